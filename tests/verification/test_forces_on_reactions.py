@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from support.on_reactions import ON_REACTIONS, WornBrake
 from support.own_types import registry_of
+from support.unknown_types import OnCurve
 
 import dap3d_core as dap
 from dap3d_core.simulation import CompiledModel, SimulationError
 
 G = 9.81
-REGISTRY = registry_of(*ON_REACTIONS, WornBrake)
+REGISTRY = registry_of(*ON_REACTIONS, WornBrake, OnCurve)
 SETTINGS = {"t_end": 0.4, "dt": 0.1, "rtol": 1e-10, "atol": 1e-12}
 
 
@@ -145,6 +146,15 @@ def test_other_rows_than_a_type_takes_are_refused():
     with pytest.raises(
         dap.SceneError, match=r"contact is to be a joint of 1 row; joint axle has 5"
     ):
+        compiled(scene)
+
+
+def test_reactions_that_only_their_joint_knows_are_refused():
+    """Those of a joint with unknowns: its multipliers are there, its force is not."""
+    scene = drum()
+    scene.add_joint("on-curve", "wire", P_i="shoe.O", P_j="ground.O")
+    scene.forces["brake"].fields["shoe"] = "wire"
+    with pytest.raises(dap.PluginError, match=r"on-curve depends on s, .* take lam_shoe"):
         compiled(scene)
 
 

@@ -1,14 +1,14 @@
 """Forces that read reactions: their groups, bound to the joints that a scene names."""
 
 import random
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
 
 import attrs
 import numpy as np
 
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.reactions import (
+    READING,
     bind_joints,
     joint_fields,
     joints_read,
@@ -90,7 +90,7 @@ def _wrong_rows(
     joint_groups: Sequence[Group],
 ) -> Iterator[tuple[int, str]]:
     """Forces with a joint that has other rows than their type takes, in words."""
-    specs, kernel = joint_fields(group.type_info.type), group.type_info.kernels["wrench"]
+    specs = joint_fields(group.type_info.type)
     refused: dict[tuple[int, ...], str] = {}
     for member, names in zip(group.members.tolist(), named, strict=True):
         rows = tuple(_row_count(joint_groups[places[name][0]]) for name in names)
@@ -101,23 +101,26 @@ def _wrong_rows(
                 if declared is not None and declared != count:
                     refused[rows] = f"{field} is to be a joint of {_rows(declared)}"
             counts = dict(zip(fields, rows, strict=True))
-            refused[rows] = refused[rows] or _refusal(group, kernel, counts)
+            refused[rows] = refused[rows] or _refusal(group, counts)
         if refused[rows]:
             owned = ", ".join(f"{n} has {_rows(c)}" for n, c in zip(names, rows, strict=True))
             yield member, f"{refused[rows]}; joint {owned}"
 
 
-def _refusal(group: Group, kernel: Callable[..., Any], rows: Mapping[str, int]) -> str:
-    """How a kernel fails with so many multipliers of each joint; "" where it does not."""
+def _refusal(group: Group, rows: Mapping[str, int]) -> str:
+    """How a kernel fails with so many multipliers of each joint; "" where none does."""
     rng = random.Random(1)
     offered = reaction_names(group.type_info.type, rows) | group.type_info.names
-    try:
-        kernel(*(random_quantity(offered[n], rng) for n in parameters(kernel)))
-    except (IndexError, ValueError, TypeError) as error:
-        words = f"{type(error).__name__}: {error}{line_of(error, kernel)}"
-        return f"its wrench does not take the multipliers of this joint ({words})"
-    except ArithmeticError:  # undefined for these random numbers, as others may be
-        return ""
+    for name in READING:
+        kernel = group.type_info.kernels.get(name)
+        try:
+            if kernel is not None:
+                kernel(*(random_quantity(offered[n], rng) for n in parameters(kernel)))
+        except (IndexError, ValueError, TypeError) as error:
+            words = f"{type(error).__name__}: {error}{line_of(error, kernel)}"
+            return f"its {name} does not take the multipliers of this joint ({words})"
+        except ArithmeticError:  # undefined for these random numbers, as others may be
+            continue
     return ""
 
 

@@ -74,7 +74,7 @@ def bind_joints(type_info: TypeInfo, joints: Mapping[str, TypeInfo]) -> TypeInfo
         the type, with its ``wrench`` as kernel ``friction``.
 
     Raises:
-        PluginError: J of a joint depends on an angle whose turns are counted, or on a state.
+        PluginError: a reaction depends on an angle whose turns are counted, a state or an unknown.
     """
     layout, width, integers = (
         type_info.layout,
@@ -195,15 +195,16 @@ def _parameters(type_info: TypeInfo, kernel: str) -> tuple[str, ...]:
 
 
 def _check_own(type_info: TypeInfo, joint: JointOfForce) -> None:
-    """The copy of the joint's numbers counts no turns, and has no states."""
+    """The copy of the joint's numbers counts no turns, and has no states and no unknowns."""
     vectors = {f"force_{joint.field}", f"moment_{joint.field}"}
     if not vectors & {n for kernel in READING for n in _parameters(type_info, kernel)}:
         return
     of_joint = joint.type_info
     needed = {q.name for q in in_order(of_joint.names, parameters(of_joint.kernels["J"]))}
-    if own := sorted(needed & {*of_joint.layout.angles, *of_joint.layout.states}):
+    own = sorted(needed & {*of_joint.layout.angles, *of_joint.layout.states})
+    if own := [*of_joint.layout.unknowns, *own]:
         raise PluginError(
-            f"{where_is(type_info.type)} asks for the reaction of joint {joint.field}; but J of "
+            f"{where_is(type_info.type)} asks for the reaction of joint {joint.field}; but that of "
             f"{of_joint.type.keyword} depends on {own[0]}, which only the joint knows: take "
             f"lam_{joint.field}"
         )

@@ -131,23 +131,19 @@ def store_acceleration(type_info: TypeInfo) -> Iterator[str]:
     columns_of = "".join(f"{_tuple(column)}, " for column in columns)
     yield f"_, reduced, _ = eliminate(G, ({columns_of}), signs)"
     remaining = len(position) - unknowns
-    rows: list[tuple[int, Callable[..., str]]] = [
-        (r, lambda which, k, r=r: f"reduced[{which}][{unknowns + r}]") for r in range(remaining)
-    ]
     for n in range(slots):
         yield f"d = idx[b0 + {layout.integers + 1 + n}]"
-        for r, value in rows:
-            for c in range(6):
-                yield f"out1[d + {6 * r + c}] = {value(6 * n + c, 0)}"
-        for k, r in enumerate(velocity):
-            for c in range(6):
-                yield f"out1[d + {6 * (remaining + k) + c}] = {entry('J', n, r, c)}"
-    for which, name in enumerate(kernels[1:]):
+        for c in range(6):
+            for r in range(remaining):
+                yield f"out1[d + {6 * r + c}] = reduced[{6 * n + c}][{unknowns + r}]"
+            for k, r in enumerate(velocity, start=remaining):
+                yield f"out1[d + {6 * k + c}] = {entry('J', n, r, c)}"
+    for which, name in enumerate(kernels[1:], start=6 * slots):
         array = "out2" if name == "gamma" else "out3"
-        for r, value in rows:
-            yield f"{array}[row + {r}] = {value(6 * slots + which, 0)}"
-        for k, r in enumerate(velocity):
-            yield f"{array}[row + {remaining + k}] = {entry(name, r)}"
+        for r in range(remaining):
+            yield f"{array}[row + {r}] = reduced[{which}][{unknowns + r}]"
+        for k, r in enumerate(velocity, start=remaining):
+            yield f"{array}[row + {k}] = {entry(name, r)}"
 
 
 def with_sample_unknowns(type_info: TypeInfo) -> TypeInfo:
