@@ -1,4 +1,7 @@
-"""Fixed cost of one compiled integration: what a run costs that has nothing to integrate."""
+"""Fixed cost of one compiled integration: what a run costs that has nothing to integrate.
+
+And of one step of rk4: by a new integration, and by a prepared one, started again.
+"""
 
 import statistics
 import time
@@ -6,6 +9,7 @@ import time
 import scenes
 
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
+from dap3d_core.integrators.prepared import PreparedRun
 from dap3d_core.simulation import CompiledModel
 
 CALLS, REPEATS = 1000, 15
@@ -33,8 +37,17 @@ def call():
             function()
         return 1e6 * (time.thread_time() - start) / CALLS
 
-    parts = {"set up": make, "compiled call": lambda: done.advance(0)}
+    def one_step():
+        return RungeKutta(
+            TABLEAUS["rk4"], evaluator.functions, evaluator.system, evaluator.loops, y0,
+            [0.0, 1e-3], step=1e-3, report_size=evaluator.report_size, buffer_rows=2,
+        )  # fmt: skip
+
+    parts = {"set up": make, "compiled call": lambda: done.advance(0),
+             "one step, new": lambda: one_step().advance(1000),
+             "one step, prepared": PreparedRun(one_step()).run}  # fmt: skip
     times = [[microseconds(function) for function in parts.values()] for _ in range(REPEATS)]
     found = [{"part": part, "us": statistics.median(column)}
              for part, column in zip(parts, zip(*times, strict=True), strict=True)]  # fmt: skip
-    return [*found, {"part": "both", "us": sum(row["us"] for row in found)}]
+    both = sum(row["us"] for row in found[:2])
+    return [*found[:2], {"part": "both", "us": both}, *found[2:]]

@@ -7,10 +7,11 @@ INERTIA = {"x": (0.001, 1 / 12, 1 / 12), "y": (1 / 12, 0.001, 1 / 12), "z": (1 /
 UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 
 
-def fourbars(count):
+def fourbars(count, couplers="rev"):
     """A02: a row of four-bars in the plane x-y, neighbours share a crank; all joints revolutes.
 
-    3 rows a loop are redundant; models/benchmarks/A02-2 explains it.
+    3 rows a loop are redundant; models/benchmarks/A02-2 explains it. None is with couplers that
+    hang on spherical joints ("sph").
     """
     scene = dap.Scene(name=f"A02-{count}")
     joints = []
@@ -30,7 +31,10 @@ def fourbars(count):
                 end = scene.add_point(f"C{k}_{side}", coupler, (x, 0.0, 0.0))
                 joints.append((coupler, end, f"crank{side}", f"B{side}"))
     for k, (i, P_i, j, P_j) in enumerate(joints):
-        scene.add_joint("rev", f"J{k}", P_i=P_i, P_j=P_j, a_i=f"{i}.z", a_j=f"{j}.z")
+        if i.startswith("coupler") and couplers == "sph":
+            scene.add_joint("sph", f"J{k}", P_i=P_i, P_j=P_j)
+        else:
+            scene.add_joint("rev", f"J{k}", P_i=P_i, P_j=P_j, a_i=f"{i}.z", a_j=f"{j}.z")
     scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
     return scene
 

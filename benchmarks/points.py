@@ -41,6 +41,17 @@ def chain():
     return scenes.chain(10)
 
 
+def in_joint_coordinates(make):
+    """The same scene by method joint."""
+
+    def made():
+        scene = make()
+        scene.simulation.method = "joint"
+        return scene
+
+    return made
+
+
 #: What varies: scene, name, least and greatest value, output.
 CASES = {
     "stiffness of a free body": (flight, "forces.spring.k", 9.0, 11.0, "stone.r.x"),
@@ -49,7 +60,16 @@ CASES = {
     "stiffness, extreme": (pendulum, "forces.spring.k", 9.0, 11.0, "bob.r.z:max"),
     "length, start corrected": (pendulum, "points.end.sPp.x", -0.6, -0.5, "bob.r.z"),
     "mass, ten rods": (chain, "bodies.b9.mass", 1.0, 1.2, "b9.r.z"),
-}
+    "joint: mass, one revolute": (
+        in_joint_coordinates(pendulum), "bodies.bob.mass", 1.0, 1.2, "bob.r.z"),
+    "joint: stiffness, extreme": (
+        in_joint_coordinates(pendulum), "forces.spring.k", 9.0, 11.0, "bob.r.z:max"),
+    "joint: speed, start corrected": (
+        in_joint_coordinates(pendulum), "bodies.bob.w.y", 0.0, 1.0, "bob.r.z"),
+    "joint: length, modelled": (
+        in_joint_coordinates(pendulum), "points.end.sPp.x", -0.6, -0.5, "bob.r.z"),
+    "joint: mass, ten rods": (in_joint_coordinates(chain), "bodies.b9.mass", 1.0, 1.2, "b9.r.z"),
+}  # fmt: skip
 
 
 def measure():

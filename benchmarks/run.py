@@ -32,8 +32,10 @@ import projection
 import right_hand_side
 import scale
 import start
+import states
 import streaming
 import study
+import tree_loops
 import trees
 import whole_runs
 from rich.console import Console
@@ -86,9 +88,11 @@ def main():
     benchmarks = {
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
         "trees": trees.measure,
+        "tree_loops": tree_loops.measure,
         "kernels": kernels.measure,
         "derived": derived.measure,
         "extension": extension.measure,
+        "states": states.measure,
         "call": calls.call,
         "projection": projection.measure,
         "dop853_on_a_chain": whole_runs.dop853_on_a_chain,

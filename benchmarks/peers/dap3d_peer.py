@@ -10,8 +10,9 @@ from mechanisms import GROUND, rotation_of
 
 import dap3d_core as dap
 from dap3d_core.formulations.pivots import store_reference_pivots
-from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
+from dap3d_core.integrators import TABLEAUS, RungeKutta
 from dap3d_core.integrators.adams.integration import AdamsIntegration
+from dap3d_core.integrators.prepared import PreparedRun
 from dap3d_core.simulation import CompiledModel
 
 VERSION = importlib.metadata.version("dap3d")
@@ -66,7 +67,7 @@ class Model:
         self.u0 = self.compiled.model.u0
         store_reference_pivots(self.evaluator, 0.0, self.u0)
         self.evaluator.start(0.0, self.u0)
-        evaluator, y0 = self.evaluator, self.evaluator.integrated(self.u0)
+        evaluator, y0 = self.evaluator, self.evaluator.coordinates.start(self.u0)
         self.problem = evaluator.functions, evaluator.system, evaluator.loops, y0, [0.0, t_end]
         self.options = {
             "error_size": len(y0) - 1,
@@ -75,33 +76,34 @@ class Model:
             "length_count": evaluator.length_count,
         }
 
-    def run(self, method, project, **control):
-        """Integrate once: state set, integrated to the end; the two ends are reported."""
+    def prepared(self, method, project, **control):
+        """An integration that can be run again and again."""
         options = self.options | control | {"project_on": project}
         if method == "adams":
-            integration = AdamsIntegration(*self.problem, **options)
-        else:
-            integration = RungeKutta(TABLEAUS[method], *self.problem, **options)
-        if integration.advance(10**12) is not Status.FINISHED:
-            raise RuntimeError(f"the run stopped: {integration.status.name}")
-        return integration
+            return PreparedRun(AdamsIntegration(*self.problem, **options))
+        return PreparedRun(RungeKutta(TABLEAUS[method], *self.problem, **options))
 
     def trial(self, method, *, project=False, fixed=False):
         """What starts a trial, by a tolerance or by a number of steps."""
-        found = [None]
 
         def start(parameter):
             control = {"rtol": parameter, "atol": parameter}
             if fixed:
                 control = {"step": self.t_end / parameter}
+            prepared = self.prepared(method, project, **control)
 
             def run():
                 before = time.thread_time()
-                found[0] = self.run(method, project, **control)
+                finished = prepared.run()
                 seconds = time.thread_time() - before
-                return seconds, found[0].statistics.steps
+                if not finished:
+                    raise RuntimeError(f"the run stopped: {prepared.integration.status.name}")
+                return seconds, prepared.integration.statistics.steps
 
-            return run, lambda: self._end(found[0].y)
+            def end():
+                return self._end(self.evaluator.body_state(prepared.integration.y))
+
+            return run, end
 
         return start
 
@@ -127,6 +129,21 @@ class Model:
         return q[:, :3], np.array([rotation_of(p) for p in q[:, 3:]])
 
 
+def in_joint_coordinates(mechanism, tolerances):
+    """The ladders of method joint, for trees."""
+    model = Model(scene_of(mechanism), mechanism.t_end, method="joint")
+    counts = sorted({round(fixed_from(mechanism) * 1.4142**k) for k in range(16)})
+    found = [(f"joint, {name}", tolerances, model.trial(name)) for name in ADAPTIVE]
+    return found + [
+        (f"joint, {name} fixed", counts, model.trial(name, fixed=True)) for name in FIXED
+    ]
+
+
+def fixed_from(mechanism):
+    """Least number of equal steps that is tried."""
+    return {"heavy-top": 100, "free-body": 16, "four-bar": 60}.get(mechanism.name, 1)
+
+
 def ladders(mechanism):
     """Methods, their parameters from coarse to fine, and what starts a trial."""
     t_end = mechanism.t_end
@@ -143,8 +160,9 @@ def ladders(mechanism):
                  for name in ("dopri5", "dop853")]  # fmt: skip
         return [*found, (f"{WHOLE}dop853", [1e-4, 1e-7, 1e-10], model.simulate("dop853"))]
     found = [(name, tolerances, model.trial(name)) for name in ADAPTIVE]
-    least = {"heavy-top": 100, "free-body": 16, "four-bar": 60}.get(mechanism.name, 1)
-    counts = sorted({round(least * 1.4142**k) for k in range(16)})
+    if not loops and mechanism.name != "free-body":
+        found += in_joint_coordinates(mechanism, tolerances)
+    counts = sorted({round(fixed_from(mechanism) * 1.4142**k) for k in range(16)})
     found += [(f"{name} fixed", counts, model.trial(name, fixed=True)) for name in FIXED]
     if loops:
         found += [(f"{name}, projected", tolerances, model.trial(name, project=True))

@@ -1,7 +1,7 @@
 """Bouc-Wen element: a spring with hysteresis."""
 
 from dap3d_core.interface import Force, Vector2, hookimpl, number, vector2
-from dap3d_core.kernels import abs, cross, dot, neg, scale, sqrt
+from dap3d_core.kernels import abs, cross, dot, neg, scale, sqrt, where
 
 interface_version = 1
 
@@ -33,8 +33,8 @@ class Hysteresis(Force):
     z_0: float = number(0.0, unit="m", doc="initial hysteretic elongation")
 
     def rate(d, d_dot, z, beta, gamma, n):
-        v, size = dot(d, d_dot) / sqrt(dot(d, d)), abs(z)
-        return v - size ** (n - 1.0) * (beta * abs(v) * z + gamma * v * size)
+        v, sign = dot(d, d_dot) / sqrt(dot(d, d)), where(z < 0.0, -1.0, 1.0)
+        return v - abs(z) ** n * (beta * abs(v) * sign + gamma * v)
 
     def wrench(d, z, s_P_i, s_P_j, k, alpha, l0):
         length = sqrt(dot(d, d))

@@ -7,6 +7,7 @@ from dap3d_core.interface import (
     choice,
     function,
     hookimpl,
+    input_,
     number,
     vector,
 )
@@ -30,7 +31,8 @@ class Torsion(Force):
     x = theta - theta_0, brought into (-pi, pi]: half a turn from theta_0 the moment of the spring
     jumps. The actuator's moment n_a has no single-valued potential then and counts as work. With
     ``turns`` x counts whole turns, and energy = k x^2 / 2 + n_a x. A function of x takes the place
-    of k x: T = f(x) + c theta_dot + n_a, without an energy.
+    of k x: T = f(x) + c theta_dot + n_a, without an energy. An input multiplies n_a, which then
+    counts as work.
     """
 
     keyword = "rot_sda"
@@ -45,6 +47,7 @@ class Torsion(Force):
     theta_0: float = number(default=0.0, unit="rad", doc="angle without moment of the spring")
     n_a: float = number(default=0.0, unit="N m", doc="moment of the actuator, as of a spring")
     turns: bool = choice((False, True), default=False, doc="whether whole turns are counted")
+    input: str = input_(doc="factor of n_a, an input")
     function: str = function(argument="theta - theta_0", doc="moment, N m, in place of k x")
 
     def prepare(self, bodies):
@@ -59,7 +62,15 @@ class Torsion(Force):
         return 0.5 * k * x * x
 
 
-class Curve(Torsion, turns=False, function=True):
+class Actuated(Torsion, turns=False, function=False, input=True):
+    """The actuator's moment times an input."""
+
+    def wrench(v_i, v_j, axis, start, w_i, w_j, k, c, n_a, input):
+        rate = dot(axis, sub(w_j, w_i))
+        return pair(k * wrapped(v_i, v_j, axis, start) + c * rate + input * n_a, axis)
+
+
+class Curve(Torsion, turns=False, function=True, input=False):
     """The spring is a function of the angle."""
 
     energy = None
@@ -69,7 +80,17 @@ class Curve(Torsion, turns=False, function=True):
         return pair(f(wrapped(v_i, v_j, axis, start)) + c * rate + n_a, axis)
 
 
-class Turning(Torsion, turns=True, function=False):
+class ActuatedCurve(Torsion, turns=False, function=True, input=True):
+    """A spring curve, and the actuator's moment times an input."""
+
+    energy = None
+
+    def wrench(v_i, v_j, axis, start, w_i, w_j, c, n_a, f, input):
+        rate = dot(axis, sub(w_j, w_i))
+        return pair(f(wrapped(v_i, v_j, axis, start)) + c * rate + input * n_a, axis)
+
+
+class Turning(Torsion, turns=True, function=False, input=False):
     """The spring winds up over whole turns."""
 
     energy_where = "where the bodies turn about the common axis"
@@ -83,13 +104,35 @@ class Turning(Torsion, turns=True, function=False):
         return (0.5 * k * x + n_a) * x
 
 
-class TurningCurve(Turning, turns=True, function=True):
+class ActuatedTurning(Turning, turns=True, function=False, input=True):
+    """The spring winds up over whole turns, and the actuator's moment is times an input."""
+
+    energy_where = "where the bodies turn about the common axis, and without n_a"
+
+    def wrench(axis, theta, theta_dot, k, c, theta_0, n_a, input):
+        return pair(k * (theta - theta_0) + c * theta_dot + input * n_a, axis)
+
+    def energy(theta, k, theta_0):
+        x = theta - theta_0
+        return 0.5 * k * x * x
+
+
+class TurningCurve(Turning, turns=True, function=True, input=False):
     """The spring is a function of the angle, over whole turns."""
 
     energy = None
 
     def wrench(axis, theta, theta_dot, c, theta_0, n_a, f):
         return pair(f(theta - theta_0) + c * theta_dot + n_a, axis)
+
+
+class ActuatedTurningCurve(Turning, turns=True, function=True, input=True):
+    """A spring curve over whole turns, and the actuator's moment times an input."""
+
+    energy = None
+
+    def wrench(axis, theta, theta_dot, c, theta_0, n_a, f, input):
+        return pair(f(theta - theta_0) + c * theta_dot + input * n_a, axis)
 
 
 def wrapped(v_i, v_j, axis, start):

@@ -1,10 +1,11 @@
 """Spline function: a smooth curve through points."""
 
-from dap3d_core.interface import Function, hookimpl, table
-from dap3d_core.kernels import lookup
+from dap3d_core.interface import Function, choice, hookimpl, table
+from dap3d_core.kernels import atan2, cos, lookup, sin
 
 interface_version = 1
 
+PI = 3.141592653589793
 #: Three points between which the slope changes by less than this part of the largest are in line.
 STRAIGHT = 1e-9
 
@@ -19,28 +20,23 @@ class Spline(Function):
         f = y_k + u (b_k + u (c_k + u d_k))
 
     Give y(x) so that it is at rest at the ends where a driver is to stop there.
+
+    With ``periodic`` the curve repeats itself with the period x_n - x_1, f' and f'' continuous;
+    where y_n is not y_1 it advances by y_n - y_1 in each. It has no breaks: where it dwells for
+    long, a run that is otherwise at rest takes a ``step`` shorter than what comes between.
     """
 
     keyword = "spline"
     x: tuple = table(doc="arguments of the points, increasing")
     y: tuple = table(doc="values of the points, as many")
+    periodic: bool = choice((False, True), False, doc="the curve repeats itself")
     pieces: tuple = table(columns=5, given=False)
 
     def prepare(self, bodies):
         import numpy as np
         from scipy.interpolate import CubicSpline
 
-        x, y = np.array(self.x), np.array(self.y)
-        if len(x) != len(y):
-            raise ValueError(f"x has {len(x)} numbers and y has {len(y)}; give as many of each")
-        if len(x) < 2:
-            raise ValueError(f"a spline takes two points or more; x and y have {len(x)}")
-        if (back := np.flatnonzero(np.diff(x) <= 0.0)).size:
-            k = int(back[0]) + 1
-            raise ValueError(
-                f"x must increase; number {k + 1}, {x[k]:g}, is not beyond the one before it, "
-                f"{x[k - 1]:g}"
-            )
+        x, y = points_of(self.x, self.y)
         d, c, b, a = CubicSpline(x, y, bc_type="natural").c
         inner = np.stack([x[:-1], a, b, c, d], axis=1)
         last = x[-1] - x[-2]
@@ -65,6 +61,59 @@ class Spline(Function):
         u = x - start
         f = a + u * (b + u * (c + u * d))
         return f, b + u * (2.0 * c + u * 3.0 * d), 2.0 * c + u * 6.0 * d, 6.0 * d
+
+
+class Periodic(Spline, periodic=True):
+    """The curve repeats itself: f(x) = g(x) + m (x - x_1), g periodic, m the mean slope.
+
+    g is the periodic cubic spline; its argument is taken back to the first period by its angle.
+    """
+
+    def prepare(self, bodies):
+        from scipy.interpolate import CubicSpline
+
+        x, y = points_of(self.x, self.y)
+        period = x[-1] - x[0]
+        slope = (y[-1] - y[0]) / period
+        rest = y - slope * (x - x[0])
+        rest[-1] = rest[0]  # but for rounding
+        d, c, b, a = CubicSpline(x, rest, bc_type="periodic").c
+        return {"pieces": [list(piece) for piece in zip(x[:-1], a, b, c, d, strict=True)],
+                "first": x[0], "period": period, "slope": slope}  # fmt: skip
+
+    def breaks(self):
+        """None: it would have as many as periods."""
+        return ()
+
+    def value(x, pieces, first, period, slope):
+        angle = 2.0 * PI * ((x - first) / period - 0.5)
+        place = first + period * (0.5 + atan2(sin(angle), cos(angle)) / (2.0 * PI))
+        start, a, b, c, d = lookup(pieces, place)
+        u = place - start
+        f = a + u * (b + u * (c + u * d)) + slope * (x - first)
+        return f, b + u * (2.0 * c + u * 3.0 * d) + slope, 2.0 * c + u * 6.0 * d, 6.0 * d
+
+
+def points_of(x, y):
+    """The points as arrays.
+
+    Raises:
+        ValueError: x and y are not as many, fewer than two, or x does not increase.
+    """
+    import numpy as np
+
+    x, y = np.array(x), np.array(y)
+    if len(x) != len(y):
+        raise ValueError(f"x has {len(x)} numbers and y has {len(y)}; give as many of each")
+    if len(x) < 2:
+        raise ValueError(f"a spline takes two points or more; x and y have {len(x)}")
+    if (back := np.flatnonzero(np.diff(x) <= 0.0)).size:
+        k = int(back[0]) + 1
+        raise ValueError(
+            f"x must increase; number {k + 1}, {x[k]:g}, is not beyond the one before it, "
+            f"{x[k - 1]:g}"
+        )
+    return x, y
 
 
 @hookimpl

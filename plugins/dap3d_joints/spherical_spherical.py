@@ -1,7 +1,7 @@
-"""Spherical-spherical joint: a massless link of constant length between two points."""
+"""Spherical-spherical joint: a massless link of given length between two points."""
 
-from dap3d_core.interface import Joint, Vector2, hookimpl, number, vector2
-from dap3d_core.kernels import cross, dot, neg, norm2, row, sub
+from dap3d_core.interface import Joint, Vector2, function, hookimpl, number, vector2
+from dap3d_core.kernels import cross, dot, neg, norm2, row, scale, sqrt, sub
 
 interface_version = 1
 
@@ -15,7 +15,8 @@ class SphericalSpherical(Joint):
         J_i   = [-d^T, -(s_i x d)^T],  J_j = [d^T, (s_j x d)^T]
         gamma = d . (w_i x s_i_dot - w_j x s_j_dot) - d_dot . d_dot
 
-    lambda |d| is the force in the link, negative in tension.
+    lambda |d| is the force in the link, negative in tension. With a function of time it is a driven
+    leg, without mass (``Leg``).
     """
 
     keyword, rows = "sph-sph", 1
@@ -24,6 +25,7 @@ class SphericalSpherical(Joint):
     length: float = number(
         default=None, unit="m", positive=True, doc="length of the link; left out, as at the start"
     )
+    function: str = function(doc="m, by which a driven leg is longer, as a function of time")
 
     def prepare(self, bodies):
         if self.length is not None:
@@ -44,6 +46,41 @@ class SphericalSpherical(Joint):
 
     def gamma(d, d_dot, w_i, w_j, s_P_i_dot, s_P_j_dot):
         return dot(d, sub(cross(w_i, s_P_i_dot), cross(w_j, s_P_j_dot))) - dot(d_dot, d_dot)
+
+
+class Leg(SphericalSpherical, function=True):
+    """A driven leg: the length is l = length + f(t), or where it is left out l(0) + f(t) - f(0).
+
+    One row, of the length itself, so that -lambda is the force of the actuator, tension positive;
+    with s = |d|, u = d / s:
+
+        C     = s - l
+        J_i   = [-u^T, -(s_i x u)^T],  J_j = [u^T, (s_j x u)^T],  nu = f_dot
+        gamma = u . (w_i x s_i_dot - w_j x s_j_dot) - (d_dot . d_dot - (u . d_dot)^2) / s + f_ddot
+    """
+
+    drives = True
+
+    def prepare(self, bodies):
+        constants = super().prepare(bodies)
+        return {"length": self.length, **constants, "counted": 1.0 if constants else 0.0}
+
+    def C(d, length, counted, f, f_0):
+        return sqrt(dot(d, d)) - length - (f - counted * f_0)
+
+    def J(d, s_P_i, s_P_j):
+        u = scale(1.0 / sqrt(dot(d, d)), d)
+        return row(neg(u), cross(u, s_P_i)), row(u, cross(s_P_j, u))
+
+    def nu(f_dot):
+        return f_dot
+
+    def gamma(d, d_dot, w_i, w_j, s_P_i_dot, s_P_j_dot, f_ddot):
+        s = sqrt(dot(d, d))
+        u = scale(1.0 / s, d)
+        arms = dot(u, sub(cross(w_i, s_P_i_dot), cross(w_j, s_P_j_dot)))
+        across = dot(d_dot, d_dot) - dot(u, d_dot) ** 2
+        return arms - across / s + f_ddot
 
 
 @hookimpl

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dap3d_core.exchange import export
-    from dap3d_core.formats import import_model
+    from dap3d_core.formats import export_model, import_model
     from dap3d_core.interface import PluginError
     from dap3d_core.matlab import import_matlab
     from dap3d_core.plot import animate, plot
@@ -30,12 +30,14 @@ if TYPE_CHECKING:
     )
     from dap3d_core.simulation import compile_scene as compile
     from dap3d_core.simulation import open_result as open
+    from dap3d_core.simulation.control.controller import Controller
     from dap3d_core.simulation.equilibrium.equilibrium import Equilibrium, equilibrium
     from dap3d_core.simulation.kinematics.inverse import inverse
     from dap3d_core.simulation.kinematics.kinematics import kinematics
     from dap3d_core.simulation.linearization.linearization import Linearization, linearize
     from dap3d_core.simulation.rerun import rerun
     from dap3d_core.simulation.resume import resume
+    from dap3d_core.simulation.stepwise.stepped_run import start
     from dap3d_core.study.fit.fit import fit
     from dap3d_core.study.fit.fit_parameters import Parameter
     from dap3d_core.study.fit.fit_result import Fit
@@ -45,6 +47,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
+    "Controller": ("simulation.control.controller", "Controller"),
     "Equilibrium": ("simulation.equilibrium.equilibrium", "Equilibrium"),
     "Event": ("simulation", "Event"),
     "Fit": ("study.fit.fit_result", "Fit"),
@@ -60,6 +63,7 @@ _HOMES = {
     "compile": ("simulation", "compile_scene"),
     "equilibrium": ("simulation.equilibrium.equilibrium", "equilibrium"),
     "export": ("exchange", "export"),
+    "export_model": ("formats", "export_model"),
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
     "import_model": ("formats", "import_model"),
@@ -76,12 +80,14 @@ _HOMES = {
     "rerun": ("simulation.rerun", "rerun"),
     "resume": ("simulation.resume", "resume"),
     "simulate": ("simulation", "simulate"),
+    "start": ("simulation.stepwise.stepped_run", "start"),
     "sweep": ("study.sweep.sweep", "sweep"),
     "view": ("view", "view"),
 }
 
 __all__ = [
     "AssemblyError",
+    "Controller",
     "Equilibrium",
     "Event",
     "Fit",
@@ -97,6 +103,7 @@ __all__ = [
     "compile",
     "equilibrium",
     "export",
+    "export_model",
     "fit",
     "import_matlab",
     "import_model",
@@ -113,6 +120,7 @@ __all__ = [
     "resume",
     "shipped_models",
     "simulate",
+    "start",
     "sweep",
     "view",
 ]

@@ -35,7 +35,7 @@ def test_every_kind_of_check_is_there():
     assert {check.name for _, check in CHECKS} == {
         "J", "nu", "gamma", "virtual power", "assembly", "rank", "frame", "action and reaction",
         "friction power", "friction frame", "friction balance", "energy", "derivatives", "purity",
-        "plain", "compiled",
+        "plain", "compiled", "rate", "rate frame",
     }  # fmt: skip
 
 

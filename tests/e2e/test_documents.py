@@ -21,7 +21,10 @@ FOLLOWED = [
     REPOSITORY / "docs" / "index.md",
     *(
         REPOSITORY / "docs" / f"{name}.md"
-        for name in ("bad-input", "events", "methods", "post-processing", "report", "view")
+        for name in (
+            "bad-input", "events", "jumps", "methods", "post-processing", "report", "view",
+            "what-a-type-can-say",
+        )  # fmt: skip
     ),
     *(
         page

@@ -7,7 +7,6 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from hypothesis import strategies as st
 from support.process import REPOSITORY
 
 from dap3d_core.formats import import_model
@@ -25,7 +24,8 @@ VALUES = (
     "model://m", "a::b", "${1/0}", "$(find x)", "%n%s", "1,2,3", "0x10", "&#0;",
 )  # fmt: skip
 ELEMENTS = (
-    '<include file="model.xml"/>', '<include file="../x.xml"/>', "<include><uri>model.sdf</uri></include>",
+    '<include file="model.xml"/>', '<include file="../x.xml"/>',
+    "<include><uri>model.sdf</uri></include>",
     '<geom type="mesh" mesh="m"/>', '<mesh name="m" file="/etc/passwd"/>', "<body/>", "<link/>",
     "<joint/>", '<joint type="ball"/>', '<joint type="planar"/>', "<freejoint/>", "<model/>",
     '<default class="a"/>', "<frame/>", '<replicate count="1000000000"/>', "<inertial/>",
@@ -89,7 +89,7 @@ def _damaged(number):
 
 def damaged_model_files():
     """A suffix in the first line, then a file."""
-    return seeds().map(_damaged)
+    return seeds.map(_damaged)
 
 
 _watched: list[Path] = []
@@ -129,11 +129,13 @@ def check_model_file(data):
         try:
             with strict(HANG):
                 scene, report = import_model(path, registry=registry())
-                assert scene.bodies and str(list(report.translated)) is not None
+                assert scene.bodies
+                assert str(list(report.translated)) is not None
                 words = "read"
         except SceneError as error:
             for mistake in error.mistakes:
-                assert mistake.what and mistake.file, mistake
+                assert mistake.what, mistake
+                assert mistake.file, mistake
             words = "refused"
         finally:
             others = [name for name in _opened if not _is_own(name)]

@@ -1,8 +1,8 @@
 """Pages whose every example is run, in the order in which a reader would.
 
-A block of Python or TOML whose first line is ``# NAME`` with a suffix is a file of that name; other
-blocks of Python are one script, each going on where the last one ended; indented lines that begin
-with ``dap3d`` are commands.
+A block whose first line is ``# NAME`` or ``<!-- NAME -->``, with a suffix, is a file of that name;
+other blocks of Python are one script, each going on where the last one ended; indented lines that
+begin with ``dap3d`` are commands.
 """
 
 import os
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from dap3d_core.cli import main
 
-FILE = re.compile(r"# (?P<name>\S+\.\w+)\n")
+FILE = re.compile(r"(?:# |<!-- )(?P<name>\S+\.\w+)(?: -->)?\n")
 
 
 class Step(NamedTuple):

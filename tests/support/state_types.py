@@ -90,6 +90,29 @@ def pulled(**fields):
     return scene
 
 
+def steered():
+    """A cart that is driven at a velocity that is a state."""
+    scene = dap.Scene(name="steered")
+    scene.add_body("cart", mass=2.0, Jp=(1.0, 1.0, 1.0), r_dot=(0.5, 0.0, 0.0))
+    scene.add_joint("test-steered", "wheel", body_i="cart", target=2.0, tau=0.25, z_0=0.5)
+    return scene
+
+
+def stated():
+    """A cart and a rod on a pin, with two forces that have states, of standard types."""
+    scene = dap.Scene(name="stated")
+    scene.add_body("cart", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(1.5, 0.0, 0.0))
+    scene.add_body("rod", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.5, 0.0))
+    scene.add_point("end", "rod", (0.0, -0.5, 0.0))
+    scene.add_joint("rev", "pin", P_i="end", P_j="ground.O", a_i="rod.z", a_j="ground.z")
+    scene.add_force("maxwell", "spring", P_i="cart.O", P_j="rod.O", k=50.0, c=3.0, k_p=5.0,
+                    l0=1.0, z_0=0.1)  # fmt: skip
+    scene.add_force("bouc-wen", "loop", P_i="cart.O", P_j="ground.O", k=20.0, beta=2.0, gamma=0.5,
+                    n=1.5, l0=1.0, z_0=0.05)  # fmt: skip
+    scene.add_force("weight", "gravity", wgt=(0.0, -1.0, 0.0))
+    return scene
+
+
 def pulled_exactly(t):
     """x (nt,), v (nt,), z (nt,) of ``pulled``: linear, by the exponential of its matrix."""
     A = np.array([[0.0, 1.0, 0.0], [-K / MASS, 0.0, K / MASS], [K / C, 0.0, -K / C]])

@@ -8,8 +8,8 @@ from dap3d_core.interface.fields import FieldSpec
 from dap3d_site.markdown import code, directive, page, table
 
 #: Makers of fields, in the order in which one meets them.
-MAKERS = ("body", "point", "vector", "vector2", "number", "vec3", "matrix", "function", "functions",
-          "input_", "angle", "table", "choice", "joint")  # fmt: skip
+MAKERS = ("body", "point", "vector", "vector2", "number", "numbers", "vec3", "matrix", "function",
+          "functions", "input_", "angle", "table", "choice", "joint")  # fmt: skip
 #: Annotations of fields: the class of what a scene names there is not seen by the author.
 ANNOTATIONS = ("Body", "Point", "Vector", "Vector2")
 CLASSES = ("Joint", "Force", "Function")
@@ -80,6 +80,14 @@ def _hooks() -> Iterator[str]:
     for _, hook in hooks.GROUPS.values():
         yield f"## {hook}"
         yield directive("autofunction", f"dap3d_core.interface.hooks.{hook}")
+    yield "## Formats"
+    yield (
+        "Importers and exporters of files of models have entry points of their own "
+        "([robots](../how-to/robots.md#formats-of-your-own)); `hookimpl`, and all else that they "
+        "need, is in `dap3d_core.interface.formats`."
+    )
+    rows = [(kind, code(group), code(hook)) for kind, (group, hook) in hooks.FORMAT_GROUPS.items()]
+    yield table(("kind", "entry-point group", "hook"), rows)
     yield "## hookimpl"
     yield (
         "`@hookimpl` before a function of the name of a hook, without arguments. "

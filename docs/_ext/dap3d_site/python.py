@@ -7,9 +7,9 @@ from dap3d_site.markdown import code, directive, page
 #: Sections of the page: title, public names of ``dap3d_core``, and classes that they hand out.
 SECTIONS = {
     "Scenes": (
-        ("load", "shipped_models", "Scene", "import_matlab"),
+        ("load", "shipped_models", "Scene", "import_matlab", "import_model", "export_model"),
         ("scene.Simulation", "scene.Body", "scene.Animation", "scene.Mistake",
-         "matlab.ImportReport"),
+         "matlab.ImportReport", "formats.ImportReport", "formats.ExportReport"),
     ),
     "Runs": (
         ("simulate", "compile", "Event", "resume", "rerun"),

@@ -202,3 +202,48 @@ def test_a_tyre_builds_up_its_side_force():
     v_y, alpha = reference(rates, (2.0, 0.0), result.t)
     np.testing.assert_allclose(result.quantity("sledge.rd.y").values, v_y, atol=1e-9)
     np.testing.assert_allclose(result.quantity("wheel.alpha").values, alpha, atol=1e-9)
+
+
+def test_a_clutch_takes_a_flywheel_along():
+    """J_1 w_1 + J_2 w_2 = M t; the twist x: m x'' + c x' + k x = M m / J_1, from rest, m reduced."""
+    result = run("clutch", rtol=1e-12)
+    J1, J2, M, k, c, t_on = 0.2, 0.8, 3.0, 400.0, 2.0, 0.5
+    w1, w2 = result.w[:, 0, 2], result.w[:, 1, 2]
+    np.testing.assert_allclose(J1 * w1 + J2 * w2, M * result.t, atol=1e-9)
+    (jump,) = result.events
+    assert jump.t == pytest.approx(t_on, abs=1e-12)
+    after = np.array(jump.u_after)[[19, 25]]
+    np.testing.assert_allclose(after, M * t_on / (J1 + J2), atol=1e-10)
+    m = J1 * J2 / (J1 + J2)
+    decay, x0 = c / (2.0 * m), M * m / J1 / k
+    w = np.sqrt(k / m - decay**2)
+    t = result.t[result.t >= jump.t] - jump.t
+    x = x0 * (1.0 - np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t)))
+    twist = result.quantity("clutch.twist").values
+    np.testing.assert_allclose(twist[result.t >= jump.t], x, atol=1e-10)
+    assert result.ledger["energy"].ok
+
+
+def test_a_charge_parts_a_rocket_from_its_tank():
+    """Velocities P / m, angular velocities (arm x P) / J at the instant; momentum is kept."""
+    result = run("stage")
+    (jump,) = result.events
+    v = np.array(jump.u_after)[14:].reshape(2, 2, 3)
+    np.testing.assert_allclose(v[:, 0, 2], [50.0 + 12.0 / 2.0, 50.0 - 12.0 / 6.0], atol=1e-12)
+    np.testing.assert_allclose(v[:, 1, 1], [-0.1 * 12.0 / 1.0, 0.1 * 12.0 / 2.0], atol=1e-12)
+    momentum = np.einsum("b,tbk->tk", [2.0, 6.0], result.rd)
+    np.testing.assert_allclose(momentum, np.tile([0.0, 0.0, 400.0], (len(result.t), 1)), atol=1e-9)
+
+
+def test_a_slider_is_lifted_by_a_cycloidal_cam():
+    """f = rise (u - sin(2 pi u) / (2 pi)), its derivatives; the driver does m g rise."""
+    result = run("cycloid")
+    u = np.clip((result.t - 0.5) / 0.5, 0.0, 1.0)
+    a = 2.0 * np.pi * u
+    np.testing.assert_allclose(result.r[:, 0, 2], 0.1 * (u - np.sin(a) / (2 * np.pi)), atol=1e-12)
+    np.testing.assert_allclose(result.rd[:, 0, 2], 0.2 * (1.0 - np.cos(a)), atol=1e-11)
+    np.testing.assert_allclose(result.rdd[:, 0, 2], 0.8 * np.pi * np.sin(a), atol=1e-10)
+    force = result.reaction("lift")["i"].force[:, 2]
+    np.testing.assert_allclose(force, 2.0 * (9.81 + 0.8 * np.pi * np.sin(a)), atol=1e-9)
+    potential = result.energy.potential[-1] - result.energy.potential[0]
+    assert potential == pytest.approx(2.0 * 9.81 * 0.1, rel=1e-10)

@@ -1,8 +1,8 @@
 """MJCF, the format of MuJoCo."""
 
+from dap3d_core.interface.formats import Exporter, Importer, hookimpl
+from dap3d_formats.mjcf.exporter import MjcfExporter
 from dap3d_formats.mjcf.importer import MjcfImporter
-
-from dap3d_core.interface.formats import Importer, hookimpl
 
 interface_version = 1
 
@@ -11,3 +11,9 @@ interface_version = 1
 def dap3d_importers() -> list[type[Importer]]:
     """The importers of this module."""
     return [MjcfImporter]
+
+
+@hookimpl
+def dap3d_exporters() -> list[type[Exporter]]:
+    """The exporters of this module."""
+    return [MjcfExporter]

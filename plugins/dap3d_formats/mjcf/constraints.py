@@ -1,13 +1,11 @@
-"""Equalities, tendons and actuators of MJCF."""
+"""Equalities of MJCF, with the tendons that they hold."""
 
 from typing import TYPE_CHECKING
 
 import attrs
-from dap3d_formats.mjcf.document import ACTUATORS
 
 from dap3d_core.interface.formats import (
     WORLD,
-    Actuator,
     Coupling,
     FormatError,
     Frame,
@@ -170,31 +168,3 @@ def _couple_by_tendon(reader: "MjcfReader", element: XmlElement) -> None:
         remarks.leave_out(element.place, "an equality of a tendon with a coefficient of 0")
         return
     reader.model.couplings.append(Coupling(name, q1, q2, -c2 / c1, 0.0, element.place))
-
-
-def read_actuators(reader: "MjcfReader") -> None:
-    """Read motors on joints; others are left out, remarked.
-
-    Raises:
-        FormatError: a motor names a joint that is not there.
-    """
-    remarks = reader.document.source.remarks
-    for holder in reader.document.root.all("actuator"):
-        for given in holder:
-            if given.name not in ACTUATORS:
-                continue
-            element = reader.document.settled(given, "main")
-            joint = element.get("joint") or element.get("jointinparent")
-            name = element.get("name") or f"actuator{len(reader.model.actuators) + 1}"
-            if element.name not in ("motor", "general") or joint is None:
-                remarks.leave_out(element.place, f"an actuator <{element.name}>: its law; give "
-                                  "its force as an input or a controller")  # fmt: skip
-            if joint is None:
-                continue
-            if joint not in reader.model.joints:
-                raise FormatError(f"actuator {name}: there is no joint {joint!r}", element.place)
-            if reader.model.joints[joint].kind not in SCALAR:
-                remarks.leave_out(element.place, "actuators of joints with several coordinates")
-                continue
-            gear = element.numbers("gear", None, (1.0,))[0]
-            reader.model.actuators.append(Actuator(name, joint, gear, element.place))

@@ -4,7 +4,6 @@ from math import atan2, pi
 from typing import Any
 
 import attrs
-from dap3d_formats.axes import unit
 
 from dap3d_core.interface.formats import (
     FormatError,
@@ -15,11 +14,12 @@ from dap3d_core.interface.formats import (
     euler_angles,
     from_quaternion,
 )
+from dap3d_formats.axes import unit
 
 #: Elements that share the defaults of actuators.
 ACTUATORS = (
     "general", "motor", "position", "velocity", "intvelocity", "damper", "cylinder", "muscle",
-    "adhesion", "dcmotor", "plugin",
+    "adhesion", "dcmotor", "orientation", "pid", "plugin",
 )  # fmt: skip
 
 

@@ -6,24 +6,24 @@ _SOLVER = "settings of a solver"
 _CONTACT = "contact properties; bodies do not touch each other"
 _DRAWING = "drawing"
 _SOFT = "softness of limits and equalities"
-_LAW = "the law of an actuator; its force is an input"
+_LAW = "the law of an actuator; one that is linear is an input, a spring and a damper"
 _FRAME = taken("pos quat axisangle xyaxes zaxis euler")
 _CLASS = taken("class")
 _ACTUATOR = (
-    taken("name class joint jointinparent gear")
+    taken("name class joint jointinparent gear kp kv gaintype gainprm biastype biasprm dyntype")
     | noted("group user", _DRAWING)
     | noted("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
     | noted(
         "ctrllimited forcelimited actlimited ctrlrange forcerange actrange lengthrange actdim "
-        "dyntype gaintype biastype dynprm gainprm biasprm actearly plugin kp kv dampratio timeconst "
-        "inheritrange kd gain bias area diameter scale range force vmax fpmax fvmax lmin lmax vmin "
-        "tausmooth input nsample interp delay armature damping",
+        "dynprm actearly plugin dampratio "
+        "timeconst inheritrange kd gain bias area diameter scale range force vmax fpmax fvmax "
+        "lmin lmax vmin tausmooth input nsample interp delay armature damping ffrange velrange "
+        "cogging controller inductance lugre motorconst nominal resistance saturation thermal imax "
+        "ki posrange slewmax",
         _LAW,
     )
 )
-_EQUALITY = (
-    taken("name class active") | translated("solref solimp", "the equality holds exactly")
-)
+_EQUALITY = taken("name class active") | translated("solref solimp", "the equality holds exactly")
 
 MJCF: Table = {
     "mujoco": taken() | taken("model"),
@@ -35,7 +35,10 @@ MJCF: Table = {
         "boundmass boundinertia balanceinertia settotalmass coordinate"
     )
     | noted("texturedir discardvisual fusestatic convexhull fitaabb usethread", "no effect here")
-    | noted("alignfree saveinertial exactmeshinertia", "no effect here"),
+    | noted(
+        "alignfree saveinertial exactmeshinertia conflict passthrough savecanonical savecompiled",
+        "no effect here",
+    ),
     "lengthrange": noted("", "muscles"),
     "option": taken() | taken("gravity")
     | noted("wind density viscosity magnetic", "fluids and fields")
@@ -50,7 +53,7 @@ MJCF: Table = {
     | noted(
         "constraint equality frictionloss limit contact passive spring damper clampctrl warmstart "
         "filterparent actuation refsafe sensor midphase eulerdamp autoreset nativeccd island "
-        "override energy fwdinv invdiscrete multiccd sleep",
+        "override energy fwdinv invdiscrete multiccd sleep diagexact ipc speculative",
         _SOLVER,
     ),
     "size": noted("", "memory of a simulator"),
@@ -77,13 +80,14 @@ MJCF: Table = {
     "body": taken() | _FRAME | taken("name childclass")
     | translated("mocap", "a part of ground")
     | noted("gravcomp", "compensation of gravity: add a force")
-    | noted("user sleep", "data of a simulator"),
+    | noted("user sleep fuse simple", "data of a simulator"),
     "frame": taken() | _FRAME | taken("name childclass"),
     "inertial": taken() | _FRAME | taken("mass diaginertia fullinertia"),
     "joint": taken()
     | taken("name class type pos axis range limited ref springref stiffness damping armature")
     | translated("frictionloss", "no type of force is friction that does not depend on the load")
     | noted("springdamper", "give stiffness and damping")
+    | noted("springyield", "springs do not yield")
     | noted("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
     | noted("actuatorfrcrange actuatorfrclimited actuatorgravcomp", "limits of actuators")
     | noted("group user align", _DRAWING),
@@ -95,9 +99,10 @@ MJCF: Table = {
     | noted(
         "contype conaffinity condim priority friction solmix solref solimp margin gap", _CONTACT
     )
-    | noted("user", _DRAWING),
+    | noted("user castshadow", _DRAWING)
+    | noted("adhesion surfacevel", _CONTACT),
     "site": taken() | _FRAME | taken("name class fromto")
-    | noted("type size group material rgba user", _DRAWING),
+    | noted("type size group material rgba user mesh", _DRAWING),
     "camera": noted("", _DRAWING),
     "light": noted("", _DRAWING),
     "plugin": noted("", "plugins of a simulator are not run"),
@@ -115,6 +120,7 @@ MJCF: Table = {
     "equality/joint": taken() | _EQUALITY | taken("joint1 joint2 polycoef"),
     "equality/tendon": taken() | _EQUALITY | taken("tendon1 tendon2 polycoef"),
     "flex": noted("", "deformable bodies"),
+    "flexstrain": noted("", "deformable bodies"),
     "flexvert": noted("", "deformable bodies"),
     "distance": noted("", "distances"),
     "tendon": taken(),
@@ -123,17 +129,17 @@ MJCF: Table = {
     | noted(
         "group limited actuatorfrclimited range actuatorfrcrange solreflimit solimplimit "
         "solreffriction solimpfriction frictionloss margin springlength width material rgba "
-        "stiffness damping armature user",
+        "stiffness damping armature user springyield",
         "forces and limits of tendons",
     ),
     "fixed/joint": taken() | taken("joint coef"),
     "spatial": noted("", "tendons over sites and pulleys"),
     "actuator": taken(),
-    **dict.fromkeys(("motor", "general"), taken() | _ACTUATOR),
+    **dict.fromkeys(("motor", "general", "position", "velocity"), taken() | _ACTUATOR),
     **dict.fromkeys(
-        ("position", "velocity", "intvelocity", "damper", "cylinder", "muscle", "adhesion",
-         "dcmotor"),
-        translated("", _LAW) | _ACTUATOR,
+        ("intvelocity", "damper", "cylinder", "muscle", "adhesion",
+         "dcmotor", "orientation", "pid"),
+        noted("", _LAW) | _ACTUATOR,
     ),
     "actuator/plugin": noted("", "plugins of a simulator are not run"),
     "sensor": noted("", "sensors"),

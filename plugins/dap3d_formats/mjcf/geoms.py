@@ -5,7 +5,6 @@ from typing import Any
 
 import attrs
 import numpy as np
-from dap3d_formats.mjcf.document import Document, along
 
 from dap3d_core.interface.formats import (
     FormatError,
@@ -19,6 +18,7 @@ from dap3d_core.interface.formats import (
     inertia_of_solid,
     total_inertia,
 )
+from dap3d_formats.mjcf.document import Document, along
 
 #: Geoms without a volume.
 FLAT = ("plane", "hfield", "sdf")
@@ -79,7 +79,9 @@ class Geoms:
     def _mesh_shape(self, geom: XmlElement, frame: Frame, common: Any) -> Geometry | None:
         asset = self._asset(geom)
         if "file" not in asset.attributes:
-            self.document.source.remarks.leave_out(geom.place, "meshes without a file are not drawn")
+            self.document.source.remarks.leave_out(
+                geom.place, "meshes without a file are not drawn"
+            )
             return None
         path = self.document.source.locate(self._file(asset), asset.place)
         if path is None:

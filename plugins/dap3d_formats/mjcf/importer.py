@@ -5,12 +5,6 @@ from typing import Any
 
 import attrs
 import numpy as np
-from dap3d_formats.axes import unit
-from dap3d_formats.element_table import note_elements
-from dap3d_formats.mjcf.constraints import read_actuators, read_equalities
-from dap3d_formats.mjcf.document import Document
-from dap3d_formats.mjcf.elements import MJCF
-from dap3d_formats.mjcf.geoms import Geoms
 
 from dap3d_core.interface.formats import (
     WORLD,
@@ -27,6 +21,13 @@ from dap3d_core.interface.formats import (
     quaternion,
     total_inertia,
 )
+from dap3d_formats.axes import unit
+from dap3d_formats.element_table import note_elements
+from dap3d_formats.mjcf.actuators import read_actuators
+from dap3d_formats.mjcf.constraints import read_equalities
+from dap3d_formats.mjcf.document import Document
+from dap3d_formats.mjcf.elements import MJCF
+from dap3d_formats.mjcf.geoms import Geoms
 
 #: Type -> kind of a joint.
 KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
@@ -120,7 +121,7 @@ class MjcfReader:
             shape = self.geoms.geometry(geom, in_link)
             if shape is not None:
                 link.geometries.append(shape)
-        link.inertial = self._inertial(element, geoms, moves=bool(joints))
+        link.inertial = self._inertial(element, geoms)
         self._join(element, link, parent, here, joints)
         self._contents(element, name, Frame(), childclass)
 
@@ -138,9 +139,7 @@ class MjcfReader:
                 gathered += self._gathered(child, tags, there, inner)
         return gathered
 
-    def _inertial(
-        self, body: XmlElement, geoms: list[tuple[XmlElement, Frame]], *, moves: bool
-    ) -> Inertial | None:
+    def _inertial(self, body: XmlElement, geoms: list[tuple[XmlElement, Frame]]) -> Inertial | None:
         """Mass and inertia of a body: given, or of its geoms."""
         document, rule = self.document, self.document.compiler.get("inertiafromgeom", "auto")
         element = body.first("inertial")
@@ -153,7 +152,7 @@ class MjcfReader:
             counted = [(g, f) for g, f in geoms if low <= g.number("group", 0.0) <= high]
             parts = [part for g, f in counted if (part := self.geoms.inertial(g, f)) is not None]
             inertial = total_inertia(parts) if parts else None
-        return self._bounded(inertial) if moves else inertial
+        return self._bounded(inertial)
 
     def _given(self, element: XmlElement) -> Inertial:
         frame = self.document.frame(element)
@@ -239,6 +238,7 @@ class MjcfReader:
 
     def _dynamics(self, joint: Joint, element: XmlElement) -> None:
         """Limits, damping, springs and armature of a joint."""
+
         def turned(value: float) -> float:
             return self.document.angle(value) if joint.kind == "revolute" else value
 

@@ -1,8 +1,7 @@
 """SDF, the format of Gazebo and Drake."""
 
-from dap3d_formats.sdf.importer import SdfImporter
-
 from dap3d_core.interface.formats import Importer, hookimpl
+from dap3d_formats.sdf.importer import SdfImporter
 
 interface_version = 1
 

@@ -41,7 +41,8 @@ class FrameGraph:
         Raises:
             FormatError: there is no such frame, or frames are given in a circle.
         """
-        path, frame = [], name
+        path: list[str] = []
+        frame = name
         while frame not in self._known and frame != WORLD:
             if frame not in self.poses:
                 raise FormatError(f"there is no frame {frame}", place)

@@ -3,11 +3,6 @@
 from collections.abc import Sequence
 from typing import Any
 
-from dap3d_formats.element_table import note_elements
-from dap3d_formats.sdf.elements import SDF
-from dap3d_formats.sdf.frames import FrameGraph
-from dap3d_formats.sdf.joints import read_gearbox, read_joint
-
 from dap3d_core.interface.formats import (
     WORLD,
     Articulation,
@@ -24,6 +19,10 @@ from dap3d_core.interface.formats import (
     from_quaternion,
     rpy,
 )
+from dap3d_formats.element_table import note_elements
+from dap3d_formats.sdf.elements import SDF
+from dap3d_formats.sdf.frames import FrameGraph
+from dap3d_formats.sdf.joints import read_gearbox, read_joint
 
 
 class SdfImporter(Importer):
@@ -176,16 +175,20 @@ class SdfReader:
             self.remarks.translate(link.place, "a link without <inertial> has 1 kg and 1 kg m^2")
             return Inertial(1.0, inertia=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
         if element.get("auto") in ("true", "1"):
-            raise FormatError("<inertial auto=\"true\">: give mass and inertia", element.place)
+            raise FormatError('<inertial auto="true">: give mass and inertia', element.place)
         mass, inertia = element.first("mass"), element.first("inertia")
         pose, _ = self.pose(element)
-        values = dict.fromkeys(("ixx", "iyy", "izz"), 1.0) | dict.fromkeys(("ixy", "ixz", "iyz"), 0.0)
+        values = dict.fromkeys(("ixx", "iyy", "izz"), 1.0) | dict.fromkeys(
+            ("ixy", "ixz", "iyz"), 0.0
+        )
         for child in inertia or ():
             values[child.name] = child.content(1)[0]
         v = values
         rows = [[v["ixx"], v["ixy"], v["ixz"]], [v["ixy"], v["iyy"], v["iyz"]],
                 [v["ixz"], v["iyz"], v["izz"]]]  # fmt: skip
-        return Inertial(1.0 if mass is None else mass.content(1)[0], pose.r, pose.A @ rows @ pose.A.T)
+        return Inertial(
+            1.0 if mass is None else mass.content(1)[0], pose.r, pose.A @ rows @ pose.A.T
+        )
 
     def _geometry(self, element: XmlElement, *, collision: bool) -> Geometry | None:
         holder = element.first("geometry")

@@ -3,8 +3,6 @@
 from math import inf, pi
 from typing import TYPE_CHECKING, Any
 
-from dap3d_formats.axes import unit
-
 from dap3d_core.interface.formats import (
     WORLD,
     Coupling,
@@ -15,6 +13,7 @@ from dap3d_core.interface.formats import (
     Place,
     XmlElement,
 )
+from dap3d_formats.axes import unit
 
 if TYPE_CHECKING:
     from dap3d_formats.sdf.importer import SdfReader
@@ -109,7 +108,9 @@ def _axes(reader: "SdfReader", joint: Joint, element: XmlElement, scope: str) ->
     """Axes, limits and dynamics of a joint."""
     tags = ("axis", "axis2") if joint.kind == "universal" else ("axis",)
     default = {"axis": (0.0, 0.0, 1.0), "axis2": (0.0, 0.0, 1.0)}
-    axes, limits, columns = [], [], {k: [] for k in ("damping", "friction", "stiffness", "rest")}
+    axes, limits = [], []
+    keys = ("damping", "friction", "stiffness", "rest")
+    columns: dict[str, list[float]] = {key: [] for key in keys}
     for tag in tags:
         axis = element.first(tag)
         if axis is None:

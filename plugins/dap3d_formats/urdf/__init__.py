@@ -1,9 +1,8 @@
 """URDF, the Unified Robot Description Format of ROS."""
 
+from dap3d_core.interface.formats import Exporter, Importer, hookimpl
 from dap3d_formats.urdf.exporter import UrdfExporter
 from dap3d_formats.urdf.importer import UrdfImporter
-
-from dap3d_core.interface.formats import Exporter, Importer, hookimpl
 
 interface_version = 1
 

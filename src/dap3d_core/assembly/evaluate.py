@@ -66,11 +66,17 @@ def place_state(y: Floats, system: System) -> None:
 
 @compiled_into
 def state_rates(t: float, out: Floats, system: System, loops: Any) -> None:
-    """Derivatives of the elements' states into dy/dt, once the multipliers are known."""
+    """Derivatives of the elements' states into dy/dt, once the multipliers are known.
+
+    Those of forces are known since their wrenches are.
+    """
     count = system.states.shape[0]
+    first = out.shape[0] - 1 - count
     if count > 0:
-        found = out[out.shape[0] - 1 - count :]
-        call_kinds(RATE, RATE, t, system, loops, found, system.multipliers, found)
+        x = system.multipliers
+        call_kinds(RATE, RATE, t, system, loops, x, x, x)
+    for k in range(count):
+        out[first + k] = system.rates[k]
 
 
 @compiled_into

@@ -8,10 +8,10 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.formats.add_shapes import MeshFiles
-from dap3d_core.formats.files import SourceFiles
-from dap3d_core.formats.names import Names
-from dap3d_core.formats.to_scene import ImportOptions, scene_of
+from dap3d_core.formats.import_scene.names import Names
+from dap3d_core.formats.import_scene.scene_builder import ImportOptions, scene_of
+from dap3d_core.formats.import_scene.shapes import MeshFiles
+from dap3d_core.formats.import_scene.source_files import SourceFiles
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import Articulation, FormatError, Importer, Remark, Remarks
 from dap3d_core.interface.formats.xml_tree import XmlElement
@@ -96,17 +96,14 @@ def import_model(
     Raises:
         SceneError: the file cannot be imported; with its line.
     """
-    try:
-        file = Path(os.fsdecode(path))
-    except TypeError:
-        raise _refusal(FormatError(f"a model is a file, not {path!r}")) from None
+    file = _path(path)
     meshes, names = MeshFiles(), Names()
     try:
         model, source, keyword = read_articulation(
             file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes
         )
-        start, moving = _coordinates(positions, model), _coordinates(rates, model)
-        options = ImportOptions(free_base, keep_fixed, balance_inertia, start, moving)
+        given = _coordinates(positions, model), _coordinates(rates, model)
+        options = ImportOptions(free_base, keep_fixed, balance_inertia, *given)
         scene = scene_of(model, source.remarks, options, meshes=meshes, names=names)
     except FormatError as error:
         raise _refusal(error, file) from None
@@ -118,6 +115,18 @@ def import_model(
     except SceneError as error:
         raise SceneError(_relocated(m, names, file) for m in error.mistakes) from None
     return scene, _report(file, keyword, model, source.remarks, checked.notes, meshes)
+
+
+def _path(path: Any) -> Path:
+    """The path of a file.
+
+    Raises:
+        SceneError: it is none.
+    """
+    try:
+        return Path(os.fsdecode(path))
+    except TypeError:
+        raise _refusal(FormatError(f"a model is a file, not {path!r}")) from None
 
 
 def _refuse_omissions(remarks: Remarks) -> None:

@@ -8,12 +8,11 @@ import numpy as np
 from dap3d_core.assembly.arrays import EVEN, KINDS, LENGTH, Floats, Integers, System
 from dap3d_core.formulations.common.friction import memory_size
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
-from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.interface.codegen.loop_source import computes_rate, stride
 from dap3d_core.kernels.runtime.function_lists import loop_list
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.model import Group, Model
-from dap3d_core.model.element_states import first_states
 
 #: Usual alpha, Omega (1/s), mu of the penalty formulation (spec 9).
 PENALTY = (1e7, 10.0, 1.0)
@@ -45,6 +44,8 @@ def build_loops(
         if kind not in kinds:
             continue
         for group in _groups_for(model, kind):
+            if kind == "rate" and computes_rate(group.type_info):
+                continue
             loop = compiled_loop(group.type_info, kind, announce)
             if loop is not None:
                 loops.append(loop)
@@ -214,6 +215,8 @@ def _integers_of(group: Group, plan: Plan, model: Model) -> Integers:
     kind = group.type_info.type.kind
     parts = [group.bodies, group.functions]
     if group.type_info.layout.states:
+        from dap3d_core.model.element_states import first_states
+
         parts.append(first_states(model.acting, group)[:, None])
     if kind == "joint":
         joints = group.members if group.joints is None else group.joints

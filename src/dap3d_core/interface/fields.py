@@ -1,7 +1,7 @@
 """Fields that a type may declare.
 
 A field is one line in a type's class: ``P_i: Point = point()``. Its last letter after ``_``, one of
-i, j and k, names its body slot. The maker specifies its values in the scene;
+i, j, k, l, m, n, o and p, names its body slot. The maker specifies its values in the scene;
 ``codegen/kernel_arguments.py`` lists the names it offers to kernels.
 """
 
@@ -15,6 +15,8 @@ Vector = NewType("Vector", str)
 Vector2 = NewType("Vector2", str)
 Body = NewType("Body", str)
 
+#: Body slots that a type may have: those after k follow one another without a gap.
+SLOTS = ("i", "j", "k", "l", "m", "n", "o", "p")
 #: Marks a field that the scene must give.
 REQUIRED = attrs.NOTHING
 
@@ -161,11 +163,11 @@ def table(*, columns: int = 1, given: bool = True, unit: str = "", doc: str = ""
 def function(default: Any = None, *, argument: str = "", doc: str = "") -> Any:
     """A function by name; absent, it is zero. With ``REQUIRED`` the scene must give it.
 
-    Of time it offers its value and derivatives ``f``, ``f_dot``, ``f_ddot``, and ``f_0``, its value
-    at t = 0; next to a field of the name ``f`` they begin with its own name. With ``argument`` (the
-    name of its argument) kernels call ``f(x)``, ``f_dot(x)``, ``f_ddot(x)``: value, first and
-    second derivative; where it may be omitted, such kernels belong to a variant of the type for
-    ``function=True``.
+    Of time it offers its value and derivatives ``f``, ``f_dot``, ``f_ddot``, ``f_dddot``, and
+    ``f_0``, its value at t = 0; next to a field of the name ``f`` they begin with its own name. With
+    ``argument`` (the name of its argument) kernels call ``f(x)``, ``f_dot(x)``, ``f_ddot(x)``,
+    ``f_dddot(x)``: value and derivatives; where it may be omitted, such kernels belong to a variant
+    of the type for ``function=True``.
     """
     return _field(FieldSpec("function", default, doc=doc, argument=argument))
 
@@ -230,4 +232,4 @@ def specs_of(type_: type) -> dict[str, FieldSpec]:
 def slot_of(name: str) -> str | None:
     """The body slot of a name, its last letter (``P_i`` -> i), or None."""
     head, _, tail = name.rpartition("_")
-    return tail if head and tail in ("i", "j", "k") else None
+    return tail if head and tail in SLOTS else None

@@ -77,7 +77,7 @@ class TypeBase:
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
         """Constants of this instance, such as the coefficients of a polynomial.
 
-        A 3-tuple with a name in _i, _j or _k is a vector in that body's axes.
+        A 3-tuple with a name in _i, _j, _k, ... is a vector in that body's axes.
         """
         return {}
 
@@ -88,7 +88,7 @@ class Joint(TypeBase):
     Subclasses define, each a pure function of named quantities (spec 2):
 
     * ``C``      position level, one number a row that ``holonomic`` keeps;
-    * ``J``      dC/dq, one block of rows x 6 (tuples of rows) a body slot, in the order i, j, k;
+    * ``J``      dC/dq, one block of rows x 6 (tuples of rows) a body slot, in their order;
     * ``gamma``  right-hand side of the acceleration level, J v_dot = gamma;
     * ``nu``     right-hand side of the velocity level, J v = nu; zero where not defined;
     * ``G``      dC/ds of its own unknowns s, one tuple a row of C.
@@ -106,7 +106,8 @@ class Joint(TypeBase):
       ends with this message where one becomes negative; without, the integration restarts where
       one changes its sign: there the element's law takes another branch (docs/events.md);
     * ``impulse``   impulses on its bodies where a switch changes its sign, as for forces without
-      ``J``. Its own rows hold through a jump (docs/jumps.md).
+      ``J``. Its own rows hold through a jump (docs/jumps.md);
+    * ``rate``      the derivatives in time of its ``states``: a number, or a tuple in their order.
 
     ``prepare(self, bodies)`` may return constants of the poses in the scene. A subclass that names
     values of fields, ``class NoSlip(Disk, slip="xyz")``, is a variant of the type: it replaces it,
@@ -127,6 +128,8 @@ class Joint(TypeBase):
             fields such as ``s_0``, within ``s_min`` and ``s_max``; ``s_dot`` is their rate.
         periodic: unknowns that begin at one bound again where they pass the other; a run ends where
             any other passes one.
+        states: names of states of its own, or name -> length; with them come the fields ``NAME_0``,
+            initial values, and ``NAME_atol``, absolute tolerances.
         symbol: symbol in pictures, one of SYMBOLS; "": drawn from the declared fields.
     """
 
@@ -170,9 +173,9 @@ class Force(TypeBase):
 
     Subclasses define ``wrench``, which returns for each body slot a pair (force, moment about the
     mass centre) in global axes, and for conservative forces ``energy``, the potential in J. Of
-    ``energy`` alone the ``wrench`` is derived (derive/derive.py). Variants and ``switch`` are as
-    for joints. A force that defines neither and names one joint, by a ``joint`` field, switches on
-    the friction of that joint; one with a ``wrench`` does not.
+    ``energy`` alone the ``wrench`` is derived (derive/derive.py). Variants, ``switch``, ``states``
+    and ``rate`` are as for joints. A force that defines neither and names one joint, by a ``joint``
+    field, switches on the friction of that joint; one with a ``wrench`` does not.
 
     Where a ``switch`` changes its sign velocities may jump (docs/jumps.md), by ``impulse``:
 

@@ -1,6 +1,6 @@
 """States of their own of joints and forces: their places among all, initial values and names."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -33,7 +33,19 @@ def width_of(group: Group) -> int:
     return group.type_info.layout.state_width
 
 
-def states_of(group: Group, start: int, names: Sequence[str]) -> list[ElementState]:
+def states_of(
+    groups: Sequence[Group], names: Mapping[str, Sequence[str]]
+) -> tuple[ElementState, ...]:
+    """The states of all groups in their order; names: of the elements of each kind."""
+    found: list[ElementState] = []
+    start = 0
+    for group in groups:
+        found += _states_of(group, start, names[group.type_info.type.kind])
+        start += width_of(group) * group.count
+    return tuple(found)
+
+
+def _states_of(group: Group, start: int, names: Sequence[str]) -> list[ElementState]:
     """The states of a group whose first number is at ``start`` among all."""
     layout, kind = group.type_info.layout, group.type_info.type.kind
     return [

@@ -6,13 +6,13 @@ of every body.
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
 
 from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.codegen.reactions import joint_fields
-from dap3d_core.model.element_states import ElementState, initial_values, states_of, width_of
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.rotations import read_only, to_global
 from dap3d_core.model.state_layout import (
@@ -25,6 +25,9 @@ from dap3d_core.model.state_layout import (
     state_layout,
 )
 from dap3d_core.scene import Instance, ValidatedScene
+
+if TYPE_CHECKING:
+    from dap3d_core.model.element_states import ElementState
 
 #: Sizes, m, of ordinary scenes: their tolerances are in metres as they are.
 ORDINARY = 0.03, 30.0
@@ -135,24 +138,24 @@ class Model:
     @cached_property
     def state_count(self) -> int:
         """Numbers of the states of their own that forces and joints have."""
-        return sum(width_of(g) * g.count for g in self.acting)
+        return sum(g.type_info.layout.state_width * g.count for g in self.acting)
 
     @cached_property
-    def element_states(self) -> tuple[ElementState, ...]:
+    def element_states(self) -> "tuple[ElementState, ...]":
         """The states of forces, then of joints, in the order in which they are integrated."""
-        found: list[ElementState] = []
-        start = 0
-        for group in self.acting:
-            if width_of(group):
-                is_joint = group.type_info.type.kind == "joint"
-                names = self.joint_names if is_joint else self.force_names
-                found += states_of(group, start, names)
-                start += width_of(group) * group.count
-        return tuple(found)
+        if not self.state_count:
+            return ()
+        from dap3d_core.model.element_states import states_of
+
+        return states_of(self.acting, {"joint": self.joint_names, "force": self.force_names})
 
     @cached_property
     def initial_states(self) -> Floats:
         """(states,) initial values of the states of elements."""
+        if not self.state_count:
+            return read_only(np.zeros(0))
+        from dap3d_core.model.element_states import initial_values
+
         return read_only(initial_values(self.acting))
 
     @property

@@ -111,11 +111,10 @@ def _refusal(group: Group, rows: Mapping[str, int]) -> str:
     """How a kernel fails with so many multipliers of each joint; "" where none does."""
     rng = random.Random(1)
     offered = reaction_names(group.type_info.type, rows) | group.type_info.names
-    for name in READING:
-        kernel = group.type_info.kernels.get(name)
+    kernels = group.type_info.kernels
+    for name, kernel in ((name, kernels[name]) for name in READING if name in kernels):
         try:
-            if kernel is not None:
-                kernel(*(random_quantity(offered[n], rng) for n in parameters(kernel)))
+            kernel(*(random_quantity(offered[n], rng) for n in parameters(kernel)))
         except (IndexError, ValueError, TypeError) as error:
             words = f"{type(error).__name__}: {error}{line_of(error, kernel)}"
             return f"its {name} does not take the multipliers of this joint ({words})"

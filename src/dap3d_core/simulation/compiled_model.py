@@ -228,16 +228,22 @@ class CompiledModel:
     def rhs(self, t: float, u: ArrayLike) -> Floats:
         """du/dt (13 n,) at time t in s and state u (13 n,).
 
-        In the order of u: r_dot, p_dot of each body, then r_ddot, omega_dot of each.
+        In the order of u: r_dot, p_dot of each body, then r_ddot, omega_dot of each. Where forces
+        or joints have s states of their own, u and its rates have them as well, last: (13 n + s,).
 
         Raises:
-            ValueError: u is not 13 n finite numbers, t is not one, or Euler parameters are zero.
+            ValueError: u is not 13 n (+ s) finite numbers, t is not one, or Euler parameters are
+                zero.
             SimulationError: the rates are not finite; names the body, force or joint.
         """
-        t, state = time_of(t), state_of(u, self.model.body_names)
-        rates = self.evaluator.rhs(t, state)
+        evaluator, model = self.evaluator, self.model
+        t, state = time_of(t), state_of(u, model.body_names, model.state_count)
+        state, own = np.split(state, [len(state) - model.state_count])
+        evaluator.states = own
+        rates = evaluator.rhs(t, state)
+        if model.state_count:
+            rates = np.concatenate([rates, evaluator.state_rates(t, state)])
         if not np.all(np.isfinite(rates)):
-            evaluator = self.evaluator
             found = find_offender(evaluator, t, evaluator.integrated(state), t)
             raise SimulationError(f"the rates are not finite: {found or f't = {t:.9g} s'}")
         return rates
@@ -278,6 +284,7 @@ class CompiledModel:
             AssemblyError: as ``find_start``.
         """
         key = correct, tuple(hold), metric
+        self.evaluator.set_inputs(self.model.input_values)
         if state is not None or key not in self._starts:
             try:
                 start = find_start(self.evaluator, *key, state)

@@ -29,7 +29,8 @@ def explain(
     """A text for people, one fact a line; u (13 n,) is where a run would start."""
     n = model.body_count
     lines = [f"scene {checked.scene.name or '(no name)'}"]
-    sizes = f"{STATE * n} states, {VELOCITIES * n} accelerations"
+    own = f" and {model.state_count} of elements" if model.state_count else ""
+    sizes = f"{STATE * n} states{own}, {VELOCITIES * n} accelerations"
     lines.append(f"  bodies     {n}: {_some(model.body_names)}; {sizes}")
     kinds = {"joints": checked.joints, "forces": checked.forces, "functions": checked.functions}
     lines += [f"  {title:10s} {_counts(instances)}" for title, instances in kinds.items()]

@@ -22,6 +22,7 @@ from dap3d_core.scene import SceneError, Simulation, check_simulation, load, par
 from dap3d_core.simulation.checkpoint.file import Checkpoint, path_of, read_checkpoint
 from dap3d_core.simulation.checkpoint.save import parts_of, remove_parts, results_of
 from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.control.controller import Controller
 from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.handover import begin_other
@@ -44,6 +45,7 @@ def resume(
     model: str | os.PathLike[str] | None = None,
     allow_code: bool = False,
     events: Sequence[Event] = (),
+    controllers: Sequence[Controller] = (),
     progress: Progress | None = None,
     watch: Callable[[RunProgress], None] | None = None,
     announce: Callable[[str], None] | None = None,
@@ -60,7 +62,8 @@ def resume(
         checkpoint: as ``simulate`` has it.
         model, allow_code: where the model's own types stand, and whether they may be loaded; as
             ``open`` has them.
-        events: those of the run, given again, in their order.
+        events, controllers: those of the run, given again, in their order. Inputs stay; what a
+            controller remembers by itself is not stored.
         progress, watch, announce: as ``simulate`` has them.
 
     Raises:
@@ -71,8 +74,9 @@ def resume(
     """
     found = resumption(path, model=model, allow_code=allow_code, announce=announce)
     return found.go(
-        output, force=force, checkpoint=checkpoint, events=events, progress=progress, watch=watch
-    )
+        output, force=force, checkpoint=checkpoint, events=events, progress=progress, watch=watch,
+        controllers=controllers,
+    )  # fmt: skip
 
 
 def resumption(
@@ -130,6 +134,7 @@ class ResumedRun:
         events: Sequence[Event] = (),
         progress: Progress | None = None,
         watch: Callable[[RunProgress], None] | None = None,
+        controllers: Sequence[Controller] = (),
     ) -> Result:
         """Go on to the end; arguments and errors as of ``resume``."""
         check_checkpoint(checkpoint, self.output)
@@ -147,7 +152,7 @@ class ResumedRun:
                       Callbacks(announce=self._announce, progress=progress, watch=watch), events,
                       output=target, force=force or is_own, identity=header["run"],
                       estimate_error=bool(header["estimate_error"]),
-                      start=self._start_state())  # fmt: skip
+                      start=self._start_state(), controllers=controllers)  # fmt: skip
             run.save_every(checkpoint, force=force or self._is_ours(target))
             try:
                 result = run.go(restore)
@@ -238,6 +243,7 @@ class ResumedRun:
         """Stand where the checkpoint was written."""
         header, stored = self._found.header, self._found.arrays
         self._restore_events(run)
+        self._check_controllers(run)
         try:
             if header["integrations"] == 2:
                 begin_other(run)
@@ -255,6 +261,8 @@ class ResumedRun:
             restore_system(run, stored)
             if run.jumps is not None:
                 run.jumps.restore(header.get("jumps"))
+            if run.control is not None:
+                run.control.restore(header["controllers"], run.integrations)
             check_position(run, header["rows"])
         except ValueError as error:
             raise self._damaged(str(error)) from error
@@ -284,6 +292,19 @@ class ResumedRun:
                 run.event_locator.restore(events)
             except ValueError as error:
                 raise self._damaged(str(error)) from error
+
+    def _check_controllers(self, run: RunState) -> None:
+        known = self._found.header.get("controllers") or {}
+        if not isinstance(known, dict) or not are_texts(known.get("titles", [])):
+            raise self._damaged("its controllers should be a table")
+        given = run.control.controllers if run.control else ()
+        titles, every = [one.title for one in given], [one.every for one in given]
+        if titles != known.get("titles", []) or every != known.get("every", []):
+            raise CheckpointError(
+                f"cannot resume from {self.path}: the run has the controllers "
+                f"{known.get('titles') or 'none'}, given are {titles or 'none'}; give the same "
+                "again, in their order and as often"
+            )
 
     def _notes(self, t: float) -> list[str]:
         """Notes on the time of resumption, and on digits that may differ."""

@@ -72,6 +72,8 @@ class Run(RunState):
     def initialise(self) -> None:
         """Correct the initial state, and compile and begin the first integration."""
         self.started = time.perf_counter()
+        if self.event_locator:
+            self.event_locator.take_rows = self._take_rows
         self.begin(self._integration(self._start()))
 
     def finish(self) -> Result:
@@ -91,6 +93,8 @@ class Run(RunState):
         finally:
             if self.event_locator:
                 self.event_locator.numbers.put_back()
+            if self.control is not None:
+                self.control.put_back()
         ended = self.present.status
         if ended not in (Status.FINISHED, Status.ENDED):
             message = cannot_cross(why_stopped(self.evaluator, self.present, self.rank), self)
@@ -140,13 +144,16 @@ class Run(RunState):
             state = found[how]
         start = self.compiled.start(*how, state)
         self.notes += start_notes(start, self.evaluator, scene)
-        self.notes += self.compiled.breakpoints(self.t_end).notes(
-            settings, settings.dt or self.t_end / 100.0
-        )
+        self.notes += self.function_notes()
         self.rank = start.redundancy.rank.rank
         if start.redundancy.rank.redundant:
             self._judge_redundancy(start)
         return start
+
+    def function_notes(self) -> list[str]:
+        """Notes on functions that steps or reports do not follow."""
+        dt = self.settings.dt or self.t_end / 100.0
+        return self.compiled.breakpoints(self.t_end).notes(self.settings, dt)
 
     def _judge_redundancy(self, start: InitialState) -> None:
         """Refuse redundant rows, or note what they leave open."""
@@ -205,7 +212,9 @@ class Run(RunState):
         while integration.status is Status.RUNNING and integration.t < self.until:
             before, clock = integration.statistics.rhs, time.perf_counter()
             self.is_whole = False
-            if self.event_locator:
+            if self.control is not None:
+                self.control.advance(integration, self.event_locator, self.until < np.inf)
+            elif self.event_locator:
                 self.event_locator.advance(integration, budget)
             else:
                 integration.advance(budget)
@@ -241,7 +250,9 @@ class Run(RunState):
                 first = len(rows[0]) - self.evaluator.report_size
                 accelerations = self.singular.acceleration
                 rows[0, first : first + len(accelerations)] = accelerations
-            self.recorder.take(self.evaluator.with_inputs(rows), lambda: self.record("done"))
+            inputs = None if self.control is None else self.control.inputs_at(rows[:, 0])
+            rows = self.evaluator.with_inputs(rows, inputs)
+            self.recorder.take(rows, lambda: self.record("done"))
 
     def _result(self, status: str) -> Result | None:
         """The result of what was computed, whole on disk if it has an output; None of nothing."""

@@ -11,7 +11,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration, StepCounts
 from dap3d_core.result import INFORMATION, EventRecord, RunMetadata, RunStatistics
-from dap3d_core.scene import Simulation
+from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.events.locate import EventLocator
@@ -24,6 +24,8 @@ from dap3d_core.simulation.output.termination import occurrences
 from dap3d_core.simulation.settings import report_times, settings_notes
 
 if TYPE_CHECKING:
+    from dap3d_core.simulation.control.controller import Controller
+    from dap3d_core.simulation.control.sampled import SampledControl
     from dap3d_core.simulation.events.jumps import Jumps
     from dap3d_core.simulation.initial.start_state import StartState
 
@@ -64,6 +66,7 @@ class RunState:
         start: a state in place of the scene's initial conditions; None for what the settings say.
         jumps: changes of velocities by elements; None where no type of the scene has any.
         recorder, watcher: the rows reported so far; the events of a script.
+        control: the controllers of a script, None for none.
         started, compile_time: clock at the start, compilation left out; seconds of compilation.
     """
 
@@ -80,9 +83,10 @@ class RunState:
         estimate_error: bool = False,
         limits: StepLimits | None = None,
         start: "StartState | None" = None,
+        controllers: "Sequence[Controller]" = (),
     ) -> None:
         """Args:
-            compiled, settings, callbacks, events: of the run.
+            compiled, settings, callbacks, events, controllers: of the run.
             output, force: file of the result, and whether over an existing one.
             identity: of the run that this one continues.
             estimate_error, limits, start: as the attributes.
@@ -113,6 +117,9 @@ class RunState:
         self.jumps = _jumps_of(self.evaluator)
         if self.event_locator is not None:
             self.event_locator.jumps = self.jumps
+        self.control: SampledControl | None = None
+        if controllers:
+            self._take(controllers)
         watch = callbacks.watch
         self.observer = None if watch is None else Observer(self.evaluator, self.t_end, watch)
         check_room(len(self.times), row_width(self.evaluator), self.settings.dt, output)
@@ -120,6 +127,17 @@ class RunState:
         self.recorder = ResultRecorder(
             compiled.model, lambda: compiled.evaluator, output, most, force=force, run=identity
         )
+
+    def _take(self, controllers: "Sequence[Controller]") -> None:
+        """Let controllers set the inputs of the run."""
+        from dap3d_core.simulation.control.sampled import SampledControl
+
+        if self.estimate_error:
+            what = "cannot be estimated in a run with controllers: they may remember its first run"
+            remedy = "compare with a run of smaller rtol and atol"
+            raise SceneError([Mistake("estimate_error", True, what, remedy=remedy)])
+        self.control = SampledControl(self.compiled, self.evaluator, controllers, self.t_end)
+        self.notes += self.control.notes(self.settings.dt or self.t_end / 100.0)
 
     @property
     def t_end(self) -> float:

@@ -14,6 +14,7 @@ from dap3d_core.simulation.run_state import Callbacks, Progress
 from dap3d_core.simulation.settings import check_checkpoint, compiled_for, settings_of
 
 if TYPE_CHECKING:
+    from dap3d_core.simulation.control.controller import Controller
     from dap3d_core.simulation.initial.start_state import Start, StartState
 
 
@@ -40,11 +41,12 @@ def simulate(
     checkpoint: float | None = None,
     events: Sequence[Event] = (),
     watch: Callable[[RunProgress], None] | None = None,
+    controllers: "Sequence[Controller]" = (),
 ) -> Result:
     """Simulate a scene from t = 0 to t_end; settings left out are those of its [simulation].
 
     Args:
-        scene: a Scene, what ``load`` takes, or a compiled model.
+        scene: a Scene, what ``load`` takes, or a compiled model; allow_code, announce: as there.
         t_end, dt: final time, s (0 solves once at t = 0); reporting step, by default t_end / 100.
         method: "auto", "unconstrained", "standard", "penalty", "lsq" or "joint".
         integrator: "dopri5", "dop853", "adams", "rk4" (needs ``step``), "radau" (implicit), "auto".
@@ -52,10 +54,9 @@ def simulate(
         correct, project: bring the start, and then every state, onto the constraints.
         correct_metric: "unit" or "mass": least correction in m and rad, or weighted by masses.
         start: "scene", "equilibrium", a result (its end), (result, time) or an ``Equilibrium``.
-        progress, watch: called between chunks of some 0.1 s, as progress(t, t_end) and with a
-            ``RunProgress``. allow_code, announce: as of ``compile``. events: see ``Event``.
-        output, force: file to write, and whether over an existing one. Rows of a run of more than
-            a second are in ``OUTPUT.part`` meanwhile, readable also when the run is killed.
+        progress, watch: called each 0.1 s or so, as progress(t, t_end), with a ``RunProgress``.
+        events, controllers: see ``Event`` and ``Controller``.
+        output, force: file to write, ``OUTPUT.part`` meanwhile; whether over an existing one.
         estimate_error: estimate ``result.error`` by a second, finer run.
         checkpoint: seconds between checkpoints, for ``resume``; inf: one where the run is ended.
 
@@ -72,7 +73,7 @@ def simulate(
     with compiled.borrow_evaluator():
         run = Run(compiled, settings, Callbacks(announce=announce, progress=progress, watch=watch),
                   events, output=output, force=force, estimate_error=estimate_error,
-                  start=_given_state(start, compiled))  # fmt: skip
+                  start=_given_state(start, compiled), controllers=controllers)  # fmt: skip
         if checkpoint is not None:
             run.save_every(checkpoint, force=force)
         return run.go()

@@ -183,6 +183,7 @@ def _of_joint(subject: SampledType) -> list[Check]:
     ]
     if "G" in subject.type_info.kernels:
         checks.insert(0, Check("G", subject, "", joints.gradient_of_unknowns))
+    checks += _of_jumps(subject)
     if "friction" in subject.type_info.kernels:
         checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))
         for name, run in (("friction frame", forces.frame), ("friction balance", forces.balance)):
@@ -213,7 +214,36 @@ def _of_force(subject: SampledType) -> list[Check]:
             if joints_read(subject.type_info)
             else ()
         ),
+        *_of_jumps(subject),
     ]
+
+
+def _of_jumps(subject: SampledType) -> list[Check]:
+    """Checks of the kernel ``impulse`` of a force or joint."""
+    if "impulse" not in subject.kernels.names():
+        return []
+    from dap3d_core.testing.checks import jumps
+
+    ground = joints.against_ground(subject)
+    if not jumps.has_rows(subject):
+        return [
+            Check(name, subject, ground, partial(run, kernel="impulse"))
+            for name, run in (
+                ("jump frame", forces.frame),
+                ("impulse and reaction", forces.balance),
+            )
+        ]
+    checks = [
+        Check("jump rows", subject, jumps.why_no_gap(subject), jumps.rows),
+        Check("round", subject, "", jumps.settling),
+        Check("jump frame", subject, ground, jumps.frame),
+        Check("impulse and reaction", subject, ground, jumps.balance),
+    ]
+    if subject.type.restitution:
+        checks.append(Check("restitution", subject, "", jumps.restitution))
+    if subject.type.unilateral:
+        checks.append(Check("unilateral", subject, "", jumps.pushing))
+    return checks
 
 
 def _of_function(subject: SampledType) -> list[Check]:

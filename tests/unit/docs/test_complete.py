@@ -200,6 +200,22 @@ def test_every_kernel_of_a_joint_is_on_the_page_about_levels():
         assert f"`{name}`" in page, name
 
 
+def test_everything_that_a_type_may_say_has_an_example():
+    """Kernels, declarations and fields of types appear in the examples of the page about them."""
+    page = (DOCS / "what-a-type-can-say.md").read_text()
+    examples = "\n".join(re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL))
+    for base in (interface.Joint, interface.Force, interface.Function):
+        for kernel in base.kernel_names:
+            assert kernel == "nu" or f"    def {kernel}(" in examples, kernel
+    declared = {
+        n for base in (interface.Joint, interface.Force) for n in inspect.get_annotations(base)
+    }
+    for name in declared - {"rows", "energy_where", "switch_words"}:
+        assert re.search(rf"\b{name}\b.* = ", examples), name
+    for maker in ("angle", "choice", "function", "functions", "input_", "number", "point", "table"):
+        assert f"= {maker}(" in examples, maker
+
+
 def test_every_public_name_is_there(pages):
     """All of ``dap3d_core``, with docstrings; so have the members of its classes."""
     for name in dap.__all__:

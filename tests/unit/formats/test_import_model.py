@@ -108,3 +108,19 @@ def test_mistakes_of_a_file_are_told_with_their_line(tmp_path, old, new, message
     (tmp_path / "arm.urdf").write_text(text.replace(old, new))
     with pytest.raises(dap.SceneError, match=message):
         dap.import_model(tmp_path / "arm.urdf")
+
+
+def test_motors_become_inputs():
+    """Gear times input about the axis, on the child, and its opposite on the parent."""
+    scene, _ = dap.import_model(ARM.with_name("cart.xml"))
+    assert list(scene.inputs) == ["slide_input", "turn", "push", "servo", "law"]
+    for one, value in zip(scene.inputs.values(), (1.3, -0.7, 2.1, 0.0, 0.0), strict=True):
+        one.value = value
+    result = dap.simulate(scene, t_end=0.0)
+    wrench = {name: result.force(name).on["i"] for name in scene.forces if name != "gravity"}
+    np.testing.assert_allclose(wrench["slide_input_i"].force[0], (3.9, 0.0, 0.0), rtol=1e-15)
+    np.testing.assert_allclose(wrench["turn_i"].moment[0], (0.0, -0.7, 0.0), rtol=1e-15)
+    np.testing.assert_allclose(wrench["turn_j"].moment[0], (0.0, 0.7, 0.0), rtol=1e-15)
+    pushed = np.array([0.0, -4.2, -4.2]) / np.sqrt(2.0)
+    np.testing.assert_allclose(wrench["push_i"].force[0], pushed, rtol=1e-15)
+    np.testing.assert_allclose(wrench["push_j"].force[0], -pushed, rtol=1e-15)

@@ -2,7 +2,7 @@
 
 import pytest
 from support.plain import in_another_process
-from support.process import run
+from support.process import REPOSITORY, run
 
 pytestmark = in_another_process
 
@@ -46,6 +46,39 @@ def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     assert names <= imported(script.format("joint"))
 
 
+def test_a_scene_without_states_has_nothing_of_them():
+    """No module, no loop, no number; a scene with a force that has one has these."""
+    script = (
+        "import dap3d_core as dap\n"
+        "scene = dap.load('bodies2')\n"
+        "{}\n"
+        "compiled = dap.compile(scene)\n"
+        "result = dap.simulate(compiled, t_end=0.04, dt=0.02)\n"
+        "assert len(result.quantity('upper.r').values)\n"
+        "arrays = compiled.evaluator.system\n"
+        "print('numbers', arrays.states.size, arrays.rates.size, compiled.model.state_count)"
+    )
+    added = "scene.add_force('maxwell', 'late', P_i='upper.O', P_j='ground.O', k=1.0, c=1.0)"
+    names = {"dap3d_core.model.element_states", "dap3d_core.interface.examine.check_states"}
+    for words, numbers, has in (("", "numbers 0 0 0", False), (added, "numbers 1 1 1", True)):
+        lines = run(f"{script.format(words)}\n{MODULES}").splitlines()
+        assert lines[-2] == numbers
+        found = set(lines[-1].split())
+        assert names <= found if has else not names & found
+        assert not any("state_derivatives" in m or "states_at_rest" in m for m in found)
+
+
+def test_formats_are_imported_by_their_commands_alone():
+    """A run needs neither importers nor what they are made with; an import needs one of them."""
+    found = imported("import dap3d_core as dap\ndap.simulate('pen1', t_end=0.02)")
+    ours = ("dap3d_formats", "dap3d_core.formats", "dap3d_core.interface.formats", "xml", "pyexpat")
+    assert not [m for m in found if m.startswith(ours)]
+    file = REPOSITORY / "tests" / "data" / "formats" / "arm.urdf"
+    found = imported(f"import dap3d_core as dap\ndap.import_model({str(file)!r})")
+    assert "dap3d_formats.urdf" in found
+    assert not found & {"trimesh", "xacrodoc", "lxml", "mujoco", "llvmlite"}
+
+
 @pytest.mark.parametrize(
     ("model", "present", "absent"),
     [
@@ -86,6 +119,26 @@ def test_a_run_needs_no_analysis_and_no_other_start(tmp_path):
             "interface.codegen.loop_derivatives")  # fmt: skip
     others = (*(f"dap3d_core.{name}" for name in core), "scipy.sparse.linalg", "control")
     assert not {m for m in found if m.startswith(others)}
+
+
+def test_a_run_without_jumps_knows_nothing_of_them():
+    """Neither modules nor loops, nor functions of the formulation; with jumps they are there."""
+    script = (
+        "import dap3d_core as dap\n"
+        "scene = dap.load('bodies2')\n"
+        "{}"
+        "compiled = dap.compile(scene)\n"
+        "dap.simulate(compiled, t_end=0.1)\n"
+        "print('loops', ' '.join(kind for kind, group in compiled.evaluator.loop_groups))\n"
+    )
+    names = {"dap3d_core.formulations.jumps.law", "dap3d_core.simulation.events.jumps"}
+    stop = "scene.add_force('plane_stop', P_i='upper.O', a_j='ground.z', k=1e4)\n"
+    for more, has_jumps in (("", False), (stop, True)):
+        lines = run(f"{script.format(more)}\n{MODULES}").splitlines()
+        assert ("impulse" in lines[-2].split()) == has_jumps
+        assert (set(lines[-1].split()) & names == names) == has_jumps
+        assert bool(set(lines[-1].split()) & names) == has_jumps
+        assert "scipy.optimize" not in lines[-1].split()
 
 
 def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():

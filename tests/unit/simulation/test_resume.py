@@ -7,9 +7,11 @@ import zipfile
 import numpy as np
 import pytest
 from support import mechanisms, problems, trees
+from support.bouncing import bouncing, swinging
 from support.ended import EndedError, ended_at, leave, shorten_chunks
 from support.on_axles import driven, stone, wheel
 from support.results import same_bits
+from support.state_types import stated
 
 import dap3d_core as dap
 from dap3d_core.kernels.runtime.cache import jit_is_on
@@ -31,6 +33,12 @@ def stiffer():
         dap.Event("stone.r.x", above=0.45),
         dap.Event("stone.r.x", above=0.6, action="stop"),
     ]
+
+
+def kicks():
+    """The stone is thrown anew where it has fallen to 1.5 m, again and again."""
+    throw = {"r_dot": (0.5, None, 2.0), "w": (0.0, 0.0, 1.0)}
+    return [dap.Event("stone.r.z", below=1.5, action=lambda here: here.set("stone", **throw))]
 
 
 RADAU = {"integrator": "radau", "t_end": 2.0, "dt": 0.1}
@@ -57,11 +65,17 @@ CASES = {
     ),
     "stiff": (lambda: dap.load("A05"), {"integrator": "auto", "t_end": 0.3, "dt": 0.01}, 0.02),
     "a function's breaks": (driven, {}, 0.4),
+    "states of elements": (stated, {}, 0.4),
+    "states, radau": (stated, {"integrator": "radau", "t_end": 1.0}, 0.4),
+    "states, joint": (stated, {"method": "joint", "integrator": "adams"}, 0.4),
     "events": (stone, {"t_end": 2.0, "dt": 0.05, "events": stiffer}, 0.35),
+    "jumps": (bouncing, {}, 0.6),
+    "jumps in joint coordinates": (swinging, {"method": "joint"}, 0.6),
+    "jumps by events": (stone, {"t_end": 2.0, "dt": 0.05, "events": kicks}, 0.35),
 }
 SLOW_IN_PYTHON = (
     "dopri5", "rk4", "radau", "stiff", "penalty", "lsq", "a singular pose", "adams",
-    "no projection", "radau across singular poses", "within a crossing of radau",
+    "no projection", "radau across singular poses", "within a crossing of radau", "states, radau",
 )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.model.rotations import rotation as rotation_of_a_model
 from dap3d_core.testing import check_type, checks_for
 from dap3d_core.testing.samples.random_state import (
+    BODIES,
     Direction,
     quaternion_product,
     random_state,
@@ -40,7 +41,7 @@ def test_rates_are_those_of_finite_moves():
     They leave some h^2 = 1e-10 of truncation and 1e-16 / h of rounding.
     """
     state, rng = some_state(), np.random.default_rng(0)
-    along = Direction(rng.normal(size=(4, 3)), rng.normal(size=(4, 3)), 0.7)
+    along = Direction(rng.normal(size=(BODIES, 3)), rng.normal(size=(BODIES, 3)), 0.7)
     ahead, back = state.moved(along, 1e-5), state.moved(along, -1e-5)
     rate = (ahead.body() - back.body()) / 2e-5
     assert state.body_rate(along) == pytest.approx(rate, abs=1e-9)

@@ -102,6 +102,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         "module": source.module,
         "file": where_is(type_).removesuffix(f": {type_.__name__}"),
         "bodies": list(type_info.layout.slots),
+        "states": type_.state_lengths(),
         **_class_data(type_info),
         "fields": [
             {
@@ -207,6 +208,8 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
     if data["kind"] == "joint":
         pairs[:1] = [("rows", rows_text(data)), ("bodies", bodies_text(data))]
         pairs[2:2] = [("motion", motion_text(motion)) for motion in data["motions"]]
+    if data["states"]:
+        pairs.append(("states", states_text(data["states"])))
     console.facts(pairs)
     console.title("fields")
     if data["fields"]:
@@ -239,6 +242,12 @@ def _show_source(console: "Terminal", data: dict[str, Any]) -> None:
 def motion_text(motion: Mapping[str, Any]) -> str:
     """A motion as ``_motions`` has it, with the variant if any."""
     return f"with {motion['variant']}: {motion['words']}" if motion["variant"] else motion["words"]
+
+
+def states_text(states: Mapping[str, int]) -> str:
+    """The states of a type, in words."""
+    words = (name if n == 1 else f"{name} ({n} numbers)" for name, n in states.items())
+    return f"{', '.join(words)}; initial values by fields in _0, tolerances by fields in _atol"
 
 
 def bodies_text(data: dict[str, Any]) -> str:

@@ -1,4 +1,4 @@
-"""``dap3d export``: a result as a file for another program."""
+"""``dap3d export``: a result, or a model, as a file for another program."""
 
 from functools import partial
 from pathlib import Path
@@ -7,17 +7,20 @@ import click
 
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, refusing
+from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusing
 
 
 @command(
-    "Write a result for ParaView, Blender, MATLAB or a table.",
+    "Write a result or a model for another program.",
     options.RESULT,
-    click.option("-f", "--format", "kind", type=click.Choice(("vtk", "gltf", "mat", "csv")),
-                 help="Format, if the name of the file does not give it; vtk by default."),
-    options.output("A .vtkhdf, .glb, .mat or .csv file; RESULT and the suffix by default."),
-    options.FPS, options.MODEL_OF_RESULT, options.ALLOW_CODE, options.FORCE, options.JSON,
-    options.QUIET,
+    click.option("-f", "--format", "kind", metavar="NAME",
+                 help="vtk, gltf, mat or csv of a result, by default that of the file, or vtk; "
+                 "urdf, mjcf or that of a plugin of a MODEL."),
+    options.output("A file; RESULT, or the name of MODEL, and the suffix by default."),
+    options.FPS, options.MODEL_OF_RESULT, options.ALLOW_CODE,
+    click.option("--strict", is_flag=True,
+                 help="Refuse a MODEL if something would be left out."),
+    options.FORCE, options.JSON, options.QUIET,
 )  # fmt: skip
 def export(
     result: str,
@@ -27,19 +30,24 @@ def export(
     fps: float | None,
     model: str | None,
     allow_code: bool,
+    strict: bool,
     force: bool,
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Write a RESULT to a file of another program.
+    """Write a RESULT, or a MODEL, to a file of another program.
 
     vtk (.vtkhdf) is the moving scene for ParaView, gltf (.glb) for Blender, browsers and viewers:
     shapes, bodies, joints and springs as dap3d view draws them. mat has all arrays for MATLAB and
     Octave, csv a column for each component.
 
+    urdf and mjcf are models: bodies, joints, loops, and what acts in joints, of a MODEL in the
+    place of RESULT. What they cannot say is refused, or listed.
+
     \b
     dap3d export pen1.nc --format vtk
     dap3d export pen1.nc -o pen1.glb --fps 60
+    dap3d export fourbar4 --format mjcf
 
     Ctrl-C leaves no file behind.
     """
@@ -50,6 +58,8 @@ def export(
     from dap3d_core.exchange import export as write
     from dap3d_core.result import ResultError
 
+    if kind is not None and kind not in FORMATS:
+        return _export_model(result, kind, output, strict=strict, force=force, as_json=as_json)
     target = output_path(result, output, FORMATS[kind or "vtk"])
     opened = open_result(result, model=model, allow_code=allow_code)
     refuse_all(
@@ -70,4 +80,39 @@ def export(
     data = {"format": made.format, "instants": made.instants}
     contents = count(made.instants, "instant")
     show_written(target, contents, data, made.notes, as_json=as_json, quiet=quiet)
+    return DONE
+
+
+def _export_model(
+    model: str, kind: str, output: str | None, *, strict: bool, force: bool, as_json: bool
+) -> int:
+    """Write a model by an exporter of a plugin."""
+    import dap3d_core as dap
+    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.framework.paths import writable, write_text
+    from dap3d_core.exchange import FORMATS
+    from dap3d_core.registry.formats import load_formats
+    from dap3d_core.registry.suggestions import nearest
+
+    formats = load_formats("exporter")
+    if kind not in formats.keywords:
+        near = nearest(kind, known := [*FORMATS, *formats.keywords])
+        hint = f"did you mean {near!r}? " if near else ""
+        raise Refused(f"--format {kind}: unknown; {hint}formats: {', '.join(known)}")
+    scene = dap.load(model)
+    name = Path(model).stem if Path(model).is_file() else Path(model).name
+    target = Path(output) if output is not None else Path(name + formats.get(kind).suffix)
+    writable(target, force=force, sources=(scene.path,))
+    report = dap.export_model(scene, format=kind, strict=strict)
+    write_text(target, report.text)
+    remarks = {
+        key: [one.text for one in getattr(report, key)] for key in ("translated", "left_out")
+    }
+    if as_json:
+        print_json({"file": target, "format": kind} | remarks)
+        return DONE
+    console = stdout()
+    console.say(f"{target} written")
+    console.section("said in another way", remarks["translated"])
+    console.section("left out", remarks["left_out"])
     return DONE

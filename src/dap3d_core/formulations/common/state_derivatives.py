@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_derivatives import differentiate_loop
+from dap3d_core.interface.codegen.loop_source import computes_rate
 from dap3d_core.model import Group
 from dap3d_core.model.element_states import first_states
 
@@ -62,12 +63,15 @@ def state_derivatives(
     minus_lambda = np.zeros(len(system.multipliers))
     minus_lambda[system.row] = -multipliers
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
-        if kind in KINDS and group.type_info.layout.states:
-            i0, p0, count = system.groups[loop].tolist()
-            own = differentiate_loop(group.type_info, kind, t, system, (i0, p0, count),
+        if kind not in KINDS or not group.type_info.layout.states:
+            continue
+        i0, p0, count = system.groups[loop].tolist()
+        states = first_states(model.acting, group)
+        also = ("rate",) if kind == "wrench" and computes_rate(group.type_info) else ()
+        for what in (kind, *also):
+            own = differentiate_loop(group.type_info, what, t, system, (i0, p0, count),
                                      minus_lambda, states=True)  # fmt: skip
-            states = first_states(model.acting, group)
-            assembly.add(kind, group, own.bodies, own.outputs, states)
+            assembly.add(what, group, own.bodies, own.outputs, states)
     return StateDerivatives(rates=assembly.rates, **assembly.matrices())
 
 

@@ -12,6 +12,7 @@ from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.tree_arrays import KeptRowArrays, TreeArrays
 from dap3d_core.formulations.joint.equations import TWO_TURNS, body_state
 from dap3d_core.formulations.joint.node_layout import (
+    CENTRE,
     CHILD,
     CHILD_BLOCK,
     CONSTANT_WIDTH,
@@ -20,6 +21,7 @@ from dap3d_core.formulations.joint.node_layout import (
     FREE,
     JOINT_PARENT,
     JOINT_WIDTH,
+    MASS,
     MOTION,
     PARENT_BLOCK,
     PRISMATIC,
@@ -29,7 +31,7 @@ from dap3d_core.formulations.joint.node_layout import (
     SPHERICAL,
     WORK_WIDTH,
 )
-from dap3d_core.formulations.joint.reference import Reference
+from dap3d_core.formulations.joint.reference import Reference, inertias_about
 from dap3d_core.formulations.joint.tree_nodes import (
     SEGMENTS,
     TreeNodes,
@@ -40,7 +42,7 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.ordering.spanning_forest import SpanningForest, spanning_forest
 from dap3d_core.model import Model
-from dap3d_core.model.state_layout import u_from_y, velocities_of
+from dap3d_core.model.state_layout import split, u_from_y, velocities_of
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
@@ -93,6 +95,8 @@ class Coordinates:
         self.size = self.nodes.layout.size - 1
         self.length_count = len(self.kept)
         self.equations = "joint_loops" if self.kept else "joint"
+        #: The last start of a run: u, the constants of the tree, y.
+        self._last: tuple[Floats, Floats, Floats] | None = None
         evaluator.system = _with_tree(evaluator, self.nodes, tree, tuple(self.kept))
 
     @property
@@ -137,16 +141,48 @@ class Coordinates:
         return f"{count} rows kept, of {', '.join(named)}{more}"
 
     def start(self, u: Floats) -> Floats:
-        """The state y of a run from a state u (13 n,), whose poses become the reference."""
-        reference = Reference(self.nodes, self.evaluator.model, u)
-        self._tree.constants[:] = reference.constants()
-        y = reference.state()
+        """The state y of a run from a state u (13 n,), whose poses become the reference.
+
+        Runs from the same state, one after another, find what the first of them computed.
+        """
+        if self._last is None or not np.array_equal(self._last[0], u):
+            self._last = u.copy(), *self._constants_and_state(u)
+        _, self._tree.constants[:], first = self._last
+        y = first.copy()
         y[self.nodes.layout["states"]] = self.evaluator.states
         if self.kept:
             from dap3d_core.formulations.joint_loops.reference_pivots import judge_kept_rows
 
             judge_kept_rows(self.evaluator, y)
         return y
+
+    def _constants_and_state(self, u: Floats) -> tuple[Floats, Floats]:
+        """``TreeArrays.constants`` with the reference u (13 n,), and its state."""
+        reference = Reference(self.nodes, self.evaluator.model, u)
+        return reference.constants(), reference.state()
+
+    def starts(self, u: Floats, others: Floats) -> Floats:
+        """States (k, size + 1) of runs whose poses at the start are those of u (13 n,).
+
+        others: (k, 13 n) states whose velocities are taken.
+        """
+        reference = Reference(self.nodes, self.evaluator.model, u)
+        ground = np.zeros((len(others), 1, 3))
+        _, _, v, w = split(others)
+        reference.v, reference.w = (np.concatenate([ground, x], axis=1) for x in (v, w))
+        return reference.state()
+
+    def inertia_places(self, bodies: Integers) -> Integers:
+        """(7 b,) indices in the tree's constants of the mass and inertia of bodies, from 1."""
+        first = CONSTANT_WIDTH * self._node_of[bodies] + MASS
+        places: Integers = (first[:, None] + np.arange(7)).ravel()
+        return places
+
+    def inertias(self, bodies: Integers, mass: Floats, Jp: Floats) -> Floats:
+        """(k, 7 b) numbers for ``inertia_places`` of masses (k, b) and inertias (k, b, 3, 3)."""
+        constants = self._tree.constants.reshape(-1, CONSTANT_WIDTH)
+        centre = constants[self._node_of[bodies], CENTRE : CENTRE + 3]
+        return inertias_about(centre, mass, Jp).reshape(len(mass), -1)
 
     def body_states(self, y: Floats) -> Floats:
         """States (k, ...) in coordinates of bodies of states (k, size + 1)."""
@@ -180,9 +216,18 @@ class Coordinates:
         """The state y of a state u; the reference of a run is restored afterwards."""
         before = self._tree.constants.copy()
         try:
-            yield self.start(u)
+            self._tree.constants[:], y = self._constants_and_state(u)
+            yield y
         finally:
             self._tree.constants[:] = before
+
+    @property
+    def _node_of(self) -> Integers:
+        """(n + 1,) the node that each body is."""
+        body = self.nodes.body
+        has_mass = np.flatnonzero(body >= 0)
+        nodes: Integers = has_mass[np.argsort(body[has_mass])]
+        return nodes
 
     @property
     def _tree(self) -> TreeArrays:

@@ -29,7 +29,6 @@ from dap3d_core.assembly.arrays import (
 from dap3d_core.assembly.evaluate import (
     call_kinds,
     place_metric,
-    place_states,
     scale_forces,
     state_rates,
     zero,
@@ -64,7 +63,6 @@ TWO_TURNS = 12.566370614359172
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces last."""
     place_tree(y, system)
-    place_states(y, system)
     apply_forces(t, system, loops)
     power = reduce_tree(system, system.force)
     if has_friction(system):
@@ -167,7 +165,6 @@ def settle_coordinates(y: Floats, system: System) -> None:
 def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     place_tree(y, system)
-    place_states(y, system)
     apply_forces(t, system, loops)
     accelerate(t, system, loops)
     body_accelerations(system, out)
@@ -180,7 +177,6 @@ def accepted(t: float, y: Floats, out: Floats, system: System, loops: Any) -> No
     """Count the turns of angles at an accepted state; ``out`` is left as it is."""
     doubtful = system.settings[DOUBTFUL : DOUBTFUL + 1]
     place_tree(y, system)
-    place_states(y, system)
     call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
     call_kinds(ANGLE, ANGLE, t, system, loops, doubtful, doubtful, doubtful)
 
@@ -190,7 +186,6 @@ def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Switches at a state into ``out``, as in common/switching_functions.py."""
     place_of_next = system.settings[SCRATCH : SCRATCH + 1]
     place_tree(y, system)
-    place_states(y, system)
     call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
     place_of_next[0] = 0.0
     call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, place_of_next)

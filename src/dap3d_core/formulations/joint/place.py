@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.evaluate import place_states
 from dap3d_core.formulations.joint.half_angles import half_angles
 from dap3d_core.formulations.joint.node_layout import (
     ACCELERATION,
@@ -75,7 +76,11 @@ def times(x: Floats, k: int, a: Vector) -> Vector:
 
 @compiled
 def place_tree(y: Floats, system: System) -> None:
-    """Place all nodes for a state: rows r, A, v, w, p of ``tree.places``, and ``tree.work``."""
+    """Place all nodes for a state: rows r, A, v, w, p of ``tree.places``, and ``tree.work``.
+
+    States of elements are placed, too.
+    """
+    place_states(y, system)
     tree, b = pointer(system.tree.nodes), pointer(system.tree.places)
     K, C = pointer(system.tree.work), pointer(system.tree.constants)
     sines, cosines = system.tree.half_angles[0], system.tree.half_angles[1]

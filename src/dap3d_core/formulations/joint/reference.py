@@ -15,7 +15,6 @@ from dap3d_core.formulations.joint.node_layout import (
     COORDINATE,
     FIXED,
     FREE,
-    INERTIA,
     LINK,
     MASS,
     MOTION,
@@ -104,40 +103,42 @@ class Reference:
         own = np.flatnonzero(body > 0)
         of = body[own]
         s = to_body(p[own], self.r[of] - self.point[own])
-        mass, J = model.mass[of - 1], model.Jp[of - 1]
-        J = J + mass[:, None, None] * (
-            np.sum(s * s, axis=-1)[:, None, None] * np.eye(3) - s[:, :, None] * s[:, None, :]
-        )
-        constants[own, CENTRE : CENTRE + 3], constants[own, MASS] = s, mass
-        constants[own, INERTIA : INERTIA + 6] = J[:, [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]
+        constants[own, CENTRE : CENTRE + 3] = s
+        constants[own, MASS : MASS + 7] = inertias_about(s, model.mass[of - 1], model.Jp[of - 1])
         return constants.ravel()
 
     def state(self) -> Floats:
-        """The state at the poses given, with the velocities that the joints allow; no work."""
-        table, y = self.nodes.table, np.zeros(self.nodes.layout.size)
+        """The state at the poses given, with the velocities that the joints allow; no work.
+
+        With velocities (..., n + 1, 3) in ``v`` and ``w``, states (..., size).
+        """
+        table, y = self.nodes.table, np.zeros((*self.v.shape[:-2], self.nodes.layout.size))
         motion = table[:, MOTION]
-        y[table[motion == REVOLUTE, COORDINATE]] = ANGLE
-        y[table[motion == PRISMATIC, COORDINATE]] = self.model.part_size
+        y[..., table[motion == REVOLUTE, COORDINATE]] = ANGLE
+        y[..., table[motion == PRISMATIC, COORDINATE]] = self.model.part_size
         for group in self.nodes.groups:
             last, children = group.nodes[:, -1], group.children
             coordinate, rate = table[last, COORDINATE], table[last, RATE]
-            r, p, v, w = (x[children] for x in (self.r, self.p, self.v, self.w))
+            r, p = self.r[children], self.p[children]
+            v, w = self.v[..., children, :], self.w[..., children, :]
             if group.motions[-1] == FREE:
-                y[coordinate[:, None] + np.arange(7)] = np.hstack([r, p])
-                y[rate[:, None] + np.arange(6)] = np.hstack([v, to_body(p, w)])
+                y[..., coordinate[:, None] + np.arange(7)] = np.hstack([r, p])
+                moving = np.concatenate([v, to_body(p, w)], axis=-1)
+                y[..., rate[:, None] + np.arange(6)] = moving
             elif group.motions[-1] == SPHERICAL:
-                y[coordinate[:, None] + np.arange(4)] = p
-                y[rate[:, None] + np.arange(3)] = to_body(p, w)
+                y[..., coordinate[:, None] + np.arange(4)] = p
+                y[..., rate[:, None] + np.arange(3)] = to_body(p, w)
             elif group.motions[-1] != FIXED:
-                y[table[group.nodes, RATE]] = self._rates(group)
+                y[..., table[group.nodes, RATE]] = self._rates(group)
         return y
 
     def _rates(self, group: MotionGroup) -> Floats:
-        """(k, parts) rates of angles and lengths by which the children move as given."""
+        """(..., k, parts) rates of angles and lengths by which the children move as given."""
         parents, children = group.parents, group.children
         arm = self.r[children] - self.r[parents]
-        w = self.w[children] - self.w[parents]
-        v = self.v[children] - self.v[parents] - np.cross(self.w[parents], arm)
+        w_parent = self.w[..., parents, :]
+        w = self.w[..., children, :] - w_parent
+        v = self.v[..., children, :] - self.v[..., parents, :] - np.cross(w_parent, arm)
         columns = np.zeros((len(children), 6, len(group.motions)))
         for part, motion in enumerate(group.motions):
             nodes: Integers = group.nodes[:, part]
@@ -148,7 +149,20 @@ class Reference:
             else:
                 columns[:, :3, part] = axis
         if not np.all(np.isfinite(columns)):  # a run that failed: its cause is looked for
-            return np.full((len(children), len(group.motions)), np.nan)
+            return np.full((*v.shape[:-1], len(group.motions)), np.nan)
         twists = np.concatenate([v, w], axis=-1)
-        rates: Floats = np.einsum("kab,kb->ka", np.linalg.pinv(columns), twists)
+        rates: Floats = np.einsum("kab,...kb->...ka", np.linalg.pinv(columns), twists)
         return rates
+
+
+def inertias_about(s: Floats, mass: Floats, Jp: Floats) -> Floats:
+    """(..., 7) mass and inertia (xx, xy, xz, yy, yz, zz) of bodies about points, body axes.
+
+    Args:
+        s: (..., 3) from the point to the mass centre.
+        mass, Jp: (...,) and (..., 3, 3) of the bodies.
+    """
+    J = Jp + mass[..., None, None] * (
+        np.sum(s * s, axis=-1)[..., None, None] * np.eye(3) - s[..., :, None] * s[..., None, :]
+    )
+    return np.concatenate([mass[..., None], J[..., [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]]], -1)

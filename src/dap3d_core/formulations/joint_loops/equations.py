@@ -15,7 +15,7 @@ The same S moves a state onto the kept rows: those of the tree cannot be violate
 from typing import Any
 
 from dap3d_core.assembly.arrays import SINGULAR, Floats, System
-from dap3d_core.assembly.evaluate import zero
+from dap3d_core.assembly.evaluate import state_rates, zero
 from dap3d_core.formulations.common.constraints import (
     power_of_drivers,
     report_levels,
@@ -66,6 +66,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
         push_freedoms(system)
         power += power_of_kept_drivers(system)
     spread_tree(y, out, system)
+    state_rates(t, out, system, loops)
     out[out.shape[0] - 1] = power
 
 

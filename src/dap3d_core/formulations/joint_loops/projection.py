@@ -38,7 +38,13 @@ from dap3d_core.formulations.joint.node_layout import (
 from dap3d_core.formulations.joint.place import place_tree, put, vector_of
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import spread_tree
-from dap3d_core.formulations.joint_loops.layout import FIRST, FIRST_ROW, PART_OF_ROW, ROW_COUNT
+from dap3d_core.formulations.joint_loops.layout import (
+    FIRST,
+    FIRST_ROW,
+    PART_OF_ROW,
+    PLACE,
+    ROW_COUNT,
+)
 from dap3d_core.formulations.joint_loops.loads import (
     carry_rows,
     kept_residuals,
@@ -57,6 +63,10 @@ from dap3d_core.formulations.joint_loops.profile import (
 )
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import R, V, W
+
+#: Pivots of dependent rows rise by this where compliances are divided by LESS; where they rise by
+#: less than HELD, the rows hold something themselves.
+LESS, HELD = 16.0, 10.0
 
 
 @compiled
@@ -121,6 +131,27 @@ def project_onto_kept(t: float, y: Floats, out: Floats, system: System, loops: A
     project_velocities(y, out, system, lost, stale)
     if pivot_lengths(system, out[4:]) > 0 and out[1] == 0.0:
         out[1] = 2.0
+    if is_redundant and have_come_to_hold(system):
+        out[1] = 1.0
+
+
+@compiled
+def have_come_to_hold(system: System) -> bool:
+    """True if rows that depended on others at the start do so no more: they hold a motion now.
+
+    Pivots of rows that still do follow the compliances; the factors are those of smaller ones then.
+    """
+    kept = system.tree.kept
+    for j in range(kept.profile.shape[0]):
+        kept.solution[j] = kept.matrix[kept.profile[j, PLACE] + j]
+    multiply_loads(system)
+    weigh_rows(system, kept.settings[PART_OF_ROW] / LESS)
+    factor_profile(system)
+    for j in range(kept.profile.shape[0]):
+        inverse = kept.matrix[kept.profile[j, PLACE] + j]
+        if kept.smallest[j] == 0.0 and inverse < HELD * kept.solution[j]:
+            return True
+    return False
 
 
 @compiled

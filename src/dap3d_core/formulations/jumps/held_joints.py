@@ -86,10 +86,11 @@ class HeldJoints:
             self._functions = step_functions(factor, solve_held)
 
     @IGNORE_FLOAT_ERRORS
-    def set_state(self, t: float, u: Floats, states: Floats) -> None:
-        """Factors at a state u (13 n,) and states of elements (states,)."""
+    def set_state(self, t: float, u: Floats, states: Floats, inputs: Floats) -> None:
+        """Factors at a state u (13 n,), states of elements (states,) and inputs (inputs,)."""
         evaluator = self._evaluator
         evaluator.states = states
+        evaluator.set_inputs(inputs)
         system = evaluator.system
         if self._has_rows:
             y = evaluator.integrated(u)

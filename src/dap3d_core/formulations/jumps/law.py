@@ -84,22 +84,24 @@ class JumpLaw:
                 they are those of the state.
             crossing: (switches,) the same of those that have just come there, else 0.
             soon: s, what closes within it is closed.
-            given: rows of the first round besides those of elements, of no element (-1).
+            given: rows of the first round besides those of elements, of no element (-1); where it
+                is not None velocities follow the joints with states that have been set.
 
         Raises:
             ImpossibleJumpError: joints hold what a row is to change.
         """
         elements, evaluator = self.elements, self._evaluator
-        one = _Rounds(self._held, t, u, evaluator.states)
+        one = _Rounds(self._held, t, u, evaluator.states, evaluator.inputs)
         values = elements.switch_values(t, u)
         sides = np.sign(values) if sides is None else sides.copy()
         while one.count < ROUNDS:
             closed = (values <= 0.0) | (sides == 0.0)
             P, acting, rows = elements.impulses(t, one.state, values, crossing, closed, soon)
             rows = one.beyond_rounding(rows)
+            asks = bool(len(acting) or len(rows.change))
             if given is not None and one.count == 0:
-                rows += given
-            moves = bool(len(acting) or len(rows.change)) and one.meet(P, rows, elements.names)
+                rows, asks = rows + given, True
+            moves = asks and one.meet(P, rows, elements.names)
             one.acting.update(acting.tolist())
             states, resetting = elements.resets(t, one.state, crossing)
             if len(resetting):
@@ -121,14 +123,16 @@ class JumpLaw:
 class _Rounds:
     """Velocities in the course of one jump."""
 
-    def __init__(self, held: HeldJoints, t: float, u: Floats, states: Floats) -> None:
-        self.held, self.state, self._t = held, u.copy(), t
+    def __init__(
+        self, held: HeldJoints, t: float, u: Floats, states: Floats, inputs: Floats
+    ) -> None:
+        self.held, self.state, self._t, self._inputs = held, u.copy(), t, inputs
         self.v = velocities_of(u).copy()
         self.fastest = np.abs(self.v)
         self.work, self.exchanged, self.count = 0.0, 0.0, 0
         self.acting: set[int] = set()
         self._touched: dict[tuple[int, int], Floats] = {}  # rows that push, by element and row
-        held.set_state(t, u, states)
+        held.set_state(t, u, states, inputs)
         self._residual = held.residual  # of the joints: the first round takes it away
 
     def beyond_rounding(self, rows: JumpRows) -> JumpRows:
@@ -178,7 +182,7 @@ class _Rounds:
 
     def reset(self, states: Floats, names: list[str]) -> bool:
         """Let velocities follow the joints with other states of elements; whether they do."""
-        self.held.set_state(self._t, self.state, states)
+        self.held.set_state(self._t, self.state, states, self._inputs)
         self._residual = self.held.residual
         return self.meet(np.zeros(self.held.size), no_rows(self.held.size), names)
 

@@ -40,8 +40,6 @@ PART = 6e-6
 SLOWEST, SMALLEST = 0.1, 1e-4
 #: What an element is; the last two only of types with states of their own (state_tangent.py).
 WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT, RATE_ELEMENT, POSITION_ELEMENT = range(5)
-#: Most body slots of an element (interface/codegen/instance_layout.py).
-SLOTS = 3
 #: Columns of ``elements``.
 (
     LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY, STATE_AT,
@@ -61,7 +59,6 @@ class StateTangent(Arrays):
     record: Integers  # (states,) of the element whose first state it is
     values: Floats
     size: Floats  # (states,) least size of a state, of which steps are parts
-    rates: Floats  # (states,) scratch
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

@@ -18,7 +18,7 @@ from dap3d_core.formulations.stabilized_index2.jacobian import (
     Tangent,
 )
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
-from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.interface.codegen.loop_source import computes_rate, stride
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.model import Group, Model
 
@@ -45,13 +45,16 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         kinds = _KINDS | _WITH_STATES if layout.states else _KINDS
         if kind not in kinds:
             continue
+        codes = [kinds[kind]]
+        if kind == "wrench" and computes_rate(group.type_info):
+            codes.append(RATE_ELEMENT)
         slots = len(group.type_info.layout.slots)
         rows = group.type_info.row_count
         read = _joints_read(group) if kind == "friction" else []
-        elements.append((loop, kinds[kind], stride(group.type_info), layout.par_width, slots,
-                         layout.integers, rows, count, int(_sees_velocity(kind, group)),
-                         layout.integers - 1 if layout.states else -1,
-                         len(readings), len(read)))  # fmt: skip
+        elements += [(loop, code, stride(group.type_info), layout.par_width, slots,
+                      layout.integers, rows, count, int(_sees_velocity(kind, group)),
+                      layout.integers - 1 if layout.states else -1,
+                      len(readings), len(read)) for code in codes]  # fmt: skip
         for q, bodies in enumerate(group.bodies.tolist()):
             for joints in read:
                 first, mine = int(plan.joint_row[joints[q]]), int(model.joint_rows[joints[q]])
@@ -99,7 +102,6 @@ def _state_tangent(model: Model) -> StateTangent:
         record=record,
         values=np.zeros(size),
         size=np.zeros(model.state_count),
-        rates=np.zeros(model.state_count),
     )
 
 
@@ -135,5 +137,8 @@ def _sees_velocity(kind: str, group: Group) -> bool:
     """
     if kind in ("acceleration", "position"):
         return False
-    wanted: Sequence[Any] = parameters(group.type_info.kernels[kind])
+    kernels = group.type_info.kernels
+    wanted: Sequence[Any] = parameters(kernels[kind])
+    if kind == "wrench" and "rate" in kernels:
+        wanted = [*wanted, *parameters(kernels["rate"])]
     return any(q.velocity for q in in_order(group.type_info.names, wanted))

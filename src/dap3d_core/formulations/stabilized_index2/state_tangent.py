@@ -85,15 +85,16 @@ def call_any(
         return
     g = row[LOOP]
     i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[WIDTH]
-    found = tangent.states.rates if row[KIND] == RATE_ELEMENT else tangent.gamma
-    call_loop(loops, g, t, system, (i0, p0, 1), found, x, found)
-    first, count = system.idx[i0 + row[STATE_AT]], row[ROWS]
     if row[KIND] == POSITION_ELEMENT:
+        call_loop(loops, g, t, system, (i0, p0, 1), tangent.gamma, x, x)
         first = system.idx[i0 + row[ROW_AT]]
-    else:
-        count = tangent.states.records[tangent.states.record[first], COUNT]
-    for k in range(count):
-        out[k] = found[first + k]
+        for k in range(row[ROWS]):
+            out[k] = tangent.gamma[first + k]
+        return
+    call_loop(loops, g, t, system, (i0, p0, 1), tangent.force, x, x)
+    first = system.idx[i0 + row[STATE_AT]]
+    for k in range(tangent.states.records[tangent.states.record[first], COUNT]):
+        out[k] = system.rates[first + k]
 
 
 @compiled

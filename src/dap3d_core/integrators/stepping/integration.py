@@ -1,7 +1,7 @@
 """An integration seen from Python: set up, advanced in chunks, drained of its rows, restored."""
 
 from bisect import bisect_left
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -92,8 +92,9 @@ class Integration(Restorable):
     #: Times in ascending order that no step goes over, and whether the right-hand side may jump
     #: there, so that the integration starts anew.
     tstops: Sequence[tuple[float, bool]] = ()
-    #: Whether its formulas are implicit.
+    #: Whether its formulas are implicit; whether it goes on with its step where rates jump.
     implicit = False
+    keeps_step = True
 
     def __init__(
         self,
@@ -167,6 +168,10 @@ class Integration(Restorable):
         """Call the compiled loop of the integrator."""
         raise NotImplementedError
 
+    def prepared(self) -> Callable[[int], Any]:
+        """``advance`` for many short calls; of an integration whose rows are taken in time."""
+        return self.advance if self.tstops or not jit_is_on() else self._advance
+
     def advance(self, budget: int) -> Status:
         """Integrate until more than ``budget`` calls of rhs are spent, or the buffer is full.
 
@@ -221,10 +226,12 @@ class Integration(Restorable):
 
         Returns False if that failed.
         """
+        return True if self.work.projects == 0 else self.project()
+
+    def project(self) -> bool:
+        """Bring the state onto its constraints; False if that failed."""
         functions, system, loops = self._arguments
         work = self.work
-        if work.projects == 0:
-            return True
         work.projection_moved = work.projection_outcome = 0.0
         work.projection_count += 1
         with np.errstate(all="ignore"):  # as compiled code does

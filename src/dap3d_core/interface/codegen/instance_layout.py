@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from inspect import signature
+from itertools import takewhile
 from math import prod
 from typing import Any
 
@@ -9,10 +10,9 @@ import attrs
 
 from dap3d_core.interface.element_states import state_shape
 from dap3d_core.interface.element_unknowns import unknown_names
-from dap3d_core.interface.fields import slot_of, specs_of
+from dap3d_core.interface.fields import SLOTS, slot_of, specs_of
 from dap3d_core.interface.types import TypeBase
 
-SLOTS = ("i", "j", "k")
 #: Numbers of an angle: itself, its rate and the time, at the last accepted step.
 ANGLE_WIDTH = 3
 
@@ -62,7 +62,11 @@ class InstanceLayout:
 
 
 def body_slots(type_: type[TypeBase]) -> tuple[str, ...]:
-    """The body slots of a type, in the order i, j, k."""
+    """The body slots of a type, in the order i, j, k, l, ...
+
+    One after k counts only where all from k on are there: a vector ``a_n`` of a type of two bodies
+    has no slot.
+    """
     slots = {"i"} if getattr(type_, "each_body", False) else set()
     for name, spec in specs_of(type_).items():
         if spec.kind == "vector2":
@@ -71,7 +75,8 @@ def body_slots(type_: type[TypeBase]) -> tuple[str, ...]:
             continue
         elif spec.kind in ("body", "point", "vector") and (slot := slot_of(name)):
             slots.add(slot)
-    return tuple(s for s in SLOTS if s in slots)
+    first = (s for s in SLOTS[:2] if s in slots)
+    return (*first, *takewhile(slots.__contains__, SLOTS[2:]))
 
 
 def size(shape: tuple[int, ...]) -> int:

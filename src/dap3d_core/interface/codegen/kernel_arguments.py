@@ -21,7 +21,7 @@ VELOCITY_KERNELS = (
 #: Numbers of a force ``friction`` for the kernel ``friction`` of its joint.
 FRICTION_NUMBERS = ("mu", "v_tol", "radius")
 #: Suffixes of a function's value and derivatives.
-DERIVATIVES = ("", "_dot", "_ddot")
+DERIVATIVES = ("", "_dot", "_ddot", "_dddot")
 #: ``KernelArgument.derivative`` of a tuple of functions.
 SEVERAL = 4
 
@@ -174,7 +174,7 @@ def _offer_function(
     at = _row_of(name, layout)
     for order, suffix in enumerate(DERIVATIVES):
         doc, code = f"function of time, derivative {order}", f"F[{at}, {order}]"
-        higher = f"{f}{DERIVATIVES[order + 1]}" if order < 2 else ""
+        higher = f"{f}{DERIVATIVES[order + 1]}" if order < 3 else ""
         rates = {"rate": f"x_{higher}", "rate_name": higher} if higher else {"derivable": False}
         offer(f"{f}{suffix}", (), code, doc=doc, **rates)
     offer(f"{f}_0", (), f"F[{at}, 4]", doc="its value at t = 0")

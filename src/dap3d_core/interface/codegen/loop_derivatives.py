@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.codegen.loop_source import stride, write
-from dap3d_core.interface.codegen.reactions import body_columns, row_columns
+from dap3d_core.interface.codegen.reactions import body_columns, rows_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.kernels.dual_numbers import Dual, DualFunctions
 from dap3d_core.kernels.runtime import generated_modules
@@ -220,9 +220,8 @@ def differentiate_loop(
     layout, (i0, p0, count), width = type_info.layout, group, stride(type_info)
     idx = arrays.idx[i0 : i0 + count * width].reshape(count, width)
     slots, first = len(layout.slots), len(layout.slots) + len(layout.functions)
+    read = rows_read(type_info) if what == "friction" else {}
     places = [*range(slots), *range(first, first + len(layout.others))]
-    own = {layout.integers: type_info.row_count}
-    read = (row_columns(type_info) or own) if what == "friction" else {}
     places += body_columns(type_info) if read else []
     of_bodies = DIRECTIONS * len(places)
     by_numbers = of_bodies + sum(read.values())
@@ -235,34 +234,18 @@ def differentiate_loop(
     ends = of_bodies + np.cumsum(list(read.values()), dtype=np.int64)
     of_rows = {c: unit[e - n : e] for (c, n), e in zip(read.items(), ends, strict=True)}
     friction = _Multipliers(multipliers, idx, of_rows) if multipliers is not None else None
-    outputs = [_Outputs(), _Outputs(friction if read else None), _Outputs()]
+    outputs = [_Outputs(), _Outputs(friction if read else None), _Outputs(), _Outputs()]
     loop_arrays = SimpleNamespace(
         body=_Bodies(arrays.body, idx, places, directions),
         F=_Functions(arrays.F, idx, by_functions),
         idx=_Integers(),
         par=_Numbers(arrays.par, p0, (count, layout.par_width), slopes),
         states=_States(arrays.states, idx, unit[by_states:] if states else None),
+        rates=outputs[3],
     )
-    _run(loop, t, loop_arrays, outputs)
-    found = _returned(type_info, what, outputs, (count, directions))
-    return LoopDerivatives(np.ascontiguousarray(idx[:, places]), found)
-
-
-def _returned(
-    type_info: TypeInfo, what: str, outputs: list[_Outputs], size: tuple[int, int]
-) -> dict[str, tuple[Floats, Floats]]:
-    """What a loop wrote, by kernel; size: (m, d)."""
-    layout, rows = type_info.layout, type_info.row_count
-    slots = len(layout.slots)
-    if what == "acceleration":
-        return _of_joint(outputs, slots, rows, layout.integers, size)
-    if what in ("position", "rate"):
-        column, width, name = layout.integers, rows, "C"
-        if what == "rate":
-            column, width, name = layout.integers - 1, layout.state_width, what
-        value, slope = _gathered(outputs[0], [column], width, size)
-        return {name: (value[:, 0], slope[:, 0])}
-    return {what: _gathered(outputs[0], list(range(slots)), 6, size)}
+    _run(loop, t, loop_arrays, outputs[:3])
+    bodies, size = np.ascontiguousarray(idx[:, places]), (count, directions)
+    return LoopDerivatives(bodies, _results(type_info, what, outputs, size))
 
 
 def _run(loop: Loop, t: float, arrays: SimpleNamespace, outputs: list[_Outputs]) -> None:
@@ -273,6 +256,21 @@ def _run(loop: Loop, t: float, arrays: SimpleNamespace, outputs: list[_Outputs])
         namespace["loop"](t, arrays, 0, 0, 1, *outputs)
 
 
+def _results(
+    type_info: TypeInfo, what: str, outputs: list[_Outputs], size: tuple[int, int]
+) -> dict[str, tuple[Floats, Floats]]:
+    """What a loop wrote, by kernel; size: (m, d)."""
+    layout, rows = type_info.layout, type_info.row_count
+    slots, row = len(layout.slots), layout.integers
+    if what == "acceleration":
+        return _of_joint(outputs, slots, rows, row, size)
+    if what == "position":
+        return {"C": _of_one(outputs[0], row, rows, size)}
+    if what == "rate":
+        return {what: _of_one(outputs[3], row - 1, layout.state_width, size)}
+    return {what: _gathered(outputs[0], list(range(slots)), 6, size)}
+
+
 def _of_joint(
     outputs: list[_Outputs], slots: int, rows: int, row: int, size: tuple[int, int]
 ) -> dict[str, tuple[Floats, Floats]]:
@@ -281,9 +279,14 @@ def _of_joint(
     shape = (size[0], slots, rows, 6)
     results = {"J": (J.reshape(shape), J_slope.reshape(*shape, size[1]))}
     for name, output in (("gamma", outputs[1]), ("nu", outputs[2])):
-        value, slope = _gathered(output, [row], rows, size)
-        results[name] = value[:, 0], slope[:, 0]
+        results[name] = _of_one(output, row, rows, size)
     return results
+
+
+def _of_one(output: _Outputs, column: int, width: int, size: tuple[int, int]) -> Any:
+    """Values (m, width) and derivatives (m, width, d) behind one index of the instances."""
+    value, slope = _gathered(output, [column], width, size)
+    return value[:, 0], slope[:, 0]
 
 
 def _gathered(

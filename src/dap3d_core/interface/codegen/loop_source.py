@@ -53,10 +53,20 @@ def kernels_of(kind: str, what: str) -> tuple[str, ...]:
     return tuple(name for name in LOOP_KINDS[what] if has_rows or name != "J")
 
 
+def computes_rate(type_info: TypeInfo) -> bool:
+    """True if the loop of ``wrench`` computes the rates of states as well, of the same quantities.
+
+    Those of joints have a loop of their own, called when the multipliers are known.
+    """
+    return type_info.type.kind == "force" and {"wrench", "rate"} <= type_info.kernels.keys()
+
+
 def write(type_info: TypeInfo, what: str) -> Loop | None:
     """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
-    of_loop = kernels_of(type_info.type.kind, what)
-    kernels = {n: k for n, k in type_info.kernels.items() if n in of_loop}
+    names = kernels_of(type_info.type.kind, what)
+    if what == "wrench" and computes_rate(type_info):
+        names = (*names, "rate")
+    kernels = {n: k for n, k in type_info.kernels.items() if n in names}
     if what == "impulse" and "impulse" not in kernels:
         return None
     layout = type_info.layout
@@ -102,7 +112,8 @@ def gathering_lines(
     first = len(layout.slots) + len(layout.functions)
     yield from (f"b_{name} = idx[b0 + {first + n}]" for n, name in enumerate(layout.others))
     if layout.states:
-        yield from (f"z0 = idx[b0 + {layout.integers - 1}]", "states = arrays.states")
+        yield f"z0 = idx[b0 + {layout.integers - 1}]"
+        yield "states, rates = arrays.states, arrays.rates"
     if type_info.type.kind == "joint":
         yield f"row = idx[b0 + {layout.integers}]"
     yield from (f"x_{q.name} = {q.code}" for q in in_order(type_info.names, wanted) if q.code)
@@ -147,7 +158,7 @@ def store(type_info: TypeInfo, kernel: str) -> Iterable[str]:
     elif kernel == "G":
         yield from (f"out1[{k}] = {path}" for k, path in enumerate(paths))
     elif kernel == "rate":
-        yield from (f"out1[z0 + {k}] = {path}" for k, path in enumerate(paths))
+        yield from (f"rates[z0 + {k}] = {path}" for k, path in enumerate(paths))
     elif kernel in ("wrench", "friction"):
         for n, s in enumerate(layout.slots):
             yield f"d = 6 * b_{s}"

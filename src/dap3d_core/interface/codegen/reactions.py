@@ -145,11 +145,13 @@ def body_columns(type_info: TypeInfo) -> list[int]:
     return columns
 
 
-def row_columns(type_info: TypeInfo) -> dict[int, int]:
-    """Columns of ``idx`` with the first rows of the joints -> their numbers of rows."""
-    return {
-        joint.integers + joint.type_info.layout.integers: joint.rows for joint in type_info.joints
-    }
+def rows_read(type_info: TypeInfo) -> dict[int, int]:
+    """Columns of ``idx`` with the first rows of the joints that an instance reads -> their rows.
+
+    The friction of a joint reads its own.
+    """
+    found = {j.integers + j.type_info.layout.integers: j.rows for j in type_info.joints}
+    return found or {type_info.layout.integers: type_info.row_count}
 
 
 def reaction_lines(

@@ -104,8 +104,8 @@ def solving_lines(type_info: TypeInfo, what: str, rates: bool) -> Iterator[str]:
         if has_nu:
             yield f"nu = {called_with(type_info, 'nu')}"
         rows = [_rate(type_info, row, has_nu) for row in _joint(type_info).position_rows()]
-        yield f"rates = least_change(G, {_tuple(rows)})"
-        yield from (f"x_{name}_dot = -rates[{k}]" for k, name in enumerate(unknowns))
+        yield f"own_rates = least_change(G, {_tuple(rows)})"
+        yield from (f"x_{name}_dot = -own_rates[{k}]" for k, name in enumerate(unknowns))
 
 
 def store_position(type_info: TypeInfo) -> Iterator[str]:

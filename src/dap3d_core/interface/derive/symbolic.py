@@ -16,7 +16,12 @@ import attrs
 import sympy
 from sympy.logic.boolalg import Boolean
 
-from dap3d_core.interface.codegen.kernel_arguments import SEVERAL, KernelArgument, parameters
+from dap3d_core.interface.codegen.kernel_arguments import (
+    DERIVATIVES,
+    SEVERAL,
+    KernelArgument,
+    parameters,
+)
 from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.kernels import add, cross, dot, sub
 
@@ -206,9 +211,9 @@ class Symbols(Mapping[str, Any]):
 
     def _function(self, name: str) -> Any:
         """A function of an argument: sympy differentiates it into the next name."""
-        orders = ("", "_dot", "_ddot")
+        orders = DERIVATIVES
         order = self.names[name].derivative
-        higher = f"{name.removesuffix(orders[order])}{orders[order + 1]}" if order < 2 else ""
+        higher = f"{name.removesuffix(orders[order])}{orders[order + 1]}" if order < 3 else ""
 
         def fdiff(self_: Any, argindex: int = 1) -> Any:
             if not higher:

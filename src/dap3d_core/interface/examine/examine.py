@@ -42,15 +42,13 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
-from dap3d_core.interface.examine.check_states import check_state_names, check_states
-from dap3d_core.interface.examine.check_unknowns import bound_count, check_unknowns
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
     random_pose,
     random_quantity,
 )
-from dap3d_core.interface.fields import specs_of
+from dap3d_core.interface.fields import SLOTS, slot_of, specs_of
 from dap3d_core.interface.types import SYMBOLS, Force, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
@@ -68,13 +66,14 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         _check_conditions(type_, conditions, class_)
     variants = tuple((conditions, examine(class_, seed)) for conditions, class_ in own_variants)
     _check_class(type_, is_abstract=bool(variants))
-    check_states(type_, is_abstract=bool(variants))
+    has_states = _declares_states(type_, is_abstract=bool(variants))
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
     _check_actuates(type_, layout)
-    if layout.states:
-        check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
+    _check_reset(type_, layout)
+    if has_states:
+        _check_state_names(type_, layout)
     names = namespace(type_, layout)
     kernels: dict[str, Callable[..., Any]] = type_.kernels()
     outputs: dict[str, tuple[str, ...]] = {}
@@ -84,8 +83,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         offered = _further_names(type_, kernel_name, outputs, len(layout.slots)) | names
         _check_names(type_, kernel_name, parameters(kernel), offered)
         quantities = [offered[n] for n in parameters(kernel)]
-        is_of_rows = kernel_name == "impulse" and type_.kind == "force"
-        rows = row_count(outputs, len(layout.slots)) if is_of_rows else 0
+        rows = row_count(outputs, len(layout.slots)) if kernel_name == "impulse" else 0
         outputs[kernel_name] = _output(type_, kernel_name, kernel, quantities, rng, rows)
 
     for kernel_name in kernels:
@@ -100,8 +98,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     derived = tuple(n for n in lacking if n in kernels)  # nu is left out where it is zero
     for kernel_name in (*derived, *(name for name in JUMP_KINDS if name in kernels)):
         call(kernel_name)
-    if layout.unknowns:  # distances from their bounds
-        outputs["bound"] = tuple(f"out[{k}]" for k in range(bound_count(type_)))
+    outputs |= _bounds(type_)
     _check_jumps(type_, outputs, len(layout.slots))
     functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
     return TypeInfo(
@@ -117,6 +114,15 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     )
 
 
+def _bounds(type_: type[TypeBase]) -> dict[str, tuple[str, ...]]:
+    """Output of the distances of unknowns from their bounds."""
+    if not unknown_names(type_):
+        return {}
+    from dap3d_core.interface.examine.check_unknowns import bound_count
+
+    return {"bound": tuple(f"out[{k}]" for k in range(bound_count(type_)))}
+
+
 def _further_names(
     type_: type[TypeBase], kernel: str, outputs: Mapping[str, tuple[str, ...]], slots: int
 ) -> dict[str, KernelArgument]:
@@ -126,6 +132,22 @@ def _further_names(
     if kernel in JUMP_KINDS:
         return jump_names(type_.kind, kernel, outputs, slots)
     return reaction_names(type_) if kernel in READING else {}
+
+
+def _declares_states(type_: type[TypeBase], *, is_abstract: bool) -> bool:
+    """True for a type with states of its own, which are checked."""
+    if not type_.states and "rate" not in type_.kernels():
+        return False
+    from dap3d_core.interface.examine.check_states import check_states
+
+    check_states(type_, is_abstract=is_abstract)
+    return True
+
+
+def _check_state_names(type_: type[TypeBase], layout: InstanceLayout) -> None:
+    from dap3d_core.interface.examine.check_states import check_state_names
+
+    check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
 
 
 def _output(
@@ -316,7 +338,10 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     if kind != "function" and not by_joint and not body_slots(type_):
         raise PluginError(f"{who} acts on no body; declare a field such as P_i: Point = point()")
     _check_fields(type_)
-    check_unknowns(type_)
+    if unknown_names(type_) or "G" in kernels:
+        from dap3d_core.interface.examine.check_unknowns import check_unknowns
+
+        check_unknowns(type_)
     _check_members(type_)
     for name in needed:
         if name not in kernels:
@@ -359,6 +384,13 @@ def _check_fields(type_: type[TypeBase]) -> None:
             raise PluginError(
                 f"{who}.{name} is to be a joint of rows = {spec.rows!r}; take 1 or more"
             )
+        slot = slot_of(name) if spec.kind in ("point", "body") else None
+        if slot and slot not in body_slots(type_):
+            before = SLOTS[SLOTS.index(slot) - 1]
+            raise PluginError(
+                f"{who}.{name} is on a body {slot}, but nothing is on a body {before}; the bodies "
+                f"of a type are {', '.join(SLOTS)}, without a gap after j"
+            )
 
 
 def _check_members(type_: type[TypeBase]) -> None:
@@ -397,6 +429,12 @@ def _check_names(
             )
 
 
+def _check_reset(type_: type[TypeBase], layout: InstanceLayout) -> None:
+    if "reset" in type_.kernels() and not layout.states:
+        who = where_is(type_)
+        raise PluginError(f'{who} defines reset, but no states; add e.g. states = ("z",) and rate')
+
+
 def _check_jumps(type_: type[TypeBase], outputs: Mapping[str, Sequence[str]], slots: int) -> None:
     """Check what a type says of its jumps besides the kernels themselves."""
     who, rows = where_is(type_), row_count(outputs, slots) if type_.kind == "force" else 0
@@ -406,8 +444,6 @@ def _check_jumps(type_: type[TypeBase], outputs: Mapping[str, Sequence[str]], sl
             f"{who} defines {jumps[0]}, but no switch: velocities and states jump where a switch "
             "changes its sign; define switch, a number that does so there"
         )
-    if "reset" in outputs and not type_.states:
-        raise PluginError(f'{who} defines reset, but no states; add e.g. states = ("z",) and rate')
     if rows and "impulse" not in outputs:
         raise PluginError(f"{who} defines J without impulse, which nothing calls; define impulse")
     if not issubclass(type_, Force):
@@ -432,7 +468,7 @@ def _expected(
     """
     slots = len(body_slots(type_))
     if kernel == "impulse":
-        if rows:
+        if rows and type_.kind == "force":
             return (rows,), f"{rows} numbers, the change of J v, one for each row of J"
         return (slots, 2, 3), f"(impulse, moment of impulse) for each of {slots} bodies"
     if kernel == "J" and type_.kind == "force":

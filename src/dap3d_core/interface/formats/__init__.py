@@ -22,7 +22,7 @@ from dap3d_core.interface.formats.frames import (
     rpy,
     rpy_of,
 )
-from dap3d_core.interface.formats.remarks import FormatError, Place, Remark, Remarks
+from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Place, Remark, Remarks
 from dap3d_core.interface.formats.solids import (
     inertia_moved,
     inertia_of_mesh,
@@ -37,6 +37,7 @@ INTERFACE_VERSION = 1
 __all__ = [
     "IDENTITY",
     "INTERFACE_VERSION",
+    "NOWHERE",
     "WORLD",
     "Actuator",
     "Articulation",

@@ -112,6 +112,10 @@ class Compiled:
             entry = self._quick[key] = self.compile([type_of(a) for a in arguments])
         return entry(*arguments)
 
+    def of(self, *arguments: Any) -> Entry:
+        """The code for the types of these arguments, for many calls with arguments of these."""
+        return self.compile([type_of(a) for a in arguments])
+
     def compile(self, given: Sequence[Any]) -> Entry:
         """The function for types of its arguments, from the cache or compiled now."""
         key = tuple(given)

@@ -22,6 +22,7 @@ class LoopArrays(Arrays):
     idx: Any  # integers of all instances
     par: Any  # numbers of all instances
     states: Any = attrs.field(factory=lambda: np.zeros(0))  # of elements that have some
+    rates: Any = attrs.Factory(lambda self: np.zeros(len(self.states)), takes_self=True)  # of these
 
 
 _OUT = Numbers()

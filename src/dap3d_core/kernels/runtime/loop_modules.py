@@ -6,7 +6,7 @@ one list and is never recompiled for a new type:
 
     loop(t, arrays, i0, p0, count, out1, out2, out3)
 
-    arrays            body, F, idx, par, states (function_lists.LoopArrays); row 0 of F: no
+    arrays            body, F, idx, par, states, rates (function_lists.LoopArrays); row 0 of F: no
                       function
     i0, p0            first integer and first number of this group in idx and par
     out1, out2, out3  what the kernels return, flat

@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from dap3d_core.result.post.joint_coordinates import JointCoordinates
     from dap3d_core.scene.expressions.expression import Expression
 
-#: Slots of bodies that a joint or a force may have.
-SLOTS = ("i", "j", "k")
-
 
 class Quantity(NamedTuple):
     """A quantity over the reported instants.

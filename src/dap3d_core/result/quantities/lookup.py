@@ -6,6 +6,7 @@ from contextlib import suppress
 
 import numpy as np
 
+from dap3d_core.interface.fields import SLOTS
 from dap3d_core.model.groups import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result.arrays import AXES
@@ -14,14 +15,11 @@ from dap3d_core.result.quantities.catalogue import (
     ACTIONS,
     POINT_ARRAYS,
     QUANTITIES,
-    SLOTS,
     SYSTEM,
     Quantity,
     QuantityOwner,
     QuantitySource,
 )
-from dap3d_core.result.quantities.element_states import components_of, state_quantity, states_of
-from dap3d_core.result.quantities.joint_unknowns import unknown_quantity, unknowns_of
 
 NORM = "norm"
 #: Names of joint coordinates, of which a joint has some.
@@ -75,9 +73,9 @@ def find(result: QuantitySource, name: str) -> Quantity:
                 columns = _components(result, owner, attribute)
                 if not component or component in columns:
                     return _quantity(result, name, owner, attribute, component)
-            elif state := state_quantity(result, name, owner, attribute, component):
+            elif state := _state(result, name, owner, attribute, component):
                 return state
-            elif unknown := unknown_quantity(result, name, owner, attribute, component):
+            elif unknown := _unknown_of_joint(result, name, owner, attribute, component):
                 return unknown
     if output := _output(result, name):
         return output
@@ -186,7 +184,51 @@ def _columns(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tu
     if attribute == "lambda" and owner.kind == "joint":
         return tuple(str(k + 1) for k in range(result.summary.joint_rows[owner.place]))
     known = QUANTITIES[owner.kind].get(attribute)
-    return known.components if known else components_of(result.summary, owner, attribute)
+    if known or not result.summary.state_names:
+        return known.components if known else ()
+    from dap3d_core.result.quantities.element_states import components_of
+
+    return components_of(result.summary, owner, attribute)
+
+
+def _state(
+    result: QuantitySource, name: str, owner: QuantityOwner, attribute: str, component: str
+) -> Quantity | None:
+    """A state of an element; None where it has none of this name."""
+    if not result.summary.state_names:
+        return None
+    from dap3d_core.result.quantities.element_states import state_quantity
+
+    return state_quantity(result, name, owner, attribute, component)
+
+
+def _unknown_of_joint(
+    result: QuantitySource, name: str, owner: QuantityOwner, attribute: str, component: str
+) -> Quantity | None:
+    """An unknown of a joint; None where it has none of this name."""
+    if owner.kind != "joint" or not result.summary.angle_count:
+        return None
+    from dap3d_core.result.quantities.joint_unknowns import unknown_quantity
+
+    return unknown_quantity(result, name, owner, attribute, component)
+
+
+def _unknown_names(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
+    """Names of the unknowns of a joint."""
+    if owner.kind != "joint" or not result.summary.angle_count:
+        return ()
+    from dap3d_core.result.quantities.joint_unknowns import unknowns_of
+
+    return tuple(unknowns_of(result, owner))
+
+
+def _state_names(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
+    """Names of the states of an element."""
+    if not result.summary.state_names:
+        return ()
+    from dap3d_core.result.quantities.element_states import states_of
+
+    return tuple(states_of(result.summary, owner))
 
 
 def _components(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tuple[str, ...]:
@@ -263,9 +305,13 @@ def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]
     names = ACTIONS if owner.slot else QUANTITIES[owner.kind]
     is_actuator = owner.name in result.record.actuation
     known = (name for name in names if name != ACTUATION or is_actuator)
-    states = states_of(result.summary, owner)
-    unknowns = unknowns_of(result, owner)
-    return (*known, *states, *unknowns, *_coordinate_names(result, owner))
+    unknowns = _unknown_names(result, owner)
+    return (
+        *known,
+        *_state_names(result, owner),
+        *unknowns,
+        *_coordinate_names(result, owner),
+    )
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:

@@ -239,6 +239,8 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
     remedy = "" if line is None else _remedy(text.splitlines()[line - 1 : line])
     if path.suffix == ".m":
         remedy = "this is a MATLAB file; dap3d import-matlab FOLDER makes a scene of it"
+    elif path.suffix in (".urdf", ".sdf", ".xml", ".xacro"):
+        remedy = f"this is a model of another program; dap3d import {path.name} makes a scene of it"
     raise file_error(path, what, line=line, remedy=remedy)
 
 

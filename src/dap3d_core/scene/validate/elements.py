@@ -365,8 +365,15 @@ def combines(type_info: TypeInfo) -> bool:
 
 def _of(field: _Field) -> str:
     """The kind and the description of a field, for the message that it is missing."""
-    kinds = {"vec3": "3 numbers", "matrix": "3x3 numbers", "choice": "a word", "table": "numbers",
-             "functions": "names", "input": "an input"}  # fmt: skip
+    kinds = {
+        "vec3": "3 numbers",
+        "numbers": f"{field.spec.columns} numbers",
+        "matrix": "3x3 numbers",
+        "choice": "a word",
+        "table": "numbers",
+        "functions": "names",
+        "input": "an input",
+    }
     kind = kinds.get(field.spec.kind, f"a {field.spec.kind}")
     return f" ({kind}: {field.spec.doc})" if field.spec.doc else f" ({kind})"
 

@@ -146,6 +146,8 @@ def checkpoint_of(run: RunState) -> Checkpoint:
         header["events"] = run.event_locator.state()
     if run.jumps is not None:
         header["jumps"] = run.jumps.state()
+    if run.control is not None:
+        header["controllers"] = run.control.state(run.integrations)
     return Checkpoint(json.loads(to_json(header)), arrays_of(run))
 
 

@@ -34,8 +34,8 @@ class Event:
         at: the level, passed in the given direction; by default 0.
         direction: +1 upwards, -1 downwards, 0 both.
         action: "record" notes the instant in ``result.events``; "stop" ends the run there as well;
-            a function is called with the ``Instant`` there, and may change numbers of forces
-            and velocities of bodies (``Instant.set``).
+            a function is called with the ``Instant`` there, and may change numbers of forces,
+            velocities of bodies, states of elements and inputs (``Instant.set``).
         name: what it is called in the result; made from the rest where it is left out.
         every: s, the largest distance of two looks at it; by default as its values ask for it.
 
@@ -155,6 +155,10 @@ class Instant:
         self.changes: dict[str, dict[str, Any]] = {}
         #: number of a body, from 0 -> (6,) velocities that it is to have, NaN where any
         self.velocities: dict[int, Floats] = {}
+        #: first place of a state of an element -> its new numbers
+        self.states: dict[int, Floats] = {}
+        #: number of an input -> its new value
+        self.inputs: dict[int, float] = {}
 
     def __getitem__(self, name: str) -> Any:
         """A quantity by its name in results: a number, or (components,).
@@ -166,25 +170,54 @@ class Instant:
         return values if np.ndim(values) else float(values)
 
     def set(self, name: str, **fields: Any) -> None:
-        """Change numbers of a force from here on, or velocities of a body here, in this run alone.
+        """Change numbers of a force or an input from here on, velocities or states here.
 
-        Velocities are set together when the action has returned: by impulses on these bodies, with
-        the joints held, so that the velocities of all others follow (docs/jumps.md).
+        All that holds in this run alone. Velocities and states are set together when the action has
+        returned: by impulses on these bodies, with the joints held, so that the velocities of all
+        others follow (docs/jumps.md).
 
         Args:
-            name: of the force or body.
-            fields: of a force field -> new value, a number, three numbers or a matrix; of a body
-                ``r_dot``, ``w``: three numbers in global axes, None for one that the joints give.
+            name: of the force, body, joint or input.
+            fields: of a force field -> new value, a number, three numbers or a matrix; of a force
+                or joint state -> new value, a number or as many as it has; of a body ``r_dot``,
+                ``w``: three numbers in global axes, None for one that the joints give; of an input
+                ``value``, a number.
 
         Raises:
-            ValueError: there is no such force, body or field, or the value is not allowed.
+            ValueError: there is no such element or field, or the value is not allowed.
         """
-        bodies = self._compiled.model.body_names
-        if name in bodies and (fields.keys() <= VELOCITIES.keys() or not self._has_force(name)):
-            self._set_velocities(name, bodies.index(name), fields)
-        else:
-            self._numbers.set(name, fields)
+        bodies, inputs = self._compiled.model.body_names, self._compiled.model.input_names
+        numbers = {n: value for n, value in fields.items() if not self._set_state(name, n, value)}
+        if name in bodies and (numbers.keys() <= VELOCITIES.keys() or not self._has_force(name)):
+            self._set_velocities(name, bodies.index(name), numbers)
+            fields = {field: list(value) for field, value in fields.items()}
+        elif name in inputs and not self._has_force(name):
+            self._set_input(name, inputs.index(name), numbers)
+        elif numbers:
+            self._numbers.set(name, numbers)
         self.changes.setdefault(name, {}).update(fields)
+
+    def _set_state(self, element: str, name: str, value: Any) -> bool:
+        """Set a state of an element; False where it has none of this name."""
+        for state in self._compiled.model.element_states:
+            if (state.element, state.name) == (element, name):
+                break
+        else:
+            return False
+        numbers = np.atleast_1d(np.asarray(value, dtype=object))
+        if numbers.shape != (state.length,) or not all(map(_is_number, numbers)):
+            wanted = "a finite number" if state.length == 1 else f"{state.length} finite numbers"
+            raise ValueError(f"{element}.{name} = {value!r} should be {wanted}")
+        self.states[state.first] = numbers.astype(float)
+        return True
+
+    def _set_input(self, name: str, index: int, fields: dict[str, Any]) -> None:
+        for field, value in fields.items():
+            if field != "value":
+                raise ValueError(f"an input has a value; {name}.{field} does not exist")
+            if not _is_number(value):
+                raise ValueError(f"{name}.value = {value!r} should be a finite number")
+            self.inputs[index] = float(value)
 
     def _has_force(self, name: str) -> bool:
         return name in self._compiled.model.force_names
@@ -230,9 +263,10 @@ class Numbers:
         """As ``Instant.set``."""
         names = self._compiled.model.force_names
         if force not in names:
-            near = nearest(force, (*names, *self._compiled.model.body_names))
+            model = self._compiled.model
+            near = nearest(force, (*names, *model.body_names, *model.input_names))
             hint = f"did you mean {near!r}?" if near else f"forces: {', '.join(names) or 'none'}"
-            raise ValueError(f"there is no force or body {force!r}; {hint}")
+            raise ValueError(f"there is no force, body or input {force!r}; {hint}")
         model, par = self._compiled.model, self._compiled.evaluator.system.par
         change = changed(self._compiled.checked, model, names.index(force), fields)
         if self.given is None:

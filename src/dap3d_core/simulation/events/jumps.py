@@ -103,15 +103,20 @@ class Jumps:
             for k in np.flatnonzero(passed).tolist()
         ]
 
-    def set_velocities(
-        self, integration: Integration, bodies: Mapping[int, Floats], title: str
+    def set_state(
+        self,
+        integration: Integration,
+        bodies: Mapping[int, Floats],
+        states: Mapping[int, Floats],
+        title: str,
     ) -> tuple[Floats, float]:
-        """Let an event set velocities; the state u (13 n,) after it, and the work of that, J.
+        """Let an event set velocities and states; u (13 n,) after it, and the work of that, J.
 
         Args:
             integration: of the run, whose state they change.
             bodies: number of a body, from 0 -> (6,) its r_dot and omega, global axes; NaN leaves a
                 component to the joints.
+            states: first place of a state among all -> its numbers.
             title: of the event.
 
         Raises:
@@ -119,12 +124,16 @@ class Jumps:
         """
         t, u = integration.t, self._state_of(integration)
         sides = integration.work.switches[at.SIDE]
+        own = self._evaluator.states.copy()
+        for first, numbers in states.items():
+            own[first : first + len(numbers)] = numbers
+        self._evaluator.states = own
         try:
             jump = self._law.jump(
                 t, u, sides, np.zeros_like(sides), self._soon(integration), _rows_to(u, bodies)
             )
         except ImpossibleJumpError as error:
-            names = ", ".join(self._evaluator.model.body_names[k] for k in bodies)
+            names = ", ".join(self._evaluator.model.body_names[k] for k in bodies) or "no body"
             raise SimulationError(
                 f"the run stopped at t = {t:.9g} s: event {title} sets a velocity of {names} that "
                 "the joints do not allow; set fewer components (None leaves one to the joints)"
@@ -248,7 +257,8 @@ class Jumps:
 def _rows_to(u: Floats, bodies: Mapping[int, Floats]) -> JumpRows:
     """Rows that bring velocities of bodies to the values given."""
     v = velocities_of(u)
-    numbers, targets = np.array(list(bodies)), np.array(list(bodies.values()))
+    numbers = np.array(list(bodies), dtype=np.int64)
+    targets = np.array(list(bodies.values())).reshape(-1, 6)
     places = (6 * numbers[:, None] + np.arange(6))[np.isfinite(targets)]
     change = targets[np.isfinite(targets)] - v[places]
     count = len(places)

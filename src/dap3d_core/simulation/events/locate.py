@@ -37,12 +37,17 @@ class EventLocator:
         occurrences: what was found.
         numbers: of the forces, which events may change.
         jumps: of velocities, which events may set; made where one does.
+        horizon: time that no step goes beyond.
+        take_rows: takes what was reported before an input changes.
     """
+
+    horizon = np.inf
 
     def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
         self.compiled, self.events = compiled, checked_events(events)
         self.numbers = Numbers(compiled)
         self.jumps: Jumps | None = None
+        self.take_rows: Callable[[], None] = lambda: None
         self.occurrences: list[EventRecord] = []
         self._samplers = [Sampler(event.every) for event in self.events]
         self._values: list[float] = []
@@ -56,6 +61,7 @@ class EventLocator:
             "values": self._values,
             "sides": self._sides,
             "samplers": [sampler.state() for sampler in self._samplers],
+            "inputs": self.compiled.evaluator.inputs.tolist(),
         }
 
     def restore(self, found: Mapping[str, Any]) -> None:
@@ -78,6 +84,10 @@ class EventLocator:
             raise ValueError("what is known of how events change is damaged")
         for sampler, state in zip(self._samplers, states, strict=True):
             sampler.restore(state)
+        inputs: Any = found.get("inputs")
+        if not _are_numbers(inputs, (len(self.compiled.model.input_names),)):
+            raise ValueError("the inputs that events have set should be a number for each")
+        self.compiled.evaluator.set_inputs(inputs)
         if any(one.changes for one in self.occurrences):
             self.numbers.given = self.compiled.evaluator.system.par.copy()
 
@@ -104,13 +114,18 @@ class EventLocator:
         limit = integration.statistics.rhs + budget
         while integration.status is Status.RUNNING and not integration.rows_are_full:
             self._step(integration)
-            if integration.statistics.rhs > limit:
+            if integration.statistics.rhs > limit or integration.t >= self.horizon:
                 break
         return integration.status
 
     def look_again(self, integration: Integration) -> None:
         """Act on the events whose numbers passed their levels in a jump of velocities."""
         self._take_notice(integration, self._instant(integration))
+
+    def begin_anew(self, integration: Integration) -> None:
+        """Look at the events again where what they watch may have jumped: that is no event."""
+        self._values = self._all(self._instant(integration))
+        self._sides = [float(np.sign(value)) for value in self._values]
 
     def _step(self, integration: Integration) -> None:
         arrays = self._arrays(integration)
@@ -125,7 +140,7 @@ class EventLocator:
                 integration.advance_to(end)
             return self._instant(integration)
 
-        integration.advance_to(np.inf)
+        integration.advance_to(self.horizon)
         if integration.t == t:
             return
         here = self._instant(integration)
@@ -239,11 +254,10 @@ class EventLocator:
             if event.sense * side <= 0.0:
                 changes |= self._act(integration, event, int(-side))
         if changes:  # numbers may jump with them: that is no event
-            self._values = self._all(self._instant(integration))
-            self._sides = [float(np.sign(value)) for value in self._values]
+            self.begin_anew(integration)
 
     def _act(self, integration: Integration, event: Event, direction: int) -> bool:
-        """Do what an event asks for; whether it changed numbers of forces or velocities."""
+        """Do what an event asks for; whether it changed numbers of forces, velocities, states."""
         here, kind = self._instant(integration), "change"
         if callable(event.action):
             event.action(here)
@@ -254,23 +268,32 @@ class EventLocator:
         if here.changes:
             integration.restart()
         after, work = None, 0.0
-        if here.velocities:
-            after, work = self._set_velocities(integration, event, here)
+        if here.inputs:
+            self._set_inputs(here.inputs)
+        if here.velocities or here.states or here.inputs:
+            after, work = self._set_state(integration, event, here)
         self.occurrences.append(
             EventRecord(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,
                        changes=here.changes, u_after=after, work=work)
         )  # fmt: skip
         return bool(here.changes)
 
-    def _set_velocities(
+    def _set_inputs(self, inputs: Mapping[int, float]) -> None:
+        """Set inputs from here on; what was reported so far has those before."""
+        self.take_rows()
+        values = self.compiled.evaluator.inputs
+        values[list(inputs)] = list(inputs.values())
+        self.compiled.evaluator.set_inputs(values)
+
+    def _set_state(
         self, integration: Integration, event: Event, here: Instant
     ) -> tuple[Floats, float]:
-        """Set the velocities that an action asks for; the state after it, and the work, J."""
+        """Set velocities and states as an action asks for; u after it, and the work, J."""
         if self.jumps is None:
             from dap3d_core.simulation.events.jumps import Jumps
 
             self.jumps = Jumps(self.compiled.evaluator)
-        return self.jumps.set_velocities(integration, here.velocities, event.title)
+        return self.jumps.set_state(integration, here.velocities, here.states, event.title)
 
 
 def hermite(

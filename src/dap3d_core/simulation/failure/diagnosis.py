@@ -65,6 +65,7 @@ def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
     for q, (kind, group) in enumerate(evaluator.loop_groups):
         for k in range(group.count):
             if fault := _fault_of(evaluator, q, k, kind, group, t):
+                kind = "rate" if _fault(s.rates) else kind  # a wrench computes both
                 name = _name(evaluator, kind, group, k)
                 return f"{_title(kind)} {name} (type {group.keyword}) is {fault}"
     return (
@@ -145,17 +146,18 @@ def _worst_state(evaluator: Evaluator, values: Floats) -> str:
 
 def _fault_of(evaluator: Evaluator, q: int, k: int, kind: str, group: Group, t: float) -> str:
     s = evaluator.system
+    s.rates[:] = 0.0
     for out in (s.force, s.gamma, s.nu, s.residual, s.D, s.multipliers):
         out[:] = 0.0
     joint_outs = {"acceleration": (s.D, s.gamma, s.nu), "position": (s.residual,) * 3,
                   "friction": (s.force, s.multipliers, s.multipliers)}  # fmt: skip
     if kind == "rate":
-        joint_outs[kind] = (np.zeros(len(s.states)), s.multipliers, s.multipliers)
+        joint_outs[kind] = (s.multipliers,) * 3
     if kind == "switch":
         joint_outs[kind] = np.zeros(len(group.type_info.outputs[kind])), np.zeros(1), np.zeros(1)
     outs = joint_outs.get(kind, (s.force, s.force, s.force))
     _call_one(evaluator, q, k, group, t, outs)
-    return _fault(*outs, s.F[:, :4])
+    return _fault(*outs, s.rates, s.F[:, :4])
 
 
 def _call_one(

@@ -11,14 +11,16 @@ from dap3d_core.model.state_layout import STATE, split, state_layout
 Floats = NDArray[np.float64]
 
 
-def state_of(u: ArrayLike, body_names: Sequence[str]) -> Floats:
-    """A state as an array of its own, (13 n,) of float64.
+def state_of(u: ArrayLike, body_names: Sequence[str], states: int = 0) -> Floats:
+    """A state as an array of its own, (13 n,) of float64; with as many states of elements last.
 
     Raises:
         ValueError: it is not 13 n finite numbers, or Euler parameters of a body are all zero.
     """
-    count = state_layout(len(body_names)).size
-    wanted = f"u must be {count} finite numbers, {STATE} a body"
+    size = state_layout(len(body_names)).size
+    count = size + states
+    more = f" and {states} states of elements" if states else ""
+    wanted = f"u must be {count} finite numbers, {STATE} a body{more}"
     try:
         given = np.asanyarray(u)
     except (ValueError, TypeError) as error:  # lists of different lengths
@@ -33,7 +35,7 @@ def state_of(u: ArrayLike, body_names: Sequence[str]) -> Floats:
     if not np.all(np.isfinite(state)):
         first = _first(~np.isfinite(state))
         raise ValueError(f"{wanted}; entry {first} is {state[first]}")
-    without = ~np.any(split(state)[1], axis=1)
+    without = ~np.any(split(state[:size])[1], axis=1)
     if np.any(without):
         name = body_names[_first(without)]
         raise ValueError(f"the Euler parameters of body {name} in u are all zero")

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE, Y
-from dap3d_core.model.element_states import tolerances
 from dap3d_core.model.state_layout import split
 from dap3d_core.scene import Simulation
 from dap3d_core.scene.validate.settings import QUANTITIES, USUAL_ATOL
@@ -131,7 +130,11 @@ def atol_vector(atol: float | Mapping[str, float], evaluator: Evaluator) -> floa
 
     States of elements have those that their fields give.
     """
-    own = tolerances(evaluator.model.acting) if evaluator.model.state_count else np.zeros(0)
+    own = np.zeros(0)
+    if evaluator.model.state_count:
+        from dap3d_core.model.element_states import tolerances
+
+        own = tolerances(evaluator.model.acting)
     if not isinstance(atol, Mapping):
         if not own.any():
             return atol

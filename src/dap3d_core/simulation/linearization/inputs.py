@@ -63,6 +63,12 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
         evaluator.place(point.t, point.u)
         for k, name in enumerate(names):
             element = name.partition(".")[0]
+            if name in point.model.input_names:
+                wrench[:, k] = _by_input(point, evaluator, name)
+                units.append("1")
+                if not np.any(wrench[:, k]):
+                    notes.append(f"input {name} has no effect at this state")
+                continue
             if element not in point.model.force_names:
                 driver[len(drivers), k] = 1.0
                 drivers.append(_driver(point, evaluator, name))
@@ -81,13 +87,48 @@ def inputs_of(point: OperatingPoint, names: Sequence[str]) -> Inputs:
     return Inputs(wrench, rate, driver, rows, tuple(units), frozenset(elements), tuple(notes))
 
 
+def _by_input(point: OperatingPoint, evaluator: Evaluator, name: str) -> Floats:
+    """(6 n,) derivative of all forces by an input of the scene.
+
+    Raises:
+        UnknownNameError: a driver reads it.
+    """
+    model = point.model
+    row = int(model.input_rows[model.input_names.index(name)])
+    result = np.zeros((model.body_count + 1, 6))
+    for loop, (kind, group) in enumerate(evaluator.loop_groups):
+        columns = range(len(group.type_info.layout.functions))
+        for column in columns if kind in ("wrench", "acceleration") else ():
+            mine = group.functions[:, column] == row
+            if np.any(mine) and kind == "acceleration":
+                joint = model.joint_names[int(group.members[np.argmax(mine)])]
+                raise UnknownNameError(
+                    f"input {name!r} is read by the driver {joint}, whose velocity jumps with it: "
+                    "equations of motion have no such input; drive it by a function, and name "
+                    f"{joint}"
+                )
+            if np.any(mine):
+                own = differentiate_loop(
+                    group.type_info, kind, point.t, evaluator.system,
+                    evaluator.system.groups[loop].tolist(), functions=[(column, 0)],
+                )  # fmt: skip
+                slope = own.outputs["wrench"][1][..., -1]
+                np.add.at(result, own.bodies[mine][:, : slope.shape[1]], slope[mine])
+    return result[1:].ravel()
+
+
+def _has_one_function(group: Group) -> bool:
+    """True if a type of joint has one function of time, and no input."""
+    specs, fields = specs_of(group.type_info.type), group.type_info.layout.functions
+    return [specs[field].kind for field in fields] == ["function"]
+
+
 def _driver(point: OperatingPoint, evaluator: Evaluator, name: str) -> list[Floats]:
     """(rows,) each: derivatives of nu by f, f_dot, of gamma by f, f_dot, f_ddot of a driver."""
     model = point.model
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
         names = [model.joint_names[k] for k in group.members] if kind == "acceleration" else []
-        layout = group.type_info.layout
-        if name not in names or len(layout.functions) != 1:
+        if name not in names or not _has_one_function(group):
             continue
         i0, p0, count = evaluator.system.groups[loop].tolist()
         orders = [(0, order) for order in range(3)]
@@ -105,14 +146,14 @@ def _driver(point: OperatingPoint, evaluator: Evaluator, name: str) -> list[Floa
     known, element = _inputs_known(point, evaluator), name.partition(".")[0]
     if element in known:
         raise UnknownNameError(f"input {name!r}: a driver is an input as a whole; name {element}")
-    raise unknown("force or driver", element, known)
+    raise unknown("input, force or driver", element, known)
 
 
 def _inputs_known(point: OperatingPoint, evaluator: Evaluator) -> list[str]:
     """Names of forces, and of joints with one function of time."""
-    known = list(point.model.force_names)
+    known = [*point.model.input_names, *point.model.force_names]
     for kind, group in evaluator.loop_groups:
-        if kind == "acceleration" and len(group.type_info.layout.functions) == 1:
+        if kind == "acceleration" and _has_one_function(group):
             known += [point.model.joint_names[k] for k in group.members]
     return known
 
@@ -128,7 +169,7 @@ def _force(
             unit, columns = _columns(group, name, field) if field else ("1", [])
             wrench[:] = _wrench(point, evaluator, loop, group, number, columns)
             if columns and group.type_info.layout.states:
-                _rate(point, evaluator, group, number, columns, rate)
+                _rate(point, evaluator, loop, group, number, columns, rate)
             return unit
     raise UnknownNameError(f"input {name!r}: {element} acts by reactions of joints alone")
 
@@ -166,6 +207,7 @@ def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:
 def _rate(
     point: OperatingPoint,
     evaluator: Evaluator,
+    loop: int,
     group: Group,
     number: int,
     columns: list[int],
@@ -173,7 +215,6 @@ def _rate(
 ) -> None:
     """Rates (s,) of the states of a force by one of its numbers."""
     system = evaluator.system
-    loop = evaluator.loop_groups.index(("rate", group))
     i0, p0, count = system.groups[loop].tolist()
     own = differentiate_loop(group.type_info, "rate", point.t, system, (i0, p0, count),
                              numbers=columns)  # fmt: skip

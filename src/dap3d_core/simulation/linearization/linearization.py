@@ -327,9 +327,9 @@ def linearize(
         at: the state: None for the start of the scene, corrected as a run does; a ``Result``, at
             its instant t; an equilibrium (``.r``, ``.p``), at rest; or u (13 n,).
         t: time, s: of the functions of time and the drivers.
-        inputs: ``FORCE.FIELD`` for a number of a force element, ``FORCE.FIELD.x`` for a component
-            (``motor.n_a``, ``push.f.z``), also of one that the rates of its states depend on;
-            ``FORCE`` for a factor on all of its force, 1 at the
+        inputs: ``INPUT``, one of the scene; ``FORCE.FIELD`` for a number of a force element,
+            ``FORCE.FIELD.x`` for a component (``motor.n_a``, ``push.f.z``), also of one that the
+            rates of its states depend on; ``FORCE`` for a factor on all of its force, 1 at the
             state. ``DRIVER``, a joint with a function of time: an acceleration, in m/s^2 or
             rad/s^2, beside that of the function; the displacement and rate that it adds are states.
         outputs: quantities by name as in results (``body.r.x``, ``P.v``, ``J1.force.z``, ...).

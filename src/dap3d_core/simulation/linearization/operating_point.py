@@ -187,6 +187,8 @@ def _state(
             raise SimulationError(f"the result has no instant at t = {t:.9g} s{near}")
         angles = at.arrays.angles[k] if at.summary.angle_count == model.angle_count else None
         states = at.arrays.states[k] if at.arrays.states.shape[1] == model.state_count else None
+        if at.summary.input_names == model.input_names:
+            compiled.evaluator.set_inputs(at.inputs[k])
         return at.u[k].copy(), angles, states
     if hasattr(at, "r") and hasattr(at, "p"):
         r, p = np.asarray(at.r, dtype=float), np.asarray(at.p, dtype=float)

@@ -109,15 +109,10 @@ def state_space(
     by_driver, lam_by_driver = solve(np.zeros((len(U), count)), gamma[2])
     rate = np.zeros((count, x.shape[1]))
     rate[:, last - count : last] = np.eye(count)
-    rate_of_own = own.by_displacement @ x + own.by_velocity @ v
-    rate_of_own += _placed(own.by_states, last, x.shape[1])
     above = np.zeros((Q.shape[1] + count, len(U)))
     below = np.zeros((count + own.count, len(U)))
-    largest = (np.linalg.norm(matrix, np.inf) for matrix in (K, C, S))
-    size = max(power**exponent for power, exponent in zip(largest, (0.5, 1.0, 1.0), strict=True))
-    size = max(size, float(np.max(np.abs(np.diag(own.by_states)), initial=0.0)))
     return StateSpace(
-        A=np.vstack([Q.T @ (v + S @ x), rate, N.T @ v_dot, 0.0 * rate, rate_of_own]),
+        A=np.vstack([Q.T @ (v + S @ x), rate, N.T @ v_dot, 0.0 * rate, own.rates(x, v)]),
         own=np.eye(x.shape[1])[:, last:],
         displacement=U @ x,
         velocity=U @ v,
@@ -132,8 +127,15 @@ def state_space(
         acceleration_by_driver=U @ by_driver,
         multipliers_by_driver=lam_by_driver / back,
         coordinate_count=Q.shape[1] + count,
-        size=float(size),
+        size=_size(K, C, S, own.by_states),
     )
+
+
+def _size(K: Floats, C: Floats, S: Floats, by_states: Floats) -> float:
+    """Magnitude of the terms of a state matrix, 1/s."""
+    largest = [np.linalg.norm(K, np.inf) ** 0.5, np.linalg.norm(C, np.inf)]
+    largest += [np.linalg.norm(S, np.inf), np.max(np.abs(np.diag(by_states)), initial=0.0)]
+    return float(max(largest))
 
 
 @attrs.frozen(eq=False, kw_only=True)
@@ -152,6 +154,12 @@ class _Own:
     def count(self) -> int:
         """Number of states."""
         return len(self.by_states)
+
+    def rates(self, x: Floats, v: Floats) -> Floats:
+        """Rates (s, c) of the states, which are the last of c columns of displacements."""
+        own = _placed(self.by_states, x.shape[1] - self.count, x.shape[1])
+        found: Floats = self.by_displacement @ x + self.by_velocity @ v + own
+        return found
 
     @classmethod
     def of(cls, equations: ScaledEquations, six: int, rows: int) -> "_Own":

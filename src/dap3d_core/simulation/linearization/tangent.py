@@ -117,6 +117,7 @@ def tangent_matrices(
         from dap3d_core.formulations.common.state_derivatives import state_derivatives
 
         states = state_derivatives(evaluator, t, velocities_of(u), assembly.multipliers, assembly.a)
+        _check_states(model, states, t)
     return TangentMatrices(
         M=M,
         f=assembly.f,
@@ -130,6 +131,20 @@ def tangent_matrices(
         states=states,
         **assembly.matrices(),
     )
+
+
+def _check_states(model: Model, own: "StateDerivatives", t: float) -> None:
+    """Refuses rates of states without derivatives; names the states."""
+    wrong = ~np.isfinite(own.rates)
+    for matrix in (own.rate_by_displacement, own.rate_by_velocity, own.rate_by_states):
+        wrong |= ~np.isfinite(np.asarray(abs(matrix).sum(axis=1)).ravel())
+    names = [f"{s.element}.{s.name}" for s in model.element_states
+             if np.any(wrong[s.first : s.first + s.length])]  # fmt: skip
+    if names:
+        raise SimulationError(
+            f"the rate of {', '.join(names[:MOST_NAMES])} has no derivative at t = {t:g} s: the "
+            "equations cannot be linearised here; move the state off this point"
+        )
 
 
 class _Entries:

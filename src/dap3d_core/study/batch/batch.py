@@ -1,9 +1,11 @@
 """Runs points in compiled batches; points that cannot be batched are left open."""
 
 import contextlib
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import SceneError
@@ -19,6 +21,9 @@ from dap3d_core.study.batch.rebuild import ModelRebuilder
 from dap3d_core.study.outputs import Reduction
 from dap3d_core.study.study import Batch, PointStatus
 
+if TYPE_CHECKING:
+    from dap3d_core.study.batch.tree_points import TreePoints
+
 
 def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner | None":
     """A batch runner for this thread; None where the scene as given cannot start, or is to start at
@@ -28,10 +33,15 @@ def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner
     """
     compiled = reduction.compiled
     settings = compiled.scene.simulation
-    if settings.start != "scene" or compiled.evaluator.formulation.has_own_coordinates:
+    if settings.start != "scene":
         return None
     if any(switch.jumps for switch in compiled.evaluator.switches):
         return None  # velocities that jump are changed between compiled calls
+    evaluator = compiled.evaluator
+    if evaluator.formulation.has_own_coordinates and (
+        evaluator.model.state_count or evaluator.coordinates.kept
+    ):
+        return None  # numbers of kept rows and states of elements are those of one run
     try:
         start = compiled.start(bool(settings.correct), settings.hold, str(settings.correct_metric))
     except (AssemblyError, SceneError):
@@ -63,18 +73,38 @@ class BatchRunner:
         stops = compiled.breakpoints(end).stops
         self._rebuilder = ModelRebuilder(compiled, evaluator, parameters, end)
         self.compiled_batch = CompiledBatch(evaluator, compiled.scene.simulation, times, stops)
+        self._runs = self._point_runs(start)
         self._pulling = Pulling(compiled.model)
         self.parameter_map: ParameterMap | None = None
         self.packed: PackedBatch | None = None
         with contextlib.suppress(NotCopiedError):
             parameter_map = ParameterMap(compiled.checked, evaluator, parameters)
-            if not parameter_map.moves_start or self._has_compiled_correction():
+            is_of_bodies = not evaluator.formulation.has_own_coordinates
+            has_start = is_of_bodies or parameter_map.keeps_poses
+            if has_start and (not parameter_map.moves_start or self._has_compiled_correction()):
                 self.parameter_map = parameter_map
                 # Switches of one copy would interrupt all, friction is iterated for all.
                 shared = evaluator.formulation.accepts_redundant or bool(evaluator.switches)
-                shared = shared or bool(compiled.model.iterated_forces)
+                shared = shared or bool(compiled.model.iterated_forces) or not is_of_bodies
                 if pack > 1 and not shared and reduction.is_of_single_copies:
                     self.packed = PackedBatch(compiled, evaluator, times, pack)
+
+    def _point_runs(self, start: InitialState) -> "CompiledBatch | TreePoints":
+        """What runs mapped points one by one, from states in coordinates of bodies."""
+        batch, compiled = self.compiled_batch, self._compiled
+        if not batch.evaluator.formulation.has_own_coordinates:
+            return batch
+        from dap3d_core.study.batch.tree_points import TreePoints
+
+        def of_bodies() -> CompiledBatch:
+            return CompiledBatch(
+                Evaluator(compiled.model, "standard"),
+                compiled.scene.simulation,
+                self._times,
+                compiled.breakpoints(float(self._times[-1])).stops,
+            )
+
+        return TreePoints(batch, start, of_bodies)
 
     def run(self, values: Floats, batch: Batch, first: int) -> None:
         """Run points (k, d), and store those that reach their end in a batch from ``first`` on."""
@@ -95,13 +125,14 @@ class BatchRunner:
         self, parameter_map: ParameterMap, values: Floats
     ) -> tuple[Integers, BatchRows]:
         """Run points by the parameter map: indices of those that were run, and their rows."""
+        evaluator = self.compiled_batch.evaluator
+        evaluator.coordinates.start(self._start.u)  # to which numbers of a tree refer
         table, valid = parameter_map.table(values)
         which = np.flatnonzero(valid)
         model, moves_start = self._compiled.model, parameter_map.moves_start
         if moves_start:
             y0 = parameter_map.states(values[which], model.u0)
         else:
-            evaluator = self.compiled_batch.evaluator
             y0 = np.repeat(evaluator.integrated(self._start.u)[None], len(which), axis=0)
         parameter_map.set_states(y0, values[which])
         table, places = table[which], parameter_map.places
@@ -114,7 +145,7 @@ class BatchRunner:
     def _run_packed(self, table: Floats, places: Integers, y0: Floats, start: int) -> BatchRows:
         """Run points in packs where they are packed, and one by one what packs do not finish."""
         if self.packed is None:
-            return self.compiled_batch.run(table, places, y0, start)
+            return self._runs.run(table, places, y0, start)
         first = None
         if start == driver.CORRECT:
             first = self.compiled_batch.run(table, places, y0, driver.CORRECT_ONLY)
@@ -140,10 +171,11 @@ class BatchRunner:
                 which.append(k)
                 points.append(point)
                 notes[first + k] = "; ".join(point.notes)
+        self.compiled_batch.evaluator.set_inputs(self._compiled.model.input_values)
         places = self._rebuilder.places
         table = np.array([point.table for point in points]).reshape(-1, len(places))
         y0 = np.array([point.y0 for point in points])
-        y0 = y0.reshape(-1, self._compiled.model.integrated_layout.size)
+        y0 = y0.reshape(-1, self.compiled_batch.last_start.size)
         return np.array(which, dtype=np.int64), self.compiled_batch.run(table, places, y0)
 
     def _reduce(self, values: Floats, index: Integers, rows: Floats, batch: Batch) -> None:
@@ -184,4 +216,6 @@ class BatchRunner:
         if not model.row_count or not settings.correct:
             return not model.row_count
         is_unit = str(settings.correct_metric) == "unit" and not settings.hold
-        return is_unit and not self._compiled.evaluator.formulation.accepts_redundant
+        formulation = self._compiled.evaluator.formulation
+        # the rows of a tree are independent, and none but they are run in batches
+        return is_unit and (formulation.has_own_coordinates or not formulation.accepts_redundant)

@@ -72,7 +72,7 @@ class CompiledBatch:
         stops: times that no step crosses, and whether something jumps there.
         """
         self.evaluator, self.size = evaluator, model_size(evaluator)
-        y0 = self.last_start = evaluator.integrated(evaluator.model.u0)
+        y0 = self.last_start = evaluator.coordinates.start(evaluator.model.u0)
         may_turn_stiff = settings.integrator == "auto" and fits(IMPLICIT, evaluator.formulation)
         self.integration = INTEGRATORS.get(str(settings.integrator), EXPLICIT).make(
             evaluator,
@@ -101,6 +101,11 @@ class CompiledBatch:
         self._begin = _begin_functions(evaluator.formulation)
         self.run(np.zeros((0, 0)), np.zeros(0, dtype=np.int64), y0[None][:0])  # to compile it
 
+    @property
+    def number_count(self) -> int:
+        """Numbers that may differ from point to point."""
+        return len(numbers_of(self.evaluator))
+
     def run(
         self, table: Floats, places: Integers, y0: Floats, start: int = driver.UNCORRECTED
     ) -> BatchRows:
@@ -108,15 +113,16 @@ class CompiledBatch:
 
         Args:
             table: (k, w) numbers that differ from the model's.
-            places: (w,) their indices in par, body and metric, concatenated.
+            places: (w,) their indices in the numbers (``numbers_of``).
             y0: (k, n) states to start from.
             start: UNCORRECTED, CORRECT, or CORRECT_ONLY (driver.py).
         """
         work, count = self.integration.work, len(table)
-        nt, width = work.rows.shape
+        nt, width = len(work.rows), self.evaluator.model.row_layout.size
+        own = self.evaluator.formulation.has_own_coordinates
         diagnostics = np.zeros((count, driver.COLUMNS))
         points = driver.Points(
-            at=np.array([0, 0, start], dtype=np.int64),
+            at=np.array([0, 0, start, own], dtype=np.int64),
             places=np.ascontiguousarray(places, dtype=np.int64),
             table=np.ascontiguousarray(table, dtype=float),
             y0=np.array(y0, dtype=float),
@@ -138,9 +144,20 @@ class CompiledBatch:
         return BatchRows(done, rows, y0, points.y0, diagnostics)
 
 
+def numbers_of(evaluator: Evaluator) -> Floats:
+    """Numbers of a model: par, body, metric and, where there is a tree, its constants."""
+    s = evaluator.system
+    tree = () if s.tree is None else (s.tree.constants,)
+    return np.concatenate([s.par, s.body.ravel(), s.metric.ravel(), *tree])
+
+
 @cache
 def _begin_functions(formulation: Formulation) -> Any:
     """Compiled functions that store the references of a start, and correct it."""
+    if formulation.has_own_coordinates:
+        from dap3d_core.study.batch.tree_start import begin_tree, state_of_bodies
+
+        return step_functions(begin_tree, begin_tree, state_of_bodies)  # none corrects a start
     if not formulation.needs_joints:
         return step_functions(initial_state.begin_free)
     redundant = formulation.accepts_redundant

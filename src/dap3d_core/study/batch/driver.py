@@ -31,8 +31,9 @@ from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, STARTING
 
-# Entries of ``at``: the current point, whether its run has begun, how to start.
-POINT, BEGUN, START, AT_SIZE = range(4)
+# Entries of ``at``: the current point, whether its run has begun, how to start; whether states are
+# in coordinates of the formulation's own, and rows have to be brought to those of bodies.
+POINT, BEGUN, START, OWN, AT_SIZE = range(5)
 # Start from the state as given, from the corrected state, or correct it and do not run.
 UNCORRECTED, CORRECT, CORRECT_ONLY = range(3)
 # Columns of ``diagnostics`` after those of the start: status, rows, steps, right-hand sides, and
@@ -56,7 +57,7 @@ class Points(Arrays):
     }
 
     at: Integers  # (AT_SIZE,)
-    places: Integers  # (w,) indices in par, body and metric, concatenated
+    places: Integers  # (w,) indices in par, body, metric and constants of a tree, concatenated
     table: Floats  # (k, w) the numbers at these indices
     y0: Floats  # (k, n) states to start from
     metric: Floats  # of the model, where its numbers do not change from point to point
@@ -84,6 +85,7 @@ def set_numbers(points: Points, p: int, system: System) -> None:
     places, par, body, metric = points.places, system.par, system.body, system.metric
     first_body = par.shape[0]
     first_metric = first_body + body.shape[0] * body.shape[1]
+    first_of_tree = first_metric + metric.shape[0] * metric.shape[1]
     for c in range(places.shape[0]):
         place, value = places[c], points.table[p, c]
         if place < first_body:
@@ -91,9 +93,11 @@ def set_numbers(points: Points, p: int, system: System) -> None:
         elif place < first_metric:
             k = place - first_body
             body[k // body.shape[1], k % body.shape[1]] = value
-        else:
+        elif place < first_of_tree:
             k = place - first_metric
             metric[k // metric.shape[1], k % metric.shape[1]] = value
+        else:
+            system.tree.constants[place - first_of_tree] = value
 
 
 @compiled
@@ -183,6 +187,22 @@ def next_stop(
 
 
 @compiled
+def store_row(
+    target: Floats,
+    row: Floats,
+    work: RungeKuttaState,
+    starting: Sequence[Function],
+    system: System,
+    loops: Any,
+) -> None:
+    """Store a reported row with its state brought to coordinates of bodies."""
+    end, length = 1 + work.state.shape[1], target.shape[0]
+    target[0] = row[0]
+    starting[2](row[0], row[1:end], target[1:], system, loops)
+    copy_into(target[length - row.shape[0] + end :], row[end:])
+
+
+@compiled
 def run_points(
     points: Points,
     work: RungeKuttaState,
@@ -219,7 +239,10 @@ def run_points(
         spent += work.rhs_count - calls
         if work.status != RUNNING:
             for k in range(work.row_count):
-                copy_into(points.rows[p * nt + k], work.rows[k])
+                if at[OWN] == 0:
+                    copy_into(points.rows[p * nt + k], work.rows[k])
+                else:
+                    store_row(points.rows[p * nt + k], work.rows[k], work, starting, system, loops)
             diagnostics[p, ENDED], diagnostics[p, ROWS] = work.status, work.row_count
             diagnostics[p, TAKEN], diagnostics[p, CALLS] = work.step_count, work.rhs_count
             diagnostics[p, FRICTION_FAILURES] = (

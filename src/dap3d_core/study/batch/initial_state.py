@@ -170,8 +170,14 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
 @compiled_into
 def store_start(t: float, y: Floats, system: System, loops: Any) -> None:
     """Place bodies, store functions' values at the start, count turns from here."""
-    unused, F = system.settings[SCRATCH : SCRATCH + 1], system.F
     place(t, y, system, loops)
+    count_from_here(t, system, loops)
+
+
+@compiled_into
+def count_from_here(t: float, system: System, loops: Any) -> None:
+    """Store functions' values at the start and count turns, at bodies and functions as placed."""
+    unused, F = system.settings[SCRATCH : SCRATCH + 1], system.F
     for k in range(F.shape[0]):
         F[k, 4] = F[k, 0]
     system.settings[UNSETTLED] = system.settings[DOUBTFUL] = 0.0

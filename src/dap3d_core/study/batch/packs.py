@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.model import Group, Model
-from dap3d_core.model.element_states import width_of
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.state_layout import bodies_of, coordinates_of, velocities_of
 from dap3d_core.simulation import CompiledModel
@@ -124,7 +123,8 @@ class LaneLayout:
         self._n = one.model.body_count
         self._row, self._row_of_many = one.model.row_layout, many.model.row_layout
         self._n_states = one.model.state_count
-        self._states = [g.count * width_of(g) for g in one.model.acting if width_of(g)]
+        widths = [g.count * g.type_info.layout.state_width for g in one.model.acting]
+        self._states = [width for width in widths if width]
         self._angles = [g.count * len(g.type_info.layout.angles) for g in one.model.acting]
         self._par = np.full((count, one.system.par.size), -1, dtype=np.int64)
         for q, (_, group) in enumerate(one.loop_groups):

@@ -84,7 +84,8 @@ class ParameterMap:
     Attributes:
         parameters: those that vary, in order.
         moves_start: True if the start depends on any of them; moves: if points or bodies move.
-        places: (w,) indices in par, body and metric, concatenated, of the table's columns.
+        places: (w,) indices in the model's numbers (``numbers_of``), of the table's columns.
+        keeps_poses: True if bodies start where they do in the scene as given.
     """
 
     def __init__(
@@ -101,6 +102,10 @@ class ParameterMap:
         self._dependence: dict[int, Dependence] = {}
         self.parameters = tuple(self._mapped(parameter) for parameter in parameters)
         self.moves_start = any(p.moves_start for p in self.parameters)
+        self.keeps_poses = all(
+            not p.moves_start or p.path[0] == "functions" or p.path[2] in ("r_dot", "w")
+            for p in self.parameters
+        )
         self.moves = self.moves_start or any(p.table == "points" for p in parameters)
         bodies = {p.path[1] for p in parameters if p.path[0] == "bodies"
                   and p.path[2] in ("mass", "Jp")}  # fmt: skip
@@ -120,6 +125,7 @@ class ParameterMap:
                 [target for p in self.parameters for target in p.targets],
                 (body + MASS + np.arange(10)).ravel(),
                 (metric + np.arange(METRIC_CONSTANTS)).ravel(),
+                *self._inertia_places(),
             ]
         ).astype(np.int64)
 
@@ -143,6 +149,8 @@ class ParameterMap:
             body = np.concatenate([mass[..., None], Jp.reshape(*mass.shape, 9)], axis=-1)
             parts += [part.reshape(len(values), -1)
                       for part in (body, metric[1:, :METRIC_CONSTANTS])]  # fmt: skip
+            if self._evaluator.formulation.has_own_coordinates:
+                parts.append(self._evaluator.coordinates.inertias(1 + self._bodies, mass, Jp))
         return np.hstack(parts), valid
 
     def states(self, values: Floats, u0: Floats) -> Floats:
@@ -299,6 +307,14 @@ class ParameterMap:
             if id(group) not in seen:
                 seen.add(id(group))
                 yield group, int(self._evaluator.system.groups[q, 1])
+
+    def _inertia_places(self) -> Iterator[Integers]:
+        """Entries of masses and inertias in the constants of a tree, where there is one."""
+        evaluator = self._evaluator
+        if evaluator.formulation.has_own_coordinates and len(self._bodies):
+            system = evaluator.system
+            first = system.par.size + system.body.size + system.metric.size
+            yield first + evaluator.coordinates.inertia_places(1 + self._bodies)
 
     def _inertias(self, values: Floats) -> tuple[Floats, Floats, Booleans]:
         """Masses (k, b), inertia matrices (k, b, 3, 3) of bodies that vary; (k,) True if valid."""

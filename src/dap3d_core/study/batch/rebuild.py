@@ -8,7 +8,6 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.model import Model, ModelError, build_model
-from dap3d_core.model.element_states import tolerances
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import SceneError, ValidatedScene, check
@@ -17,6 +16,7 @@ from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.breakpoints import stops_of
 from dap3d_core.simulation.initial.undefined_directions import undefined_directions
 from dap3d_core.simulation.initial_state import find_start, start_notes
+from dap3d_core.study.batch.compiled_batch import numbers_of
 from dap3d_core.study.parameters import SceneParameter, with_values
 
 
@@ -24,7 +24,7 @@ class RebuiltPoint(NamedTuple):
     """A point ready to run.
 
     Attributes:
-        table: par, body and metric of its model, concatenated.
+        table: the numbers of its model (``numbers_of``).
         y0: (n,) the integrated state to start from.
         notes: warnings about its start.
     """
@@ -53,7 +53,8 @@ class ModelRebuilder:
         settings = compiled.scene.simulation
         self._options = (bool(settings.correct), settings.hold, str(settings.correct_metric))
         self._rank = compiled.start(*self._options).redundancy.rank.rank
-        self.places = np.arange(_table_of(evaluator).size)
+        self.places = np.arange(len(numbers_of(evaluator)))
+        self._structure = self._structure_of(evaluator)
 
     def load(self, point: Floats) -> tuple[ValidatedScene, Model]:
         """Load the model of a point into the evaluator.
@@ -78,19 +79,32 @@ class ModelRebuilder:
             return None
         if start.redundancy.rank.rank != self._rank or not start.redundancy.is_plain:
             return None
-        if not np.array_equal(tolerances(model.acting), tolerances(self._compiled.model.acting)):
+        if model.state_count and not self._has_same_tolerances(model):
             return None
         if stops_of(checked, model, self._t_end) != self._stops:
             return None
+        if not np.array_equal(model.input_values, self._compiled.model.input_values):
+            return None  # a batch shares the functions of time, and inputs stand with them
         if not np.array_equal(effects_of(evaluator.switches), self._terminal):
             return None
         if undefined_directions(checked.scene, model, start.u, model_size(evaluator)):
             return None
         notes = start_notes(start, evaluator, checked.scene)
         warnings = tuple(note for note in notes if not note.startswith(INFORMATION))
-        return RebuiltPoint(_table_of(evaluator), evaluator.integrated(start.u), warnings)
+        y0 = evaluator.coordinates.start(start.u)  # before the numbers: they hold its reference
+        if self._structure_of(evaluator) != self._structure:
+            return None
+        return RebuiltPoint(numbers_of(evaluator), y0, warnings)
 
+    def _has_same_tolerances(self, model: Model) -> bool:
+        """True if the states of elements have the tolerances of the integration."""
+        from dap3d_core.model.element_states import tolerances
 
-def _table_of(evaluator: Evaluator) -> Floats:
-    s = evaluator.system
-    return np.concatenate([s.par, s.body.ravel(), s.metric.ravel()])
+        given = tolerances(self._compiled.model.acting)
+        return np.array_equal(tolerances(model.acting), given)
+
+    @staticmethod
+    def _structure_of(evaluator: Evaluator) -> bytes:
+        """The nodes of a tree, where there is one: joints may move otherwise at a point."""
+        tree = evaluator.system.tree
+        return b"" if tree is None else bytes(tree.nodes.tobytes())

@@ -9,14 +9,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.examine.random_values import numbers, random_pose
+from dap3d_core.interface.fields import SLOTS
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R, V, W
 
 Floats = NDArray[np.float64]
 
 #: In place of a function of time: an input, whose value stays.
 HELD = "held"
-#: Ground, and a body for each of the slots i, j, k.
-BODIES = 4
+#: Ground, and a body for each slot that a type may have.
+BODIES = 1 + len(SLOTS)
+#: Ground and the bodies of slots i, j, k, which are drawn first.
+DRAWN = 4
 
 
 @attrs.frozen
@@ -87,9 +90,9 @@ class Direction:
 
 @attrs.frozen(eq=False)
 class State:
-    """Time, and for ground and each slot r (4, 3), p (4, 4), velocity, angular velocity (4, 3).
+    """Time, and for ground and each slot r (9, 3), p (9, 4), velocity, angular velocity (9, 3).
 
-    ``mass`` (4,) and ``Jp`` (4, 9) are the bodies' inertia, ``functions`` those of time; None
+    ``mass`` (9,) and ``Jp`` (9, 9) are the bodies' inertia, ``functions`` those of time; None
     for an absent one. ``own`` (s,) are the states of the element, ``unknowns`` (k, 2) those of a
     joint, with their rates.
     """
@@ -106,7 +109,7 @@ class State:
     unknowns: Floats = attrs.field(factory=lambda: np.zeros((0, 2)))
 
     def body(self) -> Floats:
-        """(4, BODY_WIDTH) columns of the bodies, as a group loop reads them."""
+        """(9, BODY_WIDTH) columns of the bodies, as a group loop reads them."""
         body = np.zeros((BODIES, BODY_WIDTH))
         body[:, R : R + 3], body[:, A : A + 9] = self.r, rotation(self.p).reshape(BODIES, 9)
         body[:, V : V + 3], body[:, W : W + 3], body[:, P : P + 4] = self.v, self.w, self.p
@@ -187,16 +190,24 @@ def random_state(rng: random.Random, functions: Sequence[bool | str], *, grounde
         functions: True for each function of time that is present, HELD for an input.
         grounded: slot j is on ground.
     """
-    poses = [random_pose(rng) for _ in range(BODIES)]
-    r, p = np.array([x.r for x in poses]), np.array([x.p for x in poses])
-    v, w = (np.array([numbers(rng, 3) for _ in range(BODIES)]) for _ in range(2))
-    L = [np.reshape([rng.uniform(-0.3, 0.3) for _ in range(9)], (3, 3)) for _ in range(BODIES)]
-    Jp = np.array([(x @ x.T + 0.5 * np.eye(3)).ravel() for x in L])
-    mass = np.array([rng.uniform(0.5, 2.0) for _ in range(BODIES)])
+    first = _random_bodies(rng, DRAWN)
+    # drawn apart, so that the others do not depend on how many slots there are
+    rest = _random_bodies(random.Random(first[0][0, 0]), BODIES - DRAWN)
+    r, p, v, w, Jp, mass = (np.concatenate(pair) for pair in zip(first, rest, strict=True))
     for b in (0, 2) if grounded else (0,):
         r[b], p[b], v[b], w[b], mass[b], Jp[b] = 0.0, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0, 0.0
     present = (_row_of_time(rng, one) if one else None for one in functions)
     return State(rng.uniform(0.1, 1.0), r, p, v, w, mass, Jp, tuple(present))
+
+
+def _random_bodies(rng: random.Random, count: int) -> tuple[Floats, ...]:
+    """r, p, v, w, Jp (count, 9) and mass of random bodies."""
+    poses = [random_pose(rng) for _ in range(count)]
+    r, p = np.array([x.r for x in poses]), np.array([x.p for x in poses])
+    v, w = (np.array([numbers(rng, 3) for _ in range(count)]) for _ in range(2))
+    L = [np.reshape([rng.uniform(-0.3, 0.3) for _ in range(9)], (3, 3)) for _ in range(count)]
+    Jp = np.array([(x @ x.T + 0.5 * np.eye(3)).ravel() for x in L])
+    return r, p, v, w, Jp, np.array([rng.uniform(0.5, 2.0) for _ in range(count)])
 
 
 def _row_of_time(rng: random.Random, which: bool | str) -> TimeFunction | HeldInput:

@@ -20,7 +20,14 @@ from dap3d_core.interface.examine.random_values import numbers
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.testing.samples.cubic import Cubic
 from dap3d_core.testing.samples.random_element import Kernels, RandomElement, RefusalError, draw
-from dap3d_core.testing.samples.random_state import HELD, Direction, Floats, State, random_state
+from dap3d_core.testing.samples.random_state import (
+    BODIES,
+    HELD,
+    Direction,
+    Floats,
+    State,
+    random_state,
+)
 
 Cached = TypeVar("Cached")
 #: |C| of an assembled pose; maximal numbers of Newton steps and of starts.
@@ -378,7 +385,7 @@ def _is_singular(sample: Sample) -> bool:
 
 
 def _direction(x: Floats) -> Direction:
-    move, turn = np.zeros((4, 3)), np.zeros((4, 3))
+    move, turn = np.zeros((BODIES, 3)), np.zeros((BODIES, 3))
     move[1 : len(x) + 1], turn[1 : len(x) + 1] = x[:, :3], x[:, 3:]
     return Direction(move, turn)
 

@@ -208,8 +208,8 @@ def test_what_cannot_be_derived_is_refused_with_a_remedy():
     class Third(Base):
         function: str = function()
 
-        def C(r_P_i, f_dot):
-            return r_P_i[0] - f_dot
+        def C(r_P_i, f_ddot):
+            return r_P_i[0] - f_ddot
 
     for type_, words in [
         (Branch, "branch by where"),
@@ -217,7 +217,7 @@ def test_what_cannot_be_derived_is_refused_with_a_remedy():
         (Quadratic, "row 1 of C_dot is not linear in the velocities"),
         (Nothing, "does not define C_dot"),
         (Hidden, "gamma needs v_i, the velocity of the body, whose name a field has taken"),
-        (Third, "how f_ddot changes is not known"),
+        (Third, "how f_dddot changes is not known"),
     ]:
         with pytest.raises(PluginError, match=words) as caught:
             examine(type_)

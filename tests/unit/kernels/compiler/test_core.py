@@ -74,6 +74,11 @@ usual = elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS
 elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS = 0, 4, 0.3
 recorder.record(lambda: check_solution(Case(plate_net(8), np.random.default_rng(1))))
 elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS = usual
+from support.state_types import REGISTRY, stated, steered
+recorder.record(dap.simulate, dap.compile(steered(), registry=REGISTRY), t_end=0.1, dt=0.1,
+                integrator="radau")
+for settings in ({"integrator": "radau"}, {"method": "joint"}):
+    recorder.record(dap.simulate, stated(), t_end=0.2, dt=0.1, **settings)
 recorder.record(dap.simulate, everything(), t_end=1e-4, dt=1e-4, integrator="radau")
 """
 #: Functions that these runs do not call, of rare events of a run.

@@ -6,6 +6,7 @@ and leaves the mark of 1e-10 a hundredfold.
 
 import numpy as np
 import pytest
+from support.bouncing import bouncing, swinging
 from support.jumping import JUMPING
 
 import dap3d_core as dap
@@ -277,6 +278,61 @@ def test_a_moment_alone_turns_both_bars_as_the_mass_matrix_says():
     np.testing.assert_allclose(w, [2.0, -2.0 * M[1, 0] / M[1, 1]], rtol=0.0, atol=1e-12)
 
 
+def test_an_event_sets_states_and_velocities_follow():
+    """The speed of the drive is its state; the disc turns with it from then on."""
+    scene = dap.Scene(name="driven")
+    scene.add_body("disc", mass=1.0, Jp=(1.0, 1.0, 2.0), w=(0.0, 0.0, 1.0))
+    scene.add_joint("test-speed-drive", "drive", body_i="disc", a_j="ground.z", w_0=1.0, t_1=9.0,
+                    w_1=4.0)  # fmt: skip
+    event = dap.Event("t", above=0.5, action=lambda state: state.set("drive", w=3.0))
+    compiled = dap.compile(scene, registry=JUMPING)
+    result = dap.simulate(compiled, t_end=1.0, dt=0.2, events=[event], **TIGHT)
+    np.testing.assert_allclose(result.w[:, 0, 2], [1.0, 1.0, 1.0, 3.0, 3.0, 3.0], atol=1e-12)
+    np.testing.assert_array_equal(result.quantity("drive.w").values, [1.0] * 3 + [3.0] * 3)
+    (found,) = result.events
+    assert found.changes == {"drive": {"w": 3.0}}
+    assert found.work == pytest.approx(0.5 * 2.0 * (9.0 - 1.0), rel=1e-12)
+    assert result.ledger["energy"].value < 1e-12
+
+
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_an_event_sets_inputs_and_velocities_follow(method):
+    """A driven speed, which jumps with its input, and a force; results have the inputs as set."""
+    scene = dap.Scene(name="driven")
+    for name in ("speed", "thrust"):
+        scene.add_input(name, value=1.0)
+    scene.add_body("disc", mass=1.0, Jp=(1.0, 1.0, 2.0), w=(0.0, 0.0, -1.0))
+    scene.add_joint("rev", "axle", P_i="disc.O", P_j="ground.O", a_i="disc.z", a_j="ground.z")
+    scene.add_joint("rel-rot", "drive", body_i="disc", a_j="ground.z", input="speed")
+    scene.add_body("sledge", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(5.0, 0.0, 0.0))
+    scene.add_force("f", "engine", body_i="sledge", f=(1.0, 0.0, 0.0), input="thrust")
+
+    def act(state):
+        state.set("speed", value=3.0)
+        state.set("thrust", value=4.0)
+
+    event = dap.Event("t", above=0.5, action=act)
+    result = dap.simulate(scene, method=method, t_end=1.0, dt=0.2, events=[event], **TIGHT)
+    np.testing.assert_array_equal(result.quantity("thrust").values, [1.0] * 3 + [4.0] * 3)
+    sense = np.sign(result.w[0, 0, 2])
+    w = sense * result.w[:, 0, 2]
+    np.testing.assert_allclose(w, [1.0, 1.0, 1.0, 3.0, 3.0, 3.0], atol=1e-12)
+    assert result.rd[-1, 1, 0] == pytest.approx(0.5 * 0.5 + 2.0 * 0.5, abs=1e-12)
+    assert result.events[0].work == pytest.approx(0.5 * 2.0 * (9.0 - 1.0), rel=1e-12)
+    assert result.ledger["energy"].value < 1e-12
+
+
+def test_a_state_of_another_length_is_refused():
+    scene = dap.Scene(name="counted")
+    scene.add_body("ball", mass=2.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
+    scene.add_force("test-counter", "counter", P_i="ball.O")
+    event = dap.Event("t", above=0.1, action=lambda state: state.set("counter", count=(1.0, 2.0)))
+    with pytest.raises(
+        ValueError, match=r"counter\.count = \(1\.0, 2\.0\) should be a finite number"
+    ):
+        dap.simulate(dap.compile(scene, registry=JUMPING), t_end=1.0, events=[event])
+
+
 @pytest.mark.parametrize(
     ("name", "fields", "words"),
     [
@@ -291,3 +347,22 @@ def test_velocities_that_cannot_be_set_are_refused(name, fields, words):
     event = dap.Event("t", above=0.1, action=lambda state: state.set(name, **fields))
     with pytest.raises((dap.SimulationError, ValueError), match=words):
         dap.simulate(pendulums(), t_end=0.2, events=[event])
+
+
+def test_a_sweep_over_restitution_gives_what_single_runs_give():
+    values = [0.3, 0.9]
+    swept = dap.sweep(bouncing(), {"forces.floor.e": values}, outputs="ball.r.z", t_end=1.0,
+                      threads=1)  # fmt: skip
+    for k, e in enumerate(values):
+        single = dap.simulate(bouncing(e=e), t_end=1.0)
+        assert swept["ball.r.z"].values[k] == single.r[-1, 0, 2]
+
+
+def test_the_error_of_a_run_with_jumps_is_estimated():
+    """Loosely: within a factor of 100 of the error against the closed form, and not zero."""
+    result = dap.simulate(swinging(), t_end=2.5, rtol=1e-6, estimate_error=True)
+    exact = dap.simulate(swinging(), t_end=2.5, **TIGHT)
+    error = np.abs(result.r - exact.r)[:, 0].max()
+    estimate = result.error.r[:, 0].max()
+    assert len(jumps_of(result)) > 1
+    assert error / 100.0 < estimate < 100.0 * error

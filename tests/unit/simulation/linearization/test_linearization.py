@@ -123,7 +123,7 @@ def test_equilibrium_is_at_rest():
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
-        ({"inputs": ("pusch.f.x",)}, r"no force or driver 'pusch'.*did you mean 'push'"),
+        ({"inputs": ("pusch.f.x",)}, r"no input, force or driver 'pusch'.*did you mean 'push'"),
         ({"inputs": ("push.g.x",)}, r"no number 'g'"),
         ({"inputs": ("push.f",)}, r"name a component of f \(x, y or z\)"),
         ({"inputs": ("spring.k.x",)}, r"name k alone"),
@@ -133,7 +133,7 @@ def test_equilibrium_is_at_rest():
             r"theta_0 of force twist is no number.*numbers: k, c, n_a",
         ),
         ({"inputs": ("rub",)}, r"rub acts by the friction of a joint alone"),
-        ({"inputs": ("rail.k",)}, r"no force or driver 'rail'"),
+        ({"inputs": ("rail.k",)}, r"no input, force or driver 'rail'"),
         ({"outputs": ("cart.r.y_",)}, r"did you mean 'cart\.r\.[xyz]'"),
         ({"outputs": ("cart.r",)}, r"has components: name one, as cart\.r\.x"),
         ({"inputs": ("spring.k",), "outputs": ("spring.tension",)}, "force that is an input"),

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import mechanisms
+from support import mechanisms, trees
 from support.on_axles import driven, stone, wheel
 from support.plain import long_in_plain_python
 
@@ -264,12 +264,54 @@ def test_a_function_of_the_user_that_raises_fails_its_point():
     assert batch.values["of_small_masses"][[0, 2]].tolist() == [-1.0, 1.0]
 
 
-def test_points_in_joint_coordinates_are_run_one_by_one():
-    """A mass and a length of the joint change: each point is the run of its own scene."""
-    names = ["bodies.bob.mass", "points.A.sPp.y"]
-    of = ensemble(pendulum(), names, ["bob.r.z"], method="joint")
-    assert path_of(of) == "alone"
-    points = np.array([[2.0, 1.0], [3.0, 1.2]])
+def branched():
+    """A tree of all standard joints with one degree of freedom or more, and a free body."""
+    scene = trees.random_tree(7, seed=3, free=0.3)
+    scene.simulation.t_end, scene.simulation.dt = 0.2, 0.05
+    return scene
+
+
+#: Scene, varied numbers, outputs, how the points are run; in joint coordinates.
+TREES = {
+    "masses": (branched, ("bodies.b1.mass", "bodies.b4.mass"), ("b1.w:series", "b4.w"), "copied"),
+    "inertia": (pendulum, ("bodies.bob.Jp.x",), ("bob.w:series", "energy.total:mean"), "copied"),
+    "turns, friction": (
+        wheel, ("forces.spring.k", "forces.rubbing.mu"), ("wheel.w.z:series",), "copied"),
+    "reaction": (pendulum, ("forces.gravity.gravity",), ("pivot.force:max",), "copied"),
+    "constants of a joint": (
+        pendulum, ("bodies.bob.mass", "points.A.sPp.y"), ("bob.r.z", "pivot.lambda"), "rebuilt"),
+    "pose": (pendulum, ("bodies.bob.r.z",), ("bob.r:series",), "rebuilt"),
+    "given to a function": (
+        pendulum, ("bodies.bob.mass",), (lambda result: float(result.r[-1, 0, 0]),), "copied"),
+}  # fmt: skip
+
+
+@long_in_plain_python
+@pytest.mark.parametrize("case", TREES)
+def test_points_in_joint_coordinates_are_single_runs_bit_for_bit(case):
+    make, names, outputs, expected = TREES[case]
+    named = {getattr(of, "__name__", of).replace("<lambda>", "of"): of for of in outputs}
+    of = ensemble(make(), names, named, method="joint", t_end=0.3, dt=0.1)
+    given = np.array([parameter.value or 1.0 for parameter in of.parameters])
+    points = np.array([1.0, 1.2, 0.9])[:, None] * given
     batch, alone = of.run(points), singly(of, points)
-    assert (batch.status == DONE).all()
-    assert np.array_equal(batch.values["bob.r.z"], alone["bob.r.z"])
+    assert path_of(of) == expected
+    assert batch.status.tolist() == [DONE] * 3
+    for name, values in alone.items():
+        assert np.array_equal(batch.values[name], values)
+    assert any(np.ptp(values, axis=0).max() > 0.0 for values in alone.values())
+    again = of.run(points[::-1])  # whichever points were run before
+    for name, values in alone.items():
+        assert np.array_equal(again.values[name][::-1], values)
+
+
+@long_in_plain_python
+def test_velocities_in_joint_coordinates_start_as_those_of_single_runs():
+    """Rates of joints are those of body velocities, corrected in compiled code: rounding."""
+    of = ensemble(pendulum(), ["bodies.bob.r_dot.x"], ["bob.r:series", "bob.w"], method="joint")
+    points = np.array([[0.3], [0.9], [1.1]])
+    batch = of.run(points)
+    assert path_of(of) == "copied"
+    assert batch.status.tolist() == [DONE] * 3
+    for output, single in singly(of, points).items():
+        np.testing.assert_allclose(batch.values[output], single, rtol=0.0, atol=1e-13 * 10.0)

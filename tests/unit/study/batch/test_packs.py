@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support.on_axles import driven, stone, wheel
 from support.plain import long_in_plain_python
+from support.state_types import stated
 from unit.study.batch.test_batch import ensemble, pendulum
 
 import dap3d_core as dap
@@ -34,6 +35,11 @@ CASES = {
     "springs in free flight": (stone, {"forces.spring.k": (1.0, 9.0)}, "stone.r"),
     "multipliers": (pendulum, {"forces.gravity.gravity": (1.0, 20.0)}, "pivot.lambda"),
     "turns": (turning, {"forces.spring.k": (1.0, 3.0)}, "wheel.w.z:series"),
+    "states of elements": (
+        stated,
+        {"forces.spring.z_0": (0.0, 0.3), "forces.loop.beta": (1.0, 3.0)},
+        "loop.z:series",
+    ),
     "functions and their breaks": (driven, {"bodies.crank.Jp.z": (0.5, 1.5)}, "motor.lambda:max"),
 }
 

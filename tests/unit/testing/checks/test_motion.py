@@ -33,6 +33,7 @@ INSTALLED = {
         "1 rotation about n_j, constant in body j, and 1 rotation about a_i, constant in body i"
     ],
     "fix": ["none: the bodies move as one"],
+    "weld": ["none: the bodies move as one"],
     "screw": ["1 screw about a_j, constant in body j"],
     "sph-sph": [ONE_ROW],
     "rP": [ONE_ROW],

@@ -1,16 +1,18 @@
 """What acts on the coordinates of joints: springs, dampers, stops, rotors, couplings, inputs."""
 
+import re
 from math import isfinite, pi
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dap3d_core.formats.add_joints import JointEnds, from_ground
+from dap3d_core.formats.import_scene.joints import JointEnds, from_ground
 from dap3d_core.interface.formats.articulation import Articulation, Joint, Limits
 from dap3d_core.interface.formats.frames import Floats
+from dap3d_core.scene.scene import GROUND
 
 if TYPE_CHECKING:
-    from dap3d_core.formats.to_scene import SceneBuilder
+    from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 
 #: Stiffness of stops where the format says none, N m/rad and N/m.
 STOP_STIFFNESS = {"revolute": 1e4, "prismatic": 1e6}
@@ -59,7 +61,8 @@ class JointCoordinate:
         self.ends = _SameEnds(builder, joint)
         self.turns = joint.kind == "revolute"
         finite = [abs(x) for one in joint.limits for x in (one.lower, one.upper) if isfinite(x)]
-        self.back = 0.0 if self.turns else 1.0 + 2.0 * max([*finite, abs(joint.rest[0])])
+        rest = abs(joint.rest[0]) if joint.stiffness[0] else 0.0
+        self.back = 0.0 if self.turns else 1.0 + 2.0 * max([*finite, rest])
         if not self.turns and not all(map(isfinite, (joint.limits[0].lower,))):
             self.back = FAR
 
@@ -82,7 +85,7 @@ class JointCoordinate:
         if self.turns:
             fields |= {"theta_0": rest or None, "turns": True if k else None}
         else:
-            fields |= {"l0": self.back + rest}
+            fields |= {"l0": self.back + rest} if k else {}
         name = self.builder.names.free("forces", f"{self.ends.name}_spring" if k else
                                        f"{self.ends.name}_damper")  # fmt: skip
         self.builder.scene.add_force(keyword, name, k=k or None, c=c or None, **fields)
@@ -200,7 +203,30 @@ def _light(builder: "SceneBuilder", *joints: Joint) -> float:
 
 
 def add_inputs(builder: "SceneBuilder", model: Articulation) -> None:
-    """Add actuators as inputs with a force on the coordinate of their joint."""
+    """Add actuators as inputs, each a factor of a force or moment on both sides of a joint.
+
+    The force of a slider acts on the line of its axis, on both bodies.
+    """
+    scene, names = builder.scene, builder.names
     for actuator in model.actuators:
-        text = "actuators: this version has no inputs; add forces of your own"
-        builder.remarks.leave_out(actuator.place, text)
+        joint = from_ground(builder, model.joints[actuator.joint])
+        if builder.moves_alone(joint):
+            builder.remarks.leave_out(actuator.place, "an actuator of a joint that does not move")
+            continue
+        others = (scene.bodies, scene.points, scene.joints, scene.forces)
+        clash = any(actuator.name in table for table in others)
+        wanted = re.sub(r"\W", "_", f"{actuator.name}_input" if clash else actuator.name)
+        name = names.of("inputs", wanted, actuator.place, builder.remarks)
+        scene.add_input(name, 0.0)
+        ends = _SameEnds(builder, joint)
+        axis = np.asarray(joint.axes[0], dtype=float)
+        sides = (("i", ends.child, ends.on_child, 1.0), ("j", ends.parent, ends.on_parent, -1.0))
+        for end, body, frame, sign in sides:
+            if body == GROUND:
+                continue
+            vector = tuple((sign * actuator.gear * (frame.A @ axis) + 0.0).tolist())
+            force = names.free("forces", f"{name}_{end}")
+            if joint.kind == "revolute":
+                scene.add_force("np", force, body_i=body, np=vector, input=name)
+            else:
+                scene.add_force("fp", force, P_i=ends.point(end), fp=vector, input=name)

@@ -10,7 +10,7 @@ from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.scene.validate.shapes import MESHES
 
 if TYPE_CHECKING:
-    from dap3d_core.formats.to_scene import SceneBuilder
+    from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 
 #: Folder of the meshes next to a scene.
 FOLDER = "meshes"

@@ -10,7 +10,7 @@ from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.interface.formats.remarks import FormatError
 
 if TYPE_CHECKING:
-    from dap3d_core.formats.to_scene import SceneBuilder
+    from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 
 
 def add_joint(builder: "SceneBuilder", joint: Joint) -> None:

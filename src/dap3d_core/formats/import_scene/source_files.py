@@ -7,7 +7,7 @@ from pathlib import Path
 
 import attrs
 
-from dap3d_core.formats.mesh_file import read_mesh
+from dap3d_core.formats.import_scene.mesh_file import read_mesh
 from dap3d_core.interface.formats.frames import Floats, Integers
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Place, Remarks
 from dap3d_core.interface.formats.xml_tree import XmlElement, parse_xml
@@ -24,7 +24,7 @@ class SourceFiles:
     """The file that is imported, and those that it names (``interface.formats.Source``).
 
     Attributes:
-        path: the file.
+        path: the file; the names in it are relative to its folder.
         folder: the folder that its files must lie in, or below.
         packages: name of a package -> its folder.
         allow_code: whether the user allows that code of the file is run.
@@ -57,7 +57,7 @@ class SourceFiles:
         Raises:
             FormatError: it is not found, lies elsewhere, or includes itself.
         """
-        path = self._inside(name, place, base or self.folder)
+        path = self._inside(name, place, base or self.path.parent)
         if not path.is_file():
             raise FormatError(f"there is no file {name}", place)
         resolved = path.resolve()
@@ -72,7 +72,7 @@ class SourceFiles:
     @contextmanager
     def including(self, name: str, base: Path | None = None) -> Iterator[None]:
         """While what an included file holds is read: it must not include itself."""
-        self._open.append(self._inside(name, NOWHERE, base or self.folder).resolve())
+        self._open.append(self._inside(name, NOWHERE, base or self.path.parent).resolve())
         try:
             yield
         finally:
@@ -90,7 +90,7 @@ class SourceFiles:
         """
         if not self.shapes and not required:
             return None
-        path = self._inside(uri, place, base or self.folder)
+        path = self._inside(uri, place, base or self.path.parent)
         if not path.is_file() and required:
             raise FormatError(f"there is no file {uri}, whose mass properties count", place)
         if not path.is_file():

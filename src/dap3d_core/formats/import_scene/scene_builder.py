@@ -6,12 +6,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.formats.add_joints import add_joint
-from dap3d_core.formats.add_shapes import MeshFiles, add_shapes
-from dap3d_core.formats.joint_forces import add_couplings, add_inputs, add_joint_forces
-from dap3d_core.formats.names import Names
-from dap3d_core.formats.rigid_groups import RigidGroup, rigid_groups
-from dap3d_core.formats.spanning_tree import Placed, SpanningTree
+from dap3d_core.formats.import_scene.joint_forces import add_couplings, add_inputs, add_joint_forces
+from dap3d_core.formats.import_scene.joints import add_joint
+from dap3d_core.formats.import_scene.names import Names
+from dap3d_core.formats.import_scene.rigid_groups import RigidGroup, rigid_groups
+from dap3d_core.formats.import_scene.shapes import MeshFiles, add_shapes
+from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Link
 from dap3d_core.interface.formats.frames import Floats, Frame, quaternion
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
@@ -107,6 +107,10 @@ def scene_of(
     placed = tree.place(options.positions, options.rates)
     scene = Scene(name=model.name)
     scene.simulation.t_end, scene.simulation.dt = DURATION, STEP
+    if not all(group.has_mass for group in groups.values()):
+        scene.simulation.method = "joint"
+        text = "method joint, for links without mass: others lose digits to them"
+        remarks.translate(model.place, text)
     builder = SceneBuilder(scene, remarks, groups, member, options.positions, options.rates,
                            names or Names())  # fmt: skip
     builder.bodies[WORLD] = GROUND

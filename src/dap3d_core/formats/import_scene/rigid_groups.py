@@ -3,14 +3,14 @@
 import attrs
 import numpy as np
 
-from dap3d_core.formats.spanning_tree import SpanningTree
+from dap3d_core.formats.import_scene.spanning_tree import SpanningTree
 from dap3d_core.interface.formats.articulation import WORLD, Inertial, Link
 from dap3d_core.interface.formats.frames import IDENTITY, Frame
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
 from dap3d_core.interface.formats.solids import inertia_moved, total_inertia
 
 #: Mass and inertia of a link without any that moves, as a part of what it carries.
-STAND_IN = 1e-8
+STAND_IN = 1e-11
 #: Principal moments below this part of the largest count as zero.
 SMALLEST = 1e-12
 #: Departure from symmetry up to which an inertia matrix counts as symmetric, relative.
@@ -123,8 +123,8 @@ def _stand_in(
 ) -> None:
     """Give groups that move without mass, or without inertia, the least that can be computed.
 
-    It is a part of what the group carries: much less would be lost to rounding in the equations of
-    motion, much more would be seen in accelerations.
+    It is a part of what the group carries. Method ``joint`` loses nothing to rounding by it, since
+    it adds inertias along the tree; a saddle-point matrix would hold its reciprocal.
     """
     moving = [g for g in groups.values() if g.name != WORLD]
     masses = [g.inertial.mass for g in moving if g.inertial.mass > 0.0]

@@ -1,0 +1,85 @@
+"""Actuators of MJCF: motors, and servos whose law is a spring and a damper."""
+
+from typing import TYPE_CHECKING
+
+from dap3d_formats.mjcf.document import ACTUATORS
+
+from dap3d_core.interface.formats import Actuator, FormatError, Joint, XmlElement
+
+if TYPE_CHECKING:
+    from dap3d_formats.mjcf.importer import MjcfReader
+
+#: Joints with one coordinate.
+SCALAR = ("revolute", "prismatic")
+
+
+def read_actuators(reader: "MjcfReader") -> None:
+    """Read actuators on joints whose force is linear; others are left out, remarked.
+
+    Raises:
+        FormatError: one names a joint that is not there.
+    """
+    for holder in reader.document.root.all("actuator"):
+        for given in holder:
+            if given.name in ACTUATORS and given.name != "plugin":
+                _read(reader, reader.document.settled(given, "main"))
+
+
+def _read(reader: "MjcfReader", element: XmlElement) -> None:
+    remarks = reader.document.source.remarks
+    name = element.get("name") or f"actuator{len(reader.model.actuators) + 1}"
+    joint = element.get("joint") or element.get("jointinparent")
+    law = _law(element)
+    if joint is None or law is None:
+        what = "its law" if joint else "on tendons, sites and bodies"
+        remarks.leave_out(element.place, f"an actuator <{element.name}>: {what}")
+        return
+    if joint not in reader.model.joints:
+        raise FormatError(f"actuator {name}: there is no joint {joint!r}", element.place)
+    target = reader.model.joints[joint]
+    if target.kind not in SCALAR:
+        remarks.leave_out(element.place, "actuators of joints with several coordinates")
+        return
+    gear = element.numbers("gear", None, (1.0,))[0]
+    gain, constant, position, rate = law
+    reference = reader.references.get(joint, 0.0)
+    _add_law(target, gear * constant + gear * gear * position * reference,
+             -gear * gear * position, -gear * gear * rate)  # fmt: skip
+    if gear * constant and not target.stiffness[0]:
+        remarks.leave_out(element.place, "a constant force of an actuator")
+    if position or rate:
+        text = "a servo is an input, and a spring and a damper of its joint"
+        remarks.translate(element.place, text)
+    reader.model.actuators.append(Actuator(name, joint, gear * gain, element.place))
+
+
+def _law(element: XmlElement) -> tuple[float, float, float, float] | None:
+    """Gain g and bias (b0, b1, b2) of the force g u + b0 + b1 length + b2 rate; None for others."""
+    if element.name == "motor":
+        return 1.0, 0.0, 0.0, 0.0
+    if element.name == "position" and "dampratio" not in element.attributes:
+        kp = element.number("kp", 1.0)
+        return kp, 0.0, -kp, -element.number("kv", 0.0)
+    if element.name == "velocity":
+        kv = element.number("kv", 1.0)
+        return kv, 0.0, 0.0, -kv
+    plain = {"dyntype": ("none",), "gaintype": ("fixed",), "biastype": ("none", "affine")}
+    if element.name != "general" or any(
+        element.get(key, words[0]) not in words for key, words in plain.items()
+    ):
+        return None
+    gain = element.numbers("gainprm", None, (1.0,))[0]
+    if element.get("biastype", "none") == "none":
+        return gain, 0.0, 0.0, 0.0
+    b0, b1, b2 = (*element.numbers("biasprm", None, (0.0,)), 0.0, 0.0)[:3]
+    return gain, b0, b1, b2
+
+
+def _add_law(joint: Joint, constant: float, stiffness: float, damping: float) -> None:
+    """Add a force constant - stiffness q - damping q_dot to the spring and damper of a joint."""
+    k, rest = joint.stiffness[0], joint.rest[0]
+    total = k + stiffness
+    joint.damping = (joint.damping[0] + damping,)
+    if total:
+        joint.rest = ((k * rest + constant) / total,)
+        joint.stiffness = (total,)

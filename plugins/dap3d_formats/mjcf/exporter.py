@@ -1,0 +1,185 @@
+"""Writes MJCF."""
+
+from math import isfinite, isinf
+
+from dap3d_core.interface.formats import (
+    NOWHERE,
+    WORLD,
+    Articulation,
+    Exporter,
+    FormatError,
+    Frame,
+    Geometry,
+    Joint,
+    Link,
+    Remarks,
+    quaternion,
+)
+from dap3d_formats.xml_text import XmlText, words
+
+#: Kind of a joint -> types of the joints of a body.
+TYPES = {
+    "revolute": ("hinge",), "prismatic": ("slide",), "ball": ("ball",), "fixed": (),
+    "universal": ("hinge", "hinge"), "cylindrical": ("slide", "hinge"),
+}  # fmt: skip
+#: Coordinates beyond stand for no limit on one side.
+UNLIMITED = 1e6
+
+
+class MjcfExporter(Exporter):
+    """Bodies, joints, equalities and shapes as an MJCF file."""
+
+    keyword, title, suffix = "mjcf", "MJCF", ".xml"
+
+    def write(self, model: Articulation, remarks: Remarks) -> str:
+        """The text of a file."""
+        return _Writer(model, remarks).write()
+
+
+class _Writer:
+    """Writes one model."""
+
+    def __init__(self, model: Articulation, remarks: Remarks) -> None:
+        self.model, self.remarks, self.text = model, remarks, XmlText()
+        self.placing = {j.child: j for j in model.joints.values() if not j.closes}
+        self.children: dict[str, list[str]] = {}
+        for name in model.links:
+            parent = self.placing[name].parent if name in self.placing else WORLD
+            self.children.setdefault(parent, []).append(name)
+        meshes = [g for link in model.links.values() for g in link.geometries if g.kind == "mesh"]
+        self.meshes = {(str(g.mesh), g.scale): "" for g in meshes}
+        for k, key in enumerate(self.meshes, 1):
+            self.meshes[key] = f"mesh{k}"
+
+    def write(self) -> str:
+        """The text of the file."""
+        text, model = self.text, self.model
+        text.open("mujoco", model=model.name)
+        text.empty("compiler", angle="radian", inertiafromgeom="false")
+        text.empty("option", gravity=words(model.gravity))
+        if self.meshes:
+            text.open("asset")
+            for (file, scale), name in self.meshes.items():
+                text.empty("mesh", name=name, file=file, scale=words(scale))
+            text.close("asset")
+        text.open("worldbody")
+        for name in self.children.get(WORLD, []):
+            self._body(model.links[name])
+        text.close("worldbody")
+        self._equalities()
+        if model.actuators:
+            text.open("actuator")
+            for one in model.actuators:
+                text.empty("motor", name=one.name, joint=one.joint, gear=words([one.gear]))
+            text.close("actuator")
+        text.close("mujoco")
+        return text.text()
+
+    def _body(self, link: Link) -> None:
+        text, joint = self.text, self.placing.get(link.name)
+        pose = Frame()
+        if joint is not None and joint.kind == "free":
+            pos, quat = joint.position[:3], joint.position[3:]
+        else:
+            pose = pose if joint is None else joint.in_parent @ joint.in_child.inverse()
+            pos, quat = tuple(pose.r), quaternion(pose.A)
+        text.open("body", name=link.name, pos=words(pos), quat=words(quat))
+        if joint is not None:
+            self._joint(joint)
+        if link.inertial is not None:
+            J = link.inertial.inertia
+            full = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
+            text.empty("inertial", pos=words(link.inertial.com), mass=words([link.inertial.mass]),
+                       fullinertia=words(full))  # fmt: skip
+        for geometry in link.geometries:
+            self._geom(geometry)
+        for name in self.children.get(link.name, []):
+            self._body(self.model.links[name])
+        text.close("body")
+
+    def _joint(self, joint: Joint) -> None:
+        if joint.kind == "free":
+            self.text.empty("freejoint", name=joint.name)
+            return
+        if joint.kind not in TYPES:
+            raise FormatError(f"joint {joint.name} is {joint.kind}, which MJCF does not have")
+        types = TYPES[joint.kind]
+        if len(types) > 1:
+            text = f"joint {joint.name} is {joint.kind}: two joints of a body"
+            self.remarks.translate(NOWHERE, text)
+        axes = joint.axes if joint.kind == "universal" else joint.axes * len(types)
+        for k, type_ in enumerate(types):
+            attributes = {"name": joint.name if not k else f"{joint.name}_{k + 1}", "type": type_,
+                          "pos": words(joint.in_child.r)}  # fmt: skip
+            if type_ != "ball":
+                attributes["axis"] = words(joint.in_child.A @ axes[k])
+            if len(types) == 1 and type_ != "ball":
+                attributes |= self._dynamics(joint)
+            self.text.empty("joint", **attributes)
+
+    def _dynamics(self, joint: Joint) -> dict[str, str]:
+        attributes = {
+            key: words(values)
+            for key, values in (("damping", joint.damping), ("stiffness", joint.stiffness),
+                                ("springref", joint.rest), ("armature", joint.armature))
+            if values[0]
+        }  # fmt: skip
+        limits = joint.limits[0]
+        if not (isinf(limits.lower) and isinf(limits.upper)):
+            low = limits.lower if isfinite(limits.lower) else -UNLIMITED
+            high = limits.upper if isfinite(limits.upper) else UNLIMITED
+            attributes["range"] = words([low, high])
+            self.remarks.translate(NOWHERE, "stops are limits, whose stiffness is the solver's")
+        return attributes
+
+    def _geom(self, geometry: Geometry) -> None:
+        kind, size = geometry.kind, geometry.size
+        attributes = {"type": kind, "pos": words(geometry.pose.r),
+                      "quat": words(quaternion(geometry.pose.A)), "contype": "0",
+                      "conaffinity": "0", "mass": "0"}  # fmt: skip
+        if kind == "mesh":
+            attributes["mesh"] = self.meshes[str(geometry.mesh), geometry.scale]
+        elif kind == "box":
+            attributes["size"] = words(edge / 2.0 for edge in size)
+        elif kind in ("cylinder", "capsule"):
+            attributes["size"] = words([size[0], size[1] / 2.0])
+        else:
+            attributes["size"] = words(size)
+        if geometry.color:
+            rgb = (int(geometry.color[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+            attributes["rgba"] = words([*rgb, 1.0])
+        self.text.empty("geom", **attributes)
+
+    def _equalities(self) -> None:
+        loops = [joint for joint in self.model.joints.values() if joint.closes]
+        if not loops and not self.model.couplings:
+            return
+        self.text.open("equality")
+        for joint in loops:
+            self._loop(joint)
+        for coupling in self.model.couplings:
+            self.text.empty("joint", joint1=coupling.joint, joint2=coupling.other,
+                            polycoef=words([coupling.offset, coupling.ratio, 0, 0, 0]))  # fmt: skip
+        self.text.close("equality")
+
+    def _loop(self, joint: Joint) -> None:
+        """A loop: <connect> holds points together, <weld> bodies; a hinge has two points."""
+        one, other, frame = joint.parent, joint.child, joint.in_parent
+        if one == WORLD:  # body1 is no world
+            one, other, frame = joint.child, joint.parent, joint.in_child
+        ends = {"body1": one} | ({"body2": other} if other != WORLD else {})
+        if joint.kind == "fixed":
+            in_other = joint.in_child if one == joint.parent else joint.in_parent
+            pose = frame @ in_other.inverse()
+            self.text.empty("weld", name=joint.name, **ends,
+                            relpose=words([*pose.r, *quaternion(pose.A)]))  # fmt: skip
+            return
+        if joint.kind not in ("ball", "revolute"):
+            raise FormatError(f"joint {joint.name} closes a loop; MJCF has no equality for a "
+                              f"{joint.kind} joint")  # fmt: skip
+        self.text.empty("connect", name=joint.name, **ends, anchor=words(frame.r))
+        if joint.kind == "revolute":
+            text = f"joint {joint.name} closes a loop as two points on its axis"
+            self.remarks.translate(NOWHERE, text)
+            further = frame.r + frame.A @ joint.axes[0]
+            self.text.empty("connect", name=f"{joint.name}_2", **ends, anchor=words(further))

@@ -1,0 +1,83 @@
+"""``export_model``: a scene as a model of another program."""
+
+import os
+from pathlib import Path
+
+import attrs
+
+from dap3d_core.formats.export_scene.articulation import articulation_of
+from dap3d_core.interface.formats import FormatError, Remark, Remarks
+from dap3d_core.registry import Registry, load_registry
+from dap3d_core.registry.formats import load_formats
+from dap3d_core.scene import Scene, SceneError, check, load
+from dap3d_core.scene.errors import MISSING, Mistake
+
+
+@attrs.frozen
+class ExportReport:
+    """The report of an export of a scene.
+
+    Attributes:
+        format: the exporter's keyword.
+        text: of the file.
+        translated: contents that the format says in another way.
+        left_out: contents that it cannot say.
+    """
+
+    format: str
+    text: str
+    translated: tuple[Remark, ...]
+    left_out: tuple[Remark, ...]
+
+
+def export_model(
+    scene: Scene | str | os.PathLike[str],
+    path: str | os.PathLike[str] | None = None,
+    *,
+    format: str,
+    strict: bool = False,
+    force: bool = False,
+    registry: Registry | None = None,
+) -> ExportReport:
+    """Write a scene as a model of another program: URDF, MJCF, or a format of a plugin.
+
+    Args:
+        scene: the scene; or its name, folder or file.
+        path: the file; None writes none.
+        format: keyword of an exporter.
+        strict: refuse a scene of which something would be left out.
+        force: overwrites an existing file.
+        registry: the installed types; by default all.
+
+    Raises:
+        SceneError: the scene is invalid, or the format cannot say its mechanism.
+        PluginError: there is no such exporter, or it is broken.
+        OSError: the file cannot be written, or exists and ``force`` is off.
+    """
+    exporter = load_formats("exporter").get(format)
+    given = scene if isinstance(scene, Scene) else load(scene)
+    check(given, load_registry() if registry is None else registry)
+    remarks = Remarks()
+    try:
+        text = exporter.write(articulation_of(given.resolved(), remarks), remarks)
+    except FormatError as error:
+        mistake = Mistake("", MISSING, f"{format}: {error.what}", remedy=error.remedy)
+        raise SceneError([mistake]) from None
+    if strict and remarks.left_out:
+        raise SceneError(
+            Mistake("", MISSING, f"{one.text}: it would be left out") for one in remarks.left_out
+        )
+    if path is not None:
+        _write(Path(path), text, force=force)
+    return ExportReport(format, text, remarks.translated, remarks.left_out)
+
+
+def _write(path: Path, text: str, *, force: bool) -> None:
+    if not force and path.exists():
+        raise FileExistsError(f"{path} exists; force overwrites it")
+    temporary = path.with_name(f".{path.name}.part")
+    try:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+        os.replace(temporary, path)
+    finally:
+        temporary.unlink(missing_ok=True)

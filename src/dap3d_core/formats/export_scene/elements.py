@@ -1,0 +1,169 @@
+"""Bodies and joints of a scene with their frames, for export."""
+
+from typing import Any, NamedTuple
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.formats.frames import Floats, Frame, from_quaternion
+from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
+from dap3d_core.scene.scene import GROUND, Element, Scene
+
+#: Type of a joint of a scene -> kind of a joint of a model.
+KINDS = {"rev": "revolute", "tran": "prismatic", "sph": "ball", "cyl": "cylindrical",
+         "univ": "universal"}  # fmt: skip
+
+
+class SceneBody(NamedTuple):
+    """Mass, inertia in body axes, and pose of the mass centre."""
+
+    mass: float
+    inertia: Floats
+    pose: Frame
+
+
+@attrs.frozen(eq=False)
+class SceneJoint:
+    """A joint with its points as frames of its bodies, and its axes in the axes of body i."""
+
+    name: str
+    kind: str
+    body_i: str
+    body_j: str
+    on_i: Frame
+    on_j: Frame
+    axes: tuple[Floats, ...]
+    turn: Floats  # the rotation of body j in the axes of body i
+
+    def reversed(self) -> "SceneJoint":
+        """The same joint with its bodies exchanged; coordinates keep their sense."""
+        axes = tuple(-self.turn.T @ axis for axis in self.axes)
+        return attrs.evolve(self, body_i=self.body_j, body_j=self.body_i, on_i=self.on_j,
+                            on_j=self.on_i, axes=axes, turn=self.turn.T)  # fmt: skip
+
+
+@attrs.define(eq=False)
+class Rotor:
+    """A wheel on ground, and the joints that turn with it: (name of a follower, its fields)."""
+
+    inertia: float
+    followers: list[tuple[str, dict[str, Any]]] = attrs.Factory(list)
+
+
+@attrs.define(eq=False)
+class SceneElements:
+    """The elements of a scene.
+
+    Attributes:
+        bodies: by name, ground included, wheels left out.
+        joints: of kinds that a model has.
+        rotors: wheels of followers, by name.
+    """
+
+    scene: Scene
+    bodies: dict[str, SceneBody] = attrs.Factory(dict)
+    joints: list[SceneJoint] = attrs.Factory(list)
+    rotors: dict[str, Rotor] = attrs.Factory(dict)
+
+    @classmethod
+    def of(cls, scene: Scene) -> "SceneElements":
+        """The elements of a valid scene.
+
+        Raises:
+            FormatError: a joint has no counterpart.
+        """
+        elements = cls(scene)
+        elements.bodies[GROUND] = SceneBody(0.0, np.zeros((3, 3)), Frame())
+        for name, body in scene.bodies.items():
+            given = (1.0, 1.0, 1.0) if body.Jp is None else body.Jp
+            J = np.asarray(given, dtype=float)
+            pose = Frame(body.r, from_quaternion(body.p))
+            mass = 1.0 if body.mass is None else float(body.mass)
+            elements.bodies[name] = SceneBody(mass, np.diag(J) if J.ndim == 1 else J, pose)
+        elements._read_joints()
+        for name in elements.rotors:
+            del elements.bodies[name]
+        return elements
+
+    def point(self, name: str) -> tuple[str, Floats]:
+        """The body of a point, and its coordinates."""
+        body, dot, tail = name.rpartition(".")
+        if dot and tail == "O":
+            return body, np.zeros(3)
+        point = self.scene.points[name]
+        return str(point.body), np.asarray(point.sPp, dtype=float)
+
+    def vector(self, name: str) -> tuple[str, Floats]:
+        """The body of a vector, and its direction."""
+        body, dot, tail = name.rpartition(".")
+        if dot and tail in ("x", "y", "z"):
+            return body, np.eye(3)["xyz".index(tail)]
+        vector = self.scene.vectors[name]
+        sp = np.asarray(vector.sp, dtype=float)
+        return str(vector.body), sp / np.linalg.norm(sp)
+
+    def ends(self, fields: dict[str, Any]) -> tuple[str, str]:
+        """The points of an element, also of a vector of type 2."""
+        if "d" in fields:
+            d = self.scene.vectors2[fields["d"]]
+            return str(d.P_i), str(d.P_j)
+        return fields["P_i"], fields["P_j"]
+
+    def turn(self, of: str, other: str) -> Floats:
+        """The rotation of body ``other`` in the axes of body ``of``."""
+        return np.asarray(self.bodies[of].pose.A.T @ self.bodies[other].pose.A)
+
+    def _read_joints(self) -> None:
+        joints = self.scene.joints
+        wheels = {self.vector(e.fields["a_k"])[0] for e in joints.values() if e.type == "follow"}
+        locks = {
+            self.ends(e.fields): name for name, e in joints.items()
+            if e.type == "drive-tran" and "function" not in e.fields and "P_i" in e.fields
+        }  # fmt: skip
+        for name, element in joints.items():
+            if element.type == "follow":
+                wheel = self.vector(element.fields["a_k"])[0]
+                inertia = float(self.bodies[wheel].inertia[2, 2])
+                rotor = self.rotors.setdefault(wheel, Rotor(inertia))
+                rotor.followers.append((name, element.fields))
+            elif element.type == "fix":
+                self._fixed(element)
+            elif element.type == "drive-tran" and name in locks.values():
+                continue
+            elif element.type in KINDS:
+                joint = self._joint(element)
+                if joint.body_i in wheels or joint.body_j in wheels:
+                    continue
+                if element.type == "tran" and self.ends(element.fields) in locks:
+                    joint = attrs.evolve(joint, kind="fixed")
+                self.joints.append(joint)
+            else:
+                what = f"joint {name}: no joint of a model is of type {element.type!r}"
+                raise FormatError(what)
+
+    def _fixed(self, element: Element) -> None:
+        body = str(element.fields["body_i"])
+        pose = self.bodies[body].pose
+        self.joints.append(SceneJoint(element.name, "fixed", body, GROUND, Frame(), Frame(pose.r),
+                                      (), self.turn(body, GROUND)))  # fmt: skip
+
+    def _joint(self, element: Element) -> SceneJoint:
+        fields = element.fields
+        (i, r_i), (j, r_j) = (self.point(end) for end in self.ends(fields))
+        turn = self.turn(i, j)
+        axes: tuple[Floats, ...]
+        if element.type == "univ":  # the arm on the parent, then that on the child
+            axes = (turn @ self.vector(fields["n_j"])[1], self.vector(fields["a_i"])[1])
+        elif element.type == "sph":
+            axes = ()
+        elif "a_i" in fields:
+            axes = (self.vector(fields["a_i"])[1],)
+        else:
+            axes = (turn @ self.vector(fields["a_j"])[1],)
+        return SceneJoint(element.name, KINDS[str(element.type)], i, j, Frame(r_i), Frame(r_j),
+                          axes, turn)  # fmt: skip
+
+
+def leave_out(remarks: Remarks, element: Element, why: str) -> None:
+    """Remark that an element of a scene is left out."""
+    remarks.leave_out(NOWHERE, f"{element.name} of type {element.type}: {why}")

@@ -1,0 +1,59 @@
+"""Runs from one start again and again: arrays put back, one compiled call.
+
+What a run costs beside its steps, some 25 us to check arguments and allocate, is more than the
+integration of a small scene. The points of a study are run so in compiled code
+(study/batch/driver.py).
+"""
+
+from typing import Any
+
+from dap3d_core.integrators.runge_kutta.integration import RungeKutta
+from dap3d_core.integrators.stepping.integration import Integration
+from dap3d_core.integrators.stepping.integration_state import FINISHED, Y
+from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.runtime.cache import jit_is_on
+
+#: Right-hand sides of one call: all.
+ALL = 10**15
+
+
+class PreparedRun:
+    """An integration that can be run again; each run equals that of a new one bit for bit.
+
+    Attributes:
+        integration: in the state in which the last run left it; its rows are those of that run.
+    """
+
+    def __init__(self, integration: Integration) -> None:
+        """Args: an integration at its start, whose buffer takes all rows of a run.
+
+        Raises:
+            ValueError: it has begun, its buffer is too small, or it stops at break points or counts
+                turns, which lie outside its own arrays.
+        """
+        work = integration.work
+        if work.step_count or work.next_report:
+            raise ValueError("the integration has begun: prepare a new one")
+        if len(work.rows) < len(work.times):
+            raise ValueError(f"the buffer takes {len(work.rows)} of {len(work.times)} rows")
+        if integration.tstops or work.calls_accepted:
+            raise ValueError("break points and counted turns are not put back to the start")
+        self.integration = integration
+        arrays = integration.state_arrays()
+        if isinstance(integration, RungeKutta):  # what else it has is written before it is read
+            arrays = [work.real, work.integer, work.switches, work.tolerance, work.lengths]
+        self._arrays = [(array, array.copy()) for array in arrays if array.size]
+        self._first: Floats = work.state[Y].copy()
+        self._call: Any = integration._advance if jit_is_on() else integration._call_compiled
+
+    def run(self, y0: Floats | None = None) -> bool:
+        """Run from a state y0 (n,), by default that of the integration; True if it was finished.
+
+        Otherwise ``integration.status`` says why not.
+        """
+        work = self.integration.work
+        for array, first in self._arrays:
+            array[...] = first
+        work.state[Y] = self._first if y0 is None else y0
+        self._call(ALL)
+        return bool(work.status == FINISHED)

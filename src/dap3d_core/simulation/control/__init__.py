@@ -1,0 +1,1 @@
+"""Controllers of a run: sampled, and their inputs held."""

@@ -1,0 +1,1 @@
+"""Runs that a script takes step by step."""

@@ -1,0 +1,271 @@
+"""A run that a script takes step by step: for learning, hardware, loops of one's own."""
+
+import math
+import os
+from collections.abc import Callable, Mapping
+
+import attrs
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dap3d_core.assembly.arrays import CHECKPOINTED
+from dap3d_core.formulations import REPORT
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
+from dap3d_core.integrators import Status
+from dap3d_core.integrators.stepping.hold import Hold
+from dap3d_core.integrators.stepping.integration_state import Y
+from dap3d_core.result import Result
+from dap3d_core.scene import Scene
+from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.control.held_inputs import HeldInputs
+from dap3d_core.simulation.control.sampled import jump
+from dap3d_core.simulation.control.state_view import StateView
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.handover import hand_over
+from dap3d_core.simulation.initial.given_state import state_of
+from dap3d_core.simulation.output.termination import why_stopped
+from dap3d_core.simulation.run import Run
+from dap3d_core.simulation.run_state import Callbacks
+from dap3d_core.simulation.settings import compiled_for, settings_of
+
+Floats = NDArray[np.float64]
+
+#: Where a run without a final time ends at last, s: steps cannot resolve time any further.
+HORIZON = 1e5
+#: Rows that a record has room for at first; it doubles.
+FIRST_ROWS = 1024
+
+
+class SteppedRun:
+    """A run that waits for ``step``; ``dap.start`` makes it.
+
+    Attributes:
+        compiled: the model.
+        state: the present state, a ``StateView``: ``run.state["crank.r.z"]``.
+        notes: what the run chose, changed or noticed, in order.
+    """
+
+    def __init__(self, run: Run, *, record: bool) -> None:
+        """Args: a run that was not begun; whether the states between steps are kept."""
+        self.compiled, self._run = run.compiled, run
+        evaluator = self._evaluator = run.evaluator = run.compiled.new_evaluator()
+        run.initialise()
+        self.state = StateView(run.compiled, evaluator)
+        self.notes = run.notes
+        self._inputs = HeldInputs(evaluator)
+        self._failure = ""
+        self._attach()
+        integration = run.present
+        self._integration, system = integration, evaluator.system
+        arrays = [*integration.state_arrays(), *(getattr(system, name) for name in CHECKPOINTED)]
+        if evaluator.formulation.has_own_coordinates:
+            arrays.append(system.tree.constants)  # the poses that coordinates count from
+        self._start = [(array, array.copy()) for array in arrays]
+        numbers = np.arange(len(system.par))
+        turns = [numbers[place] for place in evaluator.turn_places()]
+        self._turns = np.concatenate(turns) if turns else numbers[:0]
+        self._size = int(integration.work.state.shape[1])
+        width = 1 + self._size + len(self._inputs.values) + len(self._turns)
+        self._is_recorded = record
+        self._log = np.empty((FIRST_ROWS if record else 1, width))
+        self._count = 0
+
+    @property
+    def t(self) -> float:
+        """Time reached, s."""
+        return self._hold.t
+
+    def step(self, dt: float, inputs: Mapping[str, float] | None = None) -> float:
+        """Set inputs, and integrate for a time dt, s, in which they are held.
+
+        Args:
+            dt: s, positive.
+            inputs: {input: value} of those that change.
+
+        Returns:
+            the time reached, s.
+
+        Raises:
+            ValueError: dt is no positive number, an input does not exist, or a value is not finite.
+            SimulationError: the run cannot go on; what was computed is ``.result``.
+        """
+        if self._failure:
+            raise SimulationError(self._failure, self.result())
+        hold = self._hold
+        t = hold.t
+        end = t + dt
+        if not t < end < math.inf:
+            raise ValueError(f"dt is {dt!r}; it should be a positive number of seconds")
+        if inputs and self._inputs.set(inputs):
+            jump(self._evaluator, hold, drives=self._inputs.drives)
+        if self._is_recorded:
+            self._note_state(t)
+        if not hold.to(end) or self._run.until < math.inf:
+            self._go_on(end)
+        self.state.changed()
+        return end
+
+    def reset(self, u: ArrayLike | None = None) -> None:
+        """Begin again at t = 0, with the inputs of the scene; what was recorded is given up.
+
+        Args:
+            u: (13 n,) state to begin from, in the order of ``Result.u``; it is brought onto the
+                constraints. By default that of the start.
+
+        Raises:
+            ValueError: u is not 13 n finite numbers.
+            SimulationError: no state on the constraints was found near u.
+        """
+        run, evaluator = self._run, self._evaluator
+        run.integrations[:] = [self._integration]
+        run.crossed, run.until = [], math.inf
+        for array, first in self._start:
+            array[...] = first
+        self._inputs.replace(evaluator.model.input_values.tolist())
+        self._failure, self._count = "", 0
+        self._hold.forget()
+        if self._hold.integration is not self._integration:
+            self._attach()
+        self.state.restarted()
+        if u is not None:
+            state = state_of(u, evaluator.model.body_names)
+            evaluator.start(0.0, state)
+            self._integration.work.state[Y] = evaluator.coordinates.start(state)
+            self._integration.restart()
+            if not self._integration.project():
+                raise SimulationError("no state that satisfies the constraints was found near u")
+
+    def result(self) -> Result:
+        """The states at the ends of all steps so far, with the inputs that act from there on.
+
+        Accelerations and reactions are computed here. Without ``record`` the present state alone.
+        """
+        noted, t = np.vstack([self._log[: self._count], self._present_row(self.t)]), self.t
+        record = self._run.record("stopped" if self._failure else "done")
+        record = attrs.evolve(record, settings=record.settings | {"t_end": t, "dt": None})
+        rows = self._reports(noted)
+        return Result.of_run(self._evaluator.model, rows, record, lambda: self.compiled.evaluator)
+
+    # ---------------------------------------------------------------- steps
+
+    def _attach(self) -> None:
+        """Work with the present integration."""
+        self._hold = Hold(self._run.present, self._evaluator.model.body_count)
+        self.state.attach(self._run.present)
+
+    def _go_on(self, end: float) -> None:
+        """Reach the end of a step that one compiled call has not reached."""
+        run = self._run
+        while True:
+            present = run.present
+            present.rows()  # those of the integration are not used
+            if present.status is Status.RUNNING and present.t < min(end, run.until):
+                self._hold.to(min(end, run.until), 0 if run.until < math.inf else None)
+            elif present.status is Status.RUNNING and present.t < run.until:
+                return
+            elif hand_over(run):
+                self._attach()
+            else:
+                self._stop()
+
+    def _stop(self) -> None:
+        """Say why the run cannot go on."""
+        run = self._run
+        if run.present.status is Status.FINISHED:
+            words = f"the run has reached its end, t = {self.t:g} s"
+            self._failure = f"{words}: start it with a later t_end, or reset it"
+        else:
+            self._failure = why_stopped(self._evaluator, run.present, run.rank)
+        raise SimulationError(self._failure, self.result())
+
+    # ---------------------------------------------------------------- record
+
+    def _note_state(self, t: float) -> None:
+        if self._count == len(self._log):
+            self._log = np.concatenate([self._log, np.empty_like(self._log)])
+        self._write(self._log[self._count], t)
+        self._count += 1
+
+    def _present_row(self, t: float) -> Floats:
+        row = np.empty(self._log.shape[1])
+        self._write(row, t)
+        return row
+
+    def _write(self, row: Floats, t: float) -> None:
+        """A row of the record: t, y, inputs, numbers of angles whose turns are counted."""
+        values, size = self._inputs.values, 1 + self._size
+        row[0] = t
+        row[1:size] = self._hold.integration.work.state[Y]
+        if values:
+            row[size : size + len(values)] = values
+        if len(self._turns):
+            row[size + len(values) :] = self._evaluator.system.par[self._turns]
+
+    @IGNORE_FLOAT_ERRORS
+    def _reports(self, log: Floats) -> Floats:
+        """Reported rows of rows of the record."""
+        evaluator, count, size = self._evaluator, len(self._inputs.values), 1 + self._size
+        par, places = evaluator.system.par, self._turns
+        before, rows = par[places], np.zeros((len(log), size + evaluator.report_size))
+        with evaluator.held_inputs():
+            for row, noted in zip(rows, log, strict=True):
+                row[:size] = noted[:size]
+                evaluator.set_inputs(noted[size : size + count])
+                par[places] = noted[size + count :]
+                evaluator.functions[REPORT](
+                    float(noted[0]), noted[1:size].copy(), row[size:], evaluator.system,
+                    evaluator.loops,
+                )  # fmt: skip
+        par[places] = before
+        return evaluator.with_inputs(evaluator.body_rows(rows), log[:, size : size + count])
+
+
+class _OpenRun(Run):
+    """A run with no reports of its own, and mostly without an end."""
+
+    def function_notes(self) -> list[str]:
+        """None: how often states are looked at is not known."""
+        return []
+
+
+def start(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    *,
+    t_end: float | None = None,
+    method: str | None = None,
+    integrator: str | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    step: float | None = None,
+    correct: bool | None = None,
+    project: bool | None = None,
+    allow_code: bool = False,
+    announce: Callable[[str], None] | None = None,
+    correct_metric: str | None = None,
+    record: bool = True,
+) -> SteppedRun:
+    """Begin a run that a script takes step by step; settings are those of ``simulate``.
+
+        run = dap.start(scene, rtol=1e-6)
+        while run.t < 2.0:
+            run.step(0.002, inputs={"motor": -3.0 * run.state["hinge.angle"]})
+
+    Args:
+        scene: a Scene, what ``load`` takes, or a compiled model.
+        t_end: s, where it ends at last; not that of the scene.
+        method, integrator, rtol, atol, step, correct, project, correct_metric: as of ``simulate``.
+        allow_code, announce: as of ``compile``.
+        record: keep the states between steps, for ``result``.
+
+    Raises:
+        SceneError, PluginError: as ``compile``; unusable settings.
+        SimulationError (RedundantError, AssemblyError): the run cannot begin.
+    """
+    compiled = compiled_for(scene, method, allow_code, announce)
+    end = HORIZON if t_end is None else t_end
+    settings = settings_of(compiled, t_end=end, dt=end, method=method, integrator=integrator,
+                           rtol=rtol, atol=atol, step=step, correct=correct, project=project,
+                           correct_metric=correct_metric)  # fmt: skip
+    with compiled.borrow_evaluator():
+        run = _OpenRun(compiled, settings, Callbacks(announce=announce))
+        return SteppedRun(run, record=record)

@@ -1,0 +1,60 @@
+"""``dap3d import`` and ``dap3d export`` of models, as a user runs them."""
+
+import json
+import shutil
+
+import pytest
+from support.process import REPOSITORY
+
+DATA = REPOSITORY / "tests" / "data" / "formats"
+
+
+@pytest.fixture
+def arm(tmp_path, monkeypatch):
+    """A folder with a model, in which commands work."""
+    monkeypatch.chdir(tmp_path)
+    shutil.copy(DATA / "arm.urdf", tmp_path)
+    return tmp_path
+
+
+def test_a_model_becomes_a_folder_that_runs(dap3d, arm):
+    done = dap3d("import", "arm.urdf")
+    assert done.returncode == 0, done.stderr
+    assert "arm.urdf:36: " in done.stdout
+    done = dap3d("run", "arm", "--t-end", "0.05")
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_report_for_programs(dap3d, arm):
+    done = dap3d("import", "arm.urdf", "-o", "out", "--json", "--position", "shoulder=0.5")
+    data = json.loads(done.stdout)
+    assert data["taken"] == {"links": 4, "joints": 3, "couplings": 0, "actuators": 0}
+    assert {"file", "line", "text", "count"} == set(data["left_out"][0])
+    assert (arm / "out" / "scene.toml").is_file()
+
+
+def test_nothing_is_overwritten_without_force(dap3d, refuse, arm):
+    assert dap3d("import", "arm.urdf").returncode == 0
+    assert "exists; --force" in refuse("import", "arm.urdf")
+    assert dap3d("import", "arm.urdf", "--force").returncode == 0
+    assert dap3d("export", "arm", "--format", "mjcf").returncode == 0
+    assert "exists; --force" in refuse("export", "arm", "--format", "mjcf")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("import", "arm.urdf", "--strict"), "effort"),
+        (("import", "nothing.urdf"), "there is no file nothing.urdf"),
+        (("import", "arm.urdf", "--position", "elbw=1"), "no such joint"),
+        (("import", "arm.urdf", "--position", "elbow"), "write NAME=VALUE"),
+        (("import", "arm.urdf", "--package", "a=nowhere"), "nowhere is no folder"),
+        (("import", "arm.urdf", "--format", "urfd"), "did you mean 'urdf'"),
+        (("export", "arm.urdf", "--format", "urfd"), "did you mean 'urdf'"),
+        (("run", "arm.urdf"), "dap3d import arm.urdf"),
+    ],
+)
+def test_what_is_wrong_is_told(refuse, arm, words, said):
+    """Exit code 2, and no file is left behind."""
+    assert said in refuse(*words)
+    assert not (arm / "arm").exists()

@@ -1,0 +1,136 @@
+"""Scenes as models of other programs, and back."""
+
+import numpy as np
+import pytest
+from support.process import REPOSITORY
+
+import dap3d_core as dap
+
+DATA = REPOSITORY / "tests" / "data" / "formats"
+SUFFIX = {"urdf": ".urdf", "mjcf": ".xml"}
+
+
+def matrix(Jp):
+    return np.diag(Jp) if np.ndim(Jp) == 1 else np.array(Jp)
+
+
+def places(scene):
+    """Points and vectors of all joints and forces in global axes, by element and field."""
+    bodies = {"ground": (np.zeros(3), np.eye(3))}
+    for name, body in scene.bodies.items():
+        from dap3d_core.model.rotations import rotation
+
+        bodies[name] = np.array(body.r), rotation(np.array(body.p))
+    found = {}
+    for element in (*scene.joints.values(), *scene.forces.values()):
+        for field, value in element.fields.items():
+            point, vector = scene.points.get(value), scene.vectors.get(value)
+            body, dot, tail = str(value).rpartition(".")
+            if point is not None or (dot and tail == "O"):
+                body, at = (point.body, point.sPp) if point else (body, (0, 0, 0))
+                found[element.name, field] = body, bodies[body][0] + bodies[body][1] @ at
+            elif vector is not None or (dot and tail in "xyz"):
+                body, at = (
+                    (vector.body, vector.sp) if vector else (body, np.eye(3)["xyz".index(tail)])
+                )
+                found[element.name, field] = body, bodies[body][1] @ np.array(at)
+    return found
+
+
+def assert_same(one, other):
+    """Names, masses, inertias, poses, and all that elements name are equal but for rounding."""
+    assert list(one.bodies) == list(other.bodies)
+    for a, b in zip(one.bodies.values(), other.bodies.values(), strict=True):
+        np.testing.assert_allclose([a.mass, *a.r], [b.mass, *b.r], rtol=1e-14, atol=1e-14)
+        np.testing.assert_allclose(matrix(a.Jp), matrix(b.Jp), rtol=1e-14, atol=1e-16)
+        np.testing.assert_allclose(a.p, b.p, atol=1e-14)
+    for table in ("joints", "forces", "functions"):
+        a, b = getattr(one, table), getattr(other, table)
+        assert {n: e.type for n, e in a.items()} == {n: e.type for n, e in b.items()}
+        for name in a:
+            first, second = a[name].fields, b[name].fields
+            numbers = [k for k, v in first.items() if isinstance(v, float)]
+            np.testing.assert_allclose([first[k] for k in numbers], [second[k] for k in numbers],
+                                       rtol=1e-13, atol=1e-13)  # fmt: skip
+    first, second = places(one), places(other)
+    assert first.keys() == second.keys()
+    for key in first:
+        assert first[key][0] == second[key][0], key
+        np.testing.assert_allclose(first[key][1], second[key][1], atol=1e-13, err_msg=str(key))
+
+
+@pytest.mark.parametrize(
+    ("file", "format"),
+    [
+        ("arm.urdf", "urdf"),
+        ("arm.urdf", "mjcf"),
+        ("parallelogram.urdf", "urdf"),
+        ("parallelogram.xml", "mjcf"),
+        ("parallelogram.sdf", "mjcf"),
+        ("hand.xml", "mjcf"),
+    ],
+)
+def test_what_is_written_reads_back_as_the_scene(tmp_path, file, format):
+    """Loops, springs, stops, rotors, chains of joints and free bases."""
+    scene, _ = dap.import_model(DATA / file)
+    path = tmp_path / f"model{SUFFIX[format]}"
+    report = dap.export_model(scene, path, format=format)
+    assert not report.left_out
+    back, _ = dap.import_model(path)
+    assert_same(scene, back)
+
+
+def test_a_scene_by_hand_keeps_its_mechanism(tmp_path):
+    """Joints in any direction, a spring between unlike axes: accelerations are the same."""
+    scene = dap.Scene(name="hand")
+    scene.add_body("a", mass=2.0, Jp=(0.2, 0.3, 0.4), r=(0.5, 0, 0), w=(0, 0, 0))
+    scene.add_body("b", mass=1.0, Jp=(0.1, 0.2, 0.25), r=(1.5, 0, 0.2), p=(0.8, 0, 0.6, 0))
+    scene.add_point("A", "a", (-0.5, 0, 0))
+    scene.add_point("B", "a", (0.5, 0.1, 0))
+    scene.add_vector("u", "a", (0, 1, 1))
+    scene.add_point("C", "b", tuple(np.array([[0.28, 0, -0.96], [0, 1, 0], [0.96, 0, 0.28]])
+                                    @ [-0.5, 0.1, -0.2]))  # fmt: skip
+    scene.add_vector("v", "b", tuple(np.array([[0.28, 0, -0.96], [0, 1, 0], [0.96, 0, 0.28]])
+                                     @ [0, 1, 1]))  # fmt: skip
+    scene.add_joint("rev", "J1", P_i="A", P_j="ground.O", a_i="a.z", a_j="ground.z")
+    scene.add_joint("rev", "J2", P_i="B", P_j="C", a_i="u", a_j="v")
+    scene.add_force("weight", "g", gravity=9.81, wgt=(0.0, 0.6, -0.8))
+    scene.add_force("rot_sda", "S", v_i="a.x", v_j="ground.y", axis="ground.z", k=3.0, c=0.2,
+                    theta_0=0.4)  # fmt: skip
+    path = tmp_path / "model.xml"
+    report = dap.export_model(scene, path, format="mjcf")
+    assert not report.left_out
+    back, _ = dap.import_model(path)
+    results = [dap.simulate(one, t_end=0.5, dt=0.5, rtol=1e-11, atol=1e-12)
+               for one in (scene, back)]  # fmt: skip
+    # two runs of the same motion, each to 1e-11 a step
+    np.testing.assert_allclose(results[0].r, results[1].r, rtol=0, atol=1e-8)
+
+
+def test_a_joint_without_a_counterpart_is_refused_by_name():
+    with pytest.raises(dap.SceneError, match=r"joint J5: no joint of a model is of type 'rel-rot'"):
+        dap.export_model("fourbar4", format="mjcf")
+    scene, _ = dap.import_model(DATA / "hand.xml")
+    with pytest.raises(dap.SceneError, match=r"joint loose is ball, which URDF does not have"):
+        dap.export_model(scene, format="urdf")
+
+
+def test_a_force_without_a_counterpart_is_listed_and_strict_refuses_it():
+    scene, _ = dap.import_model(DATA / "arm.urdf")
+    scene.add_force("f", "push", body_i="upper", f=(1.0, 0.0, 0.0))
+    report = dap.export_model(scene, format="mjcf")
+    assert [one.text for one in report.left_out] == [
+        "push of type f: no force on the coordinate of a joint"
+    ]
+    with pytest.raises(dap.SceneError, match="push of type f"):
+        dap.export_model(scene, format="mjcf", strict=True)
+
+
+def test_names_are_written_as_data(tmp_path):
+    """A name with marks of XML reads back as it is."""
+    scene = dap.Scene(name='"x" & <y>')
+    scene.add_body("a<&'b>", mass=1.0, Jp=(1.0, 1.0, 1.0))
+    path = tmp_path / "model.xml"
+    dap.export_model(scene, path, format="mjcf")
+    back, _ = dap.import_model(path)
+    assert (back.name, list(back.bodies)) == (scene.name, list(scene.bodies))

@@ -1,0 +1,42 @@
+"""Joint coordinates of a model: starts of runs."""
+
+import numpy as np
+from support import trees
+
+from dap3d_core.formulations.joint import coordinates as module
+from dap3d_core.simulation import CompiledModel
+
+
+def start_of(coordinates, u):
+    """State and constants of the tree at the start of a run from u."""
+    y = coordinates.start(u)
+    return y, coordinates.evaluator.system.tree.constants.copy()
+
+
+def test_runs_from_one_state_compute_its_reference_once(monkeypatch):
+    """Reports at other states, and another start, leave a start as it is."""
+    made = []
+
+    class Counted(module.Reference):
+        def __init__(self, *arguments):
+            made.append(1)
+            super().__init__(*arguments)
+
+    monkeypatch.setattr(module, "Reference", Counted)
+    model = CompiledModel(trees.random_tree(4, seed=2, free=0.3), method="joint")
+    coordinates, u = model.evaluator.coordinates, model.model.u0
+    other = u.copy()
+    other[-6:] += 0.5
+    first = start_of(coordinates, u)
+    count = len(made)
+    again = start_of(coordinates, u)
+    assert len(made) == count
+    with coordinates.at(other) as y:
+        assert not np.array_equal(y, first[0])
+    after_report, elsewhere, back = (start_of(coordinates, x) for x in (u, other, u))
+    assert not np.array_equal(elsewhere[0], first[0])
+    for found in (again, after_report, back):
+        assert all(np.array_equal(a, b) for a, b in zip(found, first, strict=True))
+    y = coordinates.start(u)
+    y[:] = np.nan  # as an integration writes into its state
+    assert np.array_equal(coordinates.start(u), first[0])

@@ -1,0 +1,152 @@
+"""Runs that a script takes step by step."""
+
+import numpy as np
+import pytest
+from support.arm import NAMES, arm_scene
+from support.pushed import feedback, held, pushed_block
+
+import dap3d_core as dap
+
+
+def loop(run, count=100, dt=0.01):
+    for _ in range(count):
+        run.step(dt, inputs=feedback(run.t, run.state))
+    return run.result()
+
+
+def test_a_loop_of_ones_own_is_the_controller():
+    """To rounding: the same zero-order hold."""
+    wanted = held(0.01, 100)
+    result = loop(dap.start(pushed_block()))
+    for name, column in (("block.r.x", 0), ("block.rd.x", 1), ("push", 2)):
+        assert result.quantity(name).values == pytest.approx(wanted[:, column], abs=1e-14)
+    assert result.t == pytest.approx(0.01 * np.arange(101), abs=1e-12)
+    controllers = [dap.Controller(every=0.01, update=feedback)]
+    other = dap.simulate(pushed_block(), t_end=1.0, dt=0.01, controllers=controllers)
+    assert np.max(np.abs(other.u - result.u)) < 1e-14
+    assert np.max(np.abs(other.v_dot - result.v_dot)[:-1]) < 1e-14
+
+
+@pytest.mark.parametrize("method", ["standard", "joint"])
+@pytest.mark.parametrize("integrator", ["dop853", "adams", "auto"])
+def test_a_reset_run_repeats_itself_to_the_bit(method, integrator):
+    """In body and in joint coordinates; and from another state and back."""
+    run = dap.start(arm_scene(method), integrator=integrator, rtol=1e-6)
+
+    def motion():
+        for k in range(20):
+            run.step(0.01, {NAMES[1]: 3.0 * k, NAMES[4]: -0.1 * k})
+        return run.result()
+
+    first = motion()
+    run.reset(first.u[10])
+    assert run.t == 0.0
+    assert run.state.u == pytest.approx(first.u[10], abs=1e-9)
+    assert run.result().inputs[-1].tolist() == [0.0] * 6
+    motion()
+    run.reset()
+    second = motion()
+    for name in ("t", "u", "v_dot", "Lam", "inputs"):
+        assert np.array_equal(getattr(first, name), getattr(second, name)), name
+
+
+def test_other_runs_of_the_model_do_not_disturb_it():
+    """It has arrays of its own; nor does asking for its result."""
+    compiled = dap.compile(pushed_block())
+    run, plain = dap.start(compiled), dap.start(compiled)
+    for k in range(50):
+        run.step(0.01, {"push": float(k)})
+        plain.step(0.01, {"push": float(k)})
+        if k % 10 == 0:
+            dap.simulate(compiled, t_end=0.1)
+            run.result().force("force")
+    assert np.array_equal(run.state.u, plain.state.u)
+
+
+def test_settings_are_those_of_simulate():
+    """Tolerances, steps, the end; the end of the scene is none."""
+    scene = pushed_block(1.0)
+    scene.simulation.t_end = 0.05
+    run = dap.start(scene, integrator="rk4", step=0.005)
+    run.step(0.1)
+    assert run.result().stats.steps in (20, 21)  # a rounding of time may be left
+    assert run.state["block.r.x"] == pytest.approx(0.25 * 0.1**2, abs=1e-15)
+    with pytest.raises(dap.SceneError, match="rtol"):
+        dap.start(scene, rtol=-1.0)
+
+
+def test_the_end_of_a_run_is_told():
+    """With what was computed, and again until it is reset."""
+    run = dap.start(pushed_block(1.0), t_end=0.25)
+    run.step(0.1)
+    run.step(0.1)
+    for _ in range(2):
+        with pytest.raises(dap.SimulationError, match=r"reached its end, t = 0\.25 s") as caught:
+            run.step(0.1)
+    assert caught.value.result.t == pytest.approx([0.0, 0.1, 0.2, 0.25])
+    run.reset()
+    assert run.step(0.1) == 0.1
+
+
+def test_a_step_that_fails_says_why_and_keeps_what_was_computed():
+    """A spring of negative stiffness: the elongation is half a metre times cosh(200 t)."""
+    scene = pushed_block()
+    scene.bodies["block"].r = (1.0, 0.0, 0.0)
+    scene.add_force("ptp", "spring", P_i="block.O", P_j="ground.O", l0=0.5, k=-80_000.0)
+    run = dap.start(scene)
+
+    def go_on():
+        for _ in range(100):
+            run.step(0.1)
+
+    with pytest.raises(dap.SimulationError, match=r"the run stopped at t = 0\.54") as caught:
+        go_on()
+    result = caught.value.result
+    assert result.status == "stopped"
+    assert result.t[:6] == pytest.approx(0.1 * np.arange(6), abs=1e-12)
+    wanted = 0.5 + 0.5 * np.cosh(200.0 * result.t[:6])
+    assert result.r[:6, 0, 0] == pytest.approx(wanted, rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("dt", "inputs", "words"),
+    [
+        (0.0, None, "dt is 0.0; it should be a positive number"),
+        (float("nan"), None, "dt is nan"),
+        (-0.1, {"push": 1.0}, "dt is -0.1"),
+        (0.1, {"pusch": 1.0}, "there is no input 'pusch'; did you mean 'push'"),
+        (0.1, {"push": None}, "input push is set to None; it should be a finite number"),
+    ],
+)
+def test_steps_that_make_no_sense_are_refused(dt, inputs, words):
+    """Before anything is done: the run goes on."""
+    run = dap.start(pushed_block(1.0))
+    with pytest.raises(ValueError, match=words):
+        run.step(dt, inputs)
+    assert run.t == 0.0
+    assert run.step(0.1) == 0.1
+
+
+def test_without_a_record_the_present_state_is_the_result():
+    """For runs of any length."""
+    run = dap.start(pushed_block(1.0), record=False)
+    for _ in range(10):
+        run.step(0.1)
+    result = run.result()
+    assert result.t == pytest.approx([1.0])
+    assert result.r[0, 0, 0] == pytest.approx(0.25)
+
+
+def test_turns_of_angles_are_those_of_a_run():
+    """An element that counts turns itself, in a result that is computed at the end."""
+    scene = dap.Scene(name="wheel")
+    scene.add_body("wheel", mass=1.0, Jp=(1.0, 1.0, 1.0), w=(0.0, 0.0, 12.0))
+    scene.add_joint("rev", "hinge", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
+    scene.add_force("rot_sda", "clock", v_i="wheel.x", v_j="ground.x", axis="ground.z", turns=True,
+                    k=2.0)  # fmt: skip
+    run = dap.start(scene)
+    for _ in range(40):
+        run.step(0.05)
+    whole = dap.simulate(scene, t_end=2.0, dt=0.05)
+    assert run.result().arrays.angles == pytest.approx(whole.arrays.angles, abs=1e-6)
+    assert np.max(np.abs(whole.arrays.angles)) > 2.0 * np.pi
