@@ -62,7 +62,7 @@ def test_a_tyre_loaded_by_its_contact():
     assert result.rd[:, 0, 0] == pytest.approx(force[0] / m / rate * (1 - slip / slip[0]), abs=1e-9)
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "adams"])
+@pytest.mark.parametrize("integrator", ["dop853", "adams", "radau"])
 def test_a_rate_reads_reactions(integrator):
     """The work that a brake takes is the kinetic energy that its drum loses."""
     scene = drum()
