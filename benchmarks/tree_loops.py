@@ -27,7 +27,7 @@ TIMES = np.linspace(0.0, 10.0, 21)
 
 
 def run(evaluator, u, rtol):
-    """CPU seconds of the integration from a state u, and x, y, v_x, v_y of the first crank's tip."""
+    """CPU seconds of the integration from a state u, and x, y, v_x, v_y of the crank's tip."""
     store_reference_pivots(evaluator, 0.0, u)
     evaluator.start(0.0, u)
     y0 = evaluator.coordinates.start(u)

@@ -46,7 +46,7 @@ def missed(cells, scenes):
     for row in rows:
         ratio = "not reached" if row["ratio"] is None else f"{row['ratio']:.2g}"
         lines.append(f"| {row['scene']} | {row['level']:.0e} | {row['peer']} | {ratio} | "
-                     f"at most {row['goal']:g} |")  # fmt: skip
+                     f"at most {row['goal']:.2g} |")  # fmt: skip
     return lines
 
 

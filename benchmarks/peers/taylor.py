@@ -1,4 +1,6 @@
-"""One body beside heyoka, Taylor integration of equations written by hand: ``make bench-taylor``.
+"""One body beside heyoka, which integrates equations written by hand by their Taylor series.
+
+``build/peers-venv/bin/python benchmarks/peers/taylor.py``, after ``make bench-peers`` has made it.
 
 heyoka gets the least equations there are: quaternion and omega' of a body about a fixed point, the
 angle of a rod. Euler's equations are its input, and it compiles Taylor series of these very

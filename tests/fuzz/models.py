@@ -38,7 +38,8 @@ ELEMENTS = (
 @functools.cache
 def models():
     """Suffix and text of the files that models are made from."""
-    return [(path.suffix, path.read_text()) for path in sorted(DATA.iterdir())]
+    files = (path for path in sorted(DATA.iterdir()) if path.is_file())
+    return [(path.suffix, path.read_text()) for path in files]
 
 
 def _value(text, rng):

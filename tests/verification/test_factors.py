@@ -80,6 +80,21 @@ def test_an_actuator_pulls_by_its_factor(field, with_curve):
     assert result.rdd[:, 0, 0] == pytest.approx(-wanted / 2.0, abs=1e-10)
     balance = result.energy.kinetic - result.work
     assert np.ptp(balance) < 1e-9
+    assert not result.settings["conservative"]
+
+
+def test_an_input_that_is_zero_at_first_does_not_make_a_scene_conservative():
+    """The spring has a potential, and the actuator will not: the ledger does not expect it."""
+    scene = block()
+    scene.bodies["block"].r = (1.5, 0.0, 0.0)
+    scene.inputs["level"].value = 0.0
+    scene.add_force("ptp", "pull", P_i="block.O", P_j="ground.O", l0=1.2, k=40.0, f_a=5.0,
+                    input="level")  # fmt: skip
+    controllers = [dap.Controller(every=0.1, update=lambda t, state: {"level": t})]
+    result = dap.simulate(scene, t_end=1.0, dt=0.25, controllers=controllers, **TIGHT)
+    assert not result.settings["conservative"]
+    assert np.ptp(result.energy.total) > 0.1
+    assert all(entry.ok is not False for entry in result.ledger.values())
 
 
 @pytest.mark.parametrize(

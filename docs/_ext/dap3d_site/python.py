@@ -12,9 +12,10 @@ SECTIONS = {
          "matlab.ImportReport", "formats.ImportReport", "formats.ExportReport"),
     ),
     "Runs": (
-        ("simulate", "compile", "Event", "resume", "rerun"),
+        ("simulate", "compile", "Event", "Controller", "start", "resume", "rerun"),
         ("simulation.CompiledModel", "simulation.Instant", "simulation.RunProgress",
-         "simulation.Reproduction"),
+         "simulation.Reproduction", "simulation.control.state_view.StateView",
+         "simulation.stepwise.stepped_run.SteppedRun"),
     ),
     "Analyses": (
         ("equilibrium", "kinematics", "inverse", "linearize", "Equilibrium", "Linearization"),

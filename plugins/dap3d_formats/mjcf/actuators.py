@@ -2,9 +2,8 @@
 
 from typing import TYPE_CHECKING
 
-from dap3d_formats.mjcf.document import ACTUATORS
-
 from dap3d_core.interface.formats import Actuator, FormatError, Joint, XmlElement
+from dap3d_formats.mjcf.document import ACTUATORS
 
 if TYPE_CHECKING:
     from dap3d_formats.mjcf.importer import MjcfReader

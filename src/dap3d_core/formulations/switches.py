@@ -13,6 +13,9 @@ from dap3d_core.model.knots import narrowest
 
 #: Kernels by which velocities and states jump.
 JUMPING = frozenset(("impulse", "reset"))
+#: Bodies that touch are apart, or not, by the rounding of their positions: this part of the length
+#: of the scene is some of them.
+ROUNDING = 32.0 * float(np.finfo(float).eps)
 #: The part of the narrowest range between two knots that counts as at the knot.
 NEAR_KNOT = 1e-6
 
@@ -27,6 +30,7 @@ class Switch:
             function that the element is given takes another form; "bound": that of an unknown of
             the element from its bound.
         is_one_of_several, part: where the kernel gives a tuple, which of its numbers.
+        length: of the scene, m (Model.length).
     """
 
     group: Group
@@ -34,6 +38,7 @@ class Switch:
     kind: str
     is_one_of_several: bool
     part: int
+    length: float = 1.0
 
     @property
     def words(self) -> str:
@@ -64,9 +69,12 @@ class Switch:
 
     @property
     def band(self) -> float:
-        """Distance beyond a knot from which on an argument has passed it."""
-        if self.kind != "knot":
+        """Distance beyond zero from which on it has passed: of a knot, and of contact at rest."""
+        if self.kind == "bound":
             return 0.0
+        if self.kind == "switch":
+            touches = self.jumps and getattr(self.group.type_info.type, "unilateral", ())
+            return ROUNDING * self.length if touches and not self.words else 0.0
         row, numbers = self.group.numbers[self.place], self.group.type_info.layout.numbers
         own = [place for name, place in numbers.items() if is_knots(name)]
         knots = [row[at : at + count] for at, (count,) in own]
@@ -81,10 +89,15 @@ class Switch:
         return f"{name} [{self.part + 1}]" if is_numbered else name
 
 
-def switches_of(loops: Iterable[tuple[str, Group]]) -> tuple[Switch, ...]:
-    """The switches of a model in the order in which ``watch`` gives them; loops: (kind, group)."""
+def switches_of(loops: Iterable[tuple[str, Group]], length: float = 1.0) -> tuple[Switch, ...]:
+    """The switches of a model in the order in which ``watch`` gives them.
+
+    Args:
+        loops: (kind, group).
+        length: of the scene, m.
+    """
     return tuple(
-        Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part)
+        Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part, length)
         for kind, group in loops
         if kind in ("switch", "bound", "knot")
         for k in range(group.count)

@@ -1,6 +1,7 @@
 """Integrators, compiled. All but radau know a vector and its functions, no mechanics."""
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import attrs
@@ -18,13 +19,17 @@ from dap3d_core.integrators.stepping.integration_state import Status
 TABLEAUS: dict[str, Tableau] = {method.name: method for method in (DOP853, DOPRI5, RK4)}
 
 
-def _explicit(name: str) -> Callable[..., Integration]:
-    def make(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
-        functions, system, loops = evaluator.functions, evaluator.system, evaluator.loops
-        options |= _placed_steps(evaluator)
-        return RungeKutta(TABLEAUS[name], functions, system, loops, y0, times, **options)
+def explicit(
+    method: Tableau, evaluator: Evaluator, y0: Any, times: Any, **options: Any
+) -> Integration:
+    """An integration by an explicit Runge-Kutta method."""
+    functions, system, loops = evaluator.functions, evaluator.system, evaluator.loops
+    options |= _placed_steps(evaluator)
+    return RungeKutta(method, functions, system, loops, y0, times, **options)
 
-    return make
+
+def _explicit(name: str) -> Callable[..., Integration]:
+    return partial(explicit, TABLEAUS[name])
 
 
 def _adams(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
@@ -92,6 +97,7 @@ __all__ = [
     "IMPLICIT",
     "INTEGRATORS",
     "TABLEAUS",
+    "explicit",
     "Integration",
     "Integrator",
     "RungeKutta",

@@ -34,6 +34,8 @@ GROUPS = {
     "force": ("dap3d.forces", "dap3d_forces"),
     "function": ("dap3d.functions", "dap3d_functions"),
 }
+#: The same of integrators, whose hook lies in ``interface.integrators``.
+INTEGRATOR_GROUP = ("dap3d.integrators", "dap3d_integrators")
 #: The same of file formats, whose hooks lie in ``interface.formats``: no scene needs them.
 FORMAT_GROUPS = {
     "importer": ("dap3d.importers", "dap3d_importers"),

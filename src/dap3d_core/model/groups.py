@@ -16,7 +16,6 @@ from dap3d_core.interface.codegen.specialise import (
     bind_functions,
     uncalled,
 )
-from dap3d_core.interface.codegen.terms import bind_terms
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
@@ -255,6 +254,8 @@ class Grouping:
         numbers, tables = self._numbers(type_info, functions, members)
         if not functions[0].terms:
             return type_info, numbers, tables
+        from dap3d_core.interface.codegen.terms import bind_terms
+
         terms = []
         for column in zip(*(function.terms for function in functions), strict=True):
             try:

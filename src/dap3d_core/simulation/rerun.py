@@ -122,6 +122,11 @@ def _settings(result: Result) -> dict[str, Any]:
             "the run cannot be made again: events of a script ended or changed it, which its "
             "result does not hold; run the script again"
         )
+    if setters := result.settings.get("controllers"):
+        raise ResultError(
+            f"the run cannot be made again: its inputs were set by {', '.join(setters)}, which its "
+            "result does not hold; run the script again"
+        )
     start = result.settings.get("start", "scene")  # which older results lack
     if start == GIVEN_START:
         raise ResultError(

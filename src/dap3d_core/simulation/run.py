@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dap3d_core.formulations.pivots import store_reference_pivots
-from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS, Integration, Status
+from dap3d_core.integrators import IMPLICIT, Integration, Status
+from dap3d_core.integrators.added import integrator_named
 from dap3d_core.integrators.stepping.singular_poses import begin_singular
 from dap3d_core.result import Result, ResultError
 from dap3d_core.scene import Mistake, SceneError, Simulation
@@ -173,7 +174,7 @@ class Run(RunState):
         if redundancy.bindings:
             raise RedundantError(words)
         if singular is not None:
-            refuse_singular_start(self.settings, singular.first_step)
+            refuse_singular_start(self.settings, singular.first_step, formulation)
         least = " (reported are those of least |lambda|)" if formulation.is_exact else ""
         self.notes.append(
             f"{words}. Accelerations are unique; reactions in these joints are not{least}"
@@ -191,7 +192,7 @@ class Run(RunState):
             "first_step": None if self.limits is None else self.limits.first,
             "buffer_rows": max(1, min(len(self.times), BUFFER_NUMBERS // width)),
         }
-        integrator = INTEGRATORS.get(settings.integrator, EXPLICIT)
+        integrator = integrator_named(settings.integrator)
         check_fit(integrator, evaluator.formulation)
         if settings.integrator == "auto":
             options = options | {"stop_when_stiff": fits(IMPLICIT, evaluator.formulation)}

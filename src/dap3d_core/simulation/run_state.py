@@ -216,6 +216,7 @@ class RunState:
                 "correct_metric": str(self.settings.correct_metric),
                 "start": self.settings.start if self.start is None else GIVEN_START,
                 "method": self.compiled.requested_method,
+                **({} if self.control is None else {"controllers": self.control.titles}),
             },
         )
 

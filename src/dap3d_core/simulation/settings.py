@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
-from dap3d_core.integrators import EXPLICIT, INTEGRATORS, Integrator
+from dap3d_core.integrators import EXPLICIT, Integrator
+from dap3d_core.integrators.added import integrator_named
 from dap3d_core.scene import (
     METHODS,
     MISSING,
@@ -145,22 +146,29 @@ def check_fit(integrator: Integrator, formulation: Formulation) -> None:
         )
 
 
-def refuse_singular_start(settings: Simulation, first_step: float) -> None:
+def refuse_singular_start(
+    settings: Simulation, first_step: float, formulation: Formulation
+) -> None:
     """Only dop853 leaves a singular pose: its result does not use the first stages, close to it.
 
     first_step: it takes so long, s, because close to the pose rounding takes the place of rates.
 
     Raises:
-        SimulationError: the integrator is another, its steps are fixed, projection is off, or the
-            run is too short.
+        SimulationError: the integrator is another, its steps are fixed, projection is off, the run
+            is too short, or the formulation has coordinates of its own.
     """
+    if formulation.has_own_coordinates:
+        raise SimulationError(
+            f"the run starts at a singular pose, from which method {formulation.name} finds no "
+            "way: take method auto or lsq, or start at another pose"
+        )
     t_end = float(settings.t_end or 0.0)
     if 0.0 < t_end < first_step:
         raise SimulationError(
             f"the run starts at a singular pose, which one step has to leave behind: give t_end of "
             f"{first_step:.3g} s or more ({t_end:g} is given)"
         )
-    integrator = INTEGRATORS.get(settings.integrator, EXPLICIT)
+    integrator = integrator_named(settings.integrator)
     if not integrator.leaves_singular or settings.step is not None or not settings.project:
         raise SimulationError(
             f"the run starts at a singular pose, from which integrator {EXPLICIT.name} alone (or "

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dap3d_core.integrators import EXPLICIT, INTEGRATORS
+from dap3d_core.integrators.added import integrator_named
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene, SceneError
@@ -59,7 +59,7 @@ class Ensemble:
         self.outputs = self.reduction.outputs
         self.labels, self.units = self.reduction.labels, self.reduction.units
         self._of_thread = threading.local()
-        self._takes_batches = INTEGRATORS.get(settings.integrator, EXPLICIT).one_step and not any(
+        self._takes_batches = integrator_named(settings.integrator).one_step and not any(
             parameter.table == "simulation" for parameter in self.parameters
         )
 
@@ -128,7 +128,7 @@ def _with_end_alone(study: Study) -> Study:
     settings = study.scene.simulation
     if any(output.reduction != "end" for output in study.outputs) or "simulation.dt" in study.names:
         return study
-    if not INTEGRATORS.get(settings.integrator, EXPLICIT).adaptive or not settings.t_end:
+    if not integrator_named(settings.integrator).adaptive or not settings.t_end:
         return study
     scene = study.scene.copy()
     scene.simulation.dt = None if "simulation.t_end" in study.names else settings.t_end

@@ -43,7 +43,9 @@ def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     names = {"dap3d_core.formulations.joint", "dap3d_core.assembly.motion.classify"}
     script = "import dap3d_core as dap\ndap.simulate('pen1', t_end=0.02, method='{}')"
     assert not imported(script.format("standard")) & names
-    assert names <= imported(script.format("joint"))
+    found = imported(script.format("joint"))
+    assert names <= found
+    assert "dap3d_core.formulations.joint_loops" not in found  # a tree keeps no rows
 
 
 def test_a_scene_without_states_has_nothing_of_them():
@@ -77,6 +79,36 @@ def test_formats_are_imported_by_their_commands_alone():
     found = imported(f"import dap3d_core as dap\ndap.import_model({str(file)!r})")
     assert "dap3d_formats.urdf" in found
     assert not found & {"trimesh", "xacrodoc", "lxml", "mujoco", "llvmlite"}
+
+
+def test_inputs_and_what_sets_them_are_imported_where_a_scene_has_some():
+    """A run without them brings in nothing of them; a loop of a script does."""
+    names = {
+        "dap3d_core.simulation.control",
+        "dap3d_core.simulation.stepwise",
+        "dap3d_core.integrators.stepping.hold",
+        "dap3d_core.scene.signals",
+        "dap3d_core.interface.codegen.terms",
+    }
+    script = "import dap3d_core as dap\ndap.{}"
+    assert not imported(script.format("simulate('fourbar2', t_end=0.1)")) & names
+    found = imported(script.format("start('pen1').step(0.01)"))
+    assert names & found == names - {
+        "dap3d_core.scene.signals",
+        "dap3d_core.interface.codegen.terms",
+    }
+
+
+@pytest.mark.parametrize("keyword", ["f", "fp", "n", "np", "ptp", "rot_sda"])
+def test_a_force_without_a_factor_has_the_loop_of_one_that_knows_of_none(keyword):
+    """Its instances have the integers of its bodies alone, and its loop reads no function."""
+    from dap3d_core.interface.codegen.loop_source import stride, write
+    from dap3d_core.registry import load_registry
+
+    type_info = load_registry().get("force", keyword)
+    assert type_info.layout.functions == ()
+    assert stride(type_info) == len(type_info.layout.slots) + len(type_info.layout.others)
+    assert "F[" not in "\n".join(write(type_info, "wrench").lines)
 
 
 @pytest.mark.parametrize(

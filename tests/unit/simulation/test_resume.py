@@ -63,6 +63,7 @@ CASES = {
         {"method": "joint", "integrator": "adams"},
         0.5,
     ),
+    "joint, loops": (lambda: dap.load("A02-1"), {"t_end": 1.0, "method": "joint"}, 0.5),
     "stiff": (lambda: dap.load("A05"), {"integrator": "auto", "t_end": 0.3, "dt": 0.01}, 0.02),
     "a function's breaks": (driven, {}, 0.4),
     "states of elements": (stated, {}, 0.4),

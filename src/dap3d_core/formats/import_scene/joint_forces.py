@@ -58,7 +58,7 @@ class JointCoordinate:
     def __init__(self, builder: "SceneBuilder", joint: Joint) -> None:
         joint = from_ground(builder, joint)
         self.builder, self.joint = builder, joint
-        self.ends = _SameEnds(builder, joint)
+        self.ends = NamedEnds(builder, joint)
         self.turns = joint.kind == "revolute"
         finite = [abs(x) for one in joint.limits for x in (one.lower, one.upper) if isfinite(x)]
         rest = abs(joint.rest[0]) if joint.stiffness[0] else 0.0
@@ -123,7 +123,7 @@ def perpendicular(axis: Floats) -> Floats:
     return np.asarray(across / np.linalg.norm(across))
 
 
-class _SameEnds(JointEnds):
+class NamedEnds(JointEnds):
     """The ends of a joint that has its name in the scene already."""
 
     def __init__(self, builder: "SceneBuilder", joint: Joint) -> None:
@@ -160,7 +160,7 @@ def wheel_of(builder: "SceneBuilder", joint: Joint, inertia: float) -> str:
 
 def follow(builder: "SceneBuilder", joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
     """Couple the coordinate of a joint with a wheel."""
-    ends = _SameEnds(builder, joint)
+    ends = NamedEnds(builder, joint)
     name = builder.names.free("joints", f"{ends.name}_{suffix}")
     builder.scene.add_joint(
         "follow", name, body_i=ends.child, a_j=ends.vector("j", joint.axes[0], "_axis"),
@@ -218,7 +218,7 @@ def add_inputs(builder: "SceneBuilder", model: Articulation) -> None:
         wanted = re.sub(r"\W", "_", f"{actuator.name}_input" if clash else actuator.name)
         name = names.of("inputs", wanted, actuator.place, builder.remarks)
         scene.add_input(name, 0.0)
-        ends = _SameEnds(builder, joint)
+        ends = NamedEnds(builder, joint)
         axis = np.asarray(joint.axes[0], dtype=float)
         sides = (("i", ends.child, ends.on_child, 1.0), ("j", ends.parent, ends.on_parent, -1.0))
         for end, body, frame, sign in sides:

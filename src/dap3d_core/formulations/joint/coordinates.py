@@ -47,6 +47,8 @@ from dap3d_core.model.state_layout import split, u_from_y, velocities_of
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
 
+#: A note says where right-hand sides take more than this time of method standard.
+COSTLY = 1.2
 #: Joints that words name.
 MOST_NAMES = 5
 #: Quantities of the segments of a state, as in tolerances.
@@ -97,7 +99,9 @@ class Coordinates:
         self.equations = "joint_loops" if self.kept else "joint"
         #: The last start of a run: u, the constants of the tree, y.
         self._last: tuple[Floats, Floats, Floats] | None = None
-        evaluator.system = _with_tree(evaluator, self.nodes, tree, tuple(self.kept))
+        rows = _kept_rows(evaluator, self.nodes, tuple(self.kept)) if self.kept else None
+        self._cost_ratio = rows[1] if rows else 0.0
+        evaluator.system = _with_tree(evaluator, self.nodes, tree, rows[0] if rows else None)
 
     @property
     def quantities(self) -> list[str]:
@@ -130,7 +134,13 @@ class Coordinates:
     @property
     def notes(self) -> list[str]:
         """As of ``formulations.coordinates.Coordinates``."""
-        return [f"method joint: {self._kept_words()}"] if self.kept else []
+        notes = [f"method joint: {self._kept_words()}"] if self.kept else []
+        if self._cost_ratio > COSTLY:
+            notes.append(
+                f"method joint takes some {self._cost_ratio:.2g} times as long as standard or lsq "
+                "here: its kept rows meet far from ground, or many of them do; auto takes those"
+            )
+        return notes
 
     def _kept_words(self) -> str:
         """Joints whose rows are kept, with the reasons."""
@@ -236,7 +246,7 @@ class Coordinates:
 
 
 def _with_tree(
-    evaluator: "Evaluator", nodes: TreeNodes, tree: SpanningForest, kept: tuple[int, ...]
+    evaluator: "Evaluator", nodes: TreeNodes, tree: SpanningForest, kept: KeptRowArrays | None
 ) -> System:
     """The system with arrays of a tree; ``body`` is then the first rows of its places."""
     system, model, plan = evaluator.system, evaluator.model, evaluator.plan
@@ -254,17 +264,22 @@ def _with_tree(
         scratch=np.zeros(48),
         force=np.zeros_like(system.force),
         slope=np.zeros(nodes.layout.size),
-        kept=_kept_rows(evaluator, nodes, kept) if kept else None,
+        kept=kept,
     )
     return attrs.evolve(system, body=places[:bodies], tree=arrays)
 
 
-def _kept_rows(evaluator: "Evaluator", nodes: TreeNodes, joints: tuple[int, ...]) -> KeptRowArrays:
-    from dap3d_core.formulations.joint_loops.tables import kept_calls, kept_row_arrays, kept_rows
+def _kept_rows(
+    evaluator: "Evaluator", nodes: TreeNodes, joints: tuple[int, ...]
+) -> tuple[KeptRowArrays, float]:
+    """Arrays of kept rows, and the time that a right-hand side takes over that of standard."""
+    from dap3d_core.formulations.joint_loops import tables
 
-    kept = kept_rows(joints, evaluator.model, nodes)
-    calls = kept_calls(kept, evaluator.loop_groups, evaluator.system.groups)
-    return kept_row_arrays(kept, evaluator.model, evaluator.plan, nodes, calls)
+    model, plan = evaluator.model, evaluator.plan
+    kept = tables.kept_rows(joints, model, nodes)
+    calls = tables.kept_calls(kept, evaluator.loop_groups, evaluator.system.groups)
+    ratio = tables.cost_ratio(kept, nodes, plan, model.body_count)
+    return tables.kept_row_arrays(kept, model, plan, nodes, calls), ratio
 
 
 def _joints(tree: SpanningForest, model: Model, plan: Plan) -> Integers:

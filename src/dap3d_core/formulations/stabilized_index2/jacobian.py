@@ -42,9 +42,9 @@ SLOWEST, SMALLEST = 0.1, 1e-4
 WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT, RATE_ELEMENT, POSITION_ELEMENT = range(5)
 #: Columns of ``elements``.
 (
-    LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY, STATE_AT,
-    FIRST_READING, JOINTS_READ, ELEMENT_WIDTH
-) = range(13)  # fmt: skip
+    LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY, FIRST_READING,
+    JOINTS_READ, ELEMENT_WIDTH
+) = range(12)  # fmt: skip
 #: Columns of ``readings``.
 PLACE, BODY, FIRST_ROW, ROW_COUNT = range(4)
 
@@ -53,8 +53,13 @@ PLACE, BODY, FIRST_ROW, ROW_COUNT = range(4)
 class StateTangent(Arrays):
     """Tables and derivatives of elements with states of their own (state_tangent.py)."""
 
-    types: ClassVar[dict[str, Any]] = {"records": INTEGER_MATRIX, "record": INTEGERS}
+    types: ClassVar[dict[str, Any]] = {
+        "at": INTEGERS,
+        "records": INTEGER_MATRIX,
+        "record": INTEGERS,
+    }
 
+    at: Integers  # (groups,) of ``elements``: place of the first state in idx, or -1
     records: Integers  # (elements, 8) COUNT, ...
     record: Integers  # (states,) of the element whose first state it is
     values: Floats
@@ -73,8 +78,7 @@ class Tangent(Arrays):
         "states": StateTangent.type_of(),
     }
 
-    # LOOP, KIND, ...; ROW_AT, STATE_AT: places in idx of the joint's row, of the first state or -1
-    elements: Integers  # (groups, ELEMENT_WIDTH)
+    elements: Integers  # (groups, ELEMENT_WIDTH); ROW_AT: place of the joint's row in idx
     pairs: Integers  # places in ``coupling`` for the slots (a, b) of each element, -1 for none
     blocks: Integers  # (pairs, 3) place in ``coupling``, body of the rows, body of the columns
     coupling: Floats

@@ -37,6 +37,7 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
     n = model.body_count
     place = {(b, b): _BLOCK * (b - 1) for b in range(1, n + 1)}
     elements: list[tuple[int, ...]] = []
+    at: list[int] = []
     pairs: list[Integers] = []
     readings: list[tuple[int, ...]] = []
     count = widest = size = 0
@@ -53,8 +54,8 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         read = _joints_read(group) if kind == "friction" else []
         elements += [(loop, code, stride(group.type_info), layout.par_width, slots,
                       layout.integers, rows, count, int(_sees_velocity(kind, group)),
-                      layout.integers - 1 if layout.states else -1,
                       len(readings), len(read)) for code in codes]  # fmt: skip
+        at += [layout.integers - 1 if layout.states else -1 for _ in codes]
         for q, bodies in enumerate(group.bodies.tolist()):
             for joints in read:
                 first, mine = int(plan.joint_row[joints[q]]), int(model.joint_rows[joints[q]])
@@ -80,12 +81,12 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         saved=np.zeros(BODY_WIDTH),
         ahead=np.zeros(widest),
         behind=np.zeros(widest),
-        states=_state_tangent(evaluator.model),
+        states=_state_tangent(evaluator.model, at),
     )
 
 
-def _state_tangent(model: Model) -> StateTangent:
-    """Tables and arrays of the derivatives by and of states, element by element."""
+def _state_tangent(model: Model, at: Sequence[int]) -> StateTangent:
+    """Tables and arrays of the derivatives by and of states; at: as of ``StateTangent``."""
     records: list[tuple[int, ...]] = []
     record = np.zeros(model.state_count, dtype=np.int64)
     start = size = 0
@@ -98,6 +99,7 @@ def _state_tangent(model: Model) -> StateTangent:
             records.append((m, *places[:-1].tolist(), slots, rows))
             start, size = start + m, int(places[-1])
     return StateTangent(
+        at=np.array(at, dtype=np.int64),
         records=np.array(records, dtype=np.int64).reshape(-1, 8),
         record=record,
         values=np.zeros(size),

@@ -29,7 +29,6 @@ from dap3d_core.formulations.stabilized_index2.jacobian import (
     ROW_AT,
     ROWS,
     SLOT_COUNT,
-    STATE_AT,
     STRIDE,
     VELOCITY,
     WIDTH,
@@ -67,7 +66,7 @@ def differentiate_states(t: float, x: Floats, system: System, loops: Any, tangen
     zero(tangent.states.values)
     for e in range(tangent.elements.shape[0]):
         row = tangent.elements[e]
-        for q in range(system.groups[row[LOOP], 2] if row[STATE_AT] >= 0 else 0):
+        for q in range(system.groups[row[LOOP], 2] if tangent.states.at[e] >= 0 else 0):
             differentiate_by_states(t, e, q, x, system, loops, tangent)
             if row[KIND] == RATE_ELEMENT:
                 differentiate_rate(t, e, q, x, system, loops, tangent)
@@ -92,7 +91,7 @@ def call_any(
             out[k] = tangent.gamma[first + k]
         return
     call_loop(loops, g, t, system, (i0, p0, 1), tangent.force, x, x)
-    first = system.idx[i0 + row[STATE_AT]]
+    first = system.idx[i0 + tangent.states.at[e]]
     for k in range(tangent.states.records[tangent.states.record[first], COUNT]):
         out[k] = system.rates[first + k]
 
@@ -105,7 +104,7 @@ def differentiate_by_states(
     row, own, z = tangent.elements[e], tangent.states, system.states
     kind, ahead, behind, values = row[KIND], tangent.ahead, tangent.behind, own.values
     i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
-    first = system.idx[i0 + row[STATE_AT]]
+    first = system.idx[i0 + tangent.states.at[e]]
     record = own.records[own.record[first]]
     m = record[COUNT]
     for k in range(m):
@@ -140,7 +139,7 @@ def differentiate_rate(
     """Derivatives of the rates of an element by the coordinates of its bodies, unscaled."""
     row, own = tangent.elements[e], tangent.states
     i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
-    record = own.records[own.record[system.idx[i0 + row[STATE_AT]]]]
+    record = own.records[own.record[system.idx[i0 + tangent.states.at[e]]]]
     m = record[COUNT]
     extent, speed = sizes_of(e, q, system, tangent)
     saved, ahead, behind = tangent.saved, tangent.ahead, tangent.behind
@@ -174,7 +173,7 @@ def scale_state_tangent(system: System, tangent: Tangent) -> None:
         row = tangent.elements[e]
         for q in range(system.groups[row[LOOP], 2] if row[KIND] == RATE_ELEMENT else 0):
             i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
-            record = own.records[own.record[system.idx[i0 + row[STATE_AT]]]]
+            record = own.records[own.record[system.idx[i0 + tangent.states.at[e]]]]
             m = record[COUNT]
             for n in range(row[SLOT_COUNT]):
                 b = system.idx[i0 + n]

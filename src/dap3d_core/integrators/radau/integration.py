@@ -31,6 +31,8 @@ REGULAR = 1e-6
 
 
 Integers = NDArray[np.int64]
+#: Arrays of states of elements, which a scene without any has not in its checkpoints.
+OF_STATES = ("tangent.states.", "matrix.state_")
 
 
 class Effort(NamedTuple):
@@ -226,8 +228,9 @@ class RadauIntegration(Integration):
     def all_arrays(self) -> Iterator[tuple[str, Any]]:
         """As ``Integration.all_arrays``."""
         yield from super().all_arrays()
-        yield from self.tangent.walk("tangent.")
-        yield from self.matrix.walk("matrix.")
+        own = (*self.tangent.walk("tangent."), *self.matrix.walk("matrix."))
+        without = () if self.evaluator.model.state_count else OF_STATES
+        yield from ((name, array) for name, array in own if not name.startswith(without))
 
     def restored(self, name: str, array: Any, found: Any) -> Any:
         """As ``Integration.restored``."""

@@ -237,7 +237,8 @@ def update_switches_after_step(
     stalled = 0
     for k in range(s.shape[1]):
         is_stalled = (work.cut_attempts > 0) & (s[FOUND, k] == s[VALUE, k])
-        stalled |= is_stalled & (s[SIDE, k] * s[RATE, k] < 0.0)
+        approaches = (s[SIDE, k] * s[RATE, k] < 0.0) | (s[DOES, k] == JUMPS)  # or its rate is noise
+        stalled |= is_stalled & approaches
         s[BEND, k] = (s[FOUND_RATE, k] - s[RATE, k]) / h
         s[VALUE, k], s[RATE, k] = s[FOUND, k], s[FOUND_RATE, k]
         if s[SIDE, k] == 0.0:

@@ -45,17 +45,22 @@ class Hold:
         self.integration = integration
         work = integration.work
         self._real, self._integer = quick_view(work.real), quick_view(work.integer)
-        self._rows = work.rows
+        self._rows, self._times = work.rows, work.times
         self._advance = integration.prepared()
         self._budget = max(LEAST_WORK, WORK_OF_A_CALL // max(1, bodies))
         self._is_simple = not work.switch_count and work.fixed_step == 0.0
         #: The step that a hold began with, and the steps rejected until then; -1.0: none has begun.
-        self._first: tuple[float, int] = (-1.0, 0)
+        self._first_h, self._first_rejected = -1.0, 0
 
     @property
     def t(self) -> float:
         """Time reached by accepted steps."""
         return float(self._real[T])
+
+    @property
+    def is_open(self) -> bool:
+        """True in the course of a hold, until its end has been reached and reported."""
+        return self._first_h >= 0.0
 
     def to(self, end: float, budget: int | None = None) -> bool:
         """Integrate to the end of a hold; True once it is reached.
@@ -63,20 +68,26 @@ class Hold:
         False where the rows are full, where ``budget`` right-hand sides are spent, or where the
         integration has come to its end: what ``integration`` tells. Then it is called again.
         """
-        self.begin()
         real = self._real
+        if self._first_h < 0.0:
+            self.begin()
         real[LIMIT] = end
         self._advance(self._budget if budget is None else budget)
         real[LIMIT] = math.inf
-        if real[T] < end or self._integer[STATUS] != RUNNING:
+        if real[T] < end or self._integer[STATUS] != RUNNING or self._waits(end):
             return False
         self.land(end)
         return True
 
+    def _waits(self, end: float) -> bool:
+        """True if a report before the end of the hold waits until rows are taken."""
+        integer, rows = self._integer, self._rows
+        return integer[ROWS] == len(rows) and bool(self._times[integer[NEXT]] < end)
+
     def begin(self) -> None:
         """Note down the step that a hold begins with."""
-        if self._first[0] < 0.0:
-            self._first = self._real[H], self._integer[REJECTED]
+        if self._first_h < 0.0:
+            self._first_h, self._first_rejected = self._real[H], self._integer[REJECTED]
 
     def land(self, end: float) -> None:
         """Be at the end of a hold, which steps have reached, as if nothing was reported of it.
@@ -84,18 +95,18 @@ class Hold:
         The last step of a hold is cut, and says little about the length of the next one: unless
         steps were rejected, that is at least the one that the hold began with.
         """
-        real, (h, rejected) = self._real, self._first
+        real, integer, h = self._real, self._integer, self._first_h
         real[T] = end  # a break of a function there has taken the run a rounding further
-        if self._integer[ROWS] and self._rows[self._integer[ROWS] - 1, 0] == end:
-            self._integer[ROWS] -= 1
-            self._integer[NEXT] -= 1
-        if real[H] < h and self._integer[REJECTED] == rejected:
+        if integer[ROWS] and self._rows[integer[ROWS] - 1, 0] == end:
+            integer[ROWS] -= 1
+            integer[NEXT] -= 1
+        if real[H] < h and integer[REJECTED] == self._first_rejected:
             real[H] = h
-        self._first = (-1.0, 0)
+        self._first_h = -1.0
 
     def forget(self) -> None:
         """No hold has begun: the state was set to another."""
-        self._first = (-1.0, 0)
+        self._first_h = -1.0
 
     def jump(self) -> None:
         """Let the next step start anew, with its usual length: what the functions give has jumped.
@@ -114,8 +125,8 @@ class Hold:
 
     def state(self) -> dict[str, Any]:
         """State as plain data."""
-        return {"h": self._first[0], "rejected": self._first[1]}
+        return {"h": self._first_h, "rejected": self._first_rejected}
 
     def restore(self, found: Mapping[str, Any]) -> None:
         """Go on from what ``state`` gave."""
-        self._first = float(found["h"]), int(found["rejected"])
+        self._first_h, self._first_rejected = float(found["h"]), int(found["rejected"])

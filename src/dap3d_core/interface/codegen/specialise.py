@@ -13,16 +13,17 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.interface.codegen.instance_layout import InstanceLayout
 from dap3d_core.interface.codegen.kernel_arguments import (
     DERIVATIVES,
     FRICTION_NUMBERS,
     KernelArgument,
     friction_names,
     in_order,
+    namespace,
     parameters,
     stored,
 )
-from dap3d_core.interface.codegen.terms import names_behind, shifted
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 
@@ -65,7 +66,8 @@ def bind_functions(
         behind = shifted(of_argument.layout, layout.par_width)
         value = of_argument.kernels["value"]
         names_of_value = parameters(value)
-        own = in_order(names_behind(of_argument, behind), [n for n in names_of_value if n != "x"])
+        all_names = _names_of(of_argument, behind)
+        own = in_order(all_names, [n for n in names_of_value if n != "x"])
         names |= {f"{prefix}__{q.name}": attrs.evolve(q, name=f"{prefix}__{q.name}") for q in own}
         wanted = tuple("x" if n == "x" else f"{prefix}__{n}" for n in names_of_value)
         given = _Given(f"{prefix}__value", value, wanted, f"{prefix}{KNOTS}", knots[field])
@@ -92,6 +94,25 @@ def bind_functions(
     paths = tuple(f"out[{k}]" for k in range(len(distances.found)))
     return attrs.evolve(
         bound, kernels=bound.kernels | {"knot": kernel}, outputs=bound.outputs | {"knot": paths}
+    )
+
+
+def _names_of(function: TypeInfo, layout: InstanceLayout) -> dict[str, KernelArgument]:
+    """Names of a function whose numbers are shifted."""
+    if not function.terms:
+        return namespace(function.type, layout)
+    from dap3d_core.interface.codegen.terms import names_behind
+
+    return names_behind(function, layout)
+
+
+def shifted(layout: InstanceLayout, start: int) -> InstanceLayout:
+    """A layout with its numbers shifted to ``start``."""
+    return attrs.evolve(
+        layout,
+        numbers={n: (start + at, shape) for n, (at, shape) in layout.numbers.items()},
+        tables={n: (start + at, columns) for n, (at, columns) in layout.tables.items()},
+        par_width=start + layout.par_width,
     )
 
 

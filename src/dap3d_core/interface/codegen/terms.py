@@ -16,6 +16,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     namespace,
     parameters,
 )
+from dap3d_core.interface.codegen.specialise import shifted
 from dap3d_core.interface.codegen.type_info import TypeInfo
 
 
@@ -56,16 +57,6 @@ def names_behind(type_info: TypeInfo, layout: InstanceLayout) -> dict[str, Kerne
             if name != "x":
                 names[f"g{k}__{name}"] = attrs.evolve(quantity, name=f"g{k}__{name}")
     return names
-
-
-def shifted(layout: InstanceLayout, start: int) -> InstanceLayout:
-    """A layout with its numbers shifted to ``start``."""
-    return attrs.evolve(
-        layout,
-        numbers={n: (start + at, shape) for n, (at, shape) in layout.numbers.items()},
-        tables={n: (start + at, columns) for n, (at, columns) in layout.tables.items()},
-        par_width=start + layout.par_width,
-    )
 
 
 def _kernel(type_info: TypeInfo, terms: Sequence[TypeInfo]) -> Callable[..., Any]:

@@ -59,6 +59,18 @@ class Plan:
     fill: int
     unfilled_size: int
 
+    @property
+    def work(self) -> int:
+        """Estimate of the multiplications of one factorisation and what goes with it."""
+        nodes, updates = self.nodes, self.updates
+        rows = np.repeat(nodes[:-1, 0], np.diff(nodes[:, 5]))
+        products = rows * updates[:, 3] * updates[:, 4] // (1 + (updates[:, 5] != 0))
+        own = int(np.sum(nodes[:-1, 0] ** 3)) // 6
+        return int(np.sum(products)) + own + ROW_WORK * int(np.sum(self.blocks[:, 2]))
+
+
+#: Multiplications for one row of a block of D: evaluated, scaled, multiplied.
+ROW_WORK = 36
 
 #: Kinds of a target: off-diagonal sum of products, diagonal sum of products, copy of a block of D
 #: by rows or transposed, identity.

@@ -65,11 +65,20 @@ def _positive(value: Any) -> Any:
     return bounded(number_of(value), positive=True)
 
 
+def _integrator(value: Any) -> Any:
+    """An integrator of dap3d, or of an installed package; it is loaded where a run begins."""
+    if value in INTEGRATORS:
+        return value
+    from dap3d_core.registry.integrators import added_integrators
+
+    return word_of(value, (*INTEGRATORS, *added_integrators()))
+
+
 _READERS: dict[str, Callable[[Any], Any]] = {
     "t_end": lambda v: _time(v, positive=False),
     "dt": _time,
     "method": lambda v: word_of(v, METHODS),
-    "integrator": lambda v: word_of(v, INTEGRATORS),
+    "integrator": _integrator,
     "rtol": lambda v: bounded(number_of(v), minimum=SMALLEST_RTOL, maximum=1.0),
     "atol": _tolerance,
     "step": _time,

@@ -1,12 +1,22 @@
 """The inputs of a run: set by name, checked, held."""
 
-import math
 from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.stepping.hold import quick_view
 from dap3d_core.registry.suggestions import nearest
+from dap3d_core.scene.validate.coerce_values import LARGEST
+
+
+def number_of(value: Any) -> float:
+    """A number, numpy's as well; NaN where it is none, or several."""
+    try:
+        return float(value) if np.ndim(value) == 0 else float("nan")
+    except (TypeError, ValueError):
+        return float("nan")
 
 
 class HeldInputs:
@@ -21,11 +31,15 @@ class HeldInputs:
         model = evaluator.model
         self._evaluator = evaluator
         self._index = {name: k for k, name in enumerate(model.input_names)}
-        self._rows = model.input_rows.tolist()
-        self._F = quick_view(evaluator.system.F)
+        F, rows = evaluator.system.F, model.input_rows
+        self._numbers = quick_view(F.reshape(-1))
+        self._places = (F.shape[1] * rows).tolist()
+        #: (inputs,) the numbers that elements read: rows of inputs follow one another.
+        self.present = F[rows[0] : rows[0] + len(rows), 0] if len(rows) else F[:0, 0]
         self.values: list[float] = evaluator.inputs.tolist()
         self.drives = any(
-            bool((group.functions == row).any()) for group in model.joints for row in self._rows
+            bool(np.isin(group.functions[:, : len(group.type_info.layout.functions)], rows).any())
+            for group in model.joints
         )
 
     def set(self, given: Mapping[str, Any]) -> bool:
@@ -39,15 +53,15 @@ class HeldInputs:
             k = index.get(name)
             if k is None:
                 raise ValueError(self._unknown(name))
+            if type(value) is not float:
+                value = number_of(value)
             if value == values[k]:
                 continue
-            try:
-                number = float(value)
-            except (TypeError, ValueError):
-                number = math.nan
-            if not math.isfinite(number):
-                raise ValueError(f"input {name} is set to {value!r}; it should be a finite number")
-            values[k] = self._F[self._rows[k], 0] = number
+            if not -LARGEST <= value <= LARGEST:
+                raise ValueError(
+                    f"input {name} is set to {given[name]!r}; it should be a finite number"
+                )
+            values[k] = self._numbers[self._places[k]] = value
             changes = True
         return changes
 

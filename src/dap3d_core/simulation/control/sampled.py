@@ -54,6 +54,8 @@ class SampledControl:
                 'name it in a force, input = "NAME"'
             )
         self._evaluator, self._t_end = evaluator, t_end
+        #: No sample is taken from here on: it would act on nothing.
+        self._last = t_end - ALIKE * min(one.every for one in self.controllers)
         self.view = StateView(compiled, evaluator)
         self._inputs = HeldInputs(evaluator)
         self._counts = [0] * len(self.controllers)
@@ -62,6 +64,11 @@ class SampledControl:
         #: When inputs have changed since rows were taken last, and to what.
         self._history: list[tuple[float, list[float]]] = []
         self._next = 0.0
+
+    @property
+    def titles(self) -> list[str]:
+        """Names of the controllers."""
+        return [controller.title for controller in self.controllers]
 
     def notes(self, dt: float) -> list[str]:
         """Notes on controllers that are slow."""
@@ -91,7 +98,7 @@ class SampledControl:
         deadline = time.perf_counter() + CHUNK_SECONDS
         budget = 0 if step_by_step else None
         while True:
-            if hold.t >= self._next:
+            if hold.t >= self._next and not hold.is_open:
                 self._sample(hold, locator)
             end = self._next
             reached = _with_events(hold, locator, end) if locator else hold.to(end, budget)
@@ -124,19 +131,17 @@ class SampledControl:
         """Call the controllers that are due, and set what they return."""
         now = self._next
         self.view.changed()
-        given: dict[str, Any] = {}
-        for k, controller in enumerate(self.controllers):
-            if abs(self._counts[k] * controller.every - now) <= ALIKE * controller.every:
-                self._counts[k] += 1
-                self._merge(given, k, self._update(controller, now))
+        given: Mapping[str, Any]
+        if len(self.controllers) == 1:
+            self._counts[0] += 1
+            given = self._update(self.controllers[0], now)
+        else:
+            given = self._of_several(now)
         self._next = self._next_instant()
         try:
             changes = self._inputs.set(given)
         except ValueError as error:
-            names = " and ".join(
-                sorted({self.controllers[k].title for k in self._setters.values()})
-            )
-            who = names or self.controllers[0].title
+            who = " or ".join(self.titles)
             raise SimulationError(f"controller {who} at t = {now:.9g} s: {error}") from error
         if changes or not self._history:
             self._history.append((now, list(self._inputs.values)))
@@ -153,34 +158,43 @@ class SampledControl:
             raise SimulationError(
                 f"controller {controller.title} failed at t = {now:.9g} s: {reason}"
             ) from error
-        if not isinstance(found, Mapping):
+        if type(found) is not dict and not isinstance(found, Mapping):
             raise SimulationError(
                 f"controller {controller.title} returned {found!r} at t = {now:.9g} s; it should "
                 "return {input: value}, or {} to leave all as they are"
             )
         return found
 
-    def _merge(self, given: dict[str, Any], k: int, found: Mapping[str, Any]) -> None:
-        for name, value in found.items():
-            other = self._setters.setdefault(name, k)
-            if other != k:
-                names = f"{self.controllers[other].title} and {self.controllers[k].title}"
-                raise SimulationError(f"controllers {names} both set input {name}")
-            given[name] = value
+    def _of_several(self, now: float) -> dict[str, Any]:
+        """What the controllers that are due set together."""
+        given: dict[str, Any] = {}
+        for k, controller in enumerate(self.controllers):
+            if abs(self._counts[k] * controller.every - now) > ALIKE * controller.every:
+                continue
+            self._counts[k] += 1
+            for name, value in self._update(controller, now).items():
+                other = self._setters.setdefault(name, k)
+                if other != k:
+                    names = f"{self.controllers[other].title} and {controller.title}"
+                    raise SimulationError(f"controllers {names} both set input {name}")
+                given[name] = value
+        return given
 
     def _next_instant(self) -> float:
         """The next instant at which a controller is due; infinite behind the end of the run."""
-        pairs = zip(self._counts, self.controllers, strict=True)
-        nearest_one = min(count * one.every for count, one in pairs)
-        slack = ALIKE * min(one.every for one in self.controllers)
-        return nearest_one if nearest_one < self._t_end - slack else math.inf
+        if len(self.controllers) == 1:
+            instant = self._counts[0] * self.controllers[0].every
+        else:
+            pairs = zip(self._counts, self.controllers, strict=True)
+            instant = min(count * one.every for count, one in pairs)
+        return instant if instant < self._last else math.inf
 
     # ---------------------------------------------------------------- checkpoints
 
     def state(self, integrations: Sequence[Integration]) -> dict[str, Any]:
         """State of the controllers' schedule and inputs, as plain data."""
         return {
-            "titles": [one.title for one in self.controllers],
+            "titles": self.titles,
             "every": [one.every for one in self.controllers],
             "counts": list(self._counts),
             "inputs": list(self._inputs.values),
@@ -259,6 +273,6 @@ def jump(evaluator: Evaluator, hold: Hold, *, drives: bool) -> None:
 def kinetic_energy(evaluator: Evaluator, y: Floats) -> float:
     """Kinetic energy, J, of an integrated state."""
     model = evaluator.model
-    state = by_body(evaluator.body_state(y))
+    state = by_body(evaluator.bodies_of(evaluator.body_state(y)))
     v, w = state[:, 7:10], state[:, 10:13]
     return 0.5 * float(model.mass @ np.sum(v * v, axis=1) + np.einsum("ba,bac,bc", w, model.Jp, w))

@@ -123,15 +123,13 @@ class Jumps:
             SimulationError: the joints do not allow such velocities.
         """
         t, u = integration.t, self._state_of(integration)
-        sides = integration.work.switches[at.SIDE]
+        none = np.zeros(integration.work.switches.shape[1])
         own = self._evaluator.states.copy()
         for first, numbers in states.items():
             own[first : first + len(numbers)] = numbers
         self._evaluator.states = own
         try:
-            jump = self._law.jump(
-                t, u, sides, np.zeros_like(sides), self._soon(integration), _rows_to(u, bodies)
-            )
+            jump = self._law.jump(t, u, None, none, self._soon(integration), _rows_to(u, bodies))
         except ImpossibleJumpError as error:
             names = ", ".join(self._evaluator.model.body_names[k] for k in bodies) or "no body"
             raise SimulationError(
@@ -199,8 +197,8 @@ class Jumps:
         stays = self._is_bare & (integration.work.switches[at.SIDE] < 0.0)
         for k in np.flatnonzero(stays).tolist():
             raise SimulationError(
-                f"the run stopped at t = {integration.t:.9g} s: {self._title(k)} stays in contact, "
-                "and nothing carries it: its type has no wrench below zero of its switch, and the "
+                f"the run stopped at t = {integration.t:.9g} s: {self._title(k)} comes to rest "
+                "in contact, and nothing carries it: its type has no wrench below zero of its switch, and the "
                 "bodies would pass through each other. Give the type a wrench there, as ptp_stop "
                 "and its like have, or end the run by an event before"
             )

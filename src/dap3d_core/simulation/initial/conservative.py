@@ -36,11 +36,12 @@ def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
     if model.state_count:  # what an element stores and loses by its states is not told
         return False
     driven = any(np.any(g.functions > 0) for g in model.joints)
-    if (
-        driven
-        or model.iterated_forces
-        or any("energy" not in g.type_info.kernels for g in model.forces)
-    ):
+    driven = driven or any(
+        np.any(g.functions[:, : len(g.type_info.layout.functions)] > 0) for g in model.forces
+    )
+    if driven or model.iterated_forces:
+        return False
+    if any("energy" not in g.type_info.kernels for g in model.forces):
         return False
     rng = np.random.default_rng(1)
     r, p, _, _ = split(u)

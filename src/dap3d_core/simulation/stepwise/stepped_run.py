@@ -5,12 +5,9 @@ import os
 from collections.abc import Callable, Mapping
 
 import attrs
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dap3d_core.assembly.arrays import CHECKPOINTED
-from dap3d_core.formulations import REPORT
-from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.stepping.hold import Hold
 from dap3d_core.integrators.stepping.integration_state import Y
@@ -18,7 +15,7 @@ from dap3d_core.result import Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
-from dap3d_core.simulation.control.sampled import jump
+from dap3d_core.simulation.control.sampled import ALIKE, jump
 from dap3d_core.simulation.control.state_view import StateView
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.handover import hand_over
@@ -27,13 +24,10 @@ from dap3d_core.simulation.output.termination import why_stopped
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import compiled_for, settings_of
-
-Floats = NDArray[np.float64]
+from dap3d_core.simulation.stepwise.state_log import StateLog
 
 #: Where a run without a final time ends at last, s: steps cannot resolve time any further.
 HORIZON = 1e5
-#: Rows that a record has room for at first; it doubles.
-FIRST_ROWS = 1024
 
 
 class SteppedRun:
@@ -54,21 +48,15 @@ class SteppedRun:
         self.notes = run.notes
         self._inputs = HeldInputs(evaluator)
         self._failure = ""
+        self._is_recorded, self._t_end = record, run.t_end
+        integration = self._integration = run.present
+        self._log = StateLog(evaluator, integration.work.state[Y], self._inputs)
         self._attach()
-        integration = run.present
-        self._integration, system = integration, evaluator.system
+        system = evaluator.system
         arrays = [*integration.state_arrays(), *(getattr(system, name) for name in CHECKPOINTED)]
         if evaluator.formulation.has_own_coordinates:
             arrays.append(system.tree.constants)  # the poses that coordinates count from
         self._start = [(array, array.copy()) for array in arrays]
-        numbers = np.arange(len(system.par))
-        turns = [numbers[place] for place in evaluator.turn_places()]
-        self._turns = np.concatenate(turns) if turns else numbers[:0]
-        self._size = int(integration.work.state.shape[1])
-        width = 1 + self._size + len(self._inputs.values) + len(self._turns)
-        self._is_recorded = record
-        self._log = np.empty((FIRST_ROWS if record else 1, width))
-        self._count = 0
 
     @property
     def t(self) -> float:
@@ -96,10 +84,12 @@ class SteppedRun:
         end = t + dt
         if not t < end < math.inf:
             raise ValueError(f"dt is {dt!r}; it should be a positive number of seconds")
+        if abs(end - self._t_end) <= ALIKE * dt:
+            end = self._t_end
         if inputs and self._inputs.set(inputs):
             jump(self._evaluator, hold, drives=self._inputs.drives)
         if self._is_recorded:
-            self._note_state(t)
+            self._log.add(t)
         if not hold.to(end) or self._run.until < math.inf:
             self._go_on(end)
         self.state.changed()
@@ -122,7 +112,7 @@ class SteppedRun:
         for array, first in self._start:
             array[...] = first
         self._inputs.replace(evaluator.model.input_values.tolist())
-        self._failure, self._count = "", 0
+        self._failure, self._log.count = "", 0
         self._hold.forget()
         if self._hold.integration is not self._integration:
             self._attach()
@@ -140,10 +130,13 @@ class SteppedRun:
 
         Accelerations and reactions are computed here. Without ``record`` the present state alone.
         """
-        noted, t = np.vstack([self._log[: self._count], self._present_row(self.t)]), self.t
+        log, t = self._log, self.t
         record = self._run.record("stopped" if self._failure else "done")
-        record = attrs.evolve(record, settings=record.settings | {"t_end": t, "dt": None})
-        rows = self._reports(noted)
+        more = {"t_end": t, "dt": None, "controllers": ["steps of a script"]}
+        record = attrs.evolve(record, settings=record.settings | more)
+        log.add(t)
+        rows = log.reports()
+        log.count -= 1
         return Result.of_run(self._evaluator.model, rows, record, lambda: self.compiled.evaluator)
 
     # ---------------------------------------------------------------- steps
@@ -151,6 +144,7 @@ class SteppedRun:
     def _attach(self) -> None:
         """Work with the present integration."""
         self._hold = Hold(self._run.present, self._evaluator.model.body_count)
+        self._log.attach(self._run.present.work.state[Y])
         self.state.attach(self._run.present)
 
     def _go_on(self, end: float) -> None:
@@ -161,7 +155,7 @@ class SteppedRun:
             present.rows()  # those of the integration are not used
             if present.status is Status.RUNNING and present.t < min(end, run.until):
                 self._hold.to(min(end, run.until), 0 if run.until < math.inf else None)
-            elif present.status is Status.RUNNING and present.t < run.until:
+            elif present.t >= end and present.status in (Status.RUNNING, Status.FINISHED):
                 return
             elif hand_over(run):
                 self._attach()
@@ -177,47 +171,6 @@ class SteppedRun:
         else:
             self._failure = why_stopped(self._evaluator, run.present, run.rank)
         raise SimulationError(self._failure, self.result())
-
-    # ---------------------------------------------------------------- record
-
-    def _note_state(self, t: float) -> None:
-        if self._count == len(self._log):
-            self._log = np.concatenate([self._log, np.empty_like(self._log)])
-        self._write(self._log[self._count], t)
-        self._count += 1
-
-    def _present_row(self, t: float) -> Floats:
-        row = np.empty(self._log.shape[1])
-        self._write(row, t)
-        return row
-
-    def _write(self, row: Floats, t: float) -> None:
-        """A row of the record: t, y, inputs, numbers of angles whose turns are counted."""
-        values, size = self._inputs.values, 1 + self._size
-        row[0] = t
-        row[1:size] = self._hold.integration.work.state[Y]
-        if values:
-            row[size : size + len(values)] = values
-        if len(self._turns):
-            row[size + len(values) :] = self._evaluator.system.par[self._turns]
-
-    @IGNORE_FLOAT_ERRORS
-    def _reports(self, log: Floats) -> Floats:
-        """Reported rows of rows of the record."""
-        evaluator, count, size = self._evaluator, len(self._inputs.values), 1 + self._size
-        par, places = evaluator.system.par, self._turns
-        before, rows = par[places], np.zeros((len(log), size + evaluator.report_size))
-        with evaluator.held_inputs():
-            for row, noted in zip(rows, log, strict=True):
-                row[:size] = noted[:size]
-                evaluator.set_inputs(noted[size : size + count])
-                par[places] = noted[size + count :]
-                evaluator.functions[REPORT](
-                    float(noted[0]), noted[1:size].copy(), row[size:], evaluator.system,
-                    evaluator.loops,
-                )  # fmt: skip
-        par[places] = before
-        return evaluator.with_inputs(evaluator.body_rows(rows), log[:, size : size + count])
 
 
 class _OpenRun(Run):

@@ -11,6 +11,7 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.state_layout import u_from_y
+from dap3d_core.simulation.initial.assemble import ROUNDING, distance
 from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.study.batch import driver
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
@@ -31,7 +32,10 @@ class TreePoints:
         return self._make_other()
 
     def run(self, table: Floats, places: Integers, y0: Floats, start: int) -> BatchRows:
-        """As ``CompiledBatch.run``; states (k, 13 n + 1), also those returned, are of bodies."""
+        """As ``CompiledBatch.run``; states (k, 13 n + 1), also those returned, are of bodies.
+
+        Points whose correction moves bodies from where they start in the scene are not done.
+        """
         coordinates = self._batch.evaluator.coordinates
         first = coordinates.start(self._u)
         if start == driver.UNCORRECTED:
@@ -42,5 +46,9 @@ class TreePoints:
         y = coordinates.starts(self._u, u_from_y(corrected.y0))
         rows = self._batch.run(table, places, y)
         rows.diagnostics[:, :STARTING] = corrected.diagnostics[:, :STARTING]
-        done = rows.done & corrected.done
+        moved, turned = distance(
+            u_from_y(corrected.y0), self._u, self._batch.evaluator.model.body_count
+        )
+        stays = np.maximum(moved / self._batch.size, turned) <= ROUNDING
+        done = rows.done & corrected.done & stays
         return BatchRows(done, rows.rows, y0, corrected.y0, rows.diagnostics)

@@ -180,3 +180,12 @@ def test_a_type_goes_before_a_model_of_its_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "rev").mkdir()
     assert "types" in json.loads(described("rev", "--json"))
+
+
+def test_states_of_a_type_are_shown():
+    """By name, with the fields that come with them; a vector by its length."""
+    result = CliRunner().invoke(dap3d, ["describe", "maxwell"])
+    assert result.exit_code == 0
+    said = " ".join(result.output.split())
+    assert "states z; initial values by fields in _0, tolerances by fields in _atol" in said
+    assert "z_atol" in said

@@ -17,9 +17,10 @@ from dap3d_core.simulation.initial.assemble import correct_initial
 ACCELERATIONS, MULTIPLIERS = 1e-12, 1e-11
 
 
-def closed(evaluator):
-    """The start of a scene, on its constraints to rounding: a correction leaves 1e-10 of them."""
-    y = evaluator.integrated(correct_initial(evaluator, evaluator.model.u0).u)
+def closed(evaluator, u=None):
+    """A state, by default the start, on its constraints to rounding: a correction leaves 1e-10."""
+    u = evaluator.model.u0 if u is None else u
+    y = evaluator.integrated(correct_initial(evaluator, u).u)
     evaluator.system.settings[[TOLERANCE_C, TOLERANCE_V]] = 0.0
     out = np.zeros(4 + evaluator.length_count)
     evaluator.functions[PROJECT](0.0, y, out, evaluator.system, evaluator.loops)

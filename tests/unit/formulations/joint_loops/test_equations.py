@@ -4,10 +4,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from support import loops, trees
+from support import loops, problems, redundant, singular, trees
 from unit.formulations.joint.test_equations import ACCELERATIONS, MULTIPLIERS, closed
 
 import dap3d_core as dap
+from dap3d_core.formulations.joint_loops import tables
 from dap3d_core.model.rigid_motion import matrices
 from dap3d_core.model.state_layout import split
 from dap3d_core.simulation import CompiledModel, SimulationError
@@ -204,6 +205,63 @@ def test_a_screw_is_kept_by_name():
     assert any("thread (its motion is a screw)" in note for note in found.notes)
     right = dap.simulate(scene, method="standard", **settings)
     assert found.u == pytest.approx(right.u, abs=1e-8 * np.max(np.abs(right.u)))
+
+
+def test_a_net_runs_and_notes_its_cost():
+    """A ladder on two chains of spherical joints: all rows meet in a matrix without zeros."""
+    found = dap.simulate(ladder(12), method="joint", t_end=0.02, dt=0.02)
+    assert any("times as long as standard" in note for note in found.notes)
+    right = dap.simulate(ladder(12), method="standard", t_end=0.02, dt=0.02)
+    assert found.u == pytest.approx(right.u, abs=1e-7)
+    assert not any("times as long" in note for note in dap.compile(ladder(1), method="joint").notes)
+
+
+def ladder(rungs):
+    """Rods along x from two points of ground, and a rung between their ends; spherical joints."""
+    scene = dap.Scene(name="ladder")
+    last = ["ground.O", scene.add_point("foot", "ground", (0.0, 1.0, 0.0))]
+    for k in range(rungs):
+        for side in range(2):
+            name = f"rod{side}_{k}"
+            scene.add_body(name, mass=1.0, Jp=(0.1, 0.1, 0.1), r=(k + 0.5, float(side), 0.0))
+            begin = scene.add_point(f"{name}a", name, (-0.5, 0.0, 0.0))
+            scene.add_joint("sph", f"J{name}", P_i=begin, P_j=last[side])
+            last[side] = scene.add_point(f"{name}b", name, (0.5, 0.0, 0.0))
+        rung = f"rung{k}"
+        scene.add_body(rung, mass=1.0, Jp=(0.1, 0.1, 0.1), r=(k + 1.0, 0.5, 0.0))
+        for side in range(2):
+            end = scene.add_point(f"{rung}{side}", rung, (0.0, side - 0.5, 0.0))
+            scene.add_joint("sph", f"J{rung}{side}", P_i=end, P_j=last[side])
+    scene.add_force("weight", "gravity")
+    return scene
+
+
+def test_rows_of_too_many_meetings_are_refused(monkeypatch):
+    """Where their arrays would take gigabytes; here from a hundred numbers on."""
+    monkeypatch.setattr(tables, "MOST_NUMBERS", 100)
+    with pytest.raises(SimulationError, match=r"kept rows would take .* GB. Use method standard"):
+        dap.compile(ladder(3), method="joint")
+
+
+def test_redundant_rows_that_come_to_hold_a_motion_end_the_run():
+    """A car whose front wheels are steered by equal angles: they contradict each other."""
+    with pytest.raises(SimulationError, match="have come to hold a motion that they left free"):
+        dap.simulate(singular.car(), method="joint", t_end=0.01, dt=0.005, rtol=1e-8)
+
+
+def test_a_singular_start_is_refused():
+    """Rows depend on each other at this pose alone; joint does not find the rates there."""
+    with pytest.raises(SimulationError, match="singular pose, from which method joint"):
+        dap.simulate(singular.flat_parallelogram(), method="joint", t_end=0.1, dt=0.1)
+
+
+def test_a_loop_goes_through_its_singular_poses():
+    """A parallelogram whose links lie in one line eight times in ten seconds, as in standard."""
+    found = dap.simulate(problems.four_bar(), method="joint", t_end=10.0, dt=0.5, rtol=1e-9,
+                         atol=1e-11)  # fmt: skip
+    tip = 2.0 * np.hstack([found.r[:, 0, :2], found.rd[:, 0, :2]])
+    expected = redundant.four_bars_tip(1, found.t)
+    assert redundant.error_of(tip[1:], expected[1:]) < 500 * 1e-9
 
 
 def test_rows_that_contradict_each_other_are_refused():

@@ -45,7 +45,7 @@ RUNS = [
 MORE = """
 from support.problems import everything
 from support.on_axles import wheel
-from support import redundant, singular, trees
+from support import loops, redundant, singular, trees
 from unit.study.batch.test_batch import ensemble, pendulum
 from unit.study.batch.test_packs import CASES, in_packs
 
@@ -60,6 +60,10 @@ recorder.record(dap.simulate, wheel(), t_end=0.2, dt=0.1, method="joint")
 from unit.formulations.joint.test_equations import hinged_spring
 for scene in (trees.random_tree(8, 5, free=0.2), trees.mixed_chain(2), hinged_spring()):
     recorder.record(dap.simulate, scene, t_end=0.01, dt=0.01, method="joint")
+rubbing = loops.spatial_four_bar()
+rubbing.add_force("friction", joint="J2", mu=0.2, radius=0.05, v_tol=0.1)
+for scene in (rubbing, "bicycle", "A04", "fourbar3"):
+    recorder.record(dap.simulate, scene, t_end=0.01, dt=0.005, method="joint")
 for scene, end in ((singular.flat_parallelogram(), 0.5), (redundant.dead_centre(), 1.2)):
     recorder.record(dap.simulate, scene, t_end=end, dt=end, rtol=1e-6)
 for case in CASES.values():

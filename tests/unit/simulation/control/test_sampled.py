@@ -6,15 +6,16 @@ from support.pushed import feedback, held, pushed_block
 
 import dap3d_core as dap
 from dap3d_core.integrators.stepping import hold
+from dap3d_core.result import ResultError
 from dap3d_core.simulation import CheckpointError
+from dap3d_core.simulation import run as run_module
 from dap3d_core.simulation.control import sampled
 
 
 def run(update, scene=None, every=0.1, t_end=1.0, **more):
     controllers = [dap.Controller(every=every, update=update)]
-    return dap.simulate(
-        scene or pushed_block(), t_end=t_end, dt=0.1, controllers=controllers, **more
-    )
+    options = {"t_end": t_end, "dt": 0.1, "controllers": controllers} | more
+    return dap.simulate(scene or pushed_block(), **options)
 
 
 @pytest.mark.parametrize("integrator", ["dopri5", "dop853", "adams", "radau"])
@@ -248,6 +249,25 @@ def test_velocities_jump_where_a_driver_reads_an_input(joint):
         np.zeros(11), abs=1e-13
     )
     assert result.energy.kinetic == pytest.approx(result.work, abs=1e-12)
+
+
+def test_a_controlled_run_is_not_made_again_without_its_script():
+    """Its result names what set the inputs."""
+    with pytest.raises(ResultError, match="inputs were set by feedback, which its result does not"):
+        dap.rerun(run(feedback))
+    stepped = dap.start(pushed_block())
+    stepped.step(0.1)
+    with pytest.raises(ResultError, match="inputs were set by steps of a script"):
+        dap.rerun(stepped.result())
+
+
+def test_reports_within_a_step_wait_for_room(monkeypatch):
+    """With a buffer of few rows: those before a sample are made with what acted there."""
+    wanted = run(feedback, every=0.25, dt=0.02)
+    monkeypatch.setattr(run_module, "BUFFER_NUMBERS", 100)
+    found = run(feedback, every=0.25, dt=0.02)
+    for name in ("t", "u", "v_dot", "inputs"):
+        assert np.array_equal(getattr(wanted, name), getattr(found, name)), name
 
 
 def test_lists_of_controllers_are_checked():

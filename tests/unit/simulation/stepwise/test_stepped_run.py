@@ -78,6 +78,10 @@ def test_settings_are_those_of_simulate():
 def test_the_end_of_a_run_is_told():
     """With what was computed, and again until it is reset."""
     run = dap.start(pushed_block(1.0), t_end=0.25)
+    for _ in range(5):
+        run.step(0.05)  # the last one ends at the end, whatever the rounding
+    assert run.t == 0.25
+    run.reset()
     run.step(0.1)
     run.step(0.1)
     for _ in range(2):

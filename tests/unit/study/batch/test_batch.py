@@ -8,6 +8,7 @@ from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
+from dap3d_core.study.batch import driver
 from dap3d_core.study.batch.parameter_map import ParameterMap, poses_of
 from dap3d_core.study.batch.prepare_dependence import dependence_of
 from dap3d_core.study.batch.rebuild import ModelRebuilder
@@ -315,3 +316,17 @@ def test_velocities_in_joint_coordinates_start_as_those_of_single_runs():
     assert batch.status.tolist() == [DONE] * 3
     for output, single in singly(of, points).items():
         np.testing.assert_allclose(batch.values[output], single, rtol=0.0, atol=1e-13 * 10.0)
+
+
+def test_points_whose_bodies_start_elsewhere_are_left_open():
+    """A correction that leads to other poses than those of the scene, to which the tree refers."""
+    of = ensemble(pendulum(), ["bodies.bob.w.y"], ["bob.r"], method="joint", t_end=0.1)
+    points = np.array([[0.3], [0.3]])
+    of.run(points)
+    runner = of._runner()
+    mapped = runner.parameter_map
+    y0 = mapped.states(points, of.compiled.model.u0)
+    y0[1, :3] += (0.1, 0.0, 0.0)
+    table, _ = mapped.table(points)
+    rows = runner._runs.run(table, mapped.places, y0, driver.CORRECT)
+    assert rows.done.tolist() == [True, False]

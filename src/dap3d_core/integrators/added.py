@@ -1,0 +1,64 @@
+"""Integrators of dap3d and of other packages, by name."""
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from dap3d_core.integrators import EXPLICIT, INTEGRATORS, Integration, Integrator, explicit
+from dap3d_core.integrators.runge_kutta.tableau import Tableau, lower_triangle
+
+if TYPE_CHECKING:
+    from dap3d_core.interface.integrators import RungeKuttaMethod
+
+#: Part of the controller that looks at the last error, from order 5 on: as in DOPRI5.
+BETA = 0.04
+
+
+def integrator_named(name: Any) -> Integrator:
+    """The integrator of a name; "auto" begins with ``EXPLICIT``.
+
+    Raises:
+        PluginError: it is of another package, and cannot be used.
+    """
+    if name == "auto":
+        return EXPLICIT
+    return INTEGRATORS.get(name) or _of_package(str(name))
+
+
+@lru_cache(maxsize=16)
+def _of_package(name: str) -> Integrator:
+    from dap3d_core.registry.integrators import load_integrator
+
+    tableau = tableau_of(load_integrator(name))
+
+    def make(*args: Any, **options: Any) -> Integration:
+        return explicit(tableau, *args, **options)
+
+    return Integrator(name, make, adaptive=tableau.adaptive)
+
+
+def tableau_of(method: "RungeKuttaMethod") -> Tableau:
+    """The coefficients as the compiled core reads them.
+
+    An adaptive method gets the cubic dense output of Hermite, between the values and rates of both
+    ends, and the controller of DOPRI5.
+    """
+    s = len(method.b)
+    errors: list[list[float]] = []
+    if method.b_hat:
+        given = [*method.b, 0.0], [*method.b_hat, 0.0][: s + 1]
+        errors = [[x - y for x, y in zip(*given, strict=True)]]
+    beta = BETA if method.order > 4 else 0.0
+    return Tableau(
+        name=method.keyword,
+        order=method.order,
+        stages=s,
+        c=[*method.c, 1.0],
+        a=lower_triangle(*method.a, method.b),
+        e=errors,
+        d=[[0.0] * (s + 1)] if errors else [],
+        dense_order=3 if errors else 0,
+        exponent=1.0 / method.order - 0.75 * beta,
+        beta=beta,
+        factor_min=1.0 / 5.0,
+        factor_max=10.0,
+    )

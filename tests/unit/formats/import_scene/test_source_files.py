@@ -1,0 +1,50 @@
+"""Files that a model names: nested and included models, and where they lie."""
+
+import numpy as np
+
+import dap3d_core as dap
+from dap3d_core.model.rotations import rotation
+
+INNER = """
+<sdf version="1.9"><model name="finger">
+  <frame name="mount"><pose>0 0 0.1 0 0 0</pose></frame>
+  <link name="tip"><pose>0 0.2 0 0 0 0</pose>
+    <inertial><mass>2</mass><inertia><ixx>1</ixx><iyy>2</iyy><izz>2.5</izz></inertia></inertial>
+  </link>
+</model></sdf>
+"""
+OUTER = """
+<sdf version="1.9"><world name="w">
+  <model name="hand">
+    <pose>1 2 3 0 0 1.5707963267948966</pose>
+    <link name="palm"><inertial><mass>1</mass></inertial></link>
+    <include><uri>model://parts/finger.sdf</uri><name>thumb</name>
+      <pose relative_to="palm">0.5 0 0 0 0 0</pose>
+      <placement_frame>mount</placement_frame></include>
+    <joint name="knuckle" type="revolute"><pose relative_to="thumb::mount"/>
+      <parent>palm</parent><child>thumb::tip</child>
+      <axis><xyz expressed_in="__model__">0 1 0</xyz></axis></joint>
+  </model>
+  <model name="base"><static>true</static><link name="block"/></model>
+</world></sdf>
+"""
+
+
+def test_frames_of_included_models(tmp_path):
+    """The thumb's frame mount lies at (0.5, 0, 0) of the palm, which is turned by a quarter."""
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "finger.sdf").write_text(INNER)
+    (tmp_path / "model").mkdir()
+    path = tmp_path / "model" / "hand.sdf"
+    path.write_text(OUTER)
+    scene, _ = dap.import_model(path, packages={"parts": tmp_path / "parts"})
+    assert list(scene.bodies) == ["hand::palm", "hand::thumb::tip"]
+    turn = np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    mount = [1, 2, 3] + turn @ [0.5, 0, 0]
+    tip = scene.bodies["hand::thumb::tip"]
+    np.testing.assert_allclose(tip.r, mount + turn @ [0, 0.2, -0.1], atol=1e-15)
+    np.testing.assert_allclose(rotation(np.array(tip.p)), turn, atol=1e-15)
+    joint = scene.joints["hand::knuckle"].fields
+    point, axis = scene.points[joint["P_j"]], joint["a_j"]
+    assert (point.body, axis) == ("hand::palm", "hand::palm.y")
+    np.testing.assert_allclose(point.sPp, (0.5, 0, 0), atol=1e-15)
