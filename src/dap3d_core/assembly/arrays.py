@@ -22,11 +22,11 @@ Integers = NDArray[np.int64]
 #: The order of the group loops in the list: all loops of one kind stand together.
 KINDS = (
     "value", "wrench", "energy", "acceleration", "position", "friction", "angle", "turned",
-    "switch", "knot", "rate", "impulse", "reset"
+    "switch", "bound", "knot", "rate", "impulse", "reset"
 )  # fmt: skip
 (
-    VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, KNOT, RATE,
-    IMPULSE, RESET
+    VALUE, WRENCH, ENERGY, ACCELERATION, POSITION, FRICTION, ANGLE, TURNED, SWITCH, BOUND, KNOT,
+    RATE, IMPULSE, RESET
 ) = range(len(KINDS))  # fmt: skip
 
 # What a switch does where it becomes negative, or changes its sign: the run ends; the integration
@@ -36,12 +36,12 @@ ENDS, BEGINS, UNSEEN, JUMPS = 1, 0, -1, 2
 # Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
 # often the multipliers did not settle with friction, the numbers of the penalty formulation, how
 # often a pose was singular where something was reported, the length that tolerances speak of
-# (Model.length), 1.0 where pivots are those of equal masses, and how often the turns of an angle
-# were in doubt.
+# (Model.length), 1.0 where pivots are those of equal masses, how often the turns of an angle
+# were in doubt, and 1.0 where forces read reactions: multipliers that do not settle end a run.
 (
     TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, LENGTH, EVEN,
-    DOUBTFUL, SETTINGS
-) = range(12)  # fmt: skip
+    DOUBTFUL, JAMS, SETTINGS
+) = range(13)  # fmt: skip
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -75,7 +75,7 @@ class System(LoopArrays):
     weight: Floats  # (rows,) from a row's residual to one in m: 1 in scenes of ordinary size
     smallest: Floats  # (rows,) a pivot not above this is singular
     settings: Floats  # (SETTINGS,) see above
-    friction: Floats  # where joints rub: two of the size of ``force``, three of rows
+    friction: Floats  # where forces depend on multipliers (common/friction.py: memory_size)
     groups: Integers  # (loops, 3) i0, p0, count
     kinds: Integers  # (KINDS + 1,) first loop of each kind
     row: Integers  # (model rows,) place of each constraint row in the row vectors

@@ -15,8 +15,8 @@ from dap3d_core.assembly.arrays import step_functions
 RHS, PROJECT, REPORT, ACCEPTED, WATCH = range(5)
 
 #: Kinds of group loops that every formulation calls, and those of joints.
-_ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "knot", "rate", "impulse",
-        "reset")  # fmt: skip
+_ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "bound", "knot", "rate",
+        "impulse", "reset")  # fmt: skip
 _OF_JOINTS = ("acceleration", "position", "friction")
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import EVEN, KINDS, LENGTH, Floats, Integers, System
+from dap3d_core.formulations.common.friction import memory_size
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
 from dap3d_core.interface.codegen.loop_source import computes_rate, stride
 from dap3d_core.kernels.runtime.function_lists import loop_list
@@ -54,7 +55,7 @@ def build_loops(
 
 def _groups_for(model: Model, kind: str) -> tuple[Group, ...]:
     if kind == "friction":
-        return model.friction
+        return (*model.friction, *model.forces)
     return (*model.functions, *model.forces, *model.joints)
 
 
@@ -86,9 +87,12 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         K=np.zeros(plan.matrix_size),
         weight=np.ones(plan.row_size),
         settings=np.array(
-            [1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0]
+            [
+                *(1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0),
+                float(any(group.read for group in model.forces)),
+            ]
         ),
-        friction=np.zeros(12 * (n + 1) + 3 * plan.row_size if model.friction else 0),
+        friction=np.zeros(memory_size(n + 1, plan.row_size) if model.iterated_forces else 0),
         idx=idx,
         groups=groups,
         kinds=starts,
@@ -220,6 +224,9 @@ def _integers_of(group: Group, plan: Plan, model: Model) -> Integers:
         parts.append(np.array([plan.joint_block[m] for m in joints], dtype=np.int64))
     elif kind == "function":
         parts.append(1 + group.members[:, None])
+    for read in group.read:
+        unused = np.zeros((read.count, int(bool(read.type_info.layout.states))), dtype=np.int64)
+        parts += [read.bodies, read.functions, unused, plan.joint_row[read.members][:, None]]
     table = np.ascontiguousarray(np.hstack(parts), dtype=np.int64)
     assert table.shape[1] == stride(group.type_info)
     return table

@@ -31,6 +31,7 @@ from dap3d_core.formulations.arrays import build_loops, build_system, load_numbe
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
 from dap3d_core.formulations.switches import Switch, switches_of
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
+from dap3d_core.interface.element_unknowns import START
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import euler_rates, to_body, to_global
@@ -45,6 +46,8 @@ from dap3d_core.model.state_layout import (
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 IGNORE_FLOAT_ERRORS = np.errstate(all="ignore")
+#: How often the unknowns of joints are solved for at the start, by a few Newton passes each time.
+SEEKING = 12
 
 
 class Evaluator:
@@ -72,6 +75,7 @@ class Evaluator:
         self.loops, self.loop_groups = build_loops(model, self.formulation.loops, announce)
         self.system: System = build_system(model, self.plan, self.loop_groups)
         self.store_initial_function_values()
+        self._seek_unknowns()
         self._weigh_rows()
         self.report_size = model.report_layout["inputs"].start
         if self.formulation.has_own_coordinates:
@@ -97,6 +101,11 @@ class Evaluator:
         """True if the model has angles; their turns are counted at accepted steps."""
         kinds = self.system.kinds
         return bool(kinds[ANGLE + 1] > kinds[ANGLE])
+
+    @cached_property
+    def has_unknowns(self) -> bool:
+        """True if joints have unknowns of their own."""
+        return any(group.type_info.layout.unknowns for group in self.model.joints)
 
     @cached_property
     def switches(self) -> tuple[Switch, ...]:
@@ -128,6 +137,7 @@ class Evaluator:
         self.model, self.states = model, model.initial_states
         self.__dict__.pop("switches", None)  # they name groups
         self.store_initial_function_values()
+        self._seek_unknowns()
         self._weigh_rows()
         if self.formulation.has_own_coordinates:
             self.coordinates = self.formulation.coordinates(self)
@@ -148,7 +158,8 @@ class Evaluator:
         states: (states,) of elements; their initial values by default.
         """
         self.states = self.model.initial_states if states is None else states
-        for places in self.turn_places():
+        self._seek_unknowns()
+        for places in self.turn_places(of_unknowns=False):
             self.system.par[places] = 0.0
         if angles is not None:
             self._set_angles(angles)
@@ -172,6 +183,25 @@ class Evaluator:
         self.place(t, u)
         self._call(ANGLE, t, s.force, s.force, s.force)
 
+    def _seek_unknowns(self) -> None:
+        """Find the unknowns of joints at the poses as given, from where their fields begin."""
+        signs: list[slice] = []
+        for q, (kind, group) in enumerate(self.loop_groups):
+            layout, p0 = group.type_info.layout, int(self.system.groups[q, 1])
+            for name in layout.unknowns if kind == "angle" else ():
+                first, end = p0 + layout.angles[name], p0 + layout.par_width * group.count
+                places = [slice(first + k, end, layout.par_width) for k in range(ANGLE_WIDTH + 1)]
+                for place in places:
+                    self.system.par[place] = 0.0
+                self.system.par[places[0]] = group.numbers[:, layout.numbers[f"{name}{START}"][0]]
+                signs.append(places[-1])
+        for _ in range(SEEKING if signs else 0):
+            self.count_turns(0.0, self.model.u0)
+        for place in signs:  # of what was found
+            self.system.par[place] = 0.0
+        if signs:
+            self.count_turns(0.0, self.model.u0)
+
     @IGNORE_FLOAT_ERRORS
     def counted_angles(self, t: float, u: ArrayLike) -> Floats:
         """(angles,) angles whose turns are counted, rad, at a state u (13 n,)."""
@@ -180,12 +210,15 @@ class Evaluator:
         self._call(TURNED, t, angles, scratch, scratch)
         return angles
 
-    def turn_places(self) -> Iterator[slice]:
-        """Slices of ``par`` that count the turns of angles."""
+    def turn_places(self, *, of_unknowns: bool = True) -> Iterator[slice]:
+        """Slices of ``par`` that count the turns of angles, or keep the unknowns of joints."""
         for q, (kind, group) in enumerate(self.loop_groups):
             if kind == "angle":
-                p0, width = int(self.system.groups[q, 1]), group.type_info.layout.par_width
-                for offset in group.type_info.layout.angles.values():
+                layout = group.type_info.layout
+                p0, width = int(self.system.groups[q, 1]), layout.par_width
+                for name, offset in layout.angles.items():
+                    if name in layout.unknowns and not of_unknowns:
+                        continue
                     for k in range(offset, offset + ANGLE_WIDTH):
                         yield slice(p0 + k, p0 + width * group.count, width)
 

@@ -27,7 +27,8 @@ class Switch:
     Attributes:
         group, place: the element, as an instance of a group.
         kind: "switch": the element's own; "knot": the distance of an argument from where the
-            function that the element is given takes another form.
+            function that the element is given takes another form; "bound": that of an unknown of
+            the element from its bound.
         is_one_of_several, part: where the kernel gives a tuple, which of its numbers.
         length: of the scene, m (Model.length).
     """
@@ -43,6 +44,13 @@ class Switch:
     def words(self) -> str:
         """Reason to end the run where it becomes negative; "" if integration restarts there."""
         type_: Any = self.group.type_info.type
+        if self.kind == "bound":
+            from dap3d_core.interface.codegen.unknowns import bound_words
+
+            unknown, which, field = bound_words(self.group.type_info)[self.part]
+            at, _ = self.group.type_info.layout.numbers[field]
+            value = self.group.numbers[self.place, at]
+            return f"its unknown {unknown} passed its {which} value, {field} = {value:g}"
         return str(type_.switch_words) if self.kind == "switch" else ""
 
     @property
@@ -62,6 +70,8 @@ class Switch:
     @property
     def band(self) -> float:
         """Distance beyond zero from which on it has passed: of a knot, and of contact at rest."""
+        if self.kind == "bound":
+            return 0.0
         if self.kind == "switch":
             type_: Any = self.group.type_info.type
             touches = self.jumps and type_.unilateral and not self.words
@@ -76,7 +86,8 @@ class Switch:
         is_joint = self.group.type_info.type.kind == "joint"
         names = model.joint_names if is_joint else model.force_names
         name = names[int(self.group.members[self.place])]
-        return f"{name} [{self.part + 1}]" if self.is_one_of_several else name
+        is_numbered = self.is_one_of_several and self.kind != "bound"
+        return f"{name} [{self.part + 1}]" if is_numbered else name
 
 
 def switches_of(loops: Iterable[tuple[str, Group]], length: float = 1.0) -> tuple[Switch, ...]:
@@ -89,7 +100,7 @@ def switches_of(loops: Iterable[tuple[str, Group]], length: float = 1.0) -> tupl
     return tuple(
         Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part, length)
         for kind, group in loops
-        if kind in ("switch", "knot")
+        if kind in ("switch", "bound", "knot")
         for k in range(group.count)
         for part in range(len(group.type_info.outputs[kind]))
     )

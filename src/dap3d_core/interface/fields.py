@@ -45,6 +45,7 @@ class FieldSpec:
         columns: numbers in a row of a table; count of ``numbers``.
         given: a table is given in the scene; False: ``prepare`` returns it.
         axes: the fields an angle is measured between: two vectors, and the axis.
+        rows: number of rows that a joint must have; None for any.
         instead_of: field that an input takes the place of; "" for none.
     """
 
@@ -67,6 +68,7 @@ class FieldSpec:
     columns: int = 1
     given: bool = True
     axes: tuple[str, str, str] = ("", "", "")
+    rows: int | None = None
     instead_of: str = ""
 
     @property
@@ -201,9 +203,15 @@ def choice(
     return _field(spec)
 
 
-def joint(*, doc: str = "") -> Any:
-    """A joint by name; a force without a ``wrench`` acts by its kernel ``friction``."""
-    return _field(FieldSpec("joint", REQUIRED, doc=doc))
+def joint(*, rows: int | None = None, doc: str = "") -> Any:
+    """A joint by name; with ``rows`` one of so many constraint rows.
+
+    A field ``pin`` offers to the ``wrench`` of a force ``lam_pin``, the multipliers of the joint,
+    and ``force_pin``, ``moment_pin``, its reaction on its body i as ``Result.reaction`` has it:
+    force and moment about the mass centre, global axes. A force without a ``wrench`` acts by the
+    kernel ``friction`` of its one joint.
+    """
+    return _field(FieldSpec("joint", REQUIRED, doc=doc, rows=rows))
 
 
 def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:

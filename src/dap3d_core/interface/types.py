@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import attrs
 
 from dap3d_core.interface.element_states import add_state_fields, state_lengths
+from dap3d_core.interface.element_unknowns import add_unknown_fields, unknown_names
 
 #: Increased by one when a type written for the old interface no longer works.
 INTERFACE_VERSION = 1
@@ -59,6 +60,7 @@ class TypeBase:
             if callable(function):
                 setattr(cls, name, staticmethod(function))
         add_state_fields(cls)
+        add_unknown_fields(cls)
         # slots would make a second class, but hooks return the first
         attrs.define(cls, slots=False, kw_only=True)
 
@@ -88,9 +90,10 @@ class Joint(TypeBase):
     * ``C``      position level, one number a row that ``holonomic`` keeps;
     * ``J``      dC/dq, one block of rows x 6 (tuples of rows) a body slot, in their order;
     * ``gamma``  right-hand side of the acceleration level, J v_dot = gamma;
-    * ``nu``     right-hand side of the velocity level, J v = nu; zero where not defined.
+    * ``nu``     right-hand side of the velocity level, J v = nu; zero where not defined;
+    * ``G``      dC/ds of its own unknowns s, one tuple a row of C.
 
-    ``J`` and ``gamma`` may be left out: they are derived, with ``nu``, from ``C``
+    ``G``, ``J`` and ``gamma`` may be left out: they are derived, with ``nu``, from ``C``
     (derive/derive.py) and, for rows of the velocity level alone, from
 
     * ``C_dot``  vanishes there, linear in the velocities: one number a row not in ``C``.
@@ -120,6 +123,11 @@ class Joint(TypeBase):
         unilateral: rows, from 0, with multipliers that are not negative in a valid motion: ground
             carries and does not pull. A run where one is gets a note with the instant.
         unilateral_words: the meaning of a negative multiplier, for that note.
+        unknowns: names of unknowns of its own, such as the place of a contact, that C may name: of
+            ``rows`` as many fewer constrain the bodies. They are solved for at all levels, from
+            fields such as ``s_0``, within ``s_min`` and ``s_max``; ``s_dot`` is their rate.
+        periodic: unknowns that begin at one bound again where they pass the other; a run ends where
+            any other passes one.
         states: names of states of its own, or name -> length; with them come the fields ``NAME_0``,
             initial values, and ``NAME_atol``, absolute tolerances.
         symbol: symbol in pictures, one of SYMBOLS; "": drawn from the declared fields.
@@ -127,7 +135,7 @@ class Joint(TypeBase):
 
     kind = "joint"
     kernel_names = (
-        "C", "C_dot", "J", "gamma", "nu", "friction", "switch", "rate", "impulse", "reset"
+        "C", "C_dot", "G", "J", "gamma", "nu", "friction", "switch", "rate", "impulse", "reset"
     )  # fmt: skip
     switch_words: ClassVar[str] = ""
     rows: ClassVar[int] = 0
@@ -135,6 +143,16 @@ class Joint(TypeBase):
     drives: ClassVar[bool] = False
     unilateral: ClassVar[tuple[int, ...]] = ()
     unilateral_words: ClassVar[str] = ""
+    unknowns: ClassVar[tuple[str, ...]] = ()
+    periodic: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def constraint_mask(cls) -> tuple[bool, ...]:
+        """Of each row that constrains the bodies, True where it has a position level."""
+        position = len(cls.position_rows()) - len(unknown_names(cls))
+        if not unknown_names(cls):
+            return tuple(k in cls.position_rows() for k in range(cls.rows))
+        return (True,) * position + (False,) * len(cls.velocity_rows())
 
     @classmethod
     def position_rows(cls) -> tuple[int, ...]:

@@ -51,6 +51,7 @@ class Group:
         numbers: (m, par_width) their numbers, as the layout says.
         tables: (instance, offset in its numbers, rows) of each table; the offset takes its place.
         joints: (m,) of friction, the joints it acts in; None for all else.
+        read: of forces that read reactions, the joint of each instance by field: groups of m.
     """
 
     type_info: TypeInfo
@@ -60,6 +61,7 @@ class Group:
     numbers: Floats
     tables: tuple[tuple[int, int, Floats], ...] = ()
     joints: Integers | None = None
+    read: tuple["Group", ...] = ()
 
     @property
     def keyword(self) -> str:
@@ -83,6 +85,7 @@ class Group:
             numbers=self.numbers[places],
             tables=tuple(tables),
             joints=None if self.joints is None else self.joints[places],
+            read=tuple(group.take(places) for group in self.read),
         )
 
     def packed_numbers(self, p0: int) -> Floats:

@@ -12,6 +12,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.body_pose import BodyPose, pose
+from dap3d_core.interface.codegen.reactions import joint_fields
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.rotations import read_only, to_global
 from dap3d_core.model.state_layout import (
@@ -126,6 +127,14 @@ class Model:
             for angle in group.type_info.layout.angles
         )
 
+    def unknowns_of(self, joint: str) -> dict[str, int]:
+        """Unknowns of a joint -> where they stand among the angles that are reported."""
+        names = {n for group in self.joints for n in group.type_info.layout.unknowns}
+        places = enumerate(self.angle_names)
+        prefix = f"joints.{joint}."
+        found = {label.removeprefix(prefix): k for k, label in places if label.startswith(prefix)}
+        return {name: k for name, k in found.items() if name in names}
+
     @cached_property
     def state_count(self) -> int:
         """Numbers of the states of their own that forces and joints have."""
@@ -153,6 +162,12 @@ class Model:
     def acting(self) -> tuple[Group, ...]:
         """Groups of what may have angles or states, in the order of the loops."""
         return (*self.forces, *self.joints)
+
+    @cached_property
+    def iterated_forces(self) -> tuple[str, ...]:
+        """Names of forces that depend on multipliers: friction of joints, forces on reactions."""
+        groups = (*self.friction, *(group for group in self.forces if group.read))
+        return tuple(self.force_names[k] for group in groups for k in group.members.tolist())
 
     @property
     def integrated_layout(self) -> Layout:
@@ -333,6 +348,7 @@ class _Groups:
         are_good = not faults
         self.forces = made("force", direct)
         self.functions = made("function", functions)
+        self._read_reactions(checked, faults)
         self.friction: tuple[Group, ...] = ()
         try:
             if are_good:
@@ -343,6 +359,17 @@ class _Groups:
             raise ModelError(*faults)
         self.notes = [note for grouping in by_kind.values() for note in grouping.notes]
 
+    def _read_reactions(self, checked: ValidatedScene, faults: list[tuple[str, str, str]]) -> None:
+        """Bind forces to the joints whose reactions they read."""
+        if faults or not any(joint_fields(group.type_info.type) for group in self.forces):
+            return
+        from dap3d_core.model.reaction_groups import bound_to_joints
+
+        try:
+            self.forces = bound_to_joints(self.forces, checked.forces, self.joints, checked.joints)
+        except PrepareError as error:
+            faults.extend(_faults("force", checked.forces, error))
+
 
 def _faults(
     kind: str, instances: Sequence[Instance], error: PrepareError
@@ -352,12 +379,12 @@ def _faults(
 
 
 def _rows(joint: Instance) -> int:
-    return int(joint.type_info.type.rows)  # type: ignore[attr-defined]
+    return joint.type_info.row_count
 
 
 def _position_mask(joint: Instance) -> tuple[bool, ...]:
-    mask = joint.type_info.type.holonomic  # type: ignore[attr-defined]
-    return (mask,) * _rows(joint) if isinstance(mask, bool) else tuple(mask)
+    mask: tuple[bool, ...] = joint.type_info.type.constraint_mask()  # type: ignore[attr-defined]
+    return mask
 
 
 class _Poses(dict[int, BodyPose]):

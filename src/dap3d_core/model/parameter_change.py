@@ -84,8 +84,11 @@ def _of_force(
         raise ValueError(f"force {force.name}: {error}") from error
     if not _same_tables(old, new):
         raise ValueError(f"force {force.name}: this would change a table, which cannot be done")
-    # what is the same stays: turns that were counted, places of tables, numbers changed before
-    return Change(group, places, old.numbers != new.numbers, new.numbers)
+    # what is the same stays: turns that were counted, places of tables, numbers changed before,
+    # those of joints that it reads, which stand behind its own
+    behind = [(0, 0), (0, group.numbers.shape[1] - new.numbers.shape[1])]
+    where = np.pad(old.numbers != new.numbers, behind)
+    return Change(group, places, where, np.pad(new.numbers, behind))
 
 
 def _same_tables(old: Group, new: Group) -> bool:

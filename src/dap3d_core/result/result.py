@@ -381,7 +381,7 @@ class Result:
             index = self.model.force_names.index(name)
             actuation = self.record.actuation.get(name)
             self._forces[name] = force_output(
-                self.evaluator, self.t, self.u, self.v_dot, name, index, self._angles(),
+                self.evaluator, self.t, self.u, self.v_dot, name, index, self.Lam, self._angles(),
                 None if actuation is None else np.array(actuation), self._states(), self.inputs,
             )  # fmt: skip
         return self._forces[name]

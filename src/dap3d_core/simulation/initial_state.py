@@ -74,6 +74,8 @@ def find_start(
     u, initial = evaluator.model.u0 if state is None else state.u, None
     given = None if state is None else state.states
     evaluator.states = evaluator.model.initial_states if given is None else given
+    if evaluator.has_unknowns:  # whatever was evaluated before
+        evaluator.start(0.0, u, None if state is None else state.angles, given)
     if correct or (state is not None and state.is_interpolated):
         held = [evaluator.model.body_names.index(name) + 1 for name in hold]
         initial = correct_initial(evaluator, u, hold=held, metric=metric)

@@ -8,6 +8,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.interface.codegen.reactions import joints_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
@@ -180,6 +181,8 @@ def _of_joint(subject: SampledType) -> list[Check]:
         Check("frame", subject, ground, joints.frame),
         Check("action and reaction", subject, ground, joints.action_and_reaction),
     ]
+    if "G" in subject.type_info.kernels:
+        checks.insert(0, Check("G", subject, "", joints.gradient_of_unknowns))
     checks += _of_jumps(subject)
     if "friction" in subject.type_info.kernels:
         checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))
@@ -206,6 +209,11 @@ def _of_force(subject: SampledType) -> list[Check]:
         Check("energy", subject, energy, forces.potential),
         Check("frame", subject, ground, forces.frame),
         Check("action and reaction", subject, ground, forces.balance),
+        *(
+            [Check("unloaded", subject, "", forces.unloaded)]
+            if joints_read(subject.type_info)
+            else ()
+        ),
         *_of_jumps(subject),
     ]
 

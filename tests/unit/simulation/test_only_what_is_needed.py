@@ -204,3 +204,21 @@ def test_a_grid_in_memory_needs_no_samples_no_cluster_and_no_packs_of_its_own():
     ours = {name.rpartition(".")[2] for name in found if name.startswith("dap3d_core.study.")}
     assert not ours & {"dask_cluster", "environment", "fit", "identifiability"}
     assert "dap3d_core.result.quantities.measured_data" not in found
+
+
+def test_reactions_and_unknowns_cost_other_scenes_nothing():
+    """No module of theirs, no loop, no array where no type has them."""
+    script = (
+        "import dap3d_core as dap\n"
+        "compiled = dap.compile(dap.load('fourbar3'))\n"
+        "dap.simulate(compiled, t_end=0.02, dt=0.02)\n"
+        "evaluator = compiled.evaluator\n"
+        "print('loops', *(kind for kind, group in evaluator.loop_groups))\n"
+        "print(evaluator.system.friction.size, evaluator.has_unknowns)\n"
+    )
+    *_, loops, arrays, modules = run(f"{script}\n{MODULES}").splitlines()
+    theirs = {"dap3d_core.model.reaction_groups", "dap3d_core.interface.codegen.unknowns",
+              "dap3d_core.kernels.elimination"}  # fmt: skip
+    assert not theirs & set(modules.split())
+    assert not {"bound", "friction", "angle", "rate"} & set(loops.split())
+    assert arrays == "0 False"

@@ -9,6 +9,7 @@ from dap3d_core.assembly.arrays import Integers
 from dap3d_core.interface.codegen.instance_layout import prefix_of
 from dap3d_core.interface.codegen.kernel_arguments import DERIVATIVES
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.model import Group
 
 #: Rows from which on joint coordinates cost less than the body coordinates and rows they replace.
@@ -30,6 +31,8 @@ def refusal_of(type_info: TypeInfo) -> str:
     slots = len(type_info.layout.slots)
     if slots > 2:
         return f"it joins {('three', 'four')[slots - 3] if slots < 5 else slots} bodies"
+    if unknowns := unknown_names(type_):
+        return f"it has unknowns of its own: {', '.join(unknowns)}"
     if type_.velocity_rows():
         return "it has rows of the velocity level"
     if "t" in _names_in_rows(type_info):

@@ -148,9 +148,9 @@ def _class_data(type_info: "TypeInfo") -> dict[str, Any]:
     }
     if type_.kind == "joint":
         data |= {
-            "rows": type_.rows,
+            "rows": type_info.row_count,
             "position_rows": len(type_.position_rows()),
-            "freedoms": 6 * max(len(type_info.layout.slots) - 1, 1) - type_.rows,
+            "freedoms": 6 * max(len(type_info.layout.slots) - 1, 1) - type_info.row_count,
         }
     return data
 

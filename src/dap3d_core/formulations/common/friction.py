@@ -1,8 +1,10 @@
-"""Coulomb friction in joints: forces that depend on the multipliers they change (spec 6.1).
+"""Forces that depend on the multipliers they change: friction in joints, forces on reactions.
 
-The multipliers are found by a fixed-point iteration, from those without friction: equal states give
-equal accelerations, whatever came before. Each pass is accelerated by one secant step
-(Irons and Tuck, Int. J. Numer. Meth. Engng 1 (1969) 275).
+The multipliers are found by a fixed-point iteration, from those without these forces: equal states
+give equal accelerations, whatever came before. Each pass is extrapolated from the difference of the
+two before (Irons and Tuck, Int. J. Numer. Meth. Engng 1 (1969) 275); of forces on reactions from
+those of more passes (Anderson, J. ACM 12 (1965) 547): brakes that load themselves, each by a part
+of its own, settle in as many passes as there are. Spec 6.1.
 """
 
 # What a compiled function returns is Any to mypy.
@@ -11,7 +13,9 @@ equal accelerations, whatever came before. Each pass is accelerated by one secan
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.assembly.arrays import FRICTION, UNSETTLED, System
+import numpy as np
+
+from dap3d_core.assembly.arrays import FRICTION, JAMS, UNSETTLED, Floats, System
 from dap3d_core.assembly.evaluate import call_kinds, zero
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
@@ -19,11 +23,13 @@ from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 SETTLED = 1e-10
 #: Passes at most; the last one is then used, and counted as not settled.
 PASSES = 25
+#: Differences of passes that are kept of forces on reactions; then they begin anew.
+DEPTH = 8
 
 
 @compiled
 def has_friction(system: System) -> bool:
-    """True if joints of the scene have friction."""
+    """True if forces of the scene depend on multipliers."""
     return bool(system.kinds[FRICTION + 1] > system.kinds[FRICTION])
 
 
@@ -36,7 +42,7 @@ def store_applied_forces(system: System) -> None:
 
 @compiled
 def apply_friction(t: float, system: System, loops: Any) -> float:
-    """Friction for ``multipliers``, added to the scaled applied forces; returns its power."""
+    """Forces for ``multipliers``, added to the scaled applied forces; returns their power."""
     body, metric, forces = system.body, system.metric, system.acceleration
     size = forces.shape[0]
     applied, friction = system.friction[:size], system.friction[size : 2 * size]
@@ -57,43 +63,86 @@ def apply_friction(t: float, system: System, loops: Any) -> float:
     return power
 
 
+def memory_size(bodies: int, rows: int) -> int:
+    """Numbers of ``System.friction``: forces of the bodies (ground too), passes of the rows."""
+    return 12 * bodies + (3 + 2 * DEPTH) * rows
+
+
 @compiled
 def accelerate_fixed_point(system: System, passes: int) -> bool:
     """True if ``multipliers`` have settled; else they become the start of the next pass."""
     x, rows = system.multipliers, system.multipliers.shape[0]
     memory = system.friction[2 * system.force.shape[0] :]
-    guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows :]
+    guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows : 3 * rows]
     if passes == 0:
-        for k in range(x.shape[0]):
+        for k in range(rows):
             guess[k] = x[k]
         return False
-    size = largest_change = upper = lower = 0.0
-    for k in range(x.shape[0]):
-        now = x[k] - guess[k]
+    size = largest_change = 0.0
+    for k in range(rows):
         size = max(size, abs(x[k]))
-        largest_change = max(largest_change, abs(now))
-        if passes > 1:
-            upper += now * (now - change[k])
-            lower += (now - change[k]) * (now - change[k])
+        largest_change = max(largest_change, abs(x[k] - guess[k]))
     if not largest_change > SETTLED * size:
         return True
-    share = upper / lower if lower > 0.0 else 0.0
     if passes == PASSES:
         system.settings[UNSETTLED] += 1.0
         return True
-    for k in range(x.shape[0]):
-        now = x[k] - guess[k]
-        mixed = x[k] - share * (x[k] - result[k]) if passes > 1 else x[k]
-        result[k], change[k], guess[k] = x[k], now, mixed
-        x[k] = mixed
+    depth = DEPTH if system.settings[JAMS] != 0.0 else 1
+    last = passes - 2
+    while last >= depth:
+        last -= depth
+    if last >= 0:
+        keep_difference(x, memory, last)
+    for k in range(rows):
+        result[k], change[k] = x[k], x[k] - guess[k]
+    for q in range(last + 1):
+        o = (3 + 2 * q) * rows
+        share = projection(change, memory[o : o + rows])
+        for k in range(rows):
+            x[k] -= share * memory[o + rows + k]
+    for k in range(rows):
+        guess[k] = x[k]
     return False
+
+
+@compiled
+def keep_difference(x: Floats, memory: Floats, last: int) -> None:
+    """Keep the differences from the pass before, of changes and results, as pair ``last``.
+
+    Those of changes are made orthogonal to the earlier ones.
+    """
+    rows = x.shape[0]
+    guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows : 3 * rows]
+    o = (3 + 2 * last) * rows
+    mine, moved = memory[o : o + rows], memory[o + rows : o + 2 * rows]
+    for k in range(rows):
+        mine[k], moved[k] = x[k] - guess[k] - change[k], x[k] - result[k]
+    for q in range(last):
+        o = (3 + 2 * q) * rows
+        share = projection(mine, memory[o : o + rows])
+        for k in range(rows):
+            mine[k] -= share * memory[o + k]
+            moved[k] -= share * memory[o + rows + k]
+
+
+@compiled
+def projection(a: Floats, b: Floats) -> float:
+    """A . b / b . b; zero where b is."""
+    upper = lower = 0.0
+    for k in range(b.shape[0]):
+        upper += a[k] * b[k]
+        lower += b[k] * b[k]
+    return upper / lower if lower > 0.0 else 0.0
 
 
 @compiled_into
 def solve_with_friction(
     t: float, system: System, loops: Any, solve: Callable[[System], None]
 ) -> float:
-    """``solve`` of a formulation, again until friction and multipliers agree; power of friction.
+    """``solve`` of a formulation, again until forces and multipliers agree; power of these forces.
+
+    Not a number, which ends a run, where forces on reactions jam: they raise their own load by more
+    than itself.
 
     solve: ``acceleration`` and ``multipliers`` from the scaled forces in ``acceleration``.
     """
@@ -102,8 +151,11 @@ def solve_with_friction(
         store_applied_forces(system)
     solve(system)
     if has_friction(system):
+        unsettled = system.settings[UNSETTLED]
         while not accelerate_fixed_point(system, passes):
             passes += 1
             power = apply_friction(t, system, loops)
             solve(system)
+        if system.settings[JAMS] != 0.0 and system.settings[UNSETTLED] > unsettled:
+            return np.inf - np.inf
     return power

@@ -12,7 +12,7 @@ displacement and v a velocity:
 
     coupling  d(force + D^T lambda) / d(x, v), blocks of 6 x 12 for pairs of bodies
     turning   d(D v - nu) / dx, laid out as D
-    friction_by_lambda  d(friction) / dlambda, laid out as D (transposed)
+    force_by_lambda  d(forces that read multipliers) / dlambda, blocks of rows x 6 (transposed)
 
 In body axes a mechanism that turns as a whole keeps its tangent. What a wrench owes to the body
 axes in which its moment acts is in it; the gyroscopic moment is added in closed form.
@@ -41,7 +41,12 @@ SLOWEST, SMALLEST = 0.1, 1e-4
 #: What an element is; the last two only of types with states of their own (state_tangent.py).
 WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT, RATE_ELEMENT, POSITION_ELEMENT = range(5)
 #: Columns of ``elements``.
-LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY = range(9)
+(
+    LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY, FIRST_READING,
+    JOINTS_READ, ELEMENT_WIDTH
+) = range(12)  # fmt: skip
+#: Columns of ``readings``.
+PLACE, BODY, FIRST_ROW, ROW_COUNT = range(4)
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -69,15 +74,17 @@ class Tangent(Arrays):
         "elements": INTEGER_MATRIX,
         "pairs": INTEGERS,
         "blocks": INTEGER_MATRIX,
+        "readings": INTEGER_MATRIX,
         "states": StateTangent.type_of(),
     }
 
-    elements: Integers  # (groups, 9): LOOP, KIND, ...; ROW_AT: place of the joint's row in idx
+    elements: Integers  # (groups, ELEMENT_WIDTH); ROW_AT: place of the joint's row in idx
     pairs: Integers  # places in ``coupling`` for the slots (a, b) of each element, -1 for none
     blocks: Integers  # (pairs, 3) place in ``coupling``, body of the rows, body of the columns
     coupling: Floats
     turning: Floats  # (block_size,)
-    friction_by_lambda: Floats  # (block_size,)
+    readings: Integers  # (k, 4) of each instance, joint that it reads, slot: PLACE, BODY, ...
+    force_by_lambda: Floats  # blocks of ``readings``
     D: Floats  # (block_size,) scratch: an element's own blocks
     gamma: Floats  # (rows,) scratch
     nu: Floats  # (rows,) scratch
@@ -226,26 +233,29 @@ def differentiate_element(
 def differentiate_friction(
     t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
 ) -> None:
-    """Derivatives of the friction of one joint by its multipliers, moments in body axes."""
+    """Derivatives of one element by the multipliers that it reads, moments in body axes."""
     row = tangent.elements[e]
-    i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
-    r0, at, slots = system.idx[i0 + row[ROW_AT]], i0 + row[ROW_AT] + 1, row[SLOT_COUNT]
-    size = 1e-3
-    for r in range(r0, r0 + row[ROWS]):
-        size = max(size, abs(x[r]))
-    step = PART * size
-    for r in range(row[ROWS]):
-        kept = x[r0 + r]
-        x[r0 + r] = kept - step  # x is -lambda
-        call_element(t, e, q, x, tangent.ahead, system, loops, tangent)
-        x[r0 + r] = kept + step
-        call_element(t, e, q, x, tangent.behind, system, loops, tangent)
-        x[r0 + r] = kept
-        for n in range(slots):
-            if system.idx[i0 + n] > 0:
-                for k in range(6):
-                    rise = tangent.ahead[6 * n + k] - tangent.behind[6 * n + k]
-                    tangent.friction_by_lambda[system.idx[at + n] + 6 * r + k] += 0.5 / step * rise
+    slots = row[SLOT_COUNT]
+    for joint in range(row[JOINTS_READ]):
+        first = row[FIRST_READING] + (q * row[JOINTS_READ] + joint) * slots
+        r0, rows = tangent.readings[first, FIRST_ROW], tangent.readings[first, ROW_COUNT]
+        size = 1e-3
+        for r in range(r0, r0 + rows):
+            size = max(size, abs(x[r]))
+        step = PART * size
+        for r in range(rows):
+            kept = x[r0 + r]
+            x[r0 + r] = kept - step  # x is -lambda
+            call_element(t, e, q, x, tangent.ahead, system, loops, tangent)
+            x[r0 + r] = kept + step
+            call_element(t, e, q, x, tangent.behind, system, loops, tangent)
+            x[r0 + r] = kept
+            for n in range(slots):
+                o = tangent.readings[first + n, PLACE]
+                if o >= 0:
+                    for k in range(6):
+                        rise = tangent.ahead[6 * n + k] - tangent.behind[6 * n + k]
+                        tangent.force_by_lambda[o + 6 * r + k] += 0.5 / step * rise
 
 
 @compiled
@@ -283,7 +293,11 @@ def scale_tangent(system: System, tangent: Tangent) -> None:
         o, b = system.blocks[q, 0], system.blocks[q, 1]
         for _ in range(system.blocks[q, 2]):
             scale_columns(tangent.turning, o, metric[b], system.body[b])
-            scale_columns(tangent.friction_by_lambda, o, metric[b], system.body[b])
+            o += 6
+    for p in range(tangent.readings.shape[0]):
+        o, b = tangent.readings[p, PLACE], tangent.readings[p, BODY]
+        for _ in range(tangent.readings[p, ROW_COUNT] if o >= 0 else 0):
+            scale_columns(tangent.force_by_lambda, o, metric[b], system.body[b])
             o += 6
 
 
@@ -325,7 +339,7 @@ def differentiate(t: float, x: Floats, system: System, loops: Any, tangent: Tang
     """
     zero(tangent.coupling)
     zero(tangent.turning)
-    zero(tangent.friction_by_lambda)
+    zero(tangent.force_by_lambda)
     for e in range(tangent.elements.shape[0]):
         count = system.groups[tangent.elements[e, LOOP], 2]
         for q in range(count if tangent.elements[e, KIND] < RATE_ELEMENT else 0):
@@ -334,7 +348,5 @@ def differentiate(t: float, x: Floats, system: System, loops: Any, tangent: Tang
                 differentiate_friction(t, e, q, x, system, loops, tangent)
     add_gyroscopic(system, tangent)
     scale_tangent(system, tangent)
-    worst = (
-        largest(tangent.coupling) + largest(tangent.turning) + largest(tangent.friction_by_lambda)
-    )
+    worst = largest(tangent.coupling) + largest(tangent.turning) + largest(tangent.force_by_lambda)
     return worst < math.inf

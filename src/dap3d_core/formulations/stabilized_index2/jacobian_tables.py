@@ -8,6 +8,7 @@ import numpy as np
 from dap3d_core.assembly.arrays import Integers
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.stabilized_index2.jacobian import (
+    ELEMENT_WIDTH,
     FRICTION_ELEMENT,
     JOINT_ELEMENT,
     POSITION_ELEMENT,
@@ -32,12 +33,14 @@ _BLOCK = 72
 
 def make_tangent(evaluator: Evaluator) -> Tangent:
     """Tables and arrays of the tangent of an evaluator's model."""
-    system, plan, n = evaluator.system, evaluator.plan, evaluator.model.body_count
+    system, plan, model = evaluator.system, evaluator.plan, evaluator.model
+    n = model.body_count
     place = {(b, b): _BLOCK * (b - 1) for b in range(1, n + 1)}
     elements: list[tuple[int, ...]] = []
     at: list[int] = []
     pairs: list[Integers] = []
-    count = widest = 0
+    readings: list[tuple[int, ...]] = []
+    count = widest = size = 0
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
         layout = group.type_info.layout
         kinds = _KINDS | _WITH_STATES if layout.states else _KINDS
@@ -47,22 +50,30 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         if kind == "wrench" and computes_rate(group.type_info):
             codes.append(RATE_ELEMENT)
         slots = len(group.type_info.layout.slots)
-        rows = int(getattr(group.type_info.type, "rows", 0))
+        rows = group.type_info.row_count
+        read = _joints_read(group) if kind == "friction" else []
         elements += [(loop, code, stride(group.type_info), layout.par_width, slots,
-                      layout.integers, rows, count, int(_sees_velocity(kind, group)))
-                     for code in codes]  # fmt: skip
+                      layout.integers, rows, count, int(_sees_velocity(kind, group)),
+                      len(readings), len(read)) for code in codes]  # fmt: skip
         at += [layout.integers - 1 if layout.states else -1 for _ in codes]
+        for q, bodies in enumerate(group.bodies.tolist()):
+            for joints in read:
+                first, mine = int(plan.joint_row[joints[q]]), int(model.joint_rows[joints[q]])
+                for b in bodies:
+                    readings.append((size if b else -1, b, first, mine))
+                    size += 6 * mine if b else 0
         pairs.append(_pairs(group.bodies, place))
         count += pairs[-1].size
         widest = max(widest, 6 * slots + rows, layout.state_width)
     blocks = [(where, a, b) for (a, b), where in place.items()]
     return Tangent(
-        elements=np.array(elements, dtype=np.int64).reshape(-1, 9),
+        elements=np.array(elements, dtype=np.int64).reshape(-1, ELEMENT_WIDTH),
         pairs=np.concatenate([np.zeros(0, dtype=np.int64), *pairs]),
         blocks=np.array(blocks, dtype=np.int64).reshape(-1, 3),
         coupling=np.zeros(_BLOCK * len(place)),
         turning=np.zeros(plan.block_size),
-        friction_by_lambda=np.zeros(plan.block_size),
+        readings=np.array(readings, dtype=np.int64).reshape(-1, 4),
+        force_by_lambda=np.zeros(size),
         D=np.zeros(plan.block_size),
         gamma=np.zeros(plan.row_size),
         nu=np.zeros(plan.row_size),
@@ -99,6 +110,11 @@ def _state_tangent(model: Model, at: Sequence[int]) -> StateTangent:
 def coupled_bodies(tangent: Tangent) -> list[tuple[int, int]]:
     """Pairs of different bodies that an element couples."""
     return [(int(a), int(b)) for _, a, b in tangent.blocks if a != b]
+
+
+def _joints_read(group: Group) -> list[Integers]:
+    """The joints whose multipliers the instances of a group read, (m,) each."""
+    return [read.members for read in group.read] if group.joints is None else [group.joints]
 
 
 def _pairs(bodies: Integers, place: dict[tuple[int, int], int]) -> Integers:

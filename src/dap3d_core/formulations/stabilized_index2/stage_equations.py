@@ -39,7 +39,12 @@ from dap3d_core.formulations.common.friction import (
     has_friction,
     store_applied_forces,
 )
-from dap3d_core.formulations.stabilized_index2.jacobian import Tangent, turn_to_body
+from dap3d_core.formulations.stabilized_index2.jacobian import (
+    PLACE,
+    ROW_COUNT,
+    Tangent,
+    turn_to_body,
+)
 from dap3d_core.formulations.stabilized_index2.state_tangent import (
     FIRST,
     UNKNOWN,
@@ -62,6 +67,7 @@ class StageMatrix(Arrays):
                 "updates",
                 "block_place",
                 "joint_place",
+                "read_place",
                 "state_nodes",
                 "state_places",
             ),
@@ -79,6 +85,7 @@ class StageMatrix(Arrays):
     pair_place: Integers  # (pairs,) block of each pair of Tangent.blocks
     block_place: Integers  # (b, 3) of each block of D: (joint, body), (body, joint), first unknown
     joint_place: Integers  # (joint nodes, 3) diagonal block, rows, first row
+    read_place: Integers  # (k, 3) of Tangent.readings: block, rows of its joint node, first row
     state_nodes: Integers  # as of ``fill_states``, as the next one
     state_places: Integers
     held: Integers  # (row_size,) 1 where a row has a position level
@@ -201,8 +208,14 @@ def fill_matrix(s: Any, K: Any, blocks: Integers, matrix: StageMatrix, tangent: 
                     K[right + 2 * m * c + r] = -v
                 K[e + c] = -tangent.turning[o + c]
                 K[e + 6 + c] = -v
-                K[right + 2 * m * (6 + c) + m + r] = -v - tangent.friction_by_lambda[o + c]
+                K[right + 2 * m * (6 + c) + m + r] = -v
             o += 6
+    for p in range(matrix.read_place.shape[0]):
+        o, rows = tangent.readings[p, PLACE], tangent.readings[p, ROW_COUNT]
+        right, m, first = matrix.read_place[p, 0], matrix.read_place[p, 1], matrix.read_place[p, 2]
+        for r in range(rows if o >= 0 else 0):
+            for c in range(6):
+                K[right + 2 * m * (6 + c) + m + first + r] -= tangent.force_by_lambda[o + 6 * r + c]
     for j in range(matrix.joint_place.shape[0]):
         d, m, f = matrix.joint_place[j, 0], matrix.joint_place[j, 1], matrix.joint_place[j, 2]
         for r in range(m):

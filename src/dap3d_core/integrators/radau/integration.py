@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.stabilized_index2.jacobian import BODY, FIRST_ROW
 from dap3d_core.formulations.stabilized_index2.jacobian_tables import coupled_bodies, make_tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau import state as at
@@ -46,12 +47,16 @@ def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan
     """Places of the parts of the matrix s - J, and its elimination program."""
     plan, model = evaluator.plan, evaluator.model
     nodes, n = plan.ordering.nodes, model.body_count
+    starts = [int(plan.joint_row[node.joints[0]]) for node in nodes]
+    readings = tangent.readings.tolist()
+    reading = [_node_of(row[FIRST_ROW], starts, nodes) for row in readings]
+    read = [(k, row[BODY]) for k, row in zip(reading, readings, strict=True) if row[BODY]]
     states = _state_nodes(model, nodes)
-    lu = make_lu_plan(n, nodes, coupled_bodies(tangent), states)
+    lu = make_lu_plan(n, nodes, coupled_bodies(tangent), states, read)
     of_row = {}
     joints = []
     for k, node in enumerate(nodes):
-        first = int(plan.joint_row[node.joints[0]])
+        first = starts[k]
         of_row[first] = k
         joints.append((lu.joint_block(k), node.rows, first))
     places = []
@@ -71,6 +76,17 @@ def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan
         pair_place=np.array([lu.body_block(a, b) for _, a, b in blocks], dtype=np.int64),
         block_place=np.array(places, dtype=np.int64).reshape(-1, 3),
         joint_place=np.array(joints, dtype=np.int64).reshape(-1, 3),
+        read_place=np.array(
+            [
+                (
+                    lu.joint_blocks(k, row[BODY])[1] if row[BODY] else -1,
+                    nodes[k].rows,
+                    row[FIRST_ROW] - starts[k],
+                )
+                for k, row in zip(reading, readings, strict=True)
+            ],
+            dtype=np.int64,
+        ).reshape(-1, 3),
         state_nodes=state_nodes,
         state_places=state_places,
         held=held,
@@ -79,6 +95,11 @@ def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan
         compliance=np.zeros(plan.row_size),
     )
     return matrix, lu
+
+
+def _node_of(row: int, starts: Sequence[int], nodes: Sequence[JointNode]) -> int:
+    """The joint node that a row belongs to."""
+    return next(k for k, node in enumerate(nodes) if 0 <= row - starts[k] < node.rows)
 
 
 def _state_nodes(model: Model, nodes: Sequence[JointNode]) -> list[StateNode]:

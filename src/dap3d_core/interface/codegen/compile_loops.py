@@ -5,6 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
+from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
@@ -49,7 +50,7 @@ def compile_all(type_info: TypeInfo) -> None:
     if not _calls_functions(type_info):
         for what in LOOP_KINDS:
             if what != "friction":
-                compiled_loop(type_info, what)
+                compiled_loop(with_sample_reactions(type_info), what)
         if type_info.type.kind == "joint" and "friction" in type_info.kernels:
             compiled_loop(bind_friction(type_info), "friction")
     for _, variant in type_info.variants:

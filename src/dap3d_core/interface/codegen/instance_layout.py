@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.element_states import state_shape
+from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.fields import SLOTS, slot_of, specs_of
 from dap3d_core.interface.types import TypeBase
 
@@ -31,7 +32,8 @@ class InstanceLayout:
         constants: names that ``prepare`` returns.
         numbers: name -> (offset in ``par``, shape) of the stored numbers.
         tables: name -> (offset of its start and its number of rows, columns).
-        angles: name -> offset of the angle at the last accepted step, its rate and the time there.
+        angles: name -> offset of the angle at the last accepted step, its rate and the time there;
+            of unknowns as well.
         par_width: numbers of an instance.
         states: name -> (offset, shape) of its own states; the index of the first one among those
             of all elements is the last of these integers.
@@ -46,6 +48,7 @@ class InstanceLayout:
     angles: dict[str, int]
     par_width: int
     states: dict[str, Place] = attrs.field(factory=dict)
+    unknowns: tuple[str, ...] = ()
 
     @property
     def integers(self) -> int:
@@ -129,13 +132,17 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> InstanceLa
         elif spec.kind == "angle":
             angles[name] = width
             width += ANGLE_WIDTH
+    unknowns = unknown_names(type_) if type_.kind == "joint" else ()
+    for name in unknowns:
+        angles[name] = width
+        width += ANGLE_WIDTH + 1  # and a sign (unknowns.py)
     stored = tuple(name for name in constants if name not in tables)
     for name in stored:
         numbers[name] = width, shape_of(constants[name])
         width += size(numbers[name][1])
     return InstanceLayout(
         slots, tuple(functions), tuple(others), stored, numbers, tables, angles, width,
-        state_places(type_),
+        state_places(type_), unknowns,
     )  # fmt: skip
 
 

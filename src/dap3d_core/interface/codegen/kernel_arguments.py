@@ -88,6 +88,10 @@ def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, Kernel
             _offer_field(offer, name, prefix_of(type_, name), spec, layout)
     for name in layout.constants:
         _offer_constant(offer, name, layout)
+    for name in layout.unknowns:
+        offer(name, (), "", doc="unknown of the joint", rate=f"x_{name}_dot")
+        rate = f"rate of {name}"
+        offer(f"{name}_dot", (), "", velocity=True, doc=rate, motion="0.0")
     for name, (at, shape) in layout.states.items():
         offer(name, shape, _state(at, shape), doc="state of the element", derivable=False)
     return names

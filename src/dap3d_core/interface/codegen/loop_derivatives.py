@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.codegen.loop_source import stride, write
+from dap3d_core.interface.codegen.reactions import body_columns, rows_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.kernels.dual_numbers import Dual, DualFunctions
 from dap3d_core.kernels.runtime import generated_modules
@@ -35,7 +36,7 @@ class LoopDerivatives:
     Attributes:
         bodies: (m, places) bodies that an instance reads; the first ones are its slots.
         outputs: kernel -> its values (m, ...) and derivatives (m, ..., d), with
-            d = 12 places, then one for each multiplier of a joint with friction, then one for each
+            d = 12 places, then one for each multiplier that the loop reads, then one for each
             number, each function and each state.
     """
 
@@ -156,15 +157,18 @@ class _States:
 
 @attrs.frozen(eq=False)
 class _Multipliers:
-    """-lambda of all rows, as friction reads it; slopes: by lambda of each row of a joint."""
+    """-lambda of all rows, as friction reads it; slopes: by lambda of each row of each joint.
+
+    A joint is known by the column of its first row's index.
+    """
 
     values: Floats
     idx: Integers
-    slopes: Floats
+    slopes: dict[int, Floats]
 
     def at(self, k: _Column) -> Dual:
         values = self.values[self.idx[:, k.column] + k.shift][:, None]
-        return Dual(values, -self.slopes[k.shift])
+        return Dual(values, -self.slopes[k.column][k.shift])
 
 
 class _Outputs:
@@ -212,25 +216,25 @@ def differentiate_loop(
         by kernel: "wrench" or "friction" (m, slots, 6), force and moment about the mass centre;
         "J" (m, slots, rows, 6); "gamma", "nu", "C" (m, rows); "rate" (m, states).
     """
-    loop = write(type_info, what)
-    assert loop is not None
+    loop: Any = write(type_info, what)
     layout, (i0, p0, count), width = type_info.layout, group, stride(type_info)
     idx = arrays.idx[i0 : i0 + count * width].reshape(count, width)
-    slots = len(layout.slots)
-    first = slots + len(layout.functions)
+    slots, first = len(layout.slots), len(layout.slots) + len(layout.functions)
+    read = rows_read(type_info) if what == "friction" else {}
     places = [*range(slots), *range(first, first + len(layout.others))]
-    rows = int(getattr(type_info.type, "rows", 0))
+    places += body_columns(type_info) if read else []
     of_bodies = DIRECTIONS * len(places)
-    by_numbers = of_bodies + (rows if what == "friction" else 0)
+    by_numbers = of_bodies + sum(read.values())
     by_states = by_numbers + len(numbers) + len(functions)
     directions = by_states + (layout.state_width if states else 0)
     unit = np.eye(directions)[:, None]
     slopes = dict(zip(numbers, unit[by_numbers:], strict=False))
     columns = [(slots + field, order) for field, order in functions]
     by_functions = dict(zip(columns, unit[by_numbers + len(numbers) : by_states], strict=True))
-    friction = _Multipliers(multipliers, idx, unit[of_bodies:]) if multipliers is not None else None
-    outputs = [_Outputs(), _Outputs(friction if what == "friction" else None), _Outputs()]
-    outputs.append(_Outputs())  # of rates
+    ends = of_bodies + np.cumsum(list(read.values()), dtype=np.int64)
+    of_rows = {c: unit[e - n : e] for (c, n), e in zip(read.items(), ends, strict=True)}
+    friction = _Multipliers(multipliers, idx, of_rows) if multipliers is not None else None
+    outputs = [_Outputs(), _Outputs(friction if read else None), _Outputs(), _Outputs()]
     loop_arrays = SimpleNamespace(
         body=_Bodies(arrays.body, idx, places, directions),
         F=_Functions(arrays.F, idx, by_functions),
@@ -240,8 +244,8 @@ def differentiate_loop(
         rates=outputs[3],
     )
     _run(loop, t, loop_arrays, outputs[:3])
-    found = _results(type_info, what, outputs, (count, directions))
-    return LoopDerivatives(np.ascontiguousarray(idx[:, places]), found)
+    bodies, size = np.ascontiguousarray(idx[:, places]), (count, directions)
+    return LoopDerivatives(bodies, _results(type_info, what, outputs, size))
 
 
 def _run(loop: Loop, t: float, arrays: SimpleNamespace, outputs: list[_Outputs]) -> None:
@@ -256,7 +260,7 @@ def _results(
     type_info: TypeInfo, what: str, outputs: list[_Outputs], size: tuple[int, int]
 ) -> dict[str, tuple[Floats, Floats]]:
     """What a loop wrote, by kernel; size: (m, d)."""
-    layout, rows = type_info.layout, int(getattr(type_info.type, "rows", 0))
+    layout, rows = type_info.layout, type_info.row_count
     slots, row = len(layout.slots), layout.integers
     if what == "acceleration":
         return _of_joint(outputs, slots, rows, row, size)

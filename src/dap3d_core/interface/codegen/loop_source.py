@@ -2,14 +2,16 @@
 
 The integers of an instance are in ``idx`` from ``b0``: the bodies of its slots, the rows of F of
 its functions, the bodies of its vectors of no slot, the index of its first state where it has
-states of its own, then for a joint the index of its first row in
-the row vectors and for each slot that of its block in D; its numbers are in ``par`` from ``p1``.
+states of its own, then for a joint the index of its first row in the row vectors and for each slot
+that of its block in D, and for a force those of the joints whose reactions it reads; its numbers
+are in ``par`` from ``p1``.
 """
 
 from collections.abc import Iterable, Sequence
 
 from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, JUMP_NAMES, jump_lines
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
+from dap3d_core.interface.codegen.reactions import integers_of_joints, reaction_lines
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.types import Joint
 from dap3d_core.kernels.runtime.loop_modules import Loop
@@ -19,6 +21,7 @@ LOOP_KINDS = {
     "acceleration": ("J", "gamma", "nu"),
     "position": ("C",),
     "velocity": ("C_dot",),
+    "gradient": ("G",),
     "wrench": ("wrench",),
     "energy": ("energy",),
     "value": ("value",),
@@ -28,6 +31,7 @@ LOOP_KINDS = {
     "angle": (),  # the angles of the type's fields, at an accepted step
     "turned": (),  # the same angles, for reports
     "rate": ("rate",),
+    "bound": (),  # as switches; of unknowns
     "reset": ("reset",),
     "knot": ("knot",),  # as switches; of functions of an argument (specialise.py)
 }
@@ -38,7 +42,9 @@ def stride(type_info: TypeInfo) -> int:
     n = type_info.layout.integers
     if type_info.type.kind == "joint":
         return n + 1 + len(type_info.layout.slots)
-    return n + 1 if type_info.type.kind == "function" else n
+    if type_info.type.kind == "function":
+        return n + 1
+    return n + integers_of_joints(type_info)
 
 
 def kernels_of(kind: str, what: str) -> tuple[str, ...]:
@@ -67,45 +73,71 @@ def write(type_info: TypeInfo, what: str) -> Loop | None:
     wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
     if what in ("angle", "turned"):
         wanted += [n for name in layout.angles for n in (name, f"{name}_dot")]
-    if not kernels and not wanted:
+    if not kernels and not wanted and not (what == "bound" and layout.unknowns):
         return None
-    lines = [f"b0 = i0 + q * {stride(type_info)}"]
-    lines += [f"p1 = p0 + q * {layout.par_width}"]
-    lines += [f"b_{s} = idx[b0 + {n}]" for n, s in enumerate(layout.slots)]
-    first = len(layout.slots) + len(layout.functions)
-    lines += [f"b_{name} = idx[b0 + {first + n}]" for n, name in enumerate(layout.others)]
-    if layout.states:
-        lines += [f"z0 = idx[b0 + {layout.integers - 1}]"]
-        lines += ["states, rates = arrays.states, arrays.rates"]
-    if type_info.type.kind == "joint":
-        lines.append(f"row = idx[b0 + {layout.integers}]")
+    if layout.unknowns:
+        from dap3d_core.interface.codegen.unknowns import write_with_unknowns
+
+        return write_with_unknowns(type_info, what, kernels, wanted)
     if what in JUMP_KINDS:
         wanted = [n for n in wanted if n not in JUMP_NAMES]
-    lines += [f"x_{q.name} = {q.code}" for q in in_order(type_info.names, wanted) if q.code]
+    reads = type_info.joints if what in ("friction", "rate") else ()
+    lines = list(gathering_lines(type_info, wanted, reactions=bool(reads)))
     if what == "angle":
         for name, at in layout.angles.items():
-            lines += _store_angle(name, at)
+            lines += store_angle(name, at)
     elif what == "turned":
-        lines += _append([f"x_{name}" for name in layout.angles])
+        lines += append([f"x_{name}" for name in layout.angles])
     if what in JUMP_KINDS:
         lines += jump_lines(type_info, what, kernels)
-    for name, kernel in kernels.items() if what not in JUMP_KINDS else ():
-        arguments = ", ".join(f"x_{n}" for n in parameters(kernel))
-        lines.append(f"out = kernel_{name}({arguments})")
-        lines += _store(type_info, name)
+    for name in kernels if what not in JUMP_KINDS else ():
+        lines.append(f"out = {called_with(type_info, name)}")
+        lines += store(type_info, name)
     title = f"{type_info.type.keyword}{type_info.given}: {', '.join(kernels) or what}"
-    return Loop(title, {f"kernel_{n}": k for n, k in kernels.items()}, lines)
+    called = {f"kernel_{n}": k for n, k in kernels.items()}
+    called |= {f"kernel_J_{joint.field}": joint.type_info.kernels["J"] for joint in reads}
+    return Loop(title, called, lines)
 
 
-def _store_angle(name: str, offset: int) -> Iterable[str]:
+def gathering_lines(
+    type_info: TypeInfo, wanted: Sequence[str], *, reactions: bool = False
+) -> Iterable[str]:
+    """Places of an instance, and the quantities that its kernels name."""
+    layout = type_info.layout
+    instance, numbers = f"i0 + q * {stride(type_info)}", f"p0 + q * {layout.par_width}"
+    if reactions:
+        yield from reaction_lines(type_info, wanted, instance, numbers)
+    yield from (f"b0 = {instance}", f"p1 = {numbers}")
+    yield from (f"b_{s} = idx[b0 + {n}]" for n, s in enumerate(layout.slots))
+    first = len(layout.slots) + len(layout.functions)
+    yield from (f"b_{name} = idx[b0 + {first + n}]" for n, name in enumerate(layout.others))
+    if layout.states:
+        yield f"z0 = idx[b0 + {layout.integers - 1}]"
+        yield "states, rates = arrays.states, arrays.rates"
+    if type_info.type.kind == "joint":
+        yield f"row = idx[b0 + {layout.integers}]"
+    yield from (f"x_{q.name} = {q.code}" for q in in_order(type_info.names, wanted) if q.code)
+
+
+def called_with(type_info: TypeInfo, kernel: str) -> str:
+    """The call of a kernel with the quantities that it names."""
+    return f"kernel_{kernel}({', '.join(f'x_{n}' for n in parameters(type_info.kernels[kernel]))})"
+
+
+def store_angle(name: str, offset: int) -> Iterable[str]:
     """Store an angle, its rate and the time; count in out1 where its turns are in doubt."""
     change = f"x_{name}_dot - par[p1 + {offset + 1}]"
     yield f"out1[0] += doubtful({change}, t - par[p1 + {offset + 2}])"
-    for k, value in enumerate((f"x_{name}", f"x_{name}_dot", "t")):
-        yield f"par[p1 + {offset + k}] = {value}"
+    yield from keep(offset, f"x_{name}", f"x_{name}_dot")
 
 
-def _append(values: Sequence[str]) -> Iterable[str]:
+def keep(offset: int, value: str, rate: str) -> Iterable[str]:
+    """Store a value, its rate and the time in the numbers of an instance."""
+    for k, number in enumerate((value, rate, "t")):
+        yield f"par[p1 + {offset + k}] = {number}"
+
+
+def append(values: Sequence[str]) -> Iterable[str]:
     """Append values to those of other instances and groups; out2 is their number."""
     yield "place = whole(out2[0])"
     for k, value in enumerate(values):
@@ -113,7 +145,7 @@ def _append(values: Sequence[str]) -> Iterable[str]:
     yield f"out2[0] += {len(values)}.0"
 
 
-def _store(type_info: TypeInfo, kernel: str) -> Iterable[str]:
+def store(type_info: TypeInfo, kernel: str) -> Iterable[str]:
     """Store the numbers that a kernel returned."""
     paths, layout, type_ = type_info.outputs[kernel], type_info.layout, type_info.type
     if kernel == "energy":
@@ -122,7 +154,9 @@ def _store(type_info: TypeInfo, kernel: str) -> Iterable[str]:
         yield "row = idx[b0]"
         yield from (f"F[row, {k}] = {path}" for k, path in enumerate(paths))
     elif kernel in ("switch", "knot"):
-        yield from _append(paths)
+        yield from append(paths)
+    elif kernel == "G":
+        yield from (f"out1[{k}] = {path}" for k, path in enumerate(paths))
     elif kernel == "rate":
         yield from (f"rates[z0 + {k}] = {path}" for k, path in enumerate(paths))
     elif kernel in ("wrench", "friction"):

@@ -12,6 +12,27 @@ from dap3d_core.interface.types import TypeBase
 
 
 @attrs.frozen
+class JointOfForce:
+    """A joint whose reaction a force reads (reactions.py).
+
+    Attributes:
+        field: the force's field that names it.
+        type_info: the type of the joint.
+        integers, numbers: where its integers and numbers begin among those of the force.
+    """
+
+    field: str
+    type_info: "TypeInfo"
+    integers: int
+    numbers: int
+
+    @property
+    def rows(self) -> int:
+        """Number of its multipliers."""
+        return self.type_info.row_count
+
+
+@attrs.frozen
 class TypeInfo:
     """A type that passed, with what its loops are generated from.
 
@@ -27,6 +48,7 @@ class TypeInfo:
             joint; "" for all others.
         given: the types of its functions of an argument, for titles.
         derived: kernels derived from others.
+        joints: of a force, the joints whose reactions it reads, once a scene has named them.
         terms: of a function that combines functions, the types of those.
     """
 
@@ -40,7 +62,13 @@ class TypeInfo:
     friction_joint: str = ""
     given: str = ""
     derived: tuple[str, ...] = ()
+    joints: tuple[JointOfForce, ...] = ()
     terms: tuple["TypeInfo", ...] = ()
+
+    @property
+    def row_count(self) -> int:
+        """Rows of a joint that constrain the bodies; 0 of other types."""
+        return int(getattr(self.type, "rows", 0)) - len(self.layout.unknowns)
 
     def chosen(self, values: Mapping[str, Any]) -> "TypeInfo":
         """The variant for the values of an instance's fields; itself where none fits."""

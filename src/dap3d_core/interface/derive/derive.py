@@ -34,9 +34,10 @@ def missing(type_: type[TypeBase], gives_one_number: bool = False) -> tuple[str,
     """
     defined = type_.kernels()
     if issubclass(type_, Joint):
+        by_unknowns = ("G",) if type_.unknowns and "G" not in defined and "C" in defined else ()
         if {"J", "gamma"} <= set(defined) or not {"C", "C_dot"} & set(defined):
-            return ()
-        return tuple(n for n in ("J", "gamma", "nu") if n not in defined)
+            return by_unknowns
+        return (*by_unknowns, *(n for n in ("J", "gamma", "nu") if n not in defined))
     if type_.kind == "force":
         wanted = ("wrench",) if "energy" in defined and "wrench" not in defined else ()
         has_rates = "Jv" in parameters(defined["impulse"]) if "impulse" in defined else False
@@ -93,7 +94,7 @@ def _text(
         if issubclass(type_, Joint):
             C, C_dot = given.get("C"), given.get("C_dot")
             found, steps = symbolic.derive_joint(
-                C, C_dot, type_.position_rows(), type_.rows, symbols
+                C, C_dot, type_.position_rows(), type_.rows, symbols, layout.unknowns
             )
         elif type_.kind == "force":
             found, steps = _of_force(symbolic, given, wanted, symbols)

@@ -311,8 +311,9 @@ def derive_joint(
     position_rows: Sequence[int],
     rows: int,
     symbols: Symbols,
+    unknowns: Sequence[str] = (),
 ) -> tuple[dict[str, Any], Steps]:
-    """J, gamma and nu of a joint, as nested lists of expressions over the names and steps.
+    """G, J, gamma and nu of a joint, as nested lists of expressions over the names and steps.
 
     Args:
         C: of the rows of the position level; None where there is none.
@@ -320,12 +321,14 @@ def derive_joint(
         position_rows: the rows of C.
         rows: number of all rows.
         symbols: the joint's names.
+        unknowns: names of those by which G has the derivatives of C.
 
     Raises:
         DerivationError: gives reason and remedy.
     """
     J: list[Any] = [[None] * rows for _ in range(len(symbols.basic) // 6)]
     gamma, nu = [sympy.Integer(0)] * rows, [sympy.Integer(0)] * rows
+    G: list[Any] = []
     steps: Steps = {}
     velocity_rows = [k for k in range(rows) if k not in position_rows]
     for kernel, which, what in ((C, position_rows, "C"), (C_dot, velocity_rows, "C_dot")):
@@ -340,13 +343,16 @@ def derive_joint(
         for k, row in enumerate(which):
             with_gradient, gradient = program.gradient(k)
             steps |= with_gradient.steps
+            if what == "C" and unknowns:
+                own = [symbols.value(name) for name in unknowns]
+                G.append([gradient.get(s, sympy.Integer(0)) for s in own])
             coefficients = _coefficients(gradient, symbols, of_rates=what == "C_dot")
             for n, block in enumerate(J):
                 block[row] = coefficients[6 * n : 6 * n + 6]
             if what == "C_dot":
                 _check_linear(program.plain(k), row, symbols)
             gamma[row], nu[row] = -rate.results[k], -rest.results[k]
-    return {"J": J, "gamma": gamma, "nu": nu}, steps
+    return {"G": G, "J": J, "gamma": gamma, "nu": nu}, steps
 
 
 def _coefficients(

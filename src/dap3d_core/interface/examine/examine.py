@@ -30,6 +30,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     namespace,
     parameters,
 )
+from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.codegen.return_shapes import (
     ShapeError,
     checked_shape,
@@ -39,6 +40,7 @@ from dap3d_core.interface.codegen.return_shapes import (
 )
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
+from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
 from dap3d_core.interface.examine.random_values import (
     numbers,
@@ -77,11 +79,8 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     outputs: dict[str, tuple[str, ...]] = {}
 
     def call(kernel_name: str) -> None:
-        kernel, offered = kernels[kernel_name], names
-        if kernel_name == "friction" and issubclass(type_, Joint):
-            offered = friction_names(type_.rows) | names
-        if kernel_name in JUMP_KINDS:
-            offered = jump_names(type_.kind, kernel_name, outputs, len(layout.slots)) | names
+        kernel = kernels[kernel_name]
+        offered = _further_names(type_, kernel_name, outputs, len(layout.slots)) | names
         _check_names(type_, kernel_name, parameters(kernel), offered)
         quantities = [offered[n] for n in parameters(kernel)]
         rows = row_count(outputs, len(layout.slots)) if kernel_name == "impulse" else 0
@@ -99,6 +98,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     derived = tuple(n for n in lacking if n in kernels)  # nu is left out where it is zero
     for kernel_name in (*derived, *(name for name in JUMP_KINDS if name in kernels)):
         call(kernel_name)
+    outputs |= _bounds(type_)
     _check_jumps(type_, outputs, len(layout.slots))
     functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
     return TypeInfo(
@@ -112,6 +112,26 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
         friction_joint=_joint_of_friction(type_),
         derived=derived,
     )
+
+
+def _bounds(type_: type[TypeBase]) -> dict[str, tuple[str, ...]]:
+    """Output of the distances of unknowns from their bounds."""
+    if not unknown_names(type_):
+        return {}
+    from dap3d_core.interface.examine.check_unknowns import bound_count
+
+    return {"bound": tuple(f"out[{k}]" for k in range(bound_count(type_)))}
+
+
+def _further_names(
+    type_: type[TypeBase], kernel: str, outputs: Mapping[str, tuple[str, ...]], slots: int
+) -> dict[str, KernelArgument]:
+    """Names that one kernel alone may use."""
+    if kernel == "friction" and issubclass(type_, Joint):
+        return friction_names(type_.rows)
+    if kernel in JUMP_KINDS:
+        return jump_names(type_.kind, kernel, outputs, slots)
+    return reaction_names(type_) if kernel in READING else {}
 
 
 def _declares_states(type_: type[TypeBase], *, is_abstract: bool) -> bool:
@@ -318,6 +338,10 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     if kind != "function" and not by_joint and not body_slots(type_):
         raise PluginError(f"{who} acts on no body; declare a field such as P_i: Point = point()")
     _check_fields(type_)
+    if unknown_names(type_) or "G" in kernels:
+        from dap3d_core.interface.examine.check_unknowns import check_unknowns
+
+        check_unknowns(type_)
     _check_members(type_)
     for name in needed:
         if name not in kernels:
@@ -344,12 +368,22 @@ def _check_fields(type_: type[TypeBase]) -> None:
             "declare points, and form the others in the kernel: sub(r_Q_j, r_Q_i)"
         )
     taken = {f"{q}_{s}" for q in ("r", "A", "p", "w", "mass", "Jp") for s in body_slots(type_)}
+    reactions = reaction_names(type_)
     for name, spec in specs.items():
         other = specs.get(spec.across)
         if spec.across and (other is None or other.kind != "vector"):
             raise PluginError(f"{who}.{name} is across {spec.across}, which is no vector field")
         if name in taken:
             raise PluginError(f"{who} has a field {name}, which is the body's; take another name")
+        if name in reactions:
+            raise PluginError(
+                f"{who} has a field {name}, which is the reaction of a joint that it names; take "
+                "another name"
+            )
+        if spec.rows is not None and not (isinstance(spec.rows, int) and spec.rows > 0):
+            raise PluginError(
+                f"{who}.{name} is to be a joint of rows = {spec.rows!r}; take 1 or more"
+            )
         slot = slot_of(name) if spec.kind in ("point", "body") else None
         if slot and slot not in body_slots(type_):
             before = SLOTS[SLOTS.index(slot) - 1]
@@ -381,6 +415,8 @@ def _check_names(
             near, declared = get_close_matches(name, names, 1), no_field(type_, name)
             hint = f"did you mean {near[0]}? " if near else ""
             hint = f"{declared}; " if declared else hint
+            if name in reaction_names(type_):
+                hint = f"reactions are known to {' and '.join(READING)} alone; "
             raise PluginError(
                 f"{who} asks for {name}, which its fields do not offer; {hint}"
                 f"they offer {', '.join(names)}"
@@ -447,6 +483,9 @@ def _expected(
         return (4,) if isinstance(value, (tuple, list)) else (), "(f, f', f'', f''')"
     if not issubclass(type_, Joint):
         return (), "one number"
+    if kernel == "G":
+        n, k = len(type_.position_rows()), len(unknown_names(type_))
+        return (n, k), f"{n} rows of the derivatives of C by its {k} unknowns"
     if kernel == "J":
         return (slots, type_.rows, 6), f"a block of {type_.rows} x 6 for each of {slots} bodies"
     if kernel in ("C", "C_dot"):

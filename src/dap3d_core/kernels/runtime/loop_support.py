@@ -31,6 +31,7 @@ __all__ = [
     "vector_at",
     "vector_in",
     "whole",
+    "within",
 ]
 
 
@@ -67,6 +68,12 @@ def unwound(angle, last):
 def doubtful(change, elapsed):
     """1 if a rate changed so much within a step that a turn may be miscounted, else 0."""
     return where(abs(change) * elapsed > 0.5 * TURN, 1.0, 0.0)
+
+
+def within(x, low, high):
+    """The number plus whole periods, high less low, so that it is between them."""
+    period = high - low
+    return x - period * np.rint(((x - 0.5 * (low + high)) / period).real)
 
 
 def whole(x):

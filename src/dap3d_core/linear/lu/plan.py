@@ -95,6 +95,7 @@ def make_lu_plan(
     nodes: Sequence[JointNode],
     coupled: Iterable[tuple[int, ...]],
     elements: Sequence[StateNode] = (),
+    reading: Iterable[tuple[int, int]] = (),
 ) -> LuPlan:
     """Find the elimination program.
 
@@ -103,6 +104,7 @@ def make_lu_plan(
         nodes: joint nodes, as ordering/elimination_order.py merges joints.
         coupled: bodies of each element that couples them directly, ground (0) allowed.
         elements: those with states of their own.
+        reading: joint nodes, and bodies on which an element acts that reads their multipliers.
     """
     joints = len(nodes)
     sizes = [ROW_SIZE * node.rows for node in nodes] + [BODY_SIZE] * body_count
@@ -118,6 +120,9 @@ def make_lu_plan(
         there = {joints + b - 1 for b in bodies if b}
         for a in there:
             neighbours[a] |= there - {a}
+    for k, b in reading:
+        neighbours[k].add(joints + b - 1)
+        neighbours[joints + b - 1].add(k)
     for e, element in enumerate(elements, start=joints + body_count):
         for other in (*(joints + b - 1 for b in element.bodies if b), element.joint):
             if other >= 0:

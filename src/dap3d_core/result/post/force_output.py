@@ -44,6 +44,7 @@ def force_output(
     v_dot: Floats,
     name: str,
     element: int,
+    Lam: Floats,
     angles: Floats | None,
     actuation: Floats | None = None,
     states: Floats | None = None,
@@ -58,6 +59,7 @@ def force_output(
         v_dot: (nt, 6 n) accelerations.
         name: its name, for the error.
         element: its index among the forces of the model.
+        Lam: (nt, m) multipliers, m rows in the order of the model.
         angles: (nt, k) angles as in ``Arrays``; None to count them from one instant to the next.
         states: (nt, s) states of elements; None for their initial values.
         actuation: (nt,) what takes the place of the field that its type ``actuates``; the element
@@ -72,6 +74,7 @@ def force_output(
     loops, bodies = ForceLoops(evaluator, group, index), group.bodies[index]
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
+    minus_lambda = np.zeros_like(evaluator.system.multipliers)
     for k, time in place_at(evaluator, t, u, states, inputs):
         if angles is None:
             loops.call("angle", time, force)
@@ -80,7 +83,9 @@ def force_output(
         if actuation is not None:
             loops.parameters.scale_field(group, field, actuation[k])
         force[:] = energy[:] = 0.0
-        loops.call("wrench", time, force)
+        if group.read:
+            minus_lambda[evaluator.system.row] = -Lam[k]
+        loops.call(loops.law, time, force, minus_lambda)
         loops.call("energy", time, energy)
         out[k], potential[k] = force.reshape(-1, 6)[bodies], energy[0]
     on = actions_of(evaluator.model, u, group, index, out)
@@ -130,7 +135,9 @@ class ForceLoops:
         s = evaluator.system
         self._evaluator = evaluator
         self._loops = {kind: q for q, (kind, g) in enumerate(evaluator.loop_groups) if g is group}
-        q = self._loops["wrench"]
+        #: The loop of its wrench; one that reads reactions is called as friction is.
+        self.law = "wrench" if "wrench" in self._loops else "friction"
+        q = self._loops[self.law]
         self.parameters = InstanceParameters(evaluator, q, group, np.array([index]))
         self.parameters.set_angles(np.zeros(evaluator.model.angle_count))
         self._groups, start = s.groups.copy(), self.parameters.start
@@ -141,8 +148,11 @@ class ForceLoops:
         """True if there is a loop of a kind."""
         return kind in self._loops
 
-    def call(self, kind: str, time: float, out: Floats) -> None:
-        """Runs a loop, if there is one, at the current poses; it adds to ``out``."""
+    def call(self, kind: str, time: float, out: Floats, multipliers: Floats | None = None) -> None:
+        """Runs a loop, if there is one, at the current poses; it adds to ``out``.
+
+        multipliers: (rows,) -lambda as the driver has it, for a loop that reads reactions.
+        """
         from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
 
         if self.has(kind):
@@ -150,4 +160,5 @@ class ForceLoops:
             par = self.parameters.par
             arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=par, states=s.states)
             q, loops = self._loops[kind], self._evaluator.loops
-            call_loop(loops, q, time, arrays, self._groups[q], out, out, out)
+            given = out if multipliers is None else multipliers
+            call_loop(loops, q, time, arrays, self._groups[q], out, given, given)

@@ -21,6 +21,7 @@ from dap3d_core.result.post.point_motion import Energy, accelerations, point_mot
 from dap3d_core.result.post.reactions import Reaction
 
 if TYPE_CHECKING:
+    from dap3d_core.model import Model
     from dap3d_core.result.post.joint_coordinates import JointCoordinates
     from dap3d_core.scene.expressions.expression import Expression
 
@@ -62,6 +63,10 @@ class QuantitySource(Protocol):
     @property
     def energy(self) -> Energy:
         """Energies of the system."""
+
+    @property
+    def model(self) -> "Model":
+        """The model."""
 
     @property
     def force_names(self) -> tuple[str, ...]:

@@ -75,6 +75,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
                     return _quantity(result, name, owner, attribute, component)
             elif state := _state(result, name, owner, attribute, component):
                 return state
+            elif unknown := _unknown_of_joint(result, name, owner, attribute, component):
+                return unknown
     if output := _output(result, name):
         return output
     raise _unknown(result, name)
@@ -200,6 +202,26 @@ def _state(
     return state_quantity(result, name, owner, attribute, component)
 
 
+def _unknown_of_joint(
+    result: QuantitySource, name: str, owner: QuantityOwner, attribute: str, component: str
+) -> Quantity | None:
+    """An unknown of a joint; None where it has none of this name."""
+    if owner.kind != "joint" or not result.summary.angle_count:
+        return None
+    from dap3d_core.result.quantities.joint_unknowns import unknown_quantity
+
+    return unknown_quantity(result, name, owner, attribute, component)
+
+
+def _unknown_names(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
+    """Names of the unknowns of a joint."""
+    if owner.kind != "joint" or not result.summary.angle_count:
+        return ()
+    from dap3d_core.result.quantities.joint_unknowns import unknowns_of
+
+    return tuple(unknowns_of(result, owner))
+
+
 def _state_names(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
     """Names of the states of an element."""
     if not result.summary.state_names:
@@ -283,7 +305,13 @@ def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]
     names = ACTIONS if owner.slot else QUANTITIES[owner.kind]
     is_actuator = owner.name in result.record.actuation
     known = (name for name in names if name != ACTUATION or is_actuator)
-    return (*known, *_state_names(result, owner), *_coordinate_names(result, owner))
+    unknowns = _unknown_names(result, owner)
+    return (
+        *known,
+        *_state_names(result, owner),
+        *unknowns,
+        *_coordinate_names(result, owner),
+    )
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:

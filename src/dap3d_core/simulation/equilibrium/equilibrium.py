@@ -16,6 +16,7 @@ from dap3d_core.result.post.reactions import Reaction, reactions
 from dap3d_core.scene import Scene, check
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.equilibrium.rest import Rest, find_rest
+from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import violation
 from dap3d_core.simulation.initial.start_state import NamedState, Start, start_state
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
@@ -188,6 +189,12 @@ def equilibrium(
     state = None
     if start is not None:
         state = start_state(start, compiled.model, compiled.checked.registry)
+    if reading := [compiled.model.force_names[k] for group in compiled.model.forces if group.read
+                   for k in group.members.tolist()]:  # fmt: skip
+        raise SimulationError(
+            "statics does not know forces that depend on the reactions of joints: leave "
+            f"{', '.join(reading)} out of the scene, or let a damped motion come to rest"
+        )
     with compiled.borrow_evaluator() as evaluator:
         first = compiled.start(True, settings.hold, str(settings.correct_metric), state)
         rest = find_rest(evaluator, first.u, first.angles, first.states)

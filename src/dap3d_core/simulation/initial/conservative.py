@@ -39,7 +39,9 @@ def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
     driven = driven or any(
         np.any(g.functions[:, : len(g.type_info.layout.functions)] > 0) for g in model.forces
     )
-    if driven or model.friction or any("energy" not in g.type_info.kernels for g in model.forces):
+    if driven or model.iterated_forces:
+        return False
+    if any("energy" not in g.type_info.kernels for g in model.forces):
         return False
     rng = np.random.default_rng(1)
     r, p, _, _ = split(u)

@@ -125,12 +125,10 @@ def _solved(
 ) -> Result:
     started, model = time.perf_counter(), evaluator.model
     chosen = actuators_of(compiled, evaluator, names)
-    if model.friction:
-        friction = [name for group in model.friction for name in
-                    (model.force_names[int(k)] for k in group.members)]  # fmt: skip
+    if model.iterated_forces:
         raise SimulationError(
-            "inverse dynamics does not know Coulomb friction in joints, which depends on their "
-            f"reactions: leave {', '.join(friction)} out of the scene"
+            "inverse dynamics does not know Coulomb friction in joints, nor other forces that "
+            f"depend on their reactions: leave {', '.join(model.iterated_forces)} out of the scene"
         )
     held = np.ones(model.row_count, dtype=bool)
     held[[a.row for a in chosen if isinstance(a, DriverActuator)]] = False

@@ -171,7 +171,7 @@ def _force(
             if columns and group.type_info.layout.states:
                 _rate(point, evaluator, loop, group, number, columns, rate)
             return unit
-    raise UnknownNameError(f"input {name!r}: {element} acts by the friction of a joint alone")
+    raise UnknownNameError(f"input {name!r}: {element} acts by reactions of joints alone")
 
 
 def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from dap3d_core.formulations import FORMULATIONS, WATCH
 from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.interface.codegen.kernel_arguments import parameters
+from dap3d_core.interface.codegen.reactions import reaction_names
 from dap3d_core.linear.rank.rank import dense_rank
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import join
@@ -124,6 +126,11 @@ def operating_point(
             f"{INFORMATION}steady motion: the equations are written in axes that turn at "
             f"({words}) rad/s, in which their coefficients are constant"
         )
+    if rated := _rates_on_reactions(model):
+        raise SimulationError(
+            "linearisation does not know states whose rates depend on the reactions of joints: "
+            f"leave {', '.join(rated)} out of the scene"
+        )
     if model.friction:
         notes.append(
             "joints with friction: linearised with the smooth law of friction at this state, "
@@ -144,6 +151,18 @@ def _keeps_states(model: Model, tangent: TangentMatrices, states: Floats) -> boo
     terms = abs(own.rate_by_states) @ np.abs(states)
     terms += abs(own.rate_by_displacement) @ size + abs(own.rate_by_velocity) @ size
     return bool(np.all(np.abs(own.rates) <= STEADY_STATES * terms))
+
+
+def _rates_on_reactions(model: Model) -> list[str]:
+    """Names of forces with a ``rate`` that reads reactions."""
+    return [
+        model.force_names[int(member)]
+        for group in model.forces
+        if group.read
+        and set(parameters(group.type_info.kernels.get("rate", lambda: None)))
+        & set(reaction_names(group.type_info.type))
+        for member in group.members
+    ]
 
 
 def _state(

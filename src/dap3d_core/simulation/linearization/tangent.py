@@ -46,8 +46,8 @@ class TangentMatrices:
 
     Attributes:
         M: (6 n, 6 n) mass matrix, kg and kg m^2, global axes.
-        f: (6 n,) applied forces and moments, with the gyroscopic moments -omega x J omega and the
-            friction of joints.
+        f: (6 n,) applied forces and moments, with the gyroscopic moments -omega x J omega, the
+            friction of joints and forces on reactions.
         a: (6 n,) accelerations r_ddot, omega_dot at which R was differentiated.
         multipliers: (rows,) lambda at which R was differentiated.
         C, nu, gamma: (rows,) of the constraint rows; C is zero where a row has no position level.
@@ -55,8 +55,8 @@ class TangentMatrices:
         position_row: (rows,) bool, True where a row has a position level.
         stiffness: (6 n, 6 n) -dR/dx by displacements, reactions and inertia included.
         damping: (6 n, 6 n) -dR/dv by velocities, gyroscopic terms included.
-        friction_by_multipliers: (6 n, rows) df/dlambda; without entries where no joint has
-            friction.
+        friction_by_multipliers: (6 n, rows) df/dlambda; without entries where no force depends on
+            reactions.
         velocity_by_displacement: (rows, 6 n) d(D v - nu)/dx; by velocities it is D.
         acceleration_by_displacement: (rows, 6 n) d(D a - gamma)/dx at fixed a.
         acceleration_by_velocity: (rows, 6 n) d(D a - gamma)/dv.
@@ -222,11 +222,14 @@ class _Assembly:
         np.add.at(self.f, row[row >= 0], value[row >= 0])
         self._add_by_motion(own.bodies, row, -slope, "stiffness", "damping")
         if kind == "friction":
-            first, rows = 12 * own.bodies.shape[1], slope.shape[-1]
-            assert group.joints is not None
-            start = self.model.joint_start[group.joints]
-            column = start[:, None, None, None] + np.arange(rows - first)
-            self.entries["friction_by_multipliers"].add(row[..., None], column, slope[..., first:])
+            first = 12 * own.bodies.shape[1]
+            joints = [j.members for j in group.read] if group.joints is None else [group.joints]
+            for members in joints:
+                rows = int(self.model.joint_rows[members[0]])
+                column = self.model.joint_start[members][:, None, None, None] + np.arange(rows)
+                part = slope[..., first : first + rows]
+                self.entries["friction_by_multipliers"].add(row[..., None], column, part)
+                first += rows
 
     def _add_joints(self, group: Group, own: LoopDerivatives) -> None:
         J, J_slope = own.outputs["J"]

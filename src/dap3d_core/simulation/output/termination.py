@@ -1,14 +1,16 @@
 """Messages on the end of a run and on the events before it."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from dap3d_core.formulations.common.friction import PASSES
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping.event_location import CHATTER
 from dap3d_core.integrators.stepping.integration_state import LOGGED
+from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.result import INFORMATION, EventRecord
-from dap3d_core.simulation.failure.diagnosis import fastest_body, find_offender
+from dap3d_core.simulation.failure.diagnosis import AHEAD, fastest_body, find_offender
 from dap3d_core.simulation.redundancy.contradictory_joints import find_contradiction
 
 REASONS = {
@@ -21,7 +23,7 @@ REASONS = {
 def doubts(evaluator: Evaluator, rhs: int) -> list[str]:
     """Notes on what was computed less surely than all else; rhs: evaluations of the run."""
     notes = []
-    if count := evaluator.friction_failure_count:
+    if (count := evaluator.friction_failure_count) and evaluator.model.friction:
         notes.append(
             f"friction: the multipliers did not settle in {PASSES} passes, {count} times of {rhs} "
             "or more; the last ones were used. Motion there is uncertain: a high mu may lock the "
@@ -56,10 +58,28 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
         culprit = find_contradiction(evaluator, t, y, rank)
         if culprit:
             return f"{head}: {culprit}"
-    culprit = find_offender(evaluator, t, y, t_stop)
+    culprit = jammed_forces(evaluator, t, y) or find_offender(evaluator, t, y, t_stop)
     if not culprit and integration.status is Status.NOT_FINITE:
         culprit = fastest_body(evaluator, y)
     return f"{message}: {culprit}" if culprit else message
+
+
+def jammed_forces(evaluator: Evaluator, t: float, y: Any) -> str:
+    """The forces on reactions where these did not settle in a run that failed, in words; or ""."""
+    model = evaluator.model
+    reading = [model.force_names[k] for g in model.forces if g.read for k in g.members.tolist()]
+    if not reading:
+        return ""
+    if not evaluator.friction_failure_count:  # of radau, which iterates on its stages
+        for later in AHEAD:
+            evaluator.rhs(t + later * (1.0 + abs(t)), u_from_y(y))
+    if not evaluator.friction_failure_count:
+        return ""
+    return (
+        f"force{'s' if len(reading) > 1 else ''} {', '.join(reading)}: the reactions that they "
+        f"read did not settle in {PASSES} passes. A brake that raises its own load by more than "
+        "that load jams: no acceleration fits it"
+    )
 
 
 def occurrences(

@@ -85,7 +85,7 @@ class BatchRunner:
                 self.parameter_map = parameter_map
                 # Switches of one copy would interrupt all, friction is iterated for all.
                 shared = evaluator.formulation.accepts_redundant or bool(evaluator.switches)
-                shared = shared or bool(compiled.model.friction) or not is_of_bodies
+                shared = shared or bool(compiled.model.iterated_forces) or not is_of_bodies
                 if pack > 1 and not shared and reduction.is_of_single_copies:
                     self.packed = PackedBatch(compiled, evaluator, times, pack)
 

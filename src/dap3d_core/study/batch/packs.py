@@ -105,6 +105,7 @@ def _copies(group: Group, model: Model, count: int) -> Group:
         bodies=np.concatenate(np.where(bodies > 0, bodies + n * lanes[..., None], 0)),
         functions=np.concatenate(np.where(functions > 0, functions + shift * lanes[..., None], 0)),
         numbers=np.tile(group.numbers, (count, 1)),
+        read=tuple(_copies(read, model, count) for read in group.read),
         tables=tuple(
             (k + lane * m, offset, rows)
             for lane in range(count)

@@ -112,6 +112,8 @@ class ParameterMap:
         self._bodies = np.array(sorted(checked.body_index[b] - 1 for b in bodies), dtype=np.int64)
         system, n = evaluator.system, 1 + self._bodies[:, None]
         par = np.arange(system.par.size)  # turns are counted from zero at the start of each run
+        if any(group.type_info.layout.unknowns for group in evaluator.model.joints):
+            raise NotCopiedError  # their unknowns are sought anew for each point
         counters = np.concatenate([par[:0], *(par[places] for places in evaluator.turn_places())])
         self._counters = len(counters)
         body = system.par.size + n * BODY_WIDTH
@@ -276,6 +278,8 @@ class ParameterMap:
         if field in self._reads(instance).constants:
             raise NotCopiedError
         component = index[0] if index else 0
+        if any(self._rows_of(instance, read).size for g, _ in self._groups() for read in g.read):
+            raise NotCopiedError  # forces that read its reaction have a copy of its numbers
         for group, first in self._groups():
             spot = group.type_info.layout.numbers.get(field)
             if spot is not None:

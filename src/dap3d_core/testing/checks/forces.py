@@ -109,6 +109,25 @@ def dissipation(subject: SampledType) -> CheckOutcome:
     return c.outcome()
 
 
+def unloaded(subject: SampledType) -> CheckOutcome:
+    """A force on reactions is finite where the joints carry nothing, as at the start of a run."""
+    c = Comparison("unloaded", subject, "wrench", "the wrench is finite where joints carry nothing")
+    for sample in subject.samples:
+        no_load = attrs.evolve(sample.element, lam=(0.0,) * len(sample.element.lam))
+        try:
+            finite = bool(np.isfinite(attrs.evolve(sample, element=no_load).value("wrench")).all())
+        except UNDEFINED:
+            finite = False
+        if not finite:
+            c.fail(
+                "the wrench is no finite number where the reactions that it reads are zero; a run "
+                "begins so, and joints are unloaded at times: divide by no load",
+                sample,
+            )
+            break
+    return c.outcome(sized=False)
+
+
 def rigid_motion(
     state: State, seed: int, k: int, *, velocity: bool = False
 ) -> tuple[State, Floats]:

@@ -1,7 +1,10 @@
 """Checks of a joint: J, nu and gamma against derivatives, reactions, rank, rigid motions."""
 
+from typing import Any
+
 import numpy as np
 
+from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.testing.checks.compare import (
     DIFFERENCE_TOLERANCE,
@@ -13,7 +16,12 @@ from dap3d_core.testing.checks.compare import (
 from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.checks.forces import rigid_motion
 from dap3d_core.testing.samples.random_state import Direction, Floats
-from dap3d_core.testing.samples.sampled_type import Sample, SampledType, position_jacobian
+from dap3d_core.testing.samples.sampled_type import (
+    Sample,
+    SampledType,
+    gradient_of_rows,
+    position_jacobian,
+)
 
 #: Singular values relative to the largest that count as zero.
 RANK_TOLERANCE = 1e-8
@@ -27,6 +35,10 @@ _J = (
     "row {x.n} of J is wrong by {x.error:.3g} at this pose: {x.is_:.6g} is in column {column} of "
     "body {letter}, and it should be {x.should:.6g}, the derivative of row {x.n} of C by {by} "
     "({way})"
+)
+_G = (
+    "row {x.n} of G is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g} and should be "
+    "{x.should:.6g}, the derivative of row {x.n} of C by the unknown {name} ({way})"
 )
 _NU = (
     "row {x.n} of nu is wrong by {x.error:.3g} at this pose: it is {x.is_:.6g} and should be "
@@ -92,6 +104,19 @@ def jacobian(subject: SampledType) -> CheckOutcome:
     return c.outcome()
 
 
+def gradient_of_unknowns(subject: SampledType) -> CheckOutcome:
+    """G is the derivative of C by the unknowns."""
+    c = Comparison("G", subject, "G", "G against dC/ds, by complex step and by differences")
+    rows, names = subject.type.position_rows(), unknown_names(subject.type)
+    for sample in poses(subject):
+        G = sample.value("G")
+        for k, name in enumerate(names):
+            for rate in rates(sample, "C", Direction.of_unknown(k, len(names)), c):
+                c.compare(sample, G[:, k], rate.value, _G, words={"name": name, "way": rate.way},
+                          tolerance=rate.tolerance, bound=rate.bound, rows=rows)  # fmt: skip
+    return c.outcome()
+
+
 def velocity_side(subject: SampledType) -> CheckOutcome:
     """The side nu is minus the rate of C in time at a fixed pose."""
     c = Comparison("nu", subject, "nu", "nu against -dC/dt at a fixed pose")
@@ -128,6 +153,7 @@ def acceleration_side(subject: SampledType) -> CheckOutcome:
     c = Comparison("gamma", subject, "gamma", "gamma against the time derivative of nu - J v")
     wrong, has_nu = _rows_apart(subject), "nu" in subject.kernels.names()
     good = [k for k in range(subject.type.rows) if k not in wrong]
+    position = list(subject.type.position_rows())
     for row, form in wrong.items():
         c.note(f"row {row + 1} of J or nu is not what {form} says: gamma is compared with {form}")
     for sample in poses(subject):
@@ -138,6 +164,7 @@ def acceleration_side(subject: SampledType) -> CheckOutcome:
         for turning in J_dot:
             pushing = next((r for r in nu_dot if r.way == turning.way), nu_dot[-1])
             terms = np.einsum("srk,sk->r", turning.value, v)
+            terms[position] += _turning_of_unknowns(sample, along)
             bound = None
             if turning.bound is not None:
                 bound = np.einsum("srk,sk->r", turning.bound, np.abs(v))
@@ -159,6 +186,19 @@ def acceleration_side(subject: SampledType) -> CheckOutcome:
     return c.outcome()
 
 
+def _turning_of_unknowns(sample: Sample, along: Direction) -> Floats:
+    """(position rows,) dG/dt, times the rates of the unknowns."""
+    type_: Any = sample.kernels.type_info.type
+    if not len(sample.state.unknowns):
+        return np.zeros(len(type_.position_rows()))
+    try:
+        slope = sample.slope("G", along)
+    except Exception:  # of a kernel that takes floats alone
+        slope = sample.difference("G", along)[0]
+    product: Floats = slope @ sample.state.unknowns[:, 1]
+    return product
+
+
 def _forms(subject: SampledType) -> list[tuple[str, tuple[int, ...]]]:
     """The kernels of which J, nu and gamma are derivatives, and the rows of each."""
     rows = {"C": subject.type.position_rows(), "C_dot": subject.type.velocity_rows()}
@@ -171,6 +211,7 @@ def _rows_apart(subject: SampledType) -> dict[int, str]:
     for sample in poses(subject):
         v = _velocities(sample)
         rate = np.einsum("srk,sk->r", sample.value("J"), v)
+        rate = rate + gradient_of_rows(sample) @ sample.state.unknowns[:, 1]
         if "nu" in subject.kernels.names():
             rate = rate - sample.value("nu")
         for form, rows in _forms(subject):
@@ -280,10 +321,10 @@ def rank(subject: SampledType) -> CheckOutcome:
 
 
 def _rows_of_J(sample: Sample) -> Floats:
-    """(rows, columns) J of the bodies that are not on ground."""
+    """(rows, columns) J of the bodies that are not on ground, and G."""
     J = sample.value("J")
     J = J[[s for s in range(len(J)) if not (sample.grounded and s == 1)]]
-    return J.transpose(1, 0, 2).reshape(J.shape[1], -1)
+    return np.hstack([J.transpose(1, 0, 2).reshape(J.shape[1], -1), gradient_of_rows(sample)])
 
 
 def _rank(rows: Floats) -> int:

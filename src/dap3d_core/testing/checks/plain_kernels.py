@@ -7,6 +7,7 @@ from typing import Any
 
 from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, jump_names
 from dap3d_core.interface.codegen.kernel_arguments import friction_names, parameters
+from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.interface.examine.examine import ATTEMPTS
 from dap3d_core.interface.examine.random_values import random_quantity
@@ -86,7 +87,9 @@ def _not_plain(subject: SampledType, name: str, kernel: Callable[..., Any]) -> s
     offered, rng = subject.type_info.names, random.Random(f"{subject.seed} {name}")
     if name == "friction":
         offered = friction_names(subject.type.rows) | offered
-    if name in JUMP_KINDS:
+    elif name in READING:
+        offered = reaction_names(subject.type) | offered
+    elif name in JUMP_KINDS:
         info = subject.type_info
         slots = len(info.layout.slots)
         offered = jump_names(info.type.kind, name, info.outputs, slots) | offered

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH, size
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, kernels_of, write
+from dap3d_core.interface.codegen.reactions import sample_size
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, prepared, set_ends
@@ -48,7 +49,7 @@ class RandomElement:
         idx: bodies of its slots (1, 2, 3), rows of functions, bodies of vectors, first state,
             row, blocks.
         par: its numbers, followed by tables.
-        lam: multipliers, for the friction of a joint.
+        lam: multipliers, for the friction of a joint; reactions that a force reads.
     """
 
     fields: Mapping[str, Any]
@@ -79,9 +80,9 @@ class Kernels:
     def value(self, name: str, element: RandomElement, state: State) -> Floats:
         """The value of a kernel, as an array of its rows.
 
-        C (position rows,), C_dot (velocity rows,), J (slots, rows, 6), gamma and nu (rows,), wrench
-        and friction (slots, 2, 3), energy (1,), switch (n,), value (4,), rate and reset (states,),
-        impulse (rows,) or (slots, 2, 3).
+        C (position rows,), G (position rows, unknowns), C_dot (velocity rows,), J (slots, rows, 6),
+        gamma and nu (rows,), wrench and friction (slots, 2, 3), energy (1,), switch (n,), value
+        (4,), rate and reset (states,), impulse (rows,) or (slots, 2, 3).
         """
         body, table = state.body().astype(object), state.table().astype(object)
         own = state.own.astype(object)
@@ -153,11 +154,12 @@ class Kernels:
         """Three outputs, large enough for every kernel; the second holds a joint's multipliers."""
         rows = getattr(self.type_info.type, "rows", 0)
         counts = [len(self.type_info.outputs.get(n, ())) for n in ("switch", *OF_JUMPS)]
-        outs = tuple(np.zeros(6 * BODIES * max(rows, 1) + sum(counts)) for _ in range(3))
+        count = max(6 * BODIES * max(rows, 1), len(element.lam)) + sum(counts)
+        outs = tuple(np.zeros(count) for _ in range(3))
         if not JUMPING.isdisjoint(self.names()):
             outs[2][: counts[0]] = self.crossing
-        if "friction" in self.names():
-            outs[1][:rows] = -np.array(element.lam)  # the solution is minus lambda
+        if "friction" in self.names() or (not rows and element.lam):
+            outs[1][: len(element.lam)] = -np.array(element.lam)  # the solution is minus lambda
         return tuple(out.astype(dtype) for out in outs)
 
     def _value_in(
@@ -169,6 +171,9 @@ class Kernels:
             return self._jump_in(name, outs[0], slots)
         if name == "J":
             return outs[0][: 6 * type_.rows * slots].reshape(slots, type_.rows, 6)
+        if name == "G":
+            rows = len(type_.position_rows())
+            return outs[0][: len(self.type_info.outputs["G"])].reshape(rows, -1)
         if name == "C":
             return outs[0][list(type_.position_rows())]
         if name == "C_dot":
@@ -240,7 +245,7 @@ def draw(
     poses = {s: pose(state.r[k + 1], state.p[k + 1]) for k, s in enumerate(slots)}
     values = _values(type_info, fields, poses, rng)
     shown = {n: v for n, v in fields.items() if isinstance(v, (bool, int, float, str, tuple))}
-    lam = numbers(rng, getattr(type_info.type, "rows", 0))
+    lam = numbers(rng, getattr(type_info.type, "rows", 0) or sample_size(type_info))
     return RandomElement(shown, tuple(idx), tuple(_numbers(type_info, values, rng)), lam)
 
 

@@ -62,6 +62,7 @@ class Direction:
     turn: Floats
     time: float = 0.0
     own: Floats = attrs.field(factory=lambda: np.zeros(0))
+    unknowns: tuple[float, ...] = ()  # rates of those of a joint
 
     @classmethod
     def of(cls, slot: int, component: int) -> "Direction":
@@ -76,6 +77,12 @@ class Direction:
         return cls(np.zeros((BODIES, 3)), np.zeros((BODIES, 3)), 0.0, np.eye(count)[k])
 
     @classmethod
+    def of_unknown(cls, k: int, count: int) -> "Direction":
+        """One of the unknowns of a joint."""
+        still = np.zeros((BODIES, 3))
+        return cls(still, still, unknowns=tuple(float(n == k) for n in range(count)))
+
+    @classmethod
     def in_time(cls) -> "Direction":
         """Time alone, at a fixed pose."""
         return cls(np.zeros((BODIES, 3)), np.zeros((BODIES, 3)), 1.0)
@@ -86,7 +93,8 @@ class State:
     """Time, and for ground and each slot r (9, 3), p (9, 4), velocity, angular velocity (9, 3).
 
     ``mass`` (9,) and ``Jp`` (9, 9) are the bodies' inertia, ``functions`` those of time; None
-    for an absent one. ``own`` (s,) are the states of the element.
+    for an absent one. ``own`` (s,) are the states of the element, ``unknowns`` (k, 2) those of a
+    joint, with their rates.
     """
 
     t: float
@@ -98,6 +106,7 @@ class State:
     Jp: Floats
     functions: tuple[TimeFunction | HeldInput | None, ...]
     own: Floats = attrs.field(factory=lambda: np.zeros(0))
+    unknowns: Floats = attrs.field(factory=lambda: np.zeros((0, 2)))
 
     def body(self) -> Floats:
         """(9, BODY_WIDTH) columns of the bodies, as a group loop reads them."""
@@ -119,12 +128,15 @@ class State:
     def table(self) -> Floats:
         """(functions + 1, 5) f, f', f'', f''' at t, and f at 0; row 0 is the absent function."""
         rows = [(*f.at(self.t), f.at(0.0)[0]) if f else (0.0,) * 5 for f in self.functions]
-        return np.array([(0.0,) * 5, *rows])
+        own = [(*x, 0.0, 0.0, 0.0) for x in self.unknowns.tolist()]  # with their rates
+        return np.array([(0.0,) * 5, *rows, *own])
 
     def table_rate(self, along: Direction) -> Floats:
         """The rate of ``table`` along a direction."""
-        rate = np.zeros((len(self.functions) + 1, 5))
-        rate[:, :3] = along.time * self.table()[:, 1:4]
+        known = len(self.functions) + 1
+        rate = np.zeros((known + len(self.unknowns), 5))
+        rate[:known, :3] = along.time * self.table()[:known, 1:4]
+        rate[known:, 0] = along.unknowns or 0.0
         return rate
 
     def moved(self, along: Direction, h: float) -> "State":
@@ -137,6 +149,9 @@ class State:
             t=self.t + along.time * h,
             r=self.r + h * along.move,
             p=quaternion_product(q, self.p),
+            unknowns=self.unknowns + [[h * rate, 0.0] for rate in along.unknowns]
+            if along.unknowns
+            else self.unknowns,
         )
 
     def together(self, q: Floats, shift: Floats, speed: Floats, spin: Floats) -> "State":
@@ -163,7 +178,8 @@ class State:
 
     def motion(self) -> Direction:
         """The direction in which the state moves: its velocities, and time."""
-        return Direction(self.v, self.w, 1.0)
+        rates = tuple(self.unknowns[:, 1].tolist())
+        return Direction(self.v, self.w, 1.0, unknowns=rates)
 
 
 def random_state(rng: random.Random, functions: Sequence[bool | str], *, grounded: bool) -> State:

@@ -9,9 +9,11 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
+from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
 from dap3d_core.interface.codegen.terms import bind_terms
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
 from dap3d_core.interface.examine.random_values import numbers
@@ -217,6 +219,9 @@ class SampledType:
             try:
                 element = draw(self.type_info, self.drawn_choices, rng, state)
                 state = random_state(rng, given, grounded=grounded)
+                if count := len(unknown_names(self.type)):
+                    unknowns = np.array([numbers(rng, 2) for _ in range(count)])
+                    state = attrs.evolve(state, unknowns=unknowns)
                 if layout.states:
                     state = attrs.evolve(state, own=np.array(numbers(rng, layout.state_width)))
                 sample = Sample(self.kernels, element, state, grounded,
@@ -249,7 +254,16 @@ def sampled_types(type_info: TypeInfo, seed: int, poses: int) -> list[SampledTyp
     if own is not None:
         variants.append((own, type_info))
     variants += [(dict(conditions), e) for conditions, e in type_info.variants]
-    return [SampledType(_given(e, values), values, seed, poses) for values, e in variants]
+    return [SampledType(_alone(_given(e, values)), values, seed, poses) for values, e in variants]
+
+
+def _alone(type_info: TypeInfo) -> TypeInfo:
+    """The type with random numbers for what a scene's joints and equations give."""
+    if type_info.layout.unknowns:
+        from dap3d_core.interface.codegen.unknowns import with_sample_unknowns
+
+        return with_sample_unknowns(type_info)
+    return with_sample_reactions(type_info)
 
 
 def _given(type_info: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
@@ -296,6 +310,30 @@ def position_jacobian(sample: Sample, state: State | None = None) -> Floats:
     return np.stack(columns, axis=-1).reshape(len(columns[0]), -1, 6)
 
 
+def gradient(sample: Sample, state: State | None = None) -> Floats:
+    """(position rows, unknowns) dC/ds by complex step, or by differences where that fails."""
+    here = sample if state is None else attrs.evolve(sample, state=state)
+    type_: Any = here.kernels.type_info.type
+    count = len(here.state.unknowns)
+    columns = [np.zeros((len(type_.position_rows()), 0))]
+    for k in range(count):
+        along = Direction.of_unknown(k, count)
+        try:
+            columns.append(here.slope("C", along)[:, None])
+        except Exception:
+            columns.append(here.difference("C", along)[0][:, None])
+    return np.hstack(columns)
+
+
+def gradient_of_rows(sample: Sample, state: State | None = None) -> Floats:
+    """(rows, unknowns) the same, with zeros in the rows of the velocity level."""
+    type_: Any = sample.kernels.type_info.type
+    whole = np.zeros((type_.rows, len(sample.state.unknowns)))
+    if whole.size:
+        whole[list(type_.position_rows())] = gradient(sample, state)
+    return whole
+
+
 def assembled(sample: Sample) -> Sample | None:
     """The sample brought to C = 0 by Newton's method and to J v = nu; None where that fails."""
     state, kernels, sizes = sample.state, sample.kernels, [math.inf] * STALLED
@@ -312,11 +350,13 @@ def assembled(sample: Sample) -> Sample | None:
             if sizes[-1] > 0.5 * sizes[-1 - STALLED]:
                 return None
             C_q = position_jacobian(sample, state)[:, free].reshape(len(C), -1)
-            step = -np.linalg.lstsq(C_q, C, rcond=1e-10)[0].reshape(-1, 6)
+            G = gradient(sample, state)
+            step = -np.linalg.lstsq(np.hstack([C_q, G]), C, rcond=1e-10)[0]
             step *= min(1.0, 0.7 / max(float(np.max(np.abs(step))), 1e-300))
             whole = np.zeros((slots, 6))
-            whole[free] = step
-            state = state.moved(_direction(whole), 1.0)
+            whole[free] = step[: C_q.shape[1]].reshape(-1, 6)
+            along = attrs.evolve(_direction(whole), unknowns=tuple(step[C_q.shape[1] :].tolist()))
+            state = state.moved(along, 1.0)
         else:
             if "C" in kernels.names():
                 return None
@@ -324,8 +364,13 @@ def assembled(sample: Sample) -> Sample | None:
         nu = sample.value("nu", state) if "nu" in kernels.names() else np.zeros(J.shape[1])
         x = np.hstack([state.v, state.w])[1 : slots + 1]
         flat = J[free].transpose(1, 0, 2).reshape(J.shape[1], -1)
-        x[free] -= np.linalg.lstsq(flat, flat @ x[free].ravel() - nu, rcond=1e-10)[0].reshape(-1, 6)
-        result = attrs.evolve(sample, state=state.with_velocity(x))
+        flat, bodies = np.hstack([flat, gradient_of_rows(sample, state)]), 6 * len(free)
+        v = np.concatenate([x[free].ravel(), state.unknowns[:, 1]])
+        v -= np.linalg.lstsq(flat, flat @ v - nu, rcond=1e-10)[0]
+        x[free] = v[:bodies].reshape(-1, 6)
+        unknowns = np.column_stack([state.unknowns[:, 0], v[bodies:]])
+        moving = attrs.evolve(state.with_velocity(x), unknowns=unknowns)
+        result = attrs.evolve(sample, state=moving)
         return result if result.is_good else None
     except (*UNDEFINED, np.linalg.LinAlgError):
         return None
@@ -334,7 +379,8 @@ def assembled(sample: Sample) -> Sample | None:
 def _is_singular(sample: Sample) -> bool:
     """True if the rows of J are nearly dependent."""
     J = sample.value("J")
-    values = np.linalg.svd(J.transpose(1, 0, 2).reshape(J.shape[1], -1), compute_uv=False)
+    rows = np.hstack([J.transpose(1, 0, 2).reshape(J.shape[1], -1), gradient_of_rows(sample)])
+    values = np.linalg.svd(rows, compute_uv=False)
     return bool(values[-1] < SINGULAR * values[0])
 
 

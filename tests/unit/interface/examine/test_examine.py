@@ -133,7 +133,7 @@ def prepare(constants):
             joint(helper=lambda w_i: 0.0),
             [
                 "defines helper",
-                "C, C_dot, J, gamma, nu, friction, switch, rate, impulse, reset, prepare",
+                "C, C_dot, G, J, gamma, nu, friction, switch, rate, impulse, reset, prepare",
             ],
         ),
         (force(energie=lambda r_i: 0.0), ["defines energie", "did you mean energy?"]),
