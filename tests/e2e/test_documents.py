@@ -22,7 +22,13 @@ FOLLOWED = [
     *(
         REPOSITORY / "docs" / f"{name}.md"
         for name in (
-            "bad-input", "events", "jumps", "methods", "post-processing", "report", "view",
+            "bad-input",
+            "events",
+            "jumps",
+            "methods",
+            "post-processing",
+            "report",
+            "view",
             "what-a-type-can-say",
         )
     ),

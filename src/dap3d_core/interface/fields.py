@@ -164,8 +164,8 @@ def function(default: Any = None, *, argument: str = "", doc: str = "") -> Any:
     """A function by name; absent, it is zero. With ``REQUIRED`` the scene must give it.
 
     Of time it offers its value and derivatives ``f``, ``f_dot``, ``f_ddot``, ``f_dddot``, and
-    ``f_0``, its value at t = 0; next to a field of the name ``f`` they begin with its own name. With
-    ``argument`` (the name of its argument) kernels call ``f(x)``, ``f_dot(x)``, ``f_ddot(x)``,
+    ``f_0``, its value at t = 0; next to a field of the name ``f`` they begin with its own name.
+    With ``argument`` (the name of its argument) kernels call ``f(x)``, ``f_dot(x)``, ``f_ddot(x)``,
     ``f_dddot(x)``: value and derivatives; where it may be omitted, such kernels belong to a variant
     of the type for ``function=True``.
     """
