@@ -281,8 +281,7 @@ def given_rows(type_info: TypeInfo, is_given: Callable[[], bool]) -> list[bool |
     """For each function of time of a type whether it is given; HELD for an input."""
     specs = specs_of(type_info.type)
     return [
-        HELD if specs[name].kind == "input" else iswith_functions()
-        for name in type_info.layout.functions
+        HELD if specs[name].kind == "input" else is_given() for name in type_info.layout.functions
     ]
 
 
