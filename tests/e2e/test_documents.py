@@ -113,7 +113,7 @@ def test_the_page_on_new_plugins(tmp_path):
     (next_steps,) = blocks(text, "sh")
     assert [line for line in next_steps.splitlines() if line not in done.stdout] == []
     folder = tmp_path / "dap3d-on-cylinder"
-    for file in re.findall(r"^\| `([^`]+\.[^`]+)` \|", text, flags=re.MULTILINE):
+    for file in re.findall(r"^\| `([^`(]+\.[^`(]+)` \|", text, flags=re.MULTILINE):
         assert (folder / file).is_file(), file
     readme = (folder / "README.md").read_text()
     assert all(line in readme for line in next_steps.splitlines())

@@ -199,6 +199,8 @@ def start(
 ) -> SteppedRun:
     """Begin a run that a script takes step by step; settings are those of ``simulate``.
 
+    ::
+
         run = dap.start(scene, rtol=1e-6)
         while run.t < 2.0:
             run.step(0.002, inputs={"motor": -3.0 * run.state["hinge.angle"]})
