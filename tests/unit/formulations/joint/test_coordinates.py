@@ -1,7 +1,8 @@
 """Joint coordinates of a model: starts of runs."""
 
 import numpy as np
-from support import trees
+import pytest
+from support import state_types, trees
 
 from dap3d_core.formulations.joint import coordinates as module
 from dap3d_core.simulation import CompiledModel
@@ -40,3 +41,13 @@ def test_runs_from_one_state_compute_its_reference_once(monkeypatch):
     y = coordinates.start(u)
     y[:] = np.nan  # as an integration writes into its state
     assert np.array_equal(coordinates.start(u), first[0])
+
+
+@pytest.mark.parametrize("held", [0.1, 0.3])
+def test_evaluations_at_a_state_know_the_states_of_elements(held):
+    """A spring and a damper in series: the damper gives way as fast as the spring pulls."""
+    scene = state_types.pulled(z_0=held)
+    model = CompiledModel(scene, method="joint", registry=state_types.REGISTRY)
+    stretch = state_types.X0 - state_types.L0 - held
+    rate = model.evaluator.state_rates(0.0, model.model.u0)
+    assert rate == pytest.approx([state_types.K / state_types.C * stretch], rel=1e-14)
