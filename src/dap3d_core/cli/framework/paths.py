@@ -84,7 +84,9 @@ def open_result(path: str, *, model: str | None = None, allow_code: bool = False
         return dap.open(path, model=model, allow_code=allow_code)
 
 
-def open_state(words: str, *, allow_code: bool = False) -> "tuple[tuple[Result, float | None], Path]":
+def open_state(
+    words: str, *, allow_code: bool = False
+) -> "tuple[tuple[Result, float | None], Path]":
     """A result and a time of it, None for its end, and the file: RESULT or RESULT@TIME."""
     name, mark, time = words.rpartition("@")
     if not mark or Path(words).exists():
