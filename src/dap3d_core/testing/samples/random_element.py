@@ -82,7 +82,7 @@ class Kernels:
 
         C (position rows,), G (position rows, unknowns), C_dot (velocity rows,), J (slots, rows, 6),
         gamma and nu (rows,), wrench and friction (slots, 2, 3), energy (1,), switch (n,), value
-        (4,), rate and reset (states,), impulse (rows,) or (slots, 2, 3).
+        (4,) or (6,), rate and reset (states,), impulse (rows,) or (slots, 2, 3).
         """
         body, table = state.body().astype(object), state.table().astype(object)
         own = state.own.astype(object)
@@ -183,7 +183,8 @@ class Kernels:
         if name in ("wrench", "friction"):
             return outs[0][6 : 6 * (slots + 1)].reshape(slots, 2, 3)
         if name == "value":
-            return table[1, :4]
+            of_two = len(self.type_info.outputs["value"]) > 4  # the last two are behind y
+            return np.concatenate([table[1, :4], table[2, 1:3]]) if of_two else table[1, :4]
         if name == "rate":
             return rates
         return outs[0][: len(self.type_info.outputs[name])]
