@@ -38,7 +38,8 @@ def test_every_kind_of_check_is_there():
     assert {check.name for _, check in CHECKS} == {
         "J", "nu", "gamma", "virtual power", "assembly", "rank", "frame", "action and reaction",
         "friction power", "friction frame", "friction balance", "energy", "derivatives", "purity",
-        "plain", "compiled", "rate", "rate frame",
+        "plain", "compiled", "rate", "rate frame", "unilateral",
+        "impulse and reaction", "restitution", "round", "jump rows", "jump frame",
     }  # fmt: skip
 
 

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from support.at_all_levels import made_of, same_bits, targets
 
-from dap3d_core.interface.codegen.compile_loops import _calls_functions
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.kernels.compiler.trace import trace
@@ -14,13 +13,15 @@ from dap3d_core.kernels.runtime.function_lists import LOOP, LoopArrays
 from dap3d_core.kernels.runtime.loop_modules import array_members, source_of
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.registry import load_registry
+from dap3d_core.testing.samples.sampled_type import with_functions
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 BODIES, INSTANCES, TRIALS = 8, 3, 6
 
 
 def loops_of(type_info):
-    """Each loop of a type and of its variants, but for those that need a scene's function."""
+    """Each loop of a type and of its variants, with cubics for the functions that they call."""
+    type_info = with_functions(type_info, {})
     for what in LOOP_KINDS:
         if what != "friction" and (loop := write(type_info, what)) is not None:
             yield type_info, loop
@@ -39,7 +40,7 @@ def arguments_of(type_info, rng):
         for q in range(INSTANCES):
             par[q * type_info.layout.par_width + offset :][:2] = 400, 20
     outs = [rng.standard_normal(600) for _ in range(3)]
-    outs[1][0] = 3.0  # where switches begin
+    outs[1][:2] = 3.0  # where switches begin, and which jump it is
     states = rng.standard_normal(BODIES + type_info.layout.state_width)
     return LoopArrays(body=body, F=F, idx=idx, par=par, states=states), outs
 
@@ -69,8 +70,6 @@ def test_traced_loops_have_the_bits_of_plain_python(kind, keyword, level):
             namespace.update(loop.kernels)
             return namespace
 
-        if type_info.argument_functions and _calls_functions(type_info):
-            continue  # its code is made with a scene's function
         text = trace("tried", python(), array_members())
         plain = python()["loop"]
         traced = made_of(text, "tried", LOOP, [level])[level]

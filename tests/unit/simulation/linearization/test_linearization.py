@@ -134,7 +134,7 @@ def test_equilibrium_is_at_rest():
             {"inputs": ("twist.theta_0",)},
             r"theta_0 of force twist is no number.*numbers: k, c, n_a",
         ),
-        ({"inputs": ("rub",)}, r"rub acts by the friction of a joint alone"),
+        ({"inputs": ("rub",)}, r"rub acts by reactions of joints alone"),
         ({"inputs": ("rail.k",)}, r"no input, force or driver 'rail'"),
         ({"outputs": ("cart.r.y_",)}, r"did you mean 'cart\.r\.[xyz]'"),
         ({"outputs": ("cart.r",)}, r"has components: name one, as cart\.r\.x"),
