@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.at_all_levels import made_of, same_bits
+from support.at_all_levels import made_of, same_bits, targets
 
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
 from dap3d_core.interface.codegen.specialise import bind_friction
@@ -58,8 +58,11 @@ TYPES = [(kind, keyword) for kind in ("joint", "force", "function")
          for keyword in REGISTRY.keywords(kind)]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    "level", [pytest.param(n, marks=[pytest.mark.slow] if n != "O3" else []) for n in targets()]
+)
 @pytest.mark.parametrize(("kind", "keyword"), TYPES)
-def test_traced_loops_have_the_bits_of_plain_python(kind, keyword):
+def test_traced_loops_have_the_bits_of_plain_python(kind, keyword, level):
     for type_info, loop in loops_of(REGISTRY.get(kind, keyword)):
 
         def python(loop=loop):
@@ -69,7 +72,6 @@ def test_traced_loops_have_the_bits_of_plain_python(kind, keyword):
 
         text = trace("tried", python(), array_members())
         plain = python()["loop"]
-        for level, traced in made_of(text, "tried", LOOP).items():
-            for seed in range(TRIALS):
-                assert same_bits(run(plain, type_info, seed), run(traced, type_info, seed)), (
-                    loop.name, level)  # fmt: skip
+        traced = made_of(text, "tried", LOOP, [level])[level]
+        for seed in range(TRIALS):
+            assert same_bits(run(plain, type_info, seed), run(traced, type_info, seed)), loop.name

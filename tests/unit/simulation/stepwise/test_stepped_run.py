@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.arm import NAMES, arm_scene
+from support.plain import long_in_plain_python
 from support.pushed import feedback, held, pushed_block
 
 import dap3d_core as dap
@@ -27,6 +28,7 @@ def test_a_loop_of_ones_own_is_the_controller():
     assert np.max(np.abs(other.v_dot - result.v_dot)[:-1]) < 1e-14
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("method", ["standard", "joint"])
 @pytest.mark.parametrize("integrator", ["dop853", "adams", "auto"])
 def test_a_reset_run_repeats_itself_to_the_bit(method, integrator):
