@@ -32,7 +32,7 @@ class BareOracle(Oracle):
         m.opt.density = m.opt.viscosity = 0.0
         m.opt.wind[:] = 0.0
         m.actuator_forcelimited[:] = m.actuator_ctrllimited[:] = m.jnt_actfrclimited[:] = 0
-        for k in range(m.nu):  # a law that is not linear is left out
+        for k in range(len(m.actuator_trntype)):  # a law that is not linear is left out
             kinds = (m.actuator_trntype[k], m.actuator_gaintype[k], m.actuator_biastype[k])
             if m.actuator_dyntype[k] or kinds[0] > 1 or kinds[1] or kinds[2] > 1:
                 m.actuator_gear[k] = 0.0

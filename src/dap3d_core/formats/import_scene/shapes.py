@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
+from dap3d_core.formats.import_scene.names import usable
 from dap3d_core.interface.formats.articulation import Geometry, Link
 from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.scene.validate.shapes import MESHES
@@ -49,7 +50,7 @@ def add_shapes(builder: "SceneBuilder", link: Link, frame: Frame, meshes: MeshFi
     for shape in seen or link.geometries:
         body, at = builder.attached(link.name, shape.pose)
         for keyword, fields in _shapes(builder, shape, at, meshes):
-            name = builder.names.free("shapes", f"{link.name.replace('.', '_')}_{keyword}")
+            name = builder.names.free("shapes", f"{usable(link.name)}_{keyword}")
             builder.scene.add_shape(keyword, name, body=body, color=shape.color or None, **fields)
 
 
