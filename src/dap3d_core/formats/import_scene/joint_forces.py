@@ -214,6 +214,7 @@ def add_inputs(builder: SceneBuilder, model: Articulation) -> None:
         others = (scene.bodies, scene.points, scene.joints, scene.forces)
         clash = any(actuator.name in table for table in others)
         wanted = re.sub(r"\W", "_", f"{actuator.name}_input" if clash else actuator.name)
+        wanted = f"input_{wanted}" if wanted[:1].isdigit() else wanted
         name = names.of("inputs", wanted, actuator.place, builder.remarks)
         scene.add_input(name, 0.0)
         ends = NamedEnds(builder, joint)

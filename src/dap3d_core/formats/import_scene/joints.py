@@ -98,7 +98,10 @@ def _prismatic(ends: JointEnds) -> None:
 
 
 def _fixed(ends: JointEnds) -> None:
-    """All six freedoms: a slider, and a driver that holds it."""
+    """A weld; where it closes a loop, whose poses may be off, a slider and a driver that holds it."""
+    if not ends.joint.closes:
+        ends.scene.add_joint("weld", ends.name, body_i=ends.child, body_j=ends.parent)
+        return
     axis = ends.vector("j", (0.0, 0.0, 1.0))
     P_i, P_j = ends.point("i"), ends.point("j")
     _add(ends, "tran", P_i=P_i, P_j=P_j, a_j=axis, A_c=_relative(ends))

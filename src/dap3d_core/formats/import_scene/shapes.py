@@ -5,6 +5,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.formats.import_scene.names import usable
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.interface.formats.articulation import Geometry, Link
 from dap3d_core.interface.formats.frames import Frame, quaternion
@@ -47,7 +48,7 @@ def add_shapes(builder: SceneBuilder, link: Link, frame: Frame, meshes: MeshFile
     for shape in seen or link.geometries:
         body, at = builder.attached(link.name, shape.pose)
         for keyword, fields in _shapes(builder, shape, at, meshes):
-            name = builder.names.free("shapes", f"{link.name.replace('.', '_')}_{keyword}")
+            name = builder.names.free("shapes", f"{usable(link.name)}_{keyword}")
             builder.scene.add_shape(keyword, name, body=body, color=shape.color or None, **fields)
 
 
