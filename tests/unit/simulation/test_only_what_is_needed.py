@@ -107,7 +107,8 @@ def test_inputs_and_what_sets_them_are_imported_where_a_scene_has_some():
 @pytest.mark.parametrize("keyword", ["f", "fp", "n", "np", "ptp", "rot_sda"])
 def test_a_force_without_a_factor_has_the_loop_of_one_that_knows_of_none(keyword):
     """Its instances have the integers of its bodies alone, and its loop reads no function."""
-    from dap3d_core.interface.codegen.loop_source import stride, write
+    from dap3d_core.interface.codegen.compile_loops import write
+    from dap3d_core.interface.codegen.loop_source import stride
     from dap3d_core.registry import load_registry
 
     type_info = load_registry().get("force", keyword)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from support.at_all_levels import made_of, same_bits, targets
 
-from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
+from dap3d_core.interface.codegen.compile_loops import write
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.runtime import generated_modules
