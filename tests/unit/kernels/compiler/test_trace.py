@@ -36,7 +36,7 @@ def loops_of(type_info):
 def arguments_of(type_info, rng):
     """Random arrays of three instances, with tables where the type has some."""
     body, F = rng.standard_normal((BODIES, BODY_WIDTH)), rng.standard_normal((BODIES, 5))
-    idx, par = rng.integers(1, BODIES - 1, size=200), rng.standard_normal(600)
+    idx, par = rng.integers(1, BODIES - 1, size=200), rng.standard_normal(1000)
     for offset, _ in type_info.layout.tables.values():
         for q in range(INSTANCES):
             par[q * type_info.layout.par_width + offset :][:2] = 400, 20
