@@ -18,10 +18,19 @@ def read_actuators(reader: "MjcfReader") -> None:
     Raises:
         FormatError: one names a joint that is not there.
     """
-    for holder in reader.document.root.all("actuator"):
+    document = reader.document
+    options = document.root.all("option")
+    disabled = {g for one in options for g in one.numbers("actuatorgroupdisable", None, ())}
+    for holder in document.root.all("actuator"):
         for given in holder:
-            if given.name in ACTUATORS and given.name != "plugin":
-                _read(reader, reader.document.settled(given, "main"))
+            if given.name not in ACTUATORS or given.name == "plugin":
+                continue
+            element = document.settled(given, "main")
+            if element.number("group", 0.0) in disabled:
+                text = "an actuator of a group that is disabled"
+                document.source.remarks.leave_out(given.place, text)
+            else:
+                _read(reader, element)
 
 
 def _read(reader: "MjcfReader", element: XmlElement) -> None:

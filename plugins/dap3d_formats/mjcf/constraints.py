@@ -53,7 +53,7 @@ def _link(reader: "MjcfReader", element: XmlElement, key: str) -> str:
 def _close(reader: "MjcfReader", element: XmlElement) -> None:
     """Close a loop: two points, or two frames, of two bodies coincide."""
     model = reader.model
-    name = element.get("name") or f"{element.name}{len(model.joints) + 1}"
+    name = reader.free_joint(element.get("name") or f"{element.name}{len(model.joints) + 1}")
     kind = "ball" if element.name == "connect" else "fixed"
     if "site1" in element.attributes:
         ends = [_site(reader, element, key) for key in ("site1", "site2")]
@@ -65,8 +65,6 @@ def _close(reader: "MjcfReader", element: XmlElement) -> None:
             in_child = _relative(reader, child, parent) @ in_parent
         else:
             in_parent, in_child = _weld(reader, element, parent, child)
-    if name in model.joints:
-        raise FormatError(f"there are two joints {name}", element.place)
     if "solref" in element.attributes or "solimp" in element.attributes:
         text = "softness of an equality (solref, solimp): it holds exactly"
         reader.document.source.remarks.translate(element.place, text)

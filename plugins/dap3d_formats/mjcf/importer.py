@@ -1,5 +1,6 @@
 """Reads MJCF."""
 
+from collections.abc import Iterator
 from math import inf
 from typing import Any
 
@@ -28,6 +29,7 @@ from dap3d_formats.mjcf.constraints import read_equalities
 from dap3d_formats.mjcf.document import Document
 from dap3d_formats.mjcf.elements import MJCF
 from dap3d_formats.mjcf.geoms import Geoms
+from dap3d_formats.mjcf.replicate import expand_replicas
 
 #: Type -> kind of a joint.
 KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
@@ -43,6 +45,7 @@ class MjcfImporter(Importer):
         """The model in a file."""
         document = Document.of(source)
         note_elements(document.root, MJCF, source.remarks)
+        expand_replicas(document)
         return MjcfReader(document).read()
 
 
@@ -56,6 +59,8 @@ class MjcfReader:
         geoms: reader of geoms.
         sites: name of a site -> its link and frame.
         references: joint -> its coordinate in the file where the model's is zero.
+        given: names of bodies and joints in the file, which those without a name do not take.
+        joints: names of the joints that have been read.
     """
 
     document: Document
@@ -63,12 +68,15 @@ class MjcfReader:
     geoms: Geoms = attrs.field(init=False)
     sites: dict[str, tuple[str, Frame]] = attrs.Factory(dict)
     references: dict[str, float] = attrs.Factory(dict)
+    given: set[str] = attrs.Factory(set)
+    joints: set[str] = attrs.Factory(set)
 
     def __attrs_post_init__(self) -> None:
         root = self.document.root
         name = root.get("model") or self.document.source.path.stem
         self.model = Articulation(name, fixed_base=True, place=root.place)
         self.geoms = Geoms.of(self.document)
+        self.given = set(_names(root))
 
     def read(self) -> Articulation:
         """The model."""
@@ -109,7 +117,7 @@ class MjcfReader:
 
     def _body(self, element: XmlElement, parent: str, frame: Frame, outer: str) -> None:
         document, model = self.document, self.model
-        name = element.get("name") or f"body{len(model.links) + 1}"
+        name = element.get("name") or self._free_link(f"body{len(model.links) + 1}")
         if name in model.links or name == WORLD:
             raise FormatError(f"there are two bodies {name}", element.place)
         childclass = element.get("childclass") or outer
@@ -191,11 +199,11 @@ class MjcfReader:
             model.joints[name] = Joint(name, "fixed", parent, link.name, here, place=place)
             return
         start, last = here, parent
-        for k, (element, frame) in enumerate(joints):
-            is_last = k == len(joints) - 1
-            joint = self._joint(element, frame)
+        made = _compound([self._joint(element, frame) for element, frame in joints])
+        for k, joint in enumerate(made):
+            is_last = k == len(made) - 1
             below = link.name if is_last else self._free_link(f"{link.name}_{joint.name}")
-            model.links[below] = link if is_last else Link(below, place=element.place)
+            model.links[below] = link if is_last else Link(below, place=joint.place)
             joint.parent, joint.child = last, below
             if joint.kind == "free":
                 joint.in_parent = joint.in_child = Frame()
@@ -204,17 +212,21 @@ class MjcfReader:
                 joint.in_parent = start @ joint.in_child
             model.joints[joint.name] = joint
             start, last = Frame(), below
-        if len(joints) > 1:
+        if len(made) > 1:
             text = "several joints of a body are joints in a row, with links between them"
             self.document.source.remarks.translate(place, text)
 
     def _free(self, name: str) -> str:
-        while name in self.model.joints:
+        while name in self.model.joints or name in self.joints or name in self.given:
             name += "_"
         return name
 
+    def free_joint(self, name: str) -> str:
+        """The name of a joint that closes a loop: one that no joint has."""
+        return name if name not in self.model.joints else self._free(name)
+
     def _free_link(self, name: str) -> str:
-        while name in self.model.links:
+        while name in self.model.links or name in self.given:
             name += "_"
         return name
 
@@ -225,8 +237,9 @@ class MjcfReader:
             raise FormatError(f"a joint of type {type_!r} is unknown; one of {', '.join(KINDS)}",
                               element.place)  # fmt: skip
         name = element.get("name") or self._free(f"joint{len(self.model.joints) + 1}")
-        if name in self.model.joints:
+        if name in self.joints:
             raise FormatError(f"there are two joints {name}", element.place)
+        self.joints.add(name)
         anchor = Frame(element.numbers("pos", 3, (0.0, 0.0, 0.0)))
         joint = Joint(name, KINDS[type_], "", "", in_child=frame @ anchor, place=element.place)
         if joint.kind == "free":
@@ -275,3 +288,34 @@ class MjcfReader:
                 if link.inertial:
                     f, one = wanted / found, link.inertial
                     link.inertial = Inertial(f * one.mass, one.com, f * one.inertia)
+
+
+def _names(root: XmlElement) -> Iterator[str]:
+    """The names of all bodies and joints below an element."""
+    for child in root:
+        if child.name in ("body", "joint", "freejoint") and "name" in child.attributes:
+            yield child.attributes["name"]
+        yield from _names(child)
+
+
+def _compound(joints: list[Joint]) -> list[Joint]:
+    """The joints of a body; two that an export wrote for one are that one again.
+
+    They have no dynamics, and names J and J_2: hinges at a point with axes across each other are a
+    universal joint, a slide and a hinge along it a cylindrical one.
+    """
+    if len(joints) != 2 or joints[1].name != f"{joints[0].name}_2":
+        return joints
+    one, other = joints
+    passive = all(
+        not any((j.damping[0], j.stiffness[0], j.friction[0], j.armature[0]))
+        and j.limits == (Limits(),) for j in joints
+    )  # fmt: skip
+    if not passive or not np.array_equal(one.in_child.r, other.in_child.r):
+        return joints
+    kinds, along = (one.kind, other.kind), np.dot(one.axes[0], other.axes[0])
+    if kinds == ("revolute", "revolute") and abs(along) < 1e-12:
+        return [attrs.evolve(one, kind="universal", axes=(one.axes[0], other.axes[0]))]
+    if kinds == ("prismatic", "revolute") and one.axes == other.axes:
+        return [attrs.evolve(one, kind="cylindrical")]
+    return joints

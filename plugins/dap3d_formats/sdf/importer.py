@@ -182,7 +182,8 @@ class SdfReader:
             ("ixy", "ixz", "iyz"), 0.0
         )
         for child in inertia or ():
-            values[child.name] = child.content(1)[0]
+            if child.name in values:
+                values[child.name] = child.content(1)[0]
         v = values
         rows = [[v["ixx"], v["ixy"], v["ixz"]], [v["ixy"], v["iyy"], v["iyz"]],
                 [v["ixz"], v["iyz"], v["izz"]]]  # fmt: skip

@@ -148,7 +148,8 @@ def _limits(axis: XmlElement, *, unlimited: bool) -> Limits:
     limit = axis.first("limit")
     if limit is None or unlimited:
         return Limits()
-    values = {child.name: _number(child) for child in limit}
+    used = ("lower", "upper", "stiffness")
+    values = {child.name: _number(child) for child in limit if child.name in used}
     lower, upper = values.get("lower", -inf), values.get("upper", inf)
     if lower > upper:
         raise FormatError(f"lower = {lower:g} lies above upper = {upper:g}", limit.place)
@@ -169,7 +170,8 @@ def _number(element: XmlElement) -> float:
 
 def _dynamics(axis: XmlElement) -> dict[str, float]:
     dynamics = axis.first("dynamics")
-    values = {child.name: child.content(1)[0] for child in dynamics or ()}
+    used = ("damping", "friction", "spring_stiffness", "spring_reference")
+    values = {c.name: c.content(1)[0] for c in dynamics or () if c.name in used}
     return {
         "damping": values.get("damping", 0.0), "friction": values.get("friction", 0.0),
         "stiffness": values.get("spring_stiffness", 0.0),
@@ -182,7 +184,8 @@ def _mimic(reader: "SdfReader", joint: Joint, axis: XmlElement, scope: str) -> N
     mimic = axis.first("mimic")
     if mimic is None:
         return
-    values = {child.name: child.content(1)[0] for child in mimic}
+    used = ("multiplier", "offset", "reference")
+    values = {child.name: child.content(1)[0] for child in mimic if child.name in used}
     ratio = values.get("multiplier", 1.0)
     offset = values.get("offset", 0.0) - ratio * values.get("reference", 0.0)
     leader = _scoped(scope, mimic.require("joint"))

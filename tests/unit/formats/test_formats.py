@@ -85,8 +85,8 @@ def test_the_tables_do_what_they_say():
     assert [one.text for one in remarks.left_out] == [
         "<a>: an unknown element", "<sensor>: sensors", "c of <body>: an unknown attribute",
     ]  # fmt: skip
-    with pytest.raises(FormatError, match="replicates are not expanded"):
-        note_elements(parse_xml("<mujoco><replicate/></mujoco>", "x.xml"), MJCF, remarks)
+    with pytest.raises(FormatError, match="composites are not expanded"):
+        note_elements(parse_xml("<mujoco><composite/></mujoco>", "x.xml"), MJCF, remarks)
 
 
 def reference(t, theta, rate):

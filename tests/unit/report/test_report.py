@@ -178,6 +178,7 @@ def test_a_target_that_cannot_be_reached_or_told_is_said_so():
 # ---------------------------------------------------------------------------- whole reports
 
 
+@long_in_plain_python
 def test_every_integrator_is_measured_and_errors_fall_with_the_tolerance(small):
     """Of the pendulum from rest, over 0.2 s; in each ladder the last error is far below the first.
 

@@ -159,7 +159,10 @@ class Coordinates:
         if self._last is None or not np.array_equal(self._last[0], u):
             self._last = u.copy(), *self._constants_and_state(u)
         _, self._tree.constants[:], first = self._last
-        y = first.copy()
+        return self._made_ready(first.copy())
+
+    def _made_ready(self, y: Floats) -> Floats:
+        """The state y of the constants as they are, with states of elements; kept rows judged."""
         y[self.nodes.layout["states"]] = self.evaluator.states
         if self.kept:
             from dap3d_core.formulations.joint_loops.reference_pivots import judge_kept_rows
@@ -235,7 +238,7 @@ class Coordinates:
         before = [array.copy() for array in arrays]
         try:
             self._tree.constants[:], y = self._constants_and_state(u)
-            yield y
+            yield self._made_ready(y)
         finally:
             for array, values in zip(arrays, before, strict=True):
                 array[:] = values

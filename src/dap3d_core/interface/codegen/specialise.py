@@ -64,7 +64,7 @@ def bind_functions(
     calls: dict[str, tuple[_Given, int]] = {}
     for field, of_argument in functions.items():
         prefix = "f" if field == "function" else field
-        behind = shifted(of_argument.layout, layout.par_width)
+        behind = of_argument.layout.shifted(layout.par_width)
         value = of_argument.kernels["value"]
         names_of_value = parameters(value)
         all_names = _names_of(of_argument, behind)
@@ -108,16 +108,6 @@ def _names_of(function: TypeInfo, layout: InstanceLayout) -> dict[str, KernelArg
     from dap3d_core.interface.codegen.terms import names_behind
 
     return names_behind(function, layout)
-
-
-def shifted(layout: InstanceLayout, start: int) -> InstanceLayout:
-    """A layout with its numbers shifted to ``start``."""
-    return attrs.evolve(
-        layout,
-        numbers={n: (start + at, shape) for n, (at, shape) in layout.numbers.items()},
-        tables={n: (start + at, columns) for n, (at, columns) in layout.tables.items()},
-        par_width=start + layout.par_width,
-    )
 
 
 def is_knots(name: str) -> bool:

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.body_pose import BodyPose, pose
+from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH, size
-from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, kernels_of, write
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, kernels_of
 from dap3d_core.interface.codegen.reactions import sample_size
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is

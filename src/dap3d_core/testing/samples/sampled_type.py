@@ -255,7 +255,10 @@ def sampled_types(type_info: TypeInfo, seed: int, poses: int) -> list[SampledTyp
     if own is not None:
         variants.append((own, type_info))
     variants += [(dict(conditions), e) for conditions, e in type_info.variants]
-    return [SampledType(_alone(_given(e, values)), values, seed, poses) for values, e in variants]
+    return [
+        SampledType(_alone(with_functions(e, values)), values, seed, poses)
+        for values, e in variants
+    ]
 
 
 def _alone(type_info: TypeInfo) -> TypeInfo:
@@ -267,7 +270,7 @@ def _alone(type_info: TypeInfo) -> TypeInfo:
     return with_sample_reactions(type_info)
 
 
-def _given(type_info: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
+def with_functions(type_info: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
     """The type with a cubic for each function of an argument, unless the variant has none."""
     if any(spec.kind == "functions" for spec in specs_of(type_info.type).values()):
         return bind_terms(type_info, [examine(Cubic)] * TERMS)

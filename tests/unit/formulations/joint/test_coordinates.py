@@ -1,7 +1,8 @@
 """Joint coordinates of a model: starts of runs."""
 
 import numpy as np
-from support import trees
+import pytest
+from support import state_types, trees
 
 from dap3d_core.formulations.joint import coordinates as module
 from dap3d_core.simulation import CompiledModel
@@ -40,3 +41,13 @@ def test_runs_from_one_state_compute_its_reference_once(monkeypatch):
     y = coordinates.start(u)
     y[:] = np.nan  # as an integration writes into its state
     assert np.array_equal(coordinates.start(u), first[0])
+
+
+def test_evaluations_at_a_state_know_the_states_of_elements():
+    """Springs with dampers in series, of which one stretches already: rates as of standard."""
+    rates = []
+    for method in ("joint", "standard"):
+        model = CompiledModel(state_types.stated(), method=method)
+        assert model.evaluator.method == method
+        rates.append(model.evaluator.state_rates(0.0, model.model.u0))
+    assert rates[0] == pytest.approx(rates[1], rel=1e-14)
