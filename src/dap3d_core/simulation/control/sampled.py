@@ -250,7 +250,6 @@ def _with_events(hold: Hold, locator: EventLocator, end: float) -> bool:
     return True
 
 
-@IGNORE_FLOAT_ERRORS
 def jump(evaluator: Evaluator, hold: Hold, *, drives: bool) -> None:
     """Go on behind a change of inputs.
 
@@ -258,9 +257,12 @@ def jump(evaluator: Evaluator, hold: Hold, *, drives: bool) -> None:
     least change in the metric of the masses. What they do is work of the drivers.
     """
     hold.jump()
-    if not drives:
-        return
-    integration = hold.integration
+    if drives:
+        _jump_of_velocities(evaluator, hold.integration)
+
+
+@IGNORE_FLOAT_ERRORS  # costs more than the rest of a sample: only where it is needed
+def _jump_of_velocities(evaluator: Evaluator, integration: Integration) -> None:
     y = integration.work.state[Y]
     before = kinetic_energy(evaluator, y)
     if not integration.project():
