@@ -42,7 +42,7 @@ _ABSENT: Any = object()
 _UNKNOWN = -2
 
 #: Readers of the kinds of fields that hold values and no references.
-_READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
+READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
     "number": lambda spec, value: bounded(
         number_of(value),
         positive=spec.positive,
@@ -120,7 +120,7 @@ class Reader:
         letter = slot_of(name)
         slot = self.slots.index(letter) if letter in self.slots else -1
         read = _FIELD_READERS.get(spec.kind, _Reading.value)
-        return _Field(name, spec, slot, read, partial(_READERS.get(spec.kind, _unread), spec))
+        return _Field(name, spec, slot, read, partial(READERS.get(spec.kind, _unread), spec))
 
     def read(self, element: Element) -> Instance | None:
         """The instance of an element; None where a mistake was reported."""
