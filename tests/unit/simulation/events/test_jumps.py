@@ -62,6 +62,29 @@ def test_a_ball_bounces_with_its_coefficient_of_restitution(settings):
     assert len(result.t) == 101
 
 
+@pytest.mark.parametrize("moving", [1, 2])
+def test_as_many_balls_leave_a_cradle_as_hit_it(moving):
+    """Balls of 0.5 m at 2 m/s, 0.3 m before three at rest that touch: at 0.15 s, all at once."""
+    scene = dap.Scene(name="cradle")
+    count, gap, speed = moving + 3, 0.3, 2.0
+    for k in range(count):
+        near, v = (k * 0.5 - gap, speed) if k < moving else (k * 0.5, 0.0)
+        scene.add_body(f"b{k}", mass=0.7, Jp=(0.1, 0.1, 0.1), r=(near, 0.0, 0.0),
+                       r_dot=(v, 0.0, 0.0))  # fmt: skip
+    for k in range(count - 1):
+        ends = {"P_i": f"b{k}.O", "P_j": f"b{k + 1}.O"}
+        scene.add_force("ptp_stop", f"c{k}", l_stop=0.5, e=1.0, k=1e3, **ends)
+    result = dap.simulate(scene, t_end=0.4, dt=0.1, **TIGHT)
+    v = np.array([0.0] * 3 + [speed] * moving)
+    np.testing.assert_allclose(result.rd[-1, :, 0], v, rtol=0.0, atol=1e-12)
+    last = np.array([0.5 * k - gap * (k < moving) + (speed * 0.15 if k < moving else 0.0)
+                     for k in range(count)])  # fmt: skip
+    np.testing.assert_allclose(result.r[-1, :, 0], last + v * 0.25, rtol=0.0, atol=1e-12)
+    assert len(jumps_of(result)) >= 1
+    assert all(j.t == pytest.approx(0.15, abs=1e-12) for j in jumps_of(result))
+    assert result.ledger["energy"].value < 1e-12
+
+
 def test_reports_from_the_instant_of_a_jump_on_are_states_after_it():
     """A disc is struck at t = 0.5, the last instant before which is a reporting time."""
     scene = dap.Scene(name="stage")
