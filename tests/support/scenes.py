@@ -87,6 +87,8 @@ def _field(scene, name, spec, owner, rng, wanted):
         return rng.uniform(-1, 1, 3)
     if spec.kind == "matrix":
         return rotation(rng.normal(size=4))
+    if spec.by_rows:
+        return np.pad(rng.uniform(-1, 1, (7, 7)), (0, 1), mode="wrap")
     if spec.kind == "table":  # increasing: a table of arguments is one
         return np.cumsum(rng.uniform(0.1, 0.5, 8))
     if spec.kind == "function" and (wanted is False or (spec.argument and not wanted)):
@@ -97,6 +99,9 @@ def _field(scene, name, spec, owner, rng, wanted):
         ]
     if spec.kind == "input":
         return scene.add_input(name, rng.uniform(-1, 1)) if wanted else None
+    if spec.kind == "function" and spec.arguments > 1:
+        places, values = [-1.0, 0.0, 1.0], rng.uniform(-1, 1, (3, 3))
+        return scene.add_function("grid", f"{name}_of_two", x=places, y=places, z=values)
     if spec.kind == "function":
         return scene.add_function("a", f"{name}_of_time", coeff=rng.uniform(-1, 1, 3))
     if spec.kind == "choice":

@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.formats.import_scene.names import Names
-from dap3d_core.formats.import_scene.scene_builder import ImportOptions, scene_of
+from dap3d_core.formats.import_scene.scene_of_model import ImportOptions, scene_of
 from dap3d_core.formats.import_scene.shapes import MeshFiles
 from dap3d_core.formats.import_scene.source_files import SourceFiles
 from dap3d_core.interface.errors import PluginError

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from support.at_all_levels import made_of, same_bits
+from support.at_all_levels import made_of, same_bits, targets
 
-from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
+from dap3d_core.interface.codegen.compile_loops import write
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.runtime import generated_modules
@@ -35,7 +36,7 @@ def loops_of(type_info):
 def arguments_of(type_info, rng):
     """Random arrays of three instances, with tables where the type has some."""
     body, F = rng.standard_normal((BODIES, BODY_WIDTH)), rng.standard_normal((BODIES, 5))
-    idx, par = rng.integers(1, BODIES - 1, size=200), rng.standard_normal(600)
+    idx, par = rng.integers(1, BODIES - 1, size=200), rng.standard_normal(1000)
     for offset, _ in type_info.layout.tables.values():
         for q in range(INSTANCES):
             par[q * type_info.layout.par_width + offset :][:2] = 400, 20
@@ -58,8 +59,11 @@ TYPES = [(kind, keyword) for kind in ("joint", "force", "function")
          for keyword in REGISTRY.keywords(kind)]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    "level", [pytest.param(n, marks=[pytest.mark.slow] if n != "O3" else []) for n in targets()]
+)
 @pytest.mark.parametrize(("kind", "keyword"), TYPES)
-def test_traced_loops_have_the_bits_of_plain_python(kind, keyword):
+def test_traced_loops_have_the_bits_of_plain_python(kind, keyword, level):
     for type_info, loop in loops_of(REGISTRY.get(kind, keyword)):
 
         def python(loop=loop):
@@ -69,7 +73,6 @@ def test_traced_loops_have_the_bits_of_plain_python(kind, keyword):
 
         text = trace("tried", python(), array_members())
         plain = python()["loop"]
-        for level, traced in made_of(text, "tried", LOOP).items():
-            for seed in range(TRIALS):
-                assert same_bits(run(plain, type_info, seed), run(traced, type_info, seed)), (
-                    loop.name, level)  # fmt: skip
+        traced = made_of(text, "tried", LOOP, [level])[level]
+        for seed in range(TRIALS):
+            assert same_bits(run(plain, type_info, seed), run(traced, type_info, seed)), loop.name

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support.bouncing import bouncing, swinging
 from support.jumping import JUMPING
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result import open_result
@@ -101,6 +102,7 @@ def test_a_clutch_makes_the_speeds_of_two_shafts_one(method):
     assert result.ledger["energy"].value < 1e-12
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("method", ["standard", "lsq", "joint"])
 def test_a_hinged_bar_rebounds_from_a_stop_of_its_angle(method):
     """Without gravity it turns at 2 rad/s to the stop at 1 rad, and back at 1.5 to that at -0.5."""
@@ -122,6 +124,7 @@ def test_a_hinged_bar_rebounds_from_a_stop_of_its_angle(method):
     assert all(entry.ok for entry in result.ledger.values())
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(("e", "v_rest"), [(0.0, 1e-2), (0.5, 1e-2), (0.5, 0.0)])
 def test_bounces_end_on_the_spring_of_a_stop(e, v_rest):
     """A ball that bounces to rest stays where the spring carries its weight; with 0 as well."""
@@ -148,6 +151,7 @@ def test_a_contact_that_stays_and_that_nothing_carries_is_refused():
         dap.simulate(ball(e=0.0), t_end=1.0)
 
 
+@long_in_plain_python
 def test_balls_that_touch_without_a_load_cost_no_steps():
     """Two of five fly into three; all touch, and rounding opens and closes their gaps."""
     scene = dap.Scene(name="row")
@@ -259,6 +263,7 @@ def bars_mass_matrix():
     return np.array([[J + m1 * 0.25 + m2, m2 * 0.5], [m2 * 0.5, J + m2 * 0.25]])
 
 
+@long_in_plain_python
 def test_an_event_near_an_open_stop_leaves_that_alone():
     """A bar between two stops is set to another speed; the next impact is where that leads."""
     kick = dap.Event("t", above=0.1, action=lambda state: state.set("bar", w=(None, None, -9.0)))
@@ -267,6 +272,7 @@ def test_an_event_near_an_open_stop_leaves_that_alone():
     assert found.u_after[-1] == pytest.approx(-9.0, abs=1e-12)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("method", ["standard", "lsq", "penalty", "joint"])
 def test_an_event_sets_velocities_and_the_joints_hold(method):
     """The tip of the second bar gets 3 m/s across by an impulse at its centre and a moment there.
@@ -356,6 +362,7 @@ def test_a_state_of_another_length_is_refused():
         dap.simulate(dap.compile(scene, registry=JUMPING), t_end=1.0, events=[event])
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(
     ("name", "fields", "words"),
     [
@@ -372,6 +379,7 @@ def test_velocities_that_cannot_be_set_are_refused(name, fields, words):
         dap.simulate(pendulums(), t_end=0.2, events=[event])
 
 
+@long_in_plain_python
 def test_a_sweep_over_restitution_gives_what_single_runs_give():
     values = [0.3, 0.9]
     swept = dap.sweep(bouncing(), {"forces.floor.e": values}, outputs="ball.r.z", t_end=1.0,
@@ -381,6 +389,7 @@ def test_a_sweep_over_restitution_gives_what_single_runs_give():
         assert swept["ball.r.z"].values[k] == single.r[-1, 0, 2]
 
 
+@long_in_plain_python
 def test_the_error_of_a_run_with_jumps_is_estimated():
     """Loosely: within a factor of 100 of the error against the closed form, and not zero."""
     result = dap.simulate(swinging(), t_end=2.5, rtol=1e-6, estimate_error=True)

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import attrs
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result import UnknownNameError
@@ -69,6 +70,7 @@ def test_parameters_as_inputs():
     assert lin.input_units == ("N/m", "m", "1", "N")
 
 
+@long_in_plain_python
 def test_state_space_follows_the_motion():
     """After a small kick the simulated motion is that of z_dot = A z."""
     kick = 1e-5
