@@ -74,9 +74,22 @@ class MjcfReader:
             self._contents(world, WORLD, Frame(), "main")
         if not model.links:
             raise FormatError("holds no <body>", document.root.place)
+        for world in document.root.all("worldbody"):
+            self._world_shapes(world)
+
+    def _world_shapes(self, world: XmlElement) -> None:
+        """The geoms of the world, as a link that is fixed to it."""
+        geoms = self._gathered(world, ("geom",), Frame(), "main")
+        shapes = [self.geoms.geometry(geom, frame) for geom, frame in geoms]
+        link = Link(self._free_link("world_shapes"), place=world.place)
+        link.geometries += [shape for shape in shapes if shape is not None]
+        if link.geometries:
+            name = self._free(f"{link.name}_fixed")
+            self.model.links[link.name] = link
+            self.model.joints[name] = Joint(name, "fixed", WORLD, link.name, place=world.place)
 
     def _contents(self, holder: XmlElement, link: str, frame: Frame, childclass: str) -> None:
-        """Bodies, sites and, of the world, geoms in a body or frame."""
+        """Bodies and sites in a body or frame."""
         for child in holder:
             if child.name == "body":
                 self._body(child, link, frame, childclass)
