@@ -1,18 +1,14 @@
 """Actuators of MJCF: motors, and servos whose law is a spring and a damper."""
 
-from typing import TYPE_CHECKING
-
 from dap3d_core.interface.formats import Actuator, FormatError, Joint, XmlElement
 from dap3d_formats.mjcf.document import ACTUATORS
-
-if TYPE_CHECKING:
-    from dap3d_formats.mjcf.importer import MjcfReader
+from dap3d_formats.mjcf.reader import MjcfReader
 
 #: Joints with one coordinate.
 SCALAR = ("revolute", "prismatic")
 
 
-def read_actuators(reader: "MjcfReader") -> None:
+def read_actuators(reader: MjcfReader) -> None:
     """Read actuators on joints whose force is linear; others are left out, remarked.
 
     Raises:
@@ -33,7 +29,7 @@ def read_actuators(reader: "MjcfReader") -> None:
                 _read(reader, element)
 
 
-def _read(reader: "MjcfReader", element: XmlElement) -> None:
+def _read(reader: MjcfReader, element: XmlElement) -> None:
     remarks = reader.document.source.remarks
     name = element.get("name") or f"actuator{len(reader.model.actuators) + 1}"
     joint = element.get("joint") or element.get("jointinparent")

@@ -60,7 +60,7 @@ class JointCoordinate:
         self.turns = joint.kind == "revolute"
         finite = [abs(x) for one in joint.limits for x in (one.lower, one.upper) if isfinite(x)]
         rest = abs(joint.rest[0]) if joint.stiffness[0] else 0.0
-        self.back = 0.0 if self.turns else 1.0 + 2.0 * max([*finite, rest])
+        self.back = 0.0 if self.turns else 1.5 * max([*finite, rest, 0.01])
         if not self.turns and not all(map(isfinite, (joint.limits[0].lower,))):
             self.back = FAR
 

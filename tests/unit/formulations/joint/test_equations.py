@@ -160,6 +160,7 @@ def test_radau_says_that_it_keeps_body_coordinates():
         dap.simulate("pen1", t_end=0.1, method="joint", integrator="radau")
 
 
+@long_in_plain_python
 def test_a_stiff_tree_is_told_which_method_radau_takes():
     """Integrator auto stays with dop853; the governor's note says what would take fewer steps."""
     found = dap.simulate("A05", t_end=0.1, dt=0.05, rtol=1e-5, method="joint", integrator="auto")

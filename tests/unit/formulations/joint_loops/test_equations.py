@@ -149,6 +149,7 @@ def test_a_start_off_the_constraints_is_corrected_first():
     assert "initial positions corrected" in " ".join(found.notes)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5", "adams"])
 def test_projection_holds_the_kept_rows(integrator):
     """Rows of position and velocity at a tolerance of 1e-4: they stay at rounding."""

@@ -141,6 +141,7 @@ def test_chunks_change_no_bit():
     assert np.array_equal(whole, cut)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("scene", [sprung, disk, mechanisms.bricard], ids=lambda f: f.__name__)
 def test_motion_is_that_of_an_explicit_method(scene):
     """Friction, rows without position level, redundant rows: within 1e-6 of dop853 at 1e-11."""

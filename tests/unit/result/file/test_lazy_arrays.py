@@ -69,6 +69,7 @@ def test_parts_and_blocks_are_those_of_the_whole(both):
     assert len(dap.view(large).html) > 1000
 
 
+@long_in_plain_python
 def test_a_file_that_takes_its_name_changes_nothing(both, tmp_path):
     whole, large = both
     dap.simulate(problems.pendulum(), output=tmp_path / "run.nc", force=True, **SHORT)

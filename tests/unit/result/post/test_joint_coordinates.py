@@ -77,6 +77,7 @@ def test_a_file_gives_the_same(turning, tmp_path):
     assert names_of(bare, "hinge.l") == ["hinge.lambda"]
 
 
+@long_in_plain_python
 def test_a_few_of_the_instants_have_the_turns_of_all():
     """A page shows some instants only: between these a body may turn several times."""
     scene = spinning("rev")

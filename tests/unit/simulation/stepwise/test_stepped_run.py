@@ -158,6 +158,7 @@ def test_turns_of_angles_are_those_of_a_run():
     assert np.max(np.abs(whole.arrays.angles)) > 2.0 * np.pi
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_velocities_jump_within_a_step(method):
     """A ball that bounces: instants in closed form, to the rounding of times; and once more."""
