@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import NdBSpline, make_interp_spline
 from support.own_types import registry_of
+from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.interface import REQUIRED, Force, Joint, Point, function, point
@@ -163,3 +164,13 @@ def test_a_ball_on_measured_terrain():
         result = dap.simulate(model, integrator=integrator, **settings)
         np.testing.assert_allclose(result.r[:, 0, :2], wanted_path[:2].T, atol=1e-9)
         np.testing.assert_allclose(result.rd[:, 0, :2], wanted_path[2:].T, atol=1e-8)
+
+
+def test_points_of_a_sweep_read_the_map():
+    """The engine of the example package at three throttles u: w = 200 (1 - exp(-u t))."""
+    throttles = [0.25, 0.5, 1.0]
+    scene = dap.load(REPOSITORY / "plugins" / "dap3d-example" / "scenes" / "engine.toml")
+    data = dap.sweep(scene, {"inputs.throttle.value": throttles}, outputs=["wheel.w.z"], t_end=1.0,
+                     dt=0.5, rtol=1e-10, atol=1e-12)  # fmt: skip
+    wanted = 200.0 * (1.0 - np.exp(-np.array(throttles)))
+    np.testing.assert_allclose(np.ravel(data["wheel.w.z"]), wanted, atol=1e-7)
