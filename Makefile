@@ -65,13 +65,14 @@ no-fma: $(VENV)/.installed-test  ## tests of compiled bits as on a processor wit
 	    tests/unit/kernels/compiler/test_core.py tests/unit/kernels/compiler/test_complex.py
 
 # All checks run, also after one has failed; the last line says which.
-lint: $(VENV)/.installed-dev  ## format, lint, types, floors, sizes
+lint: $(VENV)/.installed-dev  ## format, lint, types, floors, circles, sizes
 	@failed=""; \
 	check() { name="$$1"; shift; echo "-- $$name"; "$$@" || failed="$$failed $$name"; }; \
 	check format $(PYTHON) -m ruff format --check .; \
 	check ruff $(PYTHON) -m ruff check .; \
 	check mypy $(PYTHON) -m mypy; \
 	check floors $(VENV)/bin/lint-imports; \
+	check circles $(PYTHON) tools/check_circles.py; \
 	check sizes $(PYTHON) tools/check_sizes.py; \
 	if [ -n "$$failed" ]; then echo "lint failed:$$failed" >&2; exit 1; fi; \
 	echo "lint: all clean"

@@ -1,143 +1,142 @@
-"""Imports of all models in folders, compared with MuJoCo: masses, kinematics, accelerations.
+"""Imports of all models in folders, compared with MuJoCo, Pinocchio and Drake.
 
     python benchmarks/imported_models.py FOLDER... [--poses 100] [--csv FILE]
 
-needs the extra "peers". Each URDF file (without its shapes) and each MJCF file is read by both; a
-row has the largest relative differences of masses and inertias, those of poses (m, 1) over random
-poses, and those of accelerations at five random states, relative to the largest. Contacts, limits,
-friction of joints, equalities, tendons and fluids are off; files that either refuses are listed
-with the reason.
+needs the extra "peers"; a program that is not installed is left out. Each URDF, MJCF and SDF file
+is read by dap3d and by the programs that read its format: MuJoCo reads URDF and MJCF, Pinocchio
+URDF, Drake SDF. A row has the largest relative differences of masses and inertias, those of poses
+(m, 1) over random poses, and those of accelerations at five random states with random forces on
+all joints, relative to the largest. Contacts, limits, friction of joints, equalities, tendons and
+fluids are off. Files that are refused are listed with the reason.
 """
 
 import argparse
 import csv
 import sys
-import tempfile
+import time
 import xml.etree.ElementTree as ET
 from collections import Counter
 from pathlib import Path
 
+import attrs
 import numpy as np
 
 import dap3d_core as dap
 from dap3d_core.formats.import_model import read_articulation
-from dap3d_core.interface.formats import FormatError
+from dap3d_core.formats.import_scene.names import Names
+from dap3d_core.formats.import_scene.scene_builder import ImportOptions, scene_of
+from dap3d_core.interface.formats import Actuator, Articulation, FormatError, Remarks
 from dap3d_core.model.rotations import rotation
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
-from support.mujoco_models import Oracle
 
 COLUMNS = ("mass", "inertia", "position", "rotation", "acceleration")
-#: What is asked of each column.
+#: Asked of each column.
 MARKS = dict(zip(COLUMNS, (1e-12, 1e-12, 1e-12, 1e-12, 1e-9), strict=True))
+#: Suffix -> programs that read its files.
+PEERS = {".urdf": ("MuJoCo", "Pinocchio"), ".xml": ("MuJoCo",), ".sdf": ("Drake",)}
+#: States at which accelerations are compared.
+STATES = 5
 
 
-def without_shapes(path, folder):
-    """A URDF file as MuJoCo reads it without files of meshes; its static links merged."""
-    root = ET.parse(path).getroot()
-    for link in root.findall("link"):
-        for tag in ("visual", "collision"):
-            for element in link.findall(tag):
-                link.remove(element)
-    for element in root.findall("mujoco"):
-        root.remove(element)
-    settings = {"fusestatic": "true", "discardvisual": "true", "balanceinertia": "true"}
-    ET.SubElement(ET.SubElement(root, "mujoco"), "compiler", settings)
-    copy = Path(folder, path.name)
-    ET.ElementTree(root).write(copy)
-    return copy
+class PeerError(Exception):
+    """Another program does not read a file."""
 
 
-def oracle_of(path):
-    """The model in MuJoCo, without what has no counterpart or is soft."""
-    with tempfile.TemporaryDirectory() as folder:
-        oracle = Oracle(without_shapes(path, folder) if path.suffix == ".urdf" else path)
-    m = oracle.model
-    m.opt.density = m.opt.viscosity = 0.0
-    m.opt.wind[:] = 0.0
-    m.actuator_forcelimited[:] = m.jnt_actfrclimited[:] = 0
-    for k in range(m.nu):  # a law that is not linear is left out
-        kinds = (m.actuator_trntype[k], m.actuator_gaintype[k], m.actuator_biastype[k])
-        if m.actuator_dyntype[k] or kinds[0] > 1 or kinds[1] or kinds[2] > 1:
-            m.actuator_gear[k] = 0.0
-    for array in (m.body_gravcomp, m.tendon_stiffness, m.tendon_damping, m.tendon_armature):
-        array[:] = 0.0
-    for j in range(m.njnt):  # a ball's spring, damper and armature are left out
-        if m.jnt_type[j] in (0, 1):
-            start, size = m.jnt_dofadr[j], 6 if m.jnt_type[j] == 0 else 3
-            m.dof_damping[start : start + size] = m.dof_armature[start : start + size] = 0.0
-            m.jnt_stiffness[j] = 0.0
-    return oracle
+def oracle_of(peer, path, model):
+    """A model in another program.
+
+    Raises:
+        PeerError: it does not read the file.
+    """
+    try:
+        if peer == "Pinocchio":
+            from support.pinocchio_models import Oracle
+
+            return Oracle(path)
+        if peer == "Drake":
+            from support.drake_models import Oracle
+
+            return Oracle(path, model.gravity)
+        from support.bare_mujoco import BareOracle
+
+        return BareOracle(path)
+    except ImportError:
+        raise PeerError("is not installed") from None
+    except (ValueError, RuntimeError, ET.ParseError, KeyError) as error:
+        raise PeerError(" ".join(str(error).split())) from None
 
 
-def compare(path, poses, root):
-    """The largest differences of a model, by column."""
-    oracle, rng = oracle_of(path), np.random.default_rng(1)
-    options = {"root": root, "shapes": False}
-    model, _, _ = read_articulation(path, **options)
-    names = [j.name for j in model.joints.values() if j.kind != "fixed" and not j.closes]
-    oracle.unnamed = names if path.suffix == ".xml" else []
-    worst = dict.fromkeys(COLUMNS, 0.0)
+def scene_at(model, state, *, balance_inertia):
+    """The scene of a model in a state, with a force on the coordinate of each joint."""
+    positions, rates, torques = state
+    forced = attrs.evolve(model, actuators=[
+        Actuator(f"{name} force", name, value) for name, value in torques.items()
+    ], couplings=[])  # fmt: skip
+    options = ImportOptions(False, False, balance_inertia, positions, rates)
+    names = Names()
+    scene = scene_of(forced, Remarks(), options, names=names)
+    for one in scene.inputs.values():
+        one.value = 1.0
+    for name in [n for n, e in scene.forces.items() if "function" in e.fields]:
+        del scene.forces[name]  # stops
+    scene.functions.clear()
+    return scene, names
+
+
+def opened(model: Articulation) -> Articulation:
+    """The model without the joints that close loops: others hold them softly, or not at all."""
+    kept = {name: joint for name, joint in model.joints.items() if not joint.closes}
+    return attrs.evolve(model, joints=kept)
+
+
+def compare(path, peer, poses, root):
+    """The largest differences between a model and that in another program, by column."""
+    model = opened(read_articulation(path, root=root, shapes=False)[0])
+    oracle, rng = oracle_of(peer, path, model), np.random.default_rng(1)
+    oracle.use(model)
+    worst, count = dict.fromkeys(COLUMNS, 0.0), 0
+    dap.import_model(path, root=root, shapes=False, balance_inertia=True)
     for k in range(poses):
-        positions, rates = oracle.randomise(rng)
-        known = positions.keys() & model.joints.keys()
-        scene, _ = dap.import_model(
-            path, positions={n: positions[n] for n in known}, balance_inertia=True,
-            rates={n: rates[n] for n in known}, **options,
-        )  # fmt: skip
-        for name, error in _kinematics(oracle, scene).items():
-            worst[name] = max(worst[name], error)
-        if k < 5:
-            worst["acceleration"] = max(worst["acceleration"], _accelerations(oracle, scene))
-    return worst, len(scene.bodies)
+        state = oracle.randomise(rng)
+        scene, names = scene_at(model, state, balance_inertia=peer == "MuJoCo")
+        oracle.evaluate(accelerations=k < STATES)
+        errors, count = differences(oracle, scene, names, accelerations=k < STATES)
+        worst = {name: max(worst[name], errors[name]) for name in COLUMNS}
+    if not count:
+        raise PeerError("no body that both have")
+    return worst, count
 
 
-def _pairs(oracle, scene):
-    numbers = {oracle.name("mjOBJ_BODY", b): b for b in range(1, oracle.model.nbody)}
-    return [(k, numbers[n], b) for k, (n, b) in enumerate(scene.bodies.items()) if n in numbers]
-
-
-def _kinematics(oracle, scene):
-    errors = dict.fromkeys(COLUMNS, 0.0)
-    for _, b, body in _pairs(oracle, scene):
-        mass, com, J = oracle.group(b)
-        if not mass:
-            continue  # no mass in the file: a stand-in here
-        A = oracle.data.xmat[b].reshape(3, 3)
+def differences(oracle, scene, names, *, accelerations):
+    """The differences of all bodies that both have, and their number."""
+    errors, count = dict.fromkeys(COLUMNS, 0.0), 0
+    v_dot = accelerations_of(scene) if accelerations else {}
+    for link, (mass, com, J, A, expected) in oracle.bodies(accelerations=accelerations).items():
+        name = names.scene_names.get(("bodies", link))
+        if name is None or not mass:
+            continue  # a part of another body; no mass in the file: a stand-in here
+        body, count = scene.bodies[name], count + 1
         given = np.diag(body.Jp) if np.ndim(body.Jp) == 1 else np.array(body.Jp)
-        found = {
+        here = {
             "mass": abs(body.mass - mass) / mass,
             "inertia": np.abs(given - J).max() / max(np.abs(J).max(), 1e-15),
             "position": np.abs(body.r - com).max() / max(1.0, np.abs(com).max()),
             "rotation": np.abs(rotation(np.array(body.p)) - A).max(),
         }
-        errors = {name: max(errors[name], found.get(name, 0.0)) for name in COLUMNS}
-    return errors
+        if accelerations:
+            here["acceleration"] = np.abs(v_dot[name] - expected).max() / oracle.largest
+        errors = {key: max(errors[key], here.get(key, 0.0)) for key in COLUMNS}
+    return errors, count
 
 
-def _accelerations(oracle, scene):
-    for name in [n for n, e in scene.forces.items() if "function" in e.fields]:
-        del scene.forces[name]  # stops
-    scene.functions.clear()
-    if scene.description.endswith("urdf."):  # MuJoCo passes <constraint> over
-        for name in [n for n, e in scene.joints.items() if e.type == "sph"]:
-            del scene.joints[name]
-    coupled = [n for n, e in scene.joints.items() if n.endswith("_coupling")]
-    loops = {m.name for m in scene.joints.values() if m.type in ("sph", "tran", "drive-tran")}
-    soft = {oracle.name("mjOBJ_EQUALITY", k) for k in range(oracle.model.neq)}
-    for name in [*coupled, *(loops & (soft | {f"{n}_lock" for n in soft}))]:
-        del scene.joints[name]
-    compiled, bodies = dap.compile(scene), list(scene.bodies.values())
-    pose = np.concatenate([[*b.r, *b.p] for b in bodies])
-    rate = np.concatenate([[*b.r_dot, *b.w] for b in bodies])
-    v_dot = compiled.rhs(0.0, np.concatenate([pose, rate]))[7 * len(bodies) :].reshape(-1, 6)
-    scale = max(1.0, np.abs(oracle.data.qacc).max(initial=0.0))
-    errors = [
-        np.abs(v_dot[k] - oracle.acceleration(b, oracle.group(b)[1])).max() / scale
-        for k, b, _ in _pairs(oracle, scene)
-        if oracle.group(b)[0]
-    ]
-    return max(errors, default=0.0)
+def accelerations_of(scene):
+    """Accelerations of mass centres and angular accelerations, by body."""
+    bodies = scene.bodies
+    pose = np.concatenate([[*b.r, *b.p] for b in bodies.values()])
+    rate = np.concatenate([[*b.r_dot, *b.w] for b in bodies.values()])
+    rhs = dap.compile(scene).rhs(0.0, np.concatenate([pose, rate]))
+    return dict(zip(bodies, rhs[7 * len(bodies) :].reshape(-1, 6), strict=True))
 
 
 def main():
@@ -147,46 +146,59 @@ def main():
     parser.add_argument("--poses", type=int, default=100)
     parser.add_argument("--csv", type=Path)
     options = parser.parse_args()
-    rows, ends = [], Counter()
+    rows = []
     for folder in options.folders:
         files = [folder] if folder.is_file() else sorted(folder.rglob("*"))
         base = folder.parent if folder.is_file() else folder
-        for path in (f for f in files if f.suffix in (".urdf", ".xml") and _is_model(f)):
-            row = _row(path, options.poses, base)
-            ends[row["end"]] += 1
-            rows.append(row)
-            figures = "  ".join(f"{row[c]:8.1e}" for c in COLUMNS) if row["end"] == "ok" else ""
-            name = str(path.relative_to(base))[-50:]
-            print(f"{name:50} {row['end']:8} {figures} {row['why'][:90]}", flush=True)
-    print(dict(ends))
-    for column, mark in MARKS.items():
-        values = [row[column] for row in rows if row["end"] == "ok"]
-        print(f"{column}: {sum(v <= mark for v in values)} of {len(values)} within {mark:g}")
+        for path in (f for f in files if f.suffix in PEERS and _is_model(f)):
+            for peer in PEERS[path.suffix]:
+                rows.append(_row(path, peer, options.poses, base))
+                _print(rows[-1], base)
+    _summarise(rows)
     if options.csv:
         with options.csv.open("w", newline="") as file:
-            writer = csv.DictWriter(file, ("file", "end", "bodies", *COLUMNS, "why"))
+            columns = ("file", "peer", "end", "bodies", *COLUMNS, "seconds", "why")
+            writer = csv.DictWriter(file, columns)
             writer.writeheader()
             writer.writerows(rows)
 
 
+def _print(row, base):
+    figures = "  ".join(f"{row[c]:8.1e}" for c in COLUMNS) if row["end"] == "ok" else ""
+    name = str(Path(row["file"]).relative_to(base))[-50:]
+    print(f"{name:50} {row['peer']:9} {row['end']:8} {figures} {row['why'][:90]}", flush=True)
+
+
+def _summarise(rows):
+    """Print how many models were compared, and how many are within the marks."""
+    for peer in ("MuJoCo", "Pinocchio", "Drake"):
+        mine = [row for row in rows if row["peer"] == peer]
+        print(peer, dict(Counter(row["end"] for row in mine)))
+        for column, mark in MARKS.items():
+            values = [row[column] for row in mine if row["end"] == "ok"]
+            print(f"  {column}: {sum(v <= mark for v in values)} of {len(values)} within {mark:g}")
+
+
 def _is_model(path):
     text = path.read_bytes()[:100_000]
-    return path.suffix == ".urdf" or (b"<mujoco" in text and b"<worldbody" in text)
+    marks = {".xml": (b"<mujoco", b"<worldbody"), ".sdf": (b"<sdf", b"<link")}
+    return all(mark in text for mark in marks.get(path.suffix, ()))
 
 
-def _row(path, poses, root):
-    """The row of a file: compared, refused by dap3d, or not read by MuJoCo."""
-    row = {"file": str(path), "end": "ok", "why": "", "bodies": 0}
+def _row(path, peer, poses, root):
+    """The row of a file: compared, refused by dap3d, or not read by the other program."""
+    row = {"file": str(path), "peer": peer, "end": "ok", "why": "", "bodies": 0}
+    began = time.process_time()
     try:
-        worst, row["bodies"] = compare(path, poses, root)
-        return row | worst
+        worst, row["bodies"] = compare(path, peer, poses, root)
+        row |= worst
     except (dap.SceneError, FormatError) as error:
         row |= {"end": "refused", "why": str(error).partition("\n")[0].rpartition("/")[2]}
-    except (ValueError, ET.ParseError) as error:
-        row |= {"end": "MuJoCo", "why": " ".join(str(error).split())}
+    except PeerError as error:
+        row |= {"end": "unread", "why": str(error)}
     except Exception as error:
         row |= {"end": "CRASH", "why": f"{type(error).__name__}: {error}"}
-    return row
+    return row | {"seconds": round(time.process_time() - began, 2)}
 
 
 if __name__ == "__main__":

@@ -11,7 +11,8 @@ import attrs
 import numpy as np
 from timing import median_seconds
 
-from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, stride, write
+from dap3d_core.interface.codegen.compile_loops import write
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, stride
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
 from dap3d_core.interface.examine.random_values import random_pose, random_value
 from dap3d_core.kernels.runtime import loop_support

@@ -1,7 +1,14 @@
-"""A state added to an element: a right-hand side against one without it, by CPU time."""
+"""A state added to an element: a right-hand side against one without it, by CPU time.
+
+python benchmarks/states.py
+"""
 
 import statistics
+import sys
 import time
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 import numpy as np
 from right_hand_side import repeat

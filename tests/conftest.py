@@ -1,5 +1,6 @@
 """What all tests rely on."""
 
+import gc
 import os
 import signal
 
@@ -10,3 +11,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # A shell that puts a command into the background lets it ignore Ctrl-C, and so its children.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_finish():
+    """Thousands of tests are no garbage: each collection would go through them again."""
+    gc.collect()
+    gc.freeze()

@@ -78,15 +78,16 @@ def gathered() -> dict[str, Any]:
     import dap3d_core as dap
     from dap3d_core.interface.codegen.compile_loops import compile_all
     from dap3d_core.kernels.compiler import units
+    from dap3d_core.registry.registry import GROUPS
     from dap3d_core.scene.validate.settings import FIXED_STEP, INTEGRATORS, METHODS
 
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, set(list(os.sched_getaffinity(0))[:1]))  # nothing is made beside
     units.collected = {}
     registry = dap.load_registry()
-    for group, entries in PROJECT["entry-points"].items():
-        for keyword in entries:
-            compile_all(registry.get(group.removeprefix("dap3d.").removesuffix("s"), keyword))
+    for kind in GROUPS:
+        for keyword in PROJECT["entry-points"][f"dap3d.{kind}s"]:
+            compile_all(registry.get(kind, keyword))
     for folder in sorted(path.parent for path in (ROOT / "models").glob("*/scene.toml")):
         scene = dap.load(folder)
         for integrator in INTEGRATORS:

@@ -1,11 +1,11 @@
 """Spline function: a smooth curve through points."""
 
 from dap3d_core.interface import Function, choice, hookimpl, table
-from dap3d_core.kernels import atan2, cos, lookup, sin
+from dap3d_core.kernels import lookup
+from dap3d_functions.points import increasing, wrapped
 
 interface_version = 1
 
-PI = 3.141592653589793
 #: Three points between which the slope changes by less than this part of the largest are in line.
 STRAIGHT = 1e-9
 
@@ -86,8 +86,7 @@ class Periodic(Spline, periodic=True):
         return ()
 
     def value(x, pieces, first, period, slope):
-        angle = 2.0 * PI * ((x - first) / period - 0.5)
-        place = first + period * (0.5 + atan2(sin(angle), cos(angle)) / (2.0 * PI))
+        place = wrapped(x, first, period)
         start, a, b, c, d = lookup(pieces, place)
         u = place - start
         f = a + u * (b + u * (c + u * d)) + slope * (x - first)
@@ -102,18 +101,9 @@ def points_of(x, y):
     """
     import numpy as np
 
-    x, y = np.array(x), np.array(y)
     if len(x) != len(y):
         raise ValueError(f"x has {len(x)} numbers and y has {len(y)}; give as many of each")
-    if len(x) < 2:
-        raise ValueError(f"a spline takes two points or more; x and y have {len(x)}")
-    if (back := np.flatnonzero(np.diff(x) <= 0.0)).size:
-        k = int(back[0]) + 1
-        raise ValueError(
-            f"x must increase; number {k + 1}, {x[k]:g}, is not beyond the one before it, "
-            f"{x[k - 1]:g}"
-        )
-    return x, y
+    return increasing("x", x, "spline"), np.array(y)
 
 
 @hookimpl

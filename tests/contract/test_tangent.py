@@ -43,31 +43,34 @@ def residuals(evaluator, t, u, lam, a):
     return np.concatenate([force.ravel() + D.T @ lam, D @ v - rows.nu, D @ a.ravel() - rows.gamma])
 
 
-def moved(u, body, direction, step):
-    """The state with one body moved along one of its twelve directions."""
-    r, p, v, w = (x.copy() for x in split(u))
-    part = (r, p, v, w)[direction // 3]
-    if direction // 3 == 1:  # exp(theta / 2) p
-        c, s = np.cos(step / 2), np.sin(step / 2) * np.eye(3)[direction % 3]
-        e0, e = p[body, 0], p[body, 1:].copy()
-        p[body, 0], p[body, 1:] = c * e0 - s @ e, c * e + e0 * s + np.cross(s, e)
-    else:
-        part[body, direction % 3] += step
-    return join(r, p, v, w)
+def moved(u, direction, step):
+    """The state moved along a direction: displacements and velocities, (2, bodies, 6)."""
+    r, p, v, w = split(u)
+    x_dot, v_dot = step * direction
+    turn = x_dot[:, 3:]  # exp(turn / 2) p
+    angle = np.linalg.norm(turn, axis=1, keepdims=True)
+    c, s = np.cos(angle / 2), np.sinc(angle / (2 * np.pi)) * turn / 2
+    e0, e = p[:, :1], p[:, 1:]
+    p = np.hstack([c * e0 - np.sum(s * e, axis=1, keepdims=True), c * e + e0 * s + np.cross(s, e)])
+    return join(r + x_dot[:, :3], p, v + v_dot[:, :3], w + v_dot[:, 3:])
 
 
-def by_differences(function, u, h):
-    """(outputs, 12 n) derivatives, the first six columns of each body by displacements."""
-    columns = []
-    for body in range(len(u) // 13):
-        for direction in range(12):
-            terms = (
-                weight * (function(moved(u, body, direction, k * h))
-                          - function(moved(u, body, direction, -k * h)))
-                for k, weight in STENCIL
-            )  # fmt: skip
-            columns.append(sum(terms) / h)
-    return np.array(columns).T
+def by_differences(function, u, direction, h=2e-3):
+    """The derivative along a direction."""
+    terms = (
+        weight * (function(moved(u, direction, k * h)) - function(moved(u, direction, -k * h)))
+        for k, weight in STENCIL
+    )
+    return sum(terms) / h
+
+
+def directions(rng, bodies):
+    """Random ones of unit length, of displacements and of velocities: no column is left out."""
+    for velocity in (False, True):
+        for _ in range(3):
+            direction = np.zeros((2, bodies, 6))
+            direction[int(velocity)] = rng.normal(size=(bodies, 6))
+            yield velocity, direction / np.linalg.norm(direction)
 
 
 def compare(scene, tolerance=1e-9):
@@ -83,22 +86,23 @@ def compare(scene, tolerance=1e-9):
     lam, a = rng.normal(size=rows), rng.normal(size=n)
     evaluator.start(t, u)
     tangent = tangent_matrices(evaluator, t, u, lam, a)
-    slopes = by_differences(lambda x: residuals(evaluator, t, x, lam, a), u, 2e-3)
-    slopes = slopes.reshape(-1, 3, 2, 6)
-    by_x, by_v = (slopes[:, :, k].reshape(-1, n) for k in (0, 1))
-    pairs = [
-        (tangent.f + tangent.D.T @ lam - tangent.M @ a, residuals(evaluator, t, u, lam, a)[:n]),
-        (-tangent.stiffness.toarray(), by_x[:n]),
-        (-tangent.damping.toarray(), by_v[:n]),
-        (tangent.velocity_by_displacement.toarray(), by_x[n : n + rows]),
-        (tangent.D.toarray(), by_v[n : n + rows]),
-        (tangent.acceleration_by_displacement.toarray(), by_x[n + rows :]),
-        (tangent.acceleration_by_velocity.toarray(), by_v[n + rows :]),
-    ]
-    for exact, difference in pairs:
-        limit = tolerance * (1.0 + np.max(np.abs(difference), initial=0.0))
-        np.testing.assert_allclose(exact, difference, rtol=0.0, atol=limit)
+    residual = residuals(evaluator, t, u, lam, a)[:n]
+    close(tangent.f + tangent.D.T @ lam - tangent.M @ a, residual, tolerance)
+    by_x = (
+        -tangent.stiffness, tangent.velocity_by_displacement, tangent.acceleration_by_displacement
+    )  # fmt: skip
+    by_v = (-tangent.damping, tangent.D, tangent.acceleration_by_velocity)
+    for velocity, direction in directions(rng, 3):
+        slope = by_differences(lambda x: residuals(evaluator, t, x, lam, a), u, direction)
+        parts = np.split(slope, [n, n + rows])
+        for matrix, difference in zip(by_v if velocity else by_x, parts, strict=True):
+            close(matrix @ direction[int(velocity)].ravel(), difference, tolerance)
     return evaluator, tangent, (t, u, lam, a)
+
+
+def close(exact, difference, tolerance):
+    limit = tolerance * (1.0 + np.max(np.abs(difference), initial=0.0))
+    np.testing.assert_allclose(exact, difference, rtol=0.0, atol=limit)
 
 
 @pytest.mark.parametrize("case", JOINTS, ids=case_names(JOINTS))

@@ -46,6 +46,9 @@ def test_nothing_is_overwritten_without_force(dap3d, refuse, arm):
     [
         (("import", "arm.urdf", "--strict"), "effort"),
         (("import", "nothing.urdf"), "there is no file nothing.urdf"),
+        (("import", "amr.urdf"), "did you mean 'arm.urdf'"),
+        (("import", "."), "is a folder"),
+        (("import", "arm.urdf", "--root", "nowhere"), "nowhere is no folder"),
         (("import", "arm.urdf", "--position", "elbw=1"), "no such joint"),
         (("import", "arm.urdf", "--position", "elbow"), "write NAME=VALUE"),
         (("import", "arm.urdf", "--package", "a=nowhere"), "nowhere is no folder"),

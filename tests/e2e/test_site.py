@@ -23,7 +23,7 @@ def site(tmp_path_factory):
     done = subprocess.run(
         [sys.executable, "-m", *map(str, words)],
         cwd=folder,
-        env=environment(MPLBACKEND="Agg", **nowhere),
+        env=environment(MPLBACKEND="Agg", DAP3D_SITE_FPS=1, **nowhere),
         capture_output=True,
         text=True,
         timeout=600,

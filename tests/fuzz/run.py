@@ -28,8 +28,8 @@ FINDS = ROOT / "build" / "fuzz"
 BATCH, PATIENCE = 25, 300
 #: Targets of the coverage-guided fuzzer, which needs the extra "fuzz" (guided.py).
 GUIDED = ("scene-bytes", "matlab-bytes")
-HYPOTHESIS = ("scenes", "damaged", "matlab", "results", "numbers", "quantities", "expressions",
-              "commands", "programs")  # fmt: skip
+HYPOTHESIS = ("scenes", "damaged", "matlab", "models", "results", "numbers", "quantities",
+              "expressions", "commands", "programs")  # fmt: skip
 
 
 def keep(target, data, words, ending):

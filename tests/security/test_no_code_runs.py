@@ -156,12 +156,17 @@ def test_what_derives_formulas_has_no_functions_of_python():
 #: The one place of each, and why it is right.
 ALLOWED = {
     ("interface/codegen/specialise.py", "exec"): "the source of a plugin that was imported",
+    (
+        "interface/codegen/terms.py",
+        "exec",
+    ): "a call of a kernel, made of the names of its arguments",
     ("interface/derive/symbolic.py", "eval"): "expressions of namespace.py",
     ("kernels/runtime/generated_modules.py", "exec"): "loop modules",
     ("registry/loading.py", "exec"): "plugin.py, once it is allowed",
     ("testing/samples/random_element.py", "exec"): "loop modules",
     ("kernels/compiler/units.py", "eval"): "calls of compiled functions, by their types",
     ("kernels/compiler/background.py", "subprocess"): "Python itself, to compile beside",
+    ("testing/packages.py", "subprocess"): "pytest, on the tests of packages, when it is asked for",
     ("plot/film/encoding.py", "subprocess"): "ffmpeg, without a shell",
     ("simulation/checkpoint/file.py", "allow_pickle"): "switched off",
     (

@@ -6,11 +6,11 @@ import numpy as np
 class Oracle:
     """A model that MuJoCo has read, without contacts, limits, friction and equalities."""
 
-    def __init__(self, path):
+    def __init__(self, path, *, compiled=None):
         import mujoco
 
         self.mujoco = mujoco
-        self.model = m = mujoco.MjModel.from_xml_path(str(path))
+        self.model = m = compiled or mujoco.MjModel.from_xml_path(str(path))
         off = mujoco.mjtDisableBit
         m.opt.disableflags |= off.mjDSBL_CONTACT | off.mjDSBL_LIMIT | off.mjDSBL_EQUALITY
         m.dof_frictionloss[:] = 0.0

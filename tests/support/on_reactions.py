@@ -27,7 +27,7 @@ class Brake(Force):
 class Tyre(Force):
     """Drive of a wheel by slip under the load of its row of contact with the ground z = 0."""
 
-    keyword = "tyre"
+    keyword = "loaded-tyre"
     P_i: Point = point(doc="centre of the wheel, on body i")
     contact: str = joint(rows=1, doc="keeps the wheel on the ground")
     radius: float = number(default=0.3, unit="m", positive=True)
@@ -60,7 +60,7 @@ class PinFriction(Force):
 class Servo(Force):
     """Friction on a plane that presses its body onto the plane by a part k of the load."""
 
-    keyword = "servo"
+    keyword = "pressed-servo"
     body_i: Body = body()
     a_j: Vector = vector(ground=True)
     n_j: Vector = vector(ground=True)

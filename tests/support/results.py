@@ -29,10 +29,10 @@ def rows_of(
 ):
     """Rows as the integrator delivers them."""
     angles = np.zeros((len(t), model.angle_count)) if angles is None else angles
-    last = np.tile([0.0, *residuals], (len(t), 1))
+    last = np.tile([0.0, *residuals, *model.input_values], (len(t), 1))
     last[:, 0] = potential
-    y = y_from_u(u, work)
-    return np.hstack([t[:, None], y, v_dot, Lam, angles, last])
+    states = np.tile(model.initial_states, (len(t), 1))
+    return np.hstack([t[:, None], y_from_u(u, work, states), v_dot, Lam, angles, last])
 
 
 def result_of(scene, rows, model=None, method="standard", **more):

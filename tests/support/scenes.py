@@ -87,16 +87,23 @@ def _field(scene, name, spec, owner, rng, wanted):
         return rng.uniform(-1, 1, 3)
     if spec.kind == "matrix":
         return rotation(rng.normal(size=4))
+    if spec.by_rows:
+        return np.pad(rng.uniform(-1, 1, (7, 7)), (0, 1), mode="wrap")
     if spec.kind == "table":  # increasing: a table of arguments is one
         return np.cumsum(rng.uniform(0.1, 0.5, 8))
-    if spec.kind == "function" and (wanted is False or (spec.argument and not wanted)):
+    if spec.kind == "function" and (
+        wanted is False or (spec.argument and not wanted and not spec.required)
+    ):
         return None
     if spec.kind == "functions":
         return [
             scene.add_function("a", f"{name}{k}", coeff=rng.uniform(-1, 1, 3)) for k in range(3)
         ]
     if spec.kind == "input":
-        return scene.add_input(name, rng.uniform(-1, 1)) if wanted else None
+        return scene.add_input(name, rng.uniform(-1, 1)) if wanted or spec.required else None
+    if spec.kind == "function" and spec.arguments > 1:
+        places, values = [-1.0, 0.0, 1.0], rng.uniform(-1, 1, (3, 3))
+        return scene.add_function("grid", f"{name}_of_two", x=places, y=places, z=values)
     if spec.kind == "function":
         return scene.add_function("a", f"{name}_of_time", coeff=rng.uniform(-1, 1, 3))
     if spec.kind == "choice":

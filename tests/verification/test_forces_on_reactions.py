@@ -53,7 +53,7 @@ def test_a_tyre_loaded_by_its_contact():
     scene.add_body("wheel", mass=m, Jp=(0.5, J, 0.5), r=(0, 0, R), w=(0.0, 10.0, 0.0))
     scene.add_joint("rP", "contact", body_i="wheel", a_j="ground.z", length=R)
     scene.add_force("weight")
-    scene.add_force("tyre", P_i="wheel.O", contact="contact", radius=R, stiffness=k)
+    scene.add_force("loaded-tyre", P_i="wheel.O", contact="contact", radius=R, stiffness=k)
     result = dap.simulate(compiled(scene), **SETTINGS)
     rate = k * m * G * (1 / m + R**2 / J)
     slip = -R * 10.0 * np.exp(-rate * result.t)
@@ -106,7 +106,7 @@ def sliders(*parts):
         name = f"b{k}"
         scene.add_body(name, mass=2.0, Jp=(1, 1, 1), r=(0, k, 0), r_dot=(5.0, 0, 0))
         scene.add_joint("rP", f"p{k}", body_i=name, a_j="ground.z", length=0.0)
-        scene.add_force("servo", f"s{k}", body_i=name, a_j="ground.x", n_j="ground.z",
+        scene.add_force("pressed-servo", f"s{k}", body_i=name, a_j="ground.x", n_j="ground.z",
                         plane=f"p{k}", mu=0.02, k=part)  # fmt: skip
     scene.add_force("weight")
     return scene
@@ -142,7 +142,7 @@ def test_a_jam_in_the_course_of_a_run_keeps_what_was_computed():
 def test_other_rows_than_a_type_takes_are_refused():
     """``joint(rows=1)`` names a joint of one row; a kernel that reads more than there are, too."""
     scene = drum()
-    scene.add_force("tyre", "wrong", P_i="drum.O", contact="axle")
+    scene.add_force("loaded-tyre", "wrong", P_i="drum.O", contact="axle")
     with pytest.raises(
         dap.SceneError, match=r"contact is to be a joint of 1 row; joint axle has 5"
     ):
@@ -174,7 +174,7 @@ def test_a_linearised_tyre_has_the_rate_of_its_slip():
     scene.add_body("wheel", mass=m, Jp=(0.5, J, 0.5), r=(0, 0, R))
     scene.add_joint("rP", "contact", body_i="wheel", a_j="ground.z", length=R)
     scene.add_force("weight")
-    scene.add_force("tyre", P_i="wheel.O", contact="contact", radius=R, stiffness=k)
+    scene.add_force("loaded-tyre", P_i="wheel.O", contact="contact", radius=R, stiffness=k)
     modes = np.sort(dap.linearize(compiled(scene)).eigenvalues.real)
     wanted = [-k * m * G * (1 / m + R**2 / inertia) for inertia in (0.5, J)]
     assert modes[:2] == pytest.approx(wanted, rel=1e-9)

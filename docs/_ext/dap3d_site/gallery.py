@@ -4,6 +4,7 @@ The script's text is the model's own page; what it simulates and draws are the c
 page shows. ``VIEWS`` lists the ways in which a model is shown.
 """
 
+import os
 import shlex
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -19,6 +20,8 @@ from dap3d_site.markdown import doc_of
 
 #: Folders of the source folder of Sphinx: scripts and what they include; pages made from them.
 SCRIPTS, INCLUDED, GALLERY = "_scripts", "_models", "models"
+#: Pictures a second of the films; a build that only checks the pages draws fewer.
+FILM_FPS = float(os.environ.get("DAP3D_SITE_FPS", "12.5"))
 #: Scenes longer than this are not shown; they were written by a script.
 LONGEST = 400
 
@@ -94,7 +97,7 @@ def curves(model: Model) -> str:
 
 def motion(model: Model) -> str:
     """The motion as a stick figure, as `dap3d animate` draws it."""
-    return f'dap.animate(result, "{model.name}.gif", fps=12.5, size=(480, 0), force=True)'
+    return f'dap.animate(result, "{model.name}.gif", fps={FILM_FPS}, size=(480, 0), force=True)'
 
 
 def scene(model: Model) -> str:

@@ -7,6 +7,7 @@ from dap3d_example.bushing import Bushing
 from dap3d_example.clutch import Clutch
 from dap3d_example.cycloid import Cycloid
 from dap3d_example.cylinder import Cylinder
+from dap3d_example.engine import Engine
 from dap3d_example.gear import Gear
 from dap3d_example.motor import Motor
 from dap3d_example.point_on_plane import PointOnPlane
@@ -18,7 +19,7 @@ from dap3d_example.tyre import Tyre
 
 TYPES = (
     Screw, Gear, PointOnPlane, PointOnSurface, Bushing, Motor, Cylinder, Servo, Tyre, Clutch, Stage,
-    Cycloid
+    Engine, Cycloid
 )  # fmt: skip
 CHECKS = [(type_, check) for type_ in TYPES for check in checks_for(type_)]
 

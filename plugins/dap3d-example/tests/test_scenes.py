@@ -235,6 +235,20 @@ def test_a_charge_parts_a_rocket_from_its_tank():
     np.testing.assert_allclose(momentum, np.tile([0.0, 0.0, 400.0], (len(result.t), 1)), atol=1e-9)
 
 
+def test_an_engine_runs_up_by_its_map():
+    """J w' = u (20 - w / 10) with u = 1/2, then 1 from t = 1 on; its pole is -u / (10 J)."""
+    opened = dap.Controller(every=1.0, update=lambda t, _: {"throttle": 0.5 if t < 0.5 else 1.0})
+    result = run("engine", rtol=1e-12, controllers=[opened])
+    half = 200.0 * (1.0 - np.exp(-0.5 * np.minimum(result.t, 1.0)))
+    wanted = 200.0 - (200.0 - half) * np.exp(-np.maximum(result.t - 1.0, 0.0))
+    np.testing.assert_allclose(result.w[:, 0, 2], wanted, atol=1e-9)
+    lin = dap.linearize(dap.load(SCENES / "engine.toml"), inputs=["throttle"])
+    poles = lin.eigenvalues[np.abs(lin.eigenvalues) > 1e-6]
+    np.testing.assert_allclose(poles, [-0.5], rtol=1e-12)
+    # in coordinates of unit mass
+    np.testing.assert_allclose(np.max(np.abs(lin.B)), 20.0 / np.sqrt(0.1), rtol=1e-12)
+
+
 def test_a_slider_is_lifted_by_a_cycloidal_cam():
     """f = rise (u - sin(2 pi u) / (2 pi)), its derivatives; the driver does m g rise."""
     result = run("cycloid")

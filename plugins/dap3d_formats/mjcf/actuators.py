@@ -1,30 +1,35 @@
 """Actuators of MJCF: motors, and servos whose law is a spring and a damper."""
 
-from typing import TYPE_CHECKING
-
 from dap3d_core.interface.formats import Actuator, FormatError, Joint, XmlElement
 from dap3d_formats.mjcf.document import ACTUATORS
-
-if TYPE_CHECKING:
-    from dap3d_formats.mjcf.importer import MjcfReader
+from dap3d_formats.mjcf.reader import MjcfReader
 
 #: Joints with one coordinate.
 SCALAR = ("revolute", "prismatic")
 
 
-def read_actuators(reader: "MjcfReader") -> None:
+def read_actuators(reader: MjcfReader) -> None:
     """Read actuators on joints whose force is linear; others are left out, remarked.
 
     Raises:
         FormatError: one names a joint that is not there.
     """
-    for holder in reader.document.root.all("actuator"):
+    document = reader.document
+    options = document.root.all("option")
+    disabled = {g for one in options for g in one.numbers("actuatorgroupdisable", None, ())}
+    for holder in document.root.all("actuator"):
         for given in holder:
-            if given.name in ACTUATORS and given.name != "plugin":
-                _read(reader, reader.document.settled(given, "main"))
+            if given.name not in ACTUATORS or given.name == "plugin":
+                continue
+            element = document.settled(given, "main")
+            if element.number("group", 0.0) in disabled:
+                text = "an actuator of a group that is disabled"
+                document.source.remarks.leave_out(given.place, text)
+            else:
+                _read(reader, element)
 
 
-def _read(reader: "MjcfReader", element: XmlElement) -> None:
+def _read(reader: MjcfReader, element: XmlElement) -> None:
     remarks = reader.document.source.remarks
     name = element.get("name") or f"actuator{len(reader.model.actuators) + 1}"
     joint = element.get("joint") or element.get("jointinparent")

@@ -1,7 +1,5 @@
 """Equalities of MJCF, with the tendons that they hold."""
 
-from typing import TYPE_CHECKING
-
 import attrs
 
 from dap3d_core.interface.formats import (
@@ -15,15 +13,13 @@ from dap3d_core.interface.formats import (
     axis_angle,
     from_quaternion,
 )
-
-if TYPE_CHECKING:
-    from dap3d_formats.mjcf.importer import MjcfReader
+from dap3d_formats.mjcf.reader import MjcfReader
 
 #: Joints with one coordinate.
 SCALAR = ("revolute", "prismatic")
 
 
-def read_equalities(reader: "MjcfReader") -> None:
+def read_equalities(reader: MjcfReader) -> None:
     """Read equalities: connect, weld, joint, and tendon of a fixed tendon of two joints.
 
     Raises:
@@ -43,17 +39,17 @@ def read_equalities(reader: "MjcfReader") -> None:
                 _couple_by_tendon(reader, element)
 
 
-def _link(reader: "MjcfReader", element: XmlElement, key: str) -> str:
+def _link(reader: MjcfReader, element: XmlElement, key: str) -> str:
     name = element.get(key) or WORLD
     if name != WORLD and name not in reader.model.links:
         raise FormatError(f"{key} of <{element.name}>: there is no body {name!r}", element.place)
     return name
 
 
-def _close(reader: "MjcfReader", element: XmlElement) -> None:
+def _close(reader: MjcfReader, element: XmlElement) -> None:
     """Close a loop: two points, or two frames, of two bodies coincide."""
     model = reader.model
-    name = element.get("name") or f"{element.name}{len(model.joints) + 1}"
+    name = reader.free_joint(element.get("name") or f"{element.name}{len(model.joints) + 1}")
     kind = "ball" if element.name == "connect" else "fixed"
     if "site1" in element.attributes:
         ends = [_site(reader, element, key) for key in ("site1", "site2")]
@@ -65,8 +61,6 @@ def _close(reader: "MjcfReader", element: XmlElement) -> None:
             in_child = _relative(reader, child, parent) @ in_parent
         else:
             in_parent, in_child = _weld(reader, element, parent, child)
-    if name in model.joints:
-        raise FormatError(f"there are two joints {name}", element.place)
     if "solref" in element.attributes or "solimp" in element.attributes:
         text = "softness of an equality (solref, solimp): it holds exactly"
         reader.document.source.remarks.translate(element.place, text)
@@ -74,9 +68,7 @@ def _close(reader: "MjcfReader", element: XmlElement) -> None:
                                place=element.place)  # fmt: skip
 
 
-def _weld(
-    reader: "MjcfReader", element: XmlElement, parent: str, child: str
-) -> tuple[Frame, Frame]:
+def _weld(reader: MjcfReader, element: XmlElement, parent: str, child: str) -> tuple[Frame, Frame]:
     """The frames of a weld in its two bodies: relpose is that of body 2 in body 1."""
     relpose = element.numbers("relpose", 7, (0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0))
     if not any(relpose[3:]):
@@ -85,19 +77,19 @@ def _weld(
     return Frame(relpose[:3], from_quaternion(relpose[3:])) @ anchor, anchor
 
 
-def _site(reader: "MjcfReader", element: XmlElement, key: str) -> tuple[str, Frame]:
+def _site(reader: MjcfReader, element: XmlElement, key: str) -> tuple[str, Frame]:
     name = element.require(key)
     if name not in reader.sites:
         raise FormatError(f"{key} of <{element.name}>: there is no site {name!r}", element.place)
     return reader.sites[name]
 
 
-def _relative(reader: "MjcfReader", of: str, other: str) -> Frame:
+def _relative(reader: MjcfReader, of: str, other: str) -> Frame:
     """The pose of link ``other`` in link ``of``, where the model starts."""
     return _pose(reader, of).inverse() @ _pose(reader, other)
 
 
-def _pose(reader: "MjcfReader", link: str) -> Frame:
+def _pose(reader: MjcfReader, link: str) -> Frame:
     pose = Frame()
     while link != WORLD:
         joint = next(j for j in reader.model.joints.values() if j.child == link and not j.closes)
@@ -109,14 +101,14 @@ def _pose(reader: "MjcfReader", link: str) -> Frame:
     return pose
 
 
-def _joint(reader: "MjcfReader", name: str, place: Place) -> Joint:
+def _joint(reader: MjcfReader, name: str, place: Place) -> Joint:
     joint = reader.model.joints.get(name)
     if joint is None or joint.kind not in SCALAR:
         raise FormatError(f"there is no hinge or slide {name!r}", place)
     return joint
 
 
-def _couple(reader: "MjcfReader", element: XmlElement) -> None:
+def _couple(reader: MjcfReader, element: XmlElement) -> None:
     """q1 - ref1 = a0 + a1 (q2 - ref2); coordinates of the model are without their references."""
     joint, remarks = element.require("joint1"), reader.document.source.remarks
     one = _joint(reader, joint, element.place)
@@ -139,7 +131,7 @@ def _couple(reader: "MjcfReader", element: XmlElement) -> None:
         one.position = (a0,)
 
 
-def _hold(reader: "MjcfReader", joint: Joint, q: float) -> None:
+def _hold(reader: MjcfReader, joint: Joint, q: float) -> None:
     """Make a joint a fixed one at a coordinate."""
     axis = joint.axes[0]
     moved = Frame(A=axis_angle(axis, q)) if joint.kind == "revolute" else Frame(
@@ -148,7 +140,7 @@ def _hold(reader: "MjcfReader", joint: Joint, q: float) -> None:
     reader.model.joints[joint.name] = held
 
 
-def _couple_by_tendon(reader: "MjcfReader", element: XmlElement) -> None:
+def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:
     """The length of a fixed tendon of two joints stays constant: c1 q1 + c2 q2 = 0."""
     remarks, name = reader.document.source.remarks, element.require("tendon1")
     tendons = [t for holder in reader.document.root.all("tendon") for t in holder]

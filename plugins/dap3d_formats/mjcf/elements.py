@@ -11,7 +11,7 @@ _FRAME = taken("pos quat axisangle xyaxes zaxis euler")
 _CLASS = taken("class")
 _ACTUATOR = (
     taken("name class joint jointinparent gear kp kv gaintype gainprm biastype biasprm dyntype")
-    | noted("group user", _DRAWING)
+    | taken("group") | noted("user", _DRAWING)
     | noted("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
     | noted(
         "ctrllimited forcelimited actlimited ctrlrange forcerange actrange lengthrange actdim "
@@ -40,13 +40,13 @@ MJCF: Table = {
         "no effect here",
     ),
     "lengthrange": noted("", "muscles"),
-    "option": taken() | taken("gravity")
+    "option": taken() | taken("gravity actuatorgroupdisable")
     | noted("wind density viscosity magnetic", "fluids and fields")
     | noted(
         "timestep impratio tolerance ls_tolerance noslip_tolerance ccd_tolerance sleep_tolerance "
         "o_margin o_solref o_solimp o_friction integrator cone jacobian solver iterations "
         "ls_iterations noslip_iterations ccd_iterations sdf_iterations sdf_initpoints "
-        "actuatorgroupdisable apirate mpr_iterations mpr_tolerance collision",
+        "apirate mpr_iterations mpr_tolerance collision",
         _SOLVER,
     ),
     "flag": taken() | taken("gravity")
@@ -64,7 +64,8 @@ MJCF: Table = {
     "extension": noted("", "plugins of a simulator are not run"),
     "asset": taken(),
     "mesh": taken() | taken("name class file scale refpos refquat inertia")
-    | noted("vertex face normal texcoord builtin params", "meshes without a file are not drawn")
+    | translated("vertex face", "its mass properties count; it is not drawn")
+    | noted("normal texcoord builtin params", "meshes without a file are not drawn")
     | noted("content_type smoothnormal maxhullvert material octree_maxdepth", _DRAWING),
     "material": taken() | taken("name class rgba")
     | noted(
@@ -108,7 +109,7 @@ MJCF: Table = {
     "plugin": noted("", "plugins of a simulator are not run"),
     "composite": refused("", "composites are not expanded; save the compiled model in MuJoCo"),
     "flexcomp": refused("", "deformable bodies"),
-    "replicate": refused("", "replicates are not expanded; save the compiled model in MuJoCo"),
+    "replicate": taken() | taken("count sep offset euler"),
     "attach": refused("", "models are not attached; save the compiled model in MuJoCo"),
     "deformable": noted("", "deformable bodies"),
     "contact": noted("", _CONTACT),

@@ -168,21 +168,66 @@ class Geoms:
         Raises:
             FormatError: it cannot be read, or encloses nothing.
         """
-        asset, source = self._asset(geom), self.document.source
-        rule = asset.get("inertia", "legacy")
-        if "file" not in asset.attributes or rule not in ("legacy", "exact"):
+        asset, rule = self._asset(geom), self._asset(geom).get("inertia", "legacy")
+        given = {"file", "vertex"} & asset.attributes.keys()
+        if not given or "builtin" in asset.attributes or rule not in ("legacy", "exact"):
             what = f"the inertia of mesh {asset.get('name')} is not computed here"
             raise FormatError(what, geom.place, "give its body an <inertial>")
-        path = source.locate(self._file(asset), asset.place, required=True)
-        assert path is not None
-        vertices, triangles = source.mesh(path, asset.place)
+        vertices, triangles = self._read(asset) if "file" in given else _inline(asset)
         vertices = vertices * np.array(asset.numbers("scale", 3, (1.0, 1.0, 1.0)))
         reference = _reference(asset).inverse()
         vertices = vertices @ reference.A.T + reference.r
         try:
             return inertia_of_mesh(vertices, triangles, all_positive=rule == "legacy")
         except ValueError as error:
-            raise FormatError(f"mesh {path.name}: {error}", geom.place) from None
+            raise FormatError(f"mesh {geom.get('mesh')}: {error}", geom.place) from None
+
+    def _read(self, asset: XmlElement) -> tuple[Any, Any]:
+        source = self.document.source
+        path = source.locate(self._file(asset), asset.place, required=True)
+        assert path is not None
+        return source.mesh(path, asset.place)
+
+
+def _inline(asset: XmlElement) -> tuple[Any, Any]:
+    """Vertices and triangles of a mesh without a file; those of its hull where it has no faces.
+
+    Raises:
+        FormatError: the numbers are no triples, or name no vertices.
+    """
+    triples = {}
+    for key in ("vertex", "face"):
+        numbers = asset.numbers(key, None, ())
+        if len(numbers) % 3:
+            what = f"{key} of <mesh> should be triples; it has {len(numbers)} numbers"
+            raise FormatError(what, asset.place)
+        triples[key] = np.array(numbers, dtype=float).reshape(-1, 3)
+    vertices, triangles = triples["vertex"], triples["face"].astype(np.int64)
+    if not len(triangles):
+        return vertices, _hull(vertices, asset)
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        raise FormatError(f"face of <mesh> names other than {len(vertices)} vertices", asset.place)
+    return vertices, triangles
+
+
+def _hull(vertices: Any, asset: XmlElement) -> Any:
+    """The triangles of the convex hull of points, with their normals outwards.
+
+    Raises:
+        FormatError: the points lie in a plane.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(vertices)
+    except (QhullError, ValueError):
+        what = f"mesh {asset.get('name')}: its vertices span no volume"
+        raise FormatError(what, asset.place) from None
+    a, b, c = (vertices[hull.simplices[:, k]] for k in range(3))
+    inwards = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0.0
+    triangles = hull.simplices.copy()
+    triangles[inwards] = triangles[inwards][:, ::-1]
+    return triangles
 
 
 def _reference(asset: XmlElement) -> Frame:

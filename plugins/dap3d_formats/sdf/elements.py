@@ -24,9 +24,9 @@ SDF: Table = {
     "inertial": taken() | taken("auto") | noted("density", "give mass and inertia"),
     "mass": taken(), "inertia": taken(),
     "ixx": taken(), "ixy": taken(), "ixz": taken(), "iyy": taken(), "iyz": taken(), "izz": taken(),
-    "visual": taken() | noted("name", "names of shapes"),
+    "visual": taken() | translated("name", "shapes are named after their link"),
     "collision": translated("", "drawn where a link has no visual")
-    | noted("name", "names of shapes"),
+    | translated("name", "shapes are named after their link"),
     "geometry": taken(),
     "box": taken(), "size": taken(), "sphere": taken(), "cylinder": taken(), "capsule": taken(),
     "ellipsoid": noted("", "ellipsoids are not drawn"),

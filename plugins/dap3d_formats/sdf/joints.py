@@ -1,7 +1,7 @@
 """Joints of SDF."""
 
 from math import inf, pi
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dap3d_core.interface.formats import (
     WORLD,
@@ -14,9 +14,7 @@ from dap3d_core.interface.formats import (
     XmlElement,
 )
 from dap3d_formats.axes import unit
-
-if TYPE_CHECKING:
-    from dap3d_formats.sdf.importer import SdfReader
+from dap3d_formats.sdf.reader import SdfReader, scoped, text_of
 
 #: Type -> kind of a joint.
 KINDS = {
@@ -29,13 +27,13 @@ UNLIMITED = 1e15
 RIGID = 1e8
 
 
-def read_joint(reader: "SdfReader", element: XmlElement, scope: str) -> None:
+def read_joint(reader: SdfReader, element: XmlElement, scope: str) -> None:
     """Read a joint; a link with two parents closes a loop.
 
     Raises:
         FormatError: it has no counterpart.
     """
-    name, type_ = _scoped(scope, element.require("name")), element.require("type")
+    name, type_ = scoped(scope, element.require("name")), element.require("type")
     if type_ == "gearbox":
         return
     if type_ not in KINDS:
@@ -58,7 +56,7 @@ def read_joint(reader: "SdfReader", element: XmlElement, scope: str) -> None:
     reader.model.joints[name] = joint
 
 
-def read_gearbox(reader: "SdfReader", element: XmlElement, scope: str) -> None:
+def read_gearbox(reader: SdfReader, element: XmlElement, scope: str) -> None:
     """Read a gearbox: a coupling of two joints on its reference body.
 
     theta_1 = -ratio theta_2, of the parent and the child against the reference body.
@@ -66,10 +64,8 @@ def read_gearbox(reader: "SdfReader", element: XmlElement, scope: str) -> None:
     Raises:
         FormatError: its parent or child has no joint on the reference body.
     """
-    from dap3d_formats.sdf.importer import text_of
-
-    name = _scoped(scope, element.require("name"))
-    reference = _scoped(scope, text_of(element, "gearbox_reference_body"))
+    name = scoped(scope, element.require("name"))
+    reference = scoped(scope, text_of(element, "gearbox_reference_body"))
     ratio = element.first("gearbox_ratio")
     pair = []
     for tag in ("parent", "child"):
@@ -86,25 +82,21 @@ def read_gearbox(reader: "SdfReader", element: XmlElement, scope: str) -> None:
     reader.remarks.translate(element.place, "a gearbox couples the rates of two joints")
 
 
-def _scoped(scope: str, name: str) -> str:
-    return name if name == WORLD or not scope else f"{scope}::{name}"
-
-
-def _end(reader: "SdfReader", element: XmlElement, scope: str, tag: str) -> str:
+def _end(reader: SdfReader, element: XmlElement, scope: str, tag: str) -> str:
     """The link of an end of a joint."""
     child = element.first(tag)
     if child is None or not child.text.strip():
         raise FormatError(f"<joint> has no <{tag}>; it is required", element.place)
-    name = _scoped(scope, child.text.strip())
+    name = scoped(scope, child.text.strip())
     links: Any = reader.model.links
     return reader.frames.link_of(name, links, child.place)
 
 
-def _of_link(reader: "SdfReader", link: str, place: Place) -> Frame:
+def _of_link(reader: SdfReader, link: str, place: Place) -> Frame:
     return Frame() if link == WORLD else reader.frames.in_world(link, place)
 
 
-def _axes(reader: "SdfReader", joint: Joint, element: XmlElement, scope: str) -> None:
+def _axes(reader: SdfReader, joint: Joint, element: XmlElement, scope: str) -> None:
     """Axes, limits and dynamics of a joint."""
     tags = ("axis", "axis2") if joint.kind == "universal" else ("axis",)
     default = {"axis": (0.0, 0.0, 1.0), "axis2": (0.0, 0.0, 1.0)}
@@ -129,7 +121,7 @@ def _axes(reader: "SdfReader", joint: Joint, element: XmlElement, scope: str) ->
 
 
 def _expressed(
-    reader: "SdfReader", joint: Joint, axis: XmlElement, direction: Any, scope: str
+    reader: SdfReader, joint: Joint, axis: XmlElement, direction: Any, scope: str
 ) -> tuple[float, ...]:
     """The direction of an axis in the frame of its joint."""
     xyz = axis.first("xyz")
@@ -139,7 +131,7 @@ def _expressed(
         frame = "__model__"
     if not frame:
         return tuple(direction)
-    there = reader.frames.in_world(_scoped(scope, frame), axis.place)
+    there = reader.frames.in_world(scoped(scope, frame), axis.place)
     here = reader.frames.in_world(joint.name, axis.place)
     return tuple(float(x) for x in here.A.T @ there.A @ direction)
 
@@ -148,7 +140,8 @@ def _limits(axis: XmlElement, *, unlimited: bool) -> Limits:
     limit = axis.first("limit")
     if limit is None or unlimited:
         return Limits()
-    values = {child.name: _number(child) for child in limit}
+    used = ("lower", "upper", "stiffness")
+    values = {child.name: _number(child) for child in limit if child.name in used}
     lower, upper = values.get("lower", -inf), values.get("upper", inf)
     if lower > upper:
         raise FormatError(f"lower = {lower:g} lies above upper = {upper:g}", limit.place)
@@ -169,7 +162,8 @@ def _number(element: XmlElement) -> float:
 
 def _dynamics(axis: XmlElement) -> dict[str, float]:
     dynamics = axis.first("dynamics")
-    values = {child.name: child.content(1)[0] for child in dynamics or ()}
+    used = ("damping", "friction", "spring_stiffness", "spring_reference")
+    values = {c.name: c.content(1)[0] for c in dynamics or () if c.name in used}
     return {
         "damping": values.get("damping", 0.0), "friction": values.get("friction", 0.0),
         "stiffness": values.get("spring_stiffness", 0.0),
@@ -177,15 +171,16 @@ def _dynamics(axis: XmlElement) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _mimic(reader: "SdfReader", joint: Joint, axis: XmlElement, scope: str) -> None:
+def _mimic(reader: SdfReader, joint: Joint, axis: XmlElement, scope: str) -> None:
     """A coordinate that follows another: q = multiplier (q_leader - reference) + offset."""
     mimic = axis.first("mimic")
     if mimic is None:
         return
-    values = {child.name: child.content(1)[0] for child in mimic}
+    used = ("multiplier", "offset", "reference")
+    values = {child.name: child.content(1)[0] for child in mimic if child.name in used}
     ratio = values.get("multiplier", 1.0)
     offset = values.get("offset", 0.0) - ratio * values.get("reference", 0.0)
-    leader = _scoped(scope, mimic.require("joint"))
+    leader = scoped(scope, mimic.require("joint"))
     reader.model.couplings.append(Coupling("", joint.name, leader, ratio, offset, mimic.place))
     if offset:
         joint.position = (offset,)

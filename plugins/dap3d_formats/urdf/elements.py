@@ -11,9 +11,9 @@ URDF: Table = {
     "origin": taken() | taken("xyz rpy"),
     "mass": taken() | taken("value"),
     "inertia": taken() | taken("ixx ixy ixz iyy iyz izz"),
-    "visual": taken() | noted("name", "names of shapes"),
+    "visual": taken() | translated("name", "shapes are named after their link"),
     "collision": translated("", "drawn where a link has no visual")
-    | noted("name group", "names of shapes"),
+    | translated("name group", "shapes are named after their link"),
     "geometry": taken(),
     "box": taken() | taken("size"),
     "sphere": taken() | taken("radius"),

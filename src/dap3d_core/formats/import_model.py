@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.formats.import_scene.names import Names
-from dap3d_core.formats.import_scene.scene_builder import ImportOptions, scene_of
+from dap3d_core.formats.import_scene.scene_of_model import ImportOptions, scene_of
 from dap3d_core.formats.import_scene.shapes import MeshFiles
 from dap3d_core.formats.import_scene.source_files import SourceFiles
 from dap3d_core.interface.errors import PluginError
@@ -17,8 +17,12 @@ from dap3d_core.interface.formats import Articulation, FormatError, Importer, Re
 from dap3d_core.interface.formats.xml_tree import XmlElement
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.formats import Formats, load_formats
+from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Scene, SceneError, check
 from dap3d_core.scene.errors import MISSING, Mistake
+
+#: Endings of files that a message names where a folder is given.
+SUFFIXES = (".urdf", ".xacro", ".sdf", ".xml", ".mjcf")
 
 
 @attrs.frozen
@@ -107,6 +111,8 @@ def import_model(
         scene = scene_of(model, source.remarks, options, meshes=meshes, names=names)
     except FormatError as error:
         raise _refusal(error, file) from None
+    except SceneError as error:
+        raise SceneError(_relocated(m, names, file) for m in error.mistakes) from None
     if strict:
         _refuse_omissions(source.remarks)
     scene.description = f"From {file.name}."
@@ -170,13 +176,14 @@ def read_articulation(
         FormatError: the file cannot be read.
         PluginError: there is no such importer, or it is broken.
     """
-    if not file.exists():
-        raise FormatError(f"there is no file {file}")
+    _require_file(file)
     folders = {name: Path(os.fsdecode(folder)) for name, folder in (packages or {}).items()}
     for name, folder in folders.items():
         if not folder.is_dir():
             raise FormatError(f"package {name}: {folder} is no folder")
     folder = file.parent if root is None else Path(os.fsdecode(root))
+    if not folder.is_dir():
+        raise FormatError(f"root: {folder} is no folder")
     source = SourceFiles(file, folder, folders, allow_code, shapes)
     importer, keyword = _importer(source, format)
     try:
@@ -185,6 +192,29 @@ def read_articulation(
         raise
     except RecursionError:
         raise FormatError("is nested too deep") from None
+
+
+def _require_file(file: Path) -> None:
+    """Refuse a path that is no file.
+
+    Raises:
+        FormatError: it is missing or a folder; with names of files that may be meant.
+    """
+    if file.is_dir():
+        models = sorted(one.name for one in file.iterdir() if one.suffix in SUFFIXES)
+        names = f", such as {', '.join(models[:5])}" if models else ""
+        raise FormatError(f"{file} is a folder", remedy=f"name a file in it{names}")
+    if not file.exists():
+        near = nearest(file.name, _names_in(file.parent))
+        hint = f"; did you mean {near!r}?" if near else ""
+        raise FormatError(f"there is no file {file}{hint}")
+
+
+def _names_in(folder: Path) -> list[str]:
+    try:
+        return sorted(one.name for one in folder.iterdir())
+    except OSError:
+        return []
 
 
 def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:

@@ -41,9 +41,11 @@ class FieldSpec:
         across: the field of a vector that this one must not be parallel to at the start of a run.
         unit_length: a vector is normalised (with a warning where its length is not 1).
         ground: a vector must be fixed in ground.
-        argument: the argument of a function; "" for time.
+        argument: the argument of a function, or both of one of two; "" for time.
+        arguments: how many a function takes.
         columns: numbers in a row of a table; count of ``numbers``.
         given: a table is given in the scene; False: ``prepare`` returns it.
+        by_rows: a table is given as rows of equal length, for ``prepare`` alone.
         axes: the fields an angle is measured between: two vectors, and the axis.
         rows: number of rows that a joint must have; None for any.
         instead_of: field that an input takes the place of; "" for none.
@@ -65,8 +67,10 @@ class FieldSpec:
     across: str = ""
     ground: bool = False
     argument: str = ""
+    arguments: int = 1
     columns: int = 1
     given: bool = True
+    by_rows: bool = False
     axes: tuple[str, str, str] = ("", "", "")
     rows: int | None = None
     instead_of: str = ""
@@ -149,27 +153,40 @@ def matrix(default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
     return _field(FieldSpec("matrix", default, unit, doc))
 
 
-def table(*, columns: int = 1, given: bool = True, unit: str = "", doc: str = "") -> Any:
+def table(
+    *,
+    columns: int = 1,
+    given: bool = True,
+    by_rows: bool = False,
+    unit: str = "",
+    doc: str = "",
+) -> Any:
     """Numbers of any count, which kernels read by ``lookup``.
 
-    A table of one column is given in the scene as a list. With ``given=False`` it is not in the
-    scene: ``prepare`` returns it under the field's name, rows of ``columns`` numbers with
-    increasing first numbers.
+    A table of one column is given in the scene as a list; with ``by_rows`` as a list of rows of
+    equal length, which ``prepare`` alone reads. With ``given=False`` it is not in the scene:
+    ``prepare`` returns it under the field's name, rows of ``columns`` numbers with increasing first
+    numbers.
     """
     default = REQUIRED if given else None
-    return _field(FieldSpec("table", default, unit, doc, columns=columns, given=given))
+    spec = FieldSpec("table", default, unit, doc, columns=columns, given=given, by_rows=by_rows)
+    return _field(spec)
 
 
-def function(default: Any = None, *, argument: str = "", doc: str = "") -> Any:
+def function(default: Any = None, *, argument: str | tuple[str, str] = "", doc: str = "") -> Any:
     """A function by name; absent, it is zero. With ``REQUIRED`` the scene must give it.
 
     Of time it offers its value and derivatives ``f``, ``f_dot``, ``f_ddot``, ``f_dddot``, and
     ``f_0``, its value at t = 0; next to a field of the name ``f`` they begin with its own name.
     With ``argument`` (the name of its argument) kernels call ``f(x)``, ``f_dot(x)``, ``f_ddot(x)``,
     ``f_dddot(x)``: value and derivatives; where it may be omitted, such kernels belong to a variant
-    of the type for ``function=True``.
+    of the type for ``function=True``. With two names they call ``f(x, y)`` and its partial
+    derivatives ``f_x(x, y)``, ``f_y``, ``f_xx``, ``f_xy``, ``f_yy``; the scene gives a function of
+    two arguments.
     """
-    return _field(FieldSpec("function", default, doc=doc, argument=argument))
+    names = (argument,) if isinstance(argument, str) else argument
+    words, count = " and ".join(names), len(names)
+    return _field(FieldSpec("function", default, doc=doc, argument=words, arguments=count))
 
 
 def functions(*, doc: str = "") -> Any:

@@ -36,6 +36,8 @@ GROUPS = {
 }
 #: The same of integrators, whose hook lies in ``interface.integrators``.
 INTEGRATOR_GROUP = ("dap3d.integrators", "dap3d_integrators")
+#: The same of kinds of shapes, whose hook lies in ``interface.shapes``.
+SHAPE_GROUP = ("dap3d.shapes", "dap3d_shapes")
 #: The same of file formats, whose hooks lie in ``interface.formats``: no scene needs them.
 FORMAT_GROUPS = {
     "importer": ("dap3d.importers", "dap3d_importers"),

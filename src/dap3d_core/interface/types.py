@@ -212,12 +212,16 @@ class Force(TypeBase):
 class Function(TypeBase):
     """A function of one variable: ``value(x, ...)`` returns (f, f', f'', f''').
 
+    One of two, ``arguments = 2``, has ``value(x, y, ...)``, which returns (f, f_x, f_y, f_xx, f_xy,
+    f_yy), and no ``breaks``; types call it whose field ``function`` has two arguments.
+
     Of one that returns f alone the others are derived (derive/derive.py). No step of a run passes
     over an argument listed by ``breaks``, a time or an elongation: a change shorter than a step is
     not missed.
 
     Attributes:
         keyword: the name of the type in a scene.
+        arguments: how many it takes, 1 or 2.
         smooth: it has one smooth form everywhere. Of a function of another argument than time that
             is not declared smooth and has no ``breaks`` a run notes that steps may pass over
             changes of it.
@@ -225,6 +229,7 @@ class Function(TypeBase):
 
     kind = "function"
     kernel_names = ("value",)
+    arguments: ClassVar[int] = 1
     smooth: ClassVar[bool] = False
 
     def breaks(self) -> Sequence[float]:

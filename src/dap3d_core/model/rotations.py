@@ -13,18 +13,18 @@ AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 def rotation(p: ArrayLike) -> Floats:
     """Rotation matrices (..., 3, 3), body to global, of Euler parameters (..., 4) of any length."""
     p = np.asarray(p, dtype=float)
-    e0, e1, e2, e3 = np.moveaxis(p / np.linalg.norm(p, axis=-1, keepdims=True), -1, 0)
-    return np.moveaxis(
-        np.array(
-            [
-                [1 - 2 * (e2 * e2 + e3 * e3), 2 * (e1 * e2 - e0 * e3), 2 * (e1 * e3 + e0 * e2)],
-                [2 * (e1 * e2 + e0 * e3), 1 - 2 * (e1 * e1 + e3 * e3), 2 * (e2 * e3 - e0 * e1)],
-                [2 * (e1 * e3 - e0 * e2), 2 * (e2 * e3 + e0 * e1), 1 - 2 * (e1 * e1 + e2 * e2)],
-            ]
-        ),
-        (0, 1),
-        (-2, -1),
-    )
+    e0, e1, e2, e3 = (p / np.sqrt(np.add.reduce(p * p, axis=-1, keepdims=True))).T
+    A = np.empty((3, 3, *e0.shape))
+    A[0, 0] = 1 - 2 * (e2 * e2 + e3 * e3)
+    A[0, 1] = 2 * (e1 * e2 - e0 * e3)
+    A[0, 2] = 2 * (e1 * e3 + e0 * e2)
+    A[1, 0] = 2 * (e1 * e2 + e0 * e3)
+    A[1, 1] = 1 - 2 * (e1 * e1 + e3 * e3)
+    A[1, 2] = 2 * (e2 * e3 - e0 * e1)
+    A[2, 0] = 2 * (e1 * e3 - e0 * e2)
+    A[2, 1] = 2 * (e2 * e3 + e0 * e1)
+    A[2, 2] = 1 - 2 * (e1 * e1 + e2 * e2)
+    return A.T.swapaxes(-1, -2)
 
 
 def to_body(p: ArrayLike, vector: ArrayLike) -> Floats:

@@ -6,6 +6,7 @@ elements that have some (docs/decisions/0054), and last the work done on the sys
 (docs/decisions/0002). A reported row is t, y, and what is evaluated there.
 """
 
+from collections.abc import Callable
 from functools import cache
 from itertools import accumulate
 
@@ -135,11 +136,12 @@ def join(r: ArrayLike, p: ArrayLike, v: ArrayLike, w: ArrayLike) -> Floats:
 
 def y_from_u(u: ArrayLike, work: ArrayLike = 0.0, states: ArrayLike = ()) -> Floats:
     """Integrated states y of states u (..., 13 n) and states of elements (..., s) or (s,)."""
-    r, p, v, w = split(u)
-    work = np.broadcast_to(np.asarray(work, dtype=float), r.shape[:-2])[..., None]
-    own = np.asarray(states, dtype=float)
-    own = np.broadcast_to(own, (*r.shape[:-2], own.shape[-1]))
-    return np.concatenate([join(r, p, v, to_body(p, w)), own, work], axis=-1)
+    u, own = np.asarray(u, dtype=float), np.asarray(states, dtype=float)
+    size = u.shape[-1]
+    y = np.empty((*u.shape[:-1], size + own.shape[-1] + 1))
+    y[..., :size], y[..., size:-1], y[..., -1] = u, own, work
+    _to_frames(to_body, y[..., :size])
+    return y
 
 
 def bodies_of(y: Floats, states: int) -> Floats:
@@ -149,6 +151,12 @@ def bodies_of(y: Floats, states: int) -> Floats:
 
 def u_from_y(y: ArrayLike, states: int = 0) -> Floats:
     """States u (..., 13 n) of integrated states y with so many states of elements."""
-    y = np.asarray(y, dtype=float)
-    r, p, v, w = split(y[..., : y.shape[-1] - states])
-    return join(r, p, v, to_global(p, w))
+    u = bodies_of(np.asarray(y, dtype=float), states).copy()
+    _to_frames(to_global, u)
+    return u
+
+
+def _to_frames(turn: Callable[[Floats, Floats], Floats], u: Floats) -> None:
+    """Turn the angular velocities of states u (..., 13 n) into other axes, in place."""
+    _, p, _, w = split(u)
+    w[...] = turn(p, w)

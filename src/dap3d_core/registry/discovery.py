@@ -11,7 +11,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.hooks import FORMAT_GROUPS, GROUPS, INTEGRATOR_GROUP
+from dap3d_core.interface.hooks import FORMAT_GROUPS, GROUPS, INTEGRATOR_GROUP, SHAPE_GROUP
 
 #: Environment variable that excludes types, separated by commas: all of a distribution, ``NAME``,
 #: or one of them, ``NAME:KEYWORD``.
@@ -69,7 +69,8 @@ def _discover(
     groups: frozenset[str], blocked: frozenset[str], path: tuple[tuple[str, int], ...]
 ) -> tuple[Source, ...]:
     """The types; ``path`` is the search path with times of change, a key of the cache."""
-    known = (GROUPS | FORMAT_GROUPS | {"integrator": INTEGRATOR_GROUP}).items()
+    others = {"integrator": INTEGRATOR_GROUP, "shape": SHAPE_GROUP}
+    known = (GROUPS | FORMAT_GROUPS | others).items()
     kinds = {group: kind for kind, (group, _) in known if group in groups}
     sources = [source for one in _declaring(kinds) for source in _sources(one, kinds, blocked)]
     order = {kind: k for k, kind in enumerate(GROUPS)}

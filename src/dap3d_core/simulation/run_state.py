@@ -114,7 +114,7 @@ class RunState:
         self.until = np.inf
         self.options: dict[str, Any] = {}
         self.event_locator = EventLocator(compiled, events) if events else None
-        self.jumps = _jumps_of(self.evaluator)
+        self.jumps = jumps_of(self.evaluator)
         if self.event_locator is not None:
             self.event_locator.jumps = self.jumps
         self.control: SampledControl | None = None
@@ -238,7 +238,7 @@ class RunState:
         return {"rate_noise": {"v": v, "w": w}}
 
 
-def _jumps_of(evaluator: Evaluator) -> "Jumps | None":
+def jumps_of(evaluator: Evaluator) -> "Jumps | None":
     """What changes velocities in a run of a model; None where none of its types does."""
     if not any(switch.jumps for switch in evaluator.switches):
         return None

@@ -174,7 +174,8 @@ def test_the_names_besides_those_of_fields_are_those_of_the_sources():
 
     page = (DOCS / "reference" / "names.md").read_text()
     besides = rows_of(page, "where | names")
-    assert list(besides.values()) == [[{"t"}], [{"x"}], [set(friction_names(3))]]
+    jumps = [[{"crossing"}], [{"Jv"}]]
+    assert list(besides.values()) == [[{"t"}], [{"x"}], [set(friction_names(3))], *jumps]
     for line, levels in rows_of(page, "returned | position level | velocity level").items():
         (constant,) = re.findall(r"`(\"\w+\": .*)`", line)
         found = names_of(constants=eval(f"{{{constant}}}"))

@@ -80,6 +80,29 @@ def test_what_is_written_reads_back_as_the_scene(tmp_path, file, format):
     assert_same(scene, back)
 
 
+def test_every_joint_that_mjcf_has_reads_back_as_itself(tmp_path):
+    """A chain of all types of joints that move or hold two bodies."""
+    scene = dap.Scene(name="chain")
+    joints = [("sph", {}), ("cyl", {"a_i": "{i}.x", "a_j": "{j}.x"}),
+              ("rev", {"a_i": "{i}.y", "a_j": "{j}.y"}), ("univ", {"a_i": "{i}.y", "n_j": "{j}.z"}),
+              ("tran", {"a_j": "{j}.z"})]  # fmt: skip
+    before = "ground"
+    for k, (keyword, fields) in enumerate(joints):
+        body = f"b{k}"
+        scene.add_body(body, mass=1.0 + k, Jp=(0.1, 0.2, 0.25), r=(0.3 + 0.6 * k, 0.0, 0.1 * k))
+        scene.add_point(f"P{k}", body, (-0.3, 0.0, 0.0))
+        at = (0.0, 0.0, 0.0) if before == "ground" else (0.3, 0.0, 0.1)
+        scene.add_point(f"Q{k}", before, at)
+        ends = {key: value.format(i=body, j=before) for key, value in fields.items()}
+        scene.add_joint(keyword, f"J{k}", P_i=f"P{k}", P_j=f"Q{k}", **ends)
+        before = body
+    scene.add_body("end", mass=1.0, Jp=(0.1, 0.2, 0.25), r=(3.0, 0.2, 0.5), p=(0.8, 0.0, 0.6, 0.0))
+    scene.add_joint("weld", "end_fixed", body_i="end", body_j=before)
+    dap.export_model(scene, tmp_path / "a.xml", format="mjcf")
+    back, _ = dap.import_model(tmp_path / "a.xml", keep_fixed=True)
+    assert_same(scene, back)
+
+
 def test_a_scene_by_hand_keeps_its_mechanism(tmp_path):
     """Joints in any direction, a spring between unlike axes: accelerations are the same."""
     scene = dap.Scene(name="hand")

@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from support.plain import long_in_plain_python
 from support.process import REPOSITORY
 
 import dap3d_core as dap
@@ -85,8 +86,8 @@ def test_the_tables_do_what_they_say():
     assert [one.text for one in remarks.left_out] == [
         "<a>: an unknown element", "<sensor>: sensors", "c of <body>: an unknown attribute",
     ]  # fmt: skip
-    with pytest.raises(FormatError, match="replicates are not expanded"):
-        note_elements(parse_xml("<mujoco><replicate/></mujoco>", "x.xml"), MJCF, remarks)
+    with pytest.raises(FormatError, match="composites are not expanded"):
+        note_elements(parse_xml("<mujoco><composite/></mujoco>", "x.xml"), MJCF, remarks)
 
 
 def reference(t, theta, rate):
@@ -97,6 +98,7 @@ def reference(t, theta, rate):
     return solve_ivp(rates, (0, t[-1]), (theta, rate), "DOP853", t, rtol=1e-12, atol=1e-12).y[0]
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_a_closed_loop_moves_as_its_minimal_coordinate(suffix):
     """Over 1 s from 0.8 rad; both integrations hold 1e-10, summed errors stay below 1e-7."""

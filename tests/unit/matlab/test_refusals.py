@@ -4,6 +4,7 @@ import shutil
 
 import pytest
 from support.matlab import SMALL, write
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.matlab.language.parse import LARGEST_FILE
@@ -206,6 +207,7 @@ def test_arithmetic_that_overflows_is_refused(refused, words):
     assert "not a finite real number" in found
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(
     ("begin", "again"),
     [

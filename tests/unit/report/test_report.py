@@ -178,6 +178,7 @@ def test_a_target_that_cannot_be_reached_or_told_is_said_so():
 # ---------------------------------------------------------------------------- whole reports
 
 
+@long_in_plain_python
 def test_every_integrator_is_measured_and_errors_fall_with_the_tolerance(small):
     """Of the pendulum from rest, over 0.2 s; in each ladder the last error is far below the first.
 
@@ -196,6 +197,7 @@ def test_every_integrator_is_measured_and_errors_fall_with_the_tolerance(small):
     assert all("does not fit" in each.reason for each in small.refused)
 
 
+@long_in_plain_python
 def test_the_reference_is_two_runs_that_differ_in_integrator_and_method(small):
     first, second = small.reference.settings
     assert first.integrator != second.integrator
@@ -308,6 +310,7 @@ def test_a_run_that_takes_too_long_is_ended_and_finer_ones_are_left_out(monkeypa
     assert found.recommended().reason == "no setting came to its end"
 
 
+@long_in_plain_python
 def test_redundant_scenes_refuse_the_standard_method_and_go_on():
     found = dap.report("A04", quick=True, t_end=0.02, dt=0.02, integrators=["dop853"])
     reasons = {each.method: each.reason for each in found.refused}

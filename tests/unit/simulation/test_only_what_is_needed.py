@@ -1,5 +1,7 @@
 """A scene pays for nothing that it does not use: imports and compilations in fresh processes."""
 
+from functools import cache
+
 import pytest
 from support.plain import in_another_process
 from support.process import REPOSITORY, run
@@ -10,6 +12,11 @@ MODULES = "import sys; print(' '.join(m for m in sys.modules))"
 HEAVY = {"numpy", "scipy", "llvmlite", "matplotlib", "netCDF4", "xarray"}
 
 
+#: A run that needs nothing but a joint and a weight.
+PLAIN_RUN = "import dap3d_core as dap\ndap.simulate('pen1', t_end=0.04, dt=0.02)"
+
+
+@cache
 def imported(script):
     return set(run(f"{script}\n{MODULES}").splitlines()[-1].split())
 
@@ -41,9 +48,8 @@ def test_requirements_are_read_where_a_scene_has_them():
 def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     """Method standard brings in nothing of them."""
     names = {"dap3d_core.formulations.joint", "dap3d_core.assembly.motion.classify"}
-    script = "import dap3d_core as dap\ndap.simulate('pen1', t_end=0.02, method='{}')"
-    assert not imported(script.format("standard")) & names
-    found = imported(script.format("joint"))
+    assert not imported(PLAIN_RUN) & names
+    found = imported(PLAIN_RUN.replace("dt=", "method='joint', dt="))
     assert names <= found
     assert "dap3d_core.formulations.joint_loops" not in found  # a tree keeps no rows
 
@@ -82,7 +88,7 @@ def test_a_scene_without_states_has_nothing_of_them():
 
 def test_formats_are_imported_by_their_commands_alone():
     """A run needs neither importers nor what they are made with; an import needs one of them."""
-    found = imported("import dap3d_core as dap\ndap.simulate('pen1', t_end=0.02)")
+    found = imported(PLAIN_RUN)
     ours = ("dap3d_formats", "dap3d_core.formats", "dap3d_core.interface.formats", "xml", "pyexpat")
     assert not [m for m in found if m.startswith(ours)]
     file = REPOSITORY / "tests" / "data" / "formats" / "arm.urdf"
@@ -100,9 +106,8 @@ def test_inputs_and_what_sets_them_are_imported_where_a_scene_has_some():
         "dap3d_core.scene.signals",
         "dap3d_core.interface.codegen.terms",
     }
-    script = "import dap3d_core as dap\ndap.{}"
-    assert not imported(script.format("simulate('fourbar2', t_end=0.1)")) & names
-    found = imported(script.format("start('pen1').step(0.01)"))
+    assert not imported(PLAIN_RUN) & names
+    found = imported("import dap3d_core as dap\ndap.start('pen1').step(0.01)")
     assert names & found == names - {
         "dap3d_core.scene.signals",
         "dap3d_core.interface.codegen.terms",
@@ -112,7 +117,8 @@ def test_inputs_and_what_sets_them_are_imported_where_a_scene_has_some():
 @pytest.mark.parametrize("keyword", ["f", "fp", "n", "np", "ptp", "rot_sda"])
 def test_a_force_without_a_factor_has_the_loop_of_one_that_knows_of_none(keyword):
     """Its instances have the integers of its bodies alone, and its loop reads no function."""
-    from dap3d_core.interface.codegen.loop_source import stride, write
+    from dap3d_core.interface.codegen.compile_loops import write
+    from dap3d_core.interface.codegen.loop_source import stride
     from dap3d_core.registry import load_registry
 
     type_info = load_registry().get("force", keyword)
@@ -195,7 +201,7 @@ def test_a_page_needs_neither_matplotlib_nor_a_reader_of_meshes():
 
 def test_a_run_knows_nothing_of_studies():
     """``dap.simulate`` imports nothing of sweeps, fits, clusters."""
-    found = imported("import dap3d_core as dap\ndap.simulate('bodies2', t_end=0.04, dt=0.02)\n")
+    found = imported(PLAIN_RUN)
     others = ("dap3d_core.study", "dap3d_core.simulation.kinematics", "scipy.integrate")
     assert not any(name.startswith(others) for name in found)
     assert "dap3d_core.simulation.redundancy.freedoms" not in found
@@ -232,3 +238,16 @@ def test_reactions_and_unknowns_cost_other_scenes_nothing():
     assert not theirs & set(modules.split())
     assert not {"bound", "friction", "angle", "rate"} & set(loops.split())
     assert arrays == "0 False"
+
+
+def test_shapes_and_maps_are_imported_where_a_scene_has_them():
+    """A kind of shape of a package by a scene that names it; others look for none."""
+    ours = {"dap3d_core.registry.shapes", "dap3d_core.interface.shapes", "dap3d_functions.grid"}
+    script = "import dap3d_core as dap\nscene = dap.load('bodies2')\n{}\n"
+    script += "dap.simulate(scene, t_end=0.02, dt=0.02)"
+    sphere = "scene.add_shape('sphere', 's', body='upper', radius=0.1)"
+    assert not imported(script.format(sphere)) & ours
+    wheel = "scene.add_shape('toothed-wheel', 's', body='upper', radius=0.1, width=0.1, teeth=9)"
+    found = imported(script.format(wheel))
+    assert {"dap3d_example.toothed_wheel", "dap3d_core.registry.shapes"} <= found
+    assert "dap3d_functions.grid" not in found

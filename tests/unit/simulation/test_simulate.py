@@ -173,6 +173,7 @@ def test_equal_runs_give_equal_arrays(model):
     assert seen
 
 
+@long_in_plain_python
 def test_chunks_change_no_bit(monkeypatch):
     """However the run is cut into chunks, and however few rows the buffer holds, its arrays are the
     same bit for bit."""
@@ -377,6 +378,7 @@ def test_an_energy_that_is_not_finite_is_not_reported():
     assert np.all(np.isfinite(error.result.energy.potential))
 
 
+@long_in_plain_python
 def test_a_motion_that_runs_away_stops_at_the_step_floor():
     """v = tan t up to the last instant before pi / 2, and a finite result: relative 1e-6 at 1.5 s,
     where errors have grown as tan^2 t = 200."""

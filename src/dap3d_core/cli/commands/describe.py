@@ -133,6 +133,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         "example": example_of(type_info, registry),
         **({"motions": _motions(type_info)} if kind == "joint" else {}),
         **({"each_body": bool(type_.each_body)} if kind == "force" else {}),
+        **({"arguments": type_.arguments} if kind == "function" else {}),
     }
 
 
@@ -178,6 +179,7 @@ def _allowed(spec: Any) -> str:
     bounds = {">": 0.0 if spec.positive else None, ">=": spec.minimum, "<=": spec.maximum}
     usual = _bounds({">=": spec.usual[0], "<=": spec.usual[1]})
     words = [f"of {spec.argument}"] if spec.argument else []
+    words += ["rows of equal length"] * bool(spec.by_rows)
     if spec.choices:
         words.append(", ".join(map(_word, spec.choices)))
         words += [f"{word} is {other}" for word, other in spec.aliases.items()]
@@ -252,6 +254,8 @@ def states_text(states: Mapping[str, int]) -> str:
 
 def bodies_text(data: dict[str, Any]) -> str:
     """The bodies on which a type acts, in words."""
+    if data["kind"] == "function" and data["arguments"] > 1:
+        return "its arguments x and y, which a force or joint gives it"
     if data["kind"] == "function":
         return "its argument x, time where a force or joint does not say otherwise"
     if data.get("each_body"):

@@ -17,6 +17,7 @@ _LISTS = {
     "vec3": "[0.0, 0.0, 1.0]",
     "matrix": "[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
     "table": "[0.0, 1.0]",
+    "rows": "[[0.0, 1.0], [1.0, 2.0]]",
 }
 #: Vectors along x, from body to body: axes a and those of no slot. All others are along y.
 ALONG = ("a", "")
@@ -32,9 +33,15 @@ def example_of(type_info: "TypeInfo", registry: "Registry") -> str:
     type_: Any = type_info.type
     name = "J1" if type_.kind == "joint" else f"{_element_name(type_.keyword)}1"
     scene.add(type_info, name)
-    if type_.kind == "function":
+    if type_.kind == "function" and type_.arguments == 1:
         scene.add(scene.first("joint", lambda joint: bool(joint.layout.functions)), "J1", name)
     return scene.text()
+
+
+def _arguments(function: "TypeInfo") -> int:
+    """How many arguments a function type takes."""
+    count: int = function.type.arguments  # type: ignore[attr-defined]
+    return count
 
 
 def _has_friction(type_info: "TypeInfo") -> bool:
@@ -115,7 +122,8 @@ class _Example:
         elif spec.kind == "function":
             if spec.required or not spec.argument:  # it would replace other fields
                 if f"function.{motor}" not in self.elements:
-                    self.add(self.first("function", lambda _: True), motor)
+                    count = spec.arguments
+                    self.add(self.first("function", lambda f: _arguments(f) == count), motor)
                 yield name, f'"{motor}"'
         elif spec.kind == "functions":
             self.add(self.first("function", lambda other: other.layout.numbers != {}), "first")
@@ -129,7 +137,11 @@ class _Example:
         elif spec.kind == "choice" and spec.required:
             yield name, _toml(spec.choices[0])
         elif spec.required:
-            yield name, _LISTS.get(spec.kind) or _toml(max(0.5, spec.minimum or 0.5))
+            yield (
+                name,
+                _LISTS.get("rows" if spec.by_rows else spec.kind)
+                or _toml(max(0.5, spec.minimum or 0.5)),
+            )
         elif spec.default is not None:
             yield name, _toml(spec.default)
 

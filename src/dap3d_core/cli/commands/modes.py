@@ -120,21 +120,12 @@ def _state_of(start: str, allow_code: bool) -> tuple["Result", float]:
     Raises:
         Refused: the instant is no number, or the file holds none.
     """
-    from dap3d_core.cli.framework.paths import open_result
+    from dap3d_core.cli.framework.paths import open_state
 
-    path, _, instant = start.rpartition("@")
-    if not path or Path(start).exists():
-        path, instant = start, ""
-    result = open_result(path, allow_code=allow_code)
+    (result, t), path = open_state(start, allow_code=allow_code)
     if not len(result.t):
         raise Refused(f"{path} holds no instants")
-    try:
-        t = float(instant) if instant else float(result.t[-1])
-    except ValueError:
-        t = math.nan
-    if not math.isfinite(t):
-        raise Refused(f"--from {start}: {instant!r} is no time in s; write RESULT@TIME")
-    return result, t
+    return result, float(result.t[-1]) if t is None else t
 
 
 def _data(name: str, found: "Linearization", number: int) -> dict[str, Any]:

@@ -47,10 +47,9 @@ def plugins(*, no_compile: bool, limit: float | None, test: bool, as_json: bool)
         print_json({"types": [attrs.asdict(t) for t in types], "notes": registry.notes})
         return DONE
     console = stdout()
-    rows = [(t.kind or "?", t.keyword or "?", _origin(t), t.module, t.state) for t in types]
-    columns = ("kind", "keyword", "distribution", "module", "state")
-    console.table(columns, rows, fixed=(0, 1, 4))
-    faults = [f"{t.keyword or t.distribution}: {t.reason}" for t in types if t.reason]
+    rows = [(t.kind or "?", t.keyword or "?", _origin(t), t.state) for t in types]
+    console.table(("kind", "keyword", "distribution", "state"), rows, fixed=(0, 1, 3))
+    faults = [f"{t.keyword or t.distribution}, {t.module}: {t.reason}" for t in types if t.reason]
     console.section("not usable", faults, "red")
     console.section("notes", registry.notes)
     return DONE

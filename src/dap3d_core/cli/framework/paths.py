@@ -1,5 +1,6 @@
 """Files that commands read and write, refused before any work is done."""
 
+import math
 import os
 import sys
 import uuid
@@ -83,19 +84,20 @@ def open_result(path: str, *, model: str | None = None, allow_code: bool = False
         return dap.open(path, model=model, allow_code=allow_code)
 
 
-def open_state(words: str) -> "tuple[tuple[Result, float | None], Path]":
+def open_state(
+    words: str, *, allow_code: bool = False
+) -> "tuple[tuple[Result, float | None], Path]":
     """A result and a time of it, None for its end, and the file: RESULT or RESULT@TIME."""
     name, mark, time = words.rpartition("@")
     if not mark or Path(words).exists():
-        return (open_result(words), None), Path(words)
-    try:
-        instant = float(time)
-    except ValueError:
-        raise Refused(
-            f"--from {words}: {time!r} is no time in s, and there is no file {words}; write "
-            "RESULT@TIME, run.nc@1.5"
-        ) from None
-    return (open_result(name), instant), Path(name)
+        return (open_result(words, allow_code=allow_code), None), Path(words)
+    with suppress(ValueError):
+        if math.isfinite(instant := float(time)):
+            return (open_result(name, allow_code=allow_code), instant), Path(name)
+    raise Refused(
+        f"--from {words}: {time!r} is no time in s, and there is no file {words}; write "
+        "RESULT@TIME, run.nc@1.5"
+    )
 
 
 def open_sweep(path: str) -> "xarray.Dataset":

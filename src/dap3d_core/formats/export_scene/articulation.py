@@ -1,10 +1,10 @@
 """A scene as an articulated model: the tree of its joints, loops, and what acts in joints."""
 
-import attrs
 import numpy as np
 
 from dap3d_core.formats.export_scene.elements import SceneElements, SceneJoint
 from dap3d_core.formats.export_scene.forces import add_forces, add_gravity
+from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.formats.export_scene.shapes import geometries_of
 from dap3d_core.interface.formats.articulation import (
     WORLD,
@@ -16,33 +16,6 @@ from dap3d_core.interface.formats.articulation import (
 from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.scene.scene import GROUND, Scene
-
-
-@attrs.define(eq=False)
-class ModelBuilder:
-    """A model that is made of a scene.
-
-    Attributes:
-        elements: the elements of the scene, with their frames.
-        remarks: of the export.
-        model: the model so far.
-        origin: body -> the origin of its link in its axes at its mass centre.
-        placed: joint of the scene -> that of the model.
-    """
-
-    elements: SceneElements
-    remarks: Remarks
-    model: Articulation
-    origin: dict[str, np.ndarray] = attrs.Factory(dict)
-    placed: dict[str, Joint] = attrs.Factory(dict)
-
-    def link(self, body: str) -> str:
-        """The link of a body."""
-        return WORLD if body == GROUND else body
-
-    def in_link(self, body: str, frame: Frame) -> Frame:
-        """A frame of a body at its mass centre, in its link."""
-        return Frame(frame.r - self.origin.get(body, np.zeros(3)), frame.A)
 
 
 def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:

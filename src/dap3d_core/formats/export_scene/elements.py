@@ -126,7 +126,7 @@ class SceneElements:
                 inertia = float(self.bodies[wheel].inertia[2, 2])
                 rotor = self.rotors.setdefault(wheel, Rotor(inertia))
                 rotor.followers.append((name, element.fields))
-            elif element.type == "fix":
+            elif element.type in ("fix", "weld"):
                 self._fixed(element)
             elif element.type == "drive-tran" and name in locks.values():
                 continue
@@ -142,10 +142,10 @@ class SceneElements:
                 raise FormatError(what)
 
     def _fixed(self, element: Element) -> None:
-        body = str(element.fields["body_i"])
-        pose = self.bodies[body].pose
-        self.joints.append(SceneJoint(element.name, "fixed", body, GROUND, Frame(), Frame(pose.r),
-                                      (), self.turn(body, GROUND)))  # fmt: skip
+        body, other = str(element.fields["body_i"]), str(element.fields.get("body_j", GROUND))
+        there = self.bodies[other].pose.inverse() @ self.bodies[body].pose
+        self.joints.append(SceneJoint(element.name, "fixed", body, other, Frame(), Frame(there.r),
+                                      (), self.turn(body, other)))  # fmt: skip
 
     def _joint(self, element: Element) -> SceneJoint:
         fields = element.fields

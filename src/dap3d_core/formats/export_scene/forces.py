@@ -1,17 +1,15 @@
 """Forces of a scene as springs, dampers, limits and rotors of the joints of a model."""
 
 from math import inf
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from dap3d_core.formats.export_scene.elements import SceneJoint, leave_out
+from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.interface.formats.articulation import Coupling, Joint, Limits
 from dap3d_core.interface.formats.remarks import NOWHERE
 from dap3d_core.scene.scene import Element, Scene
-
-if TYPE_CHECKING:
-    from dap3d_core.formats.export_scene.articulation import ModelBuilder
 
 #: Stops beyond this are none, rad or m.
 NO_STOP = 1e6
@@ -19,7 +17,7 @@ NO_STOP = 1e6
 ALIGNED = 1e-9
 
 
-def add_gravity(builder: "ModelBuilder", scene: Scene) -> None:
+def add_gravity(builder: ModelBuilder, scene: Scene) -> None:
     """Add the weights of a scene as gravity."""
     total = np.zeros(3)
     for element in scene.forces.values():
@@ -30,7 +28,7 @@ def add_gravity(builder: "ModelBuilder", scene: Scene) -> None:
     builder.model.gravity = (x, y, z)
 
 
-def add_forces(builder: "ModelBuilder", scene: Scene) -> None:
+def add_forces(builder: ModelBuilder, scene: Scene) -> None:
     """Add forces on coordinates of joints, and rotors; others are left out, remarked."""
     for element in scene.forces.values():
         if element.type == "weight":
@@ -47,7 +45,7 @@ def add_forces(builder: "ModelBuilder", scene: Scene) -> None:
     _add_rotors(builder)
 
 
-def _of_hinge(builder: "ModelBuilder", element: Element) -> tuple[Joint, float, float] | None:
+def _of_hinge(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
     """The joint of a torsional spring, the sense of its angle, and the angle where q = 0."""
     elements, fields = builder.elements, element.fields
     (i, v_i), (j, v_j) = (elements.vector(fields[key]) for key in ("v_i", "v_j"))
@@ -69,7 +67,7 @@ def _of_hinge(builder: "ModelBuilder", element: Element) -> tuple[Joint, float, 
     return None
 
 
-def _of_slider(builder: "ModelBuilder", element: Element) -> tuple[Joint, float, float] | None:
+def _of_slider(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
     """The joint of a spring along its axis, the sense of its length, and that where q = 0."""
     elements = builder.elements
     (i, r_i), (j, r_j) = (elements.point(end) for end in elements.ends(element.fields))
@@ -86,7 +84,7 @@ def _of_slider(builder: "ModelBuilder", element: Element) -> tuple[Joint, float,
     return None
 
 
-def _limits(builder: "ModelBuilder", element: Element) -> Element | bool | None:
+def _limits(builder: ModelBuilder, element: Element) -> Element | bool | None:
     """The function of stops of a force; False for none, None for another function."""
     name = element.fields.get("function")
     if name is None:
@@ -95,9 +93,7 @@ def _limits(builder: "ModelBuilder", element: Element) -> Element | bool | None:
     return function if function.type == "stops" else None
 
 
-def _add(
-    builder: "ModelBuilder", element: Element, joint: Joint, sense: float, zero: float
-) -> None:
+def _add(builder: ModelBuilder, element: Element, joint: Joint, sense: float, zero: float) -> None:
     """Add a spring, damper or stops to a joint; the coordinate is sense (x - zero)."""
     fields, stops = element.fields, _limits(builder, element)
     rest = float(fields.get("theta_0", fields.get("l0", 0.0)))
@@ -118,7 +114,7 @@ def _add(
         joint.rest = (sense * (rest - zero) + 0.0,)
 
 
-def _add_rotors(builder: "ModelBuilder") -> None:
+def _add_rotors(builder: ModelBuilder) -> None:
     """Add wheels as armature of the joint that turns as they do, and couplings of others."""
     for name, rotor in builder.elements.rotors.items():
         pairs: list[tuple[str, float]] = []
@@ -143,7 +139,7 @@ def _add_rotors(builder: "ModelBuilder") -> None:
             builder.model.couplings.append(Coupling("", one, leader, ratio))
 
 
-def _followed(builder: "ModelBuilder", fields: dict[str, Any]) -> SceneJoint | None:
+def _followed(builder: ModelBuilder, fields: dict[str, Any]) -> SceneJoint | None:
     """The joint whose coordinate a follower couples."""
     elements = builder.elements
     on, axis = elements.vector(fields["a_j"])

@@ -1,19 +1,15 @@
 """Shapes of a scene as geometries of links."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from dap3d_core.formats.export_scene.elements import leave_out
+from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.interface.formats.articulation import Geometry
 from dap3d_core.interface.formats.frames import Floats, Frame, axis_angle, from_quaternion
 from dap3d_core.scene.scene import Scene
 
-if TYPE_CHECKING:
-    from dap3d_core.formats.export_scene.articulation import ModelBuilder
 
-
-def geometries_of(builder: "ModelBuilder", scene: Scene, body: str) -> list[Geometry]:
+def geometries_of(builder: ModelBuilder, scene: Scene, body: str) -> list[Geometry]:
     """The shapes of a body; those that no model has are left out, remarked."""
     geometries = []
     for element in scene.shapes.values():

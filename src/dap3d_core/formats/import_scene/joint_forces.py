@@ -2,17 +2,15 @@
 
 import re
 from math import isfinite, pi
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from dap3d_core.formats.import_scene.joints import JointEnds, from_ground
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.interface.formats.articulation import Articulation, Joint, Limits
 from dap3d_core.interface.formats.frames import Floats
 from dap3d_core.scene.scene import GROUND
-
-if TYPE_CHECKING:
-    from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 
 #: Stiffness of stops where the format says none, N m/rad and N/m.
 STOP_STIFFNESS = {"revolute": 1e4, "prismatic": 1e6}
@@ -20,7 +18,7 @@ STOP_STIFFNESS = {"revolute": 1e4, "prismatic": 1e6}
 FAR = 1e3
 
 
-def add_joint_forces(builder: "SceneBuilder", joint: Joint) -> None:
+def add_joint_forces(builder: SceneBuilder, joint: Joint) -> None:
     """Add what acts on the coordinates of a joint; what no type can say is left out, remarked."""
     said = [any(getattr(joint, name)) for name in ("damping", "stiffness", "friction", "armature")]
     limited = any(isfinite(one.lower) or isfinite(one.upper) for one in joint.limits)
@@ -41,7 +39,7 @@ def add_joint_forces(builder: "SceneBuilder", joint: Joint) -> None:
         _add_rotor(builder, joint, joint.armature[0])
 
 
-def _leave_out(builder: "SceneBuilder", joint: Joint, said: list[bool], limited: bool) -> None:
+def _leave_out(builder: SceneBuilder, joint: Joint, said: list[bool], limited: bool) -> None:
     words = ("damping", "spring", "friction", "armature", "limits")
     for word, there in zip(words, (*said, limited), strict=True):
         if there:
@@ -55,14 +53,14 @@ class JointCoordinate:
     parent: l = back + q.
     """
 
-    def __init__(self, builder: "SceneBuilder", joint: Joint) -> None:
+    def __init__(self, builder: SceneBuilder, joint: Joint) -> None:
         joint = from_ground(builder, joint)
         self.builder, self.joint = builder, joint
         self.ends = NamedEnds(builder, joint)
         self.turns = joint.kind == "revolute"
         finite = [abs(x) for one in joint.limits for x in (one.lower, one.upper) if isfinite(x)]
         rest = abs(joint.rest[0]) if joint.stiffness[0] else 0.0
-        self.back = 0.0 if self.turns else 1.0 + 2.0 * max([*finite, rest])
+        self.back = 0.0 if self.turns else 1.5 * max([*finite, rest, 0.01])
         if not self.turns and not all(map(isfinite, (joint.limits[0].lower,))):
             self.back = FAR
 
@@ -126,14 +124,14 @@ def perpendicular(axis: Floats) -> Floats:
 class NamedEnds(JointEnds):
     """The ends of a joint that has its name in the scene already."""
 
-    def __init__(self, builder: "SceneBuilder", joint: Joint) -> None:
+    def __init__(self, builder: SceneBuilder, joint: Joint) -> None:
         self.builder, self.joint, self.scene = builder, joint, builder.scene
         self.child, self.on_child = builder.attached(joint.child, joint.in_child)
         self.parent, self.on_parent = builder.attached(joint.parent, joint.in_parent)
         self.name = builder.names.scene_names["joints", joint.name]
 
 
-def _add_rotor(builder: "SceneBuilder", joint: Joint, inertia: float) -> None:
+def _add_rotor(builder: SceneBuilder, joint: Joint, inertia: float) -> None:
     """Add a wheel on ground that turns with a joint and so adds to its inertia alone."""
     text = "armature of a joint is a wheel on ground that turns with it"
     builder.remarks.translate(joint.place, text)
@@ -141,7 +139,7 @@ def _add_rotor(builder: "SceneBuilder", joint: Joint, inertia: float) -> None:
     follow(builder, joint, wheel, 1.0, "rotor")
 
 
-def wheel_of(builder: "SceneBuilder", joint: Joint, inertia: float) -> str:
+def wheel_of(builder: SceneBuilder, joint: Joint, inertia: float) -> str:
     """The wheel of a joint, made if there is none yet: a body that turns about ground's z."""
     key = ("wheel", joint.name)
     wheel = builder.names.scene_names.get(key)
@@ -158,7 +156,7 @@ def wheel_of(builder: "SceneBuilder", joint: Joint, inertia: float) -> str:
     return wheel
 
 
-def follow(builder: "SceneBuilder", joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
+def follow(builder: SceneBuilder, joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
     """Couple the coordinate of a joint with a wheel."""
     ends = NamedEnds(builder, joint)
     name = builder.names.free("joints", f"{ends.name}_{suffix}")
@@ -169,7 +167,7 @@ def follow(builder: "SceneBuilder", joint: Joint, wheel: str, ratio: float, suff
     )  # fmt: skip
 
 
-def add_couplings(builder: "SceneBuilder", model: Articulation) -> None:
+def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
     """Add coordinates that follow others; what cannot be coupled is left out, remarked."""
     for coupling in model.couplings:
         pair = [model.joints.get(name) for name in (coupling.joint, coupling.other)]
@@ -192,7 +190,7 @@ def add_couplings(builder: "SceneBuilder", model: Articulation) -> None:
         follow(builder, one, wheel, coupling.ratio, "coupling")
 
 
-def _light(builder: "SceneBuilder", *joints: Joint) -> float:
+def _light(builder: SceneBuilder, *joints: Joint) -> float:
     """A billionth of the least moment of inertia, or mass, of what joints move."""
     sizes = []
     for joint in joints:
@@ -202,7 +200,7 @@ def _light(builder: "SceneBuilder", *joints: Joint) -> float:
     return 1e-9 * min(sizes)
 
 
-def add_inputs(builder: "SceneBuilder", model: Articulation) -> None:
+def add_inputs(builder: SceneBuilder, model: Articulation) -> None:
     """Add actuators as inputs, each a factor of a force or moment on both sides of a joint.
 
     The force of a slider acts on the line of its axis, on both bodies.
@@ -216,6 +214,7 @@ def add_inputs(builder: "SceneBuilder", model: Articulation) -> None:
         others = (scene.bodies, scene.points, scene.joints, scene.forces)
         clash = any(actuator.name in table for table in others)
         wanted = re.sub(r"\W", "_", f"{actuator.name}_input" if clash else actuator.name)
+        wanted = f"input_{wanted}" if wanted[:1].isdigit() else wanted
         name = names.of("inputs", wanted, actuator.place, builder.remarks)
         scene.add_input(name, 0.0)
         ends = NamedEnds(builder, joint)

@@ -1,19 +1,17 @@
 """Joints of a model as joints of a scene: body i is the child, body j the parent."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 import numpy as np
 
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.interface.formats.articulation import WORLD, Joint
 from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.interface.formats.remarks import FormatError
 
-if TYPE_CHECKING:
-    from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 
-
-def add_joint(builder: "SceneBuilder", joint: Joint) -> None:
+def add_joint(builder: SceneBuilder, joint: Joint) -> None:
     """Add a joint.
 
     Raises:
@@ -29,7 +27,7 @@ def add_joint(builder: "SceneBuilder", joint: Joint) -> None:
     adders[joint.kind](ends)
 
 
-def from_ground(builder: "SceneBuilder", joint: Joint) -> Joint:
+def from_ground(builder: SceneBuilder, joint: Joint) -> Joint:
     """The same joint, with parent and child exchanged where the child is ground: body i moves."""
     if builder.member[joint.child][0] != WORLD:
         return joint
@@ -41,7 +39,7 @@ def from_ground(builder: "SceneBuilder", joint: Joint) -> Joint:
 class JointEnds:
     """The two ends of a joint in a scene, with points and vectors made as they are needed."""
 
-    def __init__(self, builder: "SceneBuilder", joint: Joint) -> None:
+    def __init__(self, builder: SceneBuilder, joint: Joint) -> None:
         self.builder, self.joint, self.scene = builder, joint, builder.scene
         self.child, self.on_child = builder.attached(joint.child, joint.in_child)
         self.parent, self.on_parent = builder.attached(joint.parent, joint.in_parent)
@@ -100,7 +98,10 @@ def _prismatic(ends: JointEnds) -> None:
 
 
 def _fixed(ends: JointEnds) -> None:
-    """All six freedoms: a slider, and a driver that holds it."""
+    """A weld; where it closes a loop, whose poses may be off, a slider and a driver that holds it."""
+    if not ends.joint.closes:
+        ends.scene.add_joint("weld", ends.name, body_i=ends.child, body_j=ends.parent)
+        return
     axis = ends.vector("j", (0.0, 0.0, 1.0))
     P_i, P_j = ends.point("i"), ends.point("j")
     _add(ends, "tran", P_i=P_i, P_j=P_j, a_j=axis, A_c=_relative(ends))

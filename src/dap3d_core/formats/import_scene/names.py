@@ -22,12 +22,7 @@ class Names:
 
     def of(self, table: str, name: str, place: Place, remarks: Remarks) -> str:
         """A name that the scene can have: the same one, or one made of it, which is remarked."""
-        good = (
-            "".join(c if c.isprintable() and c != "." else "_" for c in name.strip()) or "unnamed"
-        )
-        if fault_of_name(good):
-            good = f"{good}_"
-        good = self.free(table, good)
+        good = self.free(table, usable(name))
         self.scene_names[table, name], self.places[table, good] = good, place
         if good != name:
             remarks.translate(place, f"{name!r} is called {good!r} in the scene")
@@ -42,3 +37,9 @@ class Names:
             candidate = f"{name}_{number}"
         taken.add(candidate)
         return candidate
+
+
+def usable(name: str) -> str:
+    """A name that a scene can have: the same one, or one made of it."""
+    good = "".join(c if c.isprintable() and c != "." else "_" for c in name.strip()) or "unnamed"
+    return f"{good}_" if fault_of_name(good) else good

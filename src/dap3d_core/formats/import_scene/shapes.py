@@ -1,16 +1,15 @@
 """Shapes of links as shapes of a scene."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import attrs
 
+from dap3d_core.formats.import_scene.names import usable
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.interface.formats.articulation import Geometry, Link
 from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.scene.validate.shapes import MESHES
-
-if TYPE_CHECKING:
-    from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 
 #: Folder of the meshes next to a scene.
 FOLDER = "meshes"
@@ -43,18 +42,18 @@ def _plain(stem: str) -> str:
     return "".join(c if c.isalnum() or c in "-_" else "_" for c in stem)
 
 
-def add_shapes(builder: "SceneBuilder", link: Link, frame: Frame, meshes: MeshFiles) -> None:
+def add_shapes(builder: SceneBuilder, link: Link, frame: Frame, meshes: MeshFiles) -> None:
     """Add the shapes of a link: those that are seen, or of contacts where it has no others."""
     seen = [shape for shape in link.geometries if not shape.collision]
     for shape in seen or link.geometries:
         body, at = builder.attached(link.name, shape.pose)
         for keyword, fields in _shapes(builder, shape, at, meshes):
-            name = builder.names.free("shapes", f"{link.name.replace('.', '_')}_{keyword}")
+            name = builder.names.free("shapes", f"{usable(link.name)}_{keyword}")
             builder.scene.add_shape(keyword, name, body=body, color=shape.color or None, **fields)
 
 
 def _shapes(
-    builder: "SceneBuilder", shape: Geometry, frame: Frame, meshes: MeshFiles
+    builder: SceneBuilder, shape: Geometry, frame: Frame, meshes: MeshFiles
 ) -> list[tuple[str, dict[str, Any]]]:
     """Keyword and fields of the shapes that draw a geometry."""
     at, z = _numbers(frame.r), frame.A[:, 2]
@@ -81,7 +80,7 @@ def _shapes(
 
 
 def _mesh(
-    builder: "SceneBuilder", shape: Geometry, frame: Frame, meshes: MeshFiles
+    builder: SceneBuilder, shape: Geometry, frame: Frame, meshes: MeshFiles
 ) -> list[tuple[str, dict[str, Any]]]:
     if shape.mesh.suffix.lower() not in MESHES:
         text = f"meshes other than {', '.join(MESHES)} are not drawn"

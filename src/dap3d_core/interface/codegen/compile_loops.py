@@ -1,15 +1,64 @@
-"""Compiles the group loops of a type."""
+"""Writes and compiles the group loops of a type."""
 
 import inspect
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
+from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, JUMP_NAMES, jump_lines
+from dap3d_core.interface.codegen.kernel_arguments import parameters
+from dap3d_core.interface.codegen.loop_source import (
+    LOOP_KINDS,
+    append,
+    called_with,
+    computes_rate,
+    gathering_lines,
+    kernels_of,
+    store,
+    store_angle,
+)
 from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
-from dap3d_core.kernels.runtime.loop_modules import build
+from dap3d_core.kernels.runtime.loop_modules import Loop, build
+
+
+def write(type_info: TypeInfo, what: str) -> Loop | None:
+    """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
+    names = kernels_of(type_info.type.kind, what)
+    if what == "wrench" and computes_rate(type_info):
+        names = (*names, "rate")
+    kernels = {n: k for n, k in type_info.kernels.items() if n in names}
+    if what == "impulse" and "impulse" not in kernels:
+        return None
+    layout = type_info.layout
+    wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
+    if what in ("angle", "turned"):
+        wanted += [n for name in layout.angles for n in (name, f"{name}_dot")]
+    if not kernels and not wanted and not (what == "bound" and layout.unknowns):
+        return None
+    if layout.unknowns:
+        from dap3d_core.interface.codegen.unknowns import write_with_unknowns
+
+        return write_with_unknowns(type_info, what, kernels, wanted)
+    if what in JUMP_KINDS:
+        wanted = [n for n in wanted if n not in JUMP_NAMES]
+    reads = type_info.joints if what in ("friction", "rate") else ()
+    lines = list(gathering_lines(type_info, wanted, reactions=bool(reads)))
+    if what == "angle":
+        for name, at in layout.angles.items():
+            lines += store_angle(name, at)
+    elif what == "turned":
+        lines += append([f"x_{name}" for name in layout.angles])
+    if what in JUMP_KINDS:
+        lines += jump_lines(type_info, what, kernels)
+    for name in kernels if what not in JUMP_KINDS else ():
+        lines.append(f"out = {called_with(type_info, name)}")
+        lines += store(type_info, name)
+    title = f"{type_info.type.keyword}{type_info.given}: {', '.join(kernels) or what}"
+    called = {f"kernel_{n}": k for n, k in kernels.items()}
+    called |= {f"kernel_J_{joint.field}": joint.type_info.kernels["J"] for joint in reads}
+    return Loop(title, called, lines)
 
 
 def compiled_loop(

@@ -55,6 +55,15 @@ class InstanceLayout:
         """Number of bodies and functions of an instance in ``idx``, and of its states' index."""
         return len(self.slots) + len(self.functions) + len(self.others) + bool(self.states)
 
+    def shifted(self, start: int) -> "InstanceLayout":
+        """The same with the numbers from ``start`` on."""
+        return attrs.evolve(
+            self,
+            numbers={n: (start + at, shape) for n, (at, shape) in self.numbers.items()},
+            tables={n: (start + at, columns) for n, (at, columns) in self.tables.items()},
+            par_width=start + self.par_width,
+        )
+
     @property
     def state_width(self) -> int:
         """Numbers of all states of an instance."""
@@ -113,6 +122,8 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> InstanceLa
     width = 0
     shapes = {"number": (), "point": (3,), "vector": (3,), "vec3": (3,), "matrix": (3, 3)}
     for name, spec in specs_of(type_).items():
+        if spec.by_rows:
+            continue
         if spec.kind == "table":
             tables[name] = width, spec.columns
             width += 2

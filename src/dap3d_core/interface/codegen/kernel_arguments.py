@@ -22,8 +22,12 @@ VELOCITY_KERNELS = (
 FRICTION_NUMBERS = ("mu", "v_tol", "radius")
 #: Suffixes of a function's value and derivatives.
 DERIVATIVES = ("", "_dot", "_ddot", "_dddot")
+#: The same of a function of two arguments: its partial derivatives.
+PARTIALS = ("", "_x", "_y", "_xx", "_xy", "_yy")
+#: What functions of one and of two arguments return: shape and words.
+VALUES = {1: ((4,), "(f, f', f'', f''')"), 2: ((6,), "(f, f_x, f_y, f_xx, f_xy, f_yy)")}
 #: ``KernelArgument.derivative`` of a tuple of functions.
-SEVERAL = 4
+SEVERAL = len(PARTIALS)
 
 
 @attrs.frozen
@@ -38,8 +42,9 @@ class KernelArgument:
         needs: names that must be computed before.
         doc: its meaning, for ``describe``.
         columns: of a table; 0 for all else.
-        derivative: order of the derivative of a function to be called, SEVERAL of a tuple of
-            functions; -1 for all else.
+        derivative: place in DERIVATIVES, or PARTIALS, of a function to be called, SEVERAL of a
+            tuple of functions; -1 for all else.
+        arguments: how many a function to be called takes.
         rate: its rate of change as an expression of ``needs`` and the velocities ``V_i``, ``W_i``
             of the bodies, for derivations. "" for a constant.
         rate_name: the name of its rate; "" where there is none.
@@ -56,6 +61,7 @@ class KernelArgument:
     doc: str = ""
     columns: int = 0
     derivative: int = -1
+    arguments: int = 1
     rate: str = ""
     rate_name: str = ""
     motion: str = ""
@@ -78,13 +84,16 @@ def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, Kernel
         names[name] = KernelArgument(name, shape, velocity, code, tuple(needs), doc, **more)
 
     offer("t", (), "t", doc="time, s", rate="1.0")
-    if type_.kind == "function":
+    arguments = argument_names(type_)
+    if arguments:
         offer("x", (), "t", doc="the argument of the function")
+    if len(arguments) > 1:  # its loop is for tests alone: y is in the row of F behind its own
+        offer("y", (), "F[idx[b0] + 1, 0]", doc="its second argument")
     for s in layout.slots:
         _offer_body(offer, s)
     for name, spec in specs_of(type_).items():
-        is_argument = name == "x" and type_.kind == "function"
-        if name not in layout.constants and not is_argument:  # v_i may be a vector, not a velocity
+        # v_i may be a vector, not a velocity
+        if name not in layout.constants and name not in arguments:
             _offer_field(offer, name, prefix_of(type_, name), spec, layout)
     for name in layout.constants:
         _offer_constant(offer, name, layout)
@@ -95,6 +104,16 @@ def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, Kernel
     for name, (at, shape) in layout.states.items():
         offer(name, shape, _state(at, shape), doc="state of the element", derivable=False)
     return names
+
+
+def argument_names(type_: type[TypeBase]) -> tuple[str, ...]:
+    """The arguments of a function type, ``x`` or ``x`` and ``y``; none of other types."""
+    return ("x", "y")[: getattr(type_, "arguments", 0)]
+
+
+def derivative_names(arguments: int) -> tuple[str, ...]:
+    """Suffixes of the value and the derivatives of a function of so many arguments."""
+    return PARTIALS if arguments > 1 else DERIVATIVES
 
 
 def friction_names(rows: int) -> dict[str, KernelArgument]:
@@ -153,7 +172,7 @@ def _offer_field(
     elif spec.kind == "input":
         doc = f"{spec.doc or name}: an input, held until it is set again"
         offer(name, (), f"F[{_row_of(name, layout)}, 0]", doc=doc)
-    elif spec.kind == "table":
+    elif spec.kind == "table" and not spec.by_rows:
         offset, columns = layout.tables[name]
         sample = f"({'0.0, ' * columns})"
         code = f"(par, par[p1 + {offset}], par[p1 + {offset + 1}], {sample})"
@@ -167,9 +186,10 @@ def _offer_function(
     offer: Callable[..., None], name: str, f: str, spec: FieldSpec, layout: InstanceLayout
 ) -> None:
     if spec.argument:
-        for order, suffix in enumerate(DERIVATIVES):
-            doc = f"function of {spec.argument}, derivative {order}; to be called"
-            offer(f"{f}{suffix}", (), "", doc=doc, derivative=order)
+        for order, suffix in enumerate(derivative_names(spec.arguments)):
+            which = suffix.strip("_") if spec.arguments > 1 and order else order
+            doc = f"function of {spec.argument}, derivative {which}; to be called"
+            offer(f"{f}{suffix}", (), "", doc=doc, derivative=order, arguments=spec.arguments)
         return
     at = _row_of(name, layout)
     for order, suffix in enumerate(DERIVATIVES):

@@ -14,7 +14,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.interface.codegen.loop_source import stride, write
+from dap3d_core.interface.codegen.compile_loops import write
+from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.interface.codegen.reactions import body_columns, rows_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.kernels.dual_numbers import Dual, DualFunctions

@@ -9,12 +9,10 @@ are in ``par`` from ``p1``.
 
 from collections.abc import Iterable, Sequence
 
-from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, JUMP_NAMES, jump_lines
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
 from dap3d_core.interface.codegen.reactions import integers_of_joints, reaction_lines
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.types import Joint
-from dap3d_core.kernels.runtime.loop_modules import Loop
 
 #: Kinds of loops, with the kernels that each calls.
 LOOP_KINDS = {
@@ -59,44 +57,6 @@ def computes_rate(type_info: TypeInfo) -> bool:
     Those of joints have a loop of their own, called when the multipliers are known.
     """
     return type_info.type.kind == "force" and {"wrench", "rate"} <= type_info.kernels.keys()
-
-
-def write(type_info: TypeInfo, what: str) -> Loop | None:
-    """The loop that computes ``what`` (a key of LOOP_KINDS); None where there is no such kernel."""
-    names = kernels_of(type_info.type.kind, what)
-    if what == "wrench" and computes_rate(type_info):
-        names = (*names, "rate")
-    kernels = {n: k for n, k in type_info.kernels.items() if n in names}
-    if what == "impulse" and "impulse" not in kernels:
-        return None
-    layout = type_info.layout
-    wanted = [name for kernel in kernels.values() for name in parameters(kernel)]
-    if what in ("angle", "turned"):
-        wanted += [n for name in layout.angles for n in (name, f"{name}_dot")]
-    if not kernels and not wanted and not (what == "bound" and layout.unknowns):
-        return None
-    if layout.unknowns:
-        from dap3d_core.interface.codegen.unknowns import write_with_unknowns
-
-        return write_with_unknowns(type_info, what, kernels, wanted)
-    if what in JUMP_KINDS:
-        wanted = [n for n in wanted if n not in JUMP_NAMES]
-    reads = type_info.joints if what in ("friction", "rate") else ()
-    lines = list(gathering_lines(type_info, wanted, reactions=bool(reads)))
-    if what == "angle":
-        for name, at in layout.angles.items():
-            lines += store_angle(name, at)
-    elif what == "turned":
-        lines += append([f"x_{name}" for name in layout.angles])
-    if what in JUMP_KINDS:
-        lines += jump_lines(type_info, what, kernels)
-    for name in kernels if what not in JUMP_KINDS else ():
-        lines.append(f"out = {called_with(type_info, name)}")
-        lines += store(type_info, name)
-    title = f"{type_info.type.keyword}{type_info.given}: {', '.join(kernels) or what}"
-    called = {f"kernel_{n}": k for n, k in kernels.items()}
-    called |= {f"kernel_J_{joint.field}": joint.type_info.kernels["J"] for joint in reads}
-    return Loop(title, called, lines)
 
 
 def gathering_lines(
@@ -152,7 +112,9 @@ def store(type_info: TypeInfo, kernel: str) -> Iterable[str]:
         yield f"out1[0] += {paths[0]}"
     elif kernel == "value":
         yield "row = idx[b0]"
-        yield from (f"F[row, {k}] = {path}" for k, path in enumerate(paths))
+        yield from (f"F[row, {k}] = {path}" for k, path in enumerate(paths[:4]))
+        # of two arguments, for tests alone: behind y
+        yield from (f"F[row + 1, {k}] = {path}" for k, path in enumerate(paths[4:], 1))
     elif kernel in ("switch", "knot"):
         yield from append(paths)
     elif kernel == "G":

@@ -1,8 +1,8 @@
 """Completes types by a scene's functions of an argument and by the friction of a joint.
 
-A kernel that calls ``f(x)`` is compiled once for each type of function: the kernel is copied with
-the function's own kernel in place of ``f``, and the numbers of the function follow those of the
-element (compiled code takes no closure there; docs/decisions/0001).
+A kernel that calls ``f(x)``, or ``f(x, y)``, is compiled once for each type of function: the kernel
+is copied with the function's own kernel in place of ``f``, and the numbers of the function follow
+those of the element (compiled code takes no closure there; docs/decisions/0001).
 """
 
 import ast
@@ -15,9 +15,10 @@ import attrs
 
 from dap3d_core.interface.codegen.instance_layout import InstanceLayout
 from dap3d_core.interface.codegen.kernel_arguments import (
-    DERIVATIVES,
     FRICTION_NUMBERS,
     KernelArgument,
+    argument_names,
+    derivative_names,
     friction_names,
     in_order,
     namespace,
@@ -63,15 +64,18 @@ def bind_functions(
     calls: dict[str, tuple[_Given, int]] = {}
     for field, of_argument in functions.items():
         prefix = "f" if field == "function" else field
-        behind = shifted(of_argument.layout, layout.par_width)
+        behind = of_argument.layout.shifted(layout.par_width)
         value = of_argument.kernels["value"]
         names_of_value = parameters(value)
         all_names = _names_of(of_argument, behind)
-        own = in_order(all_names, [n for n in names_of_value if n != "x"])
+        arguments = argument_names(of_argument.type)
+        own = in_order(all_names, [n for n in names_of_value if n not in arguments])
         names |= {f"{prefix}__{q.name}": attrs.evolve(q, name=f"{prefix}__{q.name}") for q in own}
-        wanted = tuple("x" if n == "x" else f"{prefix}__{n}" for n in names_of_value)
-        given = _Given(f"{prefix}__value", value, wanted, f"{prefix}{KNOTS}", knots[field])
-        calls |= {f"{prefix}{s}": (given, order) for order, s in enumerate(DERIVATIVES)}
+        wanted = tuple(n if n in arguments else f"{prefix}__{n}" for n in names_of_value)
+        knots_name = f"{prefix}{KNOTS}"
+        given = _Given(f"{prefix}__value", value, arguments, wanted, knots_name, knots[field])
+        suffixes = derivative_names(len(arguments))
+        calls |= {f"{prefix}{s}": (given, order) for order, s in enumerate(suffixes)}
         width = behind.par_width
         layout = attrs.evolve(layout, par_width=width + given.knot_count)
         if given.knot_count:
@@ -106,16 +110,6 @@ def _names_of(function: TypeInfo, layout: InstanceLayout) -> dict[str, KernelArg
     return names_behind(function, layout)
 
 
-def shifted(layout: InstanceLayout, start: int) -> InstanceLayout:
-    """A layout with its numbers shifted to ``start``."""
-    return attrs.evolve(
-        layout,
-        numbers={n: (start + at, shape) for n, (at, shape) in layout.numbers.items()},
-        tables={n: (start + at, columns) for n, (at, columns) in layout.tables.items()},
-        par_width=start + layout.par_width,
-    )
-
-
 def is_knots(name: str) -> bool:
     """True if a number of a layout holds the knots of a function."""
     return name.endswith(KNOTS)
@@ -129,12 +123,13 @@ def _nothing() -> None:
 class _Given:
     """The kernel of a given function.
 
-    Its name in the copy, itself, its arguments (``x`` and the names of its numbers), the name and
-    number of its knots.
+    Its name in the copy, itself, what it is a function of, all it takes (that and the names of its
+    numbers), the name and number of its knots.
     """
 
     known_as: str
     value: Callable[..., Any]
+    arguments: tuple[str, ...]
     wanted: tuple[str, ...]
     knots: str
     knot_count: int
@@ -185,10 +180,12 @@ def _with_functions(
     replaced = _Calls(calls) if replaced is None else replaced
     replaced.generic_visit(definition)
     if replaced.other:
-        raise PluginError(f"{who} may only call {', '.join(replaced.other)}, with one argument")
+        count = "one argument" if len(calls[called[0]][0].arguments) == 1 else "two arguments"
+        raise PluginError(f"{who} may only call {', '.join(replaced.other)}, with {count}")
     others = [a for a in definition.args.args if a.arg not in called]
     used = dict.fromkeys(calls[n][0] for n in called)
-    numbers = [n for given in used for n in (*given.wanted, *replaced.names(given)) if n != "x"]
+    numbers = [n for given in used for n in (*given.wanted, *replaced.names(given))
+               if n not in given.arguments]  # fmt: skip
     definition.args.args = [*others, *(ast.arg(n) for n in numbers)]
     definition.decorator_list = []
     plain = kernel.__globals__ | {given.known_as: given.value for given in used}
@@ -207,11 +204,12 @@ class _Calls(ast.NodeTransformer):
 
     def visit_Call(self, node: ast.Call) -> ast.AST:
         name = node.func.id if isinstance(node.func, ast.Name) else ""
-        if name not in self.calls or len(node.args) != 1 or node.keywords:
+        given, order = self.calls.get(name, (None, 0))
+        if given is None or len(node.args) != len(given.arguments) or node.keywords:
             return self.generic_visit(node)
-        given, order = self.calls[name]
-        argument = self.argument(given, self.visit(node.args[0]))
-        arguments = [argument if n == "x" else ast.Name(n, ast.Load()) for n in given.wanted]
+        values = [self.argument(given, self.visit(value)) for value in node.args]
+        known = dict(zip(given.arguments, values, strict=True))
+        arguments = [known.get(n, ast.Name(n, ast.Load())) for n in given.wanted]
         call = ast.Call(ast.Name(given.known_as, ast.Load()), arguments, [])
         return ast.copy_location(ast.Subscript(call, ast.Constant(order), ast.Load()), node)
 

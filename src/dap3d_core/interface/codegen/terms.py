@@ -16,7 +16,6 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     namespace,
     parameters,
 )
-from dap3d_core.interface.codegen.specialise import shifted
 from dap3d_core.interface.codegen.type_info import TypeInfo
 
 
@@ -51,7 +50,7 @@ def names_behind(type_info: TypeInfo, layout: InstanceLayout) -> dict[str, Kerne
         return names
     start = layout.par_width - sum(term.layout.par_width for term in type_info.terms)
     for k, term in enumerate(type_info.terms):
-        behind = shifted(term.layout, start)
+        behind = term.layout.shifted(start)
         start = behind.par_width
         for name, quantity in names_behind(term, behind).items():
             if name != "x":

@@ -99,7 +99,8 @@ def _text(
         elif type_.kind == "force":
             found, steps = _of_force(symbolic, given, wanted, symbols)
         else:
-            found, steps = symbolic.derive_value(given["value"], symbols)
+            count = type_.arguments  # type: ignore[attr-defined]
+            found, steps = symbolic.derive_value(given["value"], symbols, count)
         if all(x == 0 for x in symbolic.flat(found.get("nu", 0))):
             found.pop("nu", None)
         parts = [kernel_printer.kernel_source(n, found[n], steps, symbols, names)

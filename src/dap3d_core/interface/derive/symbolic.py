@@ -17,9 +17,9 @@ import sympy
 from sympy.logic.boolalg import Boolean
 
 from dap3d_core.interface.codegen.kernel_arguments import (
-    DERIVATIVES,
     SEVERAL,
     KernelArgument,
+    derivative_names,
     parameters,
 )
 from dap3d_core.interface.errors import line_of, plain_words
@@ -211,16 +211,21 @@ class Symbols(Mapping[str, Any]):
 
     def _function(self, name: str) -> Any:
         """A function of an argument: sympy differentiates it into the next name."""
-        orders = DERIVATIVES
-        order = self.names[name].derivative
-        higher = f"{name.removesuffix(orders[order])}{orders[order + 1]}" if order < 3 else ""
+        quantity = self.names[name]
+        suffixes = derivative_names(quantity.arguments)
+        own = suffixes[quantity.derivative]
+        prefix = name.removesuffix(own)
 
         def fdiff(self_: Any, argindex: int = 1) -> Any:
-            if not higher:
+            if quantity.arguments > 1:
+                suffix = f"_{''.join(sorted(own.strip('_') + 'xy'[argindex - 1]))}"
+            else:
+                suffix = suffixes[quantity.derivative + 1] if quantity.derivative < 3 else "_none"
+            if suffix not in suffixes:
                 raise DerivationError(f"the derivative of {name} has no name; write it by hand")
-            return self.value(higher)(*self_.args)
+            return self.value(f"{prefix}{suffix}")(*self_.args)
 
-        members = {"fdiff": fdiff, "nargs": 1, "is_real": True}
+        members = {"fdiff": fdiff, "nargs": quantity.arguments, "is_real": True}
         return type(name, (sympy.Function,), members)
 
     def rate(self, name: str) -> list[Expression]:
@@ -429,9 +434,17 @@ def derive_rows(switch: Callable[..., Any], symbols: Symbols) -> tuple[dict[str,
     return {"J": J}, steps
 
 
-def derive_value(value: Callable[..., Any], symbols: Symbols) -> tuple[dict[str, Any], Steps]:
-    """(f, f', f'', f''') of a function that gives f alone."""
-    found = traced(value, symbols, "value")[:1]
+def derive_value(
+    value: Callable[..., Any], symbols: Symbols, arguments: int = 1
+) -> tuple[dict[str, Any], Steps]:
+    """(f, f', f'', f''') of a function that gives f alone; partial derivatives of one of two."""
+    (f,) = traced(value, symbols, "value")[:1]
+    x = symbols.value("x")
+    if arguments > 1:
+        y = symbols.value("y")
+        f_x, f_y = _diff(f, x), _diff(f, y)
+        return {"value": [f, f_x, f_y, _diff(f_x, x), _diff(f_x, y), _diff(f_y, y)]}, {}
+    found = [f]
     for _ in range(3):
-        found.append(_diff(found[-1], symbols.value("x")))
+        found.append(_diff(found[-1], x))
     return {"value": found}, {}

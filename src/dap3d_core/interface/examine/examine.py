@@ -24,6 +24,7 @@ from dap3d_core.interface.codegen.instance_layout import (
 )
 from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, jump_names, row_count
 from dap3d_core.interface.codegen.kernel_arguments import (
+    VALUES,
     VELOCITY_KERNELS,
     KernelArgument,
     friction_names,
@@ -323,6 +324,8 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     for field in attrs.fields(type_):  # type: ignore[arg-type]
         if "dap3d" not in field.metadata and field.default is attrs.NOTHING:
             raise PluginError(f"{who}: {no_field(type_, field.name)}")
+    if getattr(type_, "arguments", 1) not in (1, 2):
+        raise PluginError(f"{who}: arguments = {type_.arguments!r}; a function takes 1 or 2")  # type: ignore[attr-defined]
     kernels, by_joint = type_.kernels(), bool(_joint_of_friction(type_))
     derivable = missing(type_)
     needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]
@@ -396,7 +399,7 @@ def _check_fields(type_: type[TypeBase]) -> None:
 def _check_members(type_: type[TypeBase]) -> None:
     """A public function that nothing calls is a misspelt kernel."""
     kind = type_.kind
-    allowed = [*type_.kernel_names, "prepare", *(["breaks"] if kind == "function" else [])]
+    allowed = [*type_.kernel_names, "prepare", *["breaks"] * (getattr(type_, "arguments", 0) == 1)]
     for name, value in vars(type_).items():
         is_public = isinstance(value, (staticmethod, FunctionType)) and not name.startswith("_")
         if is_public and name not in allowed:
@@ -480,7 +483,8 @@ def _expected(
     if kernel in ("wrench", "friction"):
         return (slots, 2, 3), f"(force, moment) for each of {slots} bodies"
     if issubclass(type_, Function):
-        return (4,) if isinstance(value, (tuple, list)) else (), "(f, f', f'', f''')"
+        shape, words = VALUES[type_.arguments]
+        return shape if isinstance(value, (tuple, list)) else (), words
     if not issubclass(type_, Joint):
         return (), "one number"
     if kernel == "G":

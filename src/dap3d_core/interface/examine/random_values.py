@@ -44,7 +44,7 @@ def random_quantity(quantity: KernelArgument, rng: random.Random) -> Any:
         return tuple(_random_line(rng) for _ in range(3))
     if quantity.derivative >= 0:
         a, b = rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)
-        return lambda x: a + b * x
+        return (lambda x, y: a + b * (x + y)) if quantity.arguments > 1 else lambda x: a + b * x
     if quantity.columns:
         rows = [(float(k), *numbers(rng, quantity.columns - 1)) for k in range(3)]
         return [x for row in rows for x in row], 0, len(rows), (0.0,) * quantity.columns
@@ -58,6 +58,9 @@ def _random_line(rng: random.Random) -> Any:
 
 def random_field(spec: FieldSpec, rng: random.Random) -> Any:
     """A random value of a field, in the form that ``prepare`` takes."""
+    if spec.by_rows:  # its ends come again, as those of a period have to
+        rows = [(*row, row[0]) for row in (numbers(rng, 5) for _ in range(5))]
+        return (*rows, rows[0])
     if spec.kind == "table":
         return tuple(float(k) + rng.uniform(0.0, 0.5) for k in range(6)) if spec.given else None
     if spec.kind == "angle":

@@ -11,6 +11,7 @@ import os
 import threading
 import time
 from functools import cache
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -20,11 +21,14 @@ from dap3d_core.kernels.runtime.sealed_files import sealed, sealed_content, writ
 MAX_BYTES = 200_000_000
 #: Age in seconds from which a file that a killed process left behind is removed.
 STRAY_AGE = 3600.0
+#: A folder is cleaned at the first of so many objects that a process writes: it is read whole.
+CLEAN_EVERY = 50
 #: Optimisation levels.
 UNOPTIMISED, OPTIMISED = 0, 3
 _lock = threading.RLock()
 #: Execution engines; loaded code stays for the life of the process.
 _engines: list[Any] = []
+_written = count()
 
 
 class Processor(NamedTuple):
@@ -127,8 +131,9 @@ def read_object(path: Path) -> tuple[list[Any], bytes] | None:
 def write_object(path: Path, results: list[Any], code: bytes) -> None:
     """Write an object file; where that fails, the code stays in memory only."""
     write_file(path, sealed(encoded(results, code)))
-    with contextlib.suppress(OSError):
-        _clean(path.parent)
+    if next(_written) % CLEAN_EVERY == 0:
+        with contextlib.suppress(OSError):
+            _clean(path.parent)
 
 
 def _clean(folder: Path) -> None:

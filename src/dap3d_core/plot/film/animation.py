@@ -113,7 +113,7 @@ def animate(
     target = Path(path)
     suffix = target.suffix.lower()
     _check(result, target, fps, speed, size, at)
-    stage, notes = _stage_of(result, view, size, model, fit=fit)
+    stage, notes = _stage_of(result, view, size, model, fit=fit, still=suffix not in FILMS)
     duration = float(result.t[-1] - result.t[0])
     speed, times = speed or usual_speed(duration), np.array([result.t[0] if at is None else at])
     if suffix in FILMS:
@@ -137,9 +137,10 @@ def _stage_of(
     model: str | os.PathLike[str] | None,
     *,
     fit: bool,
+    still: bool,
 ) -> tuple[Stage, tuple[str, ...]]:
     """The stage, and notes on what it shows."""
-    sticks = sticks_of(result, model)
+    sticks = sticks_of(result, model, still=still)
     extent = sticks.extent(result, np.eye(3))
     camera = camera_of(view, extent)
     limits = with_margin(extent) if sticks.limits is None or fit else sticks.limits

@@ -12,8 +12,9 @@ from dap3d_core.plot.film.projection import Camera
 from dap3d_core.scene.scene import Scene
 from dap3d_core.view.scene3d.shapes import GROUND_COLOR, parts_of, scene_shapes
 
-#: Shapes of more triangles are not drawn: every picture of a film draws all of them.
-MOST_TRIANGLES = 30_000
+#: Shapes of more triangles are not drawn in films, whose every picture draws all of them; and in
+#: snapshots. Large triangles are divided as long as there are fewer than the first in all.
+MOST_TRIANGLES, MOST_IN_SNAPSHOTS = 30_000, 400_000
 #: Longer edges, as parts of the largest shape, are divided: the middle of a large triangle says
 #: little of what it hides.
 LONGEST = 0.12
@@ -67,21 +68,30 @@ class Shapes:
         return camera.project(corners[order]), self.colors[order] * shade
 
 
-def shapes_of(scene: Scene, names: Sequence[str], colors: Sequence[str]) -> Shapes:
-    """The shapes of a scene; arguments as of ``view.scene3d.shapes.scene_shapes``."""
+def shapes_of(
+    scene: Scene, names: Sequence[str], colors: Sequence[str], most: int = MOST_TRIANGLES
+) -> Shapes:
+    """The shapes of a scene; arguments as of ``view.scene3d.shapes.scene_shapes``.
+
+    Of more than ``most`` triangles nothing is drawn, with a note.
+    """
     shapes = scene_shapes(scene, names, colors)
     notes = list(shapes.notes)
     parts = [(part, part.vertices) for part in parts_of(shapes.marks, shapes.meshes)]
     size = max((float(np.max(np.ptp(local, axis=0))) for _, local in parts), default=0.0)
-    pieces = [(part.body, *_divided(local, part.form.triangles, size), part.color)
-              for part, local in parts]  # fmt: skip
+    room = MOST_TRIANGLES - sum(len(part.form.triangles) for part, _ in parts)
+    pieces = []
+    for k, (part, local) in enumerate(parts):
+        extra = room // (len(parts) - k)
+        pieces.append((part.body, *_divided(local, part.form.triangles, size, extra), part.color))
+        room -= len(pieces[-1][2]) - len(part.form.triangles)
     for line in shapes.lines:  # triangles without an area, whose edges are visible
         k = np.arange(len(line.points) - 1)
         pieces.append((line.body, line.vertices, np.stack([k, k + 1, k + 1], axis=1), line.color))
-    if sum(len(piece[2]) for piece in pieces) > MOST_TRIANGLES:
+    if sum(len(piece[2]) for piece in pieces) > most:
         notes.append(
-            f"shapes of more than {MOST_TRIANGLES} triangles in all are not drawn; dap3d view and "
-            "dap3d export show them"
+            f"shapes of more than {most} triangles in all are not drawn; dap3d view and "
+            "dap3d export show them" + (", and snapshots" if most < MOST_IN_SNAPSHOTS else "")
         )
         pieces = []
     hues = {piece[0]: to_hex(_rgb(piece[3])) for piece in reversed(pieces)}
@@ -104,13 +114,19 @@ def _rgb(color: str) -> tuple[float, float, float]:
     return to_rgb(color) if is_color_like(color) else to_rgb(GROUND_COLOR)
 
 
-def _divided(local: Floats, triangles: Integers, size: float) -> tuple[Floats, Integers]:
-    """Triangles with short edges: long ones are divided into four, repeatedly."""
+def _divided(
+    local: Floats, triangles: Integers, size: float, extra: int
+) -> tuple[Floats, Integers]:
+    """Triangles with short edges: long ones are divided into four, repeatedly.
+
+    There are at most ``extra`` more than before.
+    """
+    most = len(triangles) + extra
     corners = local[triangles]
     for _ in range(4):
         edges = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
         long = edges.max(axis=1) > LONGEST * size
-        if not long.any() or 3 * long.sum() + len(corners) > MOST_TRIANGLES:
+        if not long.any() or 3 * long.sum() + len(corners) > most:
             break
         a, b, c = corners[long].swapaxes(0, 1)
         d, e, f = 0.5 * (a + b), 0.5 * (b + c), 0.5 * (c + a)

@@ -103,12 +103,15 @@ class Sticks:
         return np.stack([np.min(found, axis=(0, 1)), np.max(found, axis=(0, 1))], axis=1)
 
 
-def sticks_of(result: Result, model: str | os.PathLike[str] | None = None) -> Sticks:
+def sticks_of(
+    result: Result, model: str | os.PathLike[str] | None = None, *, still: bool = False
+) -> Sticks:
     """The stick figure of a result, from its points and from the scene in it.
 
     Args:
         result: whose.
         model: in whose folder meshes of shapes lie, where they are drawn.
+        still: for one picture, which may take longer than each of many.
     """
     summary = result.summary
     scene = _scene(result.scene_text)
@@ -130,9 +133,15 @@ def sticks_of(result: Result, model: str | os.PathLike[str] | None = None) -> St
     colors = _colors(scene, summary.body_names, pairs_of_bodies)
     shapes = None
     if scene.shapes:
-        from dap3d_core.plot.film.shaded_solids import shapes_of
+        from dap3d_core.plot.film.shaded_solids import (
+            MOST_IN_SNAPSHOTS,
+            MOST_TRIANGLES,
+            shapes_of,
+        )
 
-        shapes = shapes_of(scene, summary.body_names, [to_hex(color) for color in colors])
+        most = MOST_IN_SNAPSHOTS if still else MOST_TRIANGLES
+        hexadecimal = [to_hex(color) for color in colors]
+        shapes = shapes_of(scene, summary.body_names, hexadecimal, most)
         colors = tuple(shapes.hues.get(k, color) for k, color in enumerate(colors, 1))
     found, shaped = np.array(body), [] if shapes is None else [*shapes.hues]
     bare = np.isin(found, shaped, invert=True)

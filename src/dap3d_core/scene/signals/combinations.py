@@ -5,6 +5,7 @@ from graphlib import CycleError, TopologicalSorter
 import attrs
 
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.scene.validate.elements import arguments_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance
 
@@ -16,10 +17,17 @@ def combine_functions(report: Collector, functions: list[Instance]) -> list[Inst
     """The functions with those that they combine; mistakes are reported.
 
     Args:
-        report: takes mistakes: a function that names itself, or too many terms.
+        report: takes mistakes: a function that names itself, one of two arguments, or too many
+            terms.
         functions: without mistakes of their own, in file order.
     """
     known = {function.name: function for function in functions}
+    arguments = arguments_of(functions)
+    for function in functions:
+        if of_two := [name for name in _terms(function) if arguments.get(name, 1) > 1]:
+            what = f"combines functions of one argument; {of_two[0]} takes two"
+            report.add(("functions", function.name), list(_terms(function)), what)
+            return functions
     uses = {name: _terms(function) for name, function in known.items()}
     try:
         order = list(TopologicalSorter(uses).static_order())

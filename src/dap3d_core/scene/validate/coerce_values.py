@@ -133,6 +133,20 @@ def list_of(value: Any) -> Any:
     return numbers_of(value, len(value))
 
 
+def rows_of(value: Any) -> Any:
+    """Rows of finite numbers, all of one length, as tuples."""
+    value, should = plain(value), "should be a list of rows of numbers"
+    if type(value) is not tuple or not value:
+        return Fault(f"{should}, not {_kind(value)}")
+    rows = _entries(value, list_of, f"{should}; row")
+    if isinstance(rows, Fault):
+        return rows
+    for k, row in enumerate(rows, 1):
+        if len(row) != len(rows[0]):
+            return Fault(f"{should} of one length; row {k} has {len(row)}, row 1 {len(rows[0])}")
+    return rows
+
+
 def word_of(value: Any, allowed: Collection[Any], aliases: Mapping[str, str] | None = None) -> Any:
     """One of the allowed words (or truth values), by its own name or an alias."""
     value = plain(value)

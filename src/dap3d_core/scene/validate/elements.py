@@ -1,6 +1,6 @@
 """Reads joints, forces and functions: from fields as written to the values their types need."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -17,6 +17,7 @@ from dap3d_core.scene.validate.coerce_values import (
     matrix_of,
     number_of,
     numbers_of,
+    rows_of,
     word_of,
 )
 from dap3d_core.scene.validate.geometry import (
@@ -41,7 +42,7 @@ _ABSENT: Any = object()
 _UNKNOWN = -2
 
 #: Readers of the kinds of fields that hold values and no references.
-_READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
+READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
     "number": lambda spec, value: bounded(
         number_of(value),
         positive=spec.positive,
@@ -52,7 +53,7 @@ _READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
     "numbers": lambda spec, value: numbers_of(value, spec.columns),
     "vec3": lambda spec, value: numbers_of(value, 3),
     "matrix": lambda spec, value: matrix_of(value),
-    "table": lambda spec, value: list_of(value),
+    "table": lambda spec, value: rows_of(value) if spec.by_rows else list_of(value),
     "choice": lambda spec, value: word_of(value, spec.choices, spec.aliases),
 }
 
@@ -81,13 +82,19 @@ class Reader:
         table: joints, forces or functions.
         geometry: resolves references to points, vectors and bodies.
         report: takes mistakes and notes.
+        arguments: how many each function of the scene takes, as far as known.
     """
 
     def __init__(
-        self, type_info: TypeInfo, table: str, geometry: Geometry, report: Collector
+        self,
+        type_info: TypeInfo,
+        table: str,
+        geometry: Geometry,
+        report: Collector,
+        arguments: Mapping[str, int],
     ) -> None:
         self.type_info, self.table = type_info, table
-        self.geometry, self.report = geometry, report
+        self.geometry, self.report, self.arguments = geometry, report, arguments
         self.body_names = (GROUND, *geometry.bodies.body_names)
         self.slots = () if getattr(type_info.type, "each_body", False) else type_info.layout.slots
         self.function_index = {name: k for k, name in enumerate(report.scene.functions, 1)}
@@ -113,7 +120,7 @@ class Reader:
         letter = slot_of(name)
         slot = self.slots.index(letter) if letter in self.slots else -1
         read = _FIELD_READERS.get(spec.kind, _Reading.value)
-        return _Field(name, spec, slot, read, partial(_READERS.get(spec.kind, _unread), spec))
+        return _Field(name, spec, slot, read, partial(READERS.get(spec.kind, _unread), spec))
 
     def read(self, element: Element) -> Instance | None:
         """The instance of an element; None where a mistake was reported."""
@@ -241,6 +248,10 @@ class _Reading:
 
     def function(self, field: _Field, value: Any) -> None:
         self.name_of(field, value, self.reader.function_index)
+        count, wanted = self.reader.arguments.get(value), field.spec.arguments
+        if count is not None and count != wanted:
+            given = field.spec.argument or "time"
+            self.refuse(field.name, f"takes {counted(count)}, and is to be a function of {given}")
 
     def functions(self, field: _Field, value: Any) -> None:
         """Several functions by name."""
@@ -358,6 +369,16 @@ _FIELD_READERS = {
 }
 
 
+def counted(count: int) -> str:
+    """A number of arguments, in words."""
+    return "one argument" if count == 1 else "two arguments"
+
+
+def arguments_of(functions: Iterable[Instance]) -> dict[str, int]:
+    """How many arguments each function takes."""
+    return {f.name: f.type_info.type.arguments for f in functions}  # type: ignore[attr-defined]
+
+
 def combines(type_info: TypeInfo) -> bool:
     """True if a type of function combines other functions."""
     return any(spec.kind == "functions" for spec in specs_of(type_info.type).values())
@@ -370,7 +391,7 @@ def _of(field: _Field) -> str:
         "numbers": f"{field.spec.columns} numbers",
         "matrix": "3x3 numbers",
         "choice": "a word",
-        "table": "numbers",
+        "table": "rows of numbers" if field.spec.by_rows else "numbers",
         "functions": "names",
         "input": "an input",
     }
@@ -379,7 +400,11 @@ def _of(field: _Field) -> str:
 
 
 def read_elements(
-    report: Collector, geometry: Geometry, table: str, types: dict[str, TypeInfo]
+    report: Collector,
+    geometry: Geometry,
+    table: str,
+    types: dict[str, TypeInfo],
+    functions: Sequence[Instance] = (),
 ) -> list[Instance]:
     """The elements of a table that are without mistakes, in file order.
 
@@ -388,8 +413,10 @@ def read_elements(
         geometry: resolves references.
         table: joints, forces or functions.
         types: the examined types that could be loaded, by keyword.
+        functions: of the scene, for those that name them.
     """
-    readers = {keyword: Reader(e, table, geometry, report) for keyword, e in types.items()}
+    arguments = arguments_of(functions)
+    readers = {k: Reader(e, table, geometry, report, arguments) for k, e in types.items()}
     instances = []
     for element in getattr(report.scene, table).values():
         reader = readers.get(element.type) if type(element.type) is str else None

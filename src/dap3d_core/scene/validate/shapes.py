@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ class Shape:
 
     Attributes:
         name: its name in the scene.
-        type: one of SHAPES.
+        type: one of SHAPES, or a kind that a package brings.
         body: index of its body, ground 0.
         values: its other fields; those left out have their default.
     """
@@ -112,12 +113,9 @@ def read_shapes(report: Collector, index: Mapping[str, int]) -> list[Shape]:
 def _shape(report: Collector, index: Mapping[str, int], element: Element) -> Shape | None:
     key: Key = ("shapes", element.name)
     word, given = element.type, element.fields
-    fields = SHAPES.get(word) if isinstance(word, str) else None
     body = body_index_of(report, index, (*key, "body"), given.get("body"))
+    fields = SHAPES[word] if isinstance(word, str) and word in SHAPES else _added(report, key, word)
     if fields is None:
-        value = MISSING if word is None else word
-        what = f"{'is required' if word is None else 'unknown shape'}; one of {', '.join(SHAPES)}"
-        report.add((*key, "type"), value, what, nearest(word, SHAPES))
         return None
     allowed = ("type", "body", *fields)
     report.add_unknown_keys(key, given, allowed, in_order=True)
@@ -134,6 +132,36 @@ def _shape(report: Collector, index: Mapping[str, int], element: Element) -> Sha
     if not is_good or any(isinstance(value, Fault) for value in values.values()):
         return None
     return Shape(element.name, str(word), body, values)
+
+
+def _added(report: Collector, key: Key, word: Any) -> Mapping[str, Field] | None:
+    """The fields of a kind that a package brings; None where a mistake is reported."""
+    from dap3d_core.interface.errors import PluginError
+    from dap3d_core.interface.fields import specs_of
+    from dap3d_core.registry.shapes import added_shapes, load_shape
+    from dap3d_core.scene.validate.elements import READERS
+
+    added = added_shapes()
+    if not isinstance(word, str) or word not in added:
+        known = (*SHAPES, *added)
+        value = MISSING if word is None else word
+        what = f"{'is required' if word is None else 'unknown shape'}; one of {', '.join(known)}"
+        report.add((*key, "type"), value, what, nearest(word, known))
+        return None
+    try:
+        specs = specs_of(load_shape(word))
+    except PluginError as error:
+        report.add((*key, "type"), word, str(error))
+        return None
+    own = {
+        name: Field(
+            partial(READERS[spec.kind], spec),
+            None if spec.required else spec.default,
+            f"{spec.doc or name}{f', {spec.unit}' if spec.unit else ''}",
+        )
+        for name, spec in specs.items()
+    }
+    return own | {"at": _AT, "p": _P, "color": _COLOR}
 
 
 def _mesh_of(folder: Path | None, value: Any) -> str | Fault:

@@ -97,7 +97,8 @@ def _with_states(evaluator: Evaluator, search: Search) -> Search:
     Raises:
         SimulationError: states do not come to rest; names them.
     """
-    from dap3d_core.simulation.equilibrium.states_at_rest import find_together, moving_states
+    from dap3d_core.simulation.equilibrium.balanced_states import find_together
+    from dap3d_core.simulation.equilibrium.states_at_rest import moving_states
 
     moving = moving_states(evaluator, 0.0, search.pose.u)
     if not moving:

@@ -6,8 +6,8 @@ states settled,
 
     K = -dF/dx - dF/dz dz/dx        dz/dx = -(dr/dz)^+ dr/dx,        rates r(x, z).
 
-Rates that no state can bring to zero, as of a controller that integrates its error, need the pose:
-then forces and rates are solved together, from the pose that was found.
+Rates that no state can bring to zero, as of a controller that integrates its error, need the pose
+(balanced_states.py).
 """
 
 from collections.abc import Iterator
@@ -20,10 +20,8 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.common.state_derivatives import StateDerivatives, state_derivatives
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.element_states import ElementState, first_states, width_of
-from dap3d_core.simulation.errors import AssemblyError
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
     from dap3d_core.simulation.linearization.tangent import TangentMatrices
 
 Floats = NDArray[np.float64]
@@ -42,7 +40,7 @@ def settle(evaluator: Evaluator, t: float, u: Floats) -> None:
     best = evaluator.states
     for _ in range(MOST_STEPS):
         own = _derivatives(evaluator, t, u)
-        left = _unsettled(own, evaluator.states)
+        left = unsettled_part(own, evaluator.states)
         if not np.all(np.isfinite(own.rates)) or not left < before:
             evaluator.states = best
             return
@@ -54,7 +52,7 @@ def settle(evaluator: Evaluator, t: float, u: Floats) -> None:
 
 def unsettled(evaluator: Evaluator, t: float, u: Floats) -> float:
     """Largest rate of a state at a pose, as a part of its terms."""
-    return _unsettled(_derivatives(evaluator, t, u), evaluator.states)
+    return unsettled_part(_derivatives(evaluator, t, u), evaluator.states)
 
 
 def moving_states(evaluator: Evaluator, t: float, u: Floats) -> list[ElementState]:
@@ -74,35 +72,6 @@ def with_settled(tangent: "TangentMatrices", evaluator: Evaluator) -> "TangentMa
     return attrs.evolve(tangent, stiffness=tangent.stiffness + own.force_by_states @ follows)
 
 
-def find_together(statics: "Statics", pose: "StaticPose") -> "StaticPose | None":
-    """The pose at which forces and rates vanish, by Newton's method; None where it finds none."""
-    evaluator, kept, before = statics.evaluator, statics.evaluator.states, np.inf
-    for _ in range(MOST_STEPS):
-        fixed = statics.fixed_tangent(pose)
-        own = fixed.states
-        assert own is not None
-        left = max(pose.residual, _unsettled(own, evaluator.states))
-        if left <= SETTLED:
-            return pose
-        if not left < 1e3 * before:
-            break
-        before = min(before, left)
-        basis = statics.scale[:, None] * pose.free
-        matrix = np.block(
-            [[-statics.reduced(fixed.stiffness, pose), basis.T @ own.force_by_states.toarray()],
-             [own.rate_by_displacement @ basis, own.rate_by_states.toarray()]]
-        )  # fmt: skip
-        step = _least_solution(matrix, -np.concatenate([pose.unbalanced, own.rates]))
-        evaluator.states = evaluator.states + step[pose.free.shape[1] :]
-        try:
-            moved = statics.moved(pose.u, pose.free @ step[: pose.free.shape[1]])
-            pose = statics.at(statics.closed(moved))
-        except (AssemblyError, np.linalg.LinAlgError):
-            break
-    evaluator.states = kept
-    return None
-
-
 def _derivatives(evaluator: Evaluator, t: float, u: Floats) -> StateDerivatives:
     model = evaluator.model
     evaluator.place(t, u)
@@ -118,7 +87,8 @@ def _terms(own: StateDerivatives, states: Floats) -> Floats:
     return found
 
 
-def _unsettled(own: StateDerivatives, states: Floats) -> float:
+def unsettled_part(own: StateDerivatives, states: Floats) -> float:
+    """Largest rate as a part of its terms, of derivatives at a pose."""
     terms, rates = _terms(own, states), np.abs(own.rates)
     parts = np.where(rates > 0.0, rates / np.where(terms > 0.0, terms, rates + (rates == 0.0)), 0.0)
     return float(np.max(parts, initial=0.0))
@@ -145,15 +115,4 @@ def _scaled_inverse(matrix: Floats) -> Floats:
     size = np.max(np.abs(matrix), axis=1, keepdims=True)
     size[size == 0.0] = 1.0
     found: Floats = np.linalg.pinv(matrix / size, rcond=OPEN) / size.T
-    return found
-
-
-def _least_solution(matrix: Floats, side: Floats) -> Floats:
-    """The least solution of equations of different units, columns and rows scaled."""
-    rows = np.max(np.abs(matrix), axis=1, initial=0.0)
-    rows[rows == 0.0] = 1.0
-    columns = np.max(np.abs(matrix / rows[:, None]), axis=0, initial=0.0)
-    columns[columns == 0.0] = 1.0
-    scaled = matrix / rows[:, None] / columns
-    found: Floats = np.linalg.lstsq(scaled, side / rows, rcond=OPEN)[0] / columns
     return found

@@ -39,6 +39,7 @@ class Jumps:
         records: of the first MOST_RECORDS jumps, and of the switches that crossed without one.
         count: jumps and such crossings.
         lose: whether a jump took or gave energy.
+        span: of the run, s, by which rates and times are judged; None: from its start to its end.
     """
 
     def __init__(self, evaluator: Evaluator) -> None:
@@ -46,6 +47,7 @@ class Jumps:
         self._evaluator = evaluator
         self.records: list[EventRecord] = []
         self.count, self.lose = 0, False
+        self.span: float | None = None
 
     @cached_property
     def _law(self) -> JumpLaw:
@@ -75,6 +77,11 @@ class Jumps:
     def begin(self, integration: Integration) -> None:
         """Let what touches and approaches at the start of a run jump there."""
         self._jump(integration, np.zeros(integration.work.switches.shape[1]), None)
+
+    def restart(self, integration: Integration) -> None:
+        """Forget the jumps so far, and begin again."""
+        self.records, self.count, self.lose = [], 0, False
+        self.begin(integration)
 
     def apply(self, integration: Integration) -> None:
         """Let velocities jump where an integration has stopped for it; it then continues."""
@@ -143,7 +150,12 @@ class Jumps:
         return u
 
     def _soon(self, integration: Integration) -> float:
-        return SOON * float(integration.work.times[-1])
+        return SOON * self._span_of(integration)
+
+    def _span_of(self, integration: Integration) -> float:
+        times = integration.work.times
+        span = float(times[-1] - times[0]) if self.span is None else self.span
+        return max(span, abs(integration.t))
 
     def _jump(self, integration: Integration, crossing: Floats, sides: Floats | None) -> None:
         t, u = integration.t, self._state_of(integration)
@@ -238,8 +250,8 @@ class Jumps:
         evaluator, work = self._evaluator, integration.work
         functions, arrays = evaluator.functions, (evaluator.system, evaluator.loops)
         t, y = integration.t, integration.y
-        span = float(work.times[-1] - work.times[0])
-        h = DIFFERENCE * max(span, abs(t))
+        span = self._span_of(integration)
+        h = DIFFERENCE * span
         slope, (values, later) = np.zeros_like(y), np.zeros((2, len(evaluator.switches)))
         functions[RHS](t, y, slope, *arrays)
         functions[WATCH](t, y, values, *arrays)

@@ -287,10 +287,9 @@ class Linearization:
         return bool(np.all(values.real <= own * np.abs(values) + all_of_them * size))
 
     def __repr__(self) -> str:
-        return (
-            f"<Linearization at t = {self.t:g} s: {len(self.body_names)} bodies, {self.dof} "
-            f"degrees of freedom, {len(self.inputs)} inputs, {len(self.outputs)} outputs>"
-        )
+        n, m = len(self.inputs), len(self.outputs)
+        size = f"degrees of freedom {self.dof}, inputs {n}, outputs {m}"
+        return f"<Linearization at t = {self.t:g} s: {size}>"
 
 
 def _balance(space: StateSpace, scale: Floats) -> Floats:

@@ -72,7 +72,7 @@ def jammed_forces(evaluator: Evaluator, t: float, y: Any) -> str:
         return ""
     if not evaluator.friction_failure_count:  # of radau, which iterates on its stages
         for later in AHEAD:
-            evaluator.rhs(t + later * (1.0 + abs(t)), u_from_y(y))
+            evaluator.rhs(t + later * (1.0 + abs(t)), u_from_y(y, model.state_count))
     if not evaluator.friction_failure_count:
         return ""
     return (

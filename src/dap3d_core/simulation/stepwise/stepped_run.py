@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING
 
 import attrs
 from numpy.typing import ArrayLike
@@ -22,12 +23,17 @@ from dap3d_core.simulation.handover import hand_over
 from dap3d_core.simulation.initial.given_state import state_of
 from dap3d_core.simulation.output.termination import why_stopped
 from dap3d_core.simulation.run import Run
-from dap3d_core.simulation.run_state import Callbacks
+from dap3d_core.simulation.run_state import Callbacks, jumps_of
 from dap3d_core.simulation.settings import compiled_for, settings_of
 from dap3d_core.simulation.stepwise.state_log import StateLog
 
+if TYPE_CHECKING:
+    from dap3d_core.simulation.events.jumps import Jumps
+
 #: Where a run without a final time ends at last, s: steps cannot resolve time any further.
 HORIZON = 1e5
+#: Steps that a run is taken to have, where a time is judged by the length of the run.
+USUAL_STEPS = 1000
 
 
 class SteppedRun:
@@ -44,6 +50,9 @@ class SteppedRun:
         self.compiled, self._run = run.compiled, run
         evaluator = self._evaluator = run.evaluator = run.compiled.new_evaluator()
         run.initialise()
+        run.jumps = jumps_of(evaluator)
+        if run.jumps is not None:
+            run.jumps.begin(run.present)
         self.state = StateView(run.compiled, evaluator)
         self.notes = run.notes
         self._inputs = HeldInputs(evaluator)
@@ -90,6 +99,8 @@ class SteppedRun:
             jump(self._evaluator, hold, drives=self._inputs.drives)
         if self._is_recorded:
             self._log.add(t)
+        if self._run.jumps is not None:
+            self._run.jumps.span = min(USUAL_STEPS * dt, self._t_end)
         if not hold.to(end) or self._run.until < math.inf:
             self._go_on(end)
         self.state.changed()
@@ -124,6 +135,8 @@ class SteppedRun:
             self._integration.restart()
             if not self._integration.project():
                 raise SimulationError("no state that satisfies the constraints was found near u")
+        if run.jumps is not None:
+            run.jumps.restart(self._integration)
 
     def result(self) -> Result:
         """The states at the ends of all steps so far, with the inputs that act from there on.
@@ -153,7 +166,9 @@ class SteppedRun:
         while True:
             present = run.present
             present.rows()  # those of the integration are not used
-            if present.status is Status.RUNNING and present.t < min(end, run.until):
+            if run.jumps is not None and present.status is Status.JUMPED:
+                self._jump(run.jumps)
+            elif present.status is Status.RUNNING and present.t < min(end, run.until):
                 self._hold.to(min(end, run.until), 0 if run.until < math.inf else None)
             elif present.t >= end and present.status in (Status.RUNNING, Status.FINISHED):
                 return
@@ -161,6 +176,14 @@ class SteppedRun:
                 self._attach()
             else:
                 self._stop()
+
+    def _jump(self, jumps: "Jumps") -> None:
+        """Let velocities jump; the hold goes on."""
+        try:
+            jumps.apply(self._run.present)
+        except SimulationError as error:
+            self._failure = str(error)
+            raise SimulationError(self._failure, self.result()) from error
 
     def _stop(self) -> None:
         """Say why the run cannot go on."""
@@ -198,6 +221,8 @@ def start(
     record: bool = True,
 ) -> SteppedRun:
     """Begin a run that a script takes step by step; settings are those of ``simulate``.
+
+    ::
 
         run = dap.start(scene, rtol=1e-6)
         while run.t < 2.0:

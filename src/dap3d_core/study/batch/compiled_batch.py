@@ -155,7 +155,7 @@ class CompiledBatch:
             start: UNCORRECTED, CORRECT, or CORRECT_ONLY (driver.py).
         """
         work, count = self.integration.work, len(table)
-        nt, width = len(work.rows), self.evaluator.model.row_layout.size
+        nt, width = len(work.rows), self.evaluator.model.row_layout["inputs"].start
         own = self.evaluator.formulation.has_own_coordinates
         diagnostics = np.zeros((count, driver.COLUMNS))
         points = driver.Points(

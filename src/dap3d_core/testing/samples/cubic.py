@@ -1,4 +1,4 @@
-"""A cubic, the sample of a function of an argument."""
+"""Samples of functions of an argument, and of two."""
 
 from typing import Any
 
@@ -17,3 +17,19 @@ class Cubic(Function):
     def value(x: Any, a: Any, b: Any, c: Any, d: Any) -> Any:  # noqa: D102, N805
         f = a + x * (b + x * (c + x * d))
         return f, b + x * (2.0 * c + 3.0 * x * d), 2.0 * c + 6.0 * x * d, 6.0 * d
+
+
+class CubicOfTwo(Function):
+    """f = a + b x + c y + x y (d x + e y), with no two derivatives alike."""
+
+    keyword, arguments = "cubic-of-two", 2
+    a: float = number(doc="constant")
+    b: float = number(doc="coefficient of x")
+    c: float = number(doc="of y")
+    d: float = number(doc="of x^2 y")
+    e: float = number(doc="of x y^2")
+
+    def value(x: Any, y: Any, a: Any, b: Any, c: Any, d: Any, e: Any) -> Any:  # noqa: D102, N805
+        f = a + b * x + c * y + x * y * (d * x + e * y)
+        f_x, f_y = b + y * (2.0 * d * x + e * y), c + x * (d * x + 2.0 * e * y)
+        return f, f_x, f_y, 2.0 * d * y, 2.0 * (d * x + e * y), 2.0 * e * x

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.body_pose import BodyPose, pose
+from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH, size
-from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, kernels_of, write
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, kernels_of
 from dap3d_core.interface.codegen.reactions import sample_size
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
@@ -82,7 +83,7 @@ class Kernels:
 
         C (position rows,), G (position rows, unknowns), C_dot (velocity rows,), J (slots, rows, 6),
         gamma and nu (rows,), wrench and friction (slots, 2, 3), energy (1,), switch (n,), value
-        (4,), rate and reset (states,), impulse (rows,) or (slots, 2, 3).
+        (4,) or (6,), rate and reset (states,), impulse (rows,) or (slots, 2, 3).
         """
         body, table = state.body().astype(object), state.table().astype(object)
         own = state.own.astype(object)
@@ -183,7 +184,8 @@ class Kernels:
         if name in ("wrench", "friction"):
             return outs[0][6 : 6 * (slots + 1)].reshape(slots, 2, 3)
         if name == "value":
-            return table[1, :4]
+            of_two = len(self.type_info.outputs["value"]) > 4  # the last two are behind y
+            return np.concatenate([table[1, :4], table[2, 1:3]]) if of_two else table[1, :4]
         if name == "rate":
             return rates
         return outs[0][: len(self.type_info.outputs[name])]

@@ -18,7 +18,7 @@ from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
 from dap3d_core.interface.examine.random_values import numbers
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.testing.samples.cubic import Cubic
+from dap3d_core.testing.samples.cubic import Cubic, CubicOfTwo
 from dap3d_core.testing.samples.random_element import Kernels, RandomElement, RefusalError, draw
 from dap3d_core.testing.samples.random_state import (
     BODIES,
@@ -219,7 +219,8 @@ class SampledType:
             try:
                 element = draw(self.type_info, self.drawn_choices, rng, state)
                 state = random_state(rng, given, grounded=grounded)
-                if count := len(unknown_names(self.type)):
+                count = getattr(self.type, "arguments", 1) - 1  # y of a function of two
+                if count := count or len(unknown_names(self.type)):
                     unknowns = np.array([numbers(rng, 2) for _ in range(count)])
                     state = attrs.evolve(state, unknowns=unknowns)
                 if layout.states:
@@ -254,7 +255,10 @@ def sampled_types(type_info: TypeInfo, seed: int, poses: int) -> list[SampledTyp
     if own is not None:
         variants.append((own, type_info))
     variants += [(dict(conditions), e) for conditions, e in type_info.variants]
-    return [SampledType(_alone(_given(e, values)), values, seed, poses) for values, e in variants]
+    return [
+        SampledType(_alone(with_functions(e, values)), values, seed, poses)
+        for values, e in variants
+    ]
 
 
 def _alone(type_info: TypeInfo) -> TypeInfo:
@@ -266,11 +270,13 @@ def _alone(type_info: TypeInfo) -> TypeInfo:
     return with_sample_reactions(type_info)
 
 
-def _given(type_info: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
+def with_functions(type_info: TypeInfo, values: Mapping[str, Any]) -> TypeInfo:
     """The type with a cubic for each function of an argument, unless the variant has none."""
     if any(spec.kind == "functions" for spec in specs_of(type_info.type).values()):
         return bind_terms(type_info, [examine(Cubic)] * TERMS)
-    given = {f: examine(Cubic) for f in type_info.argument_functions if values.get(f, True)}
+    specs = specs_of(type_info.type)
+    given = {f: examine(CubicOfTwo if specs[f].arguments > 1 else Cubic)
+             for f in type_info.argument_functions if values.get(f, True)}  # fmt: skip
     return bind_functions(type_info, given, dict.fromkeys(given, 0)) if given else type_info
 
 

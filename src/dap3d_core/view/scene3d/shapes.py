@@ -8,13 +8,15 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
+from dap3d_core.interface.errors import where_is
+from dap3d_core.interface.shapes import RESERVED
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import to_global
 from dap3d_core.scene.files.read_mesh import read_mesh
 from dap3d_core.scene.scene import Scene
 from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.shapes import Shape, mesh_file, read_shapes
+from dap3d_core.scene.validate.shapes import SHAPES, Shape, mesh_file, read_shapes
 from dap3d_core.view.scene3d.colors import color
 from dap3d_core.view.scene3d.primitives import Located, Mark, plain, turned_to
 from dap3d_core.view.scene3d.solids import Triangles, solid
@@ -148,13 +150,13 @@ def _add(shapes: SceneShapes, shape: Shape, hue: str, folder: Path | None) -> st
     values = shape.values
     about: dict[str, Any] = {"body": shape.body, "color": hue, "owner": shape.name}
     piece: Mark | Line | Mesh
-    if shape.type == "mesh":
+    if shape.type == "mesh" or shape.type not in SHAPES:
         if sum(len(mesh.triangles) for mesh in shapes.meshes) >= MOST_IN_ALL:
             return f"the picture holds {MOST_IN_ALL} triangles already, or more"
-        mesh = _mesh(folder, values["file"])
+        mesh = _mesh(folder, values["file"]) if shape.type == "mesh" else _own_mesh(shape)
         if isinstance(mesh, str):
             return mesh
-        piece = Mesh(at=values["at"], q=values["p"], scale=values["scale"],
+        piece = Mesh(at=values["at"], q=values["p"], scale=values.get("scale", 1.0),
                      vertices=mesh[0], triangles=mesh[1], **about)  # fmt: skip
         box = piece.scale * np.array([mesh[0].min(axis=0), mesh[0].max(axis=0)])
         corners = _corners(shape.body, piece.at, piece.q, box)
@@ -206,4 +208,28 @@ def _mesh(folder: Path | None, name: str) -> tuple[Floats, Any] | str:
     vertices, triangles = mesh
     if len(triangles) > MOST_TRIANGLES:
         return f"{name} has {len(triangles)} triangles; at most {MOST_TRIANGLES} are drawn"
+    return vertices, triangles
+
+
+def _own_mesh(shape: Shape) -> tuple[Floats, Any] | str:
+    """The triangles of a kind that a package brings, or why there are none."""
+    from dap3d_core.registry.shapes import load_shape
+
+    kind = load_shape(shape.type)
+    fields = {name: v for name, v in shape.values.items() if name not in RESERVED}
+    try:
+        places, corners = kind(**fields).mesh()
+        vertices: Floats = np.array(places, dtype=np.float64)
+        triangles: Integers = np.array(corners, dtype=np.int64)
+    except ValueError as error:
+        return str(error)
+    except Exception as error:  # code of others
+        return f"{where_is(kind)}.mesh failed: {type(error).__name__}: {error}"
+    if len(triangles) > MOST_TRIANGLES:
+        return f"it has {len(triangles)} triangles; at most {MOST_TRIANGLES} are drawn"
+    rows_of_three = all(x.ndim == 2 and x.shape[1] == 3 and len(x) for x in (vertices, triangles))
+    if not rows_of_three or not np.all(np.isfinite(vertices)):
+        return f"{where_is(kind)}.mesh should return finite vertices (k, 3) and triangles (m, 3)"
+    if triangles.min() < 0 or triangles.max() >= len(vertices):
+        return f"{where_is(kind)}.mesh returns a triangle of a vertex that is not there"
     return vertices, triangles

@@ -41,7 +41,7 @@ def test_the_example_of_every_type_runs(kind, keyword, tmp_path):
 
 @each
 def test_every_type_is_described(kind, keyword):
-    """Fields with unit, default and meaning; the docstring; what stands for it, where; in JSON."""
+    """Fields with unit, default and meaning, in 60 columns; the docstring; where it is; in JSON."""
     types = json.loads(described(keyword, "--json"))["types"]
     (found,) = (t for t in types if t["kind"] == kind)
     type_info = load_registry().get(kind, keyword)
@@ -57,18 +57,12 @@ def test_every_type_is_described(kind, keyword):
         e.type.__name__ for _, e in type_info.variants
     ]
     assert all(v["doc"] for v in found["variants"])
-    text = described(keyword)
+    text = described(keyword, "--names", width=60)
+    assert [line for line in text.splitlines() if len(line) > 60] == []
     for name, spec in specs.items():
         assert f"\n  {name} " in text
         if spec.unit:
             assert spec.unit in text
-
-
-@each
-def test_a_description_fits_60_columns(kind, keyword):
-    """No line is wider, the example's lines included."""
-    lines = described(keyword, "--names", width=60).splitlines()
-    assert [line for line in lines if len(line) > 60] == []
 
 
 def test_the_freedoms_that_joints_leave():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 
@@ -50,6 +51,7 @@ TENDON = """<tendon><fixed name="t">
 <equality><tendon tendon1="t"/></equality>"""
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(
     ("suffix", "text", "armature"),
     [

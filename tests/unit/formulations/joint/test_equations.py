@@ -4,6 +4,7 @@ import attrs
 import numpy as np
 import pytest
 from support import trees
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.assembly.arrays import TOLERANCE_C, TOLERANCE_V
@@ -159,6 +160,7 @@ def test_radau_says_that_it_keeps_body_coordinates():
         dap.simulate("pen1", t_end=0.1, method="joint", integrator="radau")
 
 
+@long_in_plain_python
 def test_a_stiff_tree_is_told_which_method_radau_takes():
     """Integrator auto stays with dop853; the governor's note says what would take fewer steps."""
     found = dap.simulate("A05", t_end=0.1, dt=0.05, rtol=1e-5, method="joint", integrator="auto")
@@ -179,6 +181,7 @@ def hinged_spring(theta_0=0.0):
     return scene
 
 
+@long_in_plain_python
 def test_turns_knots_and_events_are_those_of_standard():
     """A spring over more than a turn, a knot of its law, a quantity that passes a level."""
     settings = {"t_end": 2.0, "dt": 0.25, "rtol": 1e-10, "atol": 1e-12}

@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support import loops, problems, redundant, singular, trees
+from support.plain import long_in_plain_python
 from unit.formulations.joint.test_equations import ACCELERATIONS, MULTIPLIERS, closed
 
 import dap3d_core as dap
@@ -102,6 +103,7 @@ def test_a_run_is_that_of_standard(name):
     assert all(entry.ok for entry in found.ledger.values())
 
 
+@long_in_plain_python
 def test_friction_in_kept_joints_is_that_of_standard():
     """A spatial four-bar in which every joint rubs, the one that is cut as well."""
     scene, smooth = loops.spatial_four_bar(), loops.spatial_four_bar()
@@ -147,6 +149,7 @@ def test_a_start_off_the_constraints_is_corrected_first():
     assert "initial positions corrected" in " ".join(found.notes)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5", "adams"])
 def test_projection_holds_the_kept_rows(integrator):
     """Rows of position and velocity at a tolerance of 1e-4: they stay at rounding."""
@@ -207,6 +210,7 @@ def test_a_screw_is_kept_by_name():
     assert found.u == pytest.approx(right.u, abs=1e-8 * np.max(np.abs(right.u)))
 
 
+@long_in_plain_python
 def test_a_net_runs_and_notes_its_cost():
     """A ladder on two chains of spherical joints: all rows meet in a matrix without zeros."""
     found = dap.simulate(ladder(12), method="joint", t_end=0.02, dt=0.02)
@@ -243,6 +247,7 @@ def test_rows_of_too_many_meetings_are_refused(monkeypatch):
         dap.compile(ladder(3), method="joint")
 
 
+@long_in_plain_python
 def test_redundant_rows_that_come_to_hold_a_motion_end_the_run():
     """A car whose front wheels are steered by equal angles: they contradict each other."""
     with pytest.raises(SimulationError, match="have come to hold a motion that they left free"):
@@ -255,6 +260,7 @@ def test_a_singular_start_is_refused():
         dap.simulate(singular.flat_parallelogram(), method="joint", t_end=0.1, dt=0.1)
 
 
+@long_in_plain_python
 def test_a_loop_goes_through_its_singular_poses():
     """A parallelogram whose links lie in one line eight times in ten seconds, as in standard."""
     found = dap.simulate(problems.four_bar(), method="joint", t_end=10.0, dt=0.5, rtol=1e-9,

@@ -8,6 +8,7 @@ from support.plain import long_in_plain_python
 import dap3d_core as dap
 
 
+@long_in_plain_python
 def test_a_chain_moves_as_with_another_method():
     """Two methods without a common formula agree; constraints and energy hold at every report."""
     scene = problems.chain(3)

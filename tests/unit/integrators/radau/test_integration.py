@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 from support import mechanisms, problems
-from support.plain import in_another_process
+from support.plain import in_another_process, long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.formulations.pivots import store_reference_pivots
@@ -132,6 +132,7 @@ def rows_of(run, budget):
     return np.concatenate(taken)
 
 
+@long_in_plain_python
 def test_chunks_change_no_bit():
     """Everything that decides what comes next lies in arrays."""
     times = np.linspace(0.0, 0.5 if jit_is_on() else 0.04, 23)
@@ -140,6 +141,7 @@ def test_chunks_change_no_bit():
     assert np.array_equal(whole, cut)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("scene", [sprung, disk, mechanisms.bricard], ids=lambda f: f.__name__)
 def test_motion_is_that_of_an_explicit_method(scene):
     """Friction, rows without position level, redundant rows: within 1e-6 of dop853 at 1e-11."""

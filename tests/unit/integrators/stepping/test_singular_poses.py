@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support import redundant
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.formulations.pivots import store_reference_pivots
@@ -99,6 +100,7 @@ def test_the_middle_of_the_widest_gap():
     assert TABLEAUS["dopri5"].widest_gap_abscissa == pytest.approx((3 / 10 + 4 / 5) / 2)
 
 
+@long_in_plain_python
 def test_a_run_across_is_the_same_however_it_is_cut():
     """All that decides lies in the arrays of Work: step by step, in one go, and copied into a fresh
     integration just before the first crossing (t = 0.7085 s), bit for bit."""

@@ -17,7 +17,7 @@ from dap3d_core.interface import (
     point,
     vector,
 )
-from dap3d_core.interface.codegen.loop_source import write
+from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels import add
 from dap3d_core.kernels.runtime import loop_support

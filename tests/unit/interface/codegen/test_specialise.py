@@ -11,6 +11,7 @@ import dap3d_core as dap
 from dap3d_core.assembly.arrays import ANGLE
 from dap3d_core.assembly.evaluate import call_kinds
 from dap3d_core.interface import (
+    REQUIRED,
     Body,
     Force,
     Function,
@@ -316,6 +317,99 @@ def test_a_function_may_only_be_called():
     scene.add_force("hides", P_i="ball.O", function="law")
     with pytest.raises(PluginError, match="may only call f"):
         dap.compile(scene, registry=registry_of(Hides))
+
+
+class Bowl(Function):
+    """f alone: all its derivatives are derived."""
+
+    keyword, arguments = "bowl", 2
+    a: float = number(default=0.5)
+
+    def value(x, y, a):
+        return a * x * x * y + sqrt(1.0 + y * y)
+
+
+class OnBowl(Force):
+    """Names a function of two arguments, value and all derivatives, in one kernel."""
+
+    keyword, ground_axes = "on-bowl", True
+    P_i: Point = point()
+    hill: str = function(REQUIRED, argument=("x, m,", "z, m"))
+
+    def wrench(r_P_i, hill, hill_x, hill_y, hill_xx, hill_xy, hill_yy):
+        x, z = r_P_i[0], r_P_i[2]
+        first = hill(x, z), hill_x(x, z), hill_y(x, z)
+        return first, (hill_xx(x, z), hill_xy(x, z), hill_yy(x, z))
+
+
+def test_a_function_of_two_arguments_is_called_with_both():
+    """At x = 3, z = 4: f = 18 + sqrt(17), and its partial derivatives by hand."""
+    scene = scene_of(Jp=(1.0, 1.0, 1.0))
+    scene.add_function("bowl", "shape", a=0.5)
+    scene.add_force("on-bowl", "push", P_i="ball.O", hill="shape")
+    compiled = dap.compile(scene, registry=registry_of(OnBowl, Bowl))
+    root = np.sqrt(17.0)
+    first = np.array([18.0 + root, 12.0, 4.5 + 4.0 / root])
+    second = [4.0, 3.0, 1.0 / root**3]
+    a = compiled.rhs(0.0, compiled.model.u0)[7:]
+    assert a[:3] == pytest.approx(first / 2.0, rel=1e-14)
+    assert a[3:] == pytest.approx(second, rel=1e-14)
+
+
+class ByOne(Force):
+    """A mistake: one argument for a function of two."""
+
+    keyword = "by-one"
+    P_i: Point = point()
+    hill: str = function(REQUIRED, argument=("x, m,", "z, m"))
+
+    def wrench(r_P_i, hill):
+        return (hill(r_P_i[0], 1.0), hill(r_P_i[0]), 0.0), ZERO
+
+
+class Breaking(Function):
+    """A mistake: nothing reads breaks of two arguments."""
+
+    keyword, arguments = "breaking", 2
+
+    def breaks(self):
+        return (0.0,)
+
+    def value(x, y):
+        return x * y
+
+
+class OfThree(Function):
+    """A mistake."""
+
+    keyword, arguments = "of-three", 3
+
+    def value(x, y):
+        return x * y
+
+
+class Short(Function):
+    """A mistake: as a function of one argument returns them."""
+
+    keyword, arguments = "short", 2
+
+    def value(x, y):
+        return x * y, y, 0.0, 0.0
+
+
+@pytest.mark.parametrize(
+    ("type_", "words"),
+    [
+        (ByOne, r"wrench failed on a random input: TypeError.*missing 1 required positional"),
+        (Breaking, "defines breaks, which nothing calls"),
+        (OfThree, "arguments = 3; a function takes 1 or 2"),
+        (Short, r"should return \(f, f_x, f_y, f_xx, f_xy, f_yy\), shape \(6,\)"),
+    ],
+)
+def test_mistakes_with_two_arguments_are_named(type_, words):
+    """By file, type and function, before any scene."""
+    with pytest.raises(PluginError, match=words):
+        examine(type_)
 
 
 class TwoLaws(Force):

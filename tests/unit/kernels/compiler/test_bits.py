@@ -1,4 +1,7 @@
-"""Whole runs: plain Python, code made quickly, well, and without FMA have the same bits."""
+"""Whole runs: plain Python and optimised code have the same bits.
+
+Each function of them, also made quickly and without FMA: test_core.py, test_trace.py.
+"""
 
 import json
 
@@ -9,16 +12,15 @@ from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = [pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled"), pytest.mark.slow]
 
-#: Says what runs gave. {level}: -1 changes nothing, else the level at which all code is made.
+#: Says what runs gave; all code is optimised from the beginning.
 SCRIPT = """
 import hashlib
 import json
 import numpy as np
 import dap3d_core as dap
 from dap3d_core.kernels.compiler import background, objects
-if {level} >= 0:
-    background.optimiser.add = lambda unit: None
-    objects.UNOPTIMISED = {level}
+background.optimiser.add = lambda unit: None
+objects.UNOPTIMISED = objects.OPTIMISED
 for model, settings in {cases!r}:
     result = dap.simulate(model, **settings)
     energy = result.energy.total
@@ -44,22 +46,13 @@ CASES = [
 ]
 
 
-def said(cache, level=-1, **environment):
+def said(cache, **environment):
     """What one process says of all cases; code that several of them need is made once."""
-    script = SCRIPT.format(level=level, cases=CASES)
+    script = SCRIPT.format(cases=CASES)
     return [json.loads(line) for line in run(script, cache, **environment).splitlines()]
 
 
-@pytest.fixture(scope="module")
-def plain(tmp_path_factory):
-    """What plain Python gives."""
-    found = said(tmp_path_factory.mktemp("cache"), DAP3D_PLAIN=1)
-    assert [(model, settings) for model, settings, *_ in found] == CASES
-    return found
-
-
-@pytest.mark.parametrize(
-    ("level", "environment"), [(0, {}), (3, {}), (3, {"DAP3D_CPU": "x86-64"})], ids=str
-)
-def test_runs_have_the_same_bits_however_they_are_compiled(tmp_path, plain, level, environment):
-    assert said(tmp_path, level, **environment) == plain
+def test_optimised_runs_have_the_bits_of_plain_python(tmp_path):
+    plain = said(tmp_path / "plain", DAP3D_PLAIN=1)
+    assert [(model, settings) for model, settings, *_ in plain] == CASES
+    assert said(tmp_path / "optimised") == plain

@@ -3,6 +3,7 @@
 import ctypes
 import os
 import threading
+from itertools import count
 
 import numpy as np
 import pytest
@@ -89,18 +90,30 @@ def test_a_full_disk_does_no_harm(tmp_path, alone, monkeypatch):
 
 def test_objects_not_used_for_longest_go_first(tmp_path, monkeypatch):
     monkeypatch.setattr(objects, "MAX_BYTES", 1000)
+    monkeypatch.setattr(objects, "CLEAN_EVERY", 1)
     for k in range(4):
         objects.write_object(tmp_path / f"{k}.o", None, bytes(300))
         os.utime(tmp_path / f"{k}.o", (k, k))
     assert sorted(f.name for f in tmp_path.iterdir()) == ["2.o", "3.o"]
 
 
-def test_files_that_killed_processes_left_behind_are_removed(tmp_path):
+def test_a_folder_is_read_for_the_first_of_many_objects_alone(tmp_path, monkeypatch):
+    """Each pass over it takes time in proportion to what it holds."""
+    monkeypatch.setattr(objects, "_written", count())
+    cleaned = []
+    monkeypatch.setattr(objects, "_clean", cleaned.append)
+    for k in range(objects.CLEAN_EVERY + 1):
+        objects.write_object(tmp_path / f"{k}.o", None, b"")
+    assert cleaned == [tmp_path, tmp_path]
+
+
+def test_files_that_killed_processes_left_behind_are_removed(tmp_path, monkeypatch):
     """Not those of processes at work, nor files that are not the compiler's."""
     for name in ("old.1.ll", ".old.o.ab", ".old.1.ll.ab", "new.2.ll", "notes.txt"):
         (tmp_path / name).touch()
         if not name.startswith("new"):
             os.utime(tmp_path / name, (0, 0))
+    monkeypatch.setattr(objects, "CLEAN_EVERY", 1)
     objects.write_object(tmp_path / "a.o", None, b"")
     assert sorted(f.name for f in tmp_path.iterdir()) == ["a.o", "new.2.ll", "notes.txt"]
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from support.at_all_levels import made_of, same_bits
+from support.at_all_levels import made_of, same_bits, targets
 
-from dap3d_core.interface.codegen.compile_loops import _calls_functions
-from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, write
+from dap3d_core.interface.codegen.compile_loops import write
+from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.runtime import generated_modules
@@ -14,13 +14,15 @@ from dap3d_core.kernels.runtime.function_lists import LOOP, LoopArrays
 from dap3d_core.kernels.runtime.loop_modules import array_members, source_of
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.registry import load_registry
+from dap3d_core.testing.samples.sampled_type import with_functions
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 BODIES, INSTANCES, TRIALS = 8, 3, 6
 
 
 def loops_of(type_info):
-    """Each loop of a type and of its variants, but for those that need a scene's function."""
+    """Each loop of a type and of its variants, with cubics for the functions that they call."""
+    type_info = with_functions(type_info, {})
     for what in LOOP_KINDS:
         if what != "friction" and (loop := write(type_info, what)) is not None:
             yield type_info, loop
@@ -34,12 +36,12 @@ def loops_of(type_info):
 def arguments_of(type_info, rng):
     """Random arrays of three instances, with tables where the type has some."""
     body, F = rng.standard_normal((BODIES, BODY_WIDTH)), rng.standard_normal((BODIES, 5))
-    idx, par = rng.integers(1, BODIES - 1, size=200), rng.standard_normal(600)
+    idx, par = rng.integers(1, BODIES - 1, size=200), rng.standard_normal(1000)
     for offset, _ in type_info.layout.tables.values():
         for q in range(INSTANCES):
             par[q * type_info.layout.par_width + offset :][:2] = 400, 20
     outs = [rng.standard_normal(600) for _ in range(3)]
-    outs[1][0] = 3.0  # where switches begin
+    outs[1][:2] = 3.0  # where switches begin, and which jump it is
     states = rng.standard_normal(BODIES + type_info.layout.state_width)
     return LoopArrays(body=body, F=F, idx=idx, par=par, states=states), outs
 
@@ -57,8 +59,11 @@ TYPES = [(kind, keyword) for kind in ("joint", "force", "function")
          for keyword in REGISTRY.keywords(kind)]  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    "level", [pytest.param(n, marks=[pytest.mark.slow] if n != "O3" else []) for n in targets()]
+)
 @pytest.mark.parametrize(("kind", "keyword"), TYPES)
-def test_traced_loops_have_the_bits_of_plain_python(kind, keyword):
+def test_traced_loops_have_the_bits_of_plain_python(kind, keyword, level):
     for type_info, loop in loops_of(REGISTRY.get(kind, keyword)):
 
         def python(loop=loop):
@@ -66,11 +71,8 @@ def test_traced_loops_have_the_bits_of_plain_python(kind, keyword):
             namespace.update(loop.kernels)
             return namespace
 
-        if type_info.argument_functions and _calls_functions(type_info):
-            continue  # its code is made with a scene's function
         text = trace("tried", python(), array_members())
         plain = python()["loop"]
-        for level, traced in made_of(text, "tried", LOOP).items():
-            for seed in range(TRIALS):
-                assert same_bits(run(plain, type_info, seed), run(traced, type_info, seed)), (
-                    loop.name, level)  # fmt: skip
+        traced = made_of(text, "tried", LOOP, [level])[level]
+        for seed in range(TRIALS):
+            assert same_bits(run(plain, type_info, seed), run(traced, type_info, seed)), loop.name

@@ -39,7 +39,7 @@ EVALUATE = """
 import sys; sys.path.insert(0, ".")
 import numpy as np
 from dap3d_core.interface import examine
-from dap3d_core.interface.codegen.loop_source import write
+from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, MASS
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_modules import build, compiled_here

@@ -7,6 +7,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 from support import problems
+from support.plain import long_in_plain_python
 from support.process import run
 from support.results import same_bits
 
@@ -68,12 +69,14 @@ def test_parts_and_blocks_are_those_of_the_whole(both):
     assert len(dap.view(large).html) > 1000
 
 
+@long_in_plain_python
 def test_a_file_that_takes_its_name_changes_nothing(both, tmp_path):
     whole, large = both
     dap.simulate(problems.pendulum(), output=tmp_path / "run.nc", force=True, **SHORT)
     assert same_bits(large, whole)
 
 
+@long_in_plain_python
 def test_a_large_result_is_saved_again_over_itself(both, tmp_path):
     whole, large = both
     large.save(tmp_path / "run.nc", force=True)

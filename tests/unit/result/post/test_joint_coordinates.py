@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 from support.process import REPOSITORY
 
 import dap3d_core as dap
@@ -76,6 +77,7 @@ def test_a_file_gives_the_same(turning, tmp_path):
     assert names_of(bare, "hinge.l") == ["hinge.lambda"]
 
 
+@long_in_plain_python
 def test_a_few_of_the_instants_have_the_turns_of_all():
     """A page shows some instants only: between these a body may turn several times."""
     scene = spinning("rev")
@@ -141,6 +143,7 @@ def test_tables_hold_coordinates(turning):
     assert dataset["coordinate_unit"].values.tolist() == ["rad"]
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("vary", [{"forces.gravity.gravity": [9.0, 10.0, 11.0]},
                                   {"bodies.disc.mass": [1.0, 2.0]}])  # fmt: skip
 def test_sweeps_count_turns_in_each_run(vary):

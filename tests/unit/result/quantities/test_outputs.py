@@ -5,6 +5,7 @@ import csv
 import attrs
 import numpy as np
 import pytest
+from support.plain import in_another_process
 from support.process import run
 from support.results import ARM, MASS, RATE, circling
 
@@ -178,6 +179,7 @@ def test_sweeps_reduce_outputs_as_single_runs_do(tmp_path):
         np.testing.assert_array_equal(sweep["height:series"][k], value["height"])
 
 
+@in_another_process
 def test_scenes_without_outputs_import_nothing_of_them():
     script = """
 import sys

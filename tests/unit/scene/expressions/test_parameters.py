@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.scene import parse
@@ -174,6 +175,7 @@ def test_sweeps_vary_parameters_and_all_that_they_stand_for():
             np.testing.assert_array_equal(sweep[output][k], expected, err_msg=output)
 
 
+@long_in_plain_python
 def test_fits_find_parameters():
     """From an angle that an output of the scene gives in degrees."""
     scene = parse(ROD)

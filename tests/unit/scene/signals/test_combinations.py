@@ -52,6 +52,25 @@ def test_what_cannot_be_combined_is_refused(combinations, words):
     assert len(caught.value.mistakes) == 1
 
 
+def test_functions_are_given_as_many_arguments_as_they_take():
+    """A map over two arguments is no function of time, no spring curve and no term of a sum."""
+    scene = scene_with(all=("sum", ["map", "swing"]))
+    scene.add_function("grid", "map", x=[0.0, 1.0], y=[0.0, 1.0], z=[[0.0, 1.0], [1.0, 3.0]])
+    with pytest.raises(SceneError, match=r"functions.all.* of one argument; map takes two"):
+        check(scene, load_registry())
+    scene.functions["all"].fields["functions"] = ("swing",)
+    scene.forces["push"].fields["function"] = "map"
+    ends = {"P_i": "block.O", "P_j": "ground.O"}
+    scene.add_point("away", "block", (1.0, 0.0, 0.0))
+    scene.add_force("ptp", "curve", **(ends | {"P_i": "away"}), l0=0.0, function="map")
+    with pytest.raises(SceneError) as caught:
+        check(scene, load_registry())
+    time, length = caught.value.mistakes
+    assert "push.function" in str(time)
+    assert "a function of time" in str(time)
+    assert "takes two arguments, and is to be a function of" in str(length)
+
+
 def test_combinations_that_multiply_are_refused():
     """Each doubles the one before it: all terms together would be one kernel."""
     count = MOST_TERMS.bit_length()

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 from support.pushed import feedback, held, pushed_block
 
 import dap3d_core as dap
@@ -18,6 +19,7 @@ def run(update, scene=None, every=0.1, t_end=1.0, **more):
     return dap.simulate(scene or pushed_block(), **options)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("integrator", ["dopri5", "dop853", "adams", "radau"])
 def test_results_are_those_of_a_zero_order_hold(integrator):
     """To rounding: positions are quadratic in a hold, which every method integrates exactly."""
@@ -189,6 +191,7 @@ def test_events_are_located_between_samples():
     assert result.events[0].t == pytest.approx(0.25 + s, abs=1e-12)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("chunk", [0.0, 1.0])
 @pytest.mark.parametrize("integrator", ["dop853", "adams"])
 def test_a_resumed_run_goes_on_to_the_bit(tmp_path, monkeypatch, chunk, integrator):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.arm import AXES, JOINTS, NAMES, arm_scene
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result import UnknownNameError
@@ -14,6 +15,7 @@ NAMED = [
 ]  # fmt: skip
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_quantities_are_those_of_the_result(method):
     """Read where they stand or evaluated, in body and in joint coordinates, beyond a turn."""

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.own_types import registry_of
+from support.plain import long_in_plain_python
 from support.state_types import ZERO
 
 import dap3d_core as dap
@@ -58,6 +59,7 @@ def held(keyword="test-held", **fields):
     return dap.compile(scene, registry=REGISTRY)
 
 
+@long_in_plain_python
 def test_a_solid_has_its_slow_stiffness():
     """The damper has crept: x = z = m g / k_p; a run from there stays."""
     eq = dap.equilibrium(hanging())
@@ -70,6 +72,7 @@ def test_a_solid_has_its_slow_stiffness():
     assert result.quantity("solid.z").values == pytest.approx(WEIGHT / 100.0, abs=1e-12)
 
 
+@long_in_plain_python
 def test_what_integrates_its_error_finds_the_pose():
     """e = 0 and integral z = m g; slow enough it is stable, with a negative damper it is not."""
     eq = dap.equilibrium(held())
@@ -98,6 +101,7 @@ def test_a_state_that_never_rests_is_refused():
         dap.equilibrium(held("test-growing"))
 
 
+@long_in_plain_python
 def test_a_run_may_begin_at_rest():
     """The setting start = "equilibrium" has the states, too."""
     scene = hanging()

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from support.bouncing import bouncing, swinging
 from support.jumping import JUMPING
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result import open_result
@@ -61,6 +62,29 @@ def test_a_ball_bounces_with_its_coefficient_of_restitution(settings):
     assert len(result.t) == 101
 
 
+@pytest.mark.parametrize("moving", [1, 2])
+def test_as_many_balls_leave_a_cradle_as_hit_it(moving):
+    """Balls of 0.5 m at 2 m/s, 0.3 m before three at rest that touch: at 0.15 s, all at once."""
+    scene = dap.Scene(name="cradle")
+    count, gap, speed = moving + 3, 0.3, 2.0
+    for k in range(count):
+        near, v = (k * 0.5 - gap, speed) if k < moving else (k * 0.5, 0.0)
+        scene.add_body(f"b{k}", mass=0.7, Jp=(0.1, 0.1, 0.1), r=(near, 0.0, 0.0),
+                       r_dot=(v, 0.0, 0.0))  # fmt: skip
+    for k in range(count - 1):
+        ends = {"P_i": f"b{k}.O", "P_j": f"b{k + 1}.O"}
+        scene.add_force("ptp_stop", f"c{k}", l_stop=0.5, e=1.0, k=1e3, **ends)
+    result = dap.simulate(scene, t_end=0.4, dt=0.1, **TIGHT)
+    v = np.array([0.0] * 3 + [speed] * moving)
+    np.testing.assert_allclose(result.rd[-1, :, 0], v, rtol=0.0, atol=1e-12)
+    last = np.array([0.5 * k - gap * (k < moving) + (speed * 0.15 if k < moving else 0.0)
+                     for k in range(count)])  # fmt: skip
+    np.testing.assert_allclose(result.r[-1, :, 0], last + v * 0.25, rtol=0.0, atol=1e-12)
+    assert len(jumps_of(result)) >= 1
+    assert all(j.t == pytest.approx(0.15, abs=1e-12) for j in jumps_of(result))
+    assert result.ledger["energy"].value < 1e-12
+
+
 def test_reports_from_the_instant_of_a_jump_on_are_states_after_it():
     """A disc is struck at t = 0.5, the last instant before which is a reporting time."""
     scene = dap.Scene(name="stage")
@@ -101,6 +125,7 @@ def test_a_clutch_makes_the_speeds_of_two_shafts_one(method):
     assert result.ledger["energy"].value < 1e-12
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("method", ["standard", "lsq", "joint"])
 def test_a_hinged_bar_rebounds_from_a_stop_of_its_angle(method):
     """Without gravity it turns at 2 rad/s to the stop at 1 rad, and back at 1.5 to that at -0.5."""
@@ -122,6 +147,7 @@ def test_a_hinged_bar_rebounds_from_a_stop_of_its_angle(method):
     assert all(entry.ok for entry in result.ledger.values())
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(("e", "v_rest"), [(0.0, 1e-2), (0.5, 1e-2), (0.5, 0.0)])
 def test_bounces_end_on_the_spring_of_a_stop(e, v_rest):
     """A ball that bounces to rest stays where the spring carries its weight; with 0 as well."""
@@ -148,6 +174,7 @@ def test_a_contact_that_stays_and_that_nothing_carries_is_refused():
         dap.simulate(ball(e=0.0), t_end=1.0)
 
 
+@long_in_plain_python
 def test_balls_that_touch_without_a_load_cost_no_steps():
     """Two of five fly into three; all touch, and rounding opens and closes their gaps."""
     scene = dap.Scene(name="row")
@@ -259,6 +286,7 @@ def bars_mass_matrix():
     return np.array([[J + m1 * 0.25 + m2, m2 * 0.5], [m2 * 0.5, J + m2 * 0.25]])
 
 
+@long_in_plain_python
 def test_an_event_near_an_open_stop_leaves_that_alone():
     """A bar between two stops is set to another speed; the next impact is where that leads."""
     kick = dap.Event("t", above=0.1, action=lambda state: state.set("bar", w=(None, None, -9.0)))
@@ -267,6 +295,7 @@ def test_an_event_near_an_open_stop_leaves_that_alone():
     assert found.u_after[-1] == pytest.approx(-9.0, abs=1e-12)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("method", ["standard", "lsq", "penalty", "joint"])
 def test_an_event_sets_velocities_and_the_joints_hold(method):
     """The tip of the second bar gets 3 m/s across by an impulse at its centre and a moment there.
@@ -356,6 +385,7 @@ def test_a_state_of_another_length_is_refused():
         dap.simulate(dap.compile(scene, registry=JUMPING), t_end=1.0, events=[event])
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(
     ("name", "fields", "words"),
     [
@@ -372,6 +402,7 @@ def test_velocities_that_cannot_be_set_are_refused(name, fields, words):
         dap.simulate(pendulums(), t_end=0.2, events=[event])
 
 
+@long_in_plain_python
 def test_a_sweep_over_restitution_gives_what_single_runs_give():
     values = [0.3, 0.9]
     swept = dap.sweep(bouncing(), {"forces.floor.e": values}, outputs="ball.r.z", t_end=1.0,
@@ -381,6 +412,7 @@ def test_a_sweep_over_restitution_gives_what_single_runs_give():
         assert swept["ball.r.z"].values[k] == single.r[-1, 0, 2]
 
 
+@long_in_plain_python
 def test_the_error_of_a_run_with_jumps_is_estimated():
     """Loosely: within a factor of 100 of the error against the closed form, and not zero."""
     result = dap.simulate(swinging(), t_end=2.5, rtol=1e-6, estimate_error=True)

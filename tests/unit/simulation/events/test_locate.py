@@ -5,6 +5,7 @@ Where no other reason is given a tolerance of 1e-13 is some roundings of time.
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result import UnknownNameError
@@ -71,6 +72,7 @@ def test_a_number_that_comes_and_goes_within_a_step(compiled):
     assert [e.t for e in result.events] == pytest.approx([0.3 - root, 0.3 + root], abs=1e-13)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(
     ("frequency", "settings"),
     [(20.0, {}), (2.0, {"direction": 1}), (2.0, {"every": 5e-3})],

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support import one_freedom
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result.quantities.lookup import find
@@ -60,6 +61,7 @@ def test_actuation_is_stored(scene, motion, tmp_path):
                           result.force("torque").on["i"].moment)  # fmt: skip
 
 
+@long_in_plain_python
 def test_positions_as_data_are_differentiated_by_splines(scene, motion, tmp_path):
     """Of two columns, one more than freedoms, from a CSV file; the error is of order dt^4."""
     names = ["t", "crank.r.x", "crank.r.z"]
@@ -78,6 +80,7 @@ def test_positions_as_data_are_differentiated_by_splines(scene, motion, tmp_path
     assert errors[1] > 8.0 * errors[0]
 
 
+@long_in_plain_python
 def test_angles_of_joints_are_data_over_many_turns(scene):
     """One column for one freedom; the angle of the crank counts its turns, poses do not."""
     turning = dap.kinematics(scene, t_end=1.0, dt=0.125)
@@ -87,6 +90,7 @@ def test_angles_of_joints_are_data_over_many_turns(scene):
     assert np.max(np.abs(result.r - turning.r)) < 1e-12
 
 
+@long_in_plain_python
 def test_data_that_contradict_the_joints_are_met_halfway(scene, motion):
     """The crank's place is too far out by 1 mm: the note says by how much it is missed."""
     data = crank_places(motion)
@@ -117,6 +121,7 @@ def test_forces_that_no_actuator_produces_are_told(scene, motion):
     assert any("cannot produce" in note and "crank turns" in note for note in result.notes)
 
 
+@long_in_plain_python
 def test_turns_of_an_angle_are_counted(scene, motion):
     """A spring wound up over whole turns acts with them."""
     wound = undriven(scene)

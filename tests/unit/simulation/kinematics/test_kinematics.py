@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support import one_freedom
 from support.mechanisms import planar_four_bar
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result.quantities.lookup import find
@@ -38,6 +39,7 @@ def turning_parallelogram():
     return scene
 
 
+@long_in_plain_python
 def test_a_driver_beyond_reach_ends_at_its_dead_point():
     """The instant is located to 1e-9 s, the driver named, what was found before kept."""
     scene = pushed((0.0, -1.0, 0.0))
@@ -70,6 +72,7 @@ def test_a_driver_that_turns_back_at_a_dead_point_passes_through_it():
     assert result.ledger["velocity"].ok
 
 
+@long_in_plain_python
 def test_branch_points_of_a_parallelogram_are_passed_smoothly():
     """Coupler parallel to the ground through both flat poses; accelerations at one, too."""
     half = np.pi / 2.0
@@ -97,6 +100,7 @@ def test_over_a_coordinate_time_is_the_coordinate():
     assert np.allclose(result.u, other.u, atol=1e-13)
 
 
+@long_in_plain_python
 def test_rows_of_the_velocity_level_are_integrated_to_rounding():
     """fourbar2 has a rate driver: after a turn both bodies are back."""
     result = dap.kinematics("fourbar2", t_end=1.0, dt=0.5)

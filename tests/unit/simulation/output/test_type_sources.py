@@ -14,12 +14,19 @@ from dap3d_core.simulation.output.type_sources import digest_of
 SHORT = {"t_end": 0.1, "dt": 0.02}
 
 
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """The result file of a model that has a type of its own."""
+    file = tmp_path_factory.mktemp("recorded") / "run.nc"
+    dap.simulate("ball1", allow_code=True, output=file, **SHORT)
+    return file
+
+
 @pytest.fixture
-def thrown(tmp_path):
-    """A folder with a model that has a type of its own, and the result of a run of it."""
-    folder = shutil.copytree(dap.shipped_models()["ball1"], tmp_path / "ball1")
-    dap.simulate(folder, allow_code=True, output=tmp_path / "run.nc", **SHORT)
-    return folder
+def thrown(recorded, tmp_path):
+    """The model's folder, of one's own, and beside it the result."""
+    shutil.copy(recorded, tmp_path)
+    return shutil.copytree(dap.shipped_models()["ball1"], tmp_path / "ball1")
 
 
 def changed(folder):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.arm import NAMES, arm_scene
+from support.plain import long_in_plain_python
 from support.pushed import feedback, held, pushed_block
 
 import dap3d_core as dap
@@ -27,6 +28,7 @@ def test_a_loop_of_ones_own_is_the_controller():
     assert np.max(np.abs(other.v_dot - result.v_dot)[:-1]) < 1e-14
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("method", ["standard", "joint"])
 @pytest.mark.parametrize("integrator", ["dop853", "adams", "auto"])
 def test_a_reset_run_repeats_itself_to_the_bit(method, integrator):
@@ -154,3 +156,32 @@ def test_turns_of_angles_are_those_of_a_run():
     whole = dap.simulate(scene, t_end=2.0, dt=0.05)
     assert run.result().arrays.angles == pytest.approx(whole.arrays.angles, abs=1e-6)
     assert np.max(np.abs(whole.arrays.angles)) > 2.0 * np.pi
+
+
+@long_in_plain_python
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_velocities_jump_within_a_step(method):
+    """A ball that bounces: instants in closed form, to the rounding of times; and once more."""
+    scene = dap.Scene(name="bouncing")
+    scene.add_body("ball", r=(0.0, 0.0, 1.0))
+    scene.add_force("weight")
+    scene.add_force("plane_stop", "floor", P_i="ball.O", P_j="ground.O", a_j="ground.z", e=0.7,
+                    k=1e5)  # fmt: skip
+    impact = np.sqrt(2.0 / 9.81)
+    flights = 2.0 * impact * 0.7 ** np.arange(1, 6)
+    run = dap.start(scene, method=method)
+
+    def bounces(count=950):
+        for _ in range(count):
+            run.step(0.002)
+        return run.result()
+
+    first = bounces()
+    times = impact + np.cumsum([0.0, *flights])
+    assert [event.t for event in first.events] == pytest.approx(times[times < 1.9], abs=1e-12)
+    run.reset()
+    second = bounces()
+    assert np.array_equal(first.u, second.u)
+    assert [event.t for event in second.events] == [event.t for event in first.events]
+    run.reset(first.u[100])
+    assert bounces(150).events[0].t == pytest.approx(impact - 0.2, abs=1e-12)

@@ -169,6 +169,7 @@ def test_failing_points_are_noted_and_the_others_run():
     assert np.isnan(batch.values["bob.r.y"]).tolist() == [False, True, True, False]
 
 
+@long_in_plain_python
 def test_points_that_stop_early_keep_what_was_computed():
     """A spring that pushes flings the stone beyond all bounds: exp(sqrt(k) t)."""
     of = ensemble(stone(), ["forces.spring.k"], ["stone.r.z:series"], t_end=2.0, dt=0.5)

@@ -2,6 +2,7 @@
 
 import netCDF4
 import pytest
+from support.plain import long_in_plain_python
 from unit.result.file.test_checksum import REFUSED, SIZE, changed_files, no_library, written
 from unit.study.sweep.test_sweep import spring
 
@@ -54,6 +55,7 @@ def test_files_without_a_seal_are_read(good, tmp_path):
     assert dap.open_sweep(changed).equals(expected)
 
 
+@long_in_plain_python
 def test_whatever_the_library_raises_is_one_sentence(good, tmp_path, monkeypatch):
     """A damaged file without a seal had it raise AttributeError; such bytes may also hang it, so
     that none are tried here."""

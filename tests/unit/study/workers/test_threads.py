@@ -9,7 +9,7 @@ import time
 import attrs
 import numpy as np
 import pytest
-from support.plain import long_in_plain_python
+from support.plain import in_another_process, long_in_plain_python
 from support.studies import POINTS, bob, collected, same
 
 import dap3d_core as dap
@@ -123,6 +123,7 @@ def test_an_early_end_leaves_the_rest(how):
     assert not ours()
 
 
+@long_in_plain_python
 def test_an_early_end_does_not_wait_for_a_long_point(monkeypatch):
     """Its thread runs it to its end, begins no other one and does not keep the process alive."""
     monkeypatch.setattr(local, "PATIENCE", 0.01)
@@ -156,6 +157,7 @@ def test_what_is_no_number_of_threads_is_refused(ensemble, threads):
         run_here(ensemble, POINTS[:2], np.arange(2), threads=threads)
 
 
+@in_another_process
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_sweep_in_a_forked_process_after_one_with_threads_ends():
     """No lock or thread of the parent is missed by the child, at the end of a sweep or within."""

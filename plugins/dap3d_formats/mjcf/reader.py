@@ -1,0 +1,313 @@
+"""Reads bodies, joints and geoms of MJCF."""
+
+from collections.abc import Iterator
+from math import inf
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.formats import (
+    WORLD,
+    Articulation,
+    FormatError,
+    Frame,
+    Inertial,
+    Joint,
+    Limits,
+    Link,
+    XmlElement,
+    quaternion,
+    total_inertia,
+)
+from dap3d_formats.axes import unit
+from dap3d_formats.mjcf.document import Document
+from dap3d_formats.mjcf.geoms import Geoms
+
+#: Type -> kind of a joint.
+KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
+
+
+@attrs.define(eq=False)
+class MjcfReader:
+    """Reads the bodies of one document.
+
+    Attributes:
+        document: the document.
+        model: the model so far.
+        geoms: reader of geoms.
+        sites: name of a site -> its link and frame.
+        references: joint -> its coordinate in the file where the model's is zero.
+        given: names of bodies and joints in the file, which those without a name do not take.
+        joints: names of the joints that have been read.
+    """
+
+    document: Document
+    model: Articulation = attrs.field(init=False)
+    geoms: Geoms = attrs.field(init=False)
+    sites: dict[str, tuple[str, Frame]] = attrs.Factory(dict)
+    references: dict[str, float] = attrs.Factory(dict)
+    given: set[str] = attrs.Factory(set)
+    joints: set[str] = attrs.Factory(set)
+
+    def __attrs_post_init__(self) -> None:
+        root = self.document.root
+        name = root.get("model") or self.document.source.path.stem
+        self.model = Articulation(name, fixed_base=True, place=root.place)
+        self.geoms = Geoms.of(self.document)
+        self.given = set(_names(root))
+
+    def read_bodies(self) -> None:
+        """Read bodies and their joints.
+
+        Raises:
+            FormatError: there are none.
+        """
+        document, model = self.document, self.model
+        for option in document.root.all("option"):
+            x, y, z = option.numbers("gravity", 3, (0.0, 0.0, -9.81))
+            model.gravity = (x, y, z)
+            for flag in option.all("flag"):
+                if flag.get("gravity") == "disable":
+                    model.gravity = (0.0, 0.0, 0.0)
+        for world in document.root.all("worldbody"):
+            self._contents(world, WORLD, Frame(), "main")
+        if not model.links:
+            raise FormatError("holds no <body>", document.root.place)
+        for world in document.root.all("worldbody"):
+            self._world_shapes(world)
+
+    def _world_shapes(self, world: XmlElement) -> None:
+        """The geoms of the world, as a link that is fixed to it."""
+        geoms = self._gathered(world, ("geom",), Frame(), "main")
+        shapes = [self.geoms.geometry(geom, frame) for geom, frame in geoms]
+        link = Link(self._free_link("world_shapes"), place=world.place)
+        link.geometries += [shape for shape in shapes if shape is not None]
+        if link.geometries:
+            name = self._free(f"{link.name}_fixed")
+            self.model.links[link.name] = link
+            self.model.joints[name] = Joint(name, "fixed", WORLD, link.name, place=world.place)
+
+    def _contents(self, holder: XmlElement, link: str, frame: Frame, childclass: str) -> None:
+        """Bodies and sites in a body or frame."""
+        for child in holder:
+            if child.name == "body":
+                self._body(child, link, frame, childclass)
+            elif child.name == "frame":
+                inner = child.get("childclass") or childclass
+                self._contents(child, link, frame @ self.document.frame(child), inner)
+            elif child.name == "site":
+                settled = self.document.settled(child, childclass)
+                if child.get("name"):
+                    self.sites[child.require("name")] = (link, frame @ self._site(settled))
+
+    def _site(self, site: XmlElement) -> Frame:
+        if "fromto" in site.attributes:
+            ends = np.array(site.numbers("fromto", 6)).reshape(2, 3)
+            return Frame(ends.mean(axis=0))
+        return self.document.frame(site)
+
+    def _body(self, element: XmlElement, parent: str, frame: Frame, outer: str) -> None:
+        document, model = self.document, self.model
+        name = element.get("name") or self._free_link(f"body{len(model.links) + 1}")
+        if name in model.links or name == WORLD:
+            raise FormatError(f"there are two bodies {name}", element.place)
+        childclass = element.get("childclass") or outer
+        link = Link(name, place=element.place)
+        here = frame @ document.frame(element)
+        joints = self._gathered(element, ("joint", "freejoint"), Frame(), childclass)
+        geoms = self._gathered(element, ("geom",), Frame(), childclass)
+        for geom, in_link in geoms:
+            shape = self.geoms.geometry(geom, in_link)
+            if shape is not None:
+                link.geometries.append(shape)
+        link.inertial = self._inertial(element, geoms)
+        self._join(element, link, parent, here, joints)
+        self._contents(element, name, Frame(), childclass)
+
+    def _gathered(
+        self, holder: XmlElement, tags: tuple[str, ...], frame: Frame, childclass: str
+    ) -> list[tuple[XmlElement, Frame]]:
+        """Elements of a body and of frames in it, with the attributes of their classes."""
+        gathered = []
+        for child in holder:
+            if child.name in tags:
+                gathered.append((self.document.settled(child, childclass), frame))
+            elif child.name == "frame":
+                inner = child.get("childclass") or childclass
+                there = frame @ self.document.frame(child)
+                gathered += self._gathered(child, tags, there, inner)
+        return gathered
+
+    def _inertial(self, body: XmlElement, geoms: list[tuple[XmlElement, Frame]]) -> Inertial | None:
+        """Mass and inertia of a body: given, or of its geoms."""
+        document, rule = self.document, self.document.compiler.get("inertiafromgeom", "auto")
+        element = body.first("inertial")
+        if element is not None and rule != "true":
+            inertial: Inertial | None = self._given(element)
+        elif rule == "false":
+            inertial = None
+        else:
+            low, high = document.settings.numbers("inertiagrouprange", 2, (0.0, 5.0))
+            counted = [(g, f) for g, f in geoms if low <= g.number("group", 0.0) <= high]
+            parts = [part for g, f in counted if (part := self.geoms.inertial(g, f)) is not None]
+            inertial = total_inertia(parts) if parts else None
+        return self._bounded(inertial)
+
+    def _given(self, element: XmlElement) -> Inertial:
+        frame = self.document.frame(element)
+        if "fullinertia" in element.attributes:
+            xx, yy, zz, xy, xz, yz = element.numbers("fullinertia", 6)
+            J: Any = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        else:
+            J = np.diag(element.numbers("diaginertia", 3, (0.0, 0.0, 0.0)))
+        return Inertial(element.number("mass"), frame.r, frame.A @ J @ frame.A.T)
+
+    def _bounded(self, inertial: Inertial | None) -> Inertial | None:
+        """The inertial, not below the least that the compiler allows; balanced where it says so."""
+        mass = self.document.setting("boundmass", 0.0)
+        moment = self.document.setting("boundinertia", 0.0)
+        if inertial is None and not (mass and moment):
+            return None
+        inertial = inertial or Inertial(0.0)
+        moments, axes = np.linalg.eigh(inertial.inertia)
+        J = inertial.inertia
+        if moment > moments[0]:
+            moments = np.maximum(moments, moment)
+            J = axes @ np.diag(moments) @ axes.T
+        if self.document.flag("balanceinertia", False) and moments[0] + moments[1] < moments[2]:
+            J = float(np.mean(moments)) * np.eye(3)
+        return Inertial(max(inertial.mass, mass), inertial.com, J)
+
+    def _join(
+        self, body: XmlElement, link: Link, parent: str, here: Frame,
+        joints: list[tuple[XmlElement, Frame]],
+    ) -> None:  # fmt: skip
+        """The joints of a body, in their order, with links without mass between them."""
+        model, place = self.model, body.place
+        if not joints:
+            name = self._free(f"{link.name}_fixed")
+            model.links[link.name] = link
+            model.joints[name] = Joint(name, "fixed", parent, link.name, here, place=place)
+            return
+        start, last = here, parent
+        made = _compound([self._joint(element, frame) for element, frame in joints])
+        for k, joint in enumerate(made):
+            is_last = k == len(made) - 1
+            below = link.name if is_last else self._free_link(f"{link.name}_{joint.name}")
+            model.links[below] = link if is_last else Link(below, place=joint.place)
+            joint.parent, joint.child = last, below
+            if joint.kind == "free":
+                joint.in_parent = joint.in_child = Frame()
+                joint.position = (*start.r.tolist(), *quaternion(start.A))
+            else:
+                joint.in_parent = start @ joint.in_child
+            model.joints[joint.name] = joint
+            start, last = Frame(), below
+        if len(made) > 1:
+            text = "several joints of a body are joints in a row, with links between them"
+            self.document.source.remarks.translate(place, text)
+
+    def _free(self, name: str) -> str:
+        while name in self.model.joints or name in self.joints or name in self.given:
+            name += "_"
+        return name
+
+    def free_joint(self, name: str) -> str:
+        """The name of a joint that closes a loop: one that no joint has."""
+        return name if name not in self.model.joints else self._free(name)
+
+    def _free_link(self, name: str) -> str:
+        while name in self.model.links or name in self.given:
+            name += "_"
+        return name
+
+    def _joint(self, element: XmlElement, frame: Frame) -> Joint:
+        """A joint; its frame in the child is set, its ends are not."""
+        type_ = "free" if element.name == "freejoint" else element.get("type") or "hinge"
+        if type_ not in KINDS:
+            raise FormatError(f"a joint of type {type_!r} is unknown; one of {', '.join(KINDS)}",
+                              element.place)  # fmt: skip
+        name = element.get("name") or self._free(f"joint{len(self.model.joints) + 1}")
+        if name in self.joints:
+            raise FormatError(f"there are two joints {name}", element.place)
+        self.joints.add(name)
+        anchor = Frame(element.numbers("pos", 3, (0.0, 0.0, 0.0)))
+        joint = Joint(name, KINDS[type_], "", "", in_child=frame @ anchor, place=element.place)
+        if joint.kind == "free":
+            return joint
+        if joint.kind != "ball":
+            joint.axes = (unit(element.numbers("axis", 3, (0.0, 0.0, 1.0)), element),)
+        self._dynamics(joint, element)
+        return joint
+
+    def _dynamics(self, joint: Joint, element: XmlElement) -> None:
+        """Limits, damping, springs and armature of a joint."""
+
+        def turned(value: float) -> float:
+            return self.document.angle(value) if joint.kind == "revolute" else value
+
+        reference = turned(element.number("ref", 0.0))
+        self.references[joint.name] = reference
+        for key, attribute in (("damping", "damping"), ("stiffness", "stiffness"),
+                               ("friction", "frictionloss"), ("armature", "armature")):  # fmt: skip
+            first, *others = element.numbers(attribute, None, (0.0,))
+            setattr(joint, key, (first,))
+            if any(others):
+                text = f"{attribute} of a joint: higher coefficients of its polynomial"
+                self.document.source.remarks.leave_out(element.place, text)
+        joint.rest = (turned(element.number("springref", 0.0)) - reference,)
+        limited = element.get("limited", "auto")
+        if limited == "true" or (limited == "auto" and "range" in element.attributes
+                                 and self.document.flag("autolimits", True)):  # fmt: skip
+            low, high = element.numbers("range", 2)
+            if joint.kind == "ball":
+                joint.limits = (Limits(upper=self.document.angle(high)),)
+            elif low > high:
+                raise FormatError(f"range = {low:g} {high:g} is empty", element.place)
+            else:
+                joint.limits = (Limits(turned(low) - reference, turned(high) - reference),)
+        if not any((joint.damping[0], joint.stiffness[0])):
+            joint.limits = joint.limits or (Limits(-inf, inf),)
+
+    def scale_masses(self) -> None:
+        """Scale all masses to the total that the compiler says."""
+        wanted = self.document.setting("settotalmass", -1.0)
+        inertials = [link.inertial for link in self.model.links.values() if link.inertial]
+        found = sum(one.mass for one in inertials)
+        if wanted > 0.0 and found > 0.0:
+            for link in self.model.links.values():
+                if link.inertial:
+                    f, one = wanted / found, link.inertial
+                    link.inertial = Inertial(f * one.mass, one.com, f * one.inertia)
+
+
+def _names(root: XmlElement) -> Iterator[str]:
+    """The names of all bodies and joints below an element."""
+    for child in root:
+        if child.name in ("body", "joint", "freejoint") and "name" in child.attributes:
+            yield child.attributes["name"]
+        yield from _names(child)
+
+
+def _compound(joints: list[Joint]) -> list[Joint]:
+    """The joints of a body; two that an export wrote for one are that one again.
+
+    They have no dynamics, and names J and J_2: hinges at a point with axes across each other are a
+    universal joint, a slide and a hinge along it a cylindrical one.
+    """
+    if len(joints) != 2 or joints[1].name != f"{joints[0].name}_2":
+        return joints
+    one, other = joints
+    passive = all(
+        not any((j.damping[0], j.stiffness[0], j.friction[0], j.armature[0]))
+        and j.limits == (Limits(),) for j in joints
+    )  # fmt: skip
+    if not passive or not np.array_equal(one.in_child.r, other.in_child.r):
+        return joints
+    kinds, along = (one.kind, other.kind), np.dot(one.axes[0], other.axes[0])
+    if kinds == ("revolute", "revolute") and abs(along) < 1e-12:
+        return [attrs.evolve(one, kind="universal", axes=(one.axes[0], other.axes[0]))]
+    if kinds == ("prismatic", "revolute") and one.axes == other.axes:
+        return [attrs.evolve(one, kind="cylindrical")]
+    return joints

@@ -1,0 +1,256 @@
+"""Reads links, frames, nested and included models of SDF."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from dap3d_core.interface.formats import (
+    WORLD,
+    Articulation,
+    FormatError,
+    Frame,
+    Geometry,
+    Inertial,
+    Joint,
+    Link,
+    Place,
+    Source,
+    XmlElement,
+    from_quaternion,
+    rpy,
+)
+from dap3d_formats.element_table import note_elements
+from dap3d_formats.sdf.elements import SDF
+from dap3d_formats.sdf.frames import FrameGraph
+
+
+class SdfReader:
+    """Reads the models of one file into one articulation."""
+
+    def __init__(self, source: Source, root: XmlElement) -> None:
+        self.source, self.root, self.remarks = source, root, source.remarks
+        self.version = _version(root)
+        self.frames = FrameGraph()
+        self.model = Articulation(source.path.stem, gravity=(0.0, 0.0, -9.8), fixed_base=False,
+                                  place=root.place)  # fmt: skip
+        self.elements: list[tuple[XmlElement, str]] = []
+        self.static: list[tuple[str, Place]] = []
+
+    def read_links(self) -> None:
+        """Read links and frames; joints are gathered in ``elements``."""
+        note_elements(self.root, SDF, self.remarks)
+        self.frames.add(WORLD, "", Frame(), self.root.place)
+        world = self.root.first("world")
+        holder = self.root if world is None else world
+        gravity = None if world is None else world.first("gravity")
+        if gravity is not None:
+            x, y, z = gravity.content(3)
+            self.model.gravity = (x, y, z)
+        models, includes = holder.all("model"), holder.all("include")
+        alone = len(models) + len(includes) == 1
+        if alone and models:
+            self.model.name = models[0].get("name") or self.model.name
+        for element in models:
+            self._model(element, "", "" if alone else element.require("name"))
+        for element in includes:
+            self._include(element, "", "" if alone else None)
+        for name, place in self.static:
+            pose = self.frames.in_world(name, place)
+            self.model.joints[name] = Joint(name, "fixed", WORLD, name, pose, place=place)
+
+    def finish(self) -> Articulation:
+        """The model; links that no joint places are where the file has them."""
+        if not self.model.links:
+            raise FormatError("holds no <link>", self.root.place)
+        self._place_links()
+        return self.model
+
+    def _place_links(self) -> None:
+        """Poses of the links that no joint places; joints are at zero where the file has them."""
+        for name, link in self.model.links.items():
+            self.model.base_poses[name] = self.frames.in_world(name, link.place)
+
+    def _include(self, element: XmlElement, outer: str, scope: str | None) -> None:
+        """A model of another file; its name and pose may be given here."""
+        uri = element.first("uri")
+        name = "" if uri is None else uri.text.strip()
+        if not name:
+            raise FormatError("<include> has no <uri>; it is required", element.place)
+        file = name if name.endswith((".sdf", ".world")) else f"{name.rstrip('/')}/model.sdf"
+        root = self.source.include(file, element.place)
+        note_elements(root, SDF, self.remarks)
+        inner = root.first("model")
+        if inner is None:
+            raise FormatError(f"{name} holds no <model>", element.place)
+        given = element.first("name")
+        called = given.text.strip() if given is not None else inner.require("name")
+        for tag in ("pose", "static", "placement_frame"):
+            child = element.first(tag)
+            if child is not None:
+                inner.children = [c for c in inner.children if c.name != tag] + [child]
+        with self.source.including(file):
+            self._model(inner, outer, scoped(outer, called) if scope is None else scope)
+
+    def _model(self, element: XmlElement, outer: str, scope: str) -> None:
+        """A model, whose names begin with its scope."""
+        pose, relative = self.pose(element)
+        parent = scoped(outer, relative) if relative else scoped(outer, "__model__")
+        parent = parent if outer or relative else WORLD
+        inner = scoped(scope, "__model__")
+        placement = element.get("placement_frame") or text_of(element, "placement_frame")
+        self.frames.add(inner, parent, pose, element.place,
+                        placement=scoped(scope, placement) if placement else "")  # fmt: skip
+        for child in element.all("link"):
+            self._link(child, scope)
+        for child in element.all("model"):
+            self._model(child, scope, scoped(scope, child.require("name")))
+        for child in element.all("include"):
+            self._include(child, scope, None)
+        for child in element.all("frame"):
+            self._frame(child, scope)
+        for child in element.all("joint"):
+            self._joint_frame(child, scope)
+            self.elements.append((child, scope))
+        if text_of(element, "static") in ("true", "1"):
+            self._fix(element, scope)
+
+    def _fix(self, element: XmlElement, scope: str) -> None:
+        """A static model: its links stand still."""
+        self.remarks.translate(element.place, "a static model is a part of ground")
+        for child in element.all("link"):
+            name = scoped(scope, child.require("name"))
+            self.static.append((name, child.place))
+
+    def _frame(self, element: XmlElement, scope: str) -> None:
+        pose, relative = self.pose(element)
+        attached = element.get("attached_to") or "__model__"
+        name = scoped(scope, element.require("name"))
+        self.frames.add(name, scoped(scope, relative or attached), pose, element.place)
+        self.frames.attached[name] = scoped(scope, attached)
+
+    def _joint_frame(self, element: XmlElement, scope: str) -> None:
+        pose, relative = self.pose(element)
+        child = text_of(element, "child")
+        if not child:
+            raise FormatError("<joint> has no <child>; it is required", element.place)
+        name = scoped(scope, element.require("name"))
+        self.frames.add(name, scoped(scope, relative or child), pose, element.place)
+        self.frames.attached[name] = scoped(scope, child)
+
+    def _link(self, element: XmlElement, scope: str) -> None:
+        name = scoped(scope, element.require("name"))
+        if name in self.model.links:
+            raise FormatError(f"there are two links {name}", element.place)
+        pose, relative = self.pose(element)
+        self.frames.add(name, scoped(scope, relative or "__model__"), pose, element.place)
+        link = Link(name, place=element.place)
+        link.inertial = self._inertial(element)
+        tag = "visual" if element.all("visual") else "collision"
+        for shape in element.all(tag):
+            geometry = self._geometry(shape, collision=tag == "collision")
+            if geometry is not None:
+                link.geometries.append(geometry)
+        self.model.links[name] = link
+
+    def _inertial(self, link: XmlElement) -> Inertial:
+        """The inertial of a link, by default 1 kg and 1 kg m^2."""
+        element = link.first("inertial")
+        if element is None:
+            self.remarks.translate(link.place, "a link without <inertial> has 1 kg and 1 kg m^2")
+            return Inertial(1.0, inertia=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        if element.get("auto") in ("true", "1"):
+            raise FormatError('<inertial auto="true">: give mass and inertia', element.place)
+        mass, inertia = element.first("mass"), element.first("inertia")
+        pose, _ = self.pose(element)
+        values = dict.fromkeys(("ixx", "iyy", "izz"), 1.0) | dict.fromkeys(
+            ("ixy", "ixz", "iyz"), 0.0
+        )
+        for child in inertia or ():
+            if child.name in values:
+                values[child.name] = child.content(1)[0]
+        v = values
+        rows = [[v["ixx"], v["ixy"], v["ixz"]], [v["ixy"], v["iyy"], v["iyz"]],
+                [v["ixz"], v["iyz"], v["izz"]]]  # fmt: skip
+        return Inertial(
+            1.0 if mass is None else mass.content(1)[0], pose.r, pose.A @ rows @ pose.A.T
+        )
+
+    def _geometry(self, element: XmlElement, *, collision: bool) -> Geometry | None:
+        holder = element.first("geometry")
+        shape = None if holder is None or not holder.children else holder.children[0]
+        if shape is None:
+            return None
+        pose, _ = self.pose(element)
+        common: dict[str, Any] = {"pose": pose, "collision": collision, "place": shape.place}
+        common["color"] = _color(element.first("material"))
+        if shape.name == "box":
+            return Geometry("box", numbers(shape, "size", 3), **common)
+        if shape.name == "sphere":
+            return Geometry("sphere", numbers(shape, "radius", 1), **common)
+        if shape.name in ("cylinder", "capsule"):
+            size = (*numbers(shape, "radius", 1), *numbers(shape, "length", 1))
+            return Geometry(shape.name, size, **common)
+        if shape.name == "ellipsoid":
+            return Geometry("ellipsoid", numbers(shape, "radii", 3), **common)
+        if shape.name == "mesh":
+            path = self.source.locate(text_of(shape, "uri"), shape.place)
+            scale = numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
+            return None if path is None else Geometry("mesh", mesh=path, scale=scale, **common)
+        return None  # a plane, a height map, ...: remarked by their elements
+
+    def pose(self, element: XmlElement) -> tuple[Frame, str]:
+        """The pose of an element, and the name of the frame that it is given in, or ""."""
+        pose = element.first("pose")
+        if pose is None or not pose.text.strip():
+            return Frame(), "" if pose is None else pose.get("relative_to") or ""
+        relative = pose.get("relative_to") or ""
+        if pose.get("rotation_format") == "quat_xyzw":
+            x, y, z, qx, qy, qz, qw = pose.content(7)
+            return Frame((x, y, z), from_quaternion((qw, qx, qy, qz))), relative
+        values = pose.content(6)
+        angles: Sequence[float] = values[3:]
+        if pose.get("degrees") in ("true", "1"):
+            angles = [angle * 3.141592653589793 / 180.0 for angle in angles]
+        return Frame(values[:3], rpy(angles)), relative
+
+
+def scoped(scope: str, name: str) -> str:
+    """A name within a model."""
+    return name if name == WORLD or not scope else f"{scope}::{name}"
+
+
+def text_of(element: XmlElement, name: str, default: str = "") -> str:
+    """The text of a child."""
+    child = element.first(name)
+    return default if child is None else child.text.strip()
+
+
+def numbers(
+    element: XmlElement, name: str, count: int, default: tuple[float, ...] = ()
+) -> tuple[float, ...]:
+    """The numbers in a child.
+
+    Raises:
+        FormatError: it is missing without a default, or holds something else.
+    """
+    child = element.first(name)
+    if child is None:
+        if default:
+            return default
+        raise FormatError(f"<{element.name}> has no <{name}>; it is required", element.place)
+    return child.content(count)
+
+
+def _version(root: XmlElement) -> tuple[int, ...]:
+    """The version of the format that a file says, such as (1, 7)."""
+    try:
+        return tuple(int(part) for part in (root.get("version") or "1.7").split("."))
+    except ValueError:
+        raise FormatError(f"version {root.get('version')!r} is no version", root.place) from None
+
+
+def _color(material: XmlElement | None) -> str:
+    diffuse = None if material is None else material.first("diffuse")
+    if diffuse is None:
+        return ""
+    r, g, b, *_ = (*diffuse.content(), 0.0, 0.0, 0.0)
+    return "#" + "".join(f"{round(255 * min(max(x, 0.0), 1.0)):02x}" for x in (r, g, b))

@@ -1,0 +1,171 @@
+"""An articulated model as a scene."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.formats.import_scene.joint_forces import add_couplings, add_inputs, add_joint_forces
+from dap3d_core.formats.import_scene.joints import add_joint
+from dap3d_core.formats.import_scene.names import Names
+from dap3d_core.formats.import_scene.rigid_groups import RigidGroup, rigid_groups
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
+from dap3d_core.formats.import_scene.shapes import MeshFiles, add_shapes
+from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
+from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Link
+from dap3d_core.interface.formats.frames import Floats, quaternion
+from dap3d_core.interface.formats.remarks import FormatError, Remarks
+from dap3d_core.scene.scene import GROUND, Scene
+
+#: Steps of a settled result: a model does not say how long to simulate.
+DURATION, STEP = 1.0, 0.01
+
+
+@attrs.frozen
+class ImportOptions:
+    """Choices of the user that a model leaves open.
+
+    Attributes:
+        free_base: links without a joint to a parent are free, where the format leaves it open.
+        keep_fixed: fixed joints between moving links stay joints.
+        balance_inertia: principal moments that no body has are replaced by their mean.
+        positions, rates: of joints where the scene starts, by name.
+    """
+
+    free_base: bool = False
+    keep_fixed: bool = False
+    balance_inertia: bool = False
+    positions: Mapping[str, Sequence[float]] = attrs.Factory(dict)
+    rates: Mapping[str, Sequence[float]] = attrs.Factory(dict)
+
+
+def scene_of(
+    model: Articulation,
+    remarks: Remarks,
+    options: ImportOptions | None = None,
+    *,
+    meshes: MeshFiles | None = None,
+    names: Names | None = None,
+) -> Scene:
+    """The scene of a model.
+
+    Args:
+        model: the model.
+        remarks: takes what is translated with a difference and what is left out.
+        options: choices of the user.
+        meshes: takes the meshes that the shapes of the scene name.
+        names: takes the names in the scene, with their places in the file.
+
+    Raises:
+        FormatError: the model is no mechanism, or holds a joint without a counterpart.
+    """
+    options = options or ImportOptions()
+    model = split_planar(model, remarks)
+    tree = SpanningTree.of(model)
+    groups, member = rigid_groups(
+        tree, remarks, fixed_base=_is_base_fixed(model, remarks, free_base=options.free_base),
+        keep_fixed=options.keep_fixed, balance_inertia=options.balance_inertia,
+    )  # fmt: skip
+    if len(groups) == 1:
+        raise FormatError("no link of the model moves", model.place)
+    placed = tree.place(options.positions, options.rates)
+    scene = Scene(name=model.name)
+    scene.simulation.t_end, scene.simulation.dt = DURATION, STEP
+    if not all(group.has_mass for group in groups.values()):
+        scene.simulation.method = "joint"
+        text = "method joint, for links without mass: others lose digits to them"
+        remarks.translate(model.place, text)
+    builder = SceneBuilder(scene, remarks, groups, member, options.positions, options.rates,
+                           names or Names())  # fmt: skip
+    builder.bodies[WORLD] = GROUND
+    for group in groups.values():
+        if group.name != WORLD:
+            _add_body(builder, group, placed[group.name])
+    _add_gravity(scene, model.gravity)
+    for joint in model.joints.values():
+        if joint.kind != "free" and not builder.moves_alone(joint):
+            add_joint(builder, joint)
+            add_joint_forces(builder, joint)
+    add_couplings(builder, model)
+    add_inputs(builder, model)
+    for group in groups.values():
+        for link, frame in group.links:
+            add_shapes(builder, link, frame, MeshFiles() if meshes is None else meshes)
+    return scene
+
+
+def _is_base_fixed(model: Articulation, remarks: Remarks, *, free_base: bool) -> bool:
+    """True if links without a joint to a parent are fixed to ground."""
+    if model.fixed_base is not None:
+        return model.fixed_base
+    moves = any(joint.kind != "fixed" for joint in model.joints.values())
+    if not moves and not free_base:
+        remarks.translate(model.place, "no joint of the model moves: its base is free")
+    return moves and not free_base
+
+
+def _add_body(builder: SceneBuilder, group: RigidGroup, placed: Placed) -> None:
+    inertial = group.inertial
+    arm = placed.frame.A @ inertial.com
+    name = builder.names.of("bodies", group.name, group.links[0][0].place, builder.remarks)
+    builder.bodies[group.name] = name
+    fields: dict[str, Any] = {
+        "mass": inertial.mass,
+        "Jp": inertia_numbers(inertial.inertia),
+        "r": _plain(placed.frame.r + arm),
+        "p": quaternion(placed.frame.A),
+    }
+    velocity = placed.v + np.cross(placed.w, arm)
+    if velocity.any():
+        fields["r_dot"] = _plain(velocity)
+    if placed.w.any():
+        fields["w"] = _plain(placed.w)
+    builder.scene.add_body(name, **fields)
+
+
+def inertia_numbers(inertia: Floats) -> Any:
+    """Three numbers for a diagonal inertia matrix, else three rows; exactly symmetric."""
+    symmetric = 0.5 * (inertia + inertia.T)
+    if not (symmetric - np.diag(np.diag(symmetric))).any():
+        return _plain(np.diag(symmetric))
+    return tuple(_plain(row) for row in symmetric)
+
+
+def _add_gravity(scene: Scene, gravity: Sequence[float]) -> None:
+    size = float(np.linalg.norm(gravity))
+    if size > 0.0:
+        wgt = tuple(g / size + 0.0 for g in gravity)
+        scene.add_force("weight", "gravity", gravity=size, wgt=wgt)
+
+
+def split_planar(model: Articulation, remarks: Remarks) -> Articulation:
+    """The same model with two sliding joints and a hinge in place of each planar joint."""
+    if not any(joint.kind == "planar" for joint in model.joints.values()):
+        return model
+    links, joints = dict(model.links), {}
+    for name, joint in model.joints.items():
+        if joint.kind != "planar":
+            joints[name] = joint
+            continue
+        text = "a planar joint is two sliding joints and a hinge, with two links between"
+        remarks.translate(joint.place, text)
+        x, y = (np.asarray(axis, dtype=float) for axis in joint.axes)
+        between = [f"{name}_{letter}" for letter in "xy"]
+        for link in between:
+            links[link] = Link(link, place=joint.place)
+        ends = [joint.parent, *between, joint.child]
+        q = joint.position or (0.0, 0.0, 0.0)
+        parts = zip(("prismatic", "prismatic", "revolute"), (x, y, np.cross(x, y)), strict=True)
+        for k, (kind, axis) in enumerate(parts):
+            part = name if k == 2 else between[k]
+            joints[part] = Joint(
+                part, kind, ends[k], ends[k + 1], axes=(tuple(axis),), position=(q[k],),
+                damping=(joint.damping[0],), place=joint.place,
+            )  # fmt: skip
+        joints[between[0]].in_parent, joints[name].in_child = joint.in_parent, joint.in_child
+    return attrs.evolve(model, links=links, joints=joints)
+
+
+def _plain(vector: Any) -> tuple[float, ...]:
+    return tuple(float(x) + 0.0 for x in vector)
