@@ -26,7 +26,7 @@ from dap3d_core.integrators.runge_kutta.lanes import (
 )
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.stepping.integration_state import Function
-from dap3d_core.interface.codegen.loop_source import write
+from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.compiler.types import INT, CompileError, Signature, Table, Tuple
 from dap3d_core.kernels.compiler.units import Entry, Functions
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
