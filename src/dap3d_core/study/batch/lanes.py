@@ -181,7 +181,7 @@ class LaneBatch:
             CompileError: kernels of the scene decide by a number.
         """
         self.count = lane_count()
-        system, size = evaluator.system, len(evaluator.coordinates.start(evaluator.model.u0))
+        system, size = evaluator.system, evaluator.coordinates.size + 1
         rates = tree_lanes.Rates(
             t=np.zeros(1), y=np.zeros(size), out=np.zeros(size), bound=np.zeros(1)
         )

@@ -174,3 +174,16 @@ def test_notes_say_how_points_are_run():
     assert of.notes == (f"points are run in {lanes_of(of).count} lanes of a vector",)
     of = swinging("bodies.bob.mass", method="standard")
     assert of.notes == ("points are run one by one: the scene is not run by method joint",)
+
+
+def test_lanes_made_between_points_leave_the_numbers_of_the_scene():
+    """A start that is corrected is not that of the model, to which a tree would refer."""
+    of = swinging("bodies.bob.mass")
+    runner = of._runner()
+    evaluator = runner.compiled_batch.evaluator
+    u = of.compiled.model.u0.copy()
+    u[2] += 0.1
+    evaluator.coordinates.start(u)
+    before = evaluator.system.tree.constants.copy()
+    assert isinstance(lanes_of(of), LaneBatch)
+    assert np.array_equal(evaluator.system.tree.constants, before)
