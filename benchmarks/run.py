@@ -25,6 +25,7 @@ import hard.hinges
 import hard.long_time
 import joint_motions
 import kernels
+import lanes
 import llvmlite
 import numpy
 import points
@@ -104,6 +105,7 @@ def main():
         "streaming": streaming.measure,
         "study": study.measure,
         "points": points.measure,
+        "lanes": lanes.measure,
         "joint_motions": joint_motions.measure,
         "hard_cases": hard.measure,
         "long_time": hard.long_time.measure,

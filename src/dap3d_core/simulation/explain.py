@@ -45,6 +45,8 @@ def explain(
         title, words = evaluator.coordinates.structure()
         lines.append(f"  {title:10s} {words}")
     lines.append(f"  method     {method}, because {reason}")
+    if model.row_count and str(checked.scene.simulation.method) == "auto":
+        lines.append(f"  joint      {_in_joint_coordinates(model, evaluator)}")
     compiled = sorted({f"{group.keyword} ({kind})" for kind, group in evaluator.loop_groups})
     lines.append(f"  kernels    {', '.join(compiled) or 'none'}")
     left_out = _left_out(checked, model)
@@ -53,6 +55,17 @@ def explain(
     for note in checked.notes:
         lines.append(f"note: {note}")
     return "\n".join(lines)
+
+
+def _in_joint_coordinates(model: Model, evaluator: Evaluator) -> str:
+    """Time that method joint is estimated to take, and why auto leaves it."""
+    from dap3d_core.formulations.joint.coordinates import cost_over_standard
+
+    ratio = cost_over_standard(model, evaluator.plan)
+    return (
+        f"method joint would take some {ratio:.2g} of the time of a right-hand side; auto keeps "
+        "the coordinates of bodies, which radau and packs of studies take"
+    )
 
 
 def _some(names: tuple[str, ...], most: int = 8) -> str:

@@ -67,6 +67,17 @@ class Ensemble:
         """Compile the code of batches in advance: threads would wait for one another."""
         self._runner()
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Notes, for information, on how points are run."""
+        runner = self._runner()
+        if runner is None:
+            return ("each point is run alone",)
+        lanes = runner.compiled_batch.lanes
+        if isinstance(lanes, str):
+            return (f"points are run one by one: {lanes}",)
+        return (f"points are run in {lanes.count} lanes of a vector",)
+
     def run(self, points: ArrayLike) -> Batch:
         """Run points (k, parameters): the values of the parameters at each."""
         values = np.asarray(points, dtype=float).reshape(-1, len(self.parameters))

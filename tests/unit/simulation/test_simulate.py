@@ -504,6 +504,7 @@ def test_a_compiled_model_says_what_it_is():
         "2 rev, 2 sph, 1 rel-rot",
         "17 rows, all independent; 1 degree of freedom",
         "method     standard, because the scene has joints",
+        "method joint would take some 0.6",
         "rev (acceleration)",
         "weight: no force of this type, so there is no gravity",
     ]:

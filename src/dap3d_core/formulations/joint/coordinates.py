@@ -9,6 +9,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.motion.classify import classify
+from dap3d_core.assembly.motion.joint_motion import ModelMotions
 from dap3d_core.assembly.tree_arrays import KeptRowArrays, TreeArrays
 from dap3d_core.formulations.joint.equations import TWO_TURNS, body_state
 from dap3d_core.formulations.joint.node_layout import (
@@ -80,20 +81,9 @@ class Coordinates:
             PluginError: the kernels of a type cannot be compiled.
         """
         model = evaluator.model
-        motions = classify(model)
-        ends: dict[int, tuple[int, int]] = {}
-        reasons = dict(motions.refused)
-        for group in motions.motions:
-            joints = group.joints.tolist()
-            if reason := unsuitable_motion(group):
-                reasons |= dict.fromkeys(joints, reason)
-            else:
-                bodies = zip(group.body_i.tolist(), group.body_j.tolist(), strict=True)
-                ends |= zip(joints, bodies, strict=True)
-        tree = spanning_forest(model.body_count, ends, model.joint_rows.tolist())
-        reasons |= {cut.joint: cut.words(model.joint_names) for cut in tree.cuts}
+        motions, tree, reasons = _tree_and_reasons(model)
         self.evaluator = evaluator
-        self.kept: dict[int, str] = dict(sorted(reasons.items()))
+        self.kept: dict[int, str] = reasons
         self.nodes: TreeNodes = tree_nodes(tree, motions, model.body_count, model.state_count)
         self.size = self.nodes.layout.size - 1
         self.length_count = len(self.kept)
@@ -255,6 +245,33 @@ class Coordinates:
     def _tree(self) -> TreeArrays:
         tree: TreeArrays = self.evaluator.system.tree
         return tree
+
+
+def cost_over_standard(model: Model, plan: Plan) -> float:
+    """Estimate of the time of a right-hand side, over that of method standard or lsq."""
+    from dap3d_core.formulations.joint_loops import tables
+
+    motions, tree, reasons = _tree_and_reasons(model)
+    nodes = tree_nodes(tree, motions, model.body_count, model.state_count)
+    kept = tables.kept_rows(tuple(reasons), model, nodes)
+    return tables.cost_ratio(kept, nodes, plan, model.body_count)
+
+
+def _tree_and_reasons(model: Model) -> tuple[ModelMotions, SpanningForest, dict[int, str]]:
+    """Motions of joints, the joints of a tree, and why others keep their rows."""
+    motions = classify(model)
+    ends: dict[int, tuple[int, int]] = {}
+    reasons = dict(motions.refused)
+    for group in motions.motions:
+        joints = group.joints.tolist()
+        if reason := unsuitable_motion(group):
+            reasons |= dict.fromkeys(joints, reason)
+        else:
+            bodies = zip(group.body_i.tolist(), group.body_j.tolist(), strict=True)
+            ends |= zip(joints, bodies, strict=True)
+    tree = spanning_forest(model.body_count, ends, model.joint_rows.tolist())
+    reasons |= {cut.joint: cut.words(model.joint_names) for cut in tree.cuts}
+    return motions, tree, dict(sorted(reasons.items()))
 
 
 def _with_tree(

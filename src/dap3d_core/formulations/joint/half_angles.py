@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats
-from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 # pi/2 in three parts, the first two with trailing zeros, and 2/pi.
 P1, P2, P3 = 1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21
@@ -27,13 +27,25 @@ LARGEST = 1e5
 @compiled
 def half_angles(q: Floats, sines: Floats, cosines: Floats) -> None:
     """Sines and cosines of q/2 for the first angles of q, as many as there are sines."""
-    largest = 0.0
-    for i in range(sines.shape[0]):
-        largest = max(largest, abs(q[i]))
-    if not largest < 2.0 * LARGEST:
+    if not largest_angle(q, sines.shape[0]) < 2.0 * LARGEST:
         for i in range(sines.shape[0]):
             sines[i], cosines[i] = math.sin(0.5 * q[i]), math.cos(0.5 * q[i])
         return
+    small_half_angles(q, sines, cosines)
+
+
+@compiled_into
+def largest_angle(q: Floats, count: int) -> float:
+    """Largest magnitude of the first angles of q."""
+    largest = 0.0
+    for i in range(count):
+        largest = max(largest, abs(q[i]))
+    return largest
+
+
+@compiled_into
+def small_half_angles(q: Floats, sines: Floats, cosines: Floats) -> None:
+    """``half_angles`` of angles below twice ``LARGEST``."""
     for i in range(sines.shape[0]):
         x = 0.5 * q[i]
         k = np.rint(x * PER)

@@ -81,10 +81,16 @@ def place_tree(y: Floats, system: System) -> None:
     States of elements are placed, too.
     """
     place_states(y, system)
+    half_angles(y, system.tree.half_angles[0], system.tree.half_angles[1])
+    place_nodes(y, system)
+
+
+@compiled_into
+def place_nodes(y: Floats, system: System) -> None:
+    """``place_tree`` once sines and cosines of half angles are known."""
     tree, b = pointer(system.tree.nodes), pointer(system.tree.places)
     K, C = pointer(system.tree.work), pointer(system.tree.constants)
     sines, cosines = system.tree.half_angles[0], system.tree.half_angles[1]
-    half_angles(y, sines, cosines)
     for n in range(1, system.tree.nodes.shape[0]):
         t = TREE_WIDTH * n
         o, up, motion = (

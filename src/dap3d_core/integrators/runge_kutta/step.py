@@ -140,19 +140,58 @@ def step(
     near = work.projects != 0 and is_near_singularity(work, longest)
     if not take_stages(work, t1, h, near, rhs, project, watch, system, loops):
         return
-    error = 0.0
-    if adaptive and near:
+    error = step_error(work, t1, h, near, project, system, loops)
+    finish_step(work, t1, h, longest, end, near, error, False, rhs, project, watch, system, loops)
+
+
+@compiled
+def step_error(
+    work: RungeKuttaState,
+    t1: float,
+    h: float,
+    near: bool,
+    project: Function,
+    system: Any,
+    loops: Any,
+) -> float:
+    """Error of a step whose stages are known; up to 1.0 it is good enough."""
+    if work.fixed_step != 0.0:
+        return 0.0
+    if near:
         error = projected_error_norm(work, t1, h, project, system, loops)
-    elif adaptive:
+    else:
         error = error_norm(work, h)
     if 1.0 < error <= LARGEST:
         error = error_above_rounding(work, near, h, error)
+    return error
+
+
+@compiled
+def finish_step(
+    work: RungeKuttaState,
+    t1: float,
+    h: float,
+    longest: float,
+    end: float,
+    near: bool,
+    error: float,
+    has_rates: bool,
+    rhs: Function,
+    project: Function,
+    watch: Function,
+    system: Any,
+    loops: Any,
+) -> None:
+    """Accept a step whose stages and error are known, reject it, or stop the run.
+
+    has_rates: f at t1 and the trial state is known already, in the stage behind those of the step.
+    """
     if error <= 1.0:
-        failure = complete_step(work, t1, near, rhs, project, watch, system, loops)
+        failure = complete_step(work, t1, near, has_rates, rhs, project, watch, system, loops)
         if failure == STEP_CUT:
             return
         other = 0.0
-        if failure == RUNNING and adaptive and not near:
+        if failure == RUNNING and work.fixed_step == 0.0 and not near:
             other = step_elsewhere(work, t1, h)
         if other > 0.0:
             work.near_singular_landings += 1
@@ -348,6 +387,7 @@ def complete_step(
     work: RungeKuttaState,
     t1: float,
     near: bool,
+    has_rates: bool,
     rhs: Function,
     project: Function,
     watch: Function,
@@ -359,6 +399,7 @@ def complete_step(
     Dense output belongs to the step as the method took it; what it gives is projected separately.
     f is evaluated before the projection, which then has less to do. Where that moves the state by
     no more than the step's error may be, the next step starts with the value all the same.
+    has_rates: as of ``finish_step``.
     """
     times, k = work.times, work.k
     trial, result = work.state[TRIAL], work.stage_count
@@ -367,7 +408,8 @@ def complete_step(
     if work.has_dense_output != 0 and times[work.next_report] < t1:
         if not known:
             work.rhs_count += 1
-            rhs(t1, trial, k[result], system, loops)
+            if not has_rates:
+                rhs(t1, trial, k[result], system, loops)
             known = True
         if not take_dense_stages(work, t1, near, rhs, project, watch, system, loops):
             return STEP_CUT
@@ -376,7 +418,8 @@ def complete_step(
         prepare_dense(work, t1)
     if controlled and not known and t1 < times[-1]:
         work.rhs_count += 1
-        rhs(t1, trial, k[result], system, loops)
+        if not has_rates:
+            rhs(t1, trial, k[result], system, loops)
         known = here = True
     if controlled and known:
         detect_stiffness(work, t1 - work.t)

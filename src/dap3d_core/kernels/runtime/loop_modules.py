@@ -80,23 +80,41 @@ def unit_names(loop: Loop, text: str) -> tuple[str, str]:
     return names_of("loop", kernels, text, layout, *places(*kernels), *sources(*kernels, *_SUPPORT))
 
 
+def build_wide(loop: Loop, count: int) -> Entry:
+    """The loop for ``count`` scenes of one structure at once (lanes.py).
+
+    Raises:
+        CompileError: it decides by a number that differs from scene to scene.
+    """
+    from dap3d_core.kernels.runtime.lanes import wide_unit
+
+    text = source_of(loop)
+    name = f"lanes{count}.{unit_names(loop, text)[1]}"
+
+    def traced(symbol: str) -> str:
+        return trace(symbol, _module(loop, text, name), array_members())
+
+    return Entry(wide_unit(name, count, traced, optimise=True), 0, LOOP)
+
+
+def _module(loop: Loop, text: str, name: str) -> dict[str, Any]:
+    namespace = generated_modules.load(None, name, text)
+    namespace.update(loop.kernels)
+    return namespace
+
+
 def _build(
     loop: Loop, text: str, ready_name: str, name: str, announce: Callable[[str], None] | None
 ) -> Callable:
-    def module() -> dict[str, Any]:
-        namespace = generated_modules.load(None, name, text)
-        namespace.update(loop.kernels)
-        return namespace
-
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
         if announce is not None:
             announce(loop.name)
         refuse_outer_references(*loop.kernels.values())
         compiled_here.append(loop.name)
-        return trace(symbols[0], module(), array_members()), ["None"]
+        return trace(symbols[0], _module(loop, text, name), array_members()), ["None"]
 
     if not jit_is_on():
-        return module()["loop"]
+        return _module(loop, text, name)["loop"]
     unit = Unit(name, 1, write, cache_folder(), optimise=True, ready_name=ready_name)
     return Entry(unit, 0, LOOP)
 

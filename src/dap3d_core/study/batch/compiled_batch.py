@@ -1,7 +1,7 @@
 """Sets up the compiled loop over points (driver.py) and calls it."""
 
 from functools import cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,12 @@ from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.settings import fits, integration_options
 from dap3d_core.study.batch import driver, initial_state
 
+if TYPE_CHECKING:
+    from dap3d_core.study.batch.lanes import LaneBatch
+
+#: Points after which lanes are made: their code is loaded, or compiled. Points of a call that they
+#: are used for.
+BEFORE_LANES, LEAST_IN_LANES = 32, 4
 #: Right-hand sides after which a compiled call returns, so that Ctrl-C is answered.
 CALL = 200_000
 #: Constants of the metric in which displacements are measured in m (Model.length) and rad.
@@ -55,6 +61,7 @@ class CompiledBatch:
         size: a length of the model, m.
         constants: arguments of ``Points`` that all points share.
         last_start: (n,) the state that the last run started from.
+        takes_lanes: points may be run in lanes; False for comparisons.
     """
 
     def __init__(
@@ -74,14 +81,18 @@ class CompiledBatch:
         self.evaluator, self.size = evaluator, model_size(evaluator)
         y0 = self.last_start = evaluator.coordinates.start(evaluator.model.u0)
         may_turn_stiff = settings.integrator == "auto" and fits(IMPLICIT, evaluator.formulation)
-        self.integration = INTEGRATORS.get(str(settings.integrator), EXPLICIT).make(
-            evaluator,
-            y0,
-            times,
-            buffer_rows=len(times),
-            stop_when_stiff=may_turn_stiff,  # as Run does
-            **integration_options(evaluator, settings),
-        )
+
+        def make() -> Any:
+            return INTEGRATORS.get(str(settings.integrator), EXPLICIT).make(
+                evaluator,
+                y0,
+                times,
+                buffer_rows=len(times),
+                stop_when_stiff=may_turn_stiff,  # as Run does
+                **integration_options(evaluator, settings),
+            )
+
+        self._make, self.integration = make, make()
         work, unit = self.integration.work, UNIT_METRIC.copy()
         unit[0] = evaluator.model.length
         starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size)
@@ -98,8 +109,34 @@ class CompiledBatch:
             "first_switches": work.switches.copy(),
             "first_lengths": work.lengths.copy(),
         }
-        self._begin = _begin_functions(evaluator.formulation)
+        self._begin, self.takes_lanes = _begin_functions(evaluator.formulation), True
+        self._lanes: tuple[System, LaneBatch | str] | None = None
+        self._point_count = 0
         self.run(np.zeros((0, 0)), np.zeros(0, dtype=np.int64), y0[None][:0])  # to compile it
+
+    @property
+    def lanes(self) -> "LaneBatch | str":
+        """What runs many points in the lanes of vectors; in words why they are run one by one."""
+        if not self.evaluator.formulation.has_own_coordinates:
+            return "the scene is not run by method joint"
+        if self._lanes is None or self._lanes[0] is not self.evaluator.system:
+            from dap3d_core.study.batch.lanes import lane_batch
+
+            lanes = lane_batch(self.evaluator, self._lane_works, self._begin, len(self._stops) > 0)
+            self._lanes = self.evaluator.system, lanes
+        return self._lanes[1]
+
+    def _lane_works(self, count: int) -> list[RungeKuttaState]:
+        """States of as many integrations as this one's."""
+        works = [self._make().work for _ in range(count)]
+        for work in works:
+            work.tolerance[:] = self.integration.work.tolerance
+        return works
+
+    @property
+    def _stops(self) -> Floats:
+        stops: Floats = self.constants["stops"]
+        return stops
 
     @property
     def number_count(self) -> int:
@@ -132,6 +169,12 @@ class CompiledBatch:
         )
         problem = (self.evaluator.functions, _drives(), self._begin)
         system, loops = self.evaluator.system, self.evaluator.loops
+        self._point_count += count
+        are_many = count >= LEAST_IN_LANES and self._point_count >= BEFORE_LANES
+        if are_many and start == driver.UNCORRECTED and self.takes_lanes:
+            lanes = self.lanes
+            if not isinstance(lanes, str) and lanes.is_ready:
+                lanes.run(points, CALL)
         while True:
             with np.errstate(all="ignore"):  # as compiled code does
                 driver.run_points(points, work, *problem, system, loops, CALL)

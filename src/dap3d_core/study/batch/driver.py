@@ -203,6 +203,27 @@ def store_row(
 
 
 @compiled
+def store_run(
+    points: Points,
+    p: int,
+    work: RungeKuttaState,
+    starting: Sequence[Function],
+    system: System,
+    loops: Any,
+) -> None:
+    """Store rows and diagnostics of the run of point p, which has ended."""
+    diagnostics, nt = points.diagnostics, work.rows.shape[0]
+    for k in range(work.row_count):
+        if points.at[OWN] == 0:
+            copy_into(points.rows[p * nt + k], work.rows[k])
+        else:
+            store_row(points.rows[p * nt + k], work.rows[k], work, starting, system, loops)
+    diagnostics[p, ENDED], diagnostics[p, ROWS] = work.status, work.row_count
+    diagnostics[p, TAKEN], diagnostics[p, CALLS] = work.step_count, work.rhs_count
+    diagnostics[p, FRICTION_FAILURES] = system.settings[UNSETTLED] + system.settings[DOUBTFUL]
+
+
+@compiled
 def run_points(
     points: Points,
     work: RungeKuttaState,
@@ -218,7 +239,7 @@ def run_points(
     Rows of a run that is not FINISHED, by its ``diagnostics``, are not valid.
     """
     at, diagnostics = points.at, points.diagnostics
-    drive, spent, nt = drives[0], 0, work.rows.shape[0]
+    drive, spent = drives[0], 0
     while at[POINT] < diagnostics.shape[0] and spent <= budget:
         p = at[POINT]
         if at[BEGUN] == 0:
@@ -238,15 +259,6 @@ def run_points(
         work.t_limit = np.inf
         spent += work.rhs_count - calls
         if work.status != RUNNING:
-            for k in range(work.row_count):
-                if at[OWN] == 0:
-                    copy_into(points.rows[p * nt + k], work.rows[k])
-                else:
-                    store_row(points.rows[p * nt + k], work.rows[k], work, starting, system, loops)
-            diagnostics[p, ENDED], diagnostics[p, ROWS] = work.status, work.row_count
-            diagnostics[p, TAKEN], diagnostics[p, CALLS] = work.step_count, work.rhs_count
-            diagnostics[p, FRICTION_FAILURES] = (
-                system.settings[UNSETTLED] + system.settings[DOUBTFUL]
-            )
+            store_run(points, p, work, starting, system, loops)
             at[POINT] += 1
             at[BEGUN] = 0

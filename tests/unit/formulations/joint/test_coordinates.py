@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from support import state_types, trees
+from unit.formulations.joint_loops.test_equations import ladder
 
 from dap3d_core.formulations.joint import coordinates as module
+from dap3d_core.formulations.joint.coordinates import cost_over_standard
 from dap3d_core.simulation import CompiledModel
 
 
@@ -51,3 +53,13 @@ def test_evaluations_at_a_state_know_the_states_of_elements():
         assert model.evaluator.method == method
         rates.append(model.evaluator.state_rates(0.0, model.model.u0))
     assert rates[0] == pytest.approx(rates[1], rel=1e-14)
+
+
+def test_the_cost_is_known_without_a_run_by_method_joint():
+    """A third of that of standard for chains; a ladder on two chains costs more than there."""
+    chain, net = (
+        CompiledModel(scene, method="standard")
+        for scene in (trees.mixed_chain(20), ladder(12))
+    )  # fmt: skip
+    assert 0.2 < cost_over_standard(chain.model, chain.evaluator.plan) < 0.6
+    assert cost_over_standard(net.model, net.evaluator.plan) > 1.2

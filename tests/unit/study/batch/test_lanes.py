@@ -1,0 +1,189 @@
+"""Points in the lanes of a vector are the runs that ``simulate`` makes, bit for bit."""
+
+import numpy as np
+import pytest
+from support import trees
+from unit.study.batch.test_batch import DONE, ensemble, path_of, singly
+
+import dap3d_core as dap
+from dap3d_core.integrators.stepping.integration_state import NOT_FINITE
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.study import Ensemble
+from dap3d_core.study.batch import compiled_batch
+from dap3d_core.study.batch.lanes import LaneBatch
+
+pytestmark = pytest.mark.skipif(not jit_is_on(), reason="plain Python has no vectors")
+
+#: Points of each call that was run in lanes.
+RUN: list[int] = []
+
+
+@pytest.fixture(autouse=True)
+def at_once(monkeypatch):
+    """Lanes for any number of points, also before their code is optimised, which has its bits."""
+    run = LaneBatch.run
+
+    def counted(lanes, points, budget):
+        RUN.append(len(points.table))
+        run(lanes, points, budget)
+
+    RUN.clear()
+    monkeypatch.setattr(compiled_batch, "BEFORE_LANES", 1)
+    monkeypatch.setattr(LaneBatch, "is_ready", True)
+    monkeypatch.setattr(LaneBatch, "run", counted)
+
+
+def branched():
+    """A tree of all standard joints with one degree of freedom or more, and a free body.
+
+    A spring, and a force and a spring's length that follow functions of time.
+    """
+    scene = trees.random_tree(5, seed=3, free=0.3)
+    scene.add_function("harmonic", "waves", amplitude=0.2, frequency=3.0, phase=0.5, offset=1.0)
+    scene.add_force("ptp", "spring", P_i="b4.O", P_j="ground.O", k=20.0, c=0.5, l0=1.0)
+    scene.add_force("ptp", "pushed", P_i="b2.O", P_j="ground.O", k=5.0, c=0.1, function="waves")
+    return scene
+
+
+def pendulum():
+    """A bob on a hinge with a spring, whose stiffness sets the number of steps."""
+    scene = dap.Scene(name="pendulum")
+    scene.add_body("bob", mass=1.0, Jp=(0.01, 0.01, 0.01), r=(0.5, 0.0, 0.0))
+    scene.add_point("end", "bob", (-0.5, 0.0, 0.0))
+    scene.add_point("post", "ground", (1.0, 0.0, 1.0))
+    scene.add_joint("rev", "hinge", P_i="end", P_j="ground.O", a_i="bob.y", a_j="ground.y")
+    scene.add_force("weight", "gravity")
+    scene.add_force("ptp", "spring", P_i="bob.O", P_j="post", k=10.0, l0=0.5)
+    return scene
+
+
+def lanes_of(of):
+    return of._runner().compiled_batch.lanes
+
+
+def check(make, points):
+    """Compare points in lanes with points one by one, which are single runs (test_batch.py)."""
+    of, other = make(), make()
+    other._runner().compiled_batch.takes_lanes = False
+    batch, alone = of.run(points), other.run(points)
+    assert sum(RUN) == len(points)
+    assert batch.status.tolist() == [DONE] * len(points)
+    for name, values in alone.values.items():
+        assert np.array_equal(batch.values[name], values)
+    assert max(np.ptp(values, axis=0).max() for values in alone.values.values()) > 1e-3
+    return of, batch
+
+
+@pytest.mark.parametrize(
+    ("integrator", "step"), [("dop853", None), ("dopri5", None), ("rk4", 0.01), ("auto", None)]
+)
+def test_points_have_the_bits_of_single_runs(integrator, step):
+    """Two more points than lanes; a mass, a stiffness, a damper; what is reported of all kinds."""
+    names = ("bodies.b1.mass", "forces.spring.k", "forces.pushed.c")
+    outputs = ("b4.r:series", "b4.w:max", "b3.rdd", "J0.lambda:series")
+    of = ensemble(branched(), names, outputs, method="joint", t_end=0.1, dt=0.02, step=step,
+                  integrator=integrator)  # fmt: skip
+    given = np.array([parameter.value for parameter in of.parameters])
+    points = np.random.default_rng(1).uniform(0.8, 1.2, size=(10, 3)) * given
+    of, batch = check(lambda: Ensemble(of.requested), points)
+    again = of.run(points[::-1])  # whichever points run beside them
+    for name, values in batch.values.items():
+        assert np.array_equal(again.values[name][::-1], values)
+    for name, values in singly(of, points[:1]).items():
+        assert np.array_equal(batch.values[name][:1], values)
+
+
+def test_a_lane_takes_the_next_point_when_its_run_has_ended():
+    """Runs of 10 to some 200 steps, which end at any time."""
+    points = np.geomspace(1.0, 1e5, 25)[:, None]
+    of, _ = check(lambda: swinging("forces.spring.k"), points)
+    assert len(points) > 2 * lanes_of(of).count
+
+
+def swinging(name, **settings):
+    return ensemble(pendulum(), (name,), ("bob.r:series",),
+                    **{"method": "joint", "t_end": 0.5, "dt": 0.25} | settings)  # fmt: skip
+
+
+def test_velocities_differ_from_lane_to_lane():
+    """Their starts are corrected."""
+    check(lambda: swinging("bodies.bob.w.y"), np.linspace(0.0, 2.0, 9)[:, None])
+
+
+def test_points_that_have_a_model_each():
+    """The joint is elsewhere in the body: its motion is found anew."""
+    of, _ = check(lambda: swinging("points.end.sPp.x"), np.linspace(-0.6, -0.4, 9)[:, None])
+    assert path_of(of) == "rebuilt"
+
+
+def test_a_run_whose_angles_leave_the_range_of_lanes_is_run_alone():
+    """Beyond 2e5 rad half angles are reduced in another way: steps of 0.1 s at 1e7 rad/s."""
+    scene = pendulum()
+    del scene.forces["spring"]
+    scene.bodies["bob"].w = (0.0, 1e7, 0.0)
+    scene.bodies["bob"].r_dot = (0.0, 0.0, -5e6)
+    settings = {"method": "joint", "t_end": 0.3, "dt": 0.1, "integrator": "rk4", "step": 0.1}
+    of = ensemble(scene, ("forces.gravity.gravity",), ("bob.r:series",), **settings)
+    of, _ = check(lambda: Ensemble(of.requested), np.linspace(1.0, 1e6, 5)[:, None])
+    assert lanes_of(of)._works[0][1].status == NOT_FINITE
+
+
+def with_table(scene):
+    scene.add_function("spline", "path", x=[0.0, 1.0, 2.0], y=[0.0, 1.0, 0.0], periodic=True)
+    scene.forces["spring"].fields["function"] = "path"
+
+
+def with_bend(scene):
+    scene.add_function("b", "rise", x_start=0.1, x_end=0.15, f_start=0.0, f_end=1.0)
+    scene.forces["spring"].fields["function"] = "rise"
+
+
+def with_turns(scene):
+    axes = {"v_i": "bob.x", "v_j": "ground.x", "axis": "ground.y"}
+    scene.add_force("rot_sda", "coil", k=1.0, turns=True, **axes)
+
+
+def with_friction(scene):
+    scene.add_force("friction", "rubbing", joint="hinge", mu=0.1, radius=0.05, v_tol=0.1)
+
+
+#: What lanes do not take: what makes it, the reason.
+ALONE = {
+    "turns": (with_turns, "it has switches, angles whose turns are counted, or times"),
+    "a table": (with_table, "ptp(spline): wrench decides by a number that differs"),
+    "a bend in time": (with_bend, "it has switches, angles whose turns are counted, or times"),
+    "friction": (with_friction, "forces depend on multipliers"),
+}
+
+
+@pytest.mark.parametrize("case", ALONE)
+def test_what_lanes_do_not_take_runs_point_by_point(case):
+    change, reason = ALONE[case]
+    scene = pendulum()
+    change(scene)
+    settings = {"method": "joint", "t_end": 0.2, "dt": 0.1}
+    of = ensemble(scene, ("bodies.bob.mass",), ("bob.r:series",), **settings)
+    [note] = of.notes
+    assert note.startswith("points are run one by one: ")
+    assert reason in note
+    assert of.run([[1.0], [2.0]]).status.tolist() == [DONE, DONE]
+
+
+def test_notes_say_how_points_are_run():
+    of = swinging("bodies.bob.mass")
+    assert of.notes == (f"points are run in {lanes_of(of).count} lanes of a vector",)
+    of = swinging("bodies.bob.mass", method="standard")
+    assert of.notes == ("points are run one by one: the scene is not run by method joint",)
+
+
+def test_lanes_made_between_points_leave_the_numbers_of_the_scene():
+    """A start that is corrected is not that of the model, to which a tree would refer."""
+    of = swinging("bodies.bob.mass")
+    runner = of._runner()
+    evaluator = runner.compiled_batch.evaluator
+    u = of.compiled.model.u0.copy()
+    u[2] += 0.1
+    evaluator.coordinates.start(u)
+    before = evaluator.system.tree.constants.copy()
+    assert isinstance(lanes_of(of), LaneBatch)
+    assert np.array_equal(evaluator.system.tree.constants, before)
