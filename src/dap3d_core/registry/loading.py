@@ -5,6 +5,7 @@ import importlib
 import inspect
 import os
 import sys
+from functools import cache
 from importlib.util import spec_from_file_location
 from pathlib import Path
 from types import ModuleType
@@ -49,7 +50,13 @@ def load(
             module = importlib.import_module(source.module)
             types = types_of(module, (source.kind,))[source.kind]
             type_ = _with_keyword(source, types)
-        return examine(type_)
+        return _examined(type_)
+
+
+@cache
+def _examined(type_: type[TypeBase]) -> TypeInfo:
+    """What a class says is the same in all registries of a process."""
+    return examine(type_)
 
 
 def compile_kernels(source: Source, type_info: TypeInfo, notes: list[str]) -> None:
