@@ -166,7 +166,7 @@ REFUSED = [
     (("new-plugin", "mine", "--kind", "wheel"), "'wheel' is not one of"),
     (("new-plugin", "rev"), "there is a joint type 'rev' already"),
     (("import", "nothing.urdf"), "there is no file nothing.urdf"),
-    (("import", "sub"), "sub cannot be read"),
+    (("import", "sub"), "sub is a folder"),
     (("import", "words", "--format", "urfd"), "did you mean 'urdf'"),
     (("import-matlab", "nothing"), "there is no such folder"),
     (("import-matlab", "sub"), "there is no inBodies.m"),
