@@ -15,7 +15,7 @@ from dap3d_core.study import Ensemble, Study, outputs_of
 ROUNDS = 7
 #: Joint, bodies, points, end of a run, integrator.
 CASES = (
-    ("rev", 1, 512, 1.0, "dop853"),
+    ("rev", 1, 2048, 1.0, "dop853"),
     ("rev", 8, 256, 1.0, "dop853"),
     ("rev", 8, 256, 1.0, "dopri5"),
     ("rev", 8, 128, 1.0, "rk4"),

@@ -54,14 +54,24 @@ def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     assert "dap3d_core.formulations.joint_loops" not in found  # a tree keeps no rows
 
 
-def test_lanes_are_imported_by_studies_of_many_points_in_joint_coordinates():
-    """Other studies, and those of few points, bring in nothing of them."""
+def test_lanes_are_imported_by_long_studies_in_joint_coordinates():
+    """Other studies, and short ones, bring in nothing of them."""
     names = {f"dap3d_core.{part}.lanes" for part in ("kernels.compiler", "study.batch")}
-    sweep = "dap.sweep('pen1', {{'bodies.cone.mass': np.linspace(1.0, 2.0, {})}}, outputs='cone.r'"
-    sweep = "import dap3d_core as dap, numpy as np\n" + sweep + ", t_end=0.02, method='{}')\n"
-    few = sweep.format(40, "standard") + sweep.format(4, "joint")
-    assert not imported(few) & names
-    assert names <= imported(sweep.format(200, "joint"))
+    script = (
+        "import sys, numpy as np, dap3d_core as dap\n"
+        "from dap3d_core.study.batch import compiled_batch\n"
+        "def sweep(method):\n"
+        "    points = {'bodies.cone.mass': np.linspace(1.0, 2.0, 40)}\n"
+        "    dap.sweep('pen1', points, outputs='cone.r', t_end=0.02, method=method)\n"
+    )
+    script += (
+        "sweep('joint')\n"
+        "compiled_batch.BEFORE_LANES = 1\n"
+        "sweep('standard')\n"
+        f"assert not {names} & set(sys.modules)\n"
+        "sweep('joint')\n"
+    )
+    assert names <= imported(script)
 
 
 def test_a_scene_without_states_has_nothing_of_them():

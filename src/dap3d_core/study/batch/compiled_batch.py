@@ -24,9 +24,9 @@ from dap3d_core.study.batch import driver, initial_state
 if TYPE_CHECKING:
     from dap3d_core.study.batch.lanes import LaneBatch
 
-#: Points after which lanes are made: their code is loaded, or compiled. Points of a call that they
-#: are used for.
-BEFORE_LANES, LEAST_IN_LANES = 32, 4
+#: Points of a call from which on they are run in lanes; right-hand sides times bodies from which on
+#: that is tried, because loading their code takes as long; right-hand sides of a point, at first.
+LEAST_IN_LANES, BEFORE_LANES, USUAL_CALLS = 4, 500_000, 300.0
 #: Right-hand sides after which a compiled call returns, so that Ctrl-C is answered.
 CALL = 200_000
 #: Constants of the metric in which displacements are measured in m (Model.length) and rad.
@@ -111,7 +111,7 @@ class CompiledBatch:
         }
         self._begin, self.takes_lanes = _begin_functions(evaluator.formulation), True
         self._lanes: tuple[System, LaneBatch | str] | None = None
-        self._point_count = 0
+        self._calls, self._point_calls = 0.0, USUAL_CALLS
         self.run(np.zeros((0, 0)), np.zeros(0, dtype=np.int64), y0[None][:0])  # to compile it
 
     @property
@@ -125,6 +125,12 @@ class CompiledBatch:
             lanes = lane_batch(self.evaluator, self._lane_works, self._begin, len(self._stops) > 0)
             self._lanes = self.evaluator.system, lanes
         return self._lanes[1]
+
+    def _is_long(self, count: int) -> bool:
+        """True if so many points are worth lanes."""
+        calls = self._calls + count * self._point_calls
+        enough = calls * self.evaluator.model.body_count >= BEFORE_LANES
+        return count >= LEAST_IN_LANES and enough
 
     def _lane_works(self, count: int) -> list[RungeKuttaState]:
         """States of as many integrations as this one's."""
@@ -169,9 +175,7 @@ class CompiledBatch:
         )
         problem = (self.evaluator.functions, _drives(), self._begin)
         system, loops = self.evaluator.system, self.evaluator.loops
-        self._point_count += count
-        are_many = count >= LEAST_IN_LANES and self._point_count >= BEFORE_LANES
-        if are_many and start == driver.UNCORRECTED and self.takes_lanes:
+        if start == driver.UNCORRECTED and self.takes_lanes and self._is_long(count):
             lanes = self.lanes
             if not isinstance(lanes, str) and lanes.is_ready:
                 lanes.run(points, CALL)
@@ -182,6 +186,8 @@ class CompiledBatch:
                 break
         if count:
             self.last_start = points.y0[-1]
+            self._calls += float(np.sum(diagnostics[:, driver.CALLS]))
+            self._point_calls = float(np.mean(diagnostics[:, driver.CALLS]))
         rows = points.rows.reshape(count, nt, width)
         done = diagnostics[:, driver.ENDED] == Status.FINISHED
         return BatchRows(done, rows, y0, points.y0, diagnostics)
