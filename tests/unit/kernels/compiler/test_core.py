@@ -70,6 +70,8 @@ for case in CASES.values():
     recorder.record(pack, *case)
 recorder.record(pack, *CASES["functions and their breaks"], t_end=0.6)
 recorder.record(pack, pendulum, {"bodies.bob.mass": (1.0, 3.0)}, "bob.w", method="penalty")
+in_joint_coordinates = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.w"], method="joint")
+recorder.record(in_joint_coordinates.run, [[1.0], [3.0]])
 recorder.record(dap.simulate, "pen1", t_end=0.1, dt=0.1, rtol=1e-13, atol=1e-15)
 from dap3d_core.linear.ordering import elimination_order, nested_dissection, supernodes
 from support.graphs import Case, check_solution
