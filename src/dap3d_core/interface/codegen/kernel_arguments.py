@@ -108,7 +108,7 @@ def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, Kernel
 
 def argument_names(type_: type[TypeBase]) -> tuple[str, ...]:
     """The arguments of a function type, ``x`` or ``x`` and ``y``; none of other types."""
-    return ("x", "y")[: getattr(type_, "arguments", 0)]
+    return ("x", "y")[: type_.arguments] if type_.kind == "function" else ()  # type: ignore[attr-defined]
 
 
 def derivative_names(arguments: int) -> tuple[str, ...]:

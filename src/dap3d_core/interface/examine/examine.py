@@ -324,8 +324,8 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     for field in attrs.fields(type_):  # type: ignore[arg-type]
         if "dap3d" not in field.metadata and field.default is attrs.NOTHING:
             raise PluginError(f"{who}: {no_field(type_, field.name)}")
-    if getattr(type_, "arguments", 1) not in (1, 2):
-        raise PluginError(f"{who}: arguments = {type_.arguments!r}; a function takes 1 or 2")  # type: ignore[attr-defined]
+    if issubclass(type_, Function) and type_.arguments not in (1, 2):
+        raise PluginError(f"{who}: arguments = {type_.arguments!r}; a function takes 1 or 2")
     kernels, by_joint = type_.kernels(), bool(_joint_of_friction(type_))
     derivable = missing(type_)
     needed = {"joint": ["J", "gamma"], "force": ["wrench"], "function": ["value"]}[kind]

@@ -248,8 +248,8 @@ class _Reading:
 
     def function(self, field: _Field, value: Any) -> None:
         self.name_of(field, value, self.reader.function_index)
-        count, wanted = self.reader.arguments.get(value), field.spec.arguments
-        if count is not None and count != wanted:
+        count = self.reader.arguments.get(value) if isinstance(value, str) else None
+        if count is not None and count != field.spec.arguments:
             given = field.spec.argument or "time"
             self.refuse(field.name, f"takes {counted(count)}, and is to be a function of {given}")
 

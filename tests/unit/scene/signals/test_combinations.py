@@ -66,6 +66,9 @@ def test_functions_are_given_as_many_arguments_as_they_take():
     with pytest.raises(SceneError) as caught:
         check(scene, load_registry())
     time, length = caught.value.mistakes
+    scene.forces["push"].fields["function"] = {"x": 1.0}
+    with pytest.raises(SceneError, match=r"push.function.*should be the name of a function"):
+        check(scene, load_registry())
     assert "push.function" in str(time)
     assert "a function of time" in str(time)
     assert "takes two arguments, and is to be a function of" in str(length)
