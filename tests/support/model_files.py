@@ -106,9 +106,8 @@ def urdf(bodies, poses, joints):
         moments = zip(("ixx", "iyy", "izz"), body.J, strict=True)
         words = " ".join(f'{key}="{value!r}"' for key, value in moments)
         lines.append(f'<link name="{name}"><inertial><origin xyz="{_words(com)}"/>')
-        lines.append(
-            f'<mass value="{body.mass}"/><inertia {words} ixy="0" ixz="0" iyz="0"/></inertial></link>'
-        )
+        lines.append(f'<mass value="{body.mass}"/><inertia {words} ixy="0" ixz="0" iyz="0"/>')
+        lines.append("</inertial></link>")
     for name, joint in joints.items():
         (o, A), tag = at[joint.parent], "constraint" if joint.closes else "joint"
         turn = A.T if joint.closes else A.T @ at[joint.child][1]
