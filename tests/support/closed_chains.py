@@ -49,7 +49,12 @@ def four_bar():
 
 def leg():
     """Thigh, shin and tarsus with a spring in the shin; rods in space and to the foot."""
-    hip, knee, spring, ankle = np.array([0, 0, 1.0]), (0.12, 0, -0.3), (0.0, 0, -0.08), (0.05, 0, -0.36)
+    hip, knee, spring, ankle = (
+        np.array([0, 0, 1.0]),
+        (0.12, 0, -0.3),
+        (0.0, 0, -0.08),
+        (0.05, 0, -0.36),
+    )
     foot, crank = (0.02, 0.0, -0.4), (0.06, 0.0, -0.05)
     heel, lug, side = 0.12, np.array([-0.05, 0.0, -0.02]), 0.06
     bodies = {
@@ -62,7 +67,7 @@ def leg():
         "plantar": rod(0.1, 0.35),
         "foot": Body(0.15, (3e-4, 5e-4, 4e-4), (0.03, 0, 0)),
     }
-    reach, plantar = [0.0, 0.0], 0.0
+    reach = 0.62, 0.36  # of the rods, in the plane
 
     def chain(s):
         """Poses of all bodies but rods, tarsus and foot, and the points that these need."""
@@ -93,10 +98,8 @@ def leg():
         }  # fmt: skip
 
     start = np.array([-0.2, 0.9, 0.0, 0.3])
-    reach[0] = 0.62
-    reach[1] = 0.36
     here = poses(start)
-    A, at_knee, B, at_spring, C, at_ankle, top = chain(start)
+    _, at_knee, _, at_spring, _, at_ankle, top = chain(start)
     T = here["tarsus"][1]
     back = at_ankle - heel * T[:, 0]
     end = here["crank"][0] + here["crank"][1] @ (0.05, 0.0, 0.0)

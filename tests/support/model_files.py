@@ -68,8 +68,11 @@ def mjcf(bodies, poses, joints):
         else:
             kind = {"revolute": "hinge", "universal": "hinge", "prismatic": "slide"}[joint.kind]
             at = _words(axes.T @ (np.array(joint.at) - here))
-            lines.extend(f'<joint type="{kind}" pos="{at}" axis="{_words(axes.T @ axis)}" '
-                         f'stiffness="{joint.k}" damping="{joint.c}"/>' for axis in joint.axes)
+            lines.extend(
+                f'<joint type="{kind}" pos="{at}" axis="{_words(axes.T @ axis)}" '
+                f'stiffness="{joint.k}" damping="{joint.c}"/>'
+                for axis in joint.axes
+            )
         for one in tree:
             if one.parent == name:
                 write(one.child, here, axes)
@@ -102,8 +105,9 @@ def urdf(bodies, poses, joints):
         com = A.T @ (o + A @ body.com - origin)
         moments = zip(("ixx", "iyy", "izz"), body.J, strict=True)
         words = " ".join(f'{key}="{value!r}"' for key, value in moments)
-        lines.append(f'<link name="{name}"><inertial><origin xyz="{_words(com)}"/>'
-                     f'<mass value="{body.mass}"/><inertia {words}/></inertial></link>')  # fmt: skip
+        lines.append(f'<link name="{name}"><inertial><origin xyz="{_words(com)}"/>')
+        lines.append(f'<mass value="{body.mass}"/><inertia {words} ixy="0" ixz="0" iyz="0"/>')
+        lines.append("</inertial></link>")
     for name, joint in joints.items():
         (o, A), tag = at[joint.parent], "constraint" if joint.closes else "joint"
         turn = A.T if joint.closes else A.T @ at[joint.child][1]

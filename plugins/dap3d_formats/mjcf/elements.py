@@ -11,7 +11,8 @@ _FRAME = taken("pos quat axisangle xyaxes zaxis euler")
 _CLASS = taken("class")
 _ACTUATOR = (
     taken("name class joint jointinparent gear kp kv gaintype gainprm biastype biasprm dyntype")
-    | taken("group") | noted("user", _DRAWING)
+    | taken("group")
+    | noted("user", _DRAWING)
     | noted("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
     | noted(
         "ctrllimited forcelimited actlimited ctrlrange forcerange actrange lengthrange actdim "

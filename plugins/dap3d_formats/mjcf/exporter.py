@@ -105,7 +105,9 @@ class _Writer:
             raise FormatError(f"joint {joint.name} is {joint.kind}, which MJCF does not have")
         types = TYPES[joint.kind]
         if joint.kind == "fixed":
-            text = f"joint {joint.name} has no name: bodies without joints are fixed to their parent"
+            text = (
+                f"joint {joint.name} has no name: bodies without joints are fixed to their parent"
+            )
             self.remarks.translate(NOWHERE, text)
         if len(types) > 1:
             text = f"joint {joint.name} is {joint.kind}: two joints of a body"

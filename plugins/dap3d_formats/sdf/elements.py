@@ -51,6 +51,8 @@ SDF: Table = {
     "render_order": noted("", "drawing"), "shininess": noted("", "lighting"),
     "double_sided": noted("", "lighting"),
     "joint": taken() | taken("name type"),
+    "drake:rotor_inertia": translated("", "armature of the joint: a wheel that turns with it"),
+    "drake:gear_ratio": taken(),
     "parent": taken(), "child": taken(),
     "axis": taken(), "axis2": taken(),
     "xyz": taken() | taken("expressed_in"),

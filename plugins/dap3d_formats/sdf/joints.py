@@ -117,7 +117,16 @@ def _axes(reader: SdfReader, joint: Joint, element: XmlElement, scope: str) -> N
     joint.axes, joint.limits = tuple(axes), tuple(limits)
     joint.damping, joint.friction = tuple(columns["damping"]), tuple(columns["friction"])
     joint.stiffness, joint.rest = tuple(columns["stiffness"]), tuple(columns["rest"])
-    joint.armature = (0.0,) * len(axes)
+    joint.armature = (_reflected(element), *(0.0,) * (len(axes) - 1))
+
+
+def _reflected(element: XmlElement) -> float:
+    """The inertia of a rotor behind a gear, as Drake's extension of the format has it."""
+    rotor, gear = element.first("drake:rotor_inertia"), element.first("drake:gear_ratio")
+    if rotor is None:
+        return 0.0
+    ratio = 1.0 if gear is None else gear.content(1)[0]
+    return float(ratio * ratio * rotor.content(1)[0])
 
 
 def _expressed(

@@ -14,6 +14,7 @@ from dap3d_core.formats.import_scene.shapes import MeshFiles
 from dap3d_core.formats.import_scene.source_files import SourceFiles
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import Articulation, FormatError, Importer, Remark, Remarks
+from dap3d_core.interface.formats.articulation import KINDS
 from dap3d_core.interface.formats.xml_tree import XmlElement
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.formats import Formats, load_formats
@@ -106,20 +107,18 @@ def import_model(
         model, source, keyword = read_articulation(
             file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes
         )
-        given = _coordinates(positions, model), _coordinates(rates, model)
-        options = ImportOptions(free_base, keep_fixed, balance_inertia, *given)
+        options = ImportOptions(
+            free_base, keep_fixed, balance_inertia, *_states(positions, rates, model)
+        )
         scene = scene_of(model, source.remarks, options, meshes=meshes, names=names)
+        scene.description = f"From {file.name}."
+        checked = check(scene, load_registry() if registry is None else registry)
     except FormatError as error:
         raise _refusal(error, file) from None
     except SceneError as error:
         raise SceneError(_relocated(m, names, file) for m in error.mistakes) from None
     if strict:
         _refuse_omissions(source.remarks)
-    scene.description = f"From {file.name}."
-    try:
-        checked = check(scene, load_registry() if registry is None else registry)
-    except SceneError as error:
-        raise SceneError(_relocated(m, names, file) for m in error.mistakes) from None
     return scene, _report(file, keyword, model, source.remarks, checked.notes, meshes)
 
 
@@ -255,19 +254,35 @@ def _root_name(source: SourceFiles) -> str:
     return root.name
 
 
+def _states(
+    positions: Mapping[str, Any] | None, rates: Mapping[str, Any] | None, model: Articulation
+) -> tuple[dict[str, tuple[float, ...]], dict[str, tuple[float, ...]]]:
+    return (
+        _coordinates(positions, model, positions=True),
+        _coordinates(rates, model, positions=False),
+    )
+
+
 def _coordinates(
-    given: Mapping[str, Any] | None, model: Articulation
+    given: Mapping[str, Any] | None, model: Articulation, *, positions: bool
 ) -> dict[str, tuple[float, ...]]:
     """Coordinates of joints as tuples.
 
     Raises:
-        FormatError: there is no such joint.
+        FormatError: there is no such joint, or it has another number of them.
     """
     coordinates = {}
+    quaternions = {"ball": 1, "free": 1} if positions else {}
     for name, value in (given or {}).items():
         if name not in model.joints:
             raise FormatError(f"position of {name}: there is no such joint in the file")
         values = tuple(map(float, value if isinstance(value, Sequence) else (value,)))
+        kind = model.joints[name].kind
+        count = KINDS[kind] + quaternions.get(kind, 0)
+        if len(values) != count:
+            raise FormatError(
+                f"joint {name} is {kind}: it takes {count} numbers, not {len(values)}"
+            )
         coordinates[name] = values
     return coordinates
 

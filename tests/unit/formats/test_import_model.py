@@ -124,3 +124,83 @@ def test_motors_become_inputs():
     pushed = np.array([0.0, -4.2, -4.2]) / np.sqrt(2.0)
     np.testing.assert_allclose(wrench["push_i"].force[0], pushed, rtol=1e-15)
     np.testing.assert_allclose(wrench["push_j"].force[0], -pushed, rtol=1e-15)
+
+
+def test_a_position_has_as_many_numbers_as_its_joint_coordinates():
+    with pytest.raises(dap.SceneError, match="joint elbow is revolute: it takes 1 numbers, not 2"):
+        dap.import_model(ARM, positions={"elbow": (0.1, 0.2)})
+    hand = ARM.with_name("hand.xml")
+    with pytest.raises(dap.SceneError, match="joint loose is ball: it takes 4 numbers, not 1"):
+        dap.import_model(hand, positions={"loose": 0.1})
+    with pytest.raises(dap.SceneError, match="joint loose is ball: it takes 3 numbers, not 4"):
+        dap.import_model(hand, rates={"loose": (1.0, 0.0, 0.0, 0.0)})
+
+
+SPOKE = '<body name="b"><freejoint/><geom type="box" size="0.1 0.2 0.3" pos="1 0 0"/></body>'
+
+
+def imported(tmp_path, text, **options):
+    (tmp_path / "a.xml").write_text(f"<mujoco>{text}</mujoco>")
+    return dap.import_model(tmp_path / "a.xml", **options)
+
+
+def test_replicas_are_turned_and_moved_one_after_the_other(tmp_path):
+    """Replica k has (offset, turn)^k: of three quarter turns with a step along x."""
+    world = f'<replicate count="3" offset="2 0 0" euler="0 0 90" sep="-">{SPOKE}</replicate>'
+    scene, _ = imported(tmp_path, f"<worldbody>{world}</worldbody>")
+    assert list(scene.bodies) == ["b-0", "b-1", "b-2"]
+    places = [(1.0, 0.0, 0.0), (2.0, 1.0, 0.0), (1.0, 2.0, 0.0)]
+    for k, (body, place) in enumerate(zip(scene.bodies.values(), places, strict=True)):
+        np.testing.assert_allclose(body.r, place, atol=1e-15)
+        c, s = np.cos(k * np.pi / 2.0), np.sin(k * np.pi / 2.0)
+        turned = [[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]
+        np.testing.assert_allclose(rotation(np.array(body.p)), turned, atol=1e-15)
+
+
+def test_numbers_of_replicas_are_of_one_length(tmp_path):
+    world = f'<replicate count="10" offset="2 0 0">{SPOKE}</replicate>'
+    scene, _ = imported(tmp_path, f"<worldbody>{world}</worldbody>")
+    assert list(scene.bodies)[::9] == ["b00", "b09"]
+
+
+@pytest.mark.parametrize(
+    ("world", "said"),
+    [
+        ('<replicate count="1000000000"><body/></replicate>', "more than 100000 elements"),
+        ('<replicate count="9999">' * 3 + "<body/>" + "</replicate>" * 3, "more than 100000"),
+        ('<replicate count="0.5"><body/></replicate>', "an integer above 0"),
+        ("<replicate><body/></replicate>", "has no count; it is required"),
+    ],
+)
+def test_replicas_have_a_bound(tmp_path, world, said):
+    """Nested ones multiply; none is made before the number is known."""
+    with pytest.raises(dap.SceneError, match=said):
+        imported(tmp_path, f"<worldbody>{world}</worldbody>")
+
+
+@pytest.mark.parametrize("face", ["", 'face="0 2 1  0 1 3  0 3 2  1 2 3"'])
+def test_a_mesh_without_a_file_has_mass(tmp_path, face):
+    """A tetrahedron of edges 0.6, of its hull without faces: volume 0.036, centre a quarter up."""
+    mesh = f'<mesh name="m" vertex="0 0 0 0.6 0 0 0 0.6 0 0 0 0.6" {face}/>'
+    body = '<body name="b"><freejoint/><geom type="mesh" mesh="m" density="500"/></body>'
+    scene, _ = imported(tmp_path, f"<asset>{mesh}</asset><worldbody>{body}</worldbody>")
+    assert scene.bodies["b"].mass == pytest.approx(18.0, rel=1e-13)
+    np.testing.assert_allclose(scene.bodies["b"].r, 0.15, rtol=1e-13)
+
+
+def test_shapes_of_the_world_are_drawn_on_ground(tmp_path):
+    world = '<geom type="box" size="1 1 0.1" pos="0 0 -0.1"/><geom type="plane" size="1 1 1"/>'
+    scene, report = imported(tmp_path, f"<worldbody>{world}{SPOKE}</worldbody>")
+    assert [shape.fields["body"] for shape in scene.shapes.values()] == ["ground", "b"]
+    assert any("plane is not drawn" in one.text for one in report.left_out)
+
+
+def test_actuators_of_a_group_that_is_disabled_are_left_out(tmp_path):
+    """A servo would otherwise hold the joint by a spring."""
+    hinge = '<body><joint name="j"/><geom size="1"/></body>'
+    motors = '<motor name="m" joint="j"/><position name="p" joint="j" kp="5" group="2"/>'
+    text = f'<option actuatorgroupdisable="1 2"/><worldbody>{hinge}</worldbody>'
+    scene, report = imported(tmp_path, f"{text}<actuator>{motors}</actuator>")
+    assert list(scene.inputs) == ["m"]
+    assert not any(force.type == "rot_sda" for force in scene.forces.values())
+    assert any("group that is disabled" in one.text for one in report.left_out)

@@ -98,7 +98,7 @@ def _prismatic(ends: JointEnds) -> None:
 
 
 def _fixed(ends: JointEnds) -> None:
-    """A weld; where it closes a loop, whose poses may be off, a slider and a driver that holds it."""
+    """A weld; for a loop, whose poses may be off, a slider and a driver that holds it."""
     if not ends.joint.closes:
         ends.scene.add_joint("weld", ends.name, body_i=ends.child, body_j=ends.parent)
         return

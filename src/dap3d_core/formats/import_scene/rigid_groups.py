@@ -128,7 +128,8 @@ def _stand_in(
     """
     moving = [g for g in groups.values() if g.name != WORLD]
     masses = [g.inertial.mass for g in moving if g.inertial.mass > 0.0]
-    moments = [m for g in moving for m in np.linalg.eigvalsh(g.inertial.inertia) if m > 0.0]
+    principal = [np.linalg.eigvalsh(g.inertial.inertia) for g in moving]
+    moments = [m for three in principal for m in three if m > SMALLEST * three[-1]]
     usual = min(masses, default=1.0), min(moments, default=1.0)
     carried: dict[str, tuple[float, float]] = {}
     for name in reversed(tree.order):
@@ -146,11 +147,12 @@ def _stand_in(
 def _complete(group: RigidGroup, scale: tuple[float, float], remarks: Remarks) -> None:
     """Complete mass and inertia of a group by parts of a mass and a moment of inertia."""
     place, old = group.links[0][0].place, group.inertial
-    mass, moment = (STAND_IN * x for x in scale)
+    mass = STAND_IN * scale[0]
     group.has_mass = old.mass > 0.0
     inertia = old.inertia
-    least = float(np.linalg.eigvalsh(inertia)[0])
-    if least <= SMALLEST * float(np.abs(inertia).max(initial=0.0)):
+    least, _, most = np.linalg.eigvalsh(inertia).tolist()
+    moment = STAND_IN * max(scale[1], most)
+    if least <= SMALLEST * most:
         inertia = inertia + (moment - min(least, 0.0)) * np.eye(3)
     if not old.mass:
         text = f"a link without mass that moves has {STAND_IN:g} of the mass that it carries"

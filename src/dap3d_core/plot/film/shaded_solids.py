@@ -69,20 +69,21 @@ class Shapes:
 
 
 def shapes_of(
-    scene: Scene, names: Sequence[str], colors: Sequence[str], most: int = MOST_TRIANGLES
+    scene: Scene, names: Sequence[str], colors: Sequence[str], *, still: bool = False
 ) -> Shapes:
     """The shapes of a scene; arguments as of ``view.scene3d.shapes.scene_shapes``.
 
-    Of more than ``most`` triangles nothing is drawn, with a note.
+    Of too many triangles nothing is drawn, with a note; ``still``, for one picture, allows more.
     """
+    most = MOST_IN_SNAPSHOTS if still else MOST_TRIANGLES
     shapes = scene_shapes(scene, names, colors)
     notes = list(shapes.notes)
     parts = [(part, part.vertices) for part in parts_of(shapes.marks, shapes.meshes)]
     size = max((float(np.max(np.ptp(local, axis=0))) for _, local in parts), default=0.0)
     room = MOST_TRIANGLES - sum(len(part.form.triangles) for part, _ in parts)
     pieces = []
-    for k, (part, local) in enumerate(parts):
-        extra = room // (len(parts) - k)
+    for done, (part, local) in enumerate(parts):
+        extra = room // (len(parts) - done)
         pieces.append((part.body, *_divided(local, part.form.triangles, size, extra), part.color))
         room -= len(pieces[-1][2]) - len(part.form.triangles)
     for line in shapes.lines:  # triangles without an area, whose edges are visible

@@ -133,15 +133,9 @@ def sticks_of(
     colors = _colors(scene, summary.body_names, pairs_of_bodies)
     shapes = None
     if scene.shapes:
-        from dap3d_core.plot.film.shaded_solids import (
-            MOST_IN_SNAPSHOTS,
-            MOST_TRIANGLES,
-            shapes_of,
-        )
+        from dap3d_core.plot.film.shaded_solids import shapes_of
 
-        most = MOST_IN_SNAPSHOTS if still else MOST_TRIANGLES
-        hexadecimal = [to_hex(color) for color in colors]
-        shapes = shapes_of(scene, summary.body_names, hexadecimal, most)
+        shapes = shapes_of(scene, summary.body_names, [*map(to_hex, colors)], still=still)
         colors = tuple(shapes.hues.get(k, color) for k, color in enumerate(colors, 1))
     found, shaped = np.array(body), [] if shapes is None else [*shapes.hues]
     bare = np.isin(found, shaped, invert=True)
