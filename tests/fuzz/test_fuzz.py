@@ -17,11 +17,11 @@ COUNTS = {
     "matlab": (15, 100),
     "models": (25, 300),
     "results": (5, 25),
-    "numbers": (5, 50),
+    "numbers": (5, 20),
     "quantities": (20, 150),
     "expressions": (30, 500),
     "commands": (5, 25),
-    "programs": (6, 60),
+    "programs": (6, 40),
 }
 
 

@@ -1,5 +1,7 @@
 """Controllers on an arm of six hinges against joint-space equations by SciPy, hold by hold."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -25,6 +27,7 @@ def follow(t, state):
     return dict(zip(NAMES, torque(q, q_dot) + GAINS[0] * (goal(t) - GOAL), strict=True))
 
 
+@cache
 def held_by_scipy(t_end, keep):
     """(k, 12) angles and rates at every ``keep``-th sample, each hold integrated by itself."""
     y, rows = np.zeros(12), [np.zeros(12)]

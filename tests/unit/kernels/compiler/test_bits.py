@@ -28,7 +28,7 @@ for model, settings in {cases!r}:
     digest = hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays))
     print(json.dumps([model, settings, digest.hexdigest(), result.stats.rhs]))
 """
-SHORT = {"t_end": 0.03, "dt": 0.01}
+SHORT = {"t_end": 0.01, "dt": 0.005}
 CASES = [
     ("fourbar3", SHORT),
     ("fourbar3", SHORT | {"method": "penalty"}),
@@ -37,12 +37,12 @@ CASES = [
     ("pen2", SHORT | {"method": "joint"}),
     ("pen2", SHORT | {"integrator": "radau"}),
     ("fourbar2", SHORT | {"integrator": "dopri5"}),
-    ("pen1", SHORT | {"integrator": "rk4", "step": 0.005}),
+    ("pen1", SHORT | {"integrator": "rk4", "step": 0.0025}),
     ("bodies2", SHORT),
     ("ball1", {"t_end": 0.5, "dt": 0.1, "allow_code": True}),
     ("tri", SHORT),
-    ("A03", {"t_end": 0.003, "dt": 0.001}),
-    ("A05", {"t_end": 0.01, "dt": 0.01, "integrator": "radau"}),
+    ("A03", {"t_end": 0.001, "dt": 0.001}),
+    ("A05", {"t_end": 0.001, "dt": 0.001, "integrator": "radau"}),
 ]
 
 
