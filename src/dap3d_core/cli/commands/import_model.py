@@ -142,13 +142,16 @@ def _as_data(report: "ImportReport") -> dict[str, Any]:
 
 
 def _show(console: "Terminal", scene: "Scene", report: "ImportReport", target: Path) -> None:
+    from dap3d_core.cli.console.console import count
+
     console.title(f"{report.format} model {scene.name}")
     taken = ", ".join(f"{number} {part}" for part, number in report.taken.items() if number)
     console.facts([("taken", taken)])
     console.section("translated with a difference", [str(one) for one in report.translated])
     console.section("left out", [str(one) for one in report.left_out])
     console.section("notes", list(report.notes))
-    holds = f"{len(scene.bodies)} bodies, {len(scene.joints)} joints, {len(scene.forces)} forces"
+    parts = (scene.bodies, "body", "bodies"), (scene.joints, "joint"), (scene.forces, "force")
+    holds = ", ".join(count(len(part), *words) for part, *words in parts)
     console.facts([("scene", f"{target}: {holds}"), ("meshes", str(len(report.meshes) or ""))])
     console.say("Simulate it with:")
     console.say(f"dap3d run {target.parent}", indent=4, whole=True)
