@@ -26,8 +26,8 @@ CHECK_PYTHON := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help run install wheel test test-all verify unit-nojit no-fma lint audit format docs bench \
-    bench-peers fuzz clean
+.PHONY: help run install wheel test test-all verify verify-long unit-nojit coverage no-fma lint audit \
+    format docs bench bench-peers fuzz clean
 
 help:  ## show this list
 	@echo "make TARGET, where TARGET is one of"
@@ -52,9 +52,15 @@ test-all: $(VENV)/.installed-docs  ## all tests, the slow verification as well
 
 # A file stays with one worker: its tests share a built site, a browser, reference solutions.
 verify: $(VENV)/.installed-docs  ## the slow verification alone
-	@$(PYTHON) -m pytest -n auto --dist loadfile --no-loadscope-reorder -m slow
+	@$(PYTHON) -m pytest -n auto --dist loadfile --no-loadscope-reorder -m "slow and not long"
 
-unit-nojit: $(VENV)/.installed-test  ## quick unit tests with kernels as plain Python, and their coverage
+verify-long: $(VENV)/.installed-docs  ## verification that takes longest, for a release
+	@$(PYTHON) -m pytest -n auto --dist loadfile -m long
+
+unit-nojit: $(VENV)/.installed-test  ## quick unit tests with kernels as plain Python
+	@DAP3D_PLAIN=1 $(PYTHON) -m pytest -n auto -m "not slow" tests/unit
+
+coverage: $(VENV)/.installed-test  ## the same, and what part of the sources they run
 	@DAP3D_PLAIN=1 $(PYTHON) -m pytest -n auto -m "not slow" --cov --cov-report=term tests/unit
 
 # Neither compiled code nor the C library may fuse products and sums: an older processor in effect.

@@ -49,6 +49,7 @@ def found(result):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_an_arm_at_500_hz_for_5_s(method):
     """Angles to 1e-9 rad of some 1; an error of 1e-11 a step does not grow under PD control."""

@@ -103,6 +103,7 @@ def test_the_instants_of_the_flips():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_flips_over_four_hundred_seconds():
     """None of 60 is missed, at rtol 1e-6 or at the default. Each flip is late by some share of the
     error of the steps within it, and so are all after it: with time to a power between that of a

@@ -10,7 +10,11 @@ from support.process import run
 
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
-pytestmark = [pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled"), pytest.mark.slow]
+pytestmark = [
+    pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled"),
+    pytest.mark.slow,
+    pytest.mark.long,
+]
 
 #: Says what runs gave; all code is optimised from the beginning.
 SCRIPT = """

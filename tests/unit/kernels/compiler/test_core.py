@@ -136,11 +136,11 @@ def test_calls_of_a_short_run_have_the_bits_of_plain_python():
 
 @pytest.mark.slow
 def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python():
-    """Unoptimised, and optimised without FMA; functions not called are listed.
+    """Unoptimised, and optimised for this processor; functions not called are listed.
 
-    Code that is optimised for this processor: whole runs in test_bits.py.
+    Without FMA: `make no-fma`.
     """
-    count, different, missing = repeated(RUNS, MORE, levels=["O0", "O3 without FMA"])
+    count, different, missing = repeated(RUNS, MORE, levels=["O0", "O3"])
     assert count > 4000
     assert different == []
     assert set(missing) == NOT_CALLED
