@@ -14,7 +14,7 @@ from dap3d_core.cli import main
 
 FALL = ("sweep", "fall.toml", "--vary", "forces.gravity.gravity=1:9:5", "--keep", "stone.r.z")
 #: A sweep of many seconds.
-LONG = ("sweep", "pen1", "--vary", "bodies.cone.mass=1:5:240", "--keep", "cone.r.z:series",
+LONG = ("sweep", "pen1", "--vary", "bodies.cone.mass=1:5:480", "--keep", "cone.r.z:series",
         "--t-end", "150", "--dt", "15", "--threads", "1", "-o", "a.nc")  # fmt: skip
 
 
@@ -124,7 +124,7 @@ def _wait_for(process, file, count):
 @pytest.fixture(scope="module")
 def whole():
     """What the long sweep gives when nobody ends it."""
-    return dap.sweep("pen1", ["bodies.cone.mass=1:5:240"], outputs=["cone.r.z:series"],
+    return dap.sweep("pen1", ["bodies.cone.mass=1:5:480"], outputs=["cone.r.z:series"],
                      t_end=150.0, dt=15.0)  # fmt: skip
 
 
@@ -140,7 +140,7 @@ def test_a_killed_sweep_goes_on(dap3d, whole):
         process.communicate()
         left = dap.open_sweep(part)
         done = left["status"].values == 1
-        assert before < done.sum() < 240
+        assert before < done.sum() < 480
         assert (left["status"].values[~done] == 0).all()
         series = left["cone.r.z:series"].values
         assert (series[done] == whole["cone.r.z:series"].values[done]).all()
@@ -148,7 +148,7 @@ def test_a_killed_sweep_goes_on(dap3d, whole):
         before, words = int(done.sum()), (*LONG, "--resume")
     done = dap3d(*words, "--json")
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["done"] == 240
+    assert json.loads(done.stdout)["done"] == 480
     assert dap.open_sweep(dap3d.folder / "a.nc").identical(whole)
     assert not part.exists()
 
