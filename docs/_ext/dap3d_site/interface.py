@@ -80,13 +80,14 @@ def _hooks() -> Iterator[str]:
     for _, hook in hooks.GROUPS.values():
         yield f"## {hook}"
         yield directive("autofunction", f"dap3d_core.interface.hooks.{hook}")
-    yield "## Formats"
+    yield "## Formats, integrators, shapes"
     yield (
         "Importers and exporters of files of models have entry points of their own "
         "([robots](../how-to/robots.md#formats-of-your-own)); `hookimpl`, and all else that they "
-        "need, is in `dap3d_core.interface.formats`."
+        "need, is in `dap3d_core.interface.formats`. Integrators and shapes: "
+        "`dap3d_core.interface.integrators` and `dap3d_core.interface.shapes`."
     )
-    rows = [(kind, code(group), code(hook)) for kind, (group, hook) in hooks.FORMAT_GROUPS.items()]
+    rows = [(kind, code(group), code(hook)) for kind, (group, hook) in hooks.EXTENSIONS.items()]
     yield table(("kind", "entry-point group", "hook"), rows)
     yield "## hookimpl"
     yield (

@@ -5,7 +5,6 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from dap3d_core.interface.shapes import check_shape
 from dap3d_example.toothed_wheel import ToothedWheel
 
 
@@ -14,7 +13,7 @@ def test_a_toothed_wheel_is_closed():
 
     Of a tooth from angle to angle: half the product of the radii and the sine between, four times.
     """
-    check_shape(ToothedWheel)
+    ToothedWheel.check()
     n, r, width = 20, 0.02, 0.01
     vertices, triangles = ToothedWheel(radius=r, width=width, teeth=float(n)).mesh()
     edges = Counter((t[k], t[(k + 1) % 3]) for t in triangles for k in range(3))

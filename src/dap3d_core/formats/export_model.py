@@ -8,7 +8,7 @@ import attrs
 from dap3d_core.formats.export_scene.articulation import articulation_of
 from dap3d_core.interface.formats import FormatError, Remark, Remarks
 from dap3d_core.registry import Registry, load_registry
-from dap3d_core.registry.formats import load_formats
+from dap3d_core.registry.extensions import extensions
 from dap3d_core.scene import Scene, SceneError, check, load
 from dap3d_core.scene.errors import MISSING, Mistake
 
@@ -54,7 +54,7 @@ def export_model(
         PluginError: there is no such exporter, or it is broken.
         OSError: the file cannot be written, or exists and ``force`` is off.
     """
-    exporter = load_formats("exporter").get(format)
+    exporter = extensions("exporter").load(format)()
     given = scene if isinstance(scene, Scene) else load(scene)
     check(given, load_registry() if registry is None else registry)
     remarks = Remarks()

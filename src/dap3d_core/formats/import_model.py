@@ -17,7 +17,7 @@ from dap3d_core.interface.formats import Articulation, FormatError, Importer, Re
 from dap3d_core.interface.formats.articulation import KINDS
 from dap3d_core.interface.formats.xml_tree import XmlElement
 from dap3d_core.registry import Registry, load_registry
-from dap3d_core.registry.formats import Formats, load_formats
+from dap3d_core.registry.extensions import Extensions, extensions
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Scene, SceneError, check
 from dap3d_core.scene.errors import MISSING, Mistake
@@ -222,9 +222,9 @@ def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
     Raises:
         FormatError: no installed format is that of the file.
     """
-    formats = load_formats("importer")
+    formats = extensions("importer")
     if wanted is not None:
-        return formats.get(wanted), wanted
+        return formats.load(wanted)(), wanted
     suffix, loaded = source.path.suffix.lower(), _usable(formats)
     fitting = {k: one for k, one in loaded.items() if suffix in one.suffixes}
     if len(fitting) != 1:
@@ -238,12 +238,12 @@ def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
     raise FormatError(what, remedy="name its format with --format")
 
 
-def _usable(formats: Formats) -> dict[str, Importer]:
+def _usable(formats: Extensions) -> dict[str, Importer]:
     """The importers that can be loaded: a broken one hurts its own files alone."""
     usable: dict[str, Importer] = {}
     for keyword in formats.keywords:
         try:
-            usable[keyword] = formats.get(keyword)
+            usable[keyword] = formats.load(keyword)()
         except PluginError:
             continue
     return usable

@@ -26,9 +26,9 @@ def integrator_named(name: Any) -> Integrator:
 
 @lru_cache(maxsize=16)
 def _of_package(name: str) -> Integrator:
-    from dap3d_core.registry.integrators import load_integrator
+    from dap3d_core.registry.extensions import extensions
 
-    tableau = tableau_of(load_integrator(name))
+    tableau = tableau_of(extensions("integrator").load(name))
 
     def make(*args: Any, **options: Any) -> Integration:
         return explicit(tableau, *args, **options)

@@ -34,12 +34,10 @@ GROUPS = {
     "force": ("dap3d.forces", "dap3d_forces"),
     "function": ("dap3d.functions", "dap3d_functions"),
 }
-#: The same of integrators, whose hook lies in ``interface.integrators``.
-INTEGRATOR_GROUP = ("dap3d.integrators", "dap3d_integrators")
-#: The same of kinds of shapes, whose hook lies in ``interface.shapes``.
-SHAPE_GROUP = ("dap3d.shapes", "dap3d_shapes")
-#: The same of file formats, whose hooks lie in ``interface.formats``: no scene needs them.
-FORMAT_GROUPS = {
+#: The same of what no type is, whose hooks lie in modules of their own: most scenes need none.
+EXTENSIONS = {
     "importer": ("dap3d.importers", "dap3d_importers"),
     "exporter": ("dap3d.exporters", "dap3d_exporters"),
+    "integrator": ("dap3d.integrators", "dap3d_integrators"),
+    "shape": ("dap3d.shapes", "dap3d_shapes"),
 }

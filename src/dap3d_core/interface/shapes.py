@@ -31,6 +31,23 @@ class ShapeKind:
         super().__init_subclass__(**more)
         attrs.define(cls, slots=False, kw_only=True)
 
+    @classmethod
+    def check(cls) -> None:
+        """Check the fields.
+
+        Raises:
+            PluginError: names the field.
+        """
+        for name, spec in specs_of(cls).items():
+            if name in RESERVED:
+                raise PluginError(
+                    f"{where_is(cls)} has a field {name}, which every shape has; take another name"
+                )
+            if spec.kind not in KINDS or not spec.given:
+                raise PluginError(
+                    f"{where_is(cls)}.{name} is a field {spec.kind}; a shape has {', '.join(KINDS)}"
+                )
+
     def mesh(self) -> tuple[Any, Any]:
         """Vertices (k, 3), m, in the axes of the shape, and triangles (m, 3), seen from outside.
 
@@ -38,23 +55,6 @@ class ShapeKind:
             ValueError: these values make no solid; its words are shown.
         """
         raise NotImplementedError
-
-
-def check_shape(kind: type[ShapeKind]) -> None:
-    """Check the fields of a kind.
-
-    Raises:
-        PluginError: names the field.
-    """
-    for name, spec in specs_of(kind).items():
-        if name in RESERVED:
-            raise PluginError(
-                f"{where_is(kind)} has a field {name}, which every shape has; take another name"
-            )
-        if spec.kind not in KINDS or not spec.given:
-            raise PluginError(
-                f"{where_is(kind)}.{name} is a field {spec.kind}; a shape has {', '.join(KINDS)}"
-            )
 
 
 @hookspec

@@ -11,7 +11,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.hooks import FORMAT_GROUPS, GROUPS, INTEGRATOR_GROUP, SHAPE_GROUP
+from dap3d_core.interface.hooks import EXTENSIONS, GROUPS
 
 #: Environment variable that excludes types, separated by commas: all of a distribution, ``NAME``,
 #: or one of them, ``NAME:KEYWORD``.
@@ -25,7 +25,7 @@ class Source:
     """Origin of a type.
 
     Attributes:
-        kind: joint, force or function, importer or exporter; "" for a distribution whose entry
+        kind: joint, force or function, or one of ``EXTENSIONS``; "" for a distribution whose entry
             points cannot be read.
         keyword: the type's name in a scene.
         module: the module of the plugin, or the path of a model's own file.
@@ -69,8 +69,7 @@ def _discover(
     groups: frozenset[str], blocked: frozenset[str], path: tuple[tuple[str, int], ...]
 ) -> tuple[Source, ...]:
     """The types; ``path`` is the search path with times of change, a key of the cache."""
-    others = {"integrator": INTEGRATOR_GROUP, "shape": SHAPE_GROUP}
-    known = (GROUPS | FORMAT_GROUPS | others).items()
+    known = (GROUPS | EXTENSIONS).items()
     kinds = {group: kind for kind, (group, _) in known if group in groups}
     sources = [source for one in _declaring(kinds) for source in _sources(one, kinds, blocked)]
     order = {kind: k for k, kind in enumerate(GROUPS)}

@@ -12,7 +12,7 @@ from types import ModuleType
 
 import pluggy
 
-from dap3d_core.interface import INTERFACE_VERSION, PluginError, hooks
+from dap3d_core.interface import PluginError, hooks
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import examine
@@ -20,6 +20,7 @@ from dap3d_core.interface.hooks import GROUPS
 from dap3d_core.interface.types import KINDS, TypeBase
 from dap3d_core.registry.discovery import Source
 from dap3d_core.registry.guard import guard, within
+from dap3d_core.registry.plugin_module import hooks_of
 from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.suggestions import nearest
 
@@ -105,34 +106,13 @@ def types_of(module: ModuleType, kinds: tuple[str, ...]) -> dict[str, list[type[
         PluginError: wrong interface version, hook missing, unknown or of wrong signature, or it
             returns anything but a list of classes.
     """
-    _check_version(module)
-    manager = pluggy.PluginManager(hooks.PROJECT)
-    manager.add_hookspecs(hooks)
-    manager.register(module)
-    manager.check_pending()
-    return {kind: _call_hook(manager, kind, must_exist=len(kinds) == 1) for kind in kinds}
+    brought = hooks_of(module, hooks)
+    return {kind: _call_hook(brought, kind, must_exist=len(kinds) == 1) for kind in kinds}
 
 
-def _check_version(module: ModuleType) -> None:
-    version = getattr(module, "interface_version", None)
-    if type(version) is not int:
-        said = "says no interface_version" if version is None else f"says {version!r}"
-        raise PluginError(
-            f"it {said}; write the line interface_version = {INTERFACE_VERSION} (an integer) in it"
-        )
-    if version != INTERFACE_VERSION:
-        newer = "dap3d" if version > INTERFACE_VERSION else "version of the plugin"
-        raise PluginError(
-            f"it is written for interface version {version}, this dap3d has {INTERFACE_VERSION}; "
-            f"install a newer {newer}"
-        )
-
-
-def _call_hook(
-    manager: pluggy.PluginManager, kind: str, *, must_exist: bool
-) -> list[type[TypeBase]]:
+def _call_hook(brought: pluggy.HookRelay, kind: str, *, must_exist: bool) -> list[type[TypeBase]]:
     base, hook = KINDS[kind], GROUPS[kind][1]
-    caller = getattr(manager.hook, hook)
+    caller = getattr(brought, hook)
     if not caller.get_hookimpls():
         if must_exist:
             raise PluginError(

@@ -137,6 +137,6 @@ def test_dormand_and_prince_written_so_is_dopri5():
 
 def test_those_of_dap3d_are_found_without_looking_further(monkeypatch):
     """No entry point is read for them."""
-    monkeypatch.setattr("dap3d_core.registry.integrators.discover", None)
+    monkeypatch.setattr("dap3d_core.registry.extensions.discover", None)
     assert integrator_named("adams").name == "adams"
     assert integrator_named("auto").name == "dop853"

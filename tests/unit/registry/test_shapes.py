@@ -7,7 +7,7 @@ import pytest
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.registry.shapes import load_shape
+from dap3d_core.registry.extensions import extensions
 from dap3d_core.scene import SceneError, check
 from dap3d_core.view.scene3d.shapes import scene_shapes
 
@@ -104,7 +104,7 @@ def test_a_kind_is_drawn_where_its_scene_has_it():
         ("wegde", {"width": 1.0}, "unknown shape; one of box.*wedge.*did you mean 'wedge'"),
         ("named", {}, "Named has a field color, which every shape has"),
         ("pinned", {}, "Pinned.pin is a field point; a shape has number"),
-        ("missing", {}, "returns no kind with the keyword 'missing'"),
+        ("missing", {}, "returns none with the keyword 'missing'"),
     ],
 )
 def test_mistakes_are_named(type_, fields, words):
@@ -133,16 +133,16 @@ def test_what_cannot_be_drawn_is_noted(type_, fields, words):
 def test_another_package_with_the_keyword_or_none_is_refused(tmp_path):
     """Both are named."""
     with pytest.raises(PluginError, match="there is no shape 'prism'"):
-        load_shape("prism")
+        extensions("shape").load("prism")
     info = tmp_path / "other_shapes-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: other-shapes\nVersion: 1.0\n")
     (info / "entry_points.txt").write_text("[dap3d.shapes]\nwedge = my_shapes\n")
     with pytest.raises(PluginError, match=r"brought by .*my-shapes.* and .*other-shapes"):
-        load_shape("wedge")
+        extensions("shape").load("wedge")
 
 
 def test_no_kind_is_looked_for_without_one(monkeypatch):
     """Shapes of dap3d itself read no entry point."""
-    monkeypatch.setattr("dap3d_core.registry.shapes.discover", None)
+    monkeypatch.setattr("dap3d_core.registry.extensions.discover", None)
     assert len(drawn(scene_with("sphere", radius=1.0)).marks) == 1

@@ -252,12 +252,12 @@ def test_reactions_and_unknowns_cost_other_scenes_nothing():
 
 def test_shapes_and_maps_are_imported_where_a_scene_has_them():
     """A kind of shape of a package by a scene that names it; others look for none."""
-    ours = {"dap3d_core.registry.shapes", "dap3d_core.interface.shapes", "dap3d_functions.grid"}
+    ours = {"dap3d_core.registry.extensions", "dap3d_core.interface.shapes", "dap3d_functions.grid"}
     script = "import dap3d_core as dap\nscene = dap.load('bodies2')\n{}\n"
     script += "dap.simulate(scene, t_end=0.02, dt=0.02)"
     sphere = "scene.add_shape('sphere', 's', body='upper', radius=0.1)"
     assert not imported(script.format(sphere)) & ours
     wheel = "scene.add_shape('toothed-wheel', 's', body='upper', radius=0.1, width=0.1, teeth=9)"
     found = imported(script.format(wheel))
-    assert {"dap3d_example.toothed_wheel", "dap3d_core.registry.shapes"} <= found
+    assert {"dap3d_example.toothed_wheel", "dap3d_core.registry.extensions"} <= found
     assert "dap3d_functions.grid" not in found

@@ -91,17 +91,17 @@ def _export_model(
     from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.cli.framework.paths import writable, write_text
     from dap3d_core.exchange import FORMATS
-    from dap3d_core.registry.formats import load_formats
+    from dap3d_core.registry.extensions import extensions
     from dap3d_core.registry.suggestions import nearest
 
-    formats = load_formats("exporter")
+    formats = extensions("exporter")
     if kind not in formats.keywords:
         near = nearest(kind, known := [*FORMATS, *formats.keywords])
         hint = f"did you mean {near!r}? " if near else ""
         raise Refused(f"--format {kind}: unknown; {hint}formats: {', '.join(known)}")
     scene = dap.load(model)
     name = Path(model).stem if Path(model).is_file() else Path(model).name
-    target = Path(output) if output is not None else Path(name + formats.get(kind).suffix)
+    target = Path(output) if output is not None else Path(name + formats.load(kind).suffix)
     writable(target, force=force, sources=(scene.path,))
     report = dap.export_model(scene, format=kind, strict=strict)
     write_text(target, report.text)

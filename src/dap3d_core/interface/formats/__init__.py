@@ -30,9 +30,7 @@ from dap3d_core.interface.formats.solids import (
     total_inertia,
 )
 from dap3d_core.interface.formats.xml_tree import XmlElement, parse_xml
-
-#: Version of this interface, which a module of formats says as ``interface_version``.
-INTERFACE_VERSION = 1
+from dap3d_core.interface.types import INTERFACE_VERSION
 
 __all__ = [
     "IDENTITY",

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import Any, ClassVar, Protocol
+from typing import ClassVar, Protocol
 
 import pluggy
 
@@ -115,7 +115,3 @@ def dap3d_importers() -> list[type[Importer]]:
 def dap3d_exporters() -> list[type[Exporter]]:
     """The exporters of a module: a list of subclasses of ``Exporter``."""
     raise NotImplementedError
-
-
-#: Base class of each kind.
-BASES: dict[str, Any] = {"importer": Importer, "exporter": Exporter}

@@ -69,9 +69,9 @@ def _integrator(value: Any) -> Any:
     """An integrator of dap3d, or of an installed package; it is loaded where a run begins."""
     if value in INTEGRATORS:
         return value
-    from dap3d_core.registry.integrators import added_integrators
+    from dap3d_core.registry.extensions import extensions
 
-    return word_of(value, (*INTEGRATORS, *added_integrators()))
+    return word_of(value, (*INTEGRATORS, *extensions("integrator").keywords))
 
 
 _READERS: dict[str, Callable[[Any], Any]] = {

@@ -138,18 +138,18 @@ def _added(report: Collector, key: Key, word: Any) -> Mapping[str, Field] | None
     """The fields of a kind that a package brings; None where a mistake is reported."""
     from dap3d_core.interface.errors import PluginError
     from dap3d_core.interface.fields import specs_of
-    from dap3d_core.registry.shapes import added_shapes, load_shape
+    from dap3d_core.registry.extensions import extensions
     from dap3d_core.scene.validate.elements import READERS
 
-    added = added_shapes()
-    if not isinstance(word, str) or word not in added:
-        known = (*SHAPES, *added)
+    added = extensions("shape")
+    if not isinstance(word, str) or word not in added.keywords:
+        known = (*SHAPES, *added.keywords)
         value = MISSING if word is None else word
         what = f"{'is required' if word is None else 'unknown shape'}; one of {', '.join(known)}"
         report.add((*key, "type"), value, what, nearest(word, known))
         return None
     try:
-        specs = specs_of(load_shape(word))
+        specs = specs_of(added.load(word))
     except PluginError as error:
         report.add((*key, "type"), word, str(error))
         return None

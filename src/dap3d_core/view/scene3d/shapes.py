@@ -213,9 +213,9 @@ def _mesh(folder: Path | None, name: str) -> tuple[Floats, Any] | str:
 
 def _own_mesh(shape: Shape) -> tuple[Floats, Any] | str:
     """The triangles of a kind that a package brings, or why there are none."""
-    from dap3d_core.registry.shapes import load_shape
+    from dap3d_core.registry.extensions import extensions
 
-    kind = load_shape(shape.type)
+    kind = extensions("shape").load(shape.type)
     fields = {name: v for name, v in shape.values.items() if name not in RESERVED}
     try:
         places, corners = kind(**fields).mesh()

@@ -9,7 +9,7 @@ import pytest
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.registry.formats import load_formats
+from dap3d_core.registry.extensions import extensions
 
 GOOD = '''
 from dap3d_core.interface.formats import Articulation, Importer, Inertial, Joint, Link, hookimpl
@@ -69,15 +69,18 @@ def test_a_format_from_outside_takes_the_same_road(install, tmp_path):
     ("text", "words"),
     [
         ("1/0", "ZeroDivisionError"),
-        (GOOD.replace("interface_version = 1", "interface_version = 7"), "interface_version = 7"),
-        (GOOD.replace("return [Rod]", "return [int]"), "should return subclasses of Importer"),
-        (GOOD.replace('"rod", "Rod"', '"bar", "Rod"'), "no class with the keyword 'rod'"),
+        (
+            GOOD.replace("interface_version = 1", "interface_version = 7"),
+            "interface version 7, this dap3d has 1",
+        ),
+        (GOOD.replace("return [Rod]", "return [int]"), "should return a list of Importer"),
+        (GOOD.replace('"rod", "Rod"', '"bar", "Rod"'), "none with the keyword 'rod'"),
     ],
 )
 def test_a_broken_format_is_told_and_hurts_no_other(install, tmp_path, text, words):
     install("rods", text)
     with pytest.raises(PluginError, match=words) as caught:
-        load_formats("importer").get("rod")
+        extensions("importer").load("rod")
     assert "distribution rods 1.2" in str(caught.value)
     urdf = '<robot name="a"><link name="b"><inertial><mass value="1"/>'
     urdf += '<inertia ixx="1" iyy="1" izz="1"/></inertial></link></robot>'
@@ -89,15 +92,15 @@ def test_two_packages_with_one_format_are_told(install):
     install("rods", GOOD)
     install("bars", GOOD)
     with pytest.raises(PluginError, match=r"brought by distribution bars .* and .* rods"):
-        load_formats("importer").get("rod")
+        extensions("importer").load("rod")
 
 
 def test_an_unknown_format_has_the_nearest(install):
     with pytest.raises(PluginError, match=r"no importer 'urfd'; did you mean 'urdf'"):
-        load_formats("importer").get("urfd")
+        extensions("importer").load("urfd")
 
 
 def test_a_blocked_format_is_left_out(install, monkeypatch):
     install("rods", GOOD)
     monkeypatch.setenv("DAP3D_BLOCK", "rods:rod")
-    assert "rod" not in load_formats("importer").keywords
+    assert "rod" not in extensions("importer").keywords

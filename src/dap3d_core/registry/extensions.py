@@ -1,0 +1,106 @@
+"""Importers, exporters, integrators and shapes of packages, found by their entry points."""
+
+import importlib
+import inspect
+from typing import Any
+
+import attrs
+
+from dap3d_core.interface.errors import PluginError
+from dap3d_core.interface.hooks import EXTENSIONS
+from dap3d_core.registry.discovery import Source, discover
+from dap3d_core.registry.guard import guard
+from dap3d_core.registry.plugin_module import hooks_of
+from dap3d_core.registry.suggestions import nearest
+
+#: Module of each kind's hook and base class, and the name of the class.
+_BASES = {
+    "importer": ("dap3d_core.interface.formats.format_types", "Importer"),
+    "exporter": ("dap3d_core.interface.formats.format_types", "Exporter"),
+    "integrator": ("dap3d_core.interface.integrators", "RungeKuttaMethod"),
+    "shape": ("dap3d_core.interface.shapes", "ShapeKind"),
+}
+#: Kinds whose base class can check what is declared.
+_CHECKED = ("integrator", "shape")
+
+
+@attrs.frozen(eq=False)
+class Extensions:
+    """The installed extensions of a kind.
+
+    Attributes:
+        kind: importer, exporter, integrator or shape.
+        sources: origin of each, by keyword; one that DAP3D_BLOCK names is left out.
+    """
+
+    kind: str
+    sources: dict[str, list[Source]]
+
+    @property
+    def keywords(self) -> tuple[str, ...]:
+        """Their names, sorted."""
+        return tuple(sorted(self.sources))
+
+    def load(self, keyword: str) -> Any:
+        """What the hook of a module returns with this keyword, checked: a class, or a method.
+
+        Raises:
+            PluginError: there is none, two packages bring it, its module is broken, or it fails the
+                check of its kind.
+        """
+        sources = self.sources.get(keyword, [])
+        if not sources:
+            near = nearest(keyword, self.keywords)
+            hint = f"; did you mean {near!r}?" if near else ""
+            known = ", ".join(self.keywords) or "none"
+            raise PluginError(f"there is no {self.kind} {keyword!r}{hint} (installed: {known})")
+        if len(sources) > 1:
+            both = " and ".join(map(str, sources))
+            raise PluginError(
+                f"{self.kind} {keyword!r} is brought by {both}; uninstall one of them"
+            )
+        return _load(sources[0])
+
+
+def extensions(kind: str) -> Extensions:
+    """Find the extensions of a kind; imports none of them.
+
+    Args:
+        kind: importer, exporter, integrator or shape.
+    """
+    sources: dict[str, list[Source]] = {}
+    for source in discover((EXTENSIONS[kind][0],)):
+        if source.kind and not source.blocked:
+            sources.setdefault(source.keyword, []).append(source)
+    return Extensions(kind, sources)
+
+
+def _load(source: Source) -> Any:
+    """What an entry point names.
+
+    Raises:
+        PluginError: names distribution, module, reason and remedy.
+    """
+    hook = EXTENSIONS[source.kind][1]
+    module_name, base_name = _BASES[source.kind]
+    specs = importlib.import_module(module_name)
+    base = getattr(specs, base_name)
+    with guard(source, []):
+        if source.fault:
+            raise PluginError(source.fault)
+        module = importlib.import_module(source.module)
+        results = getattr(hooks_of(module, specs), hook)()
+        brought = [one for result in results for one in result or ()]
+        if not all(_is_a(one, base) for one in brought):
+            raise PluginError(f"{hook}() should return a list of {base_name}")
+        matching = [one for one in brought if one.keyword == source.keyword]
+        if not matching:
+            raise PluginError(f"{hook}() returns none with the keyword {source.keyword!r}")
+        if source.kind in _CHECKED:
+            matching[0].check()
+        return matching[0]
+
+
+def _is_a(one: Any, base: type) -> bool:
+    """True for a subclass of the base, or one of its instances: a method is data."""
+    return issubclass(one, base) if inspect.isclass(one) else isinstance(one, base)
