@@ -1,14 +1,11 @@
 """Completes types by a scene's functions of an argument and by the friction of a joint.
 
-A kernel that calls ``f(x)``, or ``f(x, y)``, is compiled once for each type of function: the kernel
-is copied with the function's own kernel in place of ``f``, and the numbers of the function follow
-those of the element (compiled code takes no closure there; docs/decisions/0001).
+A kernel that calls ``f(x)``, or ``f(x, y)``, is compiled once for each type of function: it is
+given the function's own kernel for ``f``; the numbers of the function follow those of the element.
 """
 
-import ast
-import inspect
-import textwrap
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from random import Random
 from typing import Any
 
 import attrs
@@ -28,6 +25,11 @@ from dap3d_core.interface.codegen.kernel_arguments import (
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 
+#: Suffix of the name of the knots of a function.
+KNOTS = "__knots"
+#: Kernels in the order in which they are searched for the arguments of functions.
+CALLING = ("C", "C_dot", "gamma", "wrench")
+
 
 def uncalled(type_info: TypeInfo) -> str:
     """An unknown function that kernels call; "" where there is none."""
@@ -36,10 +38,9 @@ def uncalled(type_info: TypeInfo) -> str:
                key=len, default="")  # fmt: skip
 
 
-#: Suffix of the name of the knots of a function.
-KNOTS = "__knots"
-#: Kernels in the order in which they are searched for the arguments of functions.
-CALLING = ("C", "C_dot", "gamma", "wrench")
+def is_knots(name: str) -> bool:
+    """True if a number of a layout holds the knots of a function."""
+    return name.endswith(KNOTS)
 
 
 def bind_functions(
@@ -48,7 +49,7 @@ def bind_functions(
     """A type with known functions of an argument.
 
     Args:
-        examined: the type.
+        type_info: the type.
         functions: function field -> the type of the function given.
         knots: function field -> number of arguments at which that function changes its form.
 
@@ -56,48 +57,33 @@ def bind_functions(
         the type with the numbers of these functions after its own, in the order of the fields, and
         the knots of each after its numbers. Where there are any it has a kernel ``knot``: the
         distances of the arguments of the functions from their knots.
-
-    Raises:
-        PluginError: a kernel does more with a function than to call it, or has no source.
     """
     layout, names = type_info.layout, dict(type_info.names)
-    calls: dict[str, tuple[_Given, int]] = {}
-    for field, of_argument in functions.items():
-        prefix = "f" if field == "function" else field
-        behind = of_argument.layout.shifted(layout.par_width)
-        value = of_argument.kernels["value"]
-        names_of_value = parameters(value)
-        all_names = _names_of(of_argument, behind)
-        arguments = argument_names(of_argument.type)
-        own = in_order(all_names, [n for n in names_of_value if n not in arguments])
-        names |= {f"{prefix}__{q.name}": attrs.evolve(q, name=f"{prefix}__{q.name}") for q in own}
-        wanted = tuple(n if n in arguments else f"{prefix}__{n}" for n in names_of_value)
-        knots_name = f"{prefix}{KNOTS}"
-        given = _Given(f"{prefix}__value", value, arguments, wanted, knots_name, knots[field])
-        suffixes = derivative_names(len(arguments))
-        calls |= {f"{prefix}{s}": (given, order) for order, s in enumerate(suffixes)}
-        width = behind.par_width
-        layout = attrs.evolve(layout, par_width=width + given.knot_count)
-        if given.knot_count:
-            shape = (given.knot_count,)
-            numbers = layout.numbers | {given.knots: (width, shape)}
+    given: list[_Given] = []
+    for field, function in functions.items():
+        one = _Given("f" if field == "function" else field, function, knots[field])
+        behind = function.layout.shifted(layout.par_width)
+        of_function = _names_of(function, behind)
+        own = in_order(of_function, one.own(parameters(function.kernels["value"])))
+        names |= {one.name(q.name): attrs.evolve(q, name=one.name(q.name)) for q in own}
+        layout = attrs.evolve(layout, par_width=behind.par_width + one.knot_count)
+        if one.knot_count:
+            shape = (one.knot_count,)
+            numbers = layout.numbers | {one.knots: (behind.par_width, shape)}
             layout = attrs.evolve(layout, numbers=numbers)
-            names[given.knots] = KernelArgument(
-                given.knots, shape, False, stored(layout, given.knots)
-            )
-    kernels = {n: _with_functions(type_info, n, k, calls) for n, k in type_info.kernels.items()}
+            names[one.knots] = KernelArgument(one.knots, shape, False, stored(layout, one.knots))
+        given.append(one)
+    kernels = {n: _with_functions(k, given) for n, k in type_info.kernels.items()}
+    outputs, knotted = dict(type_info.outputs), [one for one in given if one.knot_count]
+    calling = (k for n in CALLING if (k := type_info.kernels.get(n)) and _called(k, knotted))
+    if kernel := next(calling, None):
+        distances = _distances(kernel, type_info, knotted)
+        body = f"x__ = []\n{{}}\nreturn ({', '.join(distances)},)"
+        kernels["knot"] = _with_functions(kernel, given, body)
+        outputs["knot"] = tuple(f"out[{k}]" for k in range(len(distances)))
     title = f"({', '.join(g.type.keyword + g.given for g in functions.values())})"
-    bound = attrs.evolve(type_info, layout=layout, names=names, kernels=kernels, given=title)
-    calling = [
-        n for n in CALLING if set(parameters(type_info.kernels.get(n, _nothing))) & set(calls)
-    ]
-    if not calling or not any(knots.values()):
-        return bound
-    distances = _Distances(calls)
-    kernel = _with_functions(type_info, calling[0], type_info.kernels[calling[0]], calls, distances)
-    paths = tuple(f"out[{k}]" for k in range(len(distances.found)))
     return attrs.evolve(
-        bound, kernels=bound.kernels | {"knot": kernel}, outputs=bound.outputs | {"knot": paths}
+        type_info, layout=layout, names=names, kernels=kernels, outputs=outputs, given=title
     )
 
 
@@ -110,29 +96,141 @@ def _names_of(function: TypeInfo, layout: InstanceLayout) -> dict[str, KernelArg
     return names_behind(function, layout)
 
 
-def is_knots(name: str) -> bool:
-    """True if a number of a layout holds the knots of a function."""
-    return name.endswith(KNOTS)
-
-
-def _nothing() -> None:
-    """A kernel without parameters."""
-
-
-@attrs.frozen
+@attrs.frozen(eq=False)
 class _Given:
-    """The kernel of a given function.
+    """A function that the elements of a type are given.
 
-    Its name in the copy, itself, what it is a function of, all it takes (that and the names of its
-    numbers), the name and number of its knots.
+    Attributes:
+        prefix: of its names in kernels.
+        function: its type.
+        knot_count: number of its knots.
     """
 
-    known_as: str
-    value: Callable[..., Any]
-    arguments: tuple[str, ...]
-    wanted: tuple[str, ...]
-    knots: str
+    prefix: str
+    function: TypeInfo
     knot_count: int
+
+    @property
+    def knots(self) -> str:
+        """Name of its knots."""
+        return f"{self.prefix}{KNOTS}"
+
+    @property
+    def calls(self) -> dict[str, int]:
+        """Names by which kernels call it and its derivatives, with the place of each value."""
+        suffixes = derivative_names(len(argument_names(self.function.type)))
+        return {f"{self.prefix}{suffix}": order for order, suffix in enumerate(suffixes)}
+
+    def name(self, own: str) -> str:
+        """One of its names beside those of the element."""
+        return f"{self.prefix}__{own}"
+
+    def own(self, names: Iterable[str]) -> list[str]:
+        """Those of its names that are not its arguments."""
+        return [n for n in names if n not in argument_names(self.function.type)]
+
+    def expression(self, call: str, *, noted: bool) -> str:
+        """Expression for what a kernel calls; ``noted``: it adds its argument to ``x__``."""
+        arguments = argument_names(self.function.type)
+        known = {n: f"note__(x__, {n})" if noted and self.knot_count else n for n in arguments}
+        wanted = parameters(self.function.kernels["value"])
+        passed = ", ".join(known.get(n) or self.name(n) for n in wanted)
+        value = f"{self.name('value')}({passed})[{self.calls[call]}]"
+        return f"lambda {', '.join(arguments)}: {value}"
+
+
+def _called(kernel: Callable[..., Any], given: Iterable[_Given]) -> dict[str, _Given]:
+    """Functions, and derivatives of them, that a kernel calls."""
+    return {n: one for one in given for n in parameters(kernel) if n in one.calls}
+
+
+def _with_functions(
+    kernel: Callable[..., Any], given: Iterable[_Given], body: str = "return {}"
+) -> Callable[..., Any]:
+    """The kernel with the functions that it calls."""
+    called = _called(kernel, given)
+    if not called:
+        return kernel
+    noted = "x__" in body
+    expressions = {n: one.expression(n, noted=noted) for n, one in called.items()}
+    numbers: list[str] = []
+    names: dict[str, Any] = {"note__": note} if noted else {}
+    for one in called.values():
+        value = one.function.kernels["value"]
+        numbers += map(one.name, one.own(parameters(value)))
+        numbers += [one.knots] if noted and one.knot_count else []
+        names[one.name("value")] = value
+    return bound_kernel(kernel, expressions, numbers, names, body)
+
+
+def bound_kernel(
+    kernel: Callable[..., Any],
+    given: Mapping[str, str],
+    numbers: Iterable[str],
+    names: Mapping[str, Any],
+    body: str = "return {}",
+) -> Callable[..., Any]:
+    """A kernel with some of its parameters known.
+
+    Args:
+        kernel: the kernel.
+        given: parameter -> the expression that takes its place.
+        numbers: further parameters, which these expressions name.
+        names: what they call.
+        body: lines around the kernel's call.
+    """
+    wanted = parameters(kernel)
+    others = dict.fromkeys([*(n for n in wanted if n not in given), *numbers])
+    call = f"kernel__({', '.join(given.get(n, n) for n in wanted)})"
+    lines = "".join(f"    {line}\n" for line in body.format(call).splitlines())
+    source = f"def bound({', '.join(others)}):\n{lines}"
+    namespace = {**names, "kernel__": kernel, "__name__": kernel.__module__}
+    # file, line and name of the kernel: what is compiled is named by a digest of them
+    exec(compile(source, kernel.__code__.co_filename, "exec"), namespace)  # made of names alone
+    bound: Any = namespace["bound"]
+    line = kernel.__code__.co_firstlineno
+    bound.__code__ = bound.__code__.replace(co_qualname=kernel.__qualname__, co_firstlineno=line)
+    made: Callable[..., Any] = bound
+    return made
+
+
+def note(arguments: list[Any], x: Any) -> Any:
+    """Add an argument to those that functions with knots are called with."""
+    arguments.append(x)
+    return x
+
+
+def _distances(
+    kernel: Callable[..., Any], type_info: TypeInfo, knotted: Collection[_Given]
+) -> list[str]:
+    """Expressions for the distances from knots of the arguments ``x__`` in a kernel's calls.
+
+    The kernel is called once with random numbers, to see which functions it calls, in which order;
+    an argument of both f and f_dot counts once.
+    """
+    from dap3d_core.interface.examine.random_values import random_quantity
+
+    calls: list[tuple[_Given, str, Any]] = []
+    called, rng = _called(kernel, knotted), Random(1)
+
+    def argument(name: str) -> Any:
+        value = random_quantity(type_info.names[name], rng)
+        if name not in called:
+            return value
+
+        def function(x: float) -> Any:
+            calls.append((called[name], name, x))
+            return value(x)
+
+        return function
+
+    kernel(*map(argument, parameters(kernel)))
+    return [
+        f"x__[{k}] - {one.knots}[{n}]"
+        for k, (one, name, x) in enumerate(calls)
+        if not any(o is one and other != name and x is y for o, other, y in calls[:k])
+        for n in range(one.knot_count)
+    ]
 
 
 def bind_friction(type_info: TypeInfo) -> TypeInfo:
@@ -154,110 +252,3 @@ def bind_friction(type_info: TypeInfo) -> TypeInfo:
         names[name] = quantity if name not in type_info.layout.numbers else names[name]
     layout = attrs.evolve(layout, numbers=numbers, par_width=width)
     return attrs.evolve(type_info, layout=layout, names=names, kernels={"friction": kernel})
-
-
-def _with_functions(
-    type_info: TypeInfo,
-    name: str,
-    kernel: Callable[..., Any],
-    calls: Mapping[str, tuple[_Given, int]],
-    replaced: "_Calls | None" = None,
-) -> Callable[..., Any]:
-    """The kernel with its calls of functions replaced by calls of the functions' own kernels."""
-    called = [n for n in parameters(kernel) if n in calls]
-    if not called:
-        return kernel
-    who = f"{where_is(type_info.type)}.{name}"
-    try:
-        lines, first = inspect.getsourcelines(kernel)
-        tree = ast.parse(textwrap.dedent("".join(lines)))
-    except (OSError, TypeError, SyntaxError) as error:
-        raise PluginError(f"{who}: its source cannot be read ({error})") from error
-    ast.increment_lineno(tree, first - 1)
-    definition = tree.body[0]
-    if not isinstance(definition, ast.FunctionDef):
-        raise PluginError(f"{who} is to be written with def, for it calls a function")
-    replaced = _Calls(calls) if replaced is None else replaced
-    replaced.generic_visit(definition)
-    if replaced.other:
-        count = "one argument" if len(calls[called[0]][0].arguments) == 1 else "two arguments"
-        raise PluginError(f"{who} may only call {', '.join(replaced.other)}, with {count}")
-    others = [a for a in definition.args.args if a.arg not in called]
-    used = dict.fromkeys(calls[n][0] for n in called)
-    numbers = [n for given in used for n in (*given.wanted, *replaced.names(given))
-               if n not in given.arguments]  # fmt: skip
-    definition.args.args = [*others, *(ast.arg(n) for n in numbers)]
-    definition.decorator_list = []
-    plain = kernel.__globals__ | {given.known_as: given.value for given in used}
-    code = compile(ast.fix_missing_locations(tree), kernel.__code__.co_filename, "exec")
-    exec(code, plain)  # the plugin's own source, already imported
-    copied: Callable[..., Any] = plain[definition.name]
-    return copied
-
-
-class _Calls(ast.NodeTransformer):
-    """``f(x)`` -> ``f__value(x, numbers...)[0]``."""
-
-    def __init__(self, calls: Mapping[str, tuple[_Given, int]]) -> None:
-        self.calls = calls
-        self.other: list[str] = []
-
-    def visit_Call(self, node: ast.Call) -> ast.AST:
-        name = node.func.id if isinstance(node.func, ast.Name) else ""
-        given, order = self.calls.get(name, (None, 0))
-        if given is None or len(node.args) != len(given.arguments) or node.keywords:
-            return self.generic_visit(node)
-        values = [self.argument(given, self.visit(value)) for value in node.args]
-        known = dict(zip(given.arguments, values, strict=True))
-        arguments = [known.get(n, ast.Name(n, ast.Load())) for n in given.wanted]
-        call = ast.Call(ast.Name(given.known_as, ast.Load()), arguments, [])
-        return ast.copy_location(ast.Subscript(call, ast.Constant(order), ast.Load()), node)
-
-    def argument(self, given: _Given, node: ast.expr) -> ast.expr:
-        """The argument of a function in the copy."""
-        return node
-
-    def names(self, given: _Given) -> tuple[str, ...]:
-        """Further parameters of the copy, besides the numbers of a function."""
-        return ()
-
-    def visit_Name(self, node: ast.Name) -> ast.AST:
-        if node.id in self.calls:
-            self.other.append(node.id)
-        return node
-
-
-class _Distances(_Calls):
-    """The same, but the copy returns the distance of each argument from each knot."""
-
-    def __init__(self, calls: Mapping[str, tuple[_Given, int]]) -> None:
-        super().__init__(calls)
-        self.found: list[ast.expr] = []
-        self._known: dict[str, str] = {}
-        self._new: list[ast.stmt] = []
-
-    def argument(self, given: _Given, node: ast.expr) -> ast.expr:
-        key = f"{given.known_as}({ast.dump(node)})"
-        if key not in self._known:  # the same for f(x) and f_dot(x)
-            name = self._known[key] = f"x__{len(self._known)}"
-            self._new.append(ast.Assign([ast.Name(name, ast.Store())], node))
-            for k in range(given.knot_count):
-                knot = ast.Subscript(ast.Name(given.knots, ast.Load()), ast.Constant(k), ast.Load())
-                self.found.append(ast.BinOp(ast.Name(name, ast.Load()), ast.Sub(), knot))
-        return ast.Name(self._known[key], ast.Load())
-
-    def names(self, given: _Given) -> tuple[str, ...]:
-        return (given.knots,) if given.knot_count else ()
-
-    def visit_Assign(self, node: ast.Assign) -> list[ast.AST]:
-        self.generic_visit(node)
-        return [*self._pending(), node]
-
-    def visit_Return(self, node: ast.Return) -> list[ast.AST]:
-        self.generic_visit(node)  # its calls count, its value does not
-        return [*self._pending(), ast.Return(ast.Tuple(list(self.found), ast.Load()))]
-
-    def _pending(self) -> list[ast.stmt]:
-        """Assignments of arguments that precede a line."""
-        pending, self._new = self._new, []
-        return pending

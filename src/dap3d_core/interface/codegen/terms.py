@@ -16,6 +16,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     namespace,
     parameters,
 )
+from dap3d_core.interface.codegen.specialise import bound_kernel
 from dap3d_core.interface.codegen.type_info import TypeInfo
 
 
@@ -65,21 +66,9 @@ def _kernel(type_info: TypeInfo, terms: Sequence[TypeInfo]) -> Callable[..., Any
     for k, term in enumerate(terms):
         of_term = parameters(term.kernels["value"])
         numbers += [f"g{k}__{n}" for n in of_term if n != "x"]
-        given = ", ".join("x" if n == "x" else f"g{k}__{n}" for n in of_term)
-        functions.append(f"lambda x: g{k}__value({given})")
+        passed = ", ".join("x" if n == "x" else f"g{k}__{n}" for n in of_term)
+        functions.append(f"lambda x: g{k}__value({passed})")
     several = f"({', '.join(functions)},)"
-    own = [n for n in parameters(kernel) if type_info.names[n].derivative != SEVERAL]
-    arguments = ", ".join(
-        several if type_info.names[n].derivative == SEVERAL else n for n in parameters(kernel)
-    )
-    others = [n for n in own if n != "x"]
-    source = (
-        f"def value({', '.join(['x', *others, *numbers])}):\n    return g__value({arguments})\n"
-    )
-    # the file of the type, so that the digest of what is compiled is of its sources
-    code = compile(source, kernel.__code__.co_filename, "exec")
-    names = kernel.__globals__ | {"g__value": kernel}
-    names |= {f"g{k}__value": term.kernels["value"] for k, term in enumerate(terms)}
-    exec(code, names)  # text made of names alone
-    made: Callable[..., Any] = names["value"]
-    return made
+    given = {n: several for n in parameters(kernel) if type_info.names[n].derivative == SEVERAL}
+    names = {f"g{k}__value": term.kernels["value"] for k, term in enumerate(terms)}
+    return bound_kernel(kernel, given, numbers, names)
