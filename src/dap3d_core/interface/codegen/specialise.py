@@ -63,7 +63,7 @@ def bind_functions(
     for field, function in functions.items():
         one = _Given("f" if field == "function" else field, function, knots[field])
         behind = function.layout.shifted(layout.par_width)
-        of_function = _names_of(function, behind)
+        of_function = names_behind(function, behind)
         own = in_order(of_function, one.own(parameters(function.kernels["value"])))
         names |= {one.name(q.name): attrs.evolve(q, name=one.name(q.name)) for q in own}
         layout = attrs.evolve(layout, par_width=behind.par_width + one.knot_count)
@@ -87,13 +87,24 @@ def bind_functions(
     )
 
 
-def _names_of(function: TypeInfo, layout: InstanceLayout) -> dict[str, KernelArgument]:
-    """Names of a function whose numbers are shifted."""
-    if not function.terms:
-        return namespace(function.type, layout)
-    from dap3d_core.interface.codegen.terms import names_behind
+def names_behind(type_info: TypeInfo, layout: InstanceLayout) -> dict[str, KernelArgument]:
+    """Names of a function type whose numbers are shifted, with those of its terms.
 
-    return names_behind(function, layout)
+    Args:
+        type_info: the type.
+        layout: its layout, shifted.
+    """
+    names = namespace(type_info.type, layout)
+    if not type_info.terms:
+        return names
+    start = layout.par_width - sum(term.layout.par_width for term in type_info.terms)
+    for k, term in enumerate(type_info.terms):
+        behind = term.layout.shifted(start)
+        start = behind.par_width
+        for name, quantity in names_behind(term, behind).items():
+            if name != "x":
+                names[f"g{k}__{name}"] = attrs.evolve(quantity, name=f"g{k}__{name}")
+    return names
 
 
 @attrs.frozen(eq=False)

@@ -9,14 +9,11 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.instance_layout import InstanceLayout
 from dap3d_core.interface.codegen.kernel_arguments import (
     SEVERAL,
-    KernelArgument,
-    namespace,
     parameters,
 )
-from dap3d_core.interface.codegen.specialise import bound_kernel
+from dap3d_core.interface.codegen.specialise import bound_kernel, names_behind
 from dap3d_core.interface.codegen.type_info import TypeInfo
 
 
@@ -37,26 +34,6 @@ def bind_terms(type_info: TypeInfo, terms: Sequence[TypeInfo]) -> TypeInfo:
         terms=tuple(terms),
     )
     return attrs.evolve(bound, names=names_behind(bound, bound.layout))
-
-
-def names_behind(type_info: TypeInfo, layout: InstanceLayout) -> dict[str, KernelArgument]:
-    """Names of a function type whose numbers are shifted, with those of its terms.
-
-    Args:
-        type_info: the type.
-        layout: its layout, shifted.
-    """
-    names = namespace(type_info.type, layout)
-    if not type_info.terms:
-        return names
-    start = layout.par_width - sum(term.layout.par_width for term in type_info.terms)
-    for k, term in enumerate(type_info.terms):
-        behind = term.layout.shifted(start)
-        start = behind.par_width
-        for name, quantity in names_behind(term, behind).items():
-            if name != "x":
-                names[f"g{k}__{name}"] = attrs.evolve(quantity, name=f"g{k}__{name}")
-    return names
 
 
 def _kernel(type_info: TypeInfo, terms: Sequence[TypeInfo]) -> Callable[..., Any]:

@@ -23,7 +23,7 @@ from dap3d_core.kernels.runtime import generated_modules, loop_support
 from dap3d_core.kernels.runtime.cache import cache_folder, jit_is_on, names_of
 from dap3d_core.kernels.runtime.function_lists import LOOP, LoopArrays
 from dap3d_core.kernels.runtime.outer_references import refuse_outer_references
-from dap3d_core.kernels.runtime.source_digest import places, sources
+from dap3d_core.kernels.runtime.source_digest import places, reached, sources
 
 #: Functions that the text of loops calls.
 _SUPPORT = (loop_support.vector_at, loop_support.matrix_at, loop_support.unwound,
@@ -77,7 +77,9 @@ def unit_names(loop: Loop, text: str) -> tuple[str, str]:
     """Names of a loop's unit: digests of its text, its sources, and the layout of its arrays."""
     kernels = loop.kernels.values()
     layout = repr(array_members())
-    return names_of("loop", kernels, text, layout, *places(*kernels), *sources(*kernels, *_SUPPORT))
+    functions, _ = reached(*kernels)  # a kernel may be given others
+    return names_of("loop", functions, text, layout, *places(*kernels),
+                    *sources(*kernels, *_SUPPORT))  # fmt: skip
 
 
 def build_wide(loop: Loop, count: int) -> Entry:

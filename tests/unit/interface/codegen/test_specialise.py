@@ -29,7 +29,7 @@ from dap3d_core.interface import (
     table,
     vector,
 )
-from dap3d_core.kernels import dot, lookup, neg, row, scale, sqrt, sub
+from dap3d_core.kernels import dot, lookup, neg, row, scale, sqrt
 from dap3d_core.scene import SceneError
 
 ZERO = (0.0, 0.0, 0.0)
