@@ -51,32 +51,20 @@ def inverse(
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.run_summary import report_run
-    from dap3d_core.cli.framework.execute import execute
+    from dap3d_core.cli.framework.execute import execute_scene, progress_of
     from dap3d_core.cli.framework.paths import named_after, writable
-    from dap3d_core.simulation import RunProgress
 
     scene = dap.load(model)
     target = named_after(model, output, "-inverse")
     writable(target, force=force, sources=(scene.path,))
     given: Any = dap.open(motion) if motion.endswith(".nc") else motion
     names = None if actuators is None else [n.strip() for n in actuators.split(",") if n.strip()]
-    compiled: list[CompiledModel] = []
 
-    def prepare(announce: "Announce") -> "CompiledModel":
-        compiled.append(dap.compile(scene, method="auto", allow_code=allow_code, announce=announce))
-        return compiled[0]
+    def find(compiled: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":
+        return dap.inverse(
+            compiled, given, names, progress=progress_of(watch), output=target, force=force
+        )
 
-    def find(announce: "Announce", watch: "Watch") -> "Result":
-        def progress(t: float, t_end: float) -> None:
-            watch(RunProgress(t, t_end, 0, 0.0, 0.0))
-
-        try:
-            return dap.inverse(
-                compiled[0], given, names, progress=progress, output=target, force=force
-            )
-        except dap.SceneError as error:
-            names_of = {"actuators": "--actuators", "motion": "MOTION"}
-            raise options.in_options(error, names_of) from error
-
-    outcome = execute(ctx, prepare, find, quiet=quiet)
+    outcome = execute_scene(ctx, scene, find, {"actuators": "--actuators", "motion": "MOTION"},
+                            allow_code=allow_code, quiet=quiet)  # fmt: skip
     return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)

@@ -52,32 +52,20 @@ def kinematics(
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.run_summary import report_run
-    from dap3d_core.cli.framework.execute import execute
+    from dap3d_core.cli.framework.execute import execute_scene, progress_of
     from dap3d_core.cli.framework.paths import named_after, writable
-    from dap3d_core.simulation import RunProgress
 
     scene = dap.load(model)
     target = named_after(model, output, "-kinematics")
     writable(target, force=force, sources=(scene.path,))
     options.check_settings(scene, {**dict.fromkeys(options.SETTINGS), "t_end": t_end, "dt": dt})
-    compiled: list[CompiledModel] = []
 
-    def prepare(announce: "Announce") -> "CompiledModel":
-        compiled.append(dap.compile(scene, method="auto", allow_code=allow_code, announce=announce))
-        return compiled[0]
+    def find(compiled: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":
+        return dap.kinematics(
+            compiled, t_end=t_end, dt=dt, over=over, progress=progress_of(watch),
+            allow_code=allow_code, announce=announce, output=target, force=force,
+        )  # fmt: skip
 
-    def find(announce: "Announce", watch: "Watch") -> "Result":
-        def progress(t: float, t_end: float) -> None:
-            watch(RunProgress(t, t_end, 0, 0.0, 0.0))
-
-        try:
-            return dap.kinematics(
-                compiled[0], t_end=t_end, dt=dt, over=over, progress=progress,
-                allow_code=allow_code, announce=announce, output=target, force=force,
-            )  # fmt: skip
-        except dap.SceneError as error:
-            names = {"over": "--over", "t_end": "--t-end", "dt": "--dt"}
-            raise options.in_options(error, names) from error
-
-    outcome = execute(ctx, prepare, find, quiet=quiet)
+    outcome = execute_scene(ctx, scene, find, {"over": "--over", "t_end": "--t-end", "dt": "--dt"},
+                            allow_code=allow_code, quiet=quiet)  # fmt: skip
     return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)

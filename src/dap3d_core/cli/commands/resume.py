@@ -63,7 +63,7 @@ def resume(
             )
         return resumed[0].compiled
 
-    def run(announce: "Announce", watch: "Watch") -> "Result":
+    def run(_: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":
         if output is not None:
             writable(Path(output), force=force, sources=(Path(checkpoint),))
         with refusing(CheckpointError):  # a fault of the file that shows as it is restored

@@ -59,7 +59,7 @@ def run(
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.run_summary import report_run
-    from dap3d_core.cli.framework.execute import execute
+    from dap3d_core.cli.framework.execute import execute_scene
     from dap3d_core.cli.framework.paths import named_after, writable
 
     if model is None:
@@ -70,28 +70,15 @@ def run(
     target = writable(named_after(model, output), force=force, sources=(scene.path, source))
     options.check_settings(scene, given)
     given["start"] = start
-    compiled: list[CompiledModel] = []
+    names = options.SETTINGS | ({"start": "--from"} if start_file else {})
 
-    def prepare(announce: "Announce") -> "CompiledModel":
-        method = given["method"]
-        compiled.append(dap.compile(scene, method=method, allow_code=allow_code, announce=announce))
-        return compiled[0]
+    def simulate(compiled: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":
+        return dap.simulate(
+            compiled, watch=watch, announce=announce, output=target, force=force, **given
+        )
 
-    def simulate(announce: "Announce", watch: "Watch") -> "Result":
-        try:
-            return dap.simulate(
-                compiled[0],
-                watch=watch,
-                announce=announce,
-                output=target,
-                force=force,
-                **given,
-            )
-        except dap.SceneError as error:  # settings that only the integrator can check
-            names = options.SETTINGS | ({"start": "--from"} if start_file else {})
-            raise options.in_options(error, names) from error
-
-    outcome = execute(ctx, prepare, simulate, quiet=quiet)
+    outcome = execute_scene(ctx, scene, simulate, names, method=given["method"],
+                            allow_code=allow_code, quiet=quiet)  # fmt: skip
     return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
 
 

@@ -1,6 +1,6 @@
 """Runs of a command: progress, signals, and what is saved when a run ends early."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -12,16 +12,54 @@ from dap3d_core.cli.process.exit_codes import Terminated, refusing
 if TYPE_CHECKING:
     from dap3d_core.cli.console.run_summary import RunOutcome
     from dap3d_core.result import Result
+    from dap3d_core.scene import Scene
     from dap3d_core.simulation import CompiledModel, RunProgress
 
     Announce = Callable[[str], None]
     Watch = Callable[[RunProgress], None]
 
 
+def execute_scene(
+    ctx: click.Context,
+    scene: "Scene",
+    run: "Callable[[CompiledModel, Announce, Watch], Result]",
+    options_of: Mapping[str, str],
+    *,
+    allow_code: bool,
+    quiet: bool,
+    method: str | None = "auto",
+) -> "RunOutcome":
+    """Compile a scene and run it, as ``execute``.
+
+    Args:
+        options_of: argument of ``run`` -> option, for mistakes that only the run can see.
+    """
+    import dap3d_core as dap
+    from dap3d_core.cli.framework.options import in_options
+
+    def prepare(announce: "Announce") -> "CompiledModel":
+        return dap.compile(scene, method=method, allow_code=allow_code, announce=announce)
+
+    def named(compiled: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":
+        try:
+            return run(compiled, announce, watch)
+        except dap.SceneError as error:
+            raise in_options(error, options_of) from error
+
+    return execute(ctx, prepare, named, quiet=quiet)
+
+
+def progress_of(watch: "Watch") -> Callable[[float, float], None]:
+    """Progress by time alone, of what takes no steps of integration."""
+    from dap3d_core.simulation import RunProgress
+
+    return lambda t, t_end: watch(RunProgress(t, t_end, 0, 0.0, 0.0))
+
+
 def execute(
     ctx: click.Context,
     prepare: "Callable[[Announce], CompiledModel]",
-    run: "Callable[[Announce, Watch], Result]",
+    run: "Callable[[CompiledModel, Announce, Watch], Result]",
     *,
     quiet: bool,
 ) -> "RunOutcome":
@@ -35,7 +73,8 @@ def execute(
             compiled = prepare(progress.announce)
         progress.start()
         try:
-            result = run(progress.announce, signals_of(ctx).interruptible(progress.advance))
+            watch = signals_of(ctx).interruptible(progress.advance)
+            result = run(compiled, progress.announce, watch)
         except (Exception, KeyboardInterrupt) as error:
             partial, code, reason = partial_result(ctx, error)
             return RunOutcome(compiled, partial, code, reason, getattr(error, "checkpoint", None))
