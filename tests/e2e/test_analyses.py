@@ -34,6 +34,7 @@ def test_kinematics_and_inverse_dynamics_follow_each_other(dap3d):
                header="t [s],crank.r.x [m],crank.r.z [m]")  # fmt: skip
     done = dap3d("inverse", "press.toml", "motion.csv", "--actuators", "motor", "--force")
     assert done.returncode == 0, done.stderr
+    assert "dap3d plot press-inverse.nc motor.actuation\n" in done.stdout  # what to look at next
     done = dap3d("plot", "press-inverse.nc", "motor.actuation", "-o", "a.png")
     assert (dap3d.folder / "a.png").exists(), done.stderr
 

@@ -35,6 +35,8 @@ if TYPE_CHECKING:
 MOST_EVENTS = 6
 #: Bodies whose corrected initial conditions are printed, those that were changed most.
 MOST_BODIES = 5
+#: Forces of actuators that the next command plots.
+MOST_PLOTTED = 3
 #: Smaller changes, relative for numbers larger than one, are not printed.
 PRINTED = 1e-9
 #: Smaller changes are rounding.
@@ -206,8 +208,10 @@ def _show_run(
     show_details(console, data)
     console.say(f"{target} written ({size(target.stat().st_size)}). Next:", whole=True)
     file = shlex.quote(str(target))
-    quantity = shlex.quote(f"{outcome.result.summary.body_names[0]}.r")
-    commands = (f"plot {file} {quantity}", f"view {file} --open", f"animate {file}", f"info {file}")
+    quantities = [f"{name}.actuation" for name in outcome.result.record.actuation]
+    quantities = quantities or [f"{outcome.result.summary.body_names[0]}.r"]
+    words = " ".join(map(shlex.quote, quantities[:MOST_PLOTTED]))
+    commands = (f"plot {file} {words}", f"view {file} --open", f"animate {file}", f"info {file}")
     for command in commands:
         console.say(f"dap3d {command}", "green", indent=2, whole=True)
 
