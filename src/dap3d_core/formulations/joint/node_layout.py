@@ -32,9 +32,9 @@ MATRIX_M, MATRIX_H, MATRIX_J, MOMENT, FORCE, WORK_WIDTH = 30, 36, 45, 51, 54, 57
 # What an elimination leaves takes their places: U/D and u/D of one freedom; J^-1 H and J^-1 n of a
 # rotation, as H and n; then, of all, the accelerations by q_ddot.
 GAIN, FREE_RATE, ALPHA_Q, ACCELERATION_Q = MATRIX_M, FORCE, MATRIX_J, MATRIX_J + 3
-# Where rows are kept on the tree, D^-1 of each freedom: of one; J^-1 of a ball, and of a free body,
+# Where rows are kept on the tree: D^-1 of one freedom; factors of J of a ball, and of a free body,
 # which has no link and no axis.
-INVERSE, INVERSE_BALL, INVERSE_FREE = MATRIX_H, MATRIX_M, LINK_NOW
+INVERSE, FACTORS_BALL, FACTORS_FREE = MATRIX_H, MATRIX_M, LINK_NOW
 
 #: Columns of ``TreeArrays.joints``, one joint of the tree in each row, children before parents:
 #: places in D of the blocks of child and parent, 6 times these bodies, rows of the joint, place of

@@ -101,21 +101,21 @@ def place_nodes(y: Floats, system: System) -> None:
         k, m, c = WORK_WIDTH * n, WORK_WIDTH * tree[t + PARENT], CONSTANT_WIDTH * n
         i, j = tree[t + COORDINATE], tree[t + RATE]
         if motion == REVOLUTE:
-            orient(b, o, relative(b, up, turn(C, c, sines[i], cosines[i])), False)
+            orient(b, o, relative(b, up, turn(C, c, sines[i], cosines[i])))
             w, alpha = revolve(y[j], b, o, up, K, k, m, C, c)
             link(b, up, K, k, m, C, c)
         elif motion == SPHERICAL:
-            orient(b, o, (y[i], y[i + 1], y[i + 2], y[i + 3]), True)
+            orient_by_state(b, o, (y[i], y[i + 1], y[i + 2], y[i + 3]))
             w, alpha = times(b, o + A, vector_of(y, j)), (0.0, 0.0, 0.0)
             link(b, up, K, k, m, C, c)
         elif motion == FREE:
-            orient(b, o, (y[i + 3], y[i + 4], y[i + 5], y[i + 6]), True)
+            orient_by_state(b, o, (y[i + 3], y[i + 4], y[i + 5], y[i + 6]))
             w, alpha = times(b, o + A, vector_of(y, j + 3)), (0.0, 0.0, 0.0)
             put(K, k + POINT, vector_of(y, i))
             put(K, k + VELOCITY, vector_of(y, j))
             put(K, k + ACCELERATION, alpha)
         else:
-            orient(b, o, relative(b, up, (C[c], C[c + 1], C[c + 2], C[c + 3])), False)
+            orient(b, o, relative(b, up, (C[c], C[c + 1], C[c + 2], C[c + 3])))
             w, alpha = vector_of(b, up + W), vector_of(K, m + ALPHA)
             link(b, up, K, k, m, C, c)
             if motion == PRISMATIC:
@@ -147,30 +147,50 @@ def relative(b: Floats, up: int, a: Any) -> Any:
     """Euler parameters of the parent times those of a relative to it."""
     p0, p1, p2, p3 = b[up + P], b[up + P + 1], b[up + P + 2], b[up + P + 3]
     return (
-        p0 * a[0] - p1 * a[1] - p2 * a[2] - p3 * a[3],
-        p0 * a[1] + p1 * a[0] + p2 * a[3] - p3 * a[2],
-        p0 * a[2] - p1 * a[3] + p2 * a[0] + p3 * a[1],
-        p0 * a[3] + p1 * a[2] - p2 * a[1] + p3 * a[0],
+        (p0 * a[0] - p1 * a[1]) - (p2 * a[2] + p3 * a[3]),
+        (p0 * a[1] + p1 * a[0]) + (p2 * a[3] - p3 * a[2]),
+        (p0 * a[2] - p1 * a[3]) + (p2 * a[0] + p3 * a[1]),
+        (p0 * a[3] + p1 * a[2]) - (p2 * a[1] - p3 * a[0]),
     )
 
 
 @compiled_into
-def orient(b: Floats, o: int, e: Any, is_of_state: bool) -> None:
-    """Set p and A of a node from Euler parameters: of the state, of any length, or of length 1."""
+def orient(b: Floats, o: int, e: Any) -> None:
+    """Set p and A of a node from Euler parameters whose length is 1 up to rounding."""
+    square = square_of(e)
+    put_rotation(b, o + A, e, 4.0 - 2.0 * square)
+    h = 1.5 - 0.5 * square
+    b[o + P], b[o + P + 1], b[o + P + 2], b[o + P + 3] = e[0] * h, e[1] * h, e[2] * h, e[3] * h
+
+
+@compiled_into
+def orient_by_state(b: Floats, o: int, e: Any) -> None:
+    """The same of the state, of any length; A waits for no square root."""
+    square = square_of(e)
+    put_rotation(b, o + A, e, 2.0 / square)
+    h = 1.0 / np.sqrt(square)
+    b[o + P], b[o + P + 1], b[o + P + 2], b[o + P + 3] = e[0] * h, e[1] * h, e[2] * h, e[3] * h
+
+
+@compiled_into
+def square_of(e: Any) -> float:
+    """E . e of four numbers."""
+    return (e[0] * e[0] + e[1] * e[1]) + (e[2] * e[2] + e[3] * e[3])
+
+
+@compiled_into
+def put_rotation(b: Floats, k: int, e: Any, h: float) -> None:
+    """Store the rotation matrix of Euler parameters at k; h: 2/(e . e)."""
     e0, e1, e2, e3 = e
-    square = e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3
-    h = 1.0 / np.sqrt(square) if is_of_state else 1.5 - 0.5 * square
-    e0, e1, e2, e3 = e0 * h, e1 * h, e2 * h, e3 * h
-    b[o + P], b[o + P + 1], b[o + P + 2], b[o + P + 3] = e0, e1, e2, e3
-    b[o + A] = 1.0 - 2.0 * (e2 * e2 + e3 * e3)
-    b[o + A + 1] = 2.0 * (e1 * e2 - e0 * e3)
-    b[o + A + 2] = 2.0 * (e1 * e3 + e0 * e2)
-    b[o + A + 3] = 2.0 * (e1 * e2 + e0 * e3)
-    b[o + A + 4] = 1.0 - 2.0 * (e1 * e1 + e3 * e3)
-    b[o + A + 5] = 2.0 * (e2 * e3 - e0 * e1)
-    b[o + A + 6] = 2.0 * (e1 * e3 - e0 * e2)
-    b[o + A + 7] = 2.0 * (e2 * e3 + e0 * e1)
-    b[o + A + 8] = 1.0 - 2.0 * (e1 * e1 + e2 * e2)
+    b[k] = 1.0 - h * (e2 * e2 + e3 * e3)
+    b[k + 1] = h * (e1 * e2 - e0 * e3)
+    b[k + 2] = h * (e1 * e3 + e0 * e2)
+    b[k + 3] = h * (e1 * e2 + e0 * e3)
+    b[k + 4] = 1.0 - h * (e1 * e1 + e3 * e3)
+    b[k + 5] = h * (e2 * e3 - e0 * e1)
+    b[k + 6] = h * (e1 * e3 - e0 * e2)
+    b[k + 7] = h * (e2 * e3 + e0 * e1)
+    b[k + 8] = 1.0 - h * (e1 * e1 + e2 * e2)
 
 
 @compiled_into

@@ -20,6 +20,8 @@ from dap3d_core.formulations.joint.node_layout import (
     AXIS_NOW,
     CENTRE_NOW,
     CONSTANT_WIDTH,
+    FACTORS_BALL,
+    FACTORS_FREE,
     FLAGS,
     FORCE,
     FREE,
@@ -29,8 +31,6 @@ from dap3d_core.formulations.joint.node_layout import (
     HAS_MASS,
     INERTIA,
     INVERSE,
-    INVERSE_BALL,
-    INVERSE_FREE,
     IS_FIRST,
     LINK_NOW,
     MASS,
@@ -73,7 +73,7 @@ def reduce_tree(system: System, forces: Floats) -> float:
 
 @compiled_into
 def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
-    """``reduce_tree``; keeps: D^-1 of every freedom is stored as well, for rows on the tree."""
+    """``reduce_tree``; keeps: D^-1 of each freedom, or factors of D, stay, for rows on the tree."""
     tree, b = pointer(system.tree.nodes), pointer(system.tree.places)
     K, C, F = pointer(system.tree.work), pointer(system.tree.constants), pointer(forces)
     power = 0.0
@@ -105,14 +105,14 @@ def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
                 add_to_parent(K, m, is_first, M, H, J, moment, force)
         elif motion == SPHERICAL:
             if keeps:
-                put_six(K, k + INVERSE_BALL, inverse_of(J))
+                put_six(K, k + FACTORS_BALL, factors_of(J))
             M, force = release_rotation(K, k, M, H, J, moment, force)
             if m != 0:
                 H, J, moment = carry_ball(arm, M, force)
                 add_to_parent(K, m, is_first, M, H, J, moment, force)
         elif motion == FREE:
             if keeps:
-                put_six(K, k + INVERSE_FREE, inverse_of(J))
+                put_six(K, k + FACTORS_FREE, factors_of(J))
             M, force = release_rotation(K, k, M, H, J, moment, force)
             put_six(K, k + MATRIX_M, M)
             put(K, k + FORCE, force)
@@ -229,11 +229,11 @@ def release_rotation(
     K: Floats, k: int, M: Symmetric, H: Matrix, J: Symmetric, moment: Vector, force: Vector
 ) -> Any:
     """Eliminate all rotations about P: M and force are left. Stores J^-1 H and J^-1 n."""
-    inverse = inverse_of(J)
-    x = symmetric_times(inverse, (H[0], H[3], H[6]))
-    y = symmetric_times(inverse, (H[1], H[4], H[7]))
-    z = symmetric_times(inverse, (H[2], H[5], H[8]))
-    rate = symmetric_times(inverse, moment)
+    L = factors_of(J)
+    x = solve_factored(L, (H[0], H[3], H[6]))
+    y = solve_factored(L, (H[1], H[4], H[7]))
+    z = solve_factored(L, (H[2], H[5], H[8]))
+    rate = solve_factored(L, moment)
     put(K, k + MATRIX_H, (x[0], y[0], z[0]))
     put(K, k + MATRIX_H + 3, (x[1], y[1], z[1]))
     put(K, k + MATRIX_H + 6, (x[2], y[2], z[2]))
@@ -250,12 +250,28 @@ def release_rotation(
 
 
 @compiled_into
-def inverse_of(J: Symmetric) -> Symmetric:
-    """Inverse of a symmetric matrix by cofactors: one division, where L D L^T waits for three."""
-    c0, c1, c2 = J[3] * J[5] - J[4] * J[4], J[2] * J[4] - J[1] * J[5], J[1] * J[4] - J[2] * J[3]
-    d = 1.0 / (J[0] * c0 + J[1] * c1 + J[2] * c2)
-    c3, c4, c5 = J[0] * J[5] - J[2] * J[2], J[1] * J[2] - J[0] * J[4], J[0] * J[3] - J[1] * J[1]
-    return c0 * d, c1 * d, c2 * d, c3 * d, c4 * d, c5 * d
+def factors_of(S: Symmetric) -> Symmetric:
+    """L and D^-1 of S = L D L^T, positive definite: 1/d0, l10, l20, 1/d1, l21, 1/d2.
+
+    Not by cofactors, which would lose the accelerations of a thin body in all directions: here the
+    digits that its moment of inertia has not are lost about its axis alone.
+    """
+    i0 = 1.0 / S[0]
+    l1, l2 = S[1] * i0, S[2] * i0
+    x = S[4] - l1 * S[2]
+    i1 = 1.0 / (S[3] - l1 * S[1])
+    l3 = x * i1
+    return i0, l1, l2, i1, l3, 1.0 / (S[5] - l2 * S[2] - l3 * x)
+
+
+@compiled_into
+def solve_factored(L: Symmetric, b: Vector) -> Vector:
+    """Solution of S x = b; L: ``factors_of`` S."""
+    i0, l1, l2, i1, l3, i2 = L
+    y = b[1] - l1 * b[0]
+    x2 = (b[2] - l2 * b[0] - l3 * y) * i2
+    x1 = y * i1 - l3 * x2
+    return b[0] * i0 - l1 * x1 - l2 * x2, x1, x2
 
 
 @compiled_into

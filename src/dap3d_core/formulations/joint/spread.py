@@ -6,8 +6,6 @@ Featherstone, Rigid Body Dynamics Algorithms (2008), 7.3.
 # What a compiled function returns is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from typing import Any
-
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.formulations.joint.node_layout import (
     ACCELERATION,
@@ -39,7 +37,7 @@ from dap3d_core.formulations.joint.node_layout import (
     WORK_WIDTH,
 )
 from dap3d_core.formulations.joint.place import Vector, put, times, vector_of
-from dap3d_core.formulations.joint.reduce import six_of
+from dap3d_core.formulations.joint.reduce import factors_of, six_of, solve_factored
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A
@@ -57,7 +55,7 @@ def spread_tree(y: Floats, out: Floats, system: System) -> None:
         alpha = vector_of(K, m + ALPHA_Q)
         a = add(vector_of(K, m + ACCELERATION_Q), cross(alpha, vector_of(K, k + LINK_NOW)))
         if motion == FREE:
-            a = solve_symmetric(six_of(K, k + MATRIX_M), vector_of(K, k + FORCE))
+            a = solve_factored(factors_of(six_of(K, k + MATRIX_M)), vector_of(K, k + FORCE))
             put(out, i, vector_of(y, j))
             put(out, j, a)
             i, j = i + 3, j + 3
@@ -97,18 +95,6 @@ def in_node_axes(b: Floats, k: int, a: Vector) -> Vector:
         b[k + 1] * a[0] + b[k + 4] * a[1] + b[k + 7] * a[2],
         b[k + 2] * a[0] + b[k + 5] * a[1] + b[k + 8] * a[2],
     )
-
-
-@compiled_into
-def solve_symmetric(S: Any, b: Vector) -> Vector:
-    """Solution of S x = b, by S = L D L^T; S positive definite, by rows of its upper triangle."""
-    l1, l2 = S[1] / S[0], S[2] / S[0]
-    d1 = S[3] - l1 * S[1]
-    l3 = (S[4] - l1 * S[2]) / d1
-    x1 = b[1] - l1 * b[0]
-    x2 = (b[2] - l2 * b[0] - l3 * x1) / (S[5] - l2 * S[2] - l3 * l3 * d1)
-    x1 = x1 / d1 - l3 * x2
-    return b[0] / S[0] - l1 * x1 - l2 * x2, x1, x2
 
 
 @compiled

@@ -22,13 +22,13 @@ from dap3d_core.formulations.joint.node_layout import (
     ALPHA,
     AXIS_NOW,
     CENTRE_NOW,
+    FACTORS_BALL,
+    FACTORS_FREE,
     FORCE,
     FREE,
     FREE_RATE,
     GAIN,
     INVERSE,
-    INVERSE_BALL,
-    INVERSE_FREE,
     LINK_NOW,
     MATRIX_H,
     MATRIX_M,
@@ -42,8 +42,13 @@ from dap3d_core.formulations.joint.node_layout import (
     WORK_WIDTH,
 )
 from dap3d_core.formulations.joint.place import put, times, vector_of
-from dap3d_core.formulations.joint.reduce import nine_of, six_of, symmetric_times, transposed_times
-from dap3d_core.formulations.joint.spread import solve_symmetric
+from dap3d_core.formulations.joint.reduce import (
+    factors_of,
+    nine_of,
+    six_of,
+    solve_factored,
+    transposed_times,
+)
 from dap3d_core.formulations.joint_loops.layout import (
     CUT_WIDTH,
     END_BLOCK,
@@ -210,12 +215,14 @@ def multiply_loads(system: System) -> None:
             at = profile[PROFILE_WIDTH * (row + r) + PLACE] + column
             count = r + 1 if row == column else pairs[p + RIGHT_COUNT]
             if motion == SPHERICAL:
-                n = symmetric_times(six_of(K, k + INVERSE_BALL), vector_of(g, left + 3 * r))
+                n = solve_factored(six_of(K, k + FACTORS_BALL), vector_of(g, left + 3 * r))
                 for e in range(count):
                     S[at + e] += dot(n, vector_of(g, right + 3 * e))
             elif motion == FREE:
-                n = symmetric_times(six_of(K, k + INVERSE_FREE), vector_of(g, left + 6 * r))
-                f = solve_symmetric(six_of(K, k + MATRIX_M), vector_of(g, left + 6 * r + 3))
+                n = solve_factored(six_of(K, k + FACTORS_FREE), vector_of(g, left + 6 * r))
+                f = solve_factored(
+                    factors_of(six_of(K, k + MATRIX_M)), vector_of(g, left + 6 * r + 3)
+                )
                 for e in range(count):
                     o = right + 6 * e
                     S[at + e] += dot(n, vector_of(g, o)) + dot(f, vector_of(g, o + 3))
@@ -266,7 +273,7 @@ def subtract_free_rates(system: System, s: int, rows: int, first: int) -> None:
         for r in range(rows):
             right[first + r] -= dot(vector_of(g, place + 3 * r), vector_of(K, k + MOMENT))
     elif motion == FREE:
-        a = solve_symmetric(six_of(K, k + MATRIX_M), vector_of(K, k + FORCE))
+        a = solve_factored(factors_of(six_of(K, k + MATRIX_M)), vector_of(K, k + FORCE))
         for r in range(rows):
             o = place + 6 * r
             along = dot(vector_of(g, o), vector_of(K, k + MOMENT))
@@ -320,11 +327,11 @@ def push_freedoms(system: System) -> None:
             k, motion = WORK_WIDTH * node, tree[TREE_WIDTH * node + MOTION]
             if motion == SPHERICAL:
                 n = sum_of_loads(g, place, 3, rows, x)
-                change = symmetric_times(six_of(K, k + INVERSE_BALL), n)
+                change = solve_factored(six_of(K, k + FACTORS_BALL), n)
                 put(K, k + MOMENT, add(vector_of(K, k + MOMENT), change))
             elif motion == FREE:
                 n = sum_of_loads(g, place, 6, rows, x)
-                change = symmetric_times(six_of(K, k + INVERSE_FREE), n)
+                change = solve_factored(six_of(K, k + FACTORS_FREE), n)
                 put(K, k + MOMENT, add(vector_of(K, k + MOMENT), change))
                 f = sum_of_loads(g, place + 3, 6, rows, x)
                 put(K, k + FORCE, add(vector_of(K, k + FORCE), f))
