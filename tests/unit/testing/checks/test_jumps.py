@@ -102,7 +102,7 @@ class ImpulseInGroundAxes(ImpulseWithoutReaction):
 
 class RollsDice(PlaneStop):
     def impulse(Jv, e):
-        return where(Jv < 0.0, -(1.0 + e) * Jv * random.choice((0.0, 1.0)), 0.0)
+        return where(Jv < 0.0, -(1.0 + e) * Jv * random.random(), 0.0)
 
 
 class Branches(PlaneStop):
