@@ -14,6 +14,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_collection_finish():
-    """Thousands of tests are no garbage: each collection would go through them again."""
+    """Thousands of tests are no garbage: each collection would go through them again.
+
+    As for threads of BLAS, no core is left for a second process that optimises code.
+    """
+    from dap3d_core.kernels.compiler import background
+
+    background.core_count = lambda: 1
     gc.collect()
     gc.freeze()
