@@ -18,7 +18,7 @@ from dap3d_core.testing import checks_for
 
 REGISTRY = load_registry()
 INSTALLED = [(t.kind, t.keyword) for t in REGISTRY.listing() if t.state == "ok"]
-#: A quarter of the poses of ``dap3d check-plugin``, which e2e/test_check_plugin.py runs over all types.
+#: One pose: e2e/test_check_plugin.py runs ``dap3d check-plugin`` over all types.
 CHECKS = [(key, check) for key in INSTALLED for check in checks_for(REGISTRY.get(*key), poses=1)]
 JOINTS = cases(REGISTRY, "joint")
 
