@@ -4,6 +4,8 @@ import gc
 import os
 import signal
 
+import pytest
+
 # Tests fill all cores by themselves, and their matrices are small: threads of BLAS would only wait,
 # each at the cost of a core. Set before numpy is imported.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -13,13 +15,15 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def pytest_collection_finish():
-    """Thousands of tests are no garbage: each collection would go through them again.
-
-    As for threads of BLAS, no core is left for a second process that optimises code.
-    """
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection():
+    """As for threads of BLAS, no core is left for a second process that optimises code."""
     from dap3d_core.kernels.compiler import background
 
     background.core_count = lambda: 1
+
+
+def pytest_collection_finish():
+    """Thousands of tests are no garbage: each collection would go through them again."""
     gc.collect()
     gc.freeze()
