@@ -77,7 +77,7 @@ def test_ball1_against_an_integration_with_located_touches():
         assert touching == piece.touching
 
 
-@pytest.mark.parametrize("model", [pen1, pen2])
+@pytest.mark.parametrize("model", [pen1, pytest.param(pen2, marks=pytest.mark.long)])
 @pytest.mark.parametrize("t", [0.5, 2.0])
 def test_pendulums_against_elliptic_functions(model, t):
     simulated, closed = model.quantities(t), model.closed_form(t)
