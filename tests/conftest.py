@@ -16,11 +16,15 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 @pytest.hookimpl(tryfirst=True)
-def pytest_collection():
-    """As for threads of BLAS, no core is left for a second process that optimises code."""
-    from dap3d_core.kernels.compiler import background
+def pytest_collection(session):
+    """As for threads of BLAS, no core is left for a second process that optimises code.
 
-    background.core_count = lambda: 1
+    Slow tests need that code; quick ones have ended before it is there.
+    """
+    if "not slow" in session.config.option.markexpr:
+        from dap3d_core.kernels.compiler import background
+
+        background.core_count = lambda: 1
 
 
 def pytest_collection_finish():
