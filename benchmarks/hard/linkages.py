@@ -47,6 +47,7 @@ def _bars(count, tries, test):
         "the one equation of the cranks, DOP853 at 3e-14",
         tries,
         test,
+        slow=count > 2,
     )
 
 

@@ -2,7 +2,7 @@
 
 The standard types pass through the door that is there for everyone (``dap3d_core.testing``). The
 tests run over the registry: a new type is covered without a new test, and so are its variants.
-That the checks find errors is the subject of test_planted_errors.py.
+That the checks find errors is the subject of tests/unit/testing/checks.
 """
 
 import numpy as np
@@ -18,8 +18,8 @@ from dap3d_core.testing import checks_for
 
 REGISTRY = load_registry()
 INSTALLED = [(t.kind, t.keyword) for t in REGISTRY.listing() if t.state == "ok"]
-#: Half of the poses of ``dap3d check-plugin``, which e2e/test_check_plugin.py runs over all types.
-CHECKS = [(key, check) for key in INSTALLED for check in checks_for(REGISTRY.get(*key), poses=2)]
+#: One pose: e2e/test_check_plugin.py runs ``dap3d check-plugin`` over all types.
+CHECKS = [(key, check) for key in INSTALLED for check in checks_for(REGISTRY.get(*key), poses=1)]
 JOINTS = cases(REGISTRY, "joint")
 
 

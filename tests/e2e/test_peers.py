@@ -64,6 +64,7 @@ def test_references_are_of_these_scenes(beside):
         assert reference["uncertainty"] < 5e-10
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("key", ["heavy-top-1", "spherical-chain-4", "ball-1", "four-bars-2"])
 def test_references_are_found_again(beside, key):
     """Made anew at a looser tolerance they agree with what is stored."""

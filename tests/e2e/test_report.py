@@ -55,7 +55,7 @@ def test_tables_fit_the_width(dap3d):
 
 @pytest.mark.slow
 def test_a_signal_keeps_what_was_measured(dap3d):
-    process = dap3d.start("report", "pen1", "--repeat", "10000", "--method", "standard", "--csv",
+    process = dap3d.start("report", "pen1", "--repeat", "1000", "--method", "standard", "--csv",
                           "a.csv")  # fmt: skip
     lines = []
     for line in process.stderr:  # until all runs of the first tolerance are measured

@@ -10,15 +10,16 @@ from support.process import REPOSITORY, environment
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def site(tmp_path_factory):
-    """The folder of the built site."""
+@pytest.fixture(scope="module", params=["basic", pytest.param("furo", marks=pytest.mark.long)])
+def site(request, tmp_path_factory):
+    """The folder of the built site; its own theme takes as long as all the rest."""
     for package in ("sphinx", "myst_parser", "furo", "sphinx_gallery", "latex2mathml"):
         pytest.importorskip(package, reason=f"{package} is not installed: pip install '.[docs]'")
     folder = tmp_path_factory.mktemp("site")
     source, built = folder / "source", folder / "html"
     source.mkdir()
-    words = ["sphinx", "-W", "--keep-going", "-q", "-c", REPOSITORY / "docs", source, built]
+    words = ["sphinx", "-W", "--keep-going", "-q", "-c", REPOSITORY / "docs"]
+    words += ["-D", f"html_theme={request.param}", source, built]
     nowhere = dict.fromkeys(("http_proxy", "https_proxy"), "http://127.0.0.1:9")
     done = subprocess.run(
         [sys.executable, "-m", *map(str, words)],

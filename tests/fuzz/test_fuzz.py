@@ -12,16 +12,16 @@ from fuzz.targets import TARGETS
 
 #: How many inputs, quick and slow. A scene takes some 50 ms, what is refused some 5 ms.
 COUNTS = {
-    "scenes": (3, 15),
-    "damaged": (10, 60),
-    "matlab": (15, 100),
-    "models": (25, 300),
-    "results": (5, 25),
-    "numbers": (5, 20),
-    "quantities": (20, 150),
-    "expressions": (30, 500),
-    "commands": (5, 25),
-    "programs": (6, 40),
+    "scenes": (2, 10),
+    "damaged": (5, 40),
+    "matlab": (10, 60),
+    "models": (10, 200),
+    "results": (3, 15),
+    "numbers": (2, 10),
+    "quantities": (5, 75),
+    "expressions": (20, 250),
+    "commands": (3, 15),
+    "programs": (3, 20),
 }
 
 

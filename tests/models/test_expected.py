@@ -17,6 +17,8 @@ EXPECTED = {
     if (folder / "expected.toml").exists()
 }
 CHECKS = [(name, check) for name, content in EXPECTED.items() for check in content["check"]]
+#: Of forty loops.
+LONG = {"A02-40"}
 COUNTS = ("rows", "rank", "dof")
 
 
@@ -37,7 +39,13 @@ def run_to(name, t):
     return dap.simulate(compiled(name), t_end=t, dt=max(t, 1.0) if t == 0.0 else t, **settings)
 
 
-@pytest.mark.parametrize(("name", "check"), CHECKS, ids=[title(*c) for c in CHECKS])
+@pytest.mark.parametrize(
+    ("name", "check"),
+    [
+        pytest.param(*c, id=title(*c), marks=[pytest.mark.slow] if c[0] in LONG else [])
+        for c in CHECKS
+    ],
+)
 def test_expected(name, check):
     """The quantity agrees with the independent value."""
     value = np.array(check["value"], dtype=float)

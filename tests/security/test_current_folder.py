@@ -38,6 +38,7 @@ def test_a_matplotlibrc_is_not_opened(folder):
     assert run(PLOT, cwd=folder, MPLCONFIGDIR=folder / "none") == "1.5 False"
 
 
+@pytest.mark.slow
 def test_names_are_no_tex_whatever_the_users_own_settings(folder):
     """The user may have TeX set for pictures of his own; here LaTeX would be started."""
     (folder / "config").mkdir()
@@ -51,6 +52,7 @@ def test_names_are_no_tex_whatever_the_users_own_settings(folder):
     assert not list(folder.rglob("tex-was-here"))
 
 
+@pytest.mark.slow
 def test_a_script_that_has_set_matplotlib_up_keeps_it(folder):
     """Its own figures, and so its own decision: only our import leaves the file out."""
     (folder / "matplotlibrc").write_text("lines.linewidth: 77\n")

@@ -52,9 +52,9 @@ def bouncing(registry):
         ("dop853", TIGHT, 1e-12),
         ("dopri5", TIGHT, 1e-11),
         ("radau", {"rtol": 1e-11, "atol": 1e-13}, 1e-10),
-        ("dop853", {"step": 2e-3}, 1e-12),
+        pytest.param("dop853", {"step": 2e-3}, 1e-12, marks=pytest.mark.slow),
         # (100 / s h)^4 / 120 of an oscillation of some 0.05 m; without location h itself shows
-        ("rk4", {"step": 2e-3}, 1e-5),
+        pytest.param("rk4", {"step": 2e-3}, 1e-5, marks=pytest.mark.slow),
     ],
 )
 def test_the_first_bounce(registry, integrator, settings, tolerance):
@@ -299,12 +299,13 @@ def tool_velocity(t):
     return middle.imag / 1e-30
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("integrator", "settings"),
     [
         ("dop853", {}),
-        pytest.param("radau", {}, marks=pytest.mark.slow),
-        pytest.param("rk4", {"step": 2e-4}, marks=pytest.mark.slow),
+        ("radau", {}),
+        ("rk4", {"step": 2e-4}),
     ],
 )
 def test_an_arm_whose_tool_vibrates_at_500_hz(integrator, settings):

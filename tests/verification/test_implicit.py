@@ -35,6 +35,7 @@ def test_governor(governor, t):
     assert all(entry.ok for entry in result.ledger.values())
 
 
+@pytest.mark.slow
 def test_governor_in_a_fiftieth_of_the_steps(governor):
     """A05 over 10 s at e = 1e-3 (benchmarks, section 0): 50 times fewer steps than rk4 needs.
 

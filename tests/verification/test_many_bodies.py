@@ -137,6 +137,7 @@ def test_five_bodies_move_as_particles_do(scene, reference, method, integrator):
     assert all(item.ok for item in result.ledger.values())
 
 
+@pytest.mark.slow
 def test_its_formulas_are_right(scene):
     """Derived J and gamma, and the derived wrench on four bodies, against differences."""
     registry = dap.load_registry().with_file(scene.path.parent / "plugin.py")

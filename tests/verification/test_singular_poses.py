@@ -144,6 +144,7 @@ def crossings_of(result):
     return [note for note in result.notes if "radau met a singular pose" in note]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rtol", [1e-6, 1e-8, 1e-10])
 @pytest.mark.parametrize("make", [lambda: redundant.four_bars(1), problems.four_bar])
 def test_the_implicit_integrator_is_taken_across(make, rtol):

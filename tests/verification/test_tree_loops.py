@@ -18,11 +18,13 @@ pytestmark = pytest.mark.slow
 #: Relative to the largest. Loops have condition numbers of up to 1e4.
 ACCELERATIONS, MULTIPLIERS = 1e-11, 1e-10
 #: Scenes of the example package, and types of the standard one that bend.
+#: First seeds of the trees, twenty from each.
+SEEDS = [*range(0, 60, 20), *(pytest.param(k, marks=pytest.mark.long) for k in range(60, 200, 20))]
 EXAMPLES = sorted((REPOSITORY / "plugins/dap3d-example/scenes").glob("*.toml"))
 DERIVED = ("rev", "sph", "cyl", "tran", "univ")
 
 
-@pytest.mark.parametrize("first", range(0, 200, 20))
+@pytest.mark.parametrize("first", SEEDS)
 def test_200_trees_with_loops_have_the_accelerations_of_a_dense_solution(first):
     """Up to 42 bodies, up to six joints that close loops; a quarter has redundant rows."""
     for seed in range(first, first + 20):
@@ -36,7 +38,7 @@ def test_200_trees_with_loops_have_the_accelerations_of_a_dense_solution(first):
         assert multipliers < MULTIPLIERS, seed
 
 
-@pytest.mark.parametrize("first", range(0, 200, 20))
+@pytest.mark.parametrize("first", SEEDS)
 def test_200_trees_with_double_hinges_have_the_least_multipliers(first):
     """Up to seven hinges of each tree are there twice: five rows of each are redundant."""
     for seed in range(first, first + 20):

@@ -148,6 +148,7 @@ def accelerations(R, w, rolls):
     return x[:3], x[3:6]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rolls", [False, True], ids=["slides", "rolls"])
 def test_an_ellipsoid_on_a_plane(rolls):
     """Position and attitude against Euler parameters and w alone, contact in closed form."""

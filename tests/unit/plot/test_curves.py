@@ -17,21 +17,6 @@ from dap3d_core.plot.curves import curve_picture
 from dap3d_core.result import UnknownNameError
 from dap3d_core.scene import Scene
 
-matplotlib.use("Agg")
-
-
-@pytest.fixture(scope="module")
-def result():
-    return circling()[0]
-
-
-@pytest.fixture(autouse=True)
-def closed():
-    yield
-    from matplotlib import pyplot
-
-    pyplot.close("all")
-
 
 def lines(ax):
     return {line.get_label(): line.get_xydata() for line in ax.get_lines()}

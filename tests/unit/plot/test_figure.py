@@ -10,27 +10,11 @@ import matplotlib.image
 import numpy as np
 import pytest
 from support.plain import in_another_process
-from support.results import circling
 
 import dap3d_core as dap
 from dap3d_core.plot import FORMATS, animate, plot, save_plot, show_plot
 from dap3d_core.plot.work_precision import Mark, save_work_precision
 from dap3d_core.result import ResultError, UnknownNameError
-
-matplotlib.use("Agg")
-
-
-@pytest.fixture(scope="module")
-def result():
-    return circling()[0]
-
-
-@pytest.fixture(autouse=True)
-def closed():
-    yield
-    from matplotlib import pyplot
-
-    pyplot.close("all")
 
 
 def test_without_a_display_there_is_no_window(result):

@@ -8,8 +8,6 @@ from matplotlib.figure import Figure
 
 from dap3d_core.plot.work_precision import Mark, draw_work_precision, save_work_precision
 
-matplotlib.use("Agg")
-
 METHODS, INTEGRATORS = ("standard", "penalty", "lsq"), ("dop853", "dopri5", "rk4", "radau")
 MARKS = [
     Mark(method, integrator, 10.0 ** -(2 + 2 * k), 1e-3 * 2**k * (1 + i + j), i + j == 0)

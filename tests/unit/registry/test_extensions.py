@@ -3,8 +3,6 @@
 Plugins here are real distributions on sys.path: a module, and a dist-info with entry points.
 """
 
-import sys
-
 import pytest
 
 import dap3d_core as dap
@@ -33,31 +31,11 @@ class Rod(Importer):
 def dap3d_importers():
     return [Rod]
 '''
-
-
-@pytest.fixture
-def install(tmp_path, monkeypatch):
-    """Put a distribution on sys.path: its module's text, and an entry point."""
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.delenv("DAP3D_BLOCK", raising=False)
-    modules = []
-
-    def put(name, text, keyword="rod"):
-        modules.append(f"{name}_module")
-        (tmp_path / f"{name}_module.py").write_text(text)
-        info = tmp_path / f"{name}-1.2.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.2\n")
-        entry = f"[dap3d.importers]\n{keyword} = {name}_module\n"
-        (info / "entry_points.txt").write_text(entry)
-
-    yield put
-    for module in modules:
-        sys.modules.pop(module, None)
+ROD = ("rod", "dap3d.importers")
 
 
 def test_a_format_from_outside_takes_the_same_road(install, tmp_path):
-    install("rods", GOOD)
+    install("rods", GOOD, *ROD)
     (tmp_path / "a.rod").write_text("0.5")
     scene, report = dap.import_model(tmp_path / "a.rod")
     assert report.format == "rod"
@@ -78,7 +56,7 @@ def test_a_format_from_outside_takes_the_same_road(install, tmp_path):
     ],
 )
 def test_a_broken_format_is_told_and_hurts_no_other(install, tmp_path, text, words):
-    install("rods", text)
+    install("rods", text, *ROD)
     with pytest.raises(PluginError, match=words) as caught:
         extensions("importer").load("rod")
     assert "distribution rods 1.2" in str(caught.value)
@@ -89,8 +67,8 @@ def test_a_broken_format_is_told_and_hurts_no_other(install, tmp_path, text, wor
 
 
 def test_two_packages_with_one_format_are_told(install):
-    install("rods", GOOD)
-    install("bars", GOOD)
+    install("rods", GOOD, *ROD)
+    install("bars", GOOD, *ROD)
     with pytest.raises(PluginError, match=r"brought by distribution bars .* and .* rods"):
         extensions("importer").load("rod")
 
@@ -101,6 +79,6 @@ def test_an_unknown_format_has_the_nearest(install):
 
 
 def test_a_blocked_format_is_left_out(install, monkeypatch):
-    install("rods", GOOD)
+    install("rods", GOOD, *ROD)
     monkeypatch.setenv("DAP3D_BLOCK", "rods:rod")
     assert "rod" not in extensions("importer").keywords

@@ -40,30 +40,6 @@ GOOD = """
 """
 
 
-@pytest.fixture
-def install(tmp_path, monkeypatch):
-    """Put a distribution on sys.path: its module's text, and its entry points."""
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.delenv("DAP3D_BLOCK", raising=False)
-    modules = []
-
-    def put(name, text, keyword="push", group="dap3d.forces", *, entry_points=None):
-        module = name.replace("-", "_") + "_module"
-        modules.append(module)
-        (tmp_path / f"{module}.py").write_text(textwrap.dedent(text))
-        info = tmp_path / f"{name.replace('-', '_')}-1.2.dist-info"
-        info.mkdir()
-        (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.2\n")
-        if entry_points is None:
-            entry_points = f"[{group}]\n{keyword} = {module}\n"
-        (info / "entry_points.txt").write_text(entry_points)
-        return module
-
-    yield put
-    for module in modules:
-        sys.modules.pop(module, None)
-
-
 def message(kind="force", keyword="push", registry=None):
     """What ``get`` says against a type."""
     registry = registry or load_registry()

@@ -1,7 +1,5 @@
 """Kinds of shapes of other packages: found by entry points, read as others, drawn as meshes."""
 
-import sys
-
 import numpy as np
 import pytest
 
@@ -59,18 +57,10 @@ KEYWORDS = ("wedge", "broken", "named", "pinned", "missing")
 
 
 @pytest.fixture(autouse=True)
-def package(tmp_path, monkeypatch):
+def package(install):
     """A distribution with these kinds on sys.path."""
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.delenv("DAP3D_BLOCK", raising=False)
-    (tmp_path / "my_shapes.py").write_text(KINDS)
-    info = tmp_path / "my_shapes-1.0.dist-info"
-    info.mkdir()
-    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-shapes\nVersion: 1.0\n")
-    entries = "\n".join(f"{name} = my_shapes" for name in KEYWORDS)
-    (info / "entry_points.txt").write_text(f"[dap3d.shapes]\n{entries}\n")
-    yield
-    sys.modules.pop("my_shapes", None)
+    entries = "\n".join(f"{name} = my_shapes_module" for name in KEYWORDS)
+    install("my-shapes", KINDS, entry_points=f"[dap3d.shapes]\n{entries}\n")
 
 
 def scene_with(type_, **fields):
@@ -137,7 +127,7 @@ def test_another_package_with_the_keyword_or_none_is_refused(tmp_path):
     info = tmp_path / "other_shapes-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: other-shapes\nVersion: 1.0\n")
-    (info / "entry_points.txt").write_text("[dap3d.shapes]\nwedge = my_shapes\n")
+    (info / "entry_points.txt").write_text("[dap3d.shapes]\nwedge = my_shapes_module\n")
     with pytest.raises(PluginError, match=r"brought by .*my-shapes.* and .*other-shapes"):
         extensions("shape").load("wedge")
 

@@ -54,6 +54,7 @@ def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     assert "dap3d_core.formulations.joint_loops" not in found  # a tree keeps no rows
 
 
+@pytest.mark.slow
 def test_lanes_are_imported_by_long_studies_in_joint_coordinates():
     """Other studies, and short ones, bring in nothing of them."""
     names = {f"dap3d_core.{part}.lanes" for part in ("kernels.compiler", "study.batch")}
@@ -217,6 +218,7 @@ def test_a_run_knows_nothing_of_studies():
     assert "dap3d_core.simulation.redundancy.freedoms" not in found
 
 
+@pytest.mark.slow
 def test_a_grid_in_memory_needs_no_samples_no_cluster_and_no_packs_of_its_own():
     """What draws samples, fits, speaks to a cluster or draws pictures is left alone by a grid."""
     script = (

@@ -282,7 +282,9 @@ def test_a_derivation_does_not_depend_on_what_was_before(tmp_path):
     assert "def gamma(" in texts.pop()
 
 
-@pytest.mark.parametrize("type_", [Winding, Spooling], ids=lambda t: t.keyword)
+@pytest.mark.parametrize(
+    "type_", [pytest.param(Winding, marks=pytest.mark.slow), Spooling], ids=lambda t: t.keyword
+)
 def test_an_angle_has_the_rate_of_its_formula(type_):
     """Off the common axis, too, where its rate is not theta_dot = k . (w_j - w_i)."""
     report = check_type(type_)

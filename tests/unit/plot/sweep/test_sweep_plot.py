@@ -2,10 +2,10 @@
 
 import json
 
-import matplotlib
 import numpy as np
 import pytest
 import xarray
+from matplotlib import pyplot
 from matplotlib.collections import LineCollection, QuadMesh
 
 import dap3d_core as dap
@@ -17,18 +17,8 @@ from dap3d_core.plot.sweep.sweep_table import Variable, table_of
 from dap3d_core.result import UnknownNameError
 from dap3d_core.study.sweep.subsample import evenly
 
-matplotlib.use("Agg")
-
-from matplotlib import pyplot
-
 MASS, LENGTH, K = "bodies.bob.mass", "points.A.sPp.z", "forces.spring.k"
 T = np.linspace(0.0, 1.0, 5)
-
-
-@pytest.fixture(autouse=True)
-def closed():
-    yield
-    pyplot.close("all")
 
 
 def attributes(names):

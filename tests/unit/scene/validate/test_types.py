@@ -3,14 +3,7 @@
 import pytest
 from unit.scene.base import mistakes_of, scene_of
 
-from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
-
-
-@pytest.fixture(scope="module")
-def registry():
-    return load_registry()
-
 
 PLUGIN = """
 from dap3d_core.interface import (

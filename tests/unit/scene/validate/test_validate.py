@@ -5,22 +5,9 @@ import textwrap
 import numpy as np
 import pytest
 from unit.scene.base import BASE, mistakes_of
-from unit.scene.base import scene_of as read_scene
 from unit.scene.mistakes import ALL
 
-from dap3d_core.registry import load_registry
 from dap3d_core.scene import MISSING, SceneError, check, load
-
-
-@pytest.fixture(scope="module")
-def registry():
-    return load_registry()
-
-
-@pytest.fixture
-def scene_of(tmp_path):
-    """A scene read from a file of this text."""
-    return lambda text: read_scene(tmp_path, text)
 
 
 def test_a_good_scene_becomes_arrays_and_instances(scene_of, registry):

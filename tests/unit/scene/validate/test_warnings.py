@@ -3,21 +3,8 @@
 import numpy as np
 import pytest
 from unit.scene.base import BASE
-from unit.scene.base import scene_of as read_scene
 
-from dap3d_core.registry import load_registry
 from dap3d_core.scene import Scene, SceneError, check
-
-
-@pytest.fixture(scope="module")
-def registry():
-    return load_registry()
-
-
-@pytest.fixture
-def scene_of(tmp_path):
-    """A scene read from a file of this text."""
-    return lambda text: read_scene(tmp_path, text)
 
 
 @pytest.mark.parametrize(

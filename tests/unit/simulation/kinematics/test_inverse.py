@@ -80,6 +80,7 @@ def test_positions_as_data_are_differentiated_by_splines(scene, motion, tmp_path
     assert errors[1] > 8.0 * errors[0]
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_angles_of_joints_are_data_over_many_turns(scene):
     """One column for one freedom; the angle of the crank counts its turns, poses do not."""

@@ -158,6 +158,7 @@ def test_what_is_no_number_of_threads_is_refused(ensemble, threads):
 
 
 @in_another_process
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork here")
 def test_a_sweep_in_a_forked_process_after_one_with_threads_ends():
     """No lock or thread of the parent is missed by the child, at the end of a sweep or within."""

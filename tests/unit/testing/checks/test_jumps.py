@@ -13,6 +13,7 @@ from dap3d_core.interface import Force, Point, Vector, number, point, vector
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.kernels import cross, neg, scale, where
+from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.testing import check_type
 from dap3d_forces.plane_stop import PlaneStop
 from dap3d_forces.point_to_point_stop import PointToPointStop
@@ -102,7 +103,7 @@ class ImpulseInGroundAxes(ImpulseWithoutReaction):
 
 class RollsDice(PlaneStop):
     def impulse(Jv, e):
-        return where(Jv < 0.0, -(1.0 + e) * Jv * random.choice((0.0, 1.0)), 0.0)
+        return where(Jv < 0.0, -(1.0 + e) * Jv * random.random(), 0.0)
 
 
 class Branches(PlaneStop):
@@ -131,6 +132,7 @@ class Branches(PlaneStop):
 )
 def test_a_planted_error_is_found_and_named(type_, failing, words):
     report = check_type(type_)
+    failing -= set() if jit_is_on() else {"compiled"}
     assert {outcome.check for outcome in report.outcomes if not outcome.ok} == failing
     assert any(words in finding.words for finding in report.findings), str(report)
 

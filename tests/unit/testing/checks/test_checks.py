@@ -431,7 +431,7 @@ class Cam(Joint):
 
 def test_a_function_that_is_always_there_is_given_to_the_type_itself():
     """No variant is told from another by it."""
-    report = check_type(Cam)
+    report = check_type(Cam, poses=1)
     assert report.ok, str(report)
     assert {o.state for o in report.outcomes if o.check in ("J", "gamma", "rank")} == {"ok"}
 
@@ -471,7 +471,7 @@ def test_what_cannot_be_compiled_is_said():
 
 def test_a_report_has_all_that_is_needed_to_see_the_error_again():
     """Seed, pose, fields; the same seed leads to the same numbers, another one to others."""
-    report, again, other = (check_type(TermMissingInGamma, seed=s) for s in (7, 7, 8))
+    report, again, other = (check_type(TermMissingInGamma, poses=1, seed=s) for s in (7, 7, 8))
     (finding,) = (f for f in report.findings if f.check == "gamma")
     assert (finding.kernel, finding.row, finding.variant) == ("gamma", 4, "")
     assert finding.error > finding.tolerance > 0.0
@@ -484,7 +484,7 @@ def test_a_report_has_all_that_is_needed_to_see_the_error_again():
 
 def test_each_variant_is_checked_by_itself():
     """The words name the variant that is wrong; the others are right."""
-    report = check_type(OneVariantWrong)
+    report = check_type(OneVariantWrong, poses=1)
     assert {f.variant for f in report.findings} == {"slip = xyz"}
     assert {o.variant for o in report.outcomes} == {f"slip = {s}" for s in ("z", "nz", "tz", "xyz")}
 
@@ -509,7 +509,7 @@ def test_a_type_without_a_finite_number_is_told():
         def wrench(d, k, s_P_i, s_P_j, t):
             return pull(k, scale(where(t < 1.05, math.nan, 1.0), d), s_P_i, s_P_j)
 
-    report = check_type(Nowhere)
+    report = check_type(Nowhere, poses=1)
     assert "200 random elements in a row: its kernels give no finite numbers" in str(report)
     assert not report.ok
 
@@ -520,12 +520,12 @@ def test_a_declared_exemption_is_told():
     class Level(Upright):
         ground_axes = True
 
-    outcomes = {o.check: o for o in check_type(Level).outcomes}
+    outcomes = {o.check: o for o in check_type(Level, poses=1).outcomes}
     assert outcomes["frame"].state == outcomes["action and reaction"].state == "not applicable"
     assert "ground_axes = True" in outcomes["frame"].words
 
     class Limited(TwiceTheEnergy):
         energy_where = "where the spring is slack"
 
-    outcomes = {o.check: o for o in check_type(Limited).outcomes}
+    outcomes = {o.check: o for o in check_type(Limited, poses=1).outcomes}
     assert outcomes["energy"].words.endswith("only where the spring is slack")

@@ -1,6 +1,6 @@
 """An error planted in what has to do with states is found; the words name row and remedy.
 
-As test_planted_errors.py: the set of checks that fail is asserted whole.
+As in test_checks.py the set of checks that fail is asserted whole.
 """
 
 import math
