@@ -255,13 +255,13 @@ def factors_of(S: Symmetric) -> Symmetric:
 
     Not by cofactors, which would lose the accelerations of a thin body in all directions: here the
     digits that its moment of inertia has not are lost about its axis alone.
+
+    The three divisions wait for no other: d1 = m1/d0, d2 = m2/(d0 m1) with minors of S.
     """
     i0 = 1.0 / S[0]
-    l1, l2 = S[1] * i0, S[2] * i0
-    x = S[4] - l1 * S[2]
-    i1 = 1.0 / (S[3] - l1 * S[1])
-    l3 = x * i1
-    return i0, l1, l2, i1, l3, 1.0 / (S[5] - l2 * S[2] - l3 * x)
+    m1, x = S[0] * S[3] - S[1] * S[1], S[0] * S[4] - S[1] * S[2]
+    part, m2 = 1.0 / m1, m1 * (S[0] * S[5] - S[2] * S[2]) - x * x
+    return i0, S[1] * i0, S[2] * i0, S[0] * part, x * part, S[0] * m1 / m2
 
 
 @compiled_into
