@@ -18,7 +18,7 @@ from dap3d_core.kernels.compiler import types as t
 
 #: Time of optimised compilation over that of unoptimised compilation (measured: 55 to 80).
 COST_RATIO = 60.0
-_C_TYPES = {"double": ctypes.c_double, "i64": ctypes.c_int64, "i1": ctypes.c_int64,
+_C_TYPES = {"double": ctypes.c_double, "i64": ctypes.c_int64, "i1": ctypes.c_bool,
             "ptr": ctypes.c_void_p}  # fmt: skip
 _address, _from_buffer = ctypes.addressof, ctypes.c_char.from_buffer
 _ITEMS = {dtype: item for item, dtype in t.DTYPES.items()}
@@ -122,7 +122,6 @@ class Entry:
 
     def __init__(self, unit: Unit, k: int, signature: t.Signature) -> None:
         self.unit, self.k, self.signature = unit, k, signature
-        self._is_bool = signature.result == t.BOOL
         self._address: int = 0
         self._function: Any = None
         self._call: Any = None
@@ -136,12 +135,11 @@ class Entry:
         if self.unit.addresses[self.k] != self._address:
             self._bind()
         if not background.optimiser.units:
-            result = self._call(self._function, *arguments)
-        else:
-            start = time.perf_counter()
-            result = self._call(self._function, *arguments)
-            background.optimiser.poll(time.perf_counter() - start)
-        return bool(result) if self._is_bool else result
+            return self._call(self._function, *arguments)
+        start = time.perf_counter()
+        result = self._call(self._function, *arguments)
+        background.optimiser.poll(time.perf_counter() - start)
+        return result
 
     def _bind(self) -> None:
         if self._call is None:  # many entries are never called from Python
@@ -181,15 +179,15 @@ def _caller(types: Sequence[Any]) -> Callable[..., Any]:
 
 def _words_of(name: str, type_: Any, checks: dict[str, Any]) -> str:
     """Python text of the machine words of an argument; adds the functions that it calls."""
-    if isinstance(type_, t.Array):
+    if isinstance(type_, t.Array) and type_.ndim > 0:
         checks[f"array{len(checks)}"] = _array_check(type_)
         return f"array{len(checks) - 1}({name}), *{name}.shape"
     if isinstance(type_, t.Tuple):
         parts = (_words_of(f"{name}[{k}]", item, checks) for k, item in enumerate(type_.items))
         return ", ".join(filter(None, parts))
     if isinstance(type_, t.Scalar):
-        return {t.INT: f"int({name})", t.BOOL: f"int({name})", t.NOTHING: ""}.get(type_, name)
-    return f"address_of({name})" if isinstance(type_, t.Numbers) else f"{name}.address"
+        return {t.INT: f"int({name})", t.NOTHING: ""}.get(type_, name)
+    return f"address_of({name})" if isinstance(type_, t.Array) else f"{name}.address"
 
 
 def _array_check(type_: t.Array) -> Callable[[Any], int]:
