@@ -20,7 +20,6 @@ from dap3d_core.kernels.compiler import types as t
 COST_RATIO = 60.0
 _C_TYPES = {"double": ctypes.c_double, "i64": ctypes.c_int64, "i1": ctypes.c_bool,
             "ptr": ctypes.c_void_p}  # fmt: skip
-_address, _from_buffer = ctypes.addressof, ctypes.c_char.from_buffer
 _ITEMS = {dtype: item for item, dtype in t.DTYPES.items()}
 #: Names of the units that this process compiled rather than loaded.
 compiled_units: list[str] = []
@@ -77,12 +76,11 @@ class Unit:
         self.text, results = write(self.symbols)
         if collected is not None:
             collected[ready_name] = self.text, results
+        if self.is_optimised:
+            return results, objects.optimised(self.text, results, self.path)
         start = time.perf_counter()
-        level = objects.OPTIMISED if self.is_optimised else objects.UNOPTIMISED
-        code = objects.compile_ir(self.text, level)
+        code = objects.compile_ir(self.text, objects.UNOPTIMISED)
         self.cost = COST_RATIO * (time.perf_counter() - start)
-        if self.is_optimised and self.path is not None:
-            objects.write_object(self.path, results, code)
         return results, code
 
     def register_slot(self, table: Any, index: int, k: int) -> None:
@@ -157,7 +155,9 @@ def address_of(array: Any) -> int:
         TypeError: it is not C-contiguous.
     """
     try:
-        return _address(_from_buffer(array))  # four times faster than array.ctypes.data
+        return ctypes.addressof(
+            ctypes.c_char.from_buffer(array)
+        )  # four times faster than array.ctypes.data
     except (TypeError, ValueError):  # read-only, empty, or not contiguous
         if not array.flags.c_contiguous:
             raise TypeError(f"an array with strides {array.strides} is not C-contiguous") from None
@@ -196,10 +196,7 @@ def _array_check(type_: t.Array) -> Callable[[Any], int]:
     def checked_address(array: Any) -> int:
         if array.dtype != dtype or array.ndim != ndim:
             raise TypeError(f"{array.dtype} with {array.ndim} indices is no {type_}")
-        try:
-            return _address(_from_buffer(array))
-        except (TypeError, ValueError):
-            return address_of(array)
+        return address_of(array)
 
     return checked_address
 
