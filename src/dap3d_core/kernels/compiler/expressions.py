@@ -169,7 +169,7 @@ class Expressions(Writer):
             return value
         if value.constant is not None:
             return self._chain(node, read, k + 1)
-        name = self.label()
+        name = f"both.{self.label()}"  # no name of Python's
         self.store(part, name, value)
         self.fork(self.negation(value) if decides else value,
                   lambda: self.store(part, name, self._chain(node, read, k + 1)))  # fmt: skip

@@ -35,8 +35,8 @@ class Tracer(Writer):
         super().__init__(self.program.needs)
 
     def refuse(self, node: Any, why: str, remedy: str) -> NoReturn:
-        """Raise a TraceError; that of a kernel gets its line from the traceback."""
-        raise TraceError(f"has {why}; {remedy}")
+        """Raise a TraceError, with the remedy for kernels; its line is in the traceback."""
+        raise TraceError(f"has {why}; {_REMEDY}")
 
     def value(self, x: Any, like: t.Scalar = t.FLOAT) -> t.Value:
         """A number of a kernel: symbolic, or a constant, a float unless it is of the type given."""
@@ -68,7 +68,8 @@ class Tracer(Writer):
         """``a`` where the condition holds, else ``b``; tuples item by item."""
         if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
             return tuple(self.where(condition, x, y) for x, y in zip(a, b, strict=True))
-        return Symbol(self, self.select(None, condition.value, self.value(a), self.value(b)))
+        test = self.cast(None, condition.value, t.BOOL)
+        return Symbol(self, self.select(None, test, self.value(a), self.value(b)))
 
     def integer(self, x: Any) -> "Symbol":
         """A float as an integer, an index or a count."""

@@ -155,9 +155,8 @@ def address_of(array: Any) -> int:
         TypeError: it is not C-contiguous.
     """
     try:
-        return ctypes.addressof(
-            ctypes.c_char.from_buffer(array)
-        )  # four times faster than array.ctypes.data
+        # four times faster than array.ctypes.data
+        return ctypes.addressof(ctypes.c_char.from_buffer(array))
     except (TypeError, ValueError):  # read-only, empty, or not contiguous
         if not array.flags.c_contiguous:
             raise TypeError(f"an array with strides {array.strides} is not C-contiguous") from None

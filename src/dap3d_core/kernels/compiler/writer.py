@@ -1,7 +1,6 @@
 """LLVM IR of one function: instructions, casts, arithmetic, comparisons, blocks, stack slots."""
 
 import ast
-import contextlib
 import operator
 from collections.abc import Callable, Sequence
 from functools import partial
@@ -148,10 +147,12 @@ class Writer:
     def operation(self, node: Any, op: ast.operator, a: t.Value, b: t.Value) -> t.Value:
         """An operation of two numbers, in the narrowest type that has it and holds both."""
         python, instructions = OPERATORS.get(type(op), (None, {}))
-        if a.constant is not None and b.constant is not None and python is not None:
-            with contextlib.suppress(ArithmeticError, TypeError, ValueError):
-                if folded := t.constant(python(a.constant, b.constant)):
-                    return folded
+        if python is not None and a.constant is not None and b.constant is not None:
+            try:
+                folded = t.constant(python(a.constant, b.constant))
+            except (ArithmeticError, TypeError, ValueError) as error:
+                self.refuse(node, str(error), "change the constants")
+            return folded or self.refuse(node, "no number of 64 bits", "change the constants")
         common = t.wider(a.type, b.type)
         wide = t.NUMBERS[t.NUMBERS.index(common) :] if common else ()
         types = [kind for kind in wide if kind in instructions]
