@@ -149,9 +149,7 @@ def statements(draw, depth=0, indent="    "):
             test = draw(conditions())
             lines += [f"{indent}if {test}:", *inner(), f"{indent}else:", *inner()]
         elif kind == 6:
-            bounds = draw(
-                st.sampled_from(["4", "1, 4", "3, -1, -1", "abs(k) % 5", "-4, 5, abs(j) % 3 + 1"])
-            )
+            bounds = draw(st.sampled_from(["4", "1, 4", "3, -1, -1", "abs(k) % 5", "-4, 5, 2"]))
             lines += [f"{indent}for i in range({bounds}):", *inner()]
         elif kind == 7:
             leave, test = draw(st.sampled_from(["break", "continue"])), draw(conditions())

@@ -269,9 +269,9 @@ def scale_residual(
         m, f, o = blocks[q, 2], blocks[q, 3], matrix.block_place[q, 2]
         for r in range(m):
             x[o + r], x[o + m + r] = rows[0, f + r], rows[1, f + r]
-    for e in range(matrix.state_nodes.shape[0]):
-        z, o = states_offset(count) + matrix.state_nodes[e, FIRST], matrix.state_nodes[e, UNKNOWN]
-        for d in range(matrix.state_nodes[e, WIDTH_OF]):
+    for s in range(matrix.state_nodes.shape[0]):
+        z, o = states_offset(count) + matrix.state_nodes[s, FIRST], matrix.state_nodes[s, UNKNOWN]
+        for d in range(matrix.state_nodes[s, WIDTH_OF]):
             x[o + d] = R[z + d]
 
 
@@ -321,9 +321,9 @@ def unscale_solution(
         out[c + 6] = e[12] * along - e[11] * w0 + e[10] * w1 + e[9] * w2
         out[f + 3], out[f + 4], out[f + 5] = unscaled(k, x[o + 9], x[o + 10], x[o + 11])
     out[out.shape[0] - 1] = 0.0
-    for e in range(matrix.state_nodes.shape[0]):
-        z, o = states_offset(count) + matrix.state_nodes[e, FIRST], matrix.state_nodes[e, UNKNOWN]
-        for d in range(matrix.state_nodes[e, WIDTH_OF]):
+    for s in range(matrix.state_nodes.shape[0]):
+        z, o = states_offset(count) + matrix.state_nodes[s, FIRST], matrix.state_nodes[s, UNKNOWN]
+        for d in range(matrix.state_nodes[s, WIDTH_OF]):
             out[z + d] = x[o + d]
     for q in range(blocks.shape[0]):
         m, f, o = blocks[q, 2], blocks[q, 3], matrix.block_place[q, 2]

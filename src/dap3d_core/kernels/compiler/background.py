@@ -79,26 +79,22 @@ class Optimiser:
         try:
             self._polled = now
             for unit in list(self.units):
-                if unit.path is not None and unit.path.exists():
-                    self._replace(unit, objects.read_object(unit.path))
+                if unit.path is not None and (stored := objects.read_object(unit.path)):
+                    self._replace(unit, stored[1])
             if self._process is None or self._has_ended():
                 self._optimise_here()
         finally:
             self._lock.release()
 
-    def _replace(self, unit: Any, stored: tuple[Any, bytes] | None) -> None:
-        if stored is not None:
-            unit.replace_code(stored[1])
-            self.units.remove(unit)
+    def _replace(self, unit: Any, code: bytes) -> None:
+        unit.replace_code(code)
+        self.units.remove(unit)
 
     def _optimise_here(self) -> None:
         if not self.units or self._spent < sum(unit.cost for unit in self.units):
             return
         for unit in list(self.units):
-            code = objects.compile_ir(unit.text, objects.OPTIMISED)
-            if unit.path is not None:
-                objects.write_object(unit.path, unit.results, code)
-            self._replace(unit, (unit.results, code))
+            self._replace(unit, objects.optimised(unit.text, unit.results, unit.path))
         self._spent = 0.0
 
 
@@ -121,8 +117,7 @@ def main() -> None:
         with contextlib.suppress(OSError, ValueError, RuntimeError):
             results, text = objects.decoded(path.read_bytes())
             if not target.exists():
-                code = objects.compile_ir(text.decode(), objects.OPTIMISED)
-                objects.write_object(target, results, code)
+                objects.optimised(text.decode(), results, target)
         with contextlib.suppress(OSError):
             path.unlink()
 

@@ -4,7 +4,8 @@ import ast
 import builtins
 import inspect
 import types
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from functools import partial
 from typing import Any
 
 from dap3d_core.kernels.compiler import types as t
@@ -13,32 +14,30 @@ from dap3d_core.kernels.compiler.writer import Writer
 
 #: Remedies for what is outside the subset.
 INSTEAD = {
-    "ListComp": "loop over a range, and write into an array",
-    "GeneratorExp": "loop over a range",
-    "SetComp": "loop over a range",
-    "DictComp": "loop over a range",
-    "List": "pass an array, or a tuple",
-    "Dict": "pass arrays",
-    "Set": "pass arrays",
-    "Lambda": "put a function at the top of the module",
-    "JoinedStr": "format texts in Python",
-    "NamedExpr": "assign in a line of its own",
-    "Yield": "write into an array",
-    "Await": "compiled code waits for nothing",
-    "Starred": "name each argument",
-    "AnnAssign": "assign without an annotation",
-    "With": "open nothing in compiled code",
-    "Try": "test before, and return a number that says what went wrong",
-    "Raise": "return a number that says what went wrong",
-    "Assert": "return a number that says what went wrong",
-    "FunctionDef": "put the function at the top of its module",
-    "ClassDef": "put the class at the top of its module",
-    "Import": "import at the top of the module",
-    "ImportFrom": "import at the top of the module",
-    "Global": "pass an array that is written to",
-    "Nonlocal": "pass an array that is written to",
-    "Delete": "leave the name as it is",
-    "Match": "write if and elif",
+    kind: remedy
+    for kinds, remedy in {
+        "ListComp": "loop over a range, and write into an array",
+        "GeneratorExp SetComp DictComp": "loop over a range",
+        "List": "pass an array, or a tuple",
+        "Dict Set": "pass arrays",
+        "Lambda": "put a function at the top of the module",
+        "JoinedStr": "format texts in Python",
+        "NamedExpr": "assign in a line of its own",
+        "Yield": "write into an array",
+        "Await": "compiled code waits for nothing",
+        "Starred": "name each argument",
+        "AnnAssign": "assign without an annotation",
+        "With": "open nothing in compiled code",
+        "Try": "test before, and return a number that says what went wrong",
+        "Raise Assert": "return a number that says what went wrong",
+        "FunctionDef": "put the function at the top of its module",
+        "ClassDef": "put the class at the top of its module",
+        "Import ImportFrom": "import at the top of the module",
+        "Global Nonlocal": "pass an array that is written to",
+        "Delete": "leave the name as it is",
+        "Match": "write if and elif",
+    }.items()
+    for kind in kinds.split()
 }
 
 
@@ -69,17 +68,14 @@ class Expressions(Writer):
     # ------------------------------------------------------------------ names
 
     def _Name(self, node: ast.Name) -> t.Value:
-        name, code = node.id, self.function.__code__
+        name = node.id
         argument = self.arguments.get(name)
         if isinstance(argument, t.Known) and name not in self.stored:
             return self._known(node, name, argument.value)
-        if name in self.current:
-            return self.load(node, name)
+        if name in self.variables:
+            return self.load(name)
         if name in self.stored:
             self.refuse(node, f"{name} has no value yet", "assign one on every path")
-        if name in code.co_freevars:
-            cell = self.function.__closure__[code.co_freevars.index(name)]
-            return self._known(node, name, cell.cell_contents)
         for names in (self.function.__globals__, vars(builtins)):
             if name in names:
                 return self._known(node, name, names[name])
@@ -153,59 +149,53 @@ class Expressions(Writer):
 
     def condition(self, node: ast.expr) -> t.Value:
         """The truth value of an expression."""
-        value = self._both(node, True) if isinstance(node, ast.BoolOp) else self.value(node)
-        if value.type not in (t.BOOL, t.INT, t.FLOAT):
+        value = (
+            self._chain(node, self.condition) if isinstance(node, ast.BoolOp) else self.value(node)
+        )
+        if value.type not in (t.BOOL, t.INT):
             self.refuse(node, f"a {t.name_of(value.type)} is a condition", "compare numbers")
         return self.cast(node, value, t.BOOL)
 
     def _BoolOp(self, node: ast.BoolOp) -> t.Value:
-        return self._both(node, False)
+        return self._chain(node, self.value)
 
-    def _both(self, node: ast.BoolOp, is_condition: bool) -> t.Value:
-        """``and`` or ``or``; operands may be numbers where only their truth is used."""
-        decides = isinstance(node.op, ast.Or)
-        slots, end, values = self.place(t.BOOL, "both"), self.label(), []
-        for part in node.values:
-            value = self.condition(part) if is_condition else self.value(part)
-            if value.type != t.BOOL:
-                self.refuse(part, f"and, or of a {t.name_of(value.type)}", "compare it: x != 0")
-            values.append(value)
-            self.write_to(slots, value)
-            if value.constant == decides or part is node.values[-1]:
-                break
-            if value.constant is None:
-                more = self.label()
-                self.branch(value, *((end, more) if decides else (more, end)))
-                self.start(more)
-        self.jump(end)
-        self.start(end)
-        if all(v.constant is not None for v in values):
-            return values[-1]
-        return self.read_from(slots, t.BOOL)
+    def _chain(self, node: ast.BoolOp, read: Callable[[ast.expr], t.Value], k: int = 0) -> t.Value:
+        """``and`` or ``or`` of the parts from the k-th one, each read by a function."""
+        part, is_last = node.values[k], k == len(node.values) - 1
+        value, decides = read(part), isinstance(node.op, ast.Or)
+        if value.type != t.BOOL:
+            self.refuse(part, f"and, or of a {t.name_of(value.type)}", "compare it: x != 0")
+        if is_last or value.constant == decides:
+            return value
+        if value.constant is not None:
+            return self._chain(node, read, k + 1)
+        name = f"both.{self.label()}"  # no name of Python's
+        self.store(part, name, value)
+        self.fork(self.negation(value) if decides else value,
+                  lambda: self.store(part, name, self._chain(node, read, k + 1)))  # fmt: skip
+        return self.load(name)
 
     def _IfExp(self, node: ast.IfExp) -> t.Value:
         test = self.condition(node.test)
         if test.constant is not None:
             return self.value(node.body if test.constant else node.orelse)
-        labels, end = (self.label(), self.label()), self.label()
-        self.branch(test, *labels)
-        before, parts, values = self.lines, [], []
-        for label, part in zip(labels, (node.body, node.orelse), strict=True):
-            self.lines = []
-            self.start(label)
+        values, ends = [], []
+
+        def arm(part: ast.expr) -> None:
             values.append(self.value(part))
-            parts.append(self.lines)
-        type_ = t.wider(values[0].type, values[1].type)
+            ends.append(len(self.lines))
+
+        self.fork(test, partial(arm, node.body), partial(arm, node.orelse))
+        one, other = (value.type for value in values)
+        type_ = one if one == other else t.wider(one, other)
         if type_ is None:
-            self.refuse(node, f"a {t.name_of(values[0].type)} or a {t.name_of(values[1].type)}",
+            self.refuse(node, f"a {t.name_of(one)} or a {t.name_of(other)}",
                         "let both be of one type")  # fmt: skip
         slots = self.place(type_, "either")
-        for lines, value in zip(parts, values, strict=True):
-            self.lines = lines
+        for value, end in reversed(list(zip(values, ends, strict=True))):
+            self.lines, behind = self.lines[:end], self.lines[end:]
             self.write_to(slots, self.cast(node, value, type_))
-            self.line(f"br label %{end}")
-        self.lines = [*before, *parts[0], *parts[1]]
-        self.start(end)
+            self.lines += behind
         return self.read_from(slots, type_)
 
     # ------------------------------------------------------------------ arrays
@@ -219,7 +209,7 @@ class Expressions(Writer):
 
     def index(self, node: ast.expr, length: str) -> str:
         """The word of an index; a negative constant counts from the end."""
-        index = self.integer(node, self.value(node))
+        index = self.whole(node, self.value(node))
         if index.constant is not None and index.constant < 0:
             return self.new(f"add nsw i64 {length}, {index.constant}")
         return index.word
@@ -275,7 +265,7 @@ class Expressions(Writer):
         if isinstance(type_, t.Tuple):
             return self._tuple_item(node, value)
         if isinstance(type_, t.Table):
-            k = self.integer(node.slice, self.value(node.slice)).word
+            k = self.whole(node.slice, self.value(node.slice)).word
             at = self.new(f"getelementptr inbounds i64, ptr {value.word}, i64 {k}")
             return t.Value(t.Pointer(type_.signature), (self.new(f"load ptr, ptr {at}"),))
         if not isinstance(type_, t.Array) or len(places) > type_.ndim:
@@ -323,51 +313,41 @@ class Expressions(Writer):
         if not isinstance(called.type, t.Known):
             self.refuse(node, f"a {t.name_of(called.type)} is called", "call functions")
         function = called.type.value
+        if node.keywords:
+            self.refuse(node, "a call with names", "give arguments by position")
         arguments = [self.value(a) for a in node.args]
         name = KNOWN.get(function) if isinstance(function, Hashable) else None
         name = name or getattr(function, "intrinsic", None)
         if name is not None:
-            if node.keywords:
-                self.refuse(node, f"{name} is called with names", "give its arguments by position")
             return FORMS[name](self, node, arguments)
         plain = inspect.unwrap(function)
         if not isinstance(plain, types.FunctionType) or plain.__module__ in ("numpy", "math"):
             name = getattr(function, "__qualname__", repr(function))
             self.refuse(node, f"{name} is not known to compiled code",
                         "call a function of the subset, or one that it names")  # fmt: skip
-        return self._call_function(node, function, plain, arguments)
+        return self._call_function(node, function, arguments)
 
-    def _call_function(
-        self, node: ast.Call, function: Any, plain: types.FunctionType, arguments: list[t.Value]
-    ) -> t.Value:
-        parameters = list(inspect.signature(plain).parameters.values())
-        named = {k.arg: self.value(k.value) for k in node.keywords}
-        if len(arguments) > len(parameters) or set(named) - {p.name for p in parameters}:
-            self.refuse(node, f"{plain.__qualname__} is not called as it is defined",
-                        f"it takes {', '.join(p.name for p in parameters)}")  # fmt: skip
-        for parameter in parameters[len(arguments) :]:
-            given = named.get(parameter.name) or t.constant(parameter.default)
-            if given is None:
-                self.refuse(node, f"{plain.__qualname__} is called without {parameter.name}",
-                            "give it a value")  # fmt: skip
-            arguments.append(given)
-        is_inlined = getattr(function, "is_inlined", False)
+    def _call_function(self, node: ast.Call, function: Any, arguments: list[t.Value]) -> t.Value:
+        name, signature = inspect.unwrap(function).__qualname__, inspect.signature(function)
+        try:
+            given = signature.bind(*arguments)
+        except TypeError as error:
+            self.refuse(node, f"{name} is not called as it is defined: {error}",
+                        f"it takes {', '.join(signature.parameters)}")  # fmt: skip
+        given.apply_defaults()
         types_, words = [], []
-        for parameter, value in zip(parameters, arguments, strict=True):
-            if parameter.annotation is float and value.type in (t.INT, t.BOOL):
-                value = self.cast(node, value, t.FLOAT)
-            if is_inlined and value.constant is not None:
+        for parameter, value in given.arguments.items():
+            if not isinstance(value, t.Value):
+                value = self._known(node, parameter, value)
+            if getattr(function, "is_inlined", False) and value.constant is not None:
                 types_.append(t.Known(value.constant))
                 continue
             types_.append(value.type)
             words += [f"{w} {x}" for w, x in zip(value.type.words, value.words, strict=True)]
-        try:
-            name, result = self.program.function(function, types_)
-        except t.CompileError as error:
-            if "calls itself" in str(error):
-                self.refuse(node, str(error).split(";")[0], "write a loop")
-            raise
-        return self._result_of(f"@{name}", result, words)
+        done = self.program.function(function, types_)
+        if done is None:
+            self.refuse(node, f"{name} calls itself", "write a loop")
+        return self._result_of(f"@{done[0]}", done[1], words)
 
     def _call_pointer(self, node: ast.Call, called: t.Value) -> t.Value:
         """A call of a function from a table."""
@@ -378,8 +358,7 @@ class Expressions(Writer):
         words = []
         for part, type_ in zip(node.args, wanted, strict=True):
             value = self.cast(part, self.value(part), type_)
-            words += [f"{'i64' if w == 'i1' else w} {x}"
-                      for w, x in zip(type_.words, value.words, strict=True)]  # fmt: skip
+            words += [f"{w} {x}" for w, x in zip(type_.words, value.words, strict=True)]
         return self._result_of(called.word, called.type.signature.result, words)
 
     def _result_of(self, name: str, result: Any, words: Sequence[str]) -> t.Value:

@@ -1,8 +1,8 @@
 """Functions of the typed subset of Python to LLVM IR: their types, variables and statements.
 
-A function is compiled for the types of its arguments. Types of variables are inferred by compiling
-the function until none changes any more. Variables live in stack slots, which LLVM turns into
-registers. Results have the bits of plain Python: nothing is contracted or reassociated.
+A function is compiled for the types of its arguments. A variable has the type of its first value.
+Variables live in stack slots, which LLVM turns into registers. Results have the bits of plain
+Python: nothing is contracted or reassociated.
 """
 
 import ast
@@ -10,8 +10,8 @@ import contextlib
 import inspect
 import linecache
 from collections.abc import Callable, Sequence
-from functools import cache
-from typing import Any
+from functools import cache, partial
+from typing import Any, NoReturn
 
 from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.expressions import Expressions
@@ -26,39 +26,32 @@ class Program:
         self.needs: dict[str, str] = {}
         self._done: dict[Any, tuple[str, Any] | None] = {}
 
-    def function(self, function: Any, arguments: Sequence[Any]) -> tuple[str, Any]:
-        """Name and result type of a function, compiled for types of its arguments."""
+    def function(self, function: Any, arguments: Sequence[Any]) -> tuple[str, Any] | None:
+        """Name and result type of a function, compiled for types of its arguments.
+
+        None while that very code is compiled: the function calls itself.
+        """
         inlined = getattr(function, "is_inlined", False)
         function = inspect.unwrap(function)
         key = function, tuple(arguments)
         if key not in self._done:
             self._done[key] = None
             name = f"{function.__name__}.{len(self._done)}"
-            compiler = FunctionCompiler(self, function, tuple(arguments), name)
+            compiler = FunctionCompiler(self, function, tuple(arguments))
             self._done[key] = name, compiler.result
-            self.text.append(compiler.finished(inlined))
-        done = self._done[key]
-        if done is None:
-            raise t.CompileError(f"{function.__qualname__} calls itself; write a loop")
-        return done
+            self.text.append(compiler.text(name, inlined))
+        return self._done[key]
 
     def export(self, function: Any, arguments: Sequence[Any], symbol: str) -> t.Signature:
-        """Export a function under a symbol; booleans are integers in its arguments and result."""
-        name, result = self.function(function, arguments)
-        words = [(w, f"%a{k}") for k, w in enumerate(w for a in arguments for w in a.words)]
-        outside = ", ".join(f"{'i64' if w == 'i1' else w} {x}" for w, x in words)
-        lines = [f"  {x}.b = trunc i64 {x} to i1" for w, x in words if w == "i1"]
-        inside = ", ".join(f"{w} {x}{'.b' if w == 'i1' else ''}" for w, x in words)
-        returned = t.result_type(result)
-        if returned == "i1":
-            lines += [f"  %r = call i1 @{name}({inside})", "  %i = zext i1 %r to i64"]
-            lines, returned = [*lines, "  ret i64 %i"], "i64"
-        elif returned == "void":
-            lines += [f"  call void @{name}({inside})", "  ret void"]
-        else:
-            lines += [f"  %r = call {returned} @{name}({inside})", f"  ret {returned} %r"]
-        body = "\n".join(lines)
-        self.text.append(f"define {returned} @{symbol}({outside}) nounwind {{\n{body}\n}}\n")
+        """Export a function under a symbol."""
+        name, result = self.function(function, arguments) or ("", t.NOTHING)
+        words = ", ".join(f"{w} %a{k}" for k, w in enumerate(w for a in arguments for w in a.words))
+        type_ = t.result_type(result)
+        body = f"  call void @{name}({words})\n  ret void"
+        if result.words:
+            body = f"  %r = call {type_} @{name}({words})\n  ret {type_} %r"
+        outside = f"{'zeroext ' if type_ == 'i1' else ''}{type_}"  # as C has it
+        self.text.append(f"define {outside} @{symbol}({words}) nounwind {{\n{body}\n}}\n")
         return t.Signature(tuple(arguments), result)
 
     def module(self) -> str:
@@ -70,48 +63,20 @@ class FunctionCompiler(Expressions):
     """Compiles one function for one choice of argument types."""
 
     def __init__(
-        self,
-        program: Program,
-        function: Callable[..., Any],
-        arguments: tuple[Any, ...],
-        name: str,
+        self, program: Program, function: Callable[..., Any], arguments: tuple[Any, ...]
     ) -> None:
-        self.program, self.function, self.name = program, function, name
-        self.node = definition(function)
+        super().__init__(program.needs)
+        self.program, self.function, self.node = program, function, definition(function)
         given = self.node.args
         if given.vararg or given.kwarg or given.kwonlyargs or given.posonlyargs:
             self.refuse(self.node, "takes more than plain arguments", "name each of them")
         self.arguments = dict(zip([a.arg for a in given.args], arguments, strict=True))
         self.stored = stored_names(self.node)
-        self.types: dict[Any, Any] = {}
-        self.changes: dict[ast.AST, set[str]] = {}
-        self.result: Any = None
-        for _ in range(10):
-            self.is_settled = True
-            self._compile()
-            if self.is_settled:
-                return
-        self.refuse(self.node, "has variables whose types do not settle", "give each one type")
-
-    def finished(self, inlined: bool) -> str:
-        """The text of the function."""
-        parameters = [(w, f"%{n}.{k}.a") for n, kind in self.arguments.items()
-                      for k, w in enumerate(kind.words)]  # fmt: skip
-        head = ", ".join(f"{w} {x}" for w, x in parameters)
-        attributes = "nounwind inlinehint" if inlined else "nounwind"
-        lines = "\n".join(["entry:", *self.places, *self.lines])
-        return (
-            f"define internal {t.result_type(self.result)} @{self.name}({head}) {attributes} "
-            f"{{\n{lines}\n}}\n"
-        )
-
-    def _compile(self) -> None:
-        self.lines, self.places, self.count, self.is_dead = [], [], 0, False
-        self.slots: dict[Any, list[str]] = {}
-        #: Variable of each name, None where that depends on the path.
-        self.current: dict[str, Any] = {}
+        #: Type and stack slots of each variable.
+        self.variables: dict[str, tuple[Any, list[str]]] = {}
         #: Labels to continue at, and behind, each enclosing loop.
         self.loops: list[tuple[str, str]] = []
+        self.result: Any = None
         for name, type_ in self.arguments.items():
             if not isinstance(type_, t.Known):
                 words = tuple(f"%{name}.{k}.a" for k in range(len(type_.words)))
@@ -123,36 +88,34 @@ class FunctionCompiler(Expressions):
             self.result = t.NOTHING
             self.line("ret void")
 
+    def refuse(self, node: ast.AST, why: str, remedy: str) -> NoReturn:
+        """Raise a CompileError: what is wrong, what to write instead, file and line."""
+        where = f"{self.function.__code__.co_filename}:{node.lineno}"
+        raise t.CompileError(f"{self.function.__qualname__}: {why}; {remedy} [{where}]")
+
+    def text(self, name: str, inlined: bool) -> str:
+        """The text of the function."""
+        head = ", ".join(f"{w} %{n}.{k}.a" for n, type_ in self.arguments.items()
+                         for k, w in enumerate(type_.words))  # fmt: skip
+        attributes = "nounwind inlinehint" if inlined else "nounwind"
+        lines = "\n".join(["entry:", *self.places, *self.lines])
+        type_ = t.result_type(self.result)
+        return f"define internal {type_} @{name}({head}) {attributes} {{\n{lines}\n}}\n"
+
     def store(self, node: ast.AST, name: str, value: t.Value) -> None:
-        """Assign a value to a variable.
+        """Assign a value to a variable, which has the type of its first one."""
+        if name not in self.variables:
+            self.variables[name] = value.type, self.place(value.type, name)
+        type_, slots = self.variables[name]
+        if type_ != value.type:
+            self.refuse(node, f"{name} holds a {t.name_of(type_)} and a {t.name_of(value.type)}",
+                        "take two names, or convert one")  # fmt: skip
+        self.write_to(slots, value)
 
-        Numbers share one variable of the widest type; a value of any other type makes it a new
-        variable of the same name.
-        """
-        type_ = value.type
-        family = "number" if t.wider(type_, t.INT) else type_
-        if isinstance(type_, t.Tuple):
-            family = "tuple", len(type_.items)
-        key = name, family
-        before = self.types.setdefault(key, type_)
-        both = t.wider(before, type_)
-        if both is None:
-            self.refuse(node, f"{name} holds values of several types", "take two names")
-        if both != before:
-            self.types[key], self.is_settled = both, False
-        if key not in self.slots:
-            self.slots[key] = self.place(self.types[key], name)
-        self.current[name] = key
-        self.write_to(self.slots[key], self.cast(node, value, self.types[key]))
-
-    def load(self, node: ast.AST, name: str) -> t.Value:
+    def load(self, name: str) -> t.Value:
         """The value of a variable."""
-        key = self.current[name]
-        if key is None:
-            self.refuse(node, f"{name} is of another type on another path", "take two names")
-        if isinstance(self.types[key], t.Known) or self.types[key] == t.NOTHING:
-            return t.Value(self.types[key])
-        return self.read_from(self.slots[key], self.types[key])
+        type_, slots = self.variables[name]
+        return self.read_from(slots, type_)
 
     # ------------------------------------------------------------------ statements
 
@@ -175,18 +138,15 @@ class FunctionCompiler(Expressions):
 
     def _Return(self, node: ast.Return) -> None:
         value = t.Value(t.NOTHING) if node.value is None else self.value(node.value)
-        before = value.type if self.result is None else self.result
-        self.result = t.wider(before, value.type)
-        if self.result is None:
+        self.result = self.result or value.type
+        if self.result != value.type:
             self.refuse(node, "returns values of several types", "return one type")
-        if self.result != before:
-            self.is_settled = False
-        words = self.cast(node, value, self.result).words
-        type_, whole = t.result_type(self.result), "undef"
-        if len(words) > 1:
-            for k, (kind, word) in enumerate(zip(self.result.words, words, strict=True)):
+        type_, whole = t.result_type(self.result), "".join(value.words)
+        if len(value.words) > 1:
+            whole = "undef"
+            for k, (kind, word) in enumerate(zip(self.result.words, value.words, strict=True)):
                 whole = self.new(f"insertvalue {type_} {whole}, {kind} {word}, {k}")
-        self.line(f"ret {type_} {whole if len(words) > 1 else ''.join(words)}".rstrip())
+        self.line(f"ret {type_} {whole}".rstrip())
         self.is_dead = True
 
     def _Assign(self, node: ast.Assign) -> None:
@@ -224,23 +184,7 @@ class FunctionCompiler(Expressions):
         if test.constant is not None:
             self.statements(node.body if test.constant else node.orelse)
             return
-        one, other, end = self.label(), self.label(), self.label()
-        self.branch(test, one, other)
-        before, ends = dict(self.current), []
-        for label, body in ((one, node.body), (other, node.orelse)):
-            self.current = dict(before)
-            self.start(label)
-            self.statements(body)
-            if not self.is_dead:
-                ends.append(self.current)
-                self.jump(end)
-        self.is_dead = not ends
-        if ends:
-            first, last = ends[0], ends[-1]
-            both = {**first, **last}
-            differ = {n for n in first if n in last and first[n] != last[n]}
-            self.current = {n: None if n in differ else key for n, key in both.items()}
-            self.start(end)
+        self.fork(test, partial(self.statements, node.body), partial(self.statements, node.orelse))
 
     def _While(self, node: ast.While) -> None:
         if node.orelse:
@@ -251,30 +195,18 @@ class FunctionCompiler(Expressions):
         test = self.condition(node.test)
         self.branch(test, body, end)
         self.start(body)
-        self._repeat(node, head, end, None)
-        self.jump(head)
+        self._repeat(node, head, end)
         self.start(end)
         if test.constant and not any(isinstance(n, ast.Break) for n in ast.walk(node)):
             self.line("unreachable")
             self.is_dead = True
 
-    def _repeat(self, node: ast.For | ast.While, again: str, end: str, k: t.Value | None) -> None:
-        """The body of a loop; k: the value of its variable.
-
-        A variable that changes its type in the body has no type at its start and after the loop.
-        """
-        before, changes = dict(self.current), self.changes.setdefault(node, set())
-        self.current.update(dict.fromkeys(changes))
-        if k is not None and isinstance(node, ast.For):
-            self._assign(node.target, k)
+    def _repeat(self, node: ast.For | ast.While, again: str, end: str) -> None:
+        """The body of a loop, and the jump behind it."""
         self.loops.append((again, end))
         self.statements(node.body)
         self.loops.pop()
-        found = {n for n, key in before.items() if self.current[n] != key}
-        if found - changes:
-            changes.update(found)
-            self.is_settled = False
-        self.current.update(dict.fromkeys(changes))
+        self.jump(again)
 
     def _Break(self, node: ast.Break) -> None:
         self.jump(self.loops[-1][1])
@@ -299,29 +231,25 @@ class FunctionCompiler(Expressions):
 
     def _count(self, node: ast.For, call: ast.Call) -> None:
         """``for k in range(...)``; assignments to k do not change the count."""
-        given = [self.cast(a, self.integer(a, self.value(a)), t.INT) for a in call.args]
+        given = [self.whole(a, self.value(a)) for a in call.args]
         first, last = (t.constant(0), given[0]) if len(given) == 1 else given[:2]
         step = given[2] if len(given) > 2 else t.constant(1)
-        if step.constant == 0:
-            self.refuse(node, "the step of a range is zero", "take another one")
-        [counter] = self.place(t.INT, "for")
-        self.line(f"store i64 {first.word}, ptr {counter}")
+        if not step.constant:
+            self.refuse(node, "the step of a range is zero or no constant", "count in a while loop")
+        counter = self.place(t.INT, "for")
+        self.write_to(counter, first)
         head, body, again, end = (self.label() for _ in range(4))
         self.jump(head)
         self.start(head)
-        k = self.new(f"load i64, ptr {counter}")
-        below = self.new(f"icmp slt i64 {k}, {last.word}")
-        above = self.new(f"icmp sgt i64 {k}, {last.word}")
-        upwards = self.new(f"icmp sgt i64 {step.word}, 0")
-        test = self.emit(t.BOOL, f"select i1 {upwards}, i1 {below}, i1 {above}")
-        self.branch(test, body, end)
+        k = self.read_from(counter, t.INT)
+        order = ast.Lt() if step.constant > 0 else ast.Gt()
+        self.branch(self.comparison(node, order, k, last), body, end)
         self.start(body)
-        self._repeat(node, again, end, t.Value(t.INT, (k,)))
-        self.jump(again)
+        self._assign(node.target, k)
+        self._repeat(node, again, end)
         self.start(again)
-        following = self.new(f"load i64, ptr {counter}")
-        following = self.new(f"add nsw i64 {following}, {step.word}")
-        self.line(f"store i64 {following}, ptr {counter}")
+        k = self.read_from(counter, t.INT)
+        self.write_to(counter, self.operation(node, ast.Add(), k, step))
         self.jump(head)
         self.start(end)
 

@@ -111,12 +111,12 @@ def load(code: bytes, symbols: list[str]) -> list[int]:
         return [engine.get_function_address(symbol) for symbol in symbols]
 
 
-def encoded(results: list[Any], code: bytes) -> bytes:
-    """Results and code as the content of a file."""
+def encoded(results: Any, code: bytes) -> bytes:
+    """JSON values, the results of functions, and code as the content of a file."""
     return json.dumps(results).encode() + b"\n" + code
 
 
-def decoded(content: bytes) -> tuple[list[Any], bytes]:
+def decoded(content: bytes) -> tuple[Any, bytes]:
     """Results and code of the content of a file."""
     head, _, code = content.partition(b"\n")
     return json.loads(head), code
@@ -134,6 +134,14 @@ def write_object(path: Path, results: list[Any], code: bytes) -> None:
     if next(_written) % CLEAN_EVERY == 0:
         with contextlib.suppress(OSError):
             _clean(path.parent)
+
+
+def optimised(text: str, results: Any, path: Path | None) -> bytes:
+    """Optimised object code of LLVM IR, kept in a file where there is a path."""
+    code = compile_ir(text, OPTIMISED)
+    if path is not None:
+        write_object(path, results, code)
+    return code
 
 
 def _clean(folder: Path) -> None:

@@ -1,18 +1,17 @@
 """Ready-made objects: code that comes with the package, compiled when its wheel was built.
 
-There is one file for each target, a kind of processor under a system. It begins with an index,
-followed by object files, compressed and each with its checksum; only those that a scene needs are
-read. Names in the index are digests of the sources and of this compiler: the code of a source that
-has changed is not found, and compiled here, as where there is no file.
+There is one file for each target, a kind of processor under a system: an index, object files, each
+compressed for itself as a scene needs few of them, and a checksum. Names in the index are digests
+of the sources and of this compiler: the code of a source that has changed is not found, and
+compiled here, as where there is no file.
 """
 
-import json
 import lzma
 import os
 import warnings
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from dap3d_core.kernels.compiler.objects import (
     Processor,
@@ -62,54 +61,41 @@ def target_of(triple: str, features: frozenset[str]) -> str | None:
 
 def packed(units: dict[str, tuple[list[Any], bytes]]) -> bytes:
     """The content of a file from results and code of units, by name."""
-    index, blobs, at = {}, [], 0
+    index, blobs = {}, b""
     for name, unit in sorted(units.items()):
-        blobs.append(sealed(lzma.compress(encoded(*unit), **_COMPRESSION)))
-        index[name] = at, len(blobs[-1])
-        at += len(blobs[-1])
-    head = sealed(json.dumps(index).encode())
-    return b"%d\n" % len(head) + head + b"".join(blobs)
+        blob = lzma.compress(encoded(*unit), **_COMPRESSION)
+        index[name] = len(blobs), len(blobs) + len(blob)
+        blobs += blob
+    return sealed(encoded(index, blobs))
 
 
-class Pack:
-    """A file of ready-made objects; what is damaged in it is ignored with a warning."""
+class Pack(NamedTuple):
+    """A file of ready-made objects: first and last byte of each unit by name, and all units."""
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self._index: dict[str, tuple[int, int]] = {}
+    index: dict[str, tuple[int, int]]
+    units: bytes
+
+    @classmethod
+    def of(cls, path: Path) -> "Pack":
+        """The content of a file; nothing, with a warning, where it is damaged."""
         try:
-            with path.open("rb") as file:
-                first = file.readline(20)
-                head = unsealed(file.read(int(first) if first.strip().isdigit() else 0))
-                self._start = file.tell()
+            content = unsealed(path.read_bytes())
         except OSError:  # not every package has one
-            return
-        if head is None:
-            self._warn()
-        else:
-            self._index = json.loads(head)
+            return cls({}, b"")
+        if content is not None:
+            return cls(*decoded(content))
+        warnings.warn(
+            f"ready-made code was damaged and is made here: {path}; installing dap3d again "
+            "repairs it", RuntimeWarning, stacklevel=1,
+        )  # fmt: skip
+        return cls({}, b"")
 
     def read(self, name: str) -> tuple[list[Any], bytes] | None:
         """Results and code of a unit; None where there is none."""
-        if name not in self._index:
+        if name not in self.index:
             return None
-        at, size = self._index[name]
-        try:
-            with self.path.open("rb") as file:
-                file.seek(self._start + at)
-                content = unsealed(file.read(size))
-        except OSError:
-            content = None
-        if content is None:
-            self._warn()
-            return None
-        return decoded(lzma.decompress(content, **_COMPRESSION))
-
-    def _warn(self) -> None:
-        warnings.warn(
-            f"ready-made code was damaged and is made here: {self.path}; installing dap3d again "
-            "repairs it", RuntimeWarning, stacklevel=1,
-        )  # fmt: skip
+        first, last = self.index[name]
+        return decoded(lzma.decompress(self.units[first:last], **_COMPRESSION))
 
 
 @cache
@@ -118,7 +104,7 @@ def _pack() -> Pack | None:
     if os.environ.get("DAP3D_CPU"):
         return None
     target = target_of(processor().triple, host_features())
-    return None if target is None else Pack(FOLDER / f"{target}.pack")
+    return None if target is None else Pack.of(FOLDER / f"{target}.pack")
 
 
 def read(name: str) -> tuple[list[Any], bytes] | None:

@@ -5,6 +5,7 @@ afterwards; the operations on numbers are recorded as they happen. A kernel may 
 Python can, except decide by a number: it has no value yet.
 """
 
+import ast
 import traceback
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import Any, NoReturn
 
 from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.functions import Program
-from dap3d_core.kernels.compiler.writer import EXACT, LIBRARY, call_of
+from dap3d_core.kernels.compiler.writer import EXACT, LIBRARY, Writer
 
 _REMEDY = "use the functions of dap3d_core.kernels: sqrt, sin, minimum, ..., where(condition, a, b)"
 
@@ -26,146 +27,114 @@ class _MissingError(TraceError, AttributeError):
     """The same for a missing attribute, so that ``hasattr`` works."""
 
 
-class Tracer:
+class Tracer(Writer):
     """Records the operations of a kernel; has its functions for symbolic numbers."""
 
     def __init__(self) -> None:
-        self.program, self.lines = Program(), []
+        self.program = Program()
+        super().__init__(self.program.needs)
 
-    def new(self, text: str) -> str:
-        """Add an instruction; returns the name of its result."""
-        self.lines.append(f"  %v{len(self.lines)} = {text}")
-        return f"%v{len(self.lines) - 1}"
+    def refuse(self, node: Any, why: str, remedy: str) -> NoReturn:
+        """Raise a TraceError, with the remedy for kernels; its line is in the traceback."""
+        raise TraceError(f"has {why}; {_REMEDY}")
+
+    def value(self, x: Any, like: t.Scalar = t.FLOAT) -> t.Value:
+        """A number of a kernel: symbolic, or a constant, a float unless it is of the type given."""
+        if isinstance(x, Symbol):
+            return x.value
+        constant = t.constant(x)
+        if constant is not None and constant.type == like:
+            return constant
+        if isinstance(x, (tuple, list, str)) or x is None:
+            raise TraceError(f"takes a {type(x).__name__} for a number; "
+                             "for vectors use add, sub, scale, dot")  # fmt: skip
+        return t.Value(t.FLOAT, (t.bits(float(x)),))
 
     def word(self, x: Any) -> str:
         """The LLVM value of a number, as a double."""
-        if isinstance(x, Symbol):
-            return x.word
-        if isinstance(x, Integer):
-            return self.new(f"sitofp i64 {x.word} to double")
-        try:
-            return t.bits(float(x))
-        except TraceError:
-            raise
-        except (TypeError, ValueError):
-            raise TraceError(f"takes a {type(x).__name__} for a number") from None
+        return self.cast(None, self.value(x), t.FLOAT).word
+
+    def index(self, k: Any) -> str:
+        """The LLVM value of an index."""
+        return self.whole(None, self.value(k, t.INT)).word
 
     def __getattr__(self, name: str) -> Callable[..., "Symbol"]:
         """A function of floats: sqrt, sin, ..."""
         if name not in (*EXACT, *LIBRARY):
             raise AttributeError(name)
+        return lambda *numbers: Symbol(self, self.call(name, *map(self.word, numbers)))
 
-        def function(*numbers: Any) -> Symbol:
-            words = [self.word(x) for x in numbers]
-            return Symbol(self, self.new(call_of(self.program.needs, name, words)))
-
-        return function
-
-    def where(self, condition: "Condition", a: Any, b: Any) -> Any:
+    def where(self, condition: "Symbol", a: Any, b: Any) -> Any:
         """``a`` where the condition holds, else ``b``; tuples item by item."""
         if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
             return tuple(self.where(condition, x, y) for x, y in zip(a, b, strict=True))
-        if isinstance(a, Condition) and isinstance(b, Condition):
-            text = f"select i1 {condition.word}, i1 {a.word}, i1 {b.word}"
-            return Condition(self, self.new(text))
-        text = f"select i1 {condition.word}, double {self.word(a)}, double {self.word(b)}"
-        return Symbol(self, self.new(text))
+        test = self.cast(None, condition.value, t.BOOL)
+        return Symbol(self, self.select(None, test, self.value(a), self.value(b)))
 
-    def integer(self, x: Any) -> "Integer":
-        """A float as an integer."""
-        return Integer(self, self.new(f"fptosi double {self.word(x)} to i64"))
+    def integer(self, x: Any) -> "Symbol":
+        """A float as an integer, an index or a count."""
+        return Symbol(self, self.cast(None, self.value(x), t.INT))
 
     def row_of(self, row: Any, array: "NumberArray", place: Any, rows: Any, width: int,
-               x: Any) -> "Integer":  # fmt: skip
+               x: Any) -> "Symbol":  # fmt: skip
         """Index at which a row of a table begins, found by a function of the subset."""
-        name, _ = self.program.function(row, (t.Array(t.FLOAT, 1), t.INT, t.INT, t.INT, t.FLOAT))
-        given = (f"ptr {array.base}, i64 0, i64 {self.integer(place).word}, "
-                 f"i64 {self.integer(rows).word}, i64 {width}, double {self.word(x)}")  # fmt: skip
-        return Integer(self, self.new(f"call i64 @{name}({given})"))
+        types = t.Array(t.FLOAT, 1), t.INT, t.INT, t.INT, t.FLOAT
+        name, result = self.program.function(row, types) or ("", t.INT)
+        place, rows = (self.integer(k).value.word for k in (place, rows))
+        given = (f"ptr {array.base}, i64 0, i64 {place}, i64 {rows}, i64 {width}, "
+                 f"double {self.word(x)}")  # fmt: skip
+        return Symbol(self, self.emit(result, f"call i64 @{name}({given})"))
 
 
-class _Symbolic:
-    """A value that is known when the code runs: refuses everything that needs it now."""
-
-    __slots__ = ("tracer", "word")
-    __hash__ = None
-
-    def __init__(self, tracer: Tracer, word: str) -> None:
-        self.tracer, self.word = tracer, word
-
-    def _refuse(self, *arguments: Any) -> NoReturn:
-        raise TraceError(f"needs the number itself; {_REMEDY}")
-
-    __float__ = __int__ = __index__ = __complex__ = __len__ = __iter__ = _refuse
-    __round__ = __floor__ = __ceil__ = __trunc__ = _refuse
-    __floordiv__ = __mod__ = __rfloordiv__ = __rmod__ = __divmod__ = _refuse
-
-    def __bool__(self) -> NoReturn:
-        raise TraceError("branches on a number; use where(condition, a, b)")
-
-    def __getattr__(self, name: str) -> NoReturn:
-        raise _MissingError(f"reads {name} of a number; {_REMEDY}")
-
-    def __getitem__(self, k: Any) -> NoReturn:
-        raise TraceError("takes a part of a number; tuples have parts")
-
-
-def _joining(name: str) -> Any:
-    def join(self: "Condition", other: Any) -> "Condition":
-        if not isinstance(other, (Condition, bool)):
-            raise TraceError(f"joins a condition and a {type(other).__name__}; compare numbers")
-        word = other.word if isinstance(other, Condition) else str(other).lower()
-        return Condition(self.tracer, self.tracer.new(f"{name} i1 {self.word}, {word}"))
-
-    return join
-
-
-class Condition(_Symbolic):
-    """A symbolic truth value."""
-
-    __slots__ = ()
-    __and__ = __rand__ = _joining("and")
-    __or__ = __ror__ = _joining("or")
-    __xor__ = __rxor__ = _joining("xor")
-
-    def __invert__(self) -> "Condition":
-        return self ^ True
-
-
-def _operation(name: str, is_reflected: bool = False) -> Any:
+def _operation(op: ast.operator) -> tuple[Any, Any]:
     def operate(self: "Symbol", other: Any) -> "Symbol":
-        if isinstance(other, (tuple, list, str)) or other is None:
-            raise TraceError(f"{name[1:]}s a number and a {type(other).__name__}; "
-                             "for vectors use add, sub, scale, dot")  # fmt: skip
-        a, b = (other, self) if is_reflected else (self, other)
-        word = self.tracer.word
-        return Symbol(self.tracer, self.tracer.new(f"{name} double {word(a)}, {word(b)}"))
+        given = self.tracer.value(other, self.value.type)
+        return Symbol(self.tracer, self.tracer.operation(None, op, self.value, given))
 
-    return operate
+    def reflected(self: "Symbol", other: Any) -> "Symbol":
+        given = self.tracer.value(other, self.value.type)
+        return Symbol(self.tracer, self.tracer.operation(None, op, given, self.value))
+
+    return operate, reflected
 
 
-def _comparison(relation: str) -> Any:
-    def compare(self: "Symbol", other: Any) -> Condition:
-        text = f"fcmp {relation} double {self.word}, {self.tracer.word(other)}"
-        return Condition(self.tracer, self.tracer.new(text))
+def _comparison(op: ast.cmpop) -> Any:
+    def compare(self: "Symbol", other: Any) -> "Symbol":
+        given = self.tracer.value(other)
+        return Symbol(self.tracer, self.tracer.comparison(None, op, self.value, given))
 
     return compare
 
 
-class Symbol(_Symbolic):
-    """A symbolic float."""
+class Symbol:
+    """A symbolic number or truth value: known when the code runs.
 
-    __slots__ = ()
+    It refuses everything that needs it now. Kernels see floats and conditions; the text of loops
+    has integers, too.
+    """
 
-    __add__, __radd__ = _operation("fadd"), _operation("fadd", is_reflected=True)
-    __sub__, __rsub__ = _operation("fsub"), _operation("fsub", is_reflected=True)
-    __mul__, __rmul__ = _operation("fmul"), _operation("fmul", is_reflected=True)
-    __truediv__, __rtruediv__ = _operation("fdiv"), _operation("fdiv", is_reflected=True)
-    __lt__, __le__, __gt__, __ge__ = (_comparison(r) for r in ("olt", "ole", "ogt", "oge"))
-    __eq__, __ne__ = _comparison("oeq"), _comparison("une")
+    __slots__ = ("tracer", "value")
+    __hash__ = None
+
+    def __init__(self, tracer: Tracer, value: t.Value) -> None:
+        self.tracer, self.value = tracer, value
+
+    __add__, __radd__ = _operation(ast.Add())
+    __sub__, __rsub__ = _operation(ast.Sub())
+    __mul__, __rmul__ = _operation(ast.Mult())
+    __truediv__, __rtruediv__ = _operation(ast.Div())
+    __and__, __rand__ = _operation(ast.BitAnd())
+    __or__, __ror__ = _operation(ast.BitOr())
+    __xor__, __rxor__ = _operation(ast.BitXor())
+    __lt__, __le__ = _comparison(ast.Lt()), _comparison(ast.LtE())
+    __gt__, __ge__ = _comparison(ast.Gt()), _comparison(ast.GtE())
+    __eq__, __ne__ = _comparison(ast.Eq()), _comparison(ast.NotEq())
+
+    def __invert__(self) -> "Symbol":
+        return self ^ True
 
     def __neg__(self) -> "Symbol":
-        return Symbol(self.tracer, self.tracer.new(f"fneg double {self.word}"))
+        return Symbol(self.tracer, self.tracer.negative(None, self.value))
 
     def __pos__(self) -> "Symbol":
         return self
@@ -201,23 +170,21 @@ class Symbol(_Symbolic):
         """The number itself: conditions of complex numbers compare real parts."""
         return self
 
+    def _refuse(self, *arguments: Any) -> NoReturn:
+        raise TraceError(f"needs the number itself; {_REMEDY}")
 
-class Integer(_Symbolic):
-    """A symbolic integer of the loop, an index or a count; kernels do not see it."""
+    __float__ = __int__ = __index__ = __complex__ = __len__ = __iter__ = _refuse
+    __round__ = __floor__ = __ceil__ = __trunc__ = _refuse
+    __floordiv__ = __mod__ = __rfloordiv__ = __rmod__ = __divmod__ = _refuse
 
-    __slots__ = ()
+    def __bool__(self) -> NoReturn:
+        raise TraceError("branches on a number; use where(condition, a, b)")
 
-    def _with(self, other: Any, name: str) -> "Integer":
-        word = other.word if isinstance(other, Integer) else str(int(other))
-        return Integer(self.tracer, self.tracer.new(f"{name} nsw i64 {self.word}, {word}"))
+    def __getattr__(self, name: str) -> NoReturn:
+        raise _MissingError(f"reads {name} of a number; {_REMEDY}")
 
-    def __add__(self, other: Any) -> "Integer":
-        return self._with(other, "add")
-
-    def __mul__(self, other: Any) -> "Integer":
-        return self._with(other, "mul")
-
-    __radd__, __rmul__ = __add__, __mul__
+    def __getitem__(self, k: Any) -> NoReturn:
+        raise TraceError("takes a part of a number; tuples have parts")
 
 
 class NumberArray:
@@ -229,18 +196,17 @@ class NumberArray:
     def _at(self, k: Any) -> str:
         if isinstance(k, tuple):
             k = k[0] * self._width + k[1]
-        word = k.word if isinstance(k, Integer) else str(int(k))
-        return self.tracer.new(f"getelementptr inbounds {self._item}, ptr {self.base}, i64 {word}")
+        at = f"getelementptr inbounds {self._item}, ptr {self.base}, i64 {self.tracer.index(k)}"
+        return self.tracer.new(at)
 
-    def __getitem__(self, k: Any) -> Any:
-        kind = Integer if self._item == "i64" else Symbol
+    def __getitem__(self, k: Any) -> Symbol:
         text = f"load {self._item}, ptr {self._at(k)}, align 8"
-        return kind(self.tracer, self.tracer.new(text))
+        type_ = t.INT if self._item == "i64" else t.FLOAT
+        return Symbol(self.tracer, self.tracer.emit(type_, text))
 
     def __setitem__(self, k: Any, x: Any) -> None:
         word = self.tracer.word(x)
-        at = self._at(k)
-        self.tracer.lines.append(f"  store double {word}, ptr {at}, align 8")
+        self.tracer.line(f"store double {word}, ptr {self._at(k)}, align 8")
 
 
 _LOOP = """define void @{symbol}(double %t, ptr %arrays, i64 %i0, i64 %p0, i64 %count,
@@ -281,10 +247,13 @@ def trace(
                  f"  %{name} = load ptr, ptr %{name}.at, align 8"]  # fmt: skip
         setattr(arrays, name, NumberArray(tracer, f"%{name}", item, width))
     outputs = [NumberArray(tracer, f"%out{k}") for k in (1, 2, 3)]
-    i0, p0, count, q = (Integer(tracer, f"%{name}") for name in ("i0", "p0", "count", "q"))
+    i0, p0, count, q = (Symbol(tracer, t.Value(t.INT, (f"%{name}",)))
+                        for name in ("i0", "p0", "count", "q"))  # fmt: skip
     namespace["range"] = lambda count: [q]  # one symbolic instance
     try:
-        namespace["loop"](Symbol(tracer, "%t"), arrays, i0, p0, count, *outputs)
+        namespace["loop"](
+            Symbol(tracer, t.Value(t.FLOAT, ("%t",))), arrays, i0, p0, count, *outputs
+        )
     except Exception as error:
         raise t.CompileError(f"{_reason(error)}{_line_of(error)}") from error
     body = "\n".join(tracer.lines)

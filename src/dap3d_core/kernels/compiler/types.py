@@ -29,7 +29,10 @@ DTYPES = {INT: np.dtype(np.int64), FLOAT: np.dtype(float), COMPLEX: np.dtype(com
 
 @dataclass(frozen=True)
 class Array:
-    """A C-contiguous array: address of its first item, and shape."""
+    """A C-contiguous array: address of its first item, and shape.
+
+    With no dimension it is the address alone, as functions called by address take arrays.
+    """
 
     item: Scalar
     ndim: int
@@ -40,19 +43,8 @@ class Array:
         return ("ptr", *["i64"] * self.ndim)
 
 
-class _Address:
-    """Base of types of one address; no dataclass, whose equality a struct would inherit."""
-
-    words = ("ptr",)
-
-
-@dataclass(frozen=True)
-class Numbers(_Address):
-    """Address of the first item of an array, as functions called by address take it."""
-
-
 @dataclass(frozen=True, eq=False)
-class Struct(_Address):
+class Struct:
     """A struct of arrays and further structs (kernels/runtime/array_struct.py).
 
     ``scalars`` gives array and index of each number that has a name of its own.
@@ -61,6 +53,7 @@ class Struct(_Address):
     name: str
     members: tuple[tuple[str, Any], ...]
     scalars: dict[str, tuple[str, int]] = field(default_factory=dict)
+    words = ("ptr",)
 
     def begins_with(self, other: Any) -> bool:
         """True if this struct extends the other: its first members are those of the other."""
@@ -76,17 +69,19 @@ class Signature:
 
 
 @dataclass(frozen=True)
-class Pointer(_Address):
+class Pointer:
     """The address of a function."""
 
     signature: Signature
+    words = ("ptr",)
 
 
 @dataclass(frozen=True)
-class Table(_Address):
+class Table:
     """Addresses of functions of one signature."""
 
     signature: Signature
+    words = ("ptr",)
 
 
 @dataclass(frozen=True)
@@ -110,14 +105,14 @@ class Known:
 
     def __eq__(self, other: object) -> bool:
         """Equality of type and bits: 1, 1.0 and True are different code, and so are 0.0, -0.0."""
-        return isinstance(other, Known) and self._key() == other._key()
+        return isinstance(other, Known) and self._key == other._key
 
     def __hash__(self) -> int:
-        return hash(self._key())
+        return hash(self._key)
 
+    @property
     def _key(self) -> Any:
-        value = bits(self.value) if isinstance(self.value, float) else self.value
-        return type(self.value), value
+        return type(self.value), repr(self.value) if isinstance(self.value, float) else self.value
 
 
 class Value(NamedTuple):
@@ -167,16 +162,9 @@ def items_of(value: Value) -> tuple[Value, ...]:
     return tuple(Value(item, tuple(next(words) for _ in item.words)) for item in value.type.items)
 
 
-def wider(one: Any, other: Any) -> Any:
-    """The common type of two values; None where there is none."""
-    if one == other:
-        return one
-    if one in NUMBERS and other in NUMBERS:
-        return max(one, other, key=NUMBERS.index)
-    if isinstance(one, Tuple) and isinstance(other, Tuple) and len(one.items) == len(other.items):
-        items = tuple(wider(a, b) for a, b in zip(one.items, other.items, strict=True))
-        return None if None in items else Tuple(items)
-    return None
+def wider(*types: Any) -> Any:
+    """The common type of numbers; None where a type is no number's."""
+    return max(types, key=NUMBERS.index) if all(type_ in NUMBERS for type_ in types) else None
 
 
 def name_of(type_: Any) -> str:

@@ -2,7 +2,7 @@
 
 import ast
 import operator
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any, NoReturn
 
@@ -17,12 +17,23 @@ LIBRARY = ("sin", "cos", "tan", "tanh", "exp", "log", "asin", "acos", "atan", "a
 
 
 class Writer:
-    """Writes the instructions of one function: from values to values, without syntax trees."""
+    """Writes the instructions of one function: from values to values, without syntax trees.
 
-    def refuse(self, node: ast.AST, why: str, remedy: str) -> NoReturn:
-        """Raise a CompileError: what is wrong, what to write instead, file and line."""
-        where = f"{self.function.__code__.co_filename}:{node.lineno}"
-        raise t.CompileError(f"{self.function.__qualname__}: {why}; {remedy} [{where}]")
+    ``node``, in the arguments of its methods, is what an error refers to.
+    """
+
+    def __init__(self, needs: dict[str, str]) -> None:
+        """Args:
+        needs: takes the declarations of external functions, by symbol.
+        """
+        self.needs = needs
+        self.lines: list[str] = []
+        self.places: list[str] = []
+        self.count, self.is_dead = 0, False
+
+    def refuse(self, node: Any, why: str, remedy: str) -> NoReturn:
+        """Raise an error: what is wrong, what to write instead, and where."""
+        raise NotImplementedError
 
     def line(self, text: str) -> None:
         """Add an instruction."""
@@ -38,10 +49,18 @@ class Writer:
         """Add an instruction with a number of one word as its result."""
         return t.Value(type_, (self.new(text),))
 
+    def call(self, name: str, *words: str) -> t.Value:
+        """A call of an intrinsic or a function of the C library."""
+        symbol = f"llvm.{name}.f64" if name in EXACT else name
+        kind = "" if name in EXACT else " nobuiltin nounwind willreturn memory(none)"
+        self.needs[symbol] = f"declare double @{symbol}({', '.join(['double'] * len(words))}){kind}"
+        given = ", ".join(f"double {x}" for x in words)
+        return self.emit(t.FLOAT, f"call double @{symbol}({given}){kind}")
+
     # ------------------------------------------------------------------ blocks, stack slots
 
     def label(self) -> str:
-        """A new block label."""
+        """A new name of a block or a variable."""
         self.count += 1
         return f"L{self.count}"
 
@@ -59,6 +78,21 @@ class Writer:
     def branch(self, condition: t.Value, one: str, other: str) -> None:
         """End a block with a conditional jump."""
         self.line(f"br i1 {condition.word}, label %{one}, label %{other}")
+
+    def fork(
+        self, condition: t.Value, one: Callable[[], Any], other: Callable[[], Any] = lambda: None
+    ) -> None:
+        """Run what ``one`` writes where a condition holds, else what ``other`` writes."""
+        *labels, end = (self.label() for _ in range(3))
+        self.branch(condition, *labels)
+        goes_on = False
+        for label, write in zip(labels, (one, other), strict=True):
+            self.start(label)
+            write()
+            goes_on |= not self.is_dead
+            self.jump(end)
+        if goes_on:
+            self.start(end)
 
     def place(self, type_: Any, name: str) -> list[str]:
         """Stack slots for the words of a value, initialised to zero."""
@@ -83,35 +117,25 @@ class Writer:
 
     # ------------------------------------------------------------------ from one type to another
 
-    def cast(self, node: ast.AST, value: t.Value, type_: Any) -> t.Value:
+    def cast(self, node: Any, value: t.Value, type_: Any) -> t.Value:
         """A value converted to another type."""
         have = value.type
         if have == type_:
             return value
-        if type_ in t.NUMBERS and have in t.NUMBERS:
-            return self._cast_number(node, value, type_)
-        if isinstance(type_, t.Tuple) and t.wider(have, type_) == type_:
-            pairs = zip(t.items_of(value), type_.items, strict=True)
-            return t.group([self.cast(node, item, kind) for item, kind in pairs])
+        if (have, type_) in CASTS:
+            if value.constant is not None:
+                return t.constant(PYTHON[type_](value.constant))
+            return self.emit(type_, CASTS[have, type_].format(value.word))
+        if type_ == t.COMPLEX and have in t.NUMBERS:
+            return t.Value(t.COMPLEX, (self.cast(node, value, t.FLOAT).word, t.bits(0.0)))
         if isinstance(have, t.Struct) and have.begins_with(type_):
             return t.Value(type_, value.words)
-        if isinstance(type_, t.Numbers) and isinstance(have, t.Array):
+        if isinstance(have, t.Array) and type_ == t.Array(have.item, 0):
             return t.Value(type_, value.words[:1])
-        if isinstance(type_, t.Pointer) and isinstance(have, t.Pointer):
-            return value
         self.refuse(node, f"a {t.name_of(have)} is given for a {t.name_of(type_)}",
                     "pass what the function takes")  # fmt: skip
 
-    def _cast_number(self, node: ast.AST, value: t.Value, type_: Any) -> t.Value:
-        if type_ == t.COMPLEX:
-            return t.Value(t.COMPLEX, (self.cast(node, value, t.FLOAT).word, t.bits(0.0)))
-        if value.type == t.COMPLEX:
-            self.refuse(node, "a complex number is given for a real one", "take .real")
-        if value.constant is not None:
-            return t.constant({t.BOOL: bool, t.INT: int, t.FLOAT: float}[type_](value.constant))
-        return self.emit(type_, CASTS[value.type, type_].format(value.word))
-
-    def integer(self, node: ast.AST, value: t.Value) -> t.Value:
+    def whole(self, node: Any, value: t.Value) -> t.Value:
         """A value that must be an integer."""
         if value.type not in (t.INT, t.BOOL):
             self.refuse(node, f"a {t.name_of(value.type)} is an index or a count",
@@ -120,24 +144,21 @@ class Writer:
 
     # ------------------------------------------------------------------ arithmetic
 
-    def operation(self, node: ast.AST, op: ast.operator, a: t.Value, b: t.Value) -> t.Value:
+    def operation(self, node: Any, op: ast.operator, a: t.Value, b: t.Value) -> t.Value:
         """An operation of two numbers, in the narrowest type that has it and holds both."""
-        python, instructions = OPERATORS.get(type(op), (None, None))
-        operands = f"no {type(op).__name__} of a {t.name_of(a.type)} and a {t.name_of(b.type)}"
-        if python is None or a.type not in t.NUMBERS or b.type not in t.NUMBERS:
-            self.refuse(node, operands, "take numbers, one by one")
-        if a.constant is not None and b.constant is not None:
+        python, instructions = OPERATORS.get(type(op), (None, {}))
+        if python is not None and a.constant is not None and b.constant is not None:
             try:
-                result, reason = t.constant(python(a.constant, b.constant)), "no number of 64 bits"
+                folded = t.constant(python(a.constant, b.constant))
             except (ArithmeticError, TypeError, ValueError) as error:
-                result, reason = None, str(error)
-            if result is None:
-                self.refuse(node, reason, "change the constants")
-            return result
+                self.refuse(node, str(error), "change the constants")
+            return folded or self.refuse(node, "no number of 64 bits", "change the constants")
         common = t.wider(a.type, b.type)
-        types = [kind for kind in t.NUMBERS[t.NUMBERS.index(common) :] if kind in instructions]
+        wide = t.NUMBERS[t.NUMBERS.index(common) :] if common else ()
+        types = [kind for kind in wide if kind in instructions]
         if not types or (isinstance(op, ast.Pow) and common != t.FLOAT):
-            self.refuse(node, operands, INSTEAD.get(type(op), "take integers, int(x)"))
+            remedy = INSTEAD.get(type(op), "take integers, int(x)")
+            self.refuse(node, self._operands(op, a, b), remedy if common else ONE_BY_ONE)
         a, b = self.cast(node, a, types[0]), self.cast(node, b, types[0])
         instruction = instructions[types[0]]
         if callable(instruction):
@@ -145,7 +166,10 @@ class Writer:
         pairs = zip(a.words, b.words, strict=True)
         return t.Value(types[0], tuple(self.new(f"{instruction} {x}, {y}") for x, y in pairs))
 
-    def negative(self, node: ast.AST, value: t.Value) -> t.Value:
+    def _operands(self, op: ast.AST, a: t.Value, b: t.Value) -> str:
+        return f"no {type(op).__name__} of a {t.name_of(a.type)} and a {t.name_of(b.type)}"
+
+    def negative(self, node: Any, value: t.Value) -> t.Value:
         """-x."""
         if value.constant is not None:
             return t.constant(-value.constant)
@@ -159,7 +183,7 @@ class Writer:
             return t.constant(not value.constant)
         return self.emit(t.BOOL, f"xor i1 {value.word}, true")
 
-    def comparison(self, node: ast.AST, op: ast.cmpop, a: t.Value, b: t.Value) -> t.Value:
+    def comparison(self, node: Any, op: ast.cmpop, a: t.Value, b: t.Value) -> t.Value:
         """One comparison."""
         if isinstance(op, (ast.Is, ast.IsNot)):
             if t.NOTHING not in (a.type, b.type):
@@ -171,32 +195,25 @@ class Writer:
                 same = self.comparison(node, ast.Eq(), a, item)
                 result = self.operation(node, ast.BitOr(), result, same)
             return result if isinstance(op, ast.In) else self.negation(result)
-        if type(op) not in COMPARISONS or a.type not in t.NUMBERS or b.type not in t.NUMBERS:
-            self.refuse(node, f"no {type(op).__name__} of a {t.name_of(a.type)} and a "
-                        f"{t.name_of(b.type)}", "compare numbers, one by one")  # fmt: skip
+        type_ = t.wider(a.type, b.type, t.INT)
+        if type(op) not in COMPARISONS or type_ is None:
+            self.refuse(node, self._operands(op, a, b), ONE_BY_ONE)
         python, integer, real, join = COMPARISONS[type(op)]
         if a.constant is not None and b.constant is not None:
-            return t.constant(bool(python(a.constant, b.constant)))
-        type_ = t.wider(t.wider(a.type, b.type), t.INT)
+            return t.constant(python(a.constant, b.constant))
         if type_ == t.COMPLEX and not join:
             self.refuse(node, "an order of complex numbers", "compare their parts")
         pairs = zip(self.cast(node, a, type_).words, self.cast(node, b, type_).words, strict=True)
         relation = f"icmp {integer} i64" if type_ == t.INT else f"fcmp {real} double"
-        parts = [self.new(f"{relation} {x}, {y}") for x, y in pairs]
-        return t.Value(t.BOOL, (parts[0] if len(parts) == 1 else
-                            self.new(f"{join} i1 {', '.join(parts)}"),))  # fmt: skip
+        parts = [self.emit(t.BOOL, f"{relation} {x}, {y}") for x, y in pairs]
+        return parts[0] if len(parts) == 1 else self.operation(node, join, *parts)
 
-    def call(self, name: str, *words: str) -> str:
-        """A call of an intrinsic or a function of the C library."""
-        return self.new(call_of(self.program.needs, name, words))
-
-
-def call_of(needs: dict[str, str], name: str, words: Sequence[str]) -> str:
-    """LLVM IR of a call of a function of floats; adds its declaration to those needed."""
-    symbol = f"llvm.{name}.f64" if name in EXACT else name
-    kind = "" if name in EXACT else " nobuiltin nounwind willreturn memory(none)"
-    needs[symbol] = f"declare double @{symbol}({', '.join(['double'] * len(words))}){kind}"
-    return f"call double @{symbol}({', '.join(f'double {x}' for x in words)}){kind}"
+    def select(self, node: Any, condition: t.Value, a: t.Value, b: t.Value) -> t.Value:
+        """``a`` where a condition holds, else ``b``; numbers, in their common type."""
+        type_ = t.wider(a.type, b.type)
+        pairs = zip(self.cast(node, a, type_).words, self.cast(node, b, type_).words, strict=True)
+        head, word = f"select i1 {condition.word}", type_.words[0]
+        return t.Value(type_, tuple(self.new(f"{head}, {word} {x}, {word} {y}") for x, y in pairs))
 
 
 def _floored(writer: Writer, a: t.Value, b: t.Value, is_mod: bool) -> t.Value:
@@ -204,18 +221,17 @@ def _floored(writer: Writer, a: t.Value, b: t.Value, is_mod: bool) -> t.Value:
     new = writer.new
     quotient, rest = (new(f"{name} i64 {a.word}, {b.word}") for name in ("sdiv", "srem"))
     some = new(f"icmp ne i64 {rest}, 0")
-    signs = new(f"xor i64 {rest}, {b.word}")
-    below = new(f"icmp slt i64 {signs}, 0")
-    off = new(f"and i1 {some}, {below}")
+    below = new(f"icmp slt i64 {new(f'xor i64 {rest}, {b.word}')}, 0")
     exact, other = (
         (rest, f"add i64 {rest}, {b.word}") if is_mod else (quotient, f"sub i64 {quotient}, 1")
     )
-    return t.Value(t.INT, (new(f"select i1 {off}, i64 {new(other)}, i64 {exact}"),))
+    off = new(f"and i1 {some}, {below}")
+    return writer.emit(t.INT, f"select i1 {off}, i64 {new(other)}, i64 {exact}")
 
 
 def _power(writer: Writer, a: t.Value, b: t.Value) -> t.Value:
     """``pow`` of the C library, as in plain Python."""
-    return t.Value(t.FLOAT, (writer.call("pow", a.word, b.word),))
+    return writer.call("pow", a.word, b.word)
 
 
 def _complex_product(writer: Writer, a: t.Value, b: t.Value) -> t.Value:
@@ -229,24 +245,24 @@ def _complex_product(writer: Writer, a: t.Value, b: t.Value) -> t.Value:
 def _complex_quotient(writer: Writer, a: t.Value, b: t.Value) -> t.Value:
     """Smith's division as numpy does it: by the ratio of the smaller part to the larger one."""
     (a0, a1), (b0, b1), new = a.words, b.words, writer.new
-    sizes = [writer.call("fabs", x) for x in b.words]
-    test = new(f"fcmp oge double {sizes[0]}, {sizes[1]}")
 
-    def choose(x: str, y: str) -> str:
-        return new(f"select i1 {test}, double {x}, double {y}")
+    def of(name: str, x: str, y: str) -> str:
+        return new(f"{name} double {x}, {y}")
 
-    large, small = choose(b0, b1), choose(b1, b0)
-    ratio = new(f"fdiv double {small}, {large}")
-    share = new(f"fmul double {small}, {ratio}")
-    scale = new(f"fdiv double {t.bits(1.0)}, {new(f'fadd double {large}, {share}')}")
-    r0, r1 = new(f"fmul double {a0}, {ratio}"), new(f"fmul double {a1}, {ratio}")
-    real = choose(new(f"fadd double {a0}, {r1}"), new(f"fadd double {r0}, {a1}"))
-    imag = choose(new(f"fsub double {a1}, {r0}"), new(f"fsub double {r1}, {a0}"))
-    both = [new(f"fmul double {x}, {scale}") for x in (real, imag)]
-    is_zero = new(f"fcmp oeq double {new(f'fadd double {sizes[0]}, {sizes[1]}')}, 0.0")
-    plain = [new(f"fdiv double {x}, {sizes[0]}") for x in a.words]
-    pairs = zip(plain, both, strict=True)
-    return t.Value(t.COMPLEX, tuple(new(f"select i1 {is_zero}, double {x}, double {y}")
+    def choose(condition: str, x: str, y: str) -> str:
+        return new(f"select i1 {condition}, double {x}, double {y}")
+
+    size0, size1 = (writer.call("fabs", x).word for x in b.words)
+    test = of("fcmp oge", size0, size1)
+    large, small = choose(test, b0, b1), choose(test, b1, b0)
+    ratio = of("fdiv", small, large)
+    scale = of("fdiv", t.bits(1.0), of("fadd", large, of("fmul", small, ratio)))
+    r0, r1 = of("fmul", a0, ratio), of("fmul", a1, ratio)
+    real = choose(test, of("fadd", a0, r1), of("fadd", r0, a1))
+    imag = choose(test, of("fsub", a1, r0), of("fsub", r1, a0))
+    is_zero = of("fcmp oeq", of("fadd", size0, size1), t.bits(0.0))
+    pairs = zip(a.words, (real, imag), strict=True)
+    return t.Value(t.COMPLEX, tuple(choose(is_zero, of("fdiv", x, size0), of("fmul", y, scale))
                                 for x, y in pairs))  # fmt: skip
 
 
@@ -259,20 +275,16 @@ CASTS = {
     (t.INT, t.BOOL): "icmp ne i64 {}, 0",
     (t.FLOAT, t.BOOL): "fcmp une double {}, 0.0",
 }
+#: Those of constants.
+PYTHON: dict[Any, Callable[[Any], Any]] = {t.BOOL: bool, t.INT: int, t.FLOAT: float}
 #: Of each operator: that of Python, and the instruction for each type of both operands.
 OPERATORS: dict[type, tuple[Any, dict[Any, Any]]] = {
-    ast.Add: (
-        operator.add,
-        {t.INT: "add nsw i64", t.FLOAT: "fadd double", t.COMPLEX: "fadd double"},
-    ),
-    ast.Sub: (
-        operator.sub,
-        {t.INT: "sub nsw i64", t.FLOAT: "fsub double", t.COMPLEX: "fsub double"},
-    ),
-    ast.Mult: (
-        operator.mul,
-        {t.INT: "mul nsw i64", t.FLOAT: "fmul double", t.COMPLEX: _complex_product},
-    ),
+    ast.Add: (operator.add,
+              {t.INT: "add nsw i64", t.FLOAT: "fadd double", t.COMPLEX: "fadd double"}),
+    ast.Sub: (operator.sub,
+              {t.INT: "sub nsw i64", t.FLOAT: "fsub double", t.COMPLEX: "fsub double"}),
+    ast.Mult: (operator.mul,
+               {t.INT: "mul nsw i64", t.FLOAT: "fmul double", t.COMPLEX: _complex_product}),
     ast.Div: (operator.truediv, {t.FLOAT: "fdiv double", t.COMPLEX: _complex_quotient}),
     ast.FloorDiv: (operator.floordiv, {t.INT: partial(_floored, is_mod=False)}),
     ast.Mod: (operator.mod, {t.INT: partial(_floored, is_mod=True)}),
@@ -282,14 +294,15 @@ OPERATORS: dict[type, tuple[Any, dict[Any, Any]]] = {
     ast.BitXor: (operator.xor, {t.BOOL: "xor i1", t.INT: "xor i64"}),
     ast.LShift: (operator.lshift, {t.INT: "shl i64"}),
     ast.RShift: (operator.rshift, {t.INT: "ashr i64"}),
-}
-INSTEAD = {ast.Pow: "multiply, or take floats"}
+}  # fmt: skip
+ONE_BY_ONE = "take numbers, one by one"
+INSTEAD = {ast.Pow: "multiply, or take floats", ast.MatMult: ONE_BY_ONE}
 #: Of each comparison: that of Python, of integers, of floats; how complex numbers join their parts.
-COMPARISONS = {
-    ast.Lt: (operator.lt, "slt", "olt", ""),
-    ast.LtE: (operator.le, "sle", "ole", ""),
-    ast.Gt: (operator.gt, "sgt", "ogt", ""),
-    ast.GtE: (operator.ge, "sge", "oge", ""),
-    ast.Eq: (operator.eq, "eq", "oeq", "and"),
-    ast.NotEq: (operator.ne, "ne", "une", "or"),
+COMPARISONS: dict[type, tuple[Any, str, str, Any]] = {
+    ast.Lt: (operator.lt, "slt", "olt", None),
+    ast.LtE: (operator.le, "sle", "ole", None),
+    ast.Gt: (operator.gt, "sgt", "ogt", None),
+    ast.GtE: (operator.ge, "sge", "oge", None),
+    ast.Eq: (operator.eq, "eq", "oeq", ast.BitAnd()),
+    ast.NotEq: (operator.ne, "ne", "une", ast.BitOr()),
 }

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from dap3d_core.kernels.compiler.types import FLOAT, INT, Numbers, Signature, Table
+from dap3d_core.kernels.compiler.types import FLOAT, INT, Array, Signature, Table
 from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, VECTOR, Arrays, pointer
 from dap3d_core.kernels.runtime.cache import compiled, table_of
 
@@ -25,7 +25,7 @@ class LoopArrays(Arrays):
     rates: Any = attrs.Factory(lambda self: np.zeros(len(self.states)), takes_self=True)  # of these
 
 
-_OUT = Numbers()
+_OUT = Array(FLOAT, 0)
 #: Signature of every group loop (loop_modules.py).
 LOOP = Signature((FLOAT, LoopArrays.type_of(), INT, INT, INT, _OUT, _OUT, _OUT))
 LOOP_LIST = Table(LOOP)

@@ -236,8 +236,9 @@ def have_pivots(nodes: Integers, K: Floats) -> bool:
     """True if no pivot in the factors of K is zero or has the wrong sign."""
     for k in range(nodes.shape[0] - 1):
         m, d = nodes[k, 0], nodes[k, 2]
-        for r in range(d, d + m * m, m + 1):
-            if K[r] != K[r]:
+        for r in range(m):
+            pivot = K[d + r * (m + 1)]
+            if pivot != pivot:
                 return False
     return True
 

@@ -141,7 +141,7 @@ def test_objects_of_every_target_take_only_what_their_system_has(target, packs, 
     """Of the system's format; the function is there, and wants the C library's by their names."""
     path = tmp_path / "pack"
     path.write_bytes(packs[target])
-    about, code = ready.Pack(path).read(NAME)
+    about, code = ready.Pack.of(path).read(NAME)
     assert about == ["None"]
     found = symbols_of(code)
     assert found.format == FORMATS[target.partition("-")[0]]

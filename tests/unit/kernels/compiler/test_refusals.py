@@ -76,10 +76,14 @@ CASES = {
     "a.b = 1.0": "only arrays and scalars",
     "y = z": "not defined",
     "y = f(x, m, a, i, table)": "calls itself",
-    "y = helper()": "without q",
+    "y = helper()": "required argument: 'q'",
+    "y = helper(q=a)": "by position",
+    "b = 1": "holds a float and a int",
+    "for q in range(0, 9, i): pass": "no constant",
     "y = helper(1.0, 2.0)": "as it is defined",
     "y = 2 ** 70": "64 bits",
     "y = 1 / 0": "division by zero",
+    "y = a and a > 0.0": "compare it",
     "y = min(a)": "two numbers",
     "y = not x": "condition",
     "a + 1.0": "does nothing",
@@ -106,7 +110,7 @@ def test_it_says_what_is_wrong_and_in_which_line(line):
 
 @pytest.mark.parametrize(("body", "words"), [
     ("    if a > 0.0:\n        return a\n", "may end without a result"),
-    ("    y = 1.0\n    if a > 0.0:\n        y = x\n    return y\n", "another type on another path"),
+    ("    y = 1.0\n    if a > 0.0:\n        y = x\n    return y\n", "y holds a float and a array"),
     ("    if a > 0.0:\n        return a\n    return x\n", "several types"),
 ])  # fmt: skip
 def test_ways_that_do_not_agree_are_refused(body, words):
