@@ -156,11 +156,7 @@ def test_what_derives_formulas_has_no_functions_of_python():
 
 #: The one place of each, and why it is right.
 ALLOWED = {
-    ("interface/codegen/specialise.py", "exec"): "the source of a plugin that was imported",
-    (
-        "interface/codegen/terms.py",
-        "exec",
-    ): "a call of a kernel, made of the names of its arguments",
+    ("interface/codegen/specialise.py", "exec"): "calls of kernels, made of names of arguments",
     ("interface/derive/symbolic.py", "eval"): "expressions of namespace.py",
     ("kernels/runtime/generated_modules.py", "exec"): "loop modules",
     ("registry/loading.py", "exec"): "plugin.py, once it is allowed",
