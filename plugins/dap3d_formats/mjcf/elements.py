@@ -87,7 +87,7 @@ MJCF: Table = {
     "inertial": taken() | _FRAME | taken("mass diaginertia fullinertia"),
     "joint": taken()
     | taken("name class type pos axis range limited ref springref stiffness damping armature")
-    | translated("frictionloss", "no type of force is friction that does not depend on the load")
+    | translated("frictionloss", "it fades at low rates, and does not stick")
     | noted("springdamper", "give stiffness and damping")
     | noted("springyield", "springs do not yield")
     | noted("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)

@@ -234,15 +234,15 @@ class MjcfReader:
         self.joints.add(name)
         anchor = Frame(element.numbers("pos", 3, (0.0, 0.0, 0.0)))
         joint = Joint(name, KINDS[type_], "", "", in_child=frame @ anchor, place=element.place)
-        if joint.kind == "free":
+        if element.name == "freejoint":  # it takes nothing from default classes
             return joint
-        if joint.kind != "ball":
+        if joint.kind not in ("ball", "free"):
             joint.axes = (unit(element.numbers("axis", 3, (0.0, 0.0, 1.0)), element),)
         self._dynamics(joint, element)
         return joint
 
     def _dynamics(self, joint: Joint, element: XmlElement) -> None:
-        """Limits, damping, springs and armature of a joint."""
+        """Limits, damping, friction, springs and armature of a joint."""
 
         def turned(value: float) -> float:
             return self.document.angle(value) if joint.kind == "revolute" else value
