@@ -12,11 +12,12 @@ _CLASS = taken("class")
 _ACTUATOR = (
     taken("name class joint jointinparent gear kp kv gaintype gainprm biastype biasprm dyntype")
     | taken("group")
+    | translated("dampratio", "damping, by the mass matrix where the model starts")
     | noted("user", _DRAWING)
     | noted("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
     | noted(
         "ctrllimited forcelimited actlimited ctrlrange forcerange actrange lengthrange actdim "
-        "dynprm actearly plugin dampratio "
+        "dynprm actearly plugin "
         "timeconst inheritrange kd gain bias area diameter scale range force vmax fpmax fvmax "
         "lmin lmax vmin tausmooth input nsample interp delay armature damping ffrange velrange "
         "cogging controller inductance lugre motorconst nominal resistance saturation thermal imax "
@@ -88,7 +89,7 @@ MJCF: Table = {
     "joint": taken()
     | taken("name class type pos axis range limited ref springref stiffness damping armature")
     | translated("frictionloss", "it fades at low rates, and does not stick")
-    | noted("springdamper", "give stiffness and damping")
+    | translated("springdamper", "stiffness and damping, by the mass matrix where the model starts")
     | noted("springyield", "springs do not yield")
     | noted("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
     | noted("actuatorfrcrange actuatorfrclimited actuatorgravcomp", "limits of actuators")
