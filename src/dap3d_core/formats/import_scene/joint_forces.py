@@ -150,7 +150,9 @@ class JointCoordinate:
     def add_friction(self) -> None:
         """Add dry friction, which fades at low rates."""
         friction, builder, ends = self._value("friction"), self.builder, self.ends
-        if not friction:
+        if friction < 0.0:
+            builder.remarks.leave_out(self.joint.place, "friction below 0, which would drive")
+        if friction <= 0.0:
             return
         unit = "rad/s" if self.turns else "m/s"
         text = (

@@ -46,6 +46,13 @@ def test_dry_friction_stops_a_joint(tmp_path, suffix, text, type):
     assert q[-1] == pytest.approx(stop + 6.17e-7, abs=1e-9)
 
 
+def test_friction_that_would_drive_is_left_out(tmp_path):
+    text = MJCF.format(type="hinge").replace('frictionloss="0.4"', 'frictionloss="-0.4"')
+    scene, report = imported(tmp_path, text)
+    assert "friction below 0, which would drive" in {one.text for one in report.left_out}
+    assert not any("friction" in force.type for force in scene.forces.values())
+
+
 BALL = """<mujoco><option gravity="0 0 0"/><worldbody><body name="a" quat="0.8 0 0.6 0">
   <inertial pos="0 0 0" mass="1" diaginertia="0.3 0.3 0.3"/>
   <joint name="q" type="ball" stiffness="3" damping="0.4" {more}/></body></worldbody></mujoco>"""
