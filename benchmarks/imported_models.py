@@ -78,8 +78,9 @@ def scene_at(model, state, *, balance_inertia):
     scene = scene_of(forced, Remarks(), options, names=names)
     for one in scene.inputs.values():
         one.value = 1.0
-    for name in [n for n, e in scene.forces.items() if "function" in e.fields]:
-        del scene.forces[name]  # stops
+    off = ("rot_friction", "tran_friction")
+    for name in [n for n, e in scene.forces.items() if e.type in off or "function" in e.fields]:
+        del scene.forces[name]  # friction, and stops
     scene.functions.clear()
     return scene, names
 

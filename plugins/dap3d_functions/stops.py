@@ -11,8 +11,8 @@ class Stops(Function):
 
         f = k (x - lower) for x < lower,  k (x - upper) for x > upper,  0 between
 
-    As the function of a spring, ``ptp`` or ``rot_sda``, it keeps a length or an angle between
-    limits: what comes in leaves with the same speed. Its derivative jumps at both stops.
+    As the function of a spring, ``ptp``, ``rot_sda`` or ``tran_sda``, it keeps a length or an angle
+    between limits: what comes in leaves with the same speed. Its derivative jumps at both stops.
     """
 
     keyword = "stops"

@@ -38,18 +38,24 @@ class BareOracle(Oracle):
                 m.actuator_gear[k] = 0.0
         for array in (m.body_gravcomp, m.tendon_stiffness, m.tendon_damping, m.tendon_armature):
             array[:] = 0.0
-        for j in range(m.njnt):  # a ball's spring, damper and armature are left out
-            if m.jnt_type[j] in (0, 1):
-                start, size = m.jnt_dofadr[j], 6 if m.jnt_type[j] == 0 else 3
-                m.dof_damping[start : start + size] = m.dof_armature[start : start + size] = 0.0
-                m.jnt_stiffness[j] = 0.0
+        for j in range(m.njnt):  # a ball's armature, and all of a free joint, are left out
+            start, size = m.jnt_dofadr[j], {0: 6, 1: 3}.get(int(m.jnt_type[j]), 0)
+            m.dof_armature[start : start + size] = 0.0
+            if m.jnt_type[j] == 0:
+                m.dof_damping[start : start + size] = m.jnt_stiffness[j] = 0.0
 
     def use(self, model):
         """Take the names of joints, for those that have none in the file."""
-        moving = [j.name for j in model.joints.values() if j.kind != "fixed"]
+        two = ("universal", "cylindrical")  # two joints in MuJoCo
+        kinds = {name: joint.kind for name, joint in model.joints.items()}
+        moving = [n for name, kind in kinds.items() if kind != "fixed"
+                  for n in ((name, f"{name}_2") if kind in two else (name,))]  # fmt: skip
         self.unnamed = moving if len(moving) == self.model.njnt else []
-        self.scalar = {n for n, j in model.joints.items() if j.kind in ("revolute", "prismatic")}
-        self.known = set(model.joints)
+        self.scalar = {n for n, kind in kinds.items() if kind in ("revolute", "prismatic")}
+        self.known = set(kinds)
+        self.pairs = {n: (n, f"{n}_2") for n, kind in kinds.items() if kind == "universal"}
+        #: of a cylindrical joint the angle comes first, which is the second joint
+        self.pairs |= {n: (f"{n}_2", n) for n, kind in kinds.items() if kind == "cylindrical"}
 
     def randomise(self, rng):
         """A random state: coordinates, rates and forces of the joints by name."""
@@ -61,8 +67,9 @@ class BareOracle(Oracle):
                 torques[name] = d.qfrc_applied[m.jnt_dofadr[j]] = rng.uniform(-1.0, 1.0)
         q, v = super().randomise(rng)
         self.largest = max(1.0, np.abs(d.qacc).max(initial=0.0))
-        q, v = ({n: np.atleast_1d(x).tolist() for n, x in one.items() if n in self.known}
-                for one in (q, v))  # fmt: skip
+        q, v = ({n: np.atleast_1d(x).tolist() for n, x in one.items()} for one in (q, v))
+        q, v = (one | {n: one[a] + one[b] for n, (a, b) in self.pairs.items()} for one in (q, v))
+        q, v = ({n: x for n, x in one.items() if n in self.known} for one in (q, v))
         return q, v, torques
 
     def evaluate(self, *, accelerations):

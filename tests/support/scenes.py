@@ -85,6 +85,8 @@ def _field(scene, name, spec, owner, rng, wanted):
         return float(np.ceil(value)) if spec.whole else value
     if spec.kind == "vec3":
         return rng.uniform(-1, 1, 3)
+    if spec.kind == "numbers":
+        return rng.uniform(-1, 1, spec.columns)
     if spec.kind == "matrix":
         return rotation(rng.normal(size=4))
     if spec.by_rows:

@@ -1,15 +1,22 @@
 """Actuators of MJCF: motors, and servos whose law is a spring and a damper."""
 
+from math import sqrt
+
 from dap3d_core.interface.formats import Actuator, FormatError, Joint, XmlElement
 from dap3d_formats.mjcf.document import ACTUATORS
 from dap3d_formats.mjcf.reader import MjcfReader
+from dap3d_formats.mjcf.start_inertia import LEAST, StartInertia
 
 #: Joints with one coordinate.
 SCALAR = ("revolute", "prismatic")
 
 
-def read_actuators(reader: MjcfReader) -> None:
+def read_actuators(reader: MjcfReader, inertia: StartInertia) -> None:
     """Read actuators on joints whose force is linear; others are left out, remarked.
+
+    Args:
+        reader: of the bodies, which have been read.
+        inertia: of the joints where the model starts.
 
     Raises:
         FormatError: one names a joint that is not there.
@@ -26,10 +33,10 @@ def read_actuators(reader: MjcfReader) -> None:
                 text = "an actuator of a group that is disabled"
                 document.source.remarks.leave_out(given.place, text)
             else:
-                _read(reader, element)
+                _read(reader, element, inertia)
 
 
-def _read(reader: MjcfReader, element: XmlElement) -> None:
+def _read(reader: MjcfReader, element: XmlElement, inertia: StartInertia) -> None:
     remarks = reader.document.source.remarks
     name = element.get("name") or f"actuator{len(reader.model.actuators) + 1}"
     joint = element.get("joint") or element.get("jointinparent")
@@ -46,6 +53,12 @@ def _read(reader: MjcfReader, element: XmlElement) -> None:
         return
     gear = element.numbers("gear", None, (1.0,))[0]
     gain, constant, position, rate = law
+    if rate > 0.0 and gain == -position:
+        moved = inertia.of(joint)
+        if moved is None:
+            text = "dampratio: links without mass, or too many, for a mass matrix"
+            remarks.leave_out(element.place, text)
+        rate *= -_critical(gain, gear, moved or 0.0)
     reference = reader.references.get(joint, 0.0)
     _add_law(target, gear * constant + gear * gear * position * reference,
              -gear * gear * position, -gear * gear * rate)  # fmt: skip
@@ -57,13 +70,23 @@ def _read(reader: MjcfReader, element: XmlElement) -> None:
     reader.model.actuators.append(Actuator(name, joint, gear * gain, element.place))
 
 
+def _critical(kp: float, gear: float, inertia: float) -> float:
+    """The damping of a servo whose damping ratio is one."""
+    mass = inertia / gear**2 if gear**2 > LEAST else 0.0
+    return 2.0 * sqrt(max(0.0, kp * mass))
+
+
 def _law(element: XmlElement) -> tuple[float, float, float, float] | None:
-    """Gain g and bias (b0, b1, b2) of the force g u + b0 + b1 length + b2 rate; None for others."""
+    """Gain g and bias (b0, b1, b2) of the force g u + b0 + b1 length + b2 rate; None for others.
+
+    A positive b2 of a servo, b1 = -g, is a damping ratio.
+    """
     if element.name == "motor":
         return 1.0, 0.0, 0.0, 0.0
-    if element.name == "position" and "dampratio" not in element.attributes:
+    if element.name == "position":
         kp = element.number("kp", 1.0)
-        return kp, 0.0, -kp, -element.number("kv", 0.0)
+        ratio = element.number("dampratio", 0.0)  # above 0, as the compiler stores it
+        return kp, 0.0, -kp, ratio if ratio > 0.0 else -element.number("kv", 0.0)
     if element.name == "velocity":
         kv = element.number("kv", 1.0)
         return kv, 0.0, 0.0, -kv

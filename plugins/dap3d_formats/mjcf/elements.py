@@ -12,11 +12,12 @@ _CLASS = taken("class")
 _ACTUATOR = (
     taken("name class joint jointinparent gear kp kv gaintype gainprm biastype biasprm dyntype")
     | taken("group")
+    | translated("dampratio", "damping, by the mass matrix where the model starts")
     | noted("user", _DRAWING)
     | noted("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
     | noted(
         "ctrllimited forcelimited actlimited ctrlrange forcerange actrange lengthrange actdim "
-        "dynprm actearly plugin dampratio "
+        "dynprm actearly plugin "
         "timeconst inheritrange kd gain bias area diameter scale range force vmax fpmax fvmax "
         "lmin lmax vmin tausmooth input nsample interp delay armature damping ffrange velrange "
         "cogging controller inductance lugre motorconst nominal resistance saturation thermal imax "
@@ -87,8 +88,8 @@ MJCF: Table = {
     "inertial": taken() | _FRAME | taken("mass diaginertia fullinertia"),
     "joint": taken()
     | taken("name class type pos axis range limited ref springref stiffness damping armature")
-    | translated("frictionloss", "no type of force is friction that does not depend on the load")
-    | noted("springdamper", "give stiffness and damping")
+    | translated("frictionloss", "it fades at low rates, and does not stick")
+    | translated("springdamper", "stiffness and damping, by the mass matrix where the model starts")
     | noted("springyield", "springs do not yield")
     | noted("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
     | noted("actuatorfrcrange actuatorfrclimited actuatorgravcomp", "limits of actuators")

@@ -15,6 +15,7 @@ from dap3d_core.interface.formats import (
     Remarks,
     quaternion,
 )
+from dap3d_formats.unwritten import leave_out_forces
 from dap3d_formats.xml_text import XmlText, words
 
 #: Kind of a joint -> types of the joints of a body.
@@ -118,7 +119,7 @@ class _Writer:
                           "pos": words(joint.in_child.r)}  # fmt: skip
             if type_ != "ball":
                 attributes["axis"] = words(joint.in_child.A @ axes[k])
-            if len(types) == 1 and type_ != "ball":
+            if len(types) == 1:
                 attributes |= self._dynamics(joint)
             self.text.empty("joint", **attributes)
 
@@ -126,7 +127,8 @@ class _Writer:
         attributes = {
             key: words(values)
             for key, values in (("damping", joint.damping), ("stiffness", joint.stiffness),
-                                ("springref", joint.rest), ("armature", joint.armature))
+                                ("springref", joint.rest), ("armature", joint.armature),
+                                ("frictionloss", joint.friction))
             if values[0]
         }  # fmt: skip
         limits = joint.limits[0]
@@ -161,6 +163,7 @@ class _Writer:
             return
         self.text.open("equality")
         for joint in loops:
+            leave_out_forces(joint, self.remarks)
             self._loop(joint)
         for coupling in self.model.couplings:
             self.text.empty("joint", joint1=coupling.joint, joint2=coupling.other,

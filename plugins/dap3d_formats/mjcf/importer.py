@@ -8,6 +8,7 @@ from dap3d_formats.mjcf.document import Document
 from dap3d_formats.mjcf.elements import MJCF
 from dap3d_formats.mjcf.reader import MjcfReader
 from dap3d_formats.mjcf.replicate import expand_replicas
+from dap3d_formats.mjcf.start_inertia import StartInertia
 
 
 class MjcfImporter(Importer):
@@ -23,7 +24,9 @@ class MjcfImporter(Importer):
         expand_replicas(document)
         reader = MjcfReader(document)
         reader.read_bodies()
-        read_equalities(reader)
-        read_actuators(reader)
         reader.scale_masses()
+        inertia = StartInertia(reader.model)
+        reader.scale_springs(inertia)
+        read_equalities(reader)
+        read_actuators(reader, inertia)
         return reader.model

@@ -23,6 +23,7 @@ from dap3d_core.interface.formats import (
 from dap3d_formats.axes import unit
 from dap3d_formats.mjcf.document import Document
 from dap3d_formats.mjcf.geoms import Geoms
+from dap3d_formats.mjcf.start_inertia import LEAST, StartInertia
 
 #: Type -> kind of a joint.
 KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
@@ -40,6 +41,7 @@ class MjcfReader:
         references: joint -> its coordinate in the file where the model's is zero.
         given: names of bodies and joints in the file, which those without a name do not take.
         joints: names of the joints that have been read.
+        springdampers: joint -> time constant and damping ratio that give its spring and damper.
     """
 
     document: Document
@@ -49,6 +51,7 @@ class MjcfReader:
     references: dict[str, float] = attrs.Factory(dict)
     given: set[str] = attrs.Factory(set)
     joints: set[str] = attrs.Factory(set)
+    springdampers: dict[str, tuple[float, ...]] = attrs.Factory(dict)
 
     def __attrs_post_init__(self) -> None:
         root = self.document.root
@@ -191,7 +194,9 @@ class MjcfReader:
             model.joints[name] = Joint(name, "fixed", parent, link.name, here, place=place)
             return
         start, last = here, parent
-        made = _compound([self._joint(element, frame) for element, frame in joints])
+        made = [self._joint(element, frame) for element, frame in joints]
+        if not any(joint.name in self.springdampers for joint in made):
+            made = _compound(made)
         for k, joint in enumerate(made):
             is_last = k == len(made) - 1
             below = link.name if is_last else self._free_link(f"{link.name}_{joint.name}")
@@ -234,15 +239,15 @@ class MjcfReader:
         self.joints.add(name)
         anchor = Frame(element.numbers("pos", 3, (0.0, 0.0, 0.0)))
         joint = Joint(name, KINDS[type_], "", "", in_child=frame @ anchor, place=element.place)
-        if joint.kind == "free":
+        if element.name == "freejoint":  # it takes nothing from default classes
             return joint
-        if joint.kind != "ball":
+        if joint.kind not in ("ball", "free"):
             joint.axes = (unit(element.numbers("axis", 3, (0.0, 0.0, 1.0)), element),)
         self._dynamics(joint, element)
         return joint
 
     def _dynamics(self, joint: Joint, element: XmlElement) -> None:
-        """Limits, damping, springs and armature of a joint."""
+        """Limits, damping, friction, springs and armature of a joint."""
 
         def turned(value: float) -> float:
             return self.document.angle(value) if joint.kind == "revolute" else value
@@ -257,6 +262,11 @@ class MjcfReader:
                 text = f"{attribute} of a joint: higher coefficients of its polynomial"
                 self.document.source.remarks.leave_out(element.place, text)
         joint.rest = (turned(element.number("springref", 0.0)) - reference,)
+        both = element.numbers("springdamper", 2, (0.0, 0.0))
+        if min(both) > 0.0:
+            self.springdampers[joint.name] = both
+        elif any(both):
+            raise FormatError("both numbers of springdamper are above 0", element.place)
         limited = element.get("limited", "auto")
         if limited == "true" or (limited == "auto" and "range" in element.attributes
                                  and self.document.flag("autolimits", True)):  # fmt: skip
@@ -269,6 +279,17 @@ class MjcfReader:
                 joint.limits = (Limits(turned(low) - reference, turned(high) - reference),)
         if not any((joint.damping[0], joint.stiffness[0])):
             joint.limits = joint.limits or (Limits(-inf, inf),)
+
+    def scale_springs(self, inertia: StartInertia) -> None:
+        """Set the springs and dampers of joints that are given by their time constants."""
+        for name, (time, ratio) in self.springdampers.items():
+            joint, moved = self.model.joints[name], inertia.of(name)
+            if moved is None:
+                text = "springdamper: links without mass, or too many, for a mass matrix"
+                self.document.source.remarks.leave_out(joint.place, text)
+                continue
+            joint.stiffness = (moved / max(LEAST, (time * ratio) ** 2),)
+            joint.damping = (2.0 * moved / max(LEAST, time),)
 
     def scale_masses(self) -> None:
         """Scale all masses to the total that the compiler says."""

@@ -65,7 +65,7 @@ SDF: Table = {
     "dissipation": noted("", "stops have no damping"),
     "dynamics": taken(), "damping": taken(), "spring_reference": taken(),
     "spring_stiffness": taken(),
-    "friction": translated("", "no type of force is friction that does not depend on the load"),
+    "friction": translated("", "it fades at low rates, and does not stick"),
     "mimic": translated("", "a joint follow of the same rates; the offset is that of the start")
     | taken("joint axis"),
     "multiplier": taken(), "offset": taken(), "reference": taken(),

@@ -32,7 +32,7 @@ URDF: Table = {
     "child": taken() | taken("link"),
     "axis": taken() | taken("xyz"),
     "dynamics": taken() | taken("damping")
-    | translated("friction", "no type of force is friction that does not depend on the load"),
+    | translated("friction", "it fades at low rates, and does not stick"),
     "limit": translated("", "elastic stops") | taken("lower upper")
     | noted("effort velocity", "limits of forces and speeds are those of a controller"),
     "mimic": translated("", "a joint follow of the same rates; the offset is that of the start")

@@ -17,6 +17,7 @@ from dap3d_core.interface.formats import (
     from_quaternion,
     rpy_of,
 )
+from dap3d_formats.unwritten import leave_out_forces
 from dap3d_formats.xml_text import XmlText, words
 
 #: Kind of a joint -> type in the tree, and of a <constraint>.
@@ -40,6 +41,7 @@ class UrdfExporter(Exporter):
         mimics = {coupling.joint: coupling for coupling in model.couplings}
         for joint in model.joints.values():
             if joint.closes:
+                leave_out_forces(joint, remarks)
                 _write_loop(text, joint)
             else:
                 _write_joint(text, joint, mimics.get(joint.name), remarks)
@@ -113,14 +115,13 @@ def _write_joint(text: XmlText, joint: Joint, mimic: Coupling | None, remarks: R
     _write_ends(text, joint)
     if type_ in ("revolute", "prismatic"):
         _write_limit(text, joint, remarks)
-    if joint.kind in ("revolute", "prismatic") and joint.damping[0]:
-        text.empty("dynamics", damping=words(joint.damping))
+    if joint.kind in ("revolute", "prismatic") and (joint.damping[0] or joint.friction[0]):
+        numbers = {"damping": joint.damping, "friction": joint.friction}
+        text.empty("dynamics", **{key: words(value) for key, value in numbers.items() if value[0]})
     if mimic is not None:
         text.empty("mimic", joint=mimic.other, multiplier=words([mimic.ratio]))
     text.close("joint")
-    for key, what in (("stiffness", "spring"), ("armature", "armature")):
-        if joint.kind in ("revolute", "prismatic") and getattr(joint, key)[0]:
-            remarks.leave_out(NOWHERE, f"{what} of joint {joint.name}")
+    leave_out_forces(joint, remarks, ("stiffness", "armature"))
 
 
 def _write_limit(text: XmlText, joint: Joint, remarks: Remarks) -> None:

@@ -8,6 +8,7 @@ import dap3d_core as dap
 
 DATA = REPOSITORY / "tests" / "data" / "formats"
 SUFFIX = {"urdf": ".urdf", "mjcf": ".xml"}
+GRAVITY = "gravity 0 0 0 m/s^2: URDF has none, and readers take 9.81 along -z"
 
 
 def matrix(Jp):
@@ -128,6 +129,55 @@ def test_a_scene_by_hand_keeps_its_mechanism(tmp_path):
                for one in (scene, back)]  # fmt: skip
     # two runs of the same motion, each to 1e-11 a step
     np.testing.assert_allclose(results[0].r, results[1].r, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("format", ["urdf", "mjcf"])
+def test_dry_friction_and_a_spring_of_a_slider_read_back(tmp_path, format):
+    """Of a slider and a hinge on it, in axes and points of its own: accelerations are the same."""
+    scene = dap.Scene(name="rubbing")
+    scene.add_body("block", mass=2.0, Jp=(0.2, 0.3, 0.4), r=(0.5, 0.0, 0.0), r_dot=(0.3, 0, 0))
+    scene.add_body("wheel", mass=1.0, Jp=(0.1, 0.2, 0.25), r=(0.5, 0.0, 0.2), r_dot=(0.3, 0, 0),
+                   w=(0.0, -0.7, 0.0))  # fmt: skip
+    scene.add_point("P", "block", (0.0, 0.0, 0.2))
+    scene.add_point("Q", "ground", (0.1, 0.0, 0.0))
+    scene.add_vector("back", "ground", (-1.0, 0.0, 0.0))
+    scene.add_joint("tran", "way", P_i="block.O", P_j="ground.O", a_j="ground.x")
+    scene.add_joint("rev", "pin", P_i="wheel.O", P_j="P", a_i="wheel.y", a_j="block.y")
+    k = 0.0 if format == "urdf" else 30.0
+    scene.add_force("tran_sda", "spring", P_i="block.O", P_j="Q", a_j="back", k=k, c=0.5, x_0=-0.3)
+    scene.add_force("tran_friction", "rub", P_i="P", a_j="back", f_c=0.8)
+    scene.add_force("rot_friction", "drag", body_i="block", body_j="wheel", axis="wheel.y", n_c=0.6)
+    report = dap.export_model(scene, tmp_path / f"a{SUFFIX[format]}", format=format)
+    assert {one.text for one in report.left_out} <= {"initial velocities", GRAVITY}
+    back, _ = dap.import_model(tmp_path / f"a{SUFFIX[format]}")
+    back.forces.pop("gravity", None)
+    ends = []
+    for one in (scene, back):
+        state = [(*b.r, *b.p) for b in one.bodies.values()]
+        state += [(*b.r_dot, *b.w) for b in scene.bodies.values()]
+        ends.append(dap.compile(one).rhs(0.0, np.concatenate(state))[-12:])
+    assert np.abs(ends[0]).max() > 0.5
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-12)
+
+
+def test_what_acts_in_a_closed_loop_is_listed():
+    """An equality of MJCF, and a <constraint> of URDF, have no damper."""
+    scene, _ = dap.import_model(DATA / "parallelogram.sdf")
+    ends = [scene.points[scene.joints["close"].fields[end]].body for end in ("P_i", "P_j")]
+    scene.add_force("sph_sd", "drag", body_i=ends[0], body_j=ends[1], c=0.1)
+    for format in ("mjcf", "urdf"):
+        report = dap.export_model(scene, format=format)
+        assert "damping of joint close" in {one.text for one in report.left_out}
+
+
+def test_a_body_that_is_fixed_to_ground_is_said_to_become_ground():
+    scene = dap.Scene(name="held")
+    for name in ("held", "free"):
+        scene.add_body(name, mass=1.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_joint("fix", "clamp", body_i="held")
+    report = dap.export_model(scene, format="mjcf")
+    text = "clamp holds held on ground: read back, held is a part of ground"
+    assert text in {one.text for one in report.translated}
 
 
 def test_a_joint_without_a_counterpart_is_refused_by_name():

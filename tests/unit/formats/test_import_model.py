@@ -204,3 +204,42 @@ def test_actuators_of_a_group_that_is_disabled_are_left_out(tmp_path):
     assert list(scene.inputs) == ["m"]
     assert not any(force.type == "rot_sda" for force in scene.forces.values())
     assert any("group that is disabled" in one.text for one in report.left_out)
+
+
+LINE = """<worldbody><body name="a"><joint name="p" axis="0 0 1" {first}/>
+  <inertial pos="0 0 0" mass="2" diaginertia="0.1 0.1 0.05"/>
+  <body name="b" pos="0.5 0 0"><joint name="q" axis="0 0 1" armature="0.005" {second}/>
+    <inertial pos="0.1 0 0" mass="1" diaginertia="0.01 0.01 0.005"/></body></body></worldbody>"""
+#: Inertias of its joints while the other is free, of the mass matrix ((0.415, 0.065), (.., 0.02)).
+FREE = 0.415 - 0.065**2 / 0.02, 0.02 - 0.065**2 / 0.415
+
+
+def test_springs_may_be_given_by_a_time_constant_and_a_damping_ratio(tmp_path):
+    """k = I / (time ratio)^2 and c = 2 I / time, as in MuJoCo's compiler."""
+    text = LINE.format(first='springdamper="0.1 0.5"', second='springdamper="0.2 1"')
+    scene, report = imported(tmp_path, text)
+    assert not report.left_out
+    for name, inertia, time, ratio in zip("pq", FREE, (0.1, 0.2), (0.5, 1.0), strict=True):
+        fields = scene.forces[f"{name}_spring"].fields
+        assert fields["k"] == pytest.approx(inertia / (time * ratio) ** 2, rel=1e-12)
+        assert fields["c"] == pytest.approx(2.0 * inertia / time, rel=1e-12)
+
+
+def test_a_servo_may_have_a_damping_ratio(tmp_path):
+    """Of the joint c = 2 ratio gear sqrt(kp I): it moves I / gear^2, and the joint feels gear^2."""
+    servos = """<actuator><position joint="p" kp="50" dampratio="1"/>
+      <general joint="q" gear="3" gainprm="8" biastype="affine" biasprm="0 -8 0.7"/></actuator>"""
+    scene, report = imported(tmp_path, LINE.format(first="", second="") + servos)
+    assert not report.left_out
+    damping = [scene.forces[f"{name}_spring"].fields["c"] for name in "pq"]
+    expected = 2.0 * np.sqrt(50.0 * FREE[0]), 2.0 * 0.7 * 3.0 * np.sqrt(8.0 * FREE[1])
+    np.testing.assert_allclose(damping, expected, rtol=1e-12)
+
+
+def test_a_spring_by_a_time_constant_needs_a_mass(tmp_path):
+    text = LINE.format(first="", second='springdamper="0.2 1"').replace('mass="1"', 'mass="0"')
+    text = text.replace("0.01 0.01 0.005", "0 0 0").replace('armature="0.005"', "")
+    _, report = imported(tmp_path, text)
+    assert any("springdamper: links without mass" in one.text for one in report.left_out)
+    with pytest.raises(dap.SceneError, match="both numbers of springdamper are above 0"):
+        imported(tmp_path, LINE.format(first='springdamper="0.1 0"', second=""))

@@ -34,6 +34,9 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
     tree, loops = _tree(elements)
     for body, joint in tree:
         _add_link(builder, body, joint)
+        if joint is not None and joint.kind == "fixed" and joint.body_j == GROUND:
+            text = f"{joint.name} holds {body} on ground: read back, {body} is a part of ground"
+            remarks.translate(NOWHERE, text)
     for joint in loops:
         _add_joint(builder, joint, closes=True)
     add_gravity(builder, scene)

@@ -1,4 +1,4 @@
-"""Forces of a scene as springs, dampers, limits and rotors of the joints of a model."""
+"""Forces of a scene as springs, dampers, limits, friction and rotors of the joints of a model."""
 
 from math import inf
 from typing import Any
@@ -8,6 +8,7 @@ import numpy as np
 from dap3d_core.formats.export_scene.elements import SceneJoint, leave_out
 from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.interface.formats.articulation import Coupling, Joint, Limits
+from dap3d_core.interface.formats.frames import Floats, from_quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE
 from dap3d_core.scene.scene import Element, Scene
 
@@ -15,6 +16,13 @@ from dap3d_core.scene.scene import Element, Scene
 NO_STOP = 1e6
 #: Parallel axes and points on a line, up to this.
 ALIGNED = 1e-9
+#: Orientations that are one, up to this.
+SAME = 1e-12
+#: Type of dry friction -> kind of its joint, its axis, and its size.
+FRICTION = {
+    "rot_friction": ("revolute", "axis", "n_c"), "tran_friction": ("prismatic", "a_j", "f_c"),
+}  # fmt: skip
+NO_JOINT = "no force on the coordinate of a joint"
 
 
 def add_gravity(builder: ModelBuilder, scene: Scene) -> None:
@@ -30,49 +38,68 @@ def add_gravity(builder: ModelBuilder, scene: Scene) -> None:
 
 def add_forces(builder: ModelBuilder, scene: Scene) -> None:
     """Add forces on coordinates of joints, and rotors; others are left out, remarked."""
+    springs = {"rot_sda": _of_hinge, "tran_sda": _of_slider, "ptp": _on_line}
     for element in scene.forces.values():
-        if element.type == "weight":
-            continue
-        found = None
-        if element.type == "rot_sda":
-            found = _of_hinge(builder, element)
-        elif element.type == "ptp":
-            found = _of_slider(builder, element)
-        if found is None:
-            leave_out(builder.remarks, element, "no force on the coordinate of a joint")
-        else:
-            _add(builder, element, *found)
+        if element.type == "sph_sd":
+            _add_to_ball(builder, element)
+        elif element.type in FRICTION:
+            _add_friction(builder, element)
+        elif element.type != "weight":
+            of = springs.get(str(element.type))
+            found = None if of is None else of(builder, element)
+            if found is None:
+                leave_out(builder.remarks, element, NO_JOINT)
+            else:
+                _add(builder, element, *found)
     _add_rotors(builder)
+
+
+def _joint_along(
+    builder: ModelBuilder, kind: str, bodies: set[str], axis: str
+) -> tuple[SceneJoint, float] | None:
+    """The joint of two bodies with an axis, and whether the axis has its sense, 1 or -1."""
+    elements = builder.elements
+    on, u = elements.vector(axis)
+    for joint in elements.joints:
+        if joint.kind == kind and {joint.body_i, joint.body_j} == bodies:
+            along = float((elements.turn(joint.body_i, on) @ u) @ joint.axes[0])
+            if abs(abs(along) - 1.0) <= ALIGNED:
+                return joint, float(np.sign(along))
+    return None
 
 
 def _of_hinge(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
     """The joint of a torsional spring, the sense of its angle, and the angle where q = 0."""
     elements, fields = builder.elements, element.fields
     (i, v_i), (j, v_j) = (elements.vector(fields[key]) for key in ("v_i", "v_j"))
+    found = _joint_along(builder, "revolute", {i, j}, fields["axis"])
+    if found is None:
+        return None
+    joint, along = found
     on, u = elements.vector(fields["axis"])
-    for joint in elements.joints:
-        if joint.kind != "revolute" or {joint.body_i, joint.body_j} != {i, j}:
-            continue
-        axis = elements.turn(joint.body_i, on) @ u
-        along = float(axis @ joint.axes[0])
-        if abs(abs(along) - 1.0) > ALIGNED:
-            continue
-        here = elements.turn(on, i) @ v_i
-        there = elements.turn(on, j) @ v_j
-        theta = float(
-            np.arctan2(u @ np.cross(here, there), here @ there - (here @ u) * (there @ u))
-        )
-        sense = float(np.sign(along)) * (-1.0 if i == joint.body_i else 1.0)
-        return builder.placed[joint.name], sense, theta
-    return None
+    here, there = elements.turn(on, i) @ v_i, elements.turn(on, j) @ v_j
+    theta = float(np.arctan2(u @ np.cross(here, there), here @ there - (here @ u) * (there @ u)))
+    return builder.placed[joint.name], along * (-1.0 if i == joint.body_i else 1.0), theta
 
 
 def _of_slider(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
+    """The joint of a spring along an axis, the sense of its x, and x where q = 0."""
+    elements, fields = builder.elements, element.fields
+    i, j = (elements.point(fields[end])[0] for end in ("P_i", "P_j"))
+    found = _joint_along(builder, "prismatic", {i, j}, fields["a_j"])
+    if found is None:
+        return None
+    joint, along = found
+    axis = elements.bodies[joint.body_i].pose.A @ joint.axes[0]
+    x = -along * float(axis @ _between(builder, fields))
+    return builder.placed[joint.name], along * (1.0 if i == joint.body_i else -1.0), x
+
+
+def _on_line(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
     """The joint of a spring along its axis, the sense of its length, and that where q = 0."""
     elements = builder.elements
-    (i, r_i), (j, r_j) = (elements.point(end) for end in elements.ends(element.fields))
-    pose_i, pose_j = elements.bodies[i].pose, elements.bodies[j].pose
-    d = pose_j.r + pose_j.A @ r_j - pose_i.r - pose_i.A @ r_i
+    i, j = (elements.point(end)[0] for end in elements.ends(element.fields))
+    d = _between(builder, element.fields)
     length = float(np.linalg.norm(d))
     for joint in elements.joints:
         if joint.kind == "prismatic" and {joint.body_i, joint.body_j} == {i, j} and length:
@@ -82,6 +109,50 @@ def _of_slider(builder: ModelBuilder, element: Element) -> tuple[Joint, float, f
                 sense = float(np.sign(along)) * (-1.0 if i == joint.body_i else 1.0)
                 return builder.placed[joint.name], sense, length
     return None
+
+
+def _between(builder: ModelBuilder, fields: dict[str, Any]) -> Floats:
+    """The vector from P_i to P_j in global axes."""
+    elements = builder.elements
+    (i, r_i), (j, r_j) = (elements.point(end) for end in elements.ends(fields))
+    pose_i, pose_j = elements.bodies[i].pose, elements.bodies[j].pose
+    return np.asarray(pose_j.r + pose_j.A @ r_j - pose_i.r - pose_i.A @ r_i)
+
+
+def _add_friction(builder: ModelBuilder, element: Element) -> None:
+    """Add dry friction to a hinge or a slider; how it fades is the business of other programs."""
+    elements, fields = builder.elements, element.fields
+    kind, axis, size = FRICTION[str(element.type)]
+    if kind == "revolute":
+        bodies = {str(fields["body_i"]), str(fields["body_j"])}
+    else:
+        bodies = {elements.point(fields["P_i"])[0], elements.vector(fields["a_j"])[0]}
+    found = _joint_along(builder, kind, bodies, fields[axis])
+    if found is None:
+        leave_out(builder.remarks, element, NO_JOINT)
+        return
+    joint = builder.placed[found[0].name]
+    joint.friction = (joint.friction[0] + float(fields[size]),)
+
+
+def _add_to_ball(builder: ModelBuilder, element: Element) -> None:
+    """Add a spring and damper to a ball; its spring is at rest where a model starts."""
+    elements, fields = builder.elements, element.fields
+    i, j = str(fields["body_i"]), str(fields["body_j"])
+    joint = next((one for one in elements.joints if one.kind == "ball"
+                  and {one.body_i, one.body_j} == {i, j}), None)  # fmt: skip
+    if joint is None:
+        leave_out(builder.remarks, element, NO_JOINT)
+        return
+    placed, k = builder.placed[joint.name], float(fields.get("k", 0.0))
+    placed.damping = (placed.damping[0] + float(fields.get("c", 0.0)),)
+    rest = from_quaternion(fields.get("p_c", (1.0, 0.0, 0.0, 0.0)))
+    if k and np.abs(elements.turn(i, j) - rest).max() > SAME:
+        leave_out(
+            builder.remarks, element, "a spring of a ball that has a moment in the pose given"
+        )
+    elif k:
+        placed.stiffness = (placed.stiffness[0] + k,)
 
 
 def _limits(builder: ModelBuilder, element: Element) -> Element | bool | None:
@@ -96,7 +167,7 @@ def _limits(builder: ModelBuilder, element: Element) -> Element | bool | None:
 def _add(builder: ModelBuilder, element: Element, joint: Joint, sense: float, zero: float) -> None:
     """Add a spring, damper or stops to a joint; the coordinate is sense (x - zero)."""
     fields, stops = element.fields, _limits(builder, element)
-    rest = float(fields.get("theta_0", fields.get("l0", 0.0)))
+    rest = float(fields.get("theta_0", fields.get("x_0", fields.get("l0", 0.0))))
     if stops is None or fields.get("n_a") or fields.get("f_a"):
         leave_out(builder.remarks, element, "a constant force or a function on a joint")
         return

@@ -1,4 +1,4 @@
-"""What acts on the coordinates of joints: springs, dampers, stops, rotors, couplings, inputs."""
+"""What acts on the coordinates of joints: springs, dampers, stops, dry friction, inputs."""
 
 import re
 from math import isfinite, pi
@@ -6,112 +6,167 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.formats.import_scene.joints import JointEnds, from_ground
+from dap3d_core.formats.import_scene.couplings import add_rotor
+from dap3d_core.formats.import_scene.joints import NamedEnds, from_ground
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.interface.formats.articulation import Articulation, Joint, Limits
-from dap3d_core.interface.formats.frames import Floats
+from dap3d_core.interface.formats.frames import Floats, quaternion
 from dap3d_core.scene.scene import GROUND
 
 #: Stiffness of stops where the format says none, N m/rad and N/m.
-STOP_STIFFNESS = {"revolute": 1e4, "prismatic": 1e6}
-#: Distance behind a sliding joint without limits from which a spring along its axis is drawn, m.
-FAR = 1e3
+STOP_STIFFNESS = {True: 1e4, False: 1e6}
+#: Rate below which dry friction fades, rad/s and m/s.
+FADING = 1e-3
+#: What may act on each coordinate of a joint -> its name in a remark.
+WORDS = {
+    "damping": "damping", "stiffness": "spring", "friction": "friction", "armature": "armature",
+    "limits": "limits",
+}  # fmt: skip
+#: Kind of a joint -> what is taken of it.
+TAKEN = {
+    "revolute": tuple(WORDS), "prismatic": tuple(WORDS),
+    "universal": ("damping", "stiffness", "friction", "limits"), "ball": ("damping", "stiffness"),
+}  # fmt: skip
 
 
 def add_joint_forces(builder: SceneBuilder, joint: Joint) -> None:
     """Add what acts on the coordinates of a joint; what no type can say is left out, remarked."""
-    said = [any(getattr(joint, name)) for name in ("damping", "stiffness", "friction", "armature")]
-    limited = any(isfinite(one.lower) or isfinite(one.upper) for one in joint.limits)
-    if not any(said) and not limited:
+    given = [key for key in WORDS if any(map(_acts, getattr(joint, key)))]
+    taken = TAKEN.get(joint.kind, ())
+    for key in given:
+        if key not in taken:
+            builder.remarks.leave_out(joint.place, f"{WORDS[key]} of a {joint.kind} joint")
+    if not set(given) & set(taken):
         return
-    if joint.kind not in ("revolute", "prismatic"):
-        _leave_out(builder, joint, said, limited)
+    if joint.kind == "ball":
+        _add_ball_spring(builder, joint)
         return
-    coordinate = JointCoordinate(builder, joint)
-    if joint.damping[0] or joint.stiffness[0]:
-        coordinate.add_spring(joint.stiffness[0], joint.rest[0], joint.damping[0])
-    if limited:
-        coordinate.add_stops(joint.limits[0])
-    if joint.friction[0]:
-        text = "friction of a joint that does not depend on its load: no type of force is this"
-        builder.remarks.leave_out(joint.place, text)
-    if joint.armature[0]:
-        _add_rotor(builder, joint, joint.armature[0])
+    for k in range(len(joint.axes)):
+        coordinate = JointCoordinate(builder, joint, k)
+        coordinate.add_spring()
+        coordinate.add_stops()
+        coordinate.add_friction()
+    if "armature" in given and "armature" in taken:
+        add_rotor(builder, joint, joint.armature[0])
 
 
-def _leave_out(builder: SceneBuilder, joint: Joint, said: list[bool], limited: bool) -> None:
-    words = ("damping", "spring", "friction", "armature", "limits")
-    for word, there in zip(words, (*said, limited), strict=True):
-        if there:
-            builder.remarks.leave_out(joint.place, f"{word} of a {joint.kind} joint")
+def _acts(value: float | Limits) -> bool:
+    """True for a number but zero, or a finite limit."""
+    if isinstance(value, Limits):
+        return isfinite(value.lower) or isfinite(value.upper)
+    return bool(value)
+
+
+def _add_ball_spring(builder: SceneBuilder, joint: Joint) -> None:
+    """Add a spring and damper against any turn of a ball."""
+    ends = NamedEnds(builder, from_ground(builder, joint))
+    k, c = joint.stiffness[0], joint.damping[0]
+    rest = quaternion(ends.on_child.A @ ends.on_parent.A.T) if k else None
+    name = builder.names.free("forces", f"{ends.name}_{'spring' if k else 'damper'}")
+    builder.scene.add_force("sph_sd", name, body_i=ends.child, body_j=ends.parent, k=k or None,
+                            c=c or None, p_c=rest)  # fmt: skip
 
 
 class JointCoordinate:
-    """The coordinate of a hinge or a slider, and the force elements on it.
+    """A coordinate q of a joint, an angle or a length, and the force elements on it.
 
-    That of a slider is the length of a spring along its axis, from a point far behind it on the
-    parent: l = back + q.
+    The axes of a universal joint are across each other, the first fixed in the parent and the
+    second in the child: the angles about them are those of two hinges.
     """
 
-    def __init__(self, builder: SceneBuilder, joint: Joint) -> None:
-        joint = from_ground(builder, joint)
-        self.builder, self.joint = builder, joint
-        self.ends = NamedEnds(builder, joint)
-        self.turns = joint.kind == "revolute"
-        finite = [abs(x) for one in joint.limits for x in (one.lower, one.upper) if isfinite(x)]
-        rest = abs(joint.rest[0]) if joint.stiffness[0] else 0.0
-        self.back = 0.0 if self.turns else 1.5 * max([*finite, rest, 0.01])
-        if not self.turns and not all(map(isfinite, (joint.limits[0].lower,))):
-            self.back = FAR
+    def __init__(self, builder: SceneBuilder, joint: Joint, k: int) -> None:
+        self.builder, self.joint, self.k = builder, joint, k
+        self.turns = joint.kind != "prismatic"
+        # exchanged ends of a universal joint have its axes in the other order
+        there = from_ground(builder, joint)
+        self.ends = NamedEnds(builder, there)
+        self.at = k if there is joint else len(joint.axes) - 1 - k
+        self.axis = np.asarray(there.axes[self.at], dtype=float)
+        self.name = self.ends.name if len(joint.axes) == 1 else f"{self.ends.name}_{k + 1}"
 
-    def _element(self, kind: str) -> tuple[str, dict[str, Any]]:
-        """Keyword of the type of force, and its fields that place it."""
-        axis = np.asarray(self.joint.axes[0], dtype=float)
+    def _value(self, key: str) -> Any:
+        """One of what acts on this coordinate; zero, or no limits, where the model says none."""
+        values = getattr(self.joint, key)
+        return values[self.k] if self.k < len(values) else Limits() if key == "limits" else 0.0
+
+    def _add(self, what: str, **fields: Any) -> None:
+        """Add a spring, damper and stops on the coordinate."""
+        ends, axis = self.ends, self.axis
         if not self.turns:
-            behind = self.ends.point("j", -self.back * axis, f"_{kind}")
-            return "ptp", {"P_i": self.ends.point("i", suffix=f"_{kind}"), "P_j": behind}
-        across = perpendicular(axis)
-        return "rot_sda", {  # of the parent against the child about the opposite axis: q
-            "v_i": self.ends.vector("i", across, "_across"),
-            "v_j": self.ends.vector("j", across, "_across"),
-            "axis": self.ends.vector("i", -axis, "_back"),
-        }
-
-    def add_spring(self, k: float, rest: float, c: float) -> None:
-        """Add a linear spring without force at ``rest``, and a linear damper."""
-        keyword, fields = self._element("spring")
-        if self.turns:
-            fields |= {"theta_0": rest or None, "turns": True if k else None}
+            keyword = "tran_sda"
+            fields |= {"P_i": ends.point("i"), "P_j": ends.point("j"),
+                       "a_j": ends.vector("j", axis)}  # fmt: skip
         else:
-            fields |= {"l0": self.back + rest} if k else {}
-        name = self.builder.names.free("forces", f"{self.ends.name}_spring" if k else
-                                       f"{self.ends.name}_damper")  # fmt: skip
-        self.builder.scene.add_force(keyword, name, k=k or None, c=c or None, **fields)
+            keyword, suffix = "rot_sda", "" if self.k == 0 else f"_{self.k + 1}"
+            two = len(self.joint.axes) == 2
+            across = np.asarray(ends.joint.axes[1 - self.at]) if two else perpendicular(axis)
+            fields |= {  # of the parent against the child about the opposite axis: q
+                "v_i": ends.vector("i", across, f"_across{suffix}"),
+                "v_j": ends.vector("j", across, f"_across{suffix}"),
+                "axis": ends.vector(self._holder(), -axis, f"_back{suffix}"),
+            }
+        name = self.builder.names.free("forces", f"{self.name}_{what}")
+        self.builder.scene.add_force(keyword, name, **fields)
 
-    def add_stops(self, limits: Limits) -> None:
+    def _holder(self) -> str:
+        """The end that the axis is fixed in: the child, but for the first of a universal joint."""
+        return "j" if len(self.joint.axes) == 2 and self.at == 0 else "i"
+
+    def add_spring(self) -> None:
+        """Add a linear spring without force at ``rest``, and a linear damper."""
+        k, c = self._value("stiffness"), self._value("damping")
+        if not (k or c):
+            return
+        fields: dict[str, Any] = {}
+        if k:
+            rest = self._value("rest") or None
+            fields = {"theta_0": rest, "turns": True} if self.turns else {"x_0": rest}
+        self._add("spring" if k else "damper", k=k or None, c=c or None, **fields)
+
+    def add_stops(self) -> None:
         """Add elastic stops at the limits."""
-        builder, kind = self.builder, self.joint.kind
-        stiffness = limits.stiffness or STOP_STIFFNESS[kind]
+        limits, builder, joint = self._value("limits"), self.builder, self.joint
+        if not _acts(limits):
+            return
+        stiffness = limits.stiffness or STOP_STIFFNESS[self.turns]
         unit = "N m/rad" if self.turns else "N/m"
         text = f"limits of a joint are elastic stops of {stiffness:g} {unit} without damping"
-        builder.remarks.translate(self.joint.place, text)
-        keyword, fields = self._element("stops")
-        name = builder.names.free("functions", f"{self.ends.name}_stops")
+        builder.remarks.translate(joint.place, text)
+        name = builder.names.free("functions", f"{self.name}_stops")
         wide = max(1e6, *(abs(x) for x in (limits.lower, limits.upper) if isfinite(x)))
         builder.scene.add_function(
             "stops", name, k=stiffness,
             lower=limits.lower if isfinite(limits.lower) else -2.0 * wide,
             upper=limits.upper if isfinite(limits.upper) else 2.0 * wide,
         )  # fmt: skip
-        beyond = max(abs(limits.lower), abs(limits.upper)) > 0.75 * pi
-        fields |= {"turns": True if beyond else None} if self.turns else {"l0": self.back}
-        force = builder.names.free("forces", f"{self.ends.name}_stops")
-        builder.scene.add_force(keyword, force, function=name, **fields)
-        q = builder.positions.get(self.joint.name, self.joint.position) or (0.0,)
-        if not limits.lower <= q[0] <= limits.upper:
-            text = f"joint {self.joint.name} starts at {q[0]:g}, beyond its limits "
+        beyond = self.turns and max(abs(limits.lower), abs(limits.upper)) > 0.75 * pi
+        self._add("stops", function=name, **({"turns": True} if beyond else {}))
+        q = builder.positions.get(joint.name, joint.position) or (0.0,) * len(joint.axes)
+        if not limits.lower <= q[self.k] <= limits.upper:
+            text = f"joint {joint.name} starts at {q[self.k]:g}, beyond its limits "
             text += f"{limits.lower:g} and {limits.upper:g}: the stops push it back"
-            builder.remarks.translate(self.joint.place, text)
+            builder.remarks.translate(joint.place, text)
+
+    def add_friction(self) -> None:
+        """Add dry friction, which fades at low rates."""
+        friction, builder, ends = self._value("friction"), self.builder, self.ends
+        if friction < 0.0:
+            builder.remarks.leave_out(self.joint.place, "friction below 0, which would drive")
+        if friction <= 0.0:
+            return
+        unit = "rad/s" if self.turns else "m/s"
+        text = (
+            f"dry friction of a joint fades below {FADING:g} {unit}: it creeps, and does not stick"
+        )
+        builder.remarks.translate(self.joint.place, text)
+        name = builder.names.free("forces", f"{self.name}_friction")
+        if self.turns:
+            axis = ends.vector(self._holder(), self.axis)
+            builder.scene.add_force("rot_friction", name, body_i=ends.child, body_j=ends.parent,
+                                    axis=axis, n_c=friction, w_tol=FADING)  # fmt: skip
+        else:
+            builder.scene.add_force("tran_friction", name, P_i=ends.point("i"), f_c=friction,
+                                    a_j=ends.vector("j", self.axis), v_tol=FADING)  # fmt: skip
 
 
 def perpendicular(axis: Floats) -> Floats:
@@ -119,85 +174,6 @@ def perpendicular(axis: Floats) -> Floats:
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     across = other - (other @ axis) * axis
     return np.asarray(across / np.linalg.norm(across))
-
-
-class NamedEnds(JointEnds):
-    """The ends of a joint that has its name in the scene already."""
-
-    def __init__(self, builder: SceneBuilder, joint: Joint) -> None:
-        self.builder, self.joint, self.scene = builder, joint, builder.scene
-        self.child, self.on_child = builder.attached(joint.child, joint.in_child)
-        self.parent, self.on_parent = builder.attached(joint.parent, joint.in_parent)
-        self.name = builder.names.scene_names["joints", joint.name]
-
-
-def _add_rotor(builder: SceneBuilder, joint: Joint, inertia: float) -> None:
-    """Add a wheel on ground that turns with a joint and so adds to its inertia alone."""
-    text = "armature of a joint is a wheel on ground that turns with it"
-    builder.remarks.translate(joint.place, text)
-    wheel = wheel_of(builder, joint, inertia)
-    follow(builder, joint, wheel, 1.0, "rotor")
-
-
-def wheel_of(builder: SceneBuilder, joint: Joint, inertia: float) -> str:
-    """The wheel of a joint, made if there is none yet: a body that turns about ground's z."""
-    key = ("wheel", joint.name)
-    wheel = builder.names.scene_names.get(key)
-    if wheel is None:
-        scene_name = builder.names.scene_names["joints", joint.name]
-        wheel = builder.names.free("bodies", f"{scene_name}_rotor")
-        builder.names.scene_names[key] = wheel
-        rate = builder.rates.get(joint.name, (0.0,))[0]
-        builder.scene.add_body(wheel, mass=1.0, Jp=(inertia,) * 3,
-                               w=(0.0, 0.0, rate) if rate else None)  # fmt: skip
-        bearing = builder.names.free("joints", f"{wheel}_bearing")
-        builder.scene.add_joint("rev", bearing, P_i=f"{wheel}.O", P_j="ground.O",
-                                a_i=f"{wheel}.z", a_j="ground.z")  # fmt: skip
-    return wheel
-
-
-def follow(builder: SceneBuilder, joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
-    """Couple the coordinate of a joint with a wheel."""
-    ends = NamedEnds(builder, joint)
-    name = builder.names.free("joints", f"{ends.name}_{suffix}")
-    builder.scene.add_joint(
-        "follow", name, body_i=ends.child, a_j=ends.vector("j", joint.axes[0], "_axis"),
-        a_k=f"{wheel}.z", ratio=None if ratio == 1.0 else ratio,
-        along=True if joint.kind == "prismatic" else None,
-    )  # fmt: skip
-
-
-def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
-    """Add coordinates that follow others; what cannot be coupled is left out, remarked."""
-    for coupling in model.couplings:
-        pair = [model.joints.get(name) for name in (coupling.joint, coupling.other)]
-        one, other = pair
-        if one is None or other is None or {one.kind, other.kind} - {"revolute", "prismatic"}:
-            text = f"coupling of {coupling.joint} with {coupling.other}: joints of one coordinate "
-            builder.remarks.leave_out(coupling.place, f"{text}are coupled")
-            continue
-        if builder.moves_alone(one) or builder.moves_alone(other):
-            builder.remarks.leave_out(coupling.place, "coupling of a joint that does not move")
-            continue
-        inertia = _light(builder, one, other)
-        had_rotor = bool(other.armature[0])
-        wheel = wheel_of(builder, other, inertia)
-        if not had_rotor and ("followed", other.name) not in builder.names.scene_names:
-            builder.names.scene_names["followed", other.name] = wheel
-            text = "joints are coupled by a wheel on ground, with a billionth of the inertia"
-            builder.remarks.translate(coupling.place, text)
-            follow(builder, other, wheel, 1.0, "rotor")
-        follow(builder, one, wheel, coupling.ratio, "coupling")
-
-
-def _light(builder: SceneBuilder, *joints: Joint) -> float:
-    """A billionth of the least moment of inertia, or mass, of what joints move."""
-    sizes = []
-    for joint in joints:
-        inertial = builder.groups[builder.member[joint.child][0]].inertial
-        least = float(np.linalg.eigvalsh(inertial.inertia)[0])
-        sizes.append(inertial.mass if joint.kind == "prismatic" else least)
-    return 1e-9 * min(sizes)
 
 
 def add_inputs(builder: SceneBuilder, model: Articulation) -> None:

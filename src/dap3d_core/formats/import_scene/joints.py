@@ -82,6 +82,16 @@ class JointEnds:
         return (self.child, self.on_child) if end == "i" else (self.parent, self.on_parent)
 
 
+class NamedEnds(JointEnds):
+    """The ends of a joint that has its name in the scene already."""
+
+    def __init__(self, builder: SceneBuilder, joint: Joint) -> None:
+        self.builder, self.joint, self.scene = builder, joint, builder.scene
+        self.child, self.on_child = builder.attached(joint.child, joint.in_child)
+        self.parent, self.on_parent = builder.attached(joint.parent, joint.in_parent)
+        self.name = builder.names.scene_names["joints", joint.name]
+
+
 def _add(ends: JointEnds, keyword: str, **fields: Any) -> None:
     ends.scene.add_joint(keyword, ends.name, **fields)
 

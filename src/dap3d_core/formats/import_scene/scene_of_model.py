@@ -6,7 +6,8 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.formats.import_scene.joint_forces import add_couplings, add_inputs, add_joint_forces
+from dap3d_core.formats.import_scene.couplings import add_couplings
+from dap3d_core.formats.import_scene.joint_forces import add_inputs, add_joint_forces
 from dap3d_core.formats.import_scene.joints import add_joint
 from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.rigid_groups import RigidGroup, rigid_groups
@@ -84,9 +85,11 @@ def scene_of(
             _add_body(builder, group, placed[group.name])
     _add_gravity(scene, model.gravity)
     for joint in model.joints.values():
-        if joint.kind != "free" and not builder.moves_alone(joint):
+        if builder.moves_alone(joint):
+            continue
+        if joint.kind != "free":
             add_joint(builder, joint)
-            add_joint_forces(builder, joint)
+        add_joint_forces(builder, joint)
     add_couplings(builder, model)
     add_inputs(builder, model)
     for group in groups.values():
@@ -161,7 +164,7 @@ def split_planar(model: Articulation, remarks: Remarks) -> Articulation:
             part = name if k == 2 else between[k]
             joints[part] = Joint(
                 part, kind, ends[k], ends[k + 1], axes=(tuple(axis),), position=(q[k],),
-                damping=(joint.damping[0],), place=joint.place,
+                damping=joint.damping, friction=joint.friction, place=joint.place,
             )  # fmt: skip
         joints[between[0]].in_parent, joints[name].in_child = joint.in_parent, joint.in_child
     return attrs.evolve(model, links=links, joints=joints)

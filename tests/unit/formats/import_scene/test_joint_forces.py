@@ -1,95 +1,120 @@
-"""What acts on coordinates of joints: couplings and rotors, by closed forms."""
+"""What acts on coordinates of joints: friction, springs, dampers, by closed forms."""
 
 import numpy as np
 import pytest
-from support.plain import long_in_plain_python
+from scipy.spatial.transform import Rotation
 
 import dap3d_core as dap
 
-#: Moments of inertia of two wheels, the armature of the second, and the moment on the first.
-I_1, I_2, ARMATURE, MOMENT = 0.3, 0.5, 0.2, 1.5
+#: Mass or moment of inertia, friction, rate at the start.
+INERTIA, FRICTION, RATE = 0.3, 0.4, 2.0
 
-URDF = """
-<robot name="two"><link name="world"/>
-  <link name="a"><inertial><mass value="1"/>
+URDF = """<robot name="one"><link name="world"/>
+  <link name="a"><inertial><mass value="0.3"/>
     <inertia ixx="1" iyy="1" izz="0.3" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <link name="b"><inertial><mass value="1"/>
-    <inertia ixx="1" iyy="1" izz="0.5" ixy="0" ixz="0" iyz="0"/></inertial></link>
-  <joint name="one" type="continuous"><parent link="world"/><child link="a"/><axis xyz="0 0 1"/>
-    <mimic joint="two" multiplier="2"/></joint>
-  <joint name="two" type="continuous"><parent link="world"/><child link="b"/>
-    <origin xyz="1 0 0"/><axis xyz="0 0 1"/></joint>
-</robot>
-"""
-SDF = """
-<sdf version="1.9"><model name="two">
-  <link name="a"><inertial><mass>1</mass><inertia><izz>0.3</izz></inertia></inertial></link>
-  <link name="b"><pose>1 0 0 0 0 0</pose>
-    <inertial><mass>1</mass><inertia><izz>0.5</izz></inertia></inertial></link>
-  <joint name="one" type="revolute"><parent>world</parent><child>a</child>
-    <axis><xyz>0 0 1</xyz>{mimic}</axis></joint>
-  <joint name="two" type="revolute"><parent>world</parent><child>b</child>
-    <axis><xyz>0 0 {sign}1</xyz></axis></joint>
-  {gearbox}
-</model></sdf>
-"""
-MIMIC = '<mimic joint="two" axis="axis"><multiplier>2</multiplier></mimic>'
-# theta of the parent = -ratio theta of the child, each against the reference body
-GEARBOX = """<joint name="g" type="gearbox"><parent>a</parent><child>b</child>
-  <gearbox_ratio>2</gearbox_ratio><gearbox_reference_body>world</gearbox_reference_body></joint>"""
-MJCF = """
-<mujoco model="two"><worldbody>
-  <body name="a"><joint name="one" axis="0 0 1"/>
-    <inertial pos="0 0 0" mass="1" diaginertia="1 1 0.3"/></body>
-  <body name="b" pos="1 0 0"><joint name="two" axis="0 0 1" armature="{armature}"/>
-    <inertial pos="0 0 0" mass="1" diaginertia="1 1 0.5"/></body>
-</worldbody>{more}</mujoco>
-"""
-EQUALITY = '<equality><joint joint1="one" joint2="two" polycoef="0 2 0 0 0"/></equality>'
-TENDON = """<tendon><fixed name="t">
-  <joint joint="one" coef="-1"/><joint joint="two" coef="2"/></fixed></tendon>
-<equality><tendon tendon1="t"/></equality>"""
+  <joint name="q" type="{type}"><parent link="world"/><child link="a"/><axis xyz="0 0 1"/>
+    <limit lower="-9" upper="9" effort="1" velocity="1"/>
+    <dynamics friction="0.4"/></joint></robot>"""
+SDF = """<sdf version="1.9"><model name="one"><link name="a"><inertial><mass>0.3</mass>
+  <inertia><izz>0.3</izz></inertia></inertial></link>
+  <joint name="q" type="{type}"><parent>world</parent><child>a</child><axis><xyz>0 0 1</xyz>
+    <dynamics><friction>0.4</friction></dynamics></axis></joint></model></sdf>"""
+MJCF = """<mujoco><worldbody><body name="a"><inertial pos="0 0 0" mass="0.3" diaginertia="1 1 0.3"/>
+  <joint name="q" type="{type}" frictionloss="0.4"/></body></worldbody></mujoco>"""
+TURNED = [("urdf", URDF, "continuous"), ("sdf", SDF, "revolute"), ("xml", MJCF, "hinge")]
+SLID = [("urdf", URDF, "prismatic"), ("sdf", SDF, "prismatic"), ("xml", MJCF, "slide")]
 
 
-@long_in_plain_python
-@pytest.mark.parametrize(
-    ("suffix", "text", "armature"),
-    [
-        (".urdf", URDF, 0.0),
-        (".sdf", SDF.format(mimic=MIMIC, sign="", gearbox=""), 0.0),
-        (".sdf", SDF.format(mimic="", sign="-", gearbox=GEARBOX), 0.0),
-        (".xml", MJCF.format(armature=0.0, more=EQUALITY), 0.0),
-        (".xml", MJCF.format(armature=ARMATURE, more=EQUALITY), ARMATURE),
-        (".xml", MJCF.format(armature=0.0, more=TENDON), 0.0),
-    ],
-    ids=["mimic", "sdf-mimic", "gearbox", "equality", "armature", "tendon"],
-)
-def test_coupled_joints_share_their_inertia(tmp_path, suffix, text, armature):
-    """q_1 = 2 q_2, a moment on the first: (4 I_1 + I_2 + armature) q_2'' = 2 moment.
+def imported(tmp_path, text, suffix="xml", **options):
+    path = tmp_path / f"one.{suffix}"
+    path.write_text(text)
+    return dap.import_model(path, **options)
 
-    The wheel between them has a billionth of the least inertia.
+
+@pytest.mark.parametrize(("suffix", "text", "type"), TURNED + SLID)
+def test_dry_friction_stops_a_joint(tmp_path, suffix, text, type):
+    """At t = I w / n, after I w^2 / (2 n); pi^2 / 12 I w_tol^2 / n = 6e-7 of creep more."""
+    scene, report = imported(tmp_path, text.format(type=type), suffix, rates={"q": RATE})
+    assert not [one for one in report.left_out if "friction" in one.text]
+    assert any("fades below 0.001" in one.text for one in report.translated)
+    scene.forces.pop("gravity", None)
+    result = dap.simulate(scene, t_end=2.0, dt=0.5, integrator="radau", rtol=1e-10, atol=1e-12)
+    turned = 2.0 * np.arctan2(result.p[:, 0, 3], result.p[:, 0, 0])
+    q = result.r[:, 0, 2] if type in ("prismatic", "slide") else turned
+    assert q[1] == pytest.approx(0.5 * (RATE - 0.25 * FRICTION / INERTIA), abs=1e-9)
+    stop = 0.5 * INERTIA * RATE**2 / FRICTION
+    assert q[-1] == pytest.approx(stop + 6.17e-7, abs=1e-9)
+
+
+def test_friction_that_would_drive_is_left_out(tmp_path):
+    text = MJCF.format(type="hinge").replace('frictionloss="0.4"', 'frictionloss="-0.4"')
+    scene, report = imported(tmp_path, text)
+    assert "friction below 0, which would drive" in {one.text for one in report.left_out}
+    assert not any("friction" in force.type for force in scene.forces.values())
+
+
+BALL = """<mujoco><option gravity="0 0 0"/><worldbody><body name="a" quat="0.8 0 0.6 0">
+  <inertial pos="0 0 0" mass="1" diaginertia="0.3 0.3 0.3"/>
+  <joint name="q" type="ball" stiffness="3" damping="0.4" {more}/></body></worldbody></mujoco>"""
+
+
+def test_the_spring_of_a_ball_is_at_rest_where_the_file_draws_it(tmp_path):
+    """J phi'' + c phi' + k phi = 0 about an axis in the axes of the file."""
+    turn, axis = 0.7, np.array([1.0, 2.0, -2.0]) / 3.0
+    start = (np.cos(turn / 2), *(np.sin(turn / 2) * axis))
+    scene, report = imported(tmp_path, BALL.format(more=""), positions={"q": start})
+    assert not report.left_out
+    result = dap.simulate(scene, t_end=0.5, dt=0.5, rtol=1e-10, atol=1e-12)
+    decay = 0.4 / 0.6
+    w = np.sqrt(10.0 - decay**2)
+    rate = -turn * np.exp(-decay * 0.5) * 10.0 / w * np.sin(w * 0.5)
+    drawn = np.array([[0.28, 0, 0.96], [0, 1, 0], [-0.96, 0, 0.28]])
+    np.testing.assert_allclose(result.w[-1, 0], rate * drawn @ axis, rtol=0, atol=1e-9)
+
+
+def test_what_a_ball_cannot_have_is_left_out_by_name(tmp_path):
+    more = 'frictionloss="1" armature="2" range="0 1" limited="true"'
+    _, report = imported(tmp_path, BALL.format(more=more))
+    texts = {one.text for one in report.left_out}
+    assert texts == {f"{what} of a ball joint" for what in ("friction", "armature", "limits")}
+
+
+def test_dampers_of_a_free_joint_are_left_out_by_name(tmp_path):
+    text = BALL.replace("ball", "free").replace("stiffness", "frictionloss").format(more="")
+    _, report = imported(tmp_path, text)
+    texts = {one.text for one in report.left_out}
+    assert texts == {f"{what} of a free joint" for what in ("friction", "damping")}
+
+
+UNIVERSAL = """<sdf version="1.9"><model name="u"><link name="a"><inertial><mass>1</mass>
+  <inertia><ixx>0.3</ixx><iyy>0.3</iyy><izz>0.3</izz></inertia></inertial></link>
+  <joint name="q" type="universal"><parent>{parent}</parent><child>{child}</child>
+    <axis><xyz>0 0.6 0.8</xyz><dynamics><damping>0.2</damping><friction>0.7</friction>
+      <spring_stiffness>3</spring_stiffness><spring_reference>0.1</spring_reference></dynamics></axis>
+    <axis2><xyz>1 0 0</xyz><dynamics><damping>0.5</damping><friction>0.4</friction>
+      <spring_stiffness>2</spring_stiffness><spring_reference>-0.3</spring_reference></dynamics></axis2>
+  </joint></model></sdf>"""
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_both_angles_of_a_universal_joint_have_springs_and_friction(tmp_path, way):
+    """J w_dot . u_k = -k (q_k - rest) - c q_k' - n sign(q_k') on the axes, of three equal moments.
+
+    The reaction of the joint is across both axes. With the link as the parent the angles are those
+    of ground against it.
     """
-    path = tmp_path / f"two{suffix}"
-    path.write_text(text)
-    scene, report = dap.import_model(path)
-    assert not [one for one in report.left_out if "coupl" in one.text or "tendon" in one.text]
-    scene.add_force("n", "push", body_i="a", n=(0.0, 0.0, MOMENT))
-    result = dap.simulate(scene, t_end=1.0, dt=0.5, rtol=1e-10, atol=1e-12)
-    expected = MOMENT / (4.0 * I_1 + I_2 + armature) * result.t**2
-    for name, ratio in (("a", 2.0), ("b", 1.0)):
-        angle = 2.0 * np.arctan2(*result.p[:, list(scene.bodies).index(name), [3, 0]].T)
-        np.testing.assert_allclose(angle, ratio * expected, rtol=1e-8, atol=1e-9)
-
-
-def test_a_screw_needs_a_type_of_others(tmp_path):
-    """It is refused with its line where no package brings one: nothing is dropped in silence."""
-    text = SDF.format(mimic="", sign="", gearbox="").replace(
-        '"one" type="revolute"', '"one" type="screw"'
-    )
-    path = tmp_path / "a.sdf"
-    path.write_text(text)
-    if "screw" in dap.load_registry().keywords("joint"):
-        assert dap.import_model(path)[0].joints["one"].type == "screw"
-        return
-    with pytest.raises(dap.SceneError, match=r"a\.sdf:6: .*no joint type 'screw'"):
-        dap.import_model(path)
+    q, rate = np.array([0.9, -0.6]), np.array([1.3, -0.8])
+    first, second = np.array([0.0, 0.6, 0.8]), np.array([1.0, 0.0, 0.0])
+    parent, child = ("world", "a") if way > 0.0 else ("a", "world")
+    scene, report = imported(tmp_path, UNIVERSAL.format(parent=parent, child=child), "sdf")
+    assert not report.left_out
+    scene.forces.pop("gravity", None)
+    turn = Rotation.from_rotvec(q[0] * first) * Rotation.from_rotvec(q[1] * second)
+    axes = np.array([first, Rotation.from_rotvec(q[0] * first).apply(second)])  # in the parent
+    A = turn if way > 0.0 else turn.inv()
+    axes = axes if way > 0.0 else A.apply(axes)  # in global axes
+    p, w = A.as_quat()[[3, 0, 1, 2]], way * rate @ axes
+    w_dot = dap.compile(scene).rhs(0.0, np.array([0.0, 0.0, 0.0, *p, 0.0, 0.0, 0.0, *w]))[10:]
+    force = -np.array([3.0, 2.0]) * (q - [0.1, -0.3]) - [0.2, 0.5] * rate
+    force -= [0.7, 0.4] * np.sign(rate)
+    np.testing.assert_allclose(way * 0.3 * axes @ w_dot, force, rtol=0, atol=1e-12)

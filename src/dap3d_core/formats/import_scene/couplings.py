@@ -1,0 +1,76 @@
+"""Coordinates of joints that turn together: rotors, mimic joints, gearboxes, equalities."""
+
+import numpy as np
+
+from dap3d_core.formats.import_scene.joints import NamedEnds
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
+from dap3d_core.interface.formats.articulation import Articulation, Joint
+
+
+def add_rotor(builder: SceneBuilder, joint: Joint, inertia: float) -> None:
+    """Add a wheel on ground that turns with a joint and so adds to its inertia alone."""
+    text = "armature of a joint is a wheel on ground that turns with it"
+    builder.remarks.translate(joint.place, text)
+    wheel = wheel_of(builder, joint, inertia)
+    follow(builder, joint, wheel, 1.0, "rotor")
+
+
+def wheel_of(builder: SceneBuilder, joint: Joint, inertia: float) -> str:
+    """The wheel of a joint, made if there is none yet: a body that turns about ground's z."""
+    key = ("wheel", joint.name)
+    wheel = builder.names.scene_names.get(key)
+    if wheel is None:
+        scene_name = builder.names.scene_names["joints", joint.name]
+        wheel = builder.names.free("bodies", f"{scene_name}_rotor")
+        builder.names.scene_names[key] = wheel
+        rate = builder.rates.get(joint.name, (0.0,))[0]
+        builder.scene.add_body(wheel, mass=1.0, Jp=(inertia,) * 3,
+                               w=(0.0, 0.0, rate) if rate else None)  # fmt: skip
+        bearing = builder.names.free("joints", f"{wheel}_bearing")
+        builder.scene.add_joint("rev", bearing, P_i=f"{wheel}.O", P_j="ground.O",
+                                a_i=f"{wheel}.z", a_j="ground.z")  # fmt: skip
+    return wheel
+
+
+def follow(builder: SceneBuilder, joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
+    """Couple the coordinate of a joint with a wheel."""
+    ends = NamedEnds(builder, joint)
+    name = builder.names.free("joints", f"{ends.name}_{suffix}")
+    builder.scene.add_joint(
+        "follow", name, body_i=ends.child, a_j=ends.vector("j", joint.axes[0], "_axis"),
+        a_k=f"{wheel}.z", ratio=None if ratio == 1.0 else ratio,
+        along=True if joint.kind == "prismatic" else None,
+    )  # fmt: skip
+
+
+def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
+    """Add coordinates that follow others; what cannot be coupled is left out, remarked."""
+    for coupling in model.couplings:
+        pair = [model.joints.get(name) for name in (coupling.joint, coupling.other)]
+        one, other = pair
+        if one is None or other is None or {one.kind, other.kind} - {"revolute", "prismatic"}:
+            text = f"coupling of {coupling.joint} with {coupling.other}: joints of one coordinate "
+            builder.remarks.leave_out(coupling.place, f"{text}are coupled")
+            continue
+        if builder.moves_alone(one) or builder.moves_alone(other):
+            builder.remarks.leave_out(coupling.place, "coupling of a joint that does not move")
+            continue
+        inertia = _light(builder, one, other)
+        had_rotor = bool(other.armature[0])
+        wheel = wheel_of(builder, other, inertia)
+        if not had_rotor and ("followed", other.name) not in builder.names.scene_names:
+            builder.names.scene_names["followed", other.name] = wheel
+            text = "joints are coupled by a wheel on ground, with a billionth of the inertia"
+            builder.remarks.translate(coupling.place, text)
+            follow(builder, other, wheel, 1.0, "rotor")
+        follow(builder, one, wheel, coupling.ratio, "coupling")
+
+
+def _light(builder: SceneBuilder, *joints: Joint) -> float:
+    """A billionth of the least moment of inertia, or mass, of what joints move."""
+    sizes = []
+    for joint in joints:
+        inertial = builder.groups[builder.member[joint.child][0]].inertial
+        least = float(np.linalg.eigvalsh(inertial.inertia)[0])
+        sizes.append(inertial.mass if joint.kind == "prismatic" else least)
+    return 1e-9 * min(sizes)
