@@ -16,7 +16,7 @@ from dap3d_core.scene.scene import GROUND
 #: Stiffness of stops where the format says none, N m/rad and N/m.
 STOP_STIFFNESS = {True: 1e4, False: 1e6}
 #: Rate below which dry friction fades, rad/s and m/s.
-FADING = 1e-3
+FADING = 1e-2
 #: What may act on each coordinate of a joint -> its name in a remark.
 WORDS = {
     "damping": "damping", "stiffness": "spring", "friction": "friction", "armature": "armature",
