@@ -78,7 +78,11 @@ class Drawer:
 
 
 def _ball(to: Drawer, one: ElementGeometry) -> Pieces:
-    yield ball("", *one.place("i"), 1.8 * to.unit)
+    """A ball at the point; of an element without points around that of its joint."""
+    if one.points:
+        yield ball("", *one.place("i"), 1.8 * to.unit)
+    else:
+        yield ball("", *to.home(one, one.bodies["i"]), 2.6 * to.unit)
 
 
 def _block(to: Drawer, one: ElementGeometry) -> Pieces:
