@@ -59,6 +59,8 @@ def _reason(function: Any, step: dis.Instruction) -> str:
     if name not in function.__globals__:
         return f"calls {name}" if name in IMPURE and hasattr(builtins, name) else ""
     value = function.__globals__[name]
+    if value in getattr(function, "kernels", ()):  # examined on their own
+        return ""
     if isinstance(value, types.ModuleType):
         module, file = value.__name__, getattr(value, "__file__", None) or ""
     elif isinstance(value, types.FunctionType):

@@ -61,6 +61,7 @@ def reached(*functions) -> tuple[list, list[str]]:
         if function in visited:
             continue
         visited[function] = None
+        todo += getattr(function, "kernels", ())  # of which it was made
         for name, value in _named_values(function):
             plain = inspect.unwrap(value) if callable(value) else value
             if isinstance(plain, types.FunctionType):

@@ -1,6 +1,7 @@
 """What types may do beyond named numbers: variants, functions of an argument, tables, angles."""
 
 import math
+import random
 import warnings
 
 import numpy as np
@@ -30,6 +31,7 @@ from dap3d_core.interface import (
     vector,
 )
 from dap3d_core.kernels import dot, lookup, neg, row, scale, sqrt
+from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.scene import SceneError
 
 ZERO = (0.0, 0.0, 0.0)
@@ -319,6 +321,40 @@ def test_a_function_is_a_value_like_any_other():
     compiled = dap.compile(scene, registry=registry_of(Passes))
     a = compiled.rhs(0.0, compiled.model.u0)[7:10]
     assert a == pytest.approx([3.5, 1.0, 0.0], rel=1e-15)
+
+
+NOTEBOOK = """
+class Pressed(Force):
+    keyword = "pressed"
+    P_i: Point = point()
+    function: str = function(REQUIRED, argument="distance, m")
+
+    def wrench(r_P_i, f):
+        return (f(r_P_i[0]) + {more}, 0.0, 0.0), ZERO
+"""
+
+
+def of_notebook(more):
+    """A scene with a type that no file holds, and its registry: f = 1 + 2 x at x = 3."""
+    names = dict(globals(), random=random)
+    exec(compile(NOTEBOOK.format(more=more), "<cell 3>", "exec"), names)
+    scene = scene_of()
+    scene.add_function("a", "law", coeff=(1.0, 2.0, 0.0))
+    scene.add_force("pressed", P_i="ball.O", function="law")
+    return scene, registry_of(names["Pressed"])
+
+
+def test_a_type_of_a_notebook_may_call_a_function():
+    scene, registry = of_notebook("0.0")
+    compiled = dap.compile(scene, registry=registry)
+    assert compiled.rhs(0.0, compiled.model.u0)[7] == pytest.approx(3.5, rel=1e-15)
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="plain Python runs it as it stands")
+def test_what_a_kernel_that_calls_a_function_reaches_is_examined():
+    scene, registry = of_notebook("random.random()")
+    with pytest.raises(PluginError, match="random"):
+        dap.compile(scene, registry=registry)
 
 
 class Bowl(Function):
