@@ -19,7 +19,9 @@ from dap3d_core.formulations.joint.node_layout import (
     CONSTANT_WIDTH,
     COORDINATE,
     FIRST_ROW,
+    FLAGS,
     FREE,
+    IS_ALONE,
     JOINT_PARENT,
     JOINT_WIDTH,
     MASS,
@@ -87,6 +89,8 @@ class Coordinates:
         self.nodes: TreeNodes = tree_nodes(tree, motions, model.body_count, model.state_count)
         self.size = self.nodes.layout.size - 1
         self.length_count = len(self.kept)
+        if self.kept:  # their loads pass a body with the factors of its inertia
+            self.nodes.table[:, FLAGS] &= ~IS_ALONE
         self.equations = "joint_loops" if self.kept else "joint"
         #: The last start of a run: u, the constants of the tree, y.
         self._last: tuple[Floats, Floats, Floats] | None = None

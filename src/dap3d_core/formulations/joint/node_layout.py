@@ -12,12 +12,13 @@ FIXED, REVOLUTE, PRISMATIC, SPHERICAL, FREE = range(5)
 #: Columns of ``TreeArrays.nodes``: row of ``TreeArrays.places``, parent, that one's row, motion,
 #: indices in the state of its first coordinate and velocity, flags.
 ROW, PARENT, PARENT_ROW, MOTION, COORDINATE, RATE, FLAGS, TREE_WIDTH = range(8)
-#: Flags: the node has mass; it has children; it is the first to add to its parent.
-HAS_MASS, HAS_CHILDREN, IS_FIRST = 1, 2, 4
+#: Flags: the node has mass; it has children; it is the first to add to its parent; it hangs on
+#: ground, and nothing on it.
+HAS_MASS, HAS_CHILDREN, IS_FIRST, IS_ALONE = 1, 2, 4, 8
 
 # Columns of ``TreeArrays.constants``, vectors in axes of the node (n) or of its parent (p):
 # Euler parameters relative to the parent at q = 0, and what sin(q/2) multiplies; axis of a revolute
-# (n) or prismatic motion (p); from P to the mass centre (n); from the parent's P to P at q = 0 (p);
+# or prismatic motion (p); from P to the mass centre (n); from the parent's P to P at q = 0 (p);
 # mass; inertia about P: xx, xy, xz, yy, yz, zz (n).
 TURN, TURN_SIN, AXIS, CENTRE, LINK, MASS, INERTIA, CONSTANT_WIDTH = 0, 4, 8, 11, 14, 17, 18, 24
 
@@ -30,7 +31,8 @@ LINK_NOW, AXIS_NOW, CENTRE_NOW = 21, 24, 27
 # node and all that hangs on it.
 MATRIX_M, MATRIX_H, MATRIX_J, MOMENT, FORCE, WORK_WIDTH = 30, 36, 45, 51, 54, 57
 # What an elimination leaves takes their places: U/D and u/D of one freedom; J^-1 H and J^-1 n of a
-# rotation, as H and n; then, of all, the accelerations by q_ddot.
+# rotation, as H and n; of a ball or free body alone omega'_dot and acceleration, as n and f; then, of
+# all, the accelerations by q_ddot.
 GAIN, FREE_RATE, ALPHA_Q, ACCELERATION_Q = MATRIX_M, FORCE, MATRIX_J, MATRIX_J + 3
 # Where rows are kept on the tree: D^-1 of one freedom; factors of J of a ball, and of a free body,
 # which has no link and no axis.

@@ -74,6 +74,17 @@ def times(x: Floats, k: int, a: Vector) -> Vector:
     )
 
 
+@compiled_into
+def in_node_axes(b: Floats, o: int, a: Vector) -> Vector:
+    """A^T a of the node whose place is at o."""
+    k = o + A
+    return (
+        b[k] * a[0] + b[k + 3] * a[1] + b[k + 6] * a[2],
+        b[k + 1] * a[0] + b[k + 4] * a[1] + b[k + 7] * a[2],
+        b[k + 2] * a[0] + b[k + 5] * a[1] + b[k + 8] * a[2],
+    )
+
+
 @compiled
 def place_tree(y: Floats, system: System) -> None:
     """Place all nodes for a state: rows r, A, v, w, p of ``tree.places``, and ``tree.work``.
@@ -102,7 +113,7 @@ def place_nodes(y: Floats, system: System) -> None:
         i, j = tree[t + COORDINATE], tree[t + RATE]
         if motion == REVOLUTE:
             orient(b, o, relative(b, up, turn(C, c, sines[i], cosines[i])))
-            w, alpha = revolve(y[j], b, o, up, K, k, m, C, c)
+            w, alpha = revolve(y[j], b, up, K, k, m, C, c)
             link(b, up, K, k, m, C, c)
         elif motion == SPHERICAL:
             orient_by_state(b, o, (y[i], y[i + 1], y[i + 2], y[i + 3]))
@@ -158,7 +169,7 @@ def relative(b: Floats, up: int, a: Any) -> Any:
 def orient(b: Floats, o: int, e: Any) -> None:
     """Set p and A of a node from Euler parameters whose length is 1 up to rounding."""
     square = square_of(e)
-    put_rotation(b, o + A, e, 4.0 - 2.0 * square)
+    put_rotation(b, o + A, e, 2.0)
     h = 1.5 - 0.5 * square
     b[o + P], b[o + P + 1], b[o + P + 2], b[o + P + 3] = e[0] * h, e[1] * h, e[2] * h, e[3] * h
 
@@ -195,10 +206,10 @@ def put_rotation(b: Floats, k: int, e: Any, h: float) -> None:
 
 @compiled_into
 def revolve(
-    rate: float, b: Floats, o: int, up: int, K: Floats, k: int, m: int, C: Floats, c: int
+    rate: float, b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int
 ) -> Any:
     """Angular velocity and, without q_ddot, acceleration of a revolute node; sets its axis."""
-    axis = times(b, o + A, vector_of(C, c + AXIS))
+    axis = times(b, up + A, vector_of(C, c + AXIS))
     put(K, k + AXIS_NOW, axis)
     w, relative_w = vector_of(b, up + W), scale(rate, axis)
     return add(w, relative_w), add(vector_of(K, m + ALPHA), cross(w, relative_w))

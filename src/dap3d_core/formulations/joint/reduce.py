@@ -31,6 +31,7 @@ from dap3d_core.formulations.joint.node_layout import (
     HAS_MASS,
     INERTIA,
     INVERSE,
+    IS_ALONE,
     IS_FIRST,
     LINK_NOW,
     MASS,
@@ -48,7 +49,7 @@ from dap3d_core.formulations.joint.node_layout import (
     TREE_WIDTH,
     WORK_WIDTH,
 )
-from dap3d_core.formulations.joint.place import put, times, vector_of
+from dap3d_core.formulations.joint.place import in_node_axes, put, times, vector_of
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, V, W
@@ -85,6 +86,9 @@ def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
             o, f = BODY_WIDTH * row, vector_of(F, 6 * row)
             couple, w = vector_of(F, 6 * row + 3), vector_of(b, o + W)
             power += dot(f, vector_of(b, o + V)) + dot(couple, w)
+            if flags & IS_ALONE != 0:
+                accelerate_alone(motion, b, o, C, c, K, k, w, f, couple)
+                continue
             J = own_inertia(b, o, C, c)
             M, H = own_mass(C[c + MASS], vector_of(K, k + CENTRE_NOW))
             moment, force = missing(J, C[c + MASS], w, K, k, f, couple)
@@ -174,6 +178,26 @@ def missing(J: Symmetric, mass: float, w: Vector, K: Floats, k: int, f: Vector, 
     centre = add(a, times(K, k + SPIN, s))
     moment = add(n, cross(s, sub(f, scale(mass, a))))
     return sub(moment, cross(w, symmetric_times(J, w))), sub(f, scale(mass, centre))
+
+
+@compiled_into
+def accelerate_alone(
+    motion: int, b: Floats, o: int, C: Floats, c: int, K: Floats, k: int,
+    w: Vector, f: Vector, n: Vector,
+) -> None:  # fmt: skip
+    """Store the rates of a body that is alone: ground does not move, and J' is constant."""
+    J, moment = six_of(C, c + INERTIA), add(n, cross(vector_of(K, k + CENTRE_NOW), f))
+    if motion >= SPHERICAL:
+        w = in_node_axes(b, o, w)
+        moment = sub(in_node_axes(b, o, moment), cross(w, symmetric_times(J, w)))
+        put(K, k + MOMENT, solve_factored(factors_of(J), moment))
+        put(K, k + FORCE, scale(1.0 / C[c + MASS], f))
+    elif motion == REVOLUTE:
+        axis = vector_of(K, k + AXIS_NOW)
+        own = in_node_axes(b, o, axis)
+        K[k + FREE_RATE] = dot(axis, moment) / dot(own, symmetric_times(J, own))
+    elif motion == PRISMATIC:
+        K[k + FREE_RATE] = dot(vector_of(K, k + AXIS_NOW), f) / C[c + MASS]
 
 
 @compiled_into

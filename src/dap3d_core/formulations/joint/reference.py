@@ -90,13 +90,13 @@ class Reference:
         turning, sliding = motion == REVOLUTE, motion == PRISMATIC
         constants = np.zeros((len(table), CONSTANT_WIDTH))
         turn = quaternion_product(p_parent * np.array([1.0, -1.0, -1.0, -1.0]), p)
-        axis = np.where(sliding[:, None], to_body(p_parent, self.axis), to_body(p, self.axis))
+        own_axis = to_body(p, self.axis)
         back = np.where(turning, -0.5 * ANGLE, 0.0)[:, None]
-        turn = quaternion_product(turn, np.hstack([np.cos(back), np.sin(back) * axis]))
+        turn = quaternion_product(turn, np.hstack([np.cos(back), np.sin(back) * own_axis]))
         constants[:, TURN : TURN + 4] = turn
-        no_scalar = np.hstack([np.zeros((len(table), 1)), axis])
+        no_scalar = np.hstack([np.zeros((len(table), 1)), own_axis])
         constants[:, TURN_SIN : TURN_SIN + 4] = quaternion_product(turn, no_scalar)
-        constants[:, AXIS : AXIS + 3] = axis
+        axis = constants[:, AXIS : AXIS + 3] = to_body(p_parent, self.axis)
         link = to_body(p_parent, self.point - self.point[parent])
         link -= np.where(sliding, model.part_size, 0.0)[:, None] * axis
         constants[:, LINK : LINK + 3] = link

@@ -22,6 +22,7 @@ from dap3d_core.formulations.joint.node_layout import (
     FREE_RATE,
     GAIN,
     HAS_MASS,
+    IS_ALONE,
     LINK_NOW,
     MATRIX_H,
     MATRIX_M,
@@ -36,7 +37,7 @@ from dap3d_core.formulations.joint.node_layout import (
     TREE_WIDTH,
     WORK_WIDTH,
 )
-from dap3d_core.formulations.joint.place import Vector, put, times, vector_of
+from dap3d_core.formulations.joint.place import Vector, in_node_axes, put, times, vector_of
 from dap3d_core.formulations.joint.reduce import factors_of, six_of, solve_factored
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
@@ -54,15 +55,23 @@ def spread_tree(y: Floats, out: Floats, system: System) -> None:
         i, j = tree[t + COORDINATE], tree[t + RATE]
         alpha = vector_of(K, m + ALPHA_Q)
         a = add(vector_of(K, m + ACCELERATION_Q), cross(alpha, vector_of(K, k + LINK_NOW)))
+        is_alone = tree[t + FLAGS] & IS_ALONE != 0
         if motion == FREE:
-            a = solve_factored(factors_of(six_of(K, k + MATRIX_M)), vector_of(K, k + FORCE))
+            a = vector_of(K, k + FORCE)
+            if not is_alone:
+                a = solve_factored(factors_of(six_of(K, k + MATRIX_M)), a)
             put(out, i, vector_of(y, j))
             put(out, j, a)
             i, j = i + 3, j + 3
         if motion >= SPHERICAL:
-            alpha = sub(vector_of(K, k + MOMENT), times(K, k + MATRIX_H, a))
+            if is_alone:
+                own = vector_of(K, k + MOMENT)
+                alpha = times(b, o + A, own)
+            else:
+                alpha = sub(vector_of(K, k + MOMENT), times(K, k + MATRIX_H, a))
+                own = in_node_axes(b, o, alpha)
             turn_parameters(y, i, vector_of(y, j), out)
-            put(out, j, in_node_axes(b, o + A, alpha))
+            put(out, j, own)
         elif motion != FIXED:
             rate = K[k + FREE_RATE] - dot(vector_of(K, k + GAIN), alpha)
             rate -= dot(vector_of(K, k + GAIN + 3), a)
@@ -85,16 +94,6 @@ def turn_parameters(y: Floats, i: int, w: Vector, out: Floats) -> None:
     out[i + 1] = e0 * w0 - e3 * w1 + e2 * w2
     out[i + 2] = e3 * w0 + e0 * w1 - e1 * w2
     out[i + 3] = -e2 * w0 + e1 * w1 + e0 * w2
-
-
-@compiled_into
-def in_node_axes(b: Floats, k: int, a: Vector) -> Vector:
-    """A^T a, A at k."""
-    return (
-        b[k] * a[0] + b[k + 3] * a[1] + b[k + 6] * a[2],
-        b[k + 1] * a[0] + b[k + 4] * a[1] + b[k + 7] * a[2],
-        b[k + 2] * a[0] + b[k + 5] * a[1] + b[k + 8] * a[2],
-    )
 
 
 @compiled

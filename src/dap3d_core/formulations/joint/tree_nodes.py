@@ -20,6 +20,7 @@ from dap3d_core.formulations.joint.node_layout import (
     FREE,
     HAS_CHILDREN,
     HAS_MASS,
+    IS_ALONE,
     IS_FIRST,
     MOTION,
     PARENT,
@@ -162,6 +163,8 @@ def _table(motion: Integers, parent: Integers, body: Integers, body_count: int) 
     np.maximum.at(last_child, parent[1:], np.arange(1, count))
     table[:, FLAGS] = HAS_MASS * (body > 0) + HAS_CHILDREN * (last_child > 0)
     table[last_child[last_child > 0], FLAGS] += IS_FIRST
+    is_alone = (parent == 0) & (last_child == 0) & (body > 0)
+    table[is_alone, FLAGS] += IS_ALONE
     return table
 
 

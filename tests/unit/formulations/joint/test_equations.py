@@ -54,6 +54,21 @@ def test_accelerations_and_multipliers_are_those_of_standard(seed):
     assert multipliers < MULTIPLIERS
 
 
+@pytest.mark.parametrize("joint", ["rev", "tran", "sph", "cyl", "free"])
+@pytest.mark.parametrize("hangs", [False, True])
+def test_a_body_alone_accelerates_as_by_standard(joint, hangs):
+    """One body on ground, whose rates need no recursion; and with another one that hangs on it."""
+    scene = trees.random_tree(1, 4, joints=(joint,), free=float(joint == "free"))
+    body, arm = scene.bodies["b0"], np.array([0.3, -0.4, 0.5])
+    scene.add_point("tip", "b0", arm)
+    scene.add_force("ptp", "spring", P_i="tip", P_j="ground.O", k=20.0, c=0.5, l0=1.0)
+    if hangs:
+        tip = body.r + np.array(pose(body.r, body.p).A) @ arm
+        scene.add_body("bob", mass=0.3, Jp=(0.01, 0.02, 0.03), r=tip, w=(1.0, 2.0, 3.0))
+        scene.add_joint("sph", "ball", P_i="bob.O", P_j="tip")
+    assert max(differences(scene)) < ACCELERATIONS
+
+
 @pytest.mark.parametrize("name", ["pen1", "pen2", "A05"])
 def test_shipped_trees_have_the_accelerations_of_standard(name):
     """All shipped models without loops or rows of velocities; A05 has masses that differ by 1e3."""
@@ -201,7 +216,8 @@ def test_turns_knots_and_events_are_those_of_standard():
 
 
 @pytest.mark.parametrize("thin", [1e-3, 1e-6, 1e-9, 1e-12])
-def test_a_thin_rod_on_a_ball_turns_as_euler_says(thin):
+@pytest.mark.parametrize("holder", ["ground", "post"])
+def test_a_thin_rod_on_a_ball_turns_as_euler_says(thin, holder):
     """Euler's equations about the ball, in its axes; the spin about itself alone loses digits.
 
     That of a moment is lost to rounding of the moments across, 5e-15 N m here, over its inertia.
@@ -214,7 +230,10 @@ def test_a_thin_rod_on_a_ball_turns_as_euler_says(thin):
     scene.add_body("rod", mass=mass, Jp=(1.0, 1.0, thin), r=A @ arm, p=e, w=A @ w,
                    r_dot=np.cross(A @ w, A @ arm))  # fmt: skip
     scene.add_point("end", body="rod", sPp=-arm)
-    scene.add_joint("sph", "ball", P_i="end", P_j="ground.O")
+    if holder == "post":
+        scene.add_body("post", mass=1.0, Jp=(1.0, 1.0, 1.0))
+        scene.add_joint("fix", "foot", body_i="post")
+    scene.add_joint("sph", "ball", P_i="end", P_j=f"{holder}.O")
     scene.add_force("weight", "gravity")
     compiled = CompiledModel(scene, method="joint")
     found = A.T @ compiled.evaluator.report(0.0, compiled.model.u0)[3:6]
