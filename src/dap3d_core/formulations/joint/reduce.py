@@ -95,8 +95,7 @@ def reduce_nodes(system: System, forces: Floats, keeps: bool) -> float:
             if motion < SPHERICAL:
                 moment = sub(moment, symmetric_times(J, vector_of(K, k + ALPHA)))
         if flags & HAS_CHILDREN != 0:
-            M = sum6(M, six_of(K, k + MATRIX_M))
-            H = sum9(H, nine_of(K, k + MATRIX_H))
+            M, H = add_own_mass(M, H, six_of(K, k + MATRIX_M), nine_of(K, k + MATRIX_H))
             J = sum6(J, six_of(K, k + MATRIX_J))
             moment = add(moment, vector_of(K, k + MOMENT))
             force = add(force, vector_of(K, k + FORCE))
@@ -166,6 +165,16 @@ def own_mass(mass: float, s: Vector) -> Any:
     """M and H of a body, m and m s~; s: from P to the mass centre."""
     x, y, z = mass * s[0], mass * s[1], mass * s[2]
     return (mass, 0.0, 0.0, mass, 0.0, mass), (0.0, -z, y, z, 0.0, -x, -y, x, 0.0)
+
+
+@compiled_into
+def add_own_mass(m: Symmetric, h: Matrix, M: Symmetric, H: Matrix) -> Any:
+    """Sums of ``own_mass``, m and h, whose zeros are left out, with M and H."""
+    return (
+        (m[0] + M[0], M[1], M[2], m[3] + M[3], M[4], m[5] + M[5]),
+        (H[0], h[1] + H[1], h[2] + H[2], h[3] + H[3], H[4], h[5] + H[5], h[6] + H[6], h[7] + H[7],
+         H[8]),
+    )  # fmt: skip
 
 
 @compiled_into
