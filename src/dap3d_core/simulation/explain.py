@@ -46,7 +46,7 @@ def explain(
         lines.append(f"  {title:10s} {words}")
     lines.append(f"  method     {method}, because {reason}")
     if model.row_count and str(checked.scene.simulation.method) == "auto":
-        lines.append(f"  joint      {_in_joint_coordinates(model, evaluator)}")
+        lines.append(f"  joint      {in_joint_coordinates(evaluator)[1]}")
     compiled = sorted({f"{group.keyword} ({kind})" for kind, group in evaluator.loop_groups})
     lines.append(f"  kernels    {', '.join(compiled) or 'none'}")
     left_out = _left_out(checked, model)
@@ -57,12 +57,12 @@ def explain(
     return "\n".join(lines)
 
 
-def _in_joint_coordinates(model: Model, evaluator: Evaluator) -> str:
-    """Time that method joint is estimated to take, and why auto leaves it."""
+def in_joint_coordinates(evaluator: Evaluator) -> tuple[float, str]:
+    """Estimate of the time by method joint, over that of an evaluator's; why auto leaves it."""
     from dap3d_core.formulations.joint.coordinates import cost_over_standard
 
-    ratio = cost_over_standard(model, evaluator.plan)
-    return (
+    ratio = cost_over_standard(evaluator.model, evaluator.plan)
+    return ratio, (
         f"method joint would take some {ratio:.2g} of the time of a right-hand side; auto keeps "
         "the coordinates of bodies, which radau and packs of studies take"
     )

@@ -10,7 +10,7 @@ from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators import IMPLICIT, Integration, Status
 from dap3d_core.integrators.added import integrator_named
 from dap3d_core.integrators.stepping.singular_poses import begin_singular
-from dap3d_core.result import Result, ResultError
+from dap3d_core.result import INFORMATION, Result, ResultError
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.handover import (
@@ -43,6 +43,9 @@ CHUNK_SECONDS = 0.1
 FIRST_CHUNK = 100
 #: Numbers that wait in the row buffer at most.
 BUFFER_NUMBERS = 4_000_000
+#: Right-hand sides times bodies, about a second, from which on a note says that method joint would
+#: take less than this part of the time.
+MUCH_WORK, WORTHWHILE = 3_000_000, 0.7
 #: A second run, for the error, leaves a singular pose by a first step of this part.
 AGAIN = 0.8
 
@@ -271,6 +274,18 @@ class Run(RunState):
         notes += self.jumps.notes(self.present) if self.jumps is not None else []
         notes += event_notes(self.integrations, self.events())
         notes += crossing_notes(self.crossed)
-        return notes + stiffness_notes(
+        notes += stiffness_notes(
             self.integrations, self.settings.integrator, self.evaluator.formulation
         )
+        return notes + self._method_notes()
+
+    def _method_notes(self) -> list[str]:
+        """That a long run whose method was left to auto would be quicker by method joint."""
+        model, work = self.evaluator.model, self.statistics().rhs * self.evaluator.model.body_count
+        is_left_open = self.compiled.requested_method == "auto" and model.row_count > 0
+        if not is_left_open or work < MUCH_WORK or any(i.implicit for i in self.integrations):
+            return []
+        from dap3d_core.simulation.explain import in_joint_coordinates
+
+        ratio, words = in_joint_coordinates(self.evaluator)
+        return [INFORMATION + words] if ratio < WORTHWHILE else []

@@ -31,8 +31,8 @@ LINK_NOW, AXIS_NOW, CENTRE_NOW = 21, 24, 27
 # node and all that hangs on it.
 MATRIX_M, MATRIX_H, MATRIX_J, MOMENT, FORCE, WORK_WIDTH = 30, 36, 45, 51, 54, 57
 # What an elimination leaves takes their places: U/D and u/D of one freedom; J^-1 H and J^-1 n of a
-# rotation, as H and n; of a ball or free body alone omega'_dot and acceleration, as n and f; then, of
-# all, the accelerations by q_ddot.
+# rotation, as H and n; of a ball or free body alone omega'_dot and acceleration, as n and f; then,
+# of all, the accelerations by q_ddot.
 GAIN, FREE_RATE, ALPHA_Q, ACCELERATION_Q = MATRIX_M, FORCE, MATRIX_J, MATRIX_J + 3
 # Where rows are kept on the tree: D^-1 of one freedom; factors of J of a ball, and of a free body,
 # which has no link and no axis.

@@ -205,9 +205,7 @@ def put_rotation(b: Floats, k: int, e: Any, h: float) -> None:
 
 
 @compiled_into
-def revolve(
-    rate: float, b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int
-) -> Any:
+def revolve(rate: float, b: Floats, up: int, K: Floats, k: int, m: int, C: Floats, c: int) -> Any:
     """Angular velocity and, without q_ddot, acceleration of a revolute node; sets its axis."""
     axis = times(b, up + A, vector_of(C, c + AXIS))
     put(K, k + AXIS_NOW, axis)

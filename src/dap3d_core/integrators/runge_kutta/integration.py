@@ -11,7 +11,7 @@ from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.integrators.runge_kutta.tableau import Tableau, combinations
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.singular_poses import ROWS
-from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import jit_is_on, prepared
 
 
 class RungeKutta(Integration):
@@ -53,12 +53,10 @@ class RungeKutta(Integration):
         advance(self.work, *self._arguments, budget)
 
     def prepared(self) -> Callable[[int], Any]:
-        """As ``Integration.prepared``; the types of the arguments are looked up once."""
+        """As ``Integration.prepared``; types and addresses of arguments are looked up once."""
         if self.tstops or not jit_is_on():
             return super().prepared()
-        work, (functions, system, loops) = self.work, self._arguments
-        call = advance.of(work, functions, system, loops, 0)
-        return lambda budget: call(work, functions, system, loops, budget)
+        return prepared(advance, self.work, *self._arguments)
 
 
 @cache

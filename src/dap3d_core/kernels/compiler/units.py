@@ -6,6 +6,7 @@ unoptimised, which takes a tenth of a second, and replaced once the optimised co
 """
 
 import ctypes
+import functools
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -122,7 +123,7 @@ class Entry:
         self.unit, self.k, self.signature = unit, k, signature
         self._address: int = 0
         self._function: Any = None
-        self._call: Any = None
+        self._words: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the function.
@@ -130,18 +131,28 @@ class Entry:
         Raises:
             TypeError: an argument has another type than the signature.
         """
+        if self._words is None:  # many entries are never called from Python
+            self._words = _words_of(self.signature.arguments)
+        return self._run(*self._words(*arguments))
+
+    def prepared(self, *arguments: Any) -> Callable[..., Any]:
+        """The function with its first arguments, to be called with the scalars that follow them."""
+        words = _words_of(self.signature.arguments[: len(arguments)])
+        call = functools.partial(self._run, *words(*arguments))
+        vars(call)["arguments"] = arguments  # which their words do not keep alive
+        return call
+
+    def _run(self, *words: Any) -> Any:
         if self.unit.addresses[self.k] != self._address:
             self._bind()
         if not background.optimiser.units:
-            return self._call(self._function, *arguments)
+            return self._function(*words)
         start = time.perf_counter()
-        result = self._call(self._function, *arguments)
+        result = self._function(*words)
         background.optimiser.poll(time.perf_counter() - start)
         return result
 
     def _bind(self) -> None:
-        if self._call is None:  # many entries are never called from Python
-            self._call = _caller(self.signature.arguments)
         self._address = self.unit.addresses[self.k]
         words = [_C_TYPES[w] for kind in self.signature.arguments for w in kind.words]
         result = [_C_TYPES[w] for w in self.signature.result.words] or [None]
@@ -163,26 +174,26 @@ def address_of(array: Any) -> int:
         return int(array.ctypes.data) if array.size else 0
 
 
-def _caller(types: Sequence[Any]) -> Callable[..., Any]:
-    """A Python function that calls a C function with the machine words of arguments.
+def _words_of(types: Sequence[Any]) -> Callable[..., Any]:
+    """A Python function that returns the machine words of arguments.
 
     It is generated, as ``collections.namedtuple`` does: loops and closures take twice as long.
     """
     checks: dict[str, Any] = {"address_of": address_of}
-    words = [_words_of(f"a{k}", type_, checks) for k, type_ in enumerate(types)]
+    words = [_words_text(f"a{k}", type_, checks) for k, type_ in enumerate(types)]
     names = ", ".join(f"a{k}" for k in range(len(types)))
-    source = f"lambda function, {names}: function({', '.join(filter(None, words))})"
-    caller: Callable[..., Any] = eval(source, checks)
-    return caller
+    source = f"lambda {names}: [{', '.join(filter(None, words))}]"
+    made: Callable[..., Any] = eval(source, checks)
+    return made
 
 
-def _words_of(name: str, type_: Any, checks: dict[str, Any]) -> str:
+def _words_text(name: str, type_: Any, checks: dict[str, Any]) -> str:
     """Python text of the machine words of an argument; adds the functions that it calls."""
     if isinstance(type_, t.Array) and type_.ndim > 0:
         checks[f"array{len(checks)}"] = _array_check(type_)
         return f"array{len(checks) - 1}({name}), *{name}.shape"
     if isinstance(type_, t.Tuple):
-        parts = (_words_of(f"{name}[{k}]", item, checks) for k, item in enumerate(type_.items))
+        parts = (_words_text(f"{name}[{k}]", item, checks) for k, item in enumerate(type_.items))
         return ", ".join(filter(None, parts))
     if isinstance(type_, t.Scalar):
         return {t.INT: f"int({name})", t.NOTHING: ""}.get(type_, name)

@@ -88,10 +88,14 @@ def compiled_into(function):
     return Compiled(function, is_inlined=True) if jit_is_on() else function
 
 
-def prepared(function: Callable[..., Any], *arguments: Any) -> Callable[[], Any]:
-    """A compiled function with its arguments, whose types are looked up once, for many calls."""
-    code = function.of(*arguments) if isinstance(function, Compiled) else function
-    return functools.partial(code, *arguments)
+def prepared(function: Callable[..., Any], *arguments: Any) -> Callable[..., Any]:
+    """A function of the core with its first arguments, to be called with the scalars after them.
+
+    For many calls: types and addresses of the arguments are looked up once.
+    """
+    if isinstance(function, Compiled):
+        return function.prepared(*arguments)
+    return functools.partial(function, *arguments)
 
 
 class Compiled:
@@ -118,9 +122,10 @@ class Compiled:
             entry = self._quick[key] = self.compile([type_of(a) for a in arguments])
         return entry(*arguments)
 
-    def of(self, *arguments: Any) -> Entry:
-        """The code for the types of these arguments, for many calls with arguments of these."""
-        return self.compile([type_of(a) for a in arguments])
+    def prepared(self, *arguments: Any) -> Callable[..., Any]:
+        """As ``prepared``."""
+        rest = [FLOAT if p.annotation is float else INT for p in self._parameters[len(arguments) :]]
+        return self.compile([type_of(a) for a in arguments] + rest).prepared(*arguments)
 
     def compile(self, given: Sequence[Any]) -> Entry:
         """The function for types of its arguments, from the cache or compiled now."""
