@@ -180,8 +180,9 @@ class Evaluator:
     def count_turns(self, t: float, u: ArrayLike) -> None:
         """Count whole turns of angles up to a state u (13 n,), less than half a turn further."""
         s = self.system
-        self.place(t, u)
-        self._call(ANGLE, t, s.force, s.force, s.force)
+        if s.kinds[ANGLE] < s.kinds[ANGLE + 1]:
+            self.place(t, u)
+            self._call(ANGLE, t, s.force, s.force, s.force)
 
     def _seek_unknowns(self) -> None:
         """Find the unknowns of joints at the poses as given, from where their fields begin."""

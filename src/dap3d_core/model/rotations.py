@@ -13,17 +13,15 @@ AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 def rotation(p: ArrayLike) -> Floats:
     """Rotation matrices (..., 3, 3), body to global, of Euler parameters (..., 4) of any length."""
     p = np.asarray(p, dtype=float)
-    e0, e1, e2, e3 = (p / np.sqrt(np.add.reduce(p * p, axis=-1, keepdims=True))).T
+    e = (p / np.sqrt(np.add.reduce(p * p, axis=-1, keepdims=True))).T
+    e0, e1, e2, e3 = e
+    _, d1, d2, d3 = e + e
+    x, y, z = d1 * e1, d2 * e2, d3 * e3
+    xy, xz, yz, sx, sy, sz = d2 * e1, d3 * e1, d3 * e2, d1 * e0, d2 * e0, d3 * e0
     A = np.empty((3, 3, *e0.shape))
-    A[0, 0] = 1 - 2 * (e2 * e2 + e3 * e3)
-    A[0, 1] = 2 * (e1 * e2 - e0 * e3)
-    A[0, 2] = 2 * (e1 * e3 + e0 * e2)
-    A[1, 0] = 2 * (e1 * e2 + e0 * e3)
-    A[1, 1] = 1 - 2 * (e1 * e1 + e3 * e3)
-    A[1, 2] = 2 * (e2 * e3 - e0 * e1)
-    A[2, 0] = 2 * (e1 * e3 - e0 * e2)
-    A[2, 1] = 2 * (e2 * e3 + e0 * e1)
-    A[2, 2] = 1 - 2 * (e1 * e1 + e2 * e2)
+    A[0, 0], A[0, 1], A[0, 2] = 1 - (y + z), xy - sz, xz + sy
+    A[1, 0], A[1, 1], A[1, 2] = xy + sz, 1 - (x + z), yz - sx
+    A[2, 0], A[2, 1], A[2, 2] = xz - sy, yz + sx, 1 - (x + y)
     return A.T.swapaxes(-1, -2)
 
 

@@ -10,6 +10,7 @@ from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators import IMPLICIT, Integration, Status
 from dap3d_core.integrators.added import integrator_named
 from dap3d_core.integrators.stepping.singular_poses import begin_singular
+from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import INFORMATION, Result, ResultError
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.errors import RedundantError, SimulationError
@@ -39,8 +40,8 @@ if TYPE_CHECKING:
 
 #: Seconds that a compiled chunk should take: Ctrl-C and the progress bar wait for its end.
 CHUNK_SECONDS = 0.1
-#: Right-hand sides of the first chunk, before it is known how long they take.
-FIRST_CHUNK = 100
+#: Right-hand sides times bodies of the first chunk, some ms, before it is known how long they take.
+FIRST_CHUNK = 5000 if jit_is_on() else 100
 #: Numbers that wait in the row buffer at most.
 BUFFER_NUMBERS = 4_000_000
 #: Right-hand sides times bodies, about a second, from which on a note says that method joint would
@@ -212,7 +213,8 @@ class Run(RunState):
         """Advance in chunks, as many right-hand sides each as fit into ``CHUNK_SECONDS``."""
         integration, progress = self.present, self.callbacks.progress
         # step by step, where it is to end at the first step behind a time
-        budget = FIRST_CHUNK if self.until == np.inf else 0
+        first = max(1, FIRST_CHUNK // self.evaluator.model.body_count)
+        budget = first if self.until == np.inf else 0
         while integration.status is Status.RUNNING and integration.t < self.until:
             before, clock = integration.statistics.rhs, time.perf_counter()
             self.is_whole = False

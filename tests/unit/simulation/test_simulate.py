@@ -30,6 +30,7 @@ def mass_point(**fields):
 def short_chunks(monkeypatch):
     """As many chunks as there are steps."""
     monkeypatch.setattr(MODULE, "CHUNK_SECONDS", 1e-9)
+    monkeypatch.setattr(MODULE, "FIRST_CHUNK", 100)
 
 
 def arrays_of(result):
@@ -180,6 +181,7 @@ def test_chunks_change_no_bit(monkeypatch):
     compiled = dap.compile(dap.load("fourbar3"))
     wanted = arrays_of(dap.simulate(compiled, t_end=0.2, dt=0.005))
     for seconds, numbers in ((1e-9, 4_000_000), (10.0, 200), (1e-9, 1)):
+        monkeypatch.setattr(MODULE, "FIRST_CHUNK", 100)
         monkeypatch.setattr(MODULE, "CHUNK_SECONDS", seconds)
         monkeypatch.setattr(MODULE, "BUFFER_NUMBERS", numbers)
         assert arrays_of(dap.simulate(compiled, t_end=0.2, dt=0.005)) == wanted

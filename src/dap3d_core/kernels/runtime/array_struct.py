@@ -89,8 +89,9 @@ class Arrays:
         object.__setattr__(self, "address", address_of(table))
 
     def __setattr__(self, name: str, value: Any) -> None:
-        is_unbound = name not in self.__dict__ and hasattr(attrs.fields(type(self)), name)
-        if name not in type(self).scalars and not is_unbound:
+        if name not in type(self).scalars and (
+            name in self.__dict__ or not hasattr(attrs.fields(type(self)), name)
+        ):
             raise AttributeError(f"{name} is no scalar: only scalars and items of arrays change")
         object.__setattr__(self, name, value)
 
