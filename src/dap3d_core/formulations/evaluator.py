@@ -242,12 +242,11 @@ class Evaluator:
             self.set_inputs(values)
 
     @IGNORE_FLOAT_ERRORS
-    def store_initial_function_values(self, t: float = 0.0) -> None:
+    def store_initial_function_values(self) -> None:
         """Keep each function's value at the start, for drivers that count from it."""
-        s = self.system
         self.set_inputs(self.model.input_values)
-        self._call(VALUE, t, s.force, s.force, s.force)
-        s.F[:, 4] = s.F[:, 0]
+        self.function_values(0.0)
+        self.system.F[:, 4] = self.system.F[:, 0]
 
     @IGNORE_FLOAT_ERRORS
     def function_values(self, t: float) -> Floats:

@@ -96,10 +96,14 @@ def _add(ends: JointEnds, keyword: str, **fields: Any) -> None:
     ends.scene.add_joint(keyword, ends.name, **fields)
 
 
-def _revolute(ends: JointEnds) -> None:
+def _add_about_axis(ends: JointEnds, keyword: str, **more: float) -> None:
     axis = ends.joint.axes[0]
-    _add(ends, "rev", P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
-         a_j=ends.vector("j", axis))  # fmt: skip
+    _add(ends, keyword, P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
+         a_j=ends.vector("j", axis), **more)  # fmt: skip
+
+
+def _revolute(ends: JointEnds) -> None:
+    _add_about_axis(ends, "rev")
 
 
 def _prismatic(ends: JointEnds) -> None:
@@ -139,12 +143,8 @@ def _universal(ends: JointEnds) -> None:
 
 
 def _cylindrical(ends: JointEnds) -> None:
-    axis = ends.joint.axes[0]
-    _add(ends, "cyl", P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
-         a_j=ends.vector("j", axis))  # fmt: skip
+    _add_about_axis(ends, "cyl")
 
 
 def _screw(ends: JointEnds) -> None:
-    axis = ends.joint.axes[0]
-    _add(ends, "screw", P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
-         a_j=ends.vector("j", axis), pitch=ends.joint.pitch)  # fmt: skip
+    _add_about_axis(ends, "screw", pitch=ends.joint.pitch)

@@ -50,11 +50,6 @@ def settle(evaluator: Evaluator, t: float, u: Floats) -> None:
         evaluator.states = best - _inverse(evaluator, own.rate_by_states) @ own.rates
 
 
-def unsettled(evaluator: Evaluator, t: float, u: Floats) -> float:
-    """Largest rate of a state at a pose, as a part of its terms."""
-    return unsettled_part(_derivatives(evaluator, t, u), evaluator.states)
-
-
 def moving_states(evaluator: Evaluator, t: float, u: Floats) -> list[ElementState]:
     """The states that do not come to rest at a pose."""
     own = _derivatives(evaluator, t, u)

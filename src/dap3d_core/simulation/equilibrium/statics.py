@@ -190,7 +190,7 @@ class Statics:
     def moved(self, u: Floats, x: Floats) -> Floats:
         """The state after a displacement x (6 n,), not closed."""
         change = (self.scale * x).reshape(-1, 6)
-        return displaced(u, change, len(change))
+        return displaced(u, change)
 
     def closed(self, u: Floats) -> Floats:
         """The state with its position rows closed to rounding, by least displacements.
@@ -212,7 +212,7 @@ class Statics:
             if worst == 0.0:
                 break
             change = sparse_least_change(self.evaluator, C, self.t).reshape(-1, 6)
-            u = displaced(u, -change, len(change))
+            u = displaced(u, -change)
         if not before <= limit:
             raise AssemblyError(f"the positions do not close: |C| = {before:.2g}")
         return best

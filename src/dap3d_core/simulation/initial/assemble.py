@@ -199,7 +199,7 @@ def correct_positions(
         shift_limit = MOST_SHIFT * size / shift if shift else 1.0
         turn_limit = MOST_TURN / turn if turn else 1.0
         limit = min(1.0, shift_limit, turn_limit)
-        u = displaced(u, -limit * change, evaluator.model.body_count)
+        u = displaced(u, -limit * change)
     raise _failure(evaluator, rows, passes, held, is_far=limit < 1.0)
 
 
@@ -291,9 +291,13 @@ def sparse_least_change(
     return change.ravel()
 
 
-def displaced(u: Floats, change: Floats, n: int) -> Floats:
-    """The state with r + dr, and with p + 1/2 G^T dtheta of unit length (dtheta global, small)."""
+def displaced(u: Floats, change: Floats) -> Floats:
+    """The state with r + dr, and with p + 1/2 G^T dtheta of unit length (dtheta global, small).
+
+    change: (n, 6) or (6 n,) dr, dtheta of each body.
+    """
     r, p, v, w = split(u)
+    change = change.reshape(-1, 6)
     e0, e, turn = p[:, :1], p[:, 1:], 0.5 * change[:, 3:]
     dp = np.hstack([-np.sum(e * turn, axis=1, keepdims=True), e0 * turn + np.cross(turn, e)])
     p = p + dp

@@ -280,8 +280,8 @@ class _Cone:
 
         way: (6 n,) velocities, or accelerations, along it.
         """
-        n, v = self.evaluator.model.body_count, velocities_of(self.u)
-        aside = displaced(self.still, ASIDE / extent(self.evaluator, way) * way.reshape(n, 6), n)
+        v = velocities_of(self.u)
+        aside = displaced(self.still, ASIDE / extent(self.evaluator, way) * way)
         acceleration = self.free + self.N @ z
         speed, rise = extent(self.evaluator, v), extent(self.evaluator, acceleration)
         first_step = 2.0 * FIRST / (speed + (speed * speed + 2.0 * rise * FIRST) ** 0.5)
@@ -330,12 +330,11 @@ def _gamma(cone: _Cone, v: Floats) -> Floats:
 
 def _third(cone: _Cone, v: Floats, a: Floats) -> Floats:
     """d/dt of lambda^T (D a - gamma) (k,) along a motion with velocities v, accelerations a."""
-    n = cone.evaluator.model.body_count
     h = SPAN / max(extent(cone.evaluator, v), extent(cone.evaluator, a) ** 0.5)
     total = np.zeros(len(cone.left))
     for k, weight in enumerate(FORWARD):
         s = k * h
-        state = displaced(cone.still, (s * v + 0.5 * s * s * a).reshape(n, 6), n)
+        state = displaced(cone.still, s * v + 0.5 * s * s * a)
         velocities_of(state)[:] = v + s * a
         rows = finite_rows(cone.evaluator, cone.t + s, state)
         product = np.bincount(rows.row, rows.value * a[rows.column], minlength=rows.shape[0])

@@ -145,14 +145,14 @@ def _on_rows(
     evaluator: Evaluator, t: float, u: Floats, v_dot: Floats, chosen: Flags
 ) -> tuple[Floats, Floats]:
     """A state and accelerations brought onto the rows, by the least change."""
-    n, before = evaluator.model.body_count, np.inf
+    before = np.inf
     for _ in range(MOST_PASSES):
         rows = ChosenRows(evaluator, t, u, chosen)
         change = rows.least(rows.rows.C)
         size = extent(evaluator, change)
         if size <= SETTLED or (size <= ROUNDING and size > 0.5 * before):
             break
-        u, before = displaced(u, -change.reshape(n, 6), n), size
+        u, before = displaced(u, -change), size
     else:
         raise SimulationError(
             f"at t = {t:.6g} s the motion does not fit the joints of the scene: no pose near it is "
@@ -194,7 +194,7 @@ class _Fit:
 
     def pose(self, k: int, start: Floats) -> Floats:
         """The state (13 n,), without velocities, at instant k from one near it."""
-        t, n = float(self.data.t[k]), self.evaluator.model.body_count
+        t = float(self.data.t[k])
         target = np.array([self.data.values[label][k] for label in self._labels])
         measured = np.isfinite(target)
         u, before = start, np.inf
@@ -214,7 +214,7 @@ class _Fit:
             size = extent(self.evaluator, change)
             if not np.isfinite(size):
                 break
-            u = displaced(u, (min(1.0, MOST_CHANGE / max(size, 1e-300)) * change).reshape(n, 6), n)
+            u = displaced(u, min(1.0, MOST_CHANGE / max(size, 1e-300)) * change)
             if size <= SETTLED or (size <= ROUNDING and size > 0.5 * before):
                 found = np.abs(self._gap(target, self._values(np.array([t]), u[None])[:, 0]))
                 for label, gap in zip(self._labels, found, strict=True):
@@ -231,7 +231,7 @@ class _Fit:
         """Values (labels,) of the quantities, and slopes (labels, 6 n) by central differences."""
         n = self.evaluator.model.body_count
         steps = SPAN * np.vstack([np.zeros(6 * n), np.eye(6 * n), -np.eye(6 * n)])
-        near = np.array([displaced(u, step.reshape(n, 6), n) for step in steps])
+        near = np.array([displaced(u, step) for step in steps])
         values = self._values(np.full(len(near), t), near)
         ahead, behind = values[:, 1 : 6 * n + 1], values[:, 6 * n + 1 :]
         return values[:, 0], (ahead - behind) / (2.0 * SPAN)

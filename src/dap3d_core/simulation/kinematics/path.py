@@ -182,9 +182,9 @@ class KinematicPath:
 
     def _stepped(self, start: Pose, t: float) -> tuple[Pose, float] | None:
         """The pose at t from a near one, and the size of its correction; None where none is."""
-        h, n = t - start.t, self.evaluator.model.body_count
+        h = t - start.t
         way = h * velocities_of(start.u) + 0.5 * h * h * start.v_dot
-        closed = self._newton(t, displaced(start.u, way.reshape(n, 6), n))
+        closed = self._newton(t, displaced(start.u, way))
         if closed is None:
             return None
         u, correction = closed
@@ -208,7 +208,7 @@ class KinematicPath:
 
     def _newton(self, t: float, u: Floats) -> tuple[Floats, float] | None:
         """A state whose positions are closed, and the size of the first correction; or None."""
-        first, before, n = 0.0, np.inf, self.evaluator.model.body_count
+        first, before = 0.0, np.inf
         rows = self._rows(t, u)
         C = rows.rows.C
         for passes in range(MOST_PASSES):
@@ -218,7 +218,7 @@ class KinematicPath:
                 first = factored_at = size
             if not np.isfinite(size) or size > max(MOST_TURN, 4.0 * before):
                 return None
-            u = displaced(u, -change.reshape(n, 6), n)
+            u = displaced(u, -change)
             if size * factored_at <= CLOSED or (size <= ROUNDING and size > 0.5 * before):
                 return u, first
             if factored_at > FACTORED_ANEW:

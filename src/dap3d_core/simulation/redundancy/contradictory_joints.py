@@ -84,8 +84,7 @@ def _out_of_reach(evaluator: Evaluator, t: float, u: Floats) -> str:
 
 def _closed(evaluator: Evaluator, u: Floats, t: float, later: float) -> Floats | None:
     """The bodies at a later time, put together; None where they cannot be."""
-    n = evaluator.model.body_count
-    moved = displaced(u, (later - t) * velocities_of(u).reshape(n, -1), n)
+    moved = displaced(u, (later - t) * velocities_of(u))
     try:
         return correct_positions(evaluator, moved, later, NONE)[0]
     except AssemblyError:

@@ -93,7 +93,7 @@ def _leads_away(evaluator: Evaluator, u: Floats, t: float, direction: Floats) ->
         float(np.max(np.linalg.norm(step[:, :3], axis=1))) / (SHIFT * size),
         float(np.max(np.linalg.norm(step[:, 3:], axis=1))) / TURN,
     )
-    moved = displaced(u, step / extent, n)
+    moved = displaced(u, step / extent)
     try:
         closed, _ = correct_positions(evaluator, moved, t, np.zeros(0, dtype=np.int64))
     except AssemblyError:

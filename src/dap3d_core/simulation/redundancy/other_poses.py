@@ -72,24 +72,21 @@ class GenericRank:
         )
 
 
-def redundancy_elsewhere(
-    evaluator: Evaluator, u: Floats, redundancy: Redundancy, t: float = 0.0
-) -> GenericRank:
-    """Take the rank at other poses that the joints allow; the same ones each time.
+def redundancy_elsewhere(evaluator: Evaluator, u: Floats, redundancy: Redundancy) -> GenericRank:
+    """Take the rank at other poses that the joints allow at t = 0; the same ones each time.
 
     Args:
         evaluator: the model.
         u: (13 n,) an assembled state.
         redundancy: that of u.
-        t: time, s; functions of time stand still.
     """
     rows = evaluator.model.row_count
     count = next(number for limit, number in POSES if rows <= limit)
     ranks = []
     for k in range(count):
-        other = _other_pose(evaluator, u, t, np.random.default_rng(k))
+        other = _other_pose(evaluator, u, np.random.default_rng(k))
         if other is not None:
-            rows_there = finite_rows(evaluator, t, other)
+            rows_there = finite_rows(evaluator, 0.0, other)
             ranks.append(
                 rank_of(evaluator, scaled_rows(rows_there, evaluator.model.length)[0]).rank
             )
@@ -99,29 +96,27 @@ def redundancy_elsewhere(
     return GenericRank(tuple(ranks), redundant, redundant == redundancy.rank.redundant)
 
 
-def _other_pose(
-    evaluator: Evaluator, u: Floats, t: float, rng: np.random.Generator
-) -> Floats | None:
+def _other_pose(evaluator: Evaluator, u: Floats, rng: np.random.Generator) -> Floats | None:
     """A state at another pose, or None where the joints allow none."""
     n, size = evaluator.model.body_count, model_size(evaluator)
-    rows = finite_rows(evaluator, t, u)
+    rows = finite_rows(evaluator, 0.0, u)
     wish = rng.standard_normal((n, 6))
     wish[:, :3] *= size
     wish = wish.ravel()
     flow = rows.value * wish[rows.column]
     product: Floats = np.bincount(rows.row, flow, minlength=rows.shape[0]).astype(float)
-    free = (wish - least_change(evaluator, rows, product, t, NONE)).reshape(n, 6)
+    free = (wish - least_change(evaluator, rows, product, 0.0, NONE)).reshape(n, 6)
     if np.linalg.norm(free) <= FREE * np.linalg.norm(wish):
         return None
     extent = max(_largest(free[:, :3]) / (SHIFT * size), _largest(free[:, 3:]) / TURN)
     for halving in range(HALVINGS + 1):
         step = free / (extent * 2.0**halving)
         try:
-            other, _ = correct_positions(evaluator, displaced(u, step, n), t, NONE)
+            other, _ = correct_positions(evaluator, displaced(u, step), 0.0, NONE)
         except AssemblyError:
             continue
         gone = np.linalg.norm(coordinates_of(other - u))
-        if gone > ANOTHER * np.linalg.norm(coordinates_of(displaced(u, step, n) - u)):
+        if gone > ANOTHER * np.linalg.norm(coordinates_of(displaced(u, step) - u)):
             return other
     return None
 
