@@ -35,14 +35,7 @@ from dap3d_core.interface.element_unknowns import START
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import euler_rates, to_body, to_global
-from dap3d_core.model.state_layout import (
-    bodies_of,
-    join,
-    split,
-    u_from_y,
-    velocities_of,
-    y_from_u,
-)
+from dap3d_core.model.state_layout import bodies_of, join, split, u_from_y, velocities_of, y_from_u
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 IGNORE_FLOAT_ERRORS = np.errstate(all="ignore")

@@ -11,11 +11,7 @@ from numpy.typing import NDArray
 from dap3d_core.interface.body_pose import BodyPose
 from dap3d_core.interface.codegen.instance_layout import shape_of, size
 from dap3d_core.interface.codegen.kernel_arguments import parameters
-from dap3d_core.interface.codegen.specialise import (
-    bind_friction,
-    bind_functions,
-    uncalled,
-)
+from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions, uncalled
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of

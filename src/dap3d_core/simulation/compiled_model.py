@@ -34,7 +34,6 @@ from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.explain import explain
 from dap3d_core.simulation.failure.diagnosis import find_offender
 from dap3d_core.simulation.failure.narrow_forces import notes_on_laws
-from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.breakpoints import Breakpoints
 from dap3d_core.simulation.initial.conservative import is_conservative
 from dap3d_core.simulation.initial.driver_notes import notes_on_drivers
@@ -290,9 +289,7 @@ class CompiledModel:
                 start = find_start(self.evaluator, *key, state)
             except AssemblyError as error:
                 raise self._located(error) from error
-            mistakes = undefined_directions(
-                self.scene, self.model, start.u, model_size(self.evaluator)
-            )
+            mistakes = undefined_directions(self.scene, self.model, start.u, self.model.size)
             if mistakes:
                 raise SceneError(mistakes)
             if state is not None:

@@ -13,12 +13,7 @@ from dap3d_core.integrators.stepping.singular_poses import begin_singular
 from dap3d_core.result import Result, ResultError
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.errors import RedundantError, SimulationError
-from dap3d_core.simulation.handover import (
-    cannot_cross,
-    crossing_notes,
-    hand_over,
-    stiffness_notes,
-)
+from dap3d_core.simulation.handover import cannot_cross, crossing_notes, hand_over, stiffness_notes
 from dap3d_core.simulation.initial.singular_start import SingularStart
 from dap3d_core.simulation.initial.tolerances import motion_notes, rounding_notes
 from dap3d_core.simulation.initial_state import InitialState, start_notes

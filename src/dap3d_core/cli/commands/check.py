@@ -134,8 +134,9 @@ def _redundancy_data(
 
 
 def _show(console: "Terminal", compiled: "CompiledModel", data: dict[str, Any]) -> None:
-    from dap3d_core.cli.console.console import count, scene_name, some
+    from dap3d_core.cli.console.console import count, scene_name
     from dap3d_core.cli.console.run_summary import degrees_of_freedom, show_correction
+    from dap3d_core.registry.suggestions import some
 
     console.title(scene_name(data["scene"]))
     names = some(compiled.model.body_names, 8)

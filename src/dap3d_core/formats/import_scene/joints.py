@@ -5,7 +5,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
 from dap3d_core.interface.formats.articulation import WORLD, Joint
 from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.interface.formats.remarks import FormatError
@@ -57,7 +57,7 @@ class JointEnds:
         at = frame.r + frame.A @ np.asarray(offset)
         if not at.any():
             return f"{body}.O"
-        numbers = tuple(float(x) + 0.0 for x in at)
+        numbers = plain(at)
         made, key = self.builder.names.scene_names, f"{body}: {numbers}"
         if ("points", key) not in made:
             name = self.builder.names.free("points", f"{self.name}_{end}{suffix}")
@@ -71,7 +71,7 @@ class JointEnds:
         for k, letter in enumerate("xyz"):
             if np.array_equal(components, np.eye(3)[k]):
                 return f"{body}.{letter}"
-        numbers = tuple(float(x) + 0.0 for x in components)
+        numbers = plain(components)
         made, key = self.builder.names.scene_names, f"{body}: {numbers}"
         if ("vectors", key) not in made:
             name = self.builder.names.free("vectors", f"{self.name}_{end}{suffix}")

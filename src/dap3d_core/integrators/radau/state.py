@@ -6,11 +6,7 @@ from typing import Any, ClassVar
 import attrs
 
 from dap3d_core.integrators.radau.tableau import RadauMethod
-from dap3d_core.integrators.stepping.integration_state import (
-    MOST_COUNTED,
-    STATES,
-    IntegrationState,
-)
+from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, STATES, IntegrationState
 from dap3d_core.kernels.runtime.array_struct import (
     COMPLEX_VECTOR,
     MATRIX,

@@ -8,13 +8,7 @@ from typing import Any, ClassVar
 import attrs
 
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import (
-    MATRIX,
-    Arrays,
-    Floats,
-    Integers,
-    Scalar,
-)
+from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays, Floats, Integers, Scalar
 
 #: ``f(t, y, out, system, loops)``: rhs, project, report, accepted or watch (runge_kutta/step.py).
 Function = Callable[..., None]

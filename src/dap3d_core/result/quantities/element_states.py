@@ -1,11 +1,7 @@
 """States of their own of joints and forces as quantities: ``spring.z``, ``spring.z.2``."""
 
 from dap3d_core.result.model_summary import ModelSummary
-from dap3d_core.result.quantities.catalogue import (
-    Quantity,
-    QuantityOwner,
-    QuantitySource,
-)
+from dap3d_core.result.quantities.catalogue import Quantity, QuantityOwner, QuantitySource
 
 
 def states_of(summary: ModelSummary, owner: QuantityOwner) -> dict[str, dict[str, int]]:

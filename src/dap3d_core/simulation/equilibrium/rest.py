@@ -7,11 +7,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.result import INFORMATION
 from dap3d_core.simulation.equilibrium.notes import assumptions, failure, findings
-from dap3d_core.simulation.equilibrium.search import (
-    Outcome,
-    Search,
-    search_equilibrium,
-)
+from dap3d_core.simulation.equilibrium.search import Outcome, Search, search_equilibrium
 from dap3d_core.simulation.equilibrium.stability import Stability, stability_of
 from dap3d_core.simulation.equilibrium.statics import Statics
 from dap3d_core.simulation.errors import SimulationError

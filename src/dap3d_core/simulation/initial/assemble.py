@@ -147,7 +147,7 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
     position, velocity = initial.violation
     tolerance = TOLERANCE * evaluator.model.length
     if position > tolerance:
-        mark = INFORMATION if position <= ROUNDING * model_size(evaluator) else ""
+        mark = INFORMATION if position <= ROUNDING * evaluator.model.size else ""
         notes.append(
             f"{mark}initial positions corrected in {initial.passes} passes: "
             f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
@@ -181,7 +181,7 @@ def correct_positions(
     Raises:
         AssemblyError: the residual does not vanish.
     """
-    size, limit, before = model_size(evaluator), 1.0, np.inf
+    size, limit, before = evaluator.model.size, 1.0, np.inf
     length, weight = evaluator.model.length, weights_of(evaluator)
     fit = length * fit_of(evaluator.model)
     for passes in range(MOST_PASSES + 1):
@@ -336,7 +336,7 @@ def model_size(evaluator: Evaluator) -> float:
 def extent(evaluator: Evaluator, v: Floats) -> float:
     """Largest speed at velocities (6 n,), in rad/s or lengths of the model a second."""
     x = np.abs(v.reshape(-1, 6))
-    return max(_largest(x[:, :3]) / model_size(evaluator), _largest(x[:, 3:]))
+    return max(_largest(x[:, :3]) / evaluator.model.size, _largest(x[:, 3:]))
 
 
 def _largest(values: Floats) -> float:

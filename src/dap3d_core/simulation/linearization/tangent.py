@@ -26,6 +26,7 @@ from dap3d_core.interface.codegen.loop_derivatives import LoopDerivatives, diffe
 from dap3d_core.model import Group, Model
 from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split, velocities_of
+from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.errors import SimulationError
 
 if TYPE_CHECKING:
@@ -291,11 +292,10 @@ class _Assembly:
         is_joint = group.type_info.type.kind == "joint" and kind == "acceleration"
         names = model.joint_names if is_joint else model.force_names
         words = list(dict.fromkeys(names[int(k)] for k in group.members[wrong]))
-        more = f" and {len(words) - MOST_NAMES} more" if len(words) > MOST_NAMES else ""
-        listed = ", ".join(words[:MOST_NAMES]) + more
         return (
-            f"{'joint' if is_joint else 'force'} {listed} has no derivative at t = {self.t:g} s: "
-            "the equations cannot be linearised here; move the state off this point"
+            f"{'joint' if is_joint else 'force'} {some(words, MOST_NAMES)} has no derivative at "
+            f"t = {self.t:g} s: the equations cannot be linearised here; move the state off this "
+            "point"
         )
 
 

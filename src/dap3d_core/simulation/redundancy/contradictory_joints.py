@@ -19,7 +19,6 @@ from dap3d_core.simulation.initial.assemble import (
     displaced,
     extent,
     finite_rows,
-    model_size,
 )
 from dap3d_core.simulation.redundancy.near_redundant import HELD
 
@@ -129,7 +128,7 @@ def _come_to_hold(evaluator: Evaluator, t: float, u: Floats, rank: int) -> str:
     """Joints whose rows depended on each other at the start and nearly do."""
     rows: ConstraintRows = evaluator.rows(t, u)
     left, values, _ = np.linalg.svd(rows.dense(), full_matrices=False)
-    fit = FIT * min(1.0, model_size(evaluator))
+    fit = FIT * min(1.0, evaluator.model.size)
     held = [k for k in range(rank, len(values)) if fit < values[k] < HELD * values[0]]
     if not held:
         return ""

@@ -18,13 +18,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import (
-    FIT,
-    correct_positions,
-    displaced,
-    fit_of,
-    model_size,
-)
+from dap3d_core.simulation.initial.assemble import FIT, correct_positions, displaced, fit_of
 
 Floats = NDArray[np.float64]
 
@@ -87,10 +81,9 @@ def bindings(
 
 def _leads_away(evaluator: Evaluator, u: Floats, t: float, direction: Floats) -> bool:
     """True if the joints can be closed at another pose in this direction (6 n,)."""
-    n, size = evaluator.model.body_count, model_size(evaluator)
-    step = direction.reshape(n, 6) * np.repeat([evaluator.model.length, 1.0], 3)
+    step = direction.reshape(-1, 6) * np.repeat([evaluator.model.length, 1.0], 3)
     extent = max(
-        float(np.max(np.linalg.norm(step[:, :3], axis=1))) / (SHIFT * size),
+        float(np.max(np.linalg.norm(step[:, :3], axis=1))) / (SHIFT * evaluator.model.size),
         float(np.max(np.linalg.norm(step[:, 3:], axis=1))) / TURN,
     )
     moved = displaced(u, step / extent)

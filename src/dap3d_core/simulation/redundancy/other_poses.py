@@ -18,7 +18,6 @@ from dap3d_core.simulation.initial.assemble import (
     displaced,
     finite_rows,
     least_change,
-    model_size,
 )
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, rank_of
 
@@ -98,7 +97,7 @@ def redundancy_elsewhere(evaluator: Evaluator, u: Floats, redundancy: Redundancy
 
 def _other_pose(evaluator: Evaluator, u: Floats, rng: np.random.Generator) -> Floats | None:
     """A state at another pose, or None where the joints allow none."""
-    n, size = evaluator.model.body_count, model_size(evaluator)
+    n, size = evaluator.model.body_count, evaluator.model.size
     rows = finite_rows(evaluator, 0.0, u)
     wish = rng.standard_normal((n, 6))
     wish[:, :3] *= size
