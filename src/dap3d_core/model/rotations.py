@@ -53,6 +53,13 @@ def euler_rates(p: Floats, w: Floats) -> Floats:
     return rates
 
 
+def angular_velocities(p: Floats, p_dot: Floats) -> Floats:
+    """Global angular velocities (..., 3) of p (..., 4) and its rates p_dot (..., 4): 2 G p_dot."""
+    e0, e, rate = p[..., :1], p[..., 1:], p_dot[..., 1:]
+    w: Floats = 2.0 * (-e * p_dot[..., :1] + e0 * rate + np.cross(e, rate))
+    return w
+
+
 def skew(a: ArrayLike) -> Floats:
     """Skew matrices (..., 3, 3) of vectors (..., 3): skew(a) b = a x b."""
     a = np.asarray(a, dtype=float)

@@ -70,6 +70,19 @@ def compiled_for(
     return scene
 
 
+def compiled_exactly(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    allow_code: bool,
+    announce: Callable[[str], None] | None = None,
+) -> CompiledModel:
+    """The compiled model of a scene, with a method whose accelerations fulfil the constraints."""
+    if isinstance(scene, CompiledModel):
+        if scene.evaluator.formulation.is_exact:
+            return scene
+        scene = scene.scene
+    return CompiledModel(scene, method="auto", allow_code=allow_code, announce=announce)
+
+
 def check_checkpoint(seconds: float | None, output: str | os.PathLike[str] | None) -> None:
     """Refuse checkpoints that make no sense.
 

@@ -20,6 +20,7 @@ from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import violation
 from dap3d_core.simulation.initial.start_state import NamedState, Start, start_state
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
+from dap3d_core.simulation.settings import compiled_for
 
 Floats = NDArray[np.float64]
 
@@ -182,9 +183,7 @@ def equilibrium(
         SimulationError: there is no equilibrium, because nothing holds a freedom, or none was
             found; names what gives way. AssemblyError: the joints cannot be assembled.
     """
-    compiled = scene
-    if not isinstance(compiled, CompiledModel):
-        compiled = CompiledModel(scene, allow_code=allow_code, announce=announce)  # type: ignore[arg-type]
+    compiled = compiled_for(scene, None, allow_code, announce)
     settings = compiled.scene.simulation
     state = None
     if start is not None:

@@ -68,23 +68,19 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
     if timed:
         listed = some(timed, MOST_NAMES)
         yield f"{INFORMATION}forces that depend on time are those at t = 0: {listed}"
-    driven = [model.row_owner(int(k)) for k in np.flatnonzero(rows.nu)]
+    driven = model.row_owners(np.flatnonzero(rows.nu))
     if driven:
-        yield (
-            f"{INFORMATION}drivers are at rest at their initial values: "
-            f"{some(list(dict.fromkeys(driven)), MOST_NAMES)}"
-        )
+        listed = some(driven, MOST_NAMES)
+        yield f"{INFORMATION}drivers are at rest at their initial values: {listed}"
     if model.friction:
         yield (
             "friction is left out: with it the scene can rest at other poses near this one as well"
         )
-    rolling = [model.row_owner(int(k))
-               for k in np.flatnonzero(~model.position_row & (rows.nu == 0.0))]  # fmt: skip
+    rolling = model.row_owners(np.flatnonzero(~model.position_row & (rows.nu == 0.0)))
     if rolling:
         yield (
             f"{INFORMATION}rolling joints constrain displacements as they do velocities: "
-            f"{some(list(dict.fromkeys(rolling)), MOST_NAMES)}; where they come to rest depends on "
-            "the way"
+            f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
         )
 
 

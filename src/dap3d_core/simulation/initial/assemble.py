@@ -20,6 +20,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.linear.ldlt.plan import Integers
 from dap3d_core.linear.rank.rank import DENSE_ROWS, factor_independent
 from dap3d_core.model import Model
+from dap3d_core.model.rotations import euler_rates
 from dap3d_core.model.state_layout import join, split, state_layout, velocities_of
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Body, Scene
@@ -92,7 +93,8 @@ def violation(evaluator: Evaluator, u: Floats, t: float = 0.0) -> tuple[float, f
         return 0.0, 0.0
     rows = finite_rows(evaluator, t, u)
     weight = weights_of(evaluator)
-    return _largest(weight * rows.C), _largest(weight * _velocity_residual(rows, u))
+    residual = rows.product(velocities_of(u)) - rows.nu
+    return _largest(weight * rows.C), _largest(weight * residual)
 
 
 def weights_of(evaluator: Evaluator) -> Floats:
@@ -129,7 +131,7 @@ def correct_initial(
     held = np.array(sorted(hold), dtype=np.int64)
     u, passes = correct_positions(evaluator, u, t, held, metric)
     rows = finite_rows(evaluator, t, u)
-    residual = _velocity_residual(rows, u)
+    residual = rows.product(velocities_of(u)) - rows.nu
     if _largest(residual) > 0.0:
         u = u.copy()
         velocities = velocities_of(u)
@@ -298,9 +300,7 @@ def displaced(u: Floats, change: Floats) -> Floats:
     """
     r, p, v, w = split(u)
     change = change.reshape(-1, 6)
-    e0, e, turn = p[:, :1], p[:, 1:], 0.5 * change[:, 3:]
-    dp = np.hstack([-np.sum(e * turn, axis=1, keepdims=True), e0 * turn + np.cross(turn, e)])
-    p = p + dp
+    p = p + euler_rates(p, change[:, 3:])
     return join(r + change[:, :3], p / np.linalg.norm(p, axis=1, keepdims=True), v, w)
 
 
@@ -316,11 +316,6 @@ def distance(u: Floats, other: Floats, n: int) -> tuple[Floats, Floats]:
     angle = np.where(cosine > 0.9, small, large)
     shift = np.linalg.norm(r - s, axis=-1)
     return np.max(shift, axis=-1, initial=0.0), np.max(angle, axis=-1, initial=0.0)
-
-
-def _velocity_residual(rows: ConstraintRows, u: Floats) -> Floats:
-    v = u[-rows.shape[1] :]
-    return np.bincount(rows.row, rows.value * v[rows.column], minlength=rows.shape[0]) - rows.nu
 
 
 def fit_of(model: Model) -> float:

@@ -120,9 +120,7 @@ def _loses_rank(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> bool:
     if not np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]).all():
         return False  # a row without a gradient is named where the run stops
     wish = np.random.default_rng(0).standard_normal(6 * n)
-    flow = rows.value * wish[rows.column]
-    flow = np.bincount(rows.row, flow, minlength=rows.shape[0]).astype(float)
-    free = wish - least_change(evaluator, rows, flow, t)
+    free = wish - least_change(evaluator, rows, rows.product(wish), t)
     if np.linalg.norm(free) <= NONE * np.linalg.norm(wish):
         return False
     gradient = scaled_rows(rows, evaluator.model.length)[1]  # dependencies are those of scaled rows
@@ -337,8 +335,7 @@ def _third(cone: _Cone, v: Floats, a: Floats) -> Floats:
         state = displaced(cone.still, s * v + 0.5 * s * s * a)
         velocities_of(state)[:] = v + s * a
         rows = finite_rows(cone.evaluator, cone.t + s, state)
-        product = np.bincount(rows.row, rows.value * a[rows.column], minlength=rows.shape[0])
-        total += weight * cone.left @ (product - rows.gamma)
+        total += weight * cone.left @ (rows.product(a) - rows.gamma)
     derivative: Floats = total / (12.0 * h)
     return derivative
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.interface import PluginError
 from dap3d_core.model import Model, ModelError, build_model
-from dap3d_core.model.rotations import euler_rates
+from dap3d_core.model.rotations import angular_velocities, euler_rates
 from dap3d_core.model.state_layout import join, split
 from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.result import INFORMATION, Result
@@ -245,8 +245,8 @@ def _state_at(result: Result, before: int, after: int, fraction: float) -> Float
     q, q_dot = _quintic(ends[0], ends[1], h, fraction)
     p, p_dot = q[:, 3:], q_dot[:, 3:]
     length = np.linalg.norm(p, axis=1, keepdims=True)
-    w = 2.0 * (p[:, :1] * p_dot[:, 1:] - p_dot[:, :1] * p[:, 1:] - np.cross(p_dot[:, 1:], p[:, 1:]))
-    return join(q[:, :3], p / length, q_dot[:, :3], w / length**2)
+    w = angular_velocities(p, p_dot) / length**2
+    return join(q[:, :3], p / length, q_dot[:, :3], w)
 
 
 def _quintic(

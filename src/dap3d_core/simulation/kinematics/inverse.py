@@ -19,7 +19,7 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.failure.negative_reactions import Pulling
 from dap3d_core.simulation.kinematics.actuators import Actuator, DriverActuator, actuators_of
-from dap3d_core.simulation.kinematics.kinematics import check_output, compiled_exactly
+from dap3d_core.simulation.kinematics.kinematics import check_output
 from dap3d_core.simulation.kinematics.motion_data import (
     Motion,
     misfit_notes,
@@ -33,6 +33,7 @@ from dap3d_core.simulation.kinematics.pose_equations import (
     required_forces,
 )
 from dap3d_core.simulation.redundancy.freedoms import motion_words
+from dap3d_core.simulation.settings import compiled_exactly
 
 Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
@@ -86,7 +87,7 @@ def inverse(
     """
     check_output(output, force=force)
     given = read_motion(motion)
-    compiled = compiled_exactly(scene, allow_code=allow_code, announce=announce)
+    compiled = compiled_exactly(scene, allow_code, announce)
     with compiled.borrow_evaluator() as evaluator:
         result = _solved(compiled, evaluator, given, actuators, progress)
     if output is not None:

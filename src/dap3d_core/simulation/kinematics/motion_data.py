@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.model.rotations import angular_velocities
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import Result, RunMetadata
 from dap3d_core.result.arrays import Arrays
@@ -23,7 +24,6 @@ from dap3d_core.result.quantities.measured_data import MeasuredData, read_measur
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import displaced, extent
-from dap3d_core.simulation.kinematics.path import spin
 from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags
 from dap3d_core.simulation.redundancy.freedoms import motion_words
 
@@ -136,8 +136,7 @@ def differentiated(t: Floats, u: Floats) -> tuple[Floats, Floats]:
     degree = DEGREE if len(t) > DEGREE else FEWEST - 1
     splines = [make_interp_spline(t, x, k=degree) for x in (r, p)]
     (v, rate), (a, second) = ([s(t, nu=order) for s in splines] for order in (1, 2))
-    n = r.shape[1]
-    w, rise = (spin(p.reshape(-1, 4), x.reshape(-1, 4)).reshape(-1, n, 3) for x in (rate, second))
+    w, rise = (angular_velocities(p, x) for x in (rate, second))
     return join(r, p, v, w), np.concatenate([a, rise], axis=-1).reshape(len(t), -1)
 
 

@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations import FORMULATIONS, WATCH
+from dap3d_core.formulations import WATCH
 from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
@@ -27,6 +27,7 @@ from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
 from dap3d_core.simulation.linearization.steady_motion import SteadyFrames, steady_frames
 from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
+from dap3d_core.simulation.settings import compiled_exactly
 
 Floats = NDArray[np.float64]
 
@@ -94,11 +95,7 @@ def operating_point(
 ) -> OperatingPoint:
     """The state to linearise about; arguments and errors as of ``linearize``."""
     t = time_of(t)
-    if isinstance(scene, CompiledModel) and FORMULATIONS[scene.method].is_exact:
-        compiled = scene
-    else:
-        scene = scene.scene if isinstance(scene, CompiledModel) else scene
-        compiled = CompiledModel(scene, method="auto", allow_code=allow_code)
+    compiled = compiled_exactly(scene, allow_code)
     model = compiled.model
     notes: list[str] = []
     with compiled.borrow_evaluator() as evaluator:

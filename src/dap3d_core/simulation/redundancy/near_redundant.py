@@ -73,8 +73,7 @@ def bindings(
         if any(_leads_away(evaluator, u, t, sign * right[k]) for sign in (1.0, -1.0)):
             continue
         taking = np.abs(left[:, k]) > PART_TAKEN * np.max(np.abs(left[:, k]))
-        owners = np.searchsorted(model.joint_start, np.flatnonzero(taking), side="right") - 1
-        joints = tuple(model.joint_names[j] for j in np.unique(owners))
+        joints = tuple(model.row_owners(np.flatnonzero(taking)))
         found.append(Binding(joints, float(values[k])))
     return tuple(found)
 

@@ -102,9 +102,8 @@ def _other_pose(evaluator: Evaluator, u: Floats, rng: np.random.Generator) -> Fl
     wish = rng.standard_normal((n, 6))
     wish[:, :3] *= size
     wish = wish.ravel()
-    flow = rows.value * wish[rows.column]
-    product: Floats = np.bincount(rows.row, flow, minlength=rows.shape[0]).astype(float)
-    free = (wish - least_change(evaluator, rows, product, 0.0, NONE)).reshape(n, 6)
+    free = wish - least_change(evaluator, rows, rows.product(wish), 0.0, NONE)
+    free = free.reshape(n, 6)
     if np.linalg.norm(free) <= FREE * np.linalg.norm(wish):
         return None
     extent = max(_largest(free[:, :3]) / (SHIFT * size), _largest(free[:, 3:]) / TURN)

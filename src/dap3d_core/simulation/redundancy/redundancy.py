@@ -297,7 +297,7 @@ def _contradictions(
     if not dependencies:
         return found
     v = u[-rows.shape[1] :] / np.tile(np.repeat([model.length, 1.0], 3), model.body_count)
-    off = np.bincount(rows.row, rows.value * v[rows.column], minlength=rows.shape[0]) - rows.nu
+    off = rows.product(v) - rows.nu
     moving_along = float(np.max(np.abs(off))) <= MOVING_ALONG * max(1.0, float(np.max(np.abs(v))))
     for dependency in dependencies:
         open_ = _judged(model, dependency, rows.C, gradient, "position")
