@@ -1,7 +1,7 @@
 """Text on what is modelled, and on what is left out and why."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -37,7 +37,9 @@ def explain(
     sizes = f"{STATE * n} states{own}, {VELOCITIES * n} accelerations"
     lines.append(f"  bodies     {n}: {some(model.body_names, MOST_NAMES)}; {sizes}")
     kinds = {"joints": checked.joints, "forces": checked.forces, "functions": checked.functions}
-    lines += [f"  {title:10s} {_counts(instances)}" for title, instances in kinds.items()]
+    lines += [
+        f"  {title:10s} {counts_text(types_of(instances))}" for title, instances in kinds.items()
+    ]
     if model.row_count:
         lines.append(f"  rows       {redundancy.describe()}")
         lines += [f"  reactions  {words}" for words in redundancy.describe_reactions()]
@@ -77,8 +79,9 @@ def types_of(instances: Sequence[Instance]) -> dict[str, int]:
     return dict(Counter(instance.type_info.type.keyword for instance in instances))
 
 
-def _counts(instances: Sequence[Instance]) -> str:
-    return ", ".join(f"{count} {word}" for word, count in types_of(instances).items()) or "none"
+def counts_text(types: Mapping[str, int]) -> str:
+    """Numbers of elements by type, as ``types_of`` has them, in words."""
+    return ", ".join(f"{count} {word}" for word, count in types.items()) or "none"
 
 
 def _left_out(checked: ValidatedScene, model: Model) -> list[str]:
