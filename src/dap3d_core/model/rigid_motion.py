@@ -9,11 +9,9 @@ Manipulation, chapter 2.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import skew
-
-Floats = NDArray[np.float64]
 
 
 class Pose(NamedTuple):

@@ -5,7 +5,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from dap3d_core.kernels.array_types import Floats
+
 #: An array of any kind.
 AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 

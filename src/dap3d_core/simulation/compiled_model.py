@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.registry import Registry, load_registry
@@ -46,7 +47,6 @@ from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_o
 if TYPE_CHECKING:
     from dap3d_core.simulation.initial.start_state import StartState
 
-Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
 
 #: Joints whose lines in the file a message gives.

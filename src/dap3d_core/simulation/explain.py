@@ -4,18 +4,14 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import STATE, VELOCITIES
 from dap3d_core.registry.suggestions import some
 from dap3d_core.scene import Instance, Scene, ValidatedScene
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.redundancy.redundancy import Redundancy
-
-Floats = NDArray[np.float64]
 
 #: Names that a line lists.
 MOST_NAMES = 8

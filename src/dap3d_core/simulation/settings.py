@@ -6,13 +6,13 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators import EXPLICIT, Integrator
 from dap3d_core.integrators.added import integrator_named
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene import (
     METHODS,
     MISSING,
@@ -26,8 +26,6 @@ from dap3d_core.scene.validate.settings import notes_of
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.tolerances import atol_vector, resolved_atol
-
-Floats = NDArray[np.float64]
 
 
 def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:

@@ -7,8 +7,9 @@ import numpy as np
 
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
 from dap3d_core.interface.formats.articulation import WORLD, Joint
-from dap3d_core.interface.formats.frames import Floats, Frame
+from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.interface.formats.remarks import FormatError
+from dap3d_core.kernels.array_types import Floats
 
 
 def add_joint(builder: SceneBuilder, joint: Joint) -> None:

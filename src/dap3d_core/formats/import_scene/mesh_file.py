@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from dap3d_core.interface.formats.frames import Floats, Integers
 from dap3d_core.interface.formats.remarks import FormatError, Place
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.scene.files.read_mesh import read_mesh as read_arrays
 
 #: Meshes of more triangles are refused.

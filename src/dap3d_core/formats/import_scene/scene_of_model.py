@@ -15,8 +15,9 @@ from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
 from dap3d_core.formats.import_scene.shapes import MeshFiles, add_shapes
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Link
-from dap3d_core.interface.formats.frames import Floats, quaternion
+from dap3d_core.interface.formats.frames import quaternion
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import GROUND, Scene
 
 #: Steps of a settled result: a model does not say how long to simulate.

@@ -8,9 +8,9 @@ from pathlib import Path
 import attrs
 
 from dap3d_core.formats.import_scene.mesh_file import read_mesh
-from dap3d_core.interface.formats.frames import Floats, Integers
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Place, Remarks
 from dap3d_core.interface.formats.xml_tree import XmlElement, parse_xml
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.registry.regular_files import read_regular
 
 #: Larger files are not read, bytes.

@@ -8,17 +8,14 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.common.sparse_entries import SparseEntries, components
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_derivatives import differentiate_loop
 from dap3d_core.interface.codegen.loop_source import computes_rate
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model import Group
 from dap3d_core.model.element_states import first_states
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Kinds of loops that may see states.
 KINDS = ("rate", "wrench", "friction", "acceleration", "position")

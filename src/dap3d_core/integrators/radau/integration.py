@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.stabilized_index2.jacobian import BODY, FIRST_ROW
@@ -19,6 +19,7 @@ from dap3d_core.integrators.radau.tableau import ORDER, radau_method
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, restored
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
+from dap3d_core.kernels.array_types import Integers
 from dap3d_core.linear.lu.plan import LuPlan, StateNode, make_lu_plan
 from dap3d_core.linear.ordering.ordering import JointNode
 from dap3d_core.model import Model
@@ -30,7 +31,6 @@ from dap3d_core.model import Model
 REGULAR = 1e-6
 
 
-Integers = NDArray[np.int64]
 #: Arrays of states of elements, which a scene without any has not in its checkpoints.
 OF_STATES = ("tangent.states.", "matrix.state_")
 

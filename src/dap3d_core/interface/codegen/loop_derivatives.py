@@ -12,19 +12,16 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.interface.codegen.reactions import body_columns, rows_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.dual_numbers import Dual, DualFunctions
 from dap3d_core.kernels.runtime import generated_modules
 from dap3d_core.kernels.runtime.loop_modules import Loop, source_of
 from dap3d_core.kernels.runtime.loop_support import A, P, R, V, W
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Directions of a body: r, rotation vector, r_dot, omega.
 DIRECTIONS = 12

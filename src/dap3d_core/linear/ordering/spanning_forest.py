@@ -13,11 +13,9 @@ from heapq import heappop, heappush
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Integers
 from dap3d_core.registry.suggestions import some
-
-Integers = NDArray[np.int64]
 
 #: Multiplications to carry one row over one body.
 CARRY = 24

@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import read_only
@@ -21,8 +20,6 @@ from dap3d_core.simulation.initial.assemble import violation
 from dap3d_core.simulation.initial.start_state import NamedState, Start, start_state
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
 from dap3d_core.simulation.settings import compiled_for
-
-Floats = NDArray[np.float64]
 
 #: Constants that a type takes from the poses of the scene are the same to this part.
 SAME_CONSTANT = 1e-8

@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group, Model
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.registry.suggestions import some
@@ -15,8 +15,6 @@ from dap3d_core.result import INFORMATION
 from dap3d_core.simulation.equilibrium.motion_words import describe_motion
 from dap3d_core.simulation.equilibrium.search import Outcome, Search
 from dap3d_core.simulation.equilibrium.stability import Stability
-
-Floats = NDArray[np.float64]
 
 #: Names that a note lists.
 MOST_NAMES = 6

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations import REPORT
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.parameter_change import Change, changed
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result import Result, RunMetadata
 from dap3d_core.simulation.compiled_model import CompiledModel
 
-Floats = NDArray[np.float64]
 Kind = TypeVar("Kind")
 ACTIONS = ("stop", "record")
 #: Velocities of a body that an event may set, and where they lie among its six.

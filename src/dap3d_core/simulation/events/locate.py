@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.formulations import RHS
 from dap3d_core.integrators import Integration, Status
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.validate import are_events, is_number
 from dap3d_core.result.post.smooth_parts import cubic
@@ -26,7 +26,6 @@ from dap3d_core.simulation.events.sampling import Sampler
 if TYPE_CHECKING:
     from dap3d_core.simulation.events.jumps import Jumps
 
-Floats = NDArray[np.float64]
 
 EPSILON = float(np.finfo(float).eps)
 

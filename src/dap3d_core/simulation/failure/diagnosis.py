@@ -1,19 +1,17 @@
 """Finds the body, force or joint that first produced a non-finite or overflowing value."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import KINDS
 from dap3d_core.assembly.evaluate import place_state
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.pivots import near_singular_rows
 from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.model import Group
 from dap3d_core.model.state_layout import by_body, velocities_of
 from dap3d_core.scene.validate.coerce_values import LARGEST
-
-Floats = NDArray[np.float64]
 
 #: Where to look behind the last good state, as parts of the time.
 AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)

@@ -11,13 +11,12 @@ from itertools import pairwise
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import System
 from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.linear.ldlt.plan import Integers
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.linear.rank.rank import DENSE_ROWS, factor_independent
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import euler_rates
@@ -26,8 +25,6 @@ from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Body, Scene
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.failure.diagnosis import find_offender
-
-Floats = NDArray[np.float64]
 
 #: Position residuals above this are corrected; Newton stops below it.
 TOLERANCE = 1e-10

@@ -18,10 +18,10 @@ from collections.abc import Iterator
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS, Rank
 from dap3d_core.model.state_layout import split, velocities_of
 from dap3d_core.simulation.initial.assemble import (
@@ -32,8 +32,6 @@ from dap3d_core.simulation.initial.assemble import (
     mass_scaling,
     unscaled,
 )
-
-Floats = NDArray[np.float64]
 
 #: A condition of second order counts as fulfilled below this part of the largest gamma.
 FULFILLED = 1e-6

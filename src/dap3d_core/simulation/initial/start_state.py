@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.interface import PluginError
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.model.rotations import angular_velocities, euler_rates
 from dap3d_core.model.state_layout import join, split
@@ -20,7 +20,6 @@ from dap3d_core.scene import check as validate
 if TYPE_CHECKING:
     from dap3d_core.registry import Registry
 
-Floats = NDArray[np.float64]
 
 #: A time is a reported one if it differs from it by this part of the result's span.
 SAME_TIME = 1e-12

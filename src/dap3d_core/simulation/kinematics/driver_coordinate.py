@@ -5,13 +5,11 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
-
-Floats = NDArray[np.float64]
 
 #: Name behind that of a driver, and the forms of ``over``.
 COORDINATE = "q"

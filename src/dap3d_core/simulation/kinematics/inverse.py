@@ -7,9 +7,9 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.model_summary import summary_of
@@ -35,7 +35,6 @@ from dap3d_core.simulation.kinematics.pose_equations import (
 from dap3d_core.simulation.redundancy.freedoms import motion_words
 from dap3d_core.simulation.settings import compiled_exactly
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 
 #: What the record of a result has for its integrator.

@@ -7,9 +7,9 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import arrays_of
 from dap3d_core.result.file.atomic_write import check_target, check_utf8
@@ -30,7 +30,6 @@ from dap3d_core.simulation.kinematics.pose_equations import held_states, require
 from dap3d_core.simulation.redundancy.freedoms import freedoms_left, motion_words
 from dap3d_core.simulation.settings import compiled_exactly, report_times, settings_of
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 
 #: What the record of a result has for its integrator.

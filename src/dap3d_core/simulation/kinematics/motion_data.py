@@ -10,9 +10,9 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import angular_velocities
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import Result, RunMetadata
@@ -26,8 +26,6 @@ from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import displaced, extent
 from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags
 from dap3d_core.simulation.redundancy.freedoms import motion_words
-
-Floats = NDArray[np.float64]
 
 #: Degree of the splines; the fewest instants, which a spline of degree 3 goes through.
 DEGREE, FEWEST = 5, 4

@@ -16,15 +16,13 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import angular_velocities, euler_rates
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.simulation.initial.assemble import displaced, extent, finite_rows
 from dap3d_core.simulation.kinematics.pose_equations import LinearisedRows
-
-Floats = NDArray[np.float64]
 
 #: Newton stops behind a correction (rad, or parts of the model) whose product with the one behind
 #: which rows were factored is this: the size of the next; or where corrections no longer shrink.

@@ -6,20 +6,18 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.loop_derivatives import differentiate_loop
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group
 from dap3d_core.model.element_states import first_states
 from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import UnknownNameError, unknown
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
 from dap3d_core.simulation.linearization.state_space import DriverRows
-
-Floats = NDArray[np.float64]
 
 #: Kinds of fields that may be inputs.
 NUMBERS = ("number", "vec3")

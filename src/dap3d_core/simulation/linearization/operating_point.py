@@ -6,13 +6,13 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations import WATCH
 from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.reactions import reaction_names
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import dense_rank
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import join
@@ -28,8 +28,6 @@ from dap3d_core.simulation.linearization.steady_motion import SteadyFrames, stea
 from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
 from dap3d_core.simulation.settings import compiled_exactly
-
-Floats = NDArray[np.float64]
 
 #: Residuals of the constraints beyond this make a state unfit, in m and m/s.
 OFF_CONSTRAINTS = 1e-6

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 from dap3d_core.formulations.common.sparse_entries import SparseEntries, components
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_derivatives import LoopDerivatives, differentiate_loop
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model import Group, Model
 from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split, velocities_of
@@ -33,8 +34,6 @@ from dap3d_core.simulation.errors import SimulationError
 if TYPE_CHECKING:
     from dap3d_core.formulations.common.state_derivatives import StateDerivatives
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Names that an error message lists.
 MOST_NAMES = 6

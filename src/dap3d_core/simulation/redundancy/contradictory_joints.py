@@ -6,10 +6,10 @@ moment's rounding, so that the joints are put together a little later, too.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.simulation.errors import AssemblyError
@@ -21,8 +21,6 @@ from dap3d_core.simulation.initial.assemble import (
     finite_rows,
 )
 from dap3d_core.simulation.redundancy.near_redundant import HELD
-
-Floats = NDArray[np.float64]
 
 #: Rows beyond which nothing is looked for.
 MOST_ROWS = 300

@@ -11,16 +11,14 @@ away from it. So it is tried: who can be put together along that motion does not
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import FIT, correct_positions, displaced, fit_of
-
-Floats = NDArray[np.float64]
 
 #: From this part of the largest singular value on rows are held: the root of the regularisation of
 #: lsq, 1e-9 of a row's square.

@@ -7,10 +7,10 @@ position rows leave free, put together again, and the rank is taken there.
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import (
@@ -20,8 +20,6 @@ from dap3d_core.simulation.initial.assemble import (
     least_change,
 )
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, rank_of
-
-Floats = NDArray[np.float64]
 
 #: Poses that are tried up to this many rows; beyond, the last number.
 POSES = ((300, 3), (1000, 2), (10**9, 1))

@@ -5,10 +5,10 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import (
     DENSE_ROWS,
     WEIGHT,
@@ -22,8 +22,6 @@ from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.initial.assemble import finite_rows, fit_of
 from dap3d_core.simulation.initial.singular_start import SingularStart, singular_start
 from dap3d_core.simulation.redundancy.near_redundant import Binding, bindings
-
-Floats = NDArray[np.float64]
 
 #: Redundant rows whose combination misses zero by more than this contradict each other: per unit of
 #: the largest right-hand side, where that is above one.
