@@ -7,7 +7,7 @@ import pytest
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.formats.import_scene import mesh_file, source_files
+from dap3d_core.formats.import_scene import source_files
 from dap3d_core.interface.formats import xml_tree
 
 ARM = (REPOSITORY / "tests" / "data" / "formats" / "arm.urdf").read_text()
@@ -141,7 +141,7 @@ def test_a_mesh_whose_mass_counts_has_limits(tmp_path, monkeypatch):
     (tmp_path / "m.obj").write_text(CUBE)
     scene, _ = dap.import_model(tmp_path / "a.xml")
     assert scene.bodies["body1"].mass == pytest.approx(1000.0 / 6.0, rel=1e-12)
-    monkeypatch.setattr(mesh_file, "MOST_TRIANGLES", 3)
+    monkeypatch.setattr(source_files, "MOST_TRIANGLES", 3)
     assert "more than 3 triangles" in refusal(tmp_path / "a.xml", text)
 
 

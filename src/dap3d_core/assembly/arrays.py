@@ -7,17 +7,14 @@ address; the loops are an argument of their own (docs/decisions/0001).
 from typing import Any, ClassVar
 
 import attrs
-import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.tree_arrays import TreeArrays
+from dap3d_core.kernels.array_types import Floats as Floats
+from dap3d_core.kernels.array_types import Integers as Integers
 from dap3d_core.kernels.compiler.types import Table
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX
 from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, step_signature
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: The order of the group loops in the list: all loops of one kind stand together.
 KINDS = (

@@ -3,13 +3,9 @@
 from typing import Any, ClassVar
 
 import attrs
-import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

@@ -15,7 +15,6 @@ from dap3d_core.formats.import_scene.source_files import SourceFiles
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import Articulation, FormatError, Importer, Remark, Remarks
 from dap3d_core.interface.formats.articulation import KINDS
-from dap3d_core.interface.formats.xml_tree import XmlElement
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.extensions import Extensions, extensions
 from dap3d_core.registry.suggestions import nearest
@@ -228,7 +227,7 @@ def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
     suffix, loaded = source.path.suffix.lower(), _usable(formats)
     fitting = {k: one for k, one in loaded.items() if suffix in one.suffixes}
     if len(fitting) != 1:
-        name = _root_name(source)
+        name = source.xml().name
         fitting = {k: one for k, one in loaded.items() if name in one.roots} or fitting
     if len(fitting) == 1:
         keyword, importer = next(iter(fitting.items()))
@@ -247,11 +246,6 @@ def _usable(formats: Extensions) -> dict[str, Importer]:
         except PluginError:
             continue
     return usable
-
-
-def _root_name(source: SourceFiles) -> str:
-    root: XmlElement = source.xml()
-    return root.name
 
 
 def _states(

@@ -27,6 +27,11 @@ class ConstraintRows:
     value: Floats
     shape: tuple[int, int]
 
+    def product(self, x: Floats) -> Floats:
+        """(rows,) D x of x (6 n,)."""
+        terms = self.value * x[self.column]
+        return np.bincount(self.row, terms, minlength=self.shape[0]).astype(float)
+
     def dense(self) -> Floats:
         """The Jacobian D (rows, 6 n)."""
         D = np.zeros(self.shape)

@@ -35,14 +35,7 @@ from dap3d_core.interface.element_unknowns import START
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import euler_rates, to_body, to_global
-from dap3d_core.model.state_layout import (
-    bodies_of,
-    join,
-    split,
-    u_from_y,
-    velocities_of,
-    y_from_u,
-)
+from dap3d_core.model.state_layout import bodies_of, join, split, u_from_y, velocities_of, y_from_u
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 IGNORE_FLOAT_ERRORS = np.errstate(all="ignore")
@@ -243,12 +236,11 @@ class Evaluator:
             self.set_inputs(values)
 
     @IGNORE_FLOAT_ERRORS
-    def store_initial_function_values(self, t: float = 0.0) -> None:
+    def store_initial_function_values(self) -> None:
         """Keep each function's value at the start, for drivers that count from it."""
-        s = self.system
         self.set_inputs(self.model.input_values)
-        self._call(VALUE, t, s.force, s.force, s.force)
-        s.F[:, 4] = s.F[:, 0]
+        self.function_values(0.0)
+        self.system.F[:, 4] = self.system.F[:, 0]
 
     @IGNORE_FLOAT_ERRORS
     def function_values(self, t: float) -> Floats:

@@ -20,13 +20,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
-from dap3d_core.assembly.evaluate import (
-    global_accelerations,
-    largest,
-    rates,
-    state_rates,
-    zero,
-)
+from dap3d_core.assembly.evaluate import global_accelerations, largest, rates, state_rates, zero
 from dap3d_core.formulations.common.constraints import (
     PART,
     project_onto,

@@ -5,15 +5,7 @@
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import (
-    ENERGY,
-    SCRATCH,
-    TURNED,
-    VALUE,
-    WRENCH,
-    Floats,
-    System,
-)
+from dap3d_core.assembly.arrays import ENERGY, SCRATCH, TURNED, VALUE, WRENCH, Floats, System
 from dap3d_core.assembly.evaluate import (
     call_kinds,
     global_accelerations,

@@ -10,7 +10,7 @@ from typing import Any
 from dap3d_core.integrators.runge_kutta.integration import RungeKutta
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import FINISHED, Y
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
 #: Right-hand sides of one call: all.

@@ -4,14 +4,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.types import Function
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene import Instance
-
-Floats = NDArray[np.float64]
 
 #: Knots of a function without any, next to functions that have some.
 FAR = 1e100

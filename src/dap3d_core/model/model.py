@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
+from numpy.typing import ArrayLike
 
 from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.codegen.reactions import joint_fields
@@ -255,7 +256,12 @@ class Model:
 
     def row_owner(self, row: int) -> str:
         """Name of the joint that a constraint row belongs to."""
-        return self.joint_names[int(np.searchsorted(self.joint_start, row, side="right")) - 1]
+        return self.row_owners([row])[0]
+
+    def row_owners(self, rows: ArrayLike) -> list[str]:
+        """Names of the joints that constraint rows belong to, each once, in file order."""
+        owners = np.searchsorted(self.joint_start, rows, side="right") - 1
+        return [self.joint_names[k] for k in np.unique(owners)]
 
 
 class ModelError(ValueError):

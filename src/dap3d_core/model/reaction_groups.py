@@ -93,7 +93,7 @@ def _wrong_rows(
     specs = joint_fields(group.type_info.type)
     refused: dict[tuple[int, ...], str] = {}
     for member, names in zip(group.members.tolist(), named, strict=True):
-        rows = tuple(_row_count(joint_groups[places[name][0]]) for name in names)
+        rows = tuple(joint_groups[places[name][0]].type_info.row_count for name in names)
         if rows not in refused:
             refused[rows] = ""
             for field, count in zip(fields, rows, strict=True):
@@ -121,10 +121,6 @@ def _refusal(group: Group, rows: Mapping[str, int]) -> str:
         except ArithmeticError:  # undefined for these random numbers, as others may be
             continue
     return ""
-
-
-def _row_count(group: Group) -> int:
-    return group.type_info.row_count
 
 
 def _rows(count: int) -> str:

@@ -9,9 +9,9 @@ Manipulation, chapter 2.
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model.rotations import skew
 
 
 class Pose(NamedTuple):
@@ -102,13 +102,6 @@ def rotation_vector(p: Floats) -> Floats:
     angle = 2.0 * np.arctan2(sine, p[..., :1])
     vector: Floats = np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 2.0) * p[..., 1:]
     return vector
-
-
-def skew(a: Floats) -> Floats:
-    """Matrices a~ (..., 3, 3) of vectors (..., 3): a~ b = a x b."""
-    matrix = np.zeros((*a.shape, 3))
-    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -a[..., 2], a[..., 1], -a[..., 0]
-    return matrix - np.swapaxes(matrix, -1, -2)
 
 
 def adjoint(a: Pose) -> Floats:

@@ -5,7 +5,8 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from dap3d_core.kernels.array_types import Floats
+
 #: An array of any kind.
 AnyArray = TypeVar("AnyArray", bound=NDArray[Any])
 
@@ -49,6 +50,13 @@ def euler_rates(p: Floats, w: Floats) -> Floats:
     vector = p[..., :1] * w + np.cross(w, p[..., 1:])
     rates: Floats = 0.5 * np.concatenate([scalar, vector], axis=-1)
     return rates
+
+
+def angular_velocities(p: Floats, p_dot: Floats) -> Floats:
+    """Global angular velocities (..., 3) of p (..., 4) and its rates p_dot (..., 4): 2 G p_dot."""
+    e0, e, rate = p[..., :1], p[..., 1:], p_dot[..., 1:]
+    w: Floats = 2.0 * (-e * p_dot[..., :1] + e0 * rate + np.cross(e, rate))
+    return w
 
 
 def skew(a: ArrayLike) -> Floats:

@@ -11,11 +11,10 @@ from functools import cache
 from itertools import accumulate
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import to_body, to_global
-
-Floats = NDArray[np.float64]
 
 #: Coordinates (r, p) and velocities (r_dot, omega) of a body, and both.
 COORDINATES, VELOCITIES = 7, 6

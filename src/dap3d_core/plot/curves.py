@@ -26,17 +26,10 @@ from dap3d_core.plot.style import (
     with_unit,
 )
 from dap3d_core.result import Quantity, Result, UnknownNameError, find
-from dap3d_core.result.post.smooth_parts import smooth_parts
+from dap3d_core.result.post.smooth_parts import cubic, smooth_parts
 
 #: A curve of fewer instants is drawn through about so many points.
 POINTS = 600
-
-
-def cubic(a: float, h: "float | Floats", x: Floats, x_dot: Floats) -> Floats:
-    """Hermite interpolation at a fraction ``a`` of a step h; x, x_dot (2, ...) at its ends."""
-    s, b = a * a * (3.0 - 2.0 * a), a * (1.0 - a)
-    value: Floats = (1.0 - s) * x[0] + s * x[1] + b * h * ((1.0 - a) * x_dot[0] - a * x_dot[1])
-    return value
 
 
 def _refined(t: Floats, x: Floats, x_dot: Floats) -> Floats:

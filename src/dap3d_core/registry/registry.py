@@ -112,7 +112,9 @@ class Registry:
         _check_kind(kind)
         return tuple(
             sorted(
-                w for (k, w), found in self.sources.items() if k == kind and not _all_blocked(found)
+                word
+                for (of_kind, word), found in self.sources.items()
+                if of_kind == kind and not all(source.blocked for source in found)
             )
         )
 
@@ -242,10 +244,6 @@ def load_registry(*, groups: Collection[str] | None = None) -> Registry:
 def _check_kind(kind: str) -> None:
     if kind not in GROUPS:
         raise ValueError(f"a kind is one of {', '.join(GROUPS)}, not {kind!r}")
-
-
-def _all_blocked(sources: list[Source]) -> bool:
-    return all(s.blocked for s in sources)
 
 
 def _collision(sources: list[Source]) -> str:

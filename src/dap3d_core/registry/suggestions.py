@@ -1,7 +1,7 @@
-"""The nearest right spelling of a word that is wrong."""
+"""Names in messages: the nearest right spelling of one that is wrong, the first of many."""
 
 from bisect import bisect_left
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from difflib import get_close_matches
 from functools import lru_cache
 from typing import Any, NamedTuple
@@ -34,6 +34,12 @@ def nearest(word: Any, allowed: Collection[str]) -> str:
     near = get_close_matches(wanted, forms, 1)
     near = near or sorted((f for f in forms if _abbreviates(f, wanted)), key=len)[-1:]
     return words.word_of[near[0]] if near else ""
+
+
+def some(names: Sequence[str], most: int) -> str:
+    """The first of several names, and the number of the others."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(names[:most]) + more
 
 
 @lru_cache(maxsize=4)

@@ -94,8 +94,7 @@ class RunMetadata:
         actuation: name of an actuator -> (nt,) its force as inverse dynamics finds it, N or N m,
             which takes the place of that in the scene.
         types: where the types of the scene come from (simulation/output/type_sources.py): "joint
-        rev" ->
-            ``digest``, ``distribution``, ``version``; None where it was not recorded.
+            rev" -> ``digest``, ``distribution``, ``version``; None where it was not recorded.
         known_versions: of dap3d, numpy, llvmlite, python; None for those that are installed.
     """
 

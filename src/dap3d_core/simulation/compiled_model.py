@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.registry import Registry, load_registry
@@ -34,7 +35,6 @@ from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.explain import explain
 from dap3d_core.simulation.failure.diagnosis import find_offender
 from dap3d_core.simulation.failure.narrow_forces import notes_on_laws
-from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.breakpoints import Breakpoints
 from dap3d_core.simulation.initial.conservative import is_conservative
 from dap3d_core.simulation.initial.driver_notes import notes_on_drivers
@@ -47,7 +47,6 @@ from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_o
 if TYPE_CHECKING:
     from dap3d_core.simulation.initial.start_state import StartState
 
-Floats = NDArray[np.float64]
 Announce = Callable[[str], None]
 
 #: Joints whose lines in the file a message gives.
@@ -290,9 +289,7 @@ class CompiledModel:
                 start = find_start(self.evaluator, *key, state)
             except AssemblyError as error:
                 raise self._located(error) from error
-            mistakes = undefined_directions(
-                self.scene, self.model, start.u, model_size(self.evaluator)
-            )
+            mistakes = undefined_directions(self.scene, self.model, start.u, self.model.size)
             if mistakes:
                 raise SceneError(mistakes)
             if state is not None:

@@ -1,20 +1,20 @@
 """Text on what is modelled, and on what is left out and why."""
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import STATE, VELOCITIES
+from dap3d_core.registry.suggestions import some
 from dap3d_core.scene import Instance, Scene, ValidatedScene
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.redundancy.redundancy import Redundancy
 
-Floats = NDArray[np.float64]
+#: Names that a line lists.
+MOST_NAMES = 8
 
 
 def explain(
@@ -31,9 +31,11 @@ def explain(
     lines = [f"scene {checked.scene.name or '(no name)'}"]
     own = f" and {model.state_count} of elements" if model.state_count else ""
     sizes = f"{STATE * n} states{own}, {VELOCITIES * n} accelerations"
-    lines.append(f"  bodies     {n}: {_some(model.body_names)}; {sizes}")
+    lines.append(f"  bodies     {n}: {some(model.body_names, MOST_NAMES)}; {sizes}")
     kinds = {"joints": checked.joints, "forces": checked.forces, "functions": checked.functions}
-    lines += [f"  {title:10s} {_counts(instances)}" for title, instances in kinds.items()]
+    lines += [
+        f"  {title:10s} {counts_text(types_of(instances))}" for title, instances in kinds.items()
+    ]
     if model.row_count:
         lines.append(f"  rows       {redundancy.describe()}")
         lines += [f"  reactions  {words}" for words in redundancy.describe_reactions()]
@@ -68,17 +70,14 @@ def in_joint_coordinates(evaluator: Evaluator) -> tuple[float, str]:
     )
 
 
-def _some(names: tuple[str, ...], most: int = 8) -> str:
-    return ", ".join(names[:most]) + (f" and {len(names) - most} more" if len(names) > most else "")
-
-
 def types_of(instances: Sequence[Instance]) -> dict[str, int]:
     """Keyword -> how many elements of this type there are, in the order of the file."""
     return dict(Counter(instance.type_info.type.keyword for instance in instances))
 
 
-def _counts(instances: Sequence[Instance]) -> str:
-    return ", ".join(f"{count} {word}" for word, count in types_of(instances).items()) or "none"
+def counts_text(types: Mapping[str, int]) -> str:
+    """Numbers of elements by type, as ``types_of`` has them, in words."""
+    return ", ".join(f"{count} {word}" for word, count in types.items()) or "none"
 
 
 def _left_out(checked: ValidatedScene, model: Model) -> list[str]:
@@ -93,7 +92,7 @@ def _left_out(checked: ValidatedScene, model: Model) -> list[str]:
     for word, declared in _declared(scene).items():
         unused = [name for name in declared if name not in _used(scene)]
         if unused:
-            result.append(f"{word} that nothing uses: {_some(tuple(unused))}")
+            result.append(f"{word} that nothing uses: {some(unused, MOST_NAMES)}")
     if checked.animation_count:
         result.append(f"animation points: {checked.animation_count}, not part of the analysis")
     return result

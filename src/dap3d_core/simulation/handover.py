@@ -8,17 +8,15 @@ its sign, and its steps stop short of it. Those of dop853 are placed about it
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations import PROJECT, RHS, Formulation
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.singular_poses import NOW, RATE, forget_measures
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result import INFORMATION
 from dap3d_core.simulation.run_state import RunState
-
-Floats = NDArray[np.float64]
 
 WHY_STIFF = "motions that have died away limit the steps, not the error of those that go on"
 #: A singular pose is met where it is less than this part of the run away.

@@ -3,10 +3,9 @@
 from typing import TYPE_CHECKING
 
 import attrs
-import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.initial.assemble import (
     Initial,
@@ -19,7 +18,6 @@ from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_o
 if TYPE_CHECKING:
     from dap3d_core.simulation.initial.start_state import StartState
 
-Floats = NDArray[np.float64]
 
 #: A start this far off the constraints, left uncorrected, gets a note.
 OFF_CONSTRAINTS = 1e-6

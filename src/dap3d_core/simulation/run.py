@@ -14,12 +14,7 @@ from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import INFORMATION, Result, ResultError
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.errors import RedundantError, SimulationError
-from dap3d_core.simulation.handover import (
-    cannot_cross,
-    crossing_notes,
-    hand_over,
-    stiffness_notes,
-)
+from dap3d_core.simulation.handover import cannot_cross, crossing_notes, hand_over, stiffness_notes
 from dap3d_core.simulation.initial.singular_start import SingularStart
 from dap3d_core.simulation.initial.tolerances import motion_notes, rounding_notes
 from dap3d_core.simulation.initial_state import InitialState, start_notes

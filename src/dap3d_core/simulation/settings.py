@@ -6,13 +6,13 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators import EXPLICIT, Integrator
 from dap3d_core.integrators.added import integrator_named
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene import (
     METHODS,
     MISSING,
@@ -26,8 +26,6 @@ from dap3d_core.scene.validate.settings import notes_of
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.tolerances import atol_vector, resolved_atol
-
-Floats = NDArray[np.float64]
 
 
 def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:
@@ -68,6 +66,19 @@ def compiled_for(
         words = f"the model was compiled for method {scene.method}; compile it for {method}"
         raise SimulationError(words)
     return scene
+
+
+def compiled_exactly(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    allow_code: bool,
+    announce: Callable[[str], None] | None = None,
+) -> CompiledModel:
+    """The compiled model of a scene, with a method whose accelerations fulfil the constraints."""
+    if isinstance(scene, CompiledModel):
+        if scene.evaluator.formulation.is_exact:
+            return scene
+        scene = scene.scene
+    return CompiledModel(scene, method="auto", allow_code=allow_code, announce=announce)
 
 
 def check_checkpoint(seconds: float | None, output: str | os.PathLike[str] | None) -> None:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from dap3d_core.registry.suggestions import LONGEST, nearest
+from dap3d_core.registry.suggestions import LONGEST, nearest, some
 
 MANY = [f"left_rear_suspension_{k:05d}" for k in range(50_000)]
 
@@ -38,3 +38,7 @@ def test_many_slips_among_many_words_come_to_an_end():
 
 def test_nothing_is_similar_to_a_very_long_word():
     assert nearest("a" * (LONGEST + 1), ["a" * LONGEST]) == ""
+
+
+def test_of_many_names_the_first_are_listed():
+    assert some("abc", 2) == "a, b and 1 more"

@@ -7,7 +7,7 @@ exp(S1 q1) T0 exp(S2 q2) does: universal joints. Neither is taken for granted: C
 random coordinates. All joints of a type are classified at once (docs/decisions/0038).
 """
 
-from collections.abc import Container, Iterator
+from collections.abc import Iterator
 from itertools import product
 from typing import Any
 
@@ -66,7 +66,7 @@ def classify(model: Model, u: Floats | None = None) -> ModelMotions:
     for group in model.joints:
         reasons = refused_joints(group)
         refused |= reasons
-        group = _without(group, reasons)
+        group = group.take(np.flatnonzero([k not in reasons for k in group.members.tolist()]))
         if group.count:
             i, j = two_bodies(group).T
             pose = relative(Pose(r[j], p[j]), Pose(r[i], p[i]))
@@ -100,11 +100,6 @@ def classify_group(
         group, pose = group.take(again), Pose(pose.r[again], pose.p[again])
     known = {k for motion in motions for k in motion.joints.tolist()}
     return motions, {k: reason for k, reason in refused.items() if k not in known}
-
-
-def _without(group: Group, members: Container[int]) -> Group:
-    """The joints of a group that are not among members of the model."""
-    return group.take(np.flatnonzero([k not in members for k in group.members.tolist()]))
 
 
 def _attempt(

@@ -134,16 +134,18 @@ def _redundancy_data(
 
 
 def _show(console: "Terminal", compiled: "CompiledModel", data: dict[str, Any]) -> None:
-    from dap3d_core.cli.console.console import count, scene_name, some
+    from dap3d_core.cli.console.console import count, scene_name
     from dap3d_core.cli.console.run_summary import degrees_of_freedom, show_correction
+    from dap3d_core.registry.suggestions import some
+    from dap3d_core.simulation.explain import counts_text
 
     console.title(scene_name(data["scene"]))
     names = some(compiled.model.body_names, 8)
     console.facts([
             ("bodies", f"{count(data['bodies'], 'body', 'bodies')}: {names}"),
-            ("joints", _listed(data["joint_types"])),
-            ("forces", _listed(data["force_types"])),
-            ("functions", _listed(data["function_types"])),
+            ("joints", counts_text(data["joint_types"])),
+            ("forces", counts_text(data["force_types"])),
+            ("functions", counts_text(data["function_types"])),
             ("freedoms", f"{count(data['rows'], 'row')}, rank {data['rank']}; "
                          f"{degrees_of_freedom(data['dof'])}"),
             ("violation", _violation(data["violation"], compiled) if data["rows"] else ""),
@@ -159,10 +161,6 @@ def _show(console: "Terminal", compiled: "CompiledModel", data: dict[str, Any]) 
         console.say(mistake["what"], "bold red")
     if not data["mistakes"]:
         console.say("no mistakes found", "green")
-
-
-def _listed(types: dict[str, int]) -> str:
-    return ", ".join(f"{number} {keyword}" for keyword, number in types.items()) or "none"
 
 
 def _violation(violation: dict[str, float], compiled: "CompiledModel") -> str:

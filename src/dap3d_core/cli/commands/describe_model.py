@@ -73,7 +73,8 @@ def _joints(compiled: "CompiledModel", probe: "Result") -> list[dict[str, Any]]:
 
 def show_model(console: "Terminal", data: dict[str, Any]) -> None:
     """Print the description of a model."""
-    from dap3d_core.cli.console.console import count, scene_name, some
+    from dap3d_core.cli.console.console import count, scene_name
+    from dap3d_core.registry.suggestions import some
 
     console.title(scene_name(data["name"]))
     if data["description"]:

@@ -35,9 +35,10 @@ def _show_sweep(file: str, as_json: bool) -> None:
 
 
 def _show_run(file: str, as_json: bool) -> None:
-    from dap3d_core.cli.console.console import print_json, scene_name, size, some, stdout
+    from dap3d_core.cli.console.console import print_json, scene_name, size, stdout
     from dap3d_core.cli.console.run_summary import run_data, run_pairs, show_details
     from dap3d_core.cli.framework.paths import open_result
+    from dap3d_core.registry.suggestions import some
 
     result = open_result(file)
     data, byte_count = run_data(result), Path(file).stat().st_size

@@ -249,12 +249,6 @@ def count(number: int, word: str, plural: str = "") -> str:
     return f"{number:,} {noun}" if number else f"no {plural or word + 's'}"
 
 
-def some(names: Sequence[str], most: int) -> str:
-    """The first of several names, and the number of the others."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
-
-
 def seconds(duration: float) -> str:
     """A duration for people."""
     if duration < 0.0995:

@@ -6,13 +6,7 @@ from dap3d_core.formats.export_scene.elements import SceneElements, SceneJoint
 from dap3d_core.formats.export_scene.forces import add_forces, add_gravity
 from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.formats.export_scene.shapes import geometries_of
-from dap3d_core.interface.formats.articulation import (
-    WORLD,
-    Articulation,
-    Inertial,
-    Joint,
-    Link,
-)
+from dap3d_core.interface.formats.articulation import WORLD, Articulation, Inertial, Joint, Link
 from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.scene.scene import GROUND, Scene

@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from dap3d_core.interface.formats.frames import Floats, Frame, from_quaternion
+from dap3d_core.interface.formats.frames import Frame, from_quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import GROUND, Element, Scene
 
 #: Type of a joint of a scene -> kind of a joint of a model.

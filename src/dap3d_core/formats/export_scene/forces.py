@@ -8,8 +8,9 @@ import numpy as np
 from dap3d_core.formats.export_scene.elements import SceneJoint, leave_out
 from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.interface.formats.articulation import Coupling, Joint, Limits
-from dap3d_core.interface.formats.frames import Floats, from_quaternion
+from dap3d_core.interface.formats.frames import from_quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import Element, Scene
 
 #: Stops beyond this are none, rad or m.

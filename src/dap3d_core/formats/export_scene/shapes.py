@@ -5,7 +5,8 @@ import numpy as np
 from dap3d_core.formats.export_scene.elements import leave_out
 from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.interface.formats.articulation import Geometry
-from dap3d_core.interface.formats.frames import Floats, Frame, axis_angle, from_quaternion
+from dap3d_core.interface.formats.frames import Frame, axis_angle, from_quaternion
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import Scene
 
 

@@ -10,7 +10,8 @@ from dap3d_core.formats.import_scene.couplings import add_rotor
 from dap3d_core.formats.import_scene.joints import NamedEnds, from_ground
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.interface.formats.articulation import Articulation, Joint, Limits
-from dap3d_core.interface.formats.frames import Floats, quaternion
+from dap3d_core.interface.formats.frames import quaternion
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import GROUND
 
 #: Stiffness of stops where the format says none, N m/rad and N/m.

@@ -5,10 +5,11 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
 from dap3d_core.interface.formats.articulation import WORLD, Joint
 from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.interface.formats.remarks import FormatError
+from dap3d_core.kernels.array_types import Floats
 
 
 def add_joint(builder: SceneBuilder, joint: Joint) -> None:
@@ -57,12 +58,7 @@ class JointEnds:
         at = frame.r + frame.A @ np.asarray(offset)
         if not at.any():
             return f"{body}.O"
-        numbers = tuple(float(x) + 0.0 for x in at)
-        made, key = self.builder.names.scene_names, f"{body}: {numbers}"
-        if ("points", key) not in made:
-            name = self.builder.names.free("points", f"{self.name}_{end}{suffix}")
-            made["points", key] = self.scene.add_point(name, body, numbers)
-        return made["points", key]
+        return self._named("points", body, at, f"{end}{suffix}")
 
     def vector(self, end: str, direction: Any, suffix: str = "") -> str:
         """The name of a vector in the joint's frame, fixed in the child ("i") or the parent."""
@@ -71,12 +67,17 @@ class JointEnds:
         for k, letter in enumerate("xyz"):
             if np.array_equal(components, np.eye(3)[k]):
                 return f"{body}.{letter}"
-        numbers = tuple(float(x) + 0.0 for x in components)
+        return self._named("vectors", body, components, f"{end}{suffix}")
+
+    def _named(self, table: str, body: str, vector: Floats, suffix: str) -> str:
+        """The name of a point or vector of a body, which is added where there is none."""
+        numbers = plain(vector)
         made, key = self.builder.names.scene_names, f"{body}: {numbers}"
-        if ("vectors", key) not in made:
-            name = self.builder.names.free("vectors", f"{self.name}_{end}{suffix}")
-            made["vectors", key] = self.scene.add_vector(name, body, numbers)
-        return made["vectors", key]
+        if (table, key) not in made:
+            name = self.builder.names.free(table, f"{self.name}_{suffix}")
+            add = self.scene.add_point if table == "points" else self.scene.add_vector
+            made[table, key] = add(name, body, numbers)
+        return made[table, key]
 
     def _end(self, end: str) -> tuple[str, Frame]:
         return (self.child, self.on_child) if end == "i" else (self.parent, self.on_parent)
@@ -96,10 +97,14 @@ def _add(ends: JointEnds, keyword: str, **fields: Any) -> None:
     ends.scene.add_joint(keyword, ends.name, **fields)
 
 
-def _revolute(ends: JointEnds) -> None:
+def _add_about_axis(ends: JointEnds, keyword: str, **more: float) -> None:
     axis = ends.joint.axes[0]
-    _add(ends, "rev", P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
-         a_j=ends.vector("j", axis))  # fmt: skip
+    _add(ends, keyword, P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
+         a_j=ends.vector("j", axis), **more)  # fmt: skip
+
+
+def _revolute(ends: JointEnds) -> None:
+    _add_about_axis(ends, "rev")
 
 
 def _prismatic(ends: JointEnds) -> None:
@@ -139,12 +144,8 @@ def _universal(ends: JointEnds) -> None:
 
 
 def _cylindrical(ends: JointEnds) -> None:
-    axis = ends.joint.axes[0]
-    _add(ends, "cyl", P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
-         a_j=ends.vector("j", axis))  # fmt: skip
+    _add_about_axis(ends, "cyl")
 
 
 def _screw(ends: JointEnds) -> None:
-    axis = ends.joint.axes[0]
-    _add(ends, "screw", P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
-         a_j=ends.vector("j", axis), pitch=ends.joint.pitch)  # fmt: skip
+    _add_about_axis(ends, "screw", pitch=ends.joint.pitch)

@@ -1,6 +1,7 @@
 """A scene in the making, of an articulated model."""
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
 
@@ -46,3 +47,8 @@ class SceneBuilder:
     def moves_alone(self, joint: Joint) -> bool:
         """True if a joint's two links are one body, so that it has no effect."""
         return self.member[joint.parent][0] == self.member[joint.child][0]
+
+
+def plain(vector: Any) -> tuple[float, ...]:
+    """The components of a vector as a scene has them: Python's floats, zero without a sign."""
+    return tuple(float(x) + 0.0 for x in vector)

@@ -11,12 +11,13 @@ from dap3d_core.formats.import_scene.joint_forces import add_inputs, add_joint_f
 from dap3d_core.formats.import_scene.joints import add_joint
 from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.rigid_groups import RigidGroup, rigid_groups
-from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
 from dap3d_core.formats.import_scene.shapes import MeshFiles, add_shapes
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Link
-from dap3d_core.interface.formats.frames import Floats, quaternion
+from dap3d_core.interface.formats.frames import quaternion
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import GROUND, Scene
 
 #: Steps of a settled result: a model does not say how long to simulate.
@@ -93,8 +94,8 @@ def scene_of(
     add_couplings(builder, model)
     add_inputs(builder, model)
     for group in groups.values():
-        for link, frame in group.links:
-            add_shapes(builder, link, frame, MeshFiles() if meshes is None else meshes)
+        for link, _ in group.links:
+            add_shapes(builder, link, MeshFiles() if meshes is None else meshes)
     return scene
 
 
@@ -116,14 +117,14 @@ def _add_body(builder: SceneBuilder, group: RigidGroup, placed: Placed) -> None:
     fields: dict[str, Any] = {
         "mass": inertial.mass,
         "Jp": inertia_numbers(inertial.inertia),
-        "r": _plain(placed.frame.r + arm),
+        "r": plain(placed.frame.r + arm),
         "p": quaternion(placed.frame.A),
     }
     velocity = placed.v + np.cross(placed.w, arm)
     if velocity.any():
-        fields["r_dot"] = _plain(velocity)
+        fields["r_dot"] = plain(velocity)
     if placed.w.any():
-        fields["w"] = _plain(placed.w)
+        fields["w"] = plain(placed.w)
     builder.scene.add_body(name, **fields)
 
 
@@ -131,8 +132,8 @@ def inertia_numbers(inertia: Floats) -> Any:
     """Three numbers for a diagonal inertia matrix, else three rows; exactly symmetric."""
     symmetric = 0.5 * (inertia + inertia.T)
     if not (symmetric - np.diag(np.diag(symmetric))).any():
-        return _plain(np.diag(symmetric))
-    return tuple(_plain(row) for row in symmetric)
+        return plain(np.diag(symmetric))
+    return tuple(plain(row) for row in symmetric)
 
 
 def _add_gravity(scene: Scene, gravity: Sequence[float]) -> None:
@@ -168,7 +169,3 @@ def split_planar(model: Articulation, remarks: Remarks) -> Articulation:
             )  # fmt: skip
         joints[between[0]].in_parent, joints[name].in_child = joint.in_parent, joint.in_child
     return attrs.evolve(model, links=links, joints=joints)
-
-
-def _plain(vector: Any) -> tuple[float, ...]:
-    return tuple(float(x) + 0.0 for x in vector)

@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.formats.import_scene.names import usable
-from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
 from dap3d_core.interface.formats.articulation import Geometry, Link
 from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.scene.validate.shapes import MESHES
@@ -42,7 +42,7 @@ def _plain(stem: str) -> str:
     return "".join(c if c.isalnum() or c in "-_" else "_" for c in stem)
 
 
-def add_shapes(builder: SceneBuilder, link: Link, frame: Frame, meshes: MeshFiles) -> None:
+def add_shapes(builder: SceneBuilder, link: Link, meshes: MeshFiles) -> None:
     """Add the shapes of a link: those that are seen, or of contacts where it has no others."""
     seen = [shape for shape in link.geometries if not shape.collision]
     for shape in seen or link.geometries:
@@ -56,7 +56,7 @@ def _shapes(
     builder: SceneBuilder, shape: Geometry, frame: Frame, meshes: MeshFiles
 ) -> list[tuple[str, dict[str, Any]]]:
     """Keyword and fields of the shapes that draw a geometry."""
-    at, z = _numbers(frame.r), frame.A[:, 2]
+    at, z = plain(frame.r), frame.A[:, 2]
     if shape.size and min(shape.size) <= 0.0:
         builder.remarks.leave_out(shape.place, "a shape of size 0 is not drawn")
         return []
@@ -66,9 +66,9 @@ def _shapes(
         return [("sphere", {"radius": shape.size[0], "at": at})]
     if shape.kind in ("cylinder", "capsule"):
         radius, length = shape.size
-        tube = {"radius": radius, "length": length, "at": at, "axis": _numbers(z)}
+        tube = {"radius": radius, "length": length, "at": at, "axis": plain(z)}
         caps = [
-            ("sphere", {"radius": radius, "at": _numbers(frame.r + side * z * length / 2.0)})
+            ("sphere", {"radius": radius, "at": plain(frame.r + side * z * length / 2.0)})
             for side in (1.0, -1.0)
         ]
         return [("cylinder", tube), *(caps if shape.kind == "capsule" else [])]
@@ -93,9 +93,5 @@ def _mesh(
         return []
     name = meshes.name(shape.mesh, (1.0, 1.0, 1.0))
     factor = shape.scale[0]
-    fields = {"file": name, "at": _numbers(frame.r), "p": quaternion(frame.A)}
+    fields = {"file": name, "at": plain(frame.r), "p": quaternion(frame.A)}
     return [("mesh", fields | ({} if factor == 1.0 else {"scale": factor}))]
-
-
-def _numbers(vector: Any) -> tuple[float, ...]:
-    return tuple(float(x) + 0.0 for x in vector)

@@ -7,14 +7,16 @@ from pathlib import Path
 
 import attrs
 
-from dap3d_core.formats.import_scene.mesh_file import read_mesh
-from dap3d_core.interface.formats.frames import Floats, Integers
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Place, Remarks
 from dap3d_core.interface.formats.xml_tree import XmlElement, parse_xml
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.registry.regular_files import read_regular
+from dap3d_core.scene.files.read_mesh import read_mesh
 
 #: Larger files are not read, bytes.
 LARGEST = 64 * 2**20
+#: Meshes of more triangles are refused.
+MOST_TRIANGLES = 3_000_000
 #: Number of included files beyond which a model is refused, and their depth.
 MOST_INCLUDES, DEEPEST_INCLUDE = 500, 30
 
@@ -105,7 +107,12 @@ class SourceFiles:
             FormatError: it cannot be read, is too large, or trimesh is not installed.
         """
         if path not in self._meshes:
-            self._meshes[path] = read_mesh(path, place)
+            mesh = read_mesh(path, path.name)
+            if isinstance(mesh, str):
+                raise FormatError(mesh, place)
+            if len(mesh[1]) > MOST_TRIANGLES:
+                raise FormatError(f"{path.name} has more than {MOST_TRIANGLES} triangles", place)
+            self._meshes[path] = mesh
         return self._meshes[path]
 
     def _inside(self, uri: str, place: Place, base: Path) -> Path:

@@ -6,14 +6,9 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.formats.articulation import KINDS, WORLD, Articulation, Joint
-from dap3d_core.interface.formats.frames import (
-    IDENTITY,
-    Floats,
-    Frame,
-    axis_angle,
-    from_quaternion,
-)
+from dap3d_core.interface.formats.frames import IDENTITY, Frame, axis_angle, from_quaternion
 from dap3d_core.interface.formats.remarks import FormatError
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.suggestions import nearest
 
 ZERO = np.zeros(3)

@@ -8,16 +8,14 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.formulations.common.sparse_entries import SparseEntries, components
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_derivatives import differentiate_loop
 from dap3d_core.interface.codegen.loop_source import computes_rate
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model import Group
 from dap3d_core.model.element_states import first_states
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Kinds of loops that may see states.
 KINDS = ("rate", "wrench", "friction", "acceleration", "position")
@@ -85,29 +83,14 @@ class _Assembly:
         self.v, self.a = (np.vstack([np.zeros((1, 6)), x.reshape(-1, 6)]) for x in (v, a))
         self.rates = np.zeros(s)
         by_rows = ("position_by_states", "velocity_by_states", "acceleration_by_states")
-        self.shapes = {"rate_by_displacement": (s, six), "rate_by_velocity": (s, six),
-                       "rate_by_states": (s, s), "force_by_states": (six, s),
-                       **dict.fromkeys(by_rows, (rows, s))}  # fmt: skip
-        self.parts: dict[str, list[tuple[Integers, Integers, Floats]]] = {}
+        shapes = {"rate_by_displacement": (s, six), "rate_by_velocity": (s, six),
+                  "rate_by_states": (s, s), "force_by_states": (six, s),
+                  **dict.fromkeys(by_rows, (rows, s))}  # fmt: skip
+        self.entries = {name: SparseEntries(*shape) for name, shape in shapes.items()}
 
     def matrices(self) -> dict[str, Any]:
         """All matrices by name."""
-        from scipy.sparse import csr_array
-
-        none = np.zeros(0, dtype=np.int64)
-        found = {}
-        for name, shape in self.shapes.items():
-            first = (none, none, np.zeros(0))
-            row, column, value = zip(first, *self.parts.get(name, []), strict=True)
-            places = np.concatenate(row), np.concatenate(column)
-            found[name] = csr_array((np.concatenate(value), places), shape=shape)
-        return found
-
-    def entries(self, name: str, row: Integers, column: Integers, value: Floats) -> None:
-        """Add entries; negative rows or columns are left out. Arguments broadcast."""
-        row, column, value = (x.ravel() for x in np.broadcast_arrays(row, column, value))
-        chosen = (row >= 0) & (column >= 0) & (value != 0.0)
-        self.parts.setdefault(name, []).append((row[chosen], column[chosen], value[chosen]))
+        return {name: entries.matrix() for name, entries in self.entries.items()}
 
     def add(
         self,
@@ -124,17 +107,19 @@ class _Assembly:
         if kind == "rate":
             value, slope = outputs["rate"]
             self.rates[own] = value
-            self.entries("rate_by_states", own[:, :, None], own[:, None, :], slope[..., -width:])
+            self.entries["rate_by_states"].add(
+                own[:, :, None], own[:, None, :], slope[..., -width:]
+            )
             for place in range(bodies.shape[1]):
-                column = _components(bodies[:, place])[:, None]
+                column = components(bodies[:, place])[:, None]
                 part = slope[..., 12 * place : 12 * place + 12]
                 for name, of_level in (("rate_by_displacement", part[..., :6]),
                                        ("rate_by_velocity", part[..., 6:])):  # fmt: skip
-                    self.entries(name, own[:, :, None], column, of_level)
+                    self.entries[name].add(own[:, :, None], column, of_level)
         elif kind in ("wrench", "friction"):
             slope = outputs[kind][1][..., -width:]
-            row = _components(bodies[:, :slots])
-            self.entries("force_by_states", row[..., None], own[:, None, None], slope)
+            row = components(bodies[:, :slots])
+            self.entries["force_by_states"].add(row[..., None], own[:, None, None], slope)
         else:
             self.add_rows(kind, group, bodies[:, :slots], outputs, own)
 
@@ -152,19 +137,13 @@ class _Assembly:
         row = self.start[group.members][:, None] + np.arange(rows)
         where = row[..., None], own[:, None]
         if kind == "position":
-            self.entries("position_by_states", *where, outputs["C"][1][..., -width:])
+            self.entries["position_by_states"].add(*where, outputs["C"][1][..., -width:])
             return
         J = outputs["J"][1][..., -width:]
         reaction = np.einsum("msrcd,mr->mscd", J, self.multipliers[row])
-        place = _components(bodies)[..., None]
-        self.entries("force_by_states", place, own[:, None, None], reaction)
+        place = components(bodies)[..., None]
+        self.entries["force_by_states"].add(place, own[:, None, None], reaction)
         for name, motion, side in (("velocity_by_states", self.v, "nu"),
                                    ("acceleration_by_states", self.a, "gamma")):  # fmt: skip
             moved = np.einsum("msrcd,msc->mrd", J, motion[bodies])
-            self.entries(name, *where, moved - outputs[side][1][..., -width:])
-
-
-def _components(bodies: Integers) -> Integers:
-    """(..., 6) components of bodies (...); -1 for ground."""
-    first = 6 * (bodies[..., None] - 1) + np.arange(6)
-    return np.where(bodies[..., None] > 0, first, -1)
+            self.entries[name].add(*where, moved - outputs[side][1][..., -width:])

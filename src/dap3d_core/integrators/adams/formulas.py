@@ -23,7 +23,8 @@ from dap3d_core.integrators.stepping.integration_state import (
     IntegrationState,
     Y,
 )
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Floats, Scalar
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.array_struct import MATRIX, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
 
 HIGHEST = 12

@@ -15,7 +15,7 @@ from dap3d_core.integrators.adams.formulas import (
 from dap3d_core.integrators.adams.step import advance_adams
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.restore import restored
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 
 
 class AdamsIntegration(Integration):

@@ -57,7 +57,7 @@ from dap3d_core.integrators.stepping.step_control import (
     step_floor,
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_beyond, scaled_largest
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: The step is doubled, kept, or multiplied by a factor in between these.

@@ -5,9 +5,7 @@
 
 import math
 
-from dap3d_core.integrators.radau.state import (
-    RadauState,
-)
+from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, Y
 from dap3d_core.integrators.stepping.step_control import EPSILON, LARGEST
 from dap3d_core.kernels.runtime.cache import compiled

@@ -24,13 +24,7 @@ from dap3d_core.formulations.common.constraints import (
 )
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
-from dap3d_core.integrators.radau.state import (
-    OLD,
-    OLD_SLOPE,
-    SLOPE,
-    TRIAL_SLOPE,
-    RadauState,
-)
+from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, RadauState
 from dap3d_core.integrators.stepping.integration_state import TRIAL, Y
 from dap3d_core.kernels.runtime.cache import compiled
 

@@ -5,20 +5,30 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from dap3d_core.assembly.arrays import System
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.formulations.stabilized_index2.jacobian import BODY, FIRST_ROW
+from dap3d_core.formulations.stabilized_index2.jacobian import BODY, FIRST_ROW, Tangent
 from dap3d_core.formulations.stabilized_index2.jacobian_tables import coupled_bodies, make_tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau import state as at
-from dap3d_core.integrators.radau.dispatch import radau_parts
+from dap3d_core.integrators.radau.dense_output import find_slope
+from dap3d_core.integrators.radau.newton import (
+    estimate_error,
+    factorise_both,
+    find_stages,
+    find_tangent,
+)
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.step import advance
 from dap3d_core.integrators.radau.tableau import ORDER, radau_method
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, restored
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
+from dap3d_core.kernels.array_types import Integers
+from dap3d_core.kernels.runtime.cache import table_of
+from dap3d_core.kernels.runtime.function_lists import LOOP_LIST, number_signature
 from dap3d_core.linear.lu.plan import LuPlan, StateNode, make_lu_plan
 from dap3d_core.linear.ordering.ordering import JointNode
 from dap3d_core.model import Model
@@ -30,7 +40,6 @@ from dap3d_core.model import Model
 REGULAR = 1e-6
 
 
-Integers = NDArray[np.int64]
 #: Arrays of states of elements, which a scene without any has not in its checkpoints.
 OF_STATES = ("tangent.states.", "matrix.state_")
 
@@ -207,7 +216,17 @@ class RadauIntegration(Integration):
 
     @cached_property
     def _parts(self) -> Any:
-        return radau_parts()
+        """The parts of a step as first-class functions, each compiled separately.
+
+        A compiled function that calls another one takes in its code, and optimises it again; calls
+        by pointer keep the parts apart: part(t, h, work, system, loops, tangent, matrix).
+        """
+        signature = number_signature(
+            RadauState.type_of(), System.type_of(), LOOP_LIST, Tangent.type_of(),
+            StageMatrix.type_of(),
+        )  # fmt: skip
+        parts = (find_tangent, factorise_both, find_stages, estimate_error, find_slope)
+        return table_of(signature, parts)
 
     def _advance(self, budget: int) -> None:
         evaluator = self.evaluator

@@ -39,15 +39,8 @@ from dap3d_core.integrators.radau.convergence import (
     is_stalled,
     newton_limit,
 )
-from dap3d_core.integrators.radau.state import (
-    RadauState,
-)
-from dap3d_core.integrators.stepping.integration_state import (
-    ABSOLUTE,
-    SCRATCH,
-    TRIAL,
-    Y,
-)
+from dap3d_core.integrators.radau.state import RadauState
+from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, SCRATCH, TRIAL, Y
 from dap3d_core.integrators.stepping.vector_ops import scaled_largest
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.lu.factor import factor_lu, solve_lu

@@ -6,19 +6,9 @@ from typing import Any, ClassVar
 import attrs
 
 from dap3d_core.integrators.radau.tableau import RadauMethod
-from dap3d_core.integrators.stepping.integration_state import (
-    MOST_COUNTED,
-    STATES,
-    IntegrationState,
-)
-from dap3d_core.kernels.runtime.array_struct import (
-    COMPLEX_VECTOR,
-    MATRIX,
-    TENSOR,
-    Floats,
-    Integers,
-    Scalar,
-)
+from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, STATES, IntegrationState
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.runtime.array_struct import COMPLEX_VECTOR, MATRIX, TENSOR, Scalar
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 
 # Rows of ``state`` behind those of stepping/integration_state.py: state before the last step, dy/dt

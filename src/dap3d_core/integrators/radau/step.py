@@ -18,13 +18,7 @@ from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatri
 from dap3d_core.integrators.radau.convergence import newton_limit
 from dap3d_core.integrators.radau.dense_output import prepare_dense
 from dap3d_core.integrators.radau.newton import MOST, SAME_STEP, predict
-from dap3d_core.integrators.radau.state import (
-    OLD,
-    OLD_SLOPE,
-    SLOPE,
-    TRIAL_SLOPE,
-    RadauState,
-)
+from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, RadauState
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     is_sample_across,

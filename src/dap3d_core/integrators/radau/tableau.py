@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays, Floats
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
 
 STAGES = 3
 #: Order of the method, and of its error estimate plus one.

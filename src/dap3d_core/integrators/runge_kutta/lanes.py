@@ -26,8 +26,9 @@ from dap3d_core.integrators.stepping.output import dense_state, may_step
 from dap3d_core.integrators.stepping.rounding import update_rounding
 from dap3d_core.integrators.stepping.step_control import end_of_step, first_step
 from dap3d_core.integrators.stepping.vector_ops import combine
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays, Floats, Integers
+from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: What a lane does: nothing; it takes a step; the rates of its trial state are known; rates that it

@@ -5,7 +5,8 @@ from typing import Any, ClassVar
 import attrs
 
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
-from dap3d_core.kernels.runtime.array_struct import MATRIX, Floats
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.array_struct import MATRIX
 
 
 @attrs.define(eq=False, kw_only=True, slots=False)

@@ -46,11 +46,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Function,
     Y,
 )
-from dap3d_core.integrators.stepping.output import (
-    dense_state,
-    may_step,
-    project_state,
-)
+from dap3d_core.integrators.stepping.output import dense_state, may_step, project_state
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.singular_poses import (
     is_approaching,
@@ -81,7 +77,7 @@ from dap3d_core.integrators.stepping.step_control import (
     step_reduction,
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, combine, copy, scaled_largest
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Near a singular state nothing is known better than to this part of the largest component.

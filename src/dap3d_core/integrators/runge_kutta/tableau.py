@@ -8,7 +8,7 @@ from attrs import field, frozen
 from numpy.typing import ArrayLike
 
 from dap3d_core.integrators.stepping.vector_ops import GROUP, GROUPS, TERMS
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 
 
 def _read_only(rows: ArrayLike) -> Floats:

@@ -57,7 +57,7 @@ from dap3d_core.integrators.stepping.switch_values import (
     time_span,
     usual_step,
 )
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: A crossing this part of a usual step away is reached by an Euler step: its error is of the order

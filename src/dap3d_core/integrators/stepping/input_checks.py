@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dap3d_core.integrators.stepping.step_control import FLOOR
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 
 
 def check_state_and_times(y: Floats, times: Floats) -> None:

@@ -18,7 +18,7 @@ from dap3d_core.integrators.stepping.integration_state import Function, Integrat
 from dap3d_core.integrators.stepping.output import FAILED
 from dap3d_core.integrators.stepping.restore import Restorable
 from dap3d_core.integrators.stepping.rounding import tolerance_of
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
 

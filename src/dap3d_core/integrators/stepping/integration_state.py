@@ -7,14 +7,9 @@ from typing import Any, ClassVar
 
 import attrs
 
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
-from dap3d_core.kernels.runtime.array_struct import (
-    MATRIX,
-    Arrays,
-    Floats,
-    Integers,
-    Scalar,
-)
+from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays, Scalar
 
 #: ``f(t, y, out, system, loops)``: rhs, project, report, accepted or watch (runge_kutta/step.py).
 Function = Callable[..., None]

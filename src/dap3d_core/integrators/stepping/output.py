@@ -18,7 +18,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, interpolate
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: What project says in out[1]: it failed; the state is good, but too close to a singular one.

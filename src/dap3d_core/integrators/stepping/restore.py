@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.integrators.stepping import integration_state as at
-from dap3d_core.kernels.runtime.array_struct import Floats, Integers
+from dap3d_core.kernels.array_types import Floats, Integers
 
 
 class Restorable:

@@ -25,7 +25,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Function,
     Y,
 )
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: Least scale of an error: at atol = 0 a component that is exactly zero is not divided by zero.

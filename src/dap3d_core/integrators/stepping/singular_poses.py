@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.integrators.stepping.integration_state import MEASURES
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.ldlt.factor import SINGULAR_NODE_RATIO
 

@@ -10,15 +10,10 @@ their codes DOPRI5 and DOP853.
 import math
 from typing import Any
 
-from dap3d_core.integrators.stepping.integration_state import (
-    SCRATCH,
-    TRIAL,
-    Function,
-    Y,
-)
+from dap3d_core.integrators.stepping.integration_state import SCRATCH, TRIAL, Function, Y
 from dap3d_core.integrators.stepping.output import NEAR_SINGULAR
 from dap3d_core.integrators.stepping.vector_ops import combine, scaled_beyond, scaled_largest
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: A step is never shorter than this part of the time or of the whole span, sixteen roundings.

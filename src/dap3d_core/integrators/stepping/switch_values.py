@@ -22,7 +22,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     IntegrationState,
     Y,
 )
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Part of a usual step over which rates are found by differences, and the least part of the time.

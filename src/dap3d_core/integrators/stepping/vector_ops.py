@@ -5,7 +5,7 @@ and writes its result a few times only; the terms come from ``tableau.combinatio
 """
 
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE
-from dap3d_core.kernels.runtime.array_struct import Floats
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Terms of a linear combination of stages that are added in one pass over the components.

@@ -12,19 +12,16 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.interface.codegen.reactions import body_columns, rows_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.dual_numbers import Dual, DualFunctions
 from dap3d_core.kernels.runtime import generated_modules
 from dap3d_core.kernels.runtime.loop_modules import Loop, source_of
 from dap3d_core.kernels.runtime.loop_support import A, P, R, V, W
-
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Directions of a body: r, rotation vector, r_dot, omega.
 DIRECTIONS = 12
@@ -262,26 +259,20 @@ def _results(
 ) -> dict[str, tuple[Floats, Floats]]:
     """What a loop wrote, by kernel; size: (m, d)."""
     layout, rows = type_info.layout, type_info.row_count
-    slots, row = len(layout.slots), layout.integers
+    slots, row = len(layout.slots), layout.integers  # the column of the first row's index
     if what == "acceleration":
-        return _of_joint(outputs, slots, rows, row, size)
+        J, J_slope = _gathered(outputs[0], list(range(row + 1, row + 1 + slots)), 6 * rows, size)
+        shape = (size[0], slots, rows, 6)
+        return {
+            "J": (J.reshape(shape), J_slope.reshape(*shape, size[1])),
+            "gamma": _of_one(outputs[1], row, rows, size),
+            "nu": _of_one(outputs[2], row, rows, size),
+        }
     if what == "position":
         return {"C": _of_one(outputs[0], row, rows, size)}
     if what == "rate":
         return {what: _of_one(outputs[3], row - 1, layout.state_width, size)}
     return {what: _gathered(outputs[0], list(range(slots)), 6, size)}
-
-
-def _of_joint(
-    outputs: list[_Outputs], slots: int, rows: int, row: int, size: tuple[int, int]
-) -> dict[str, tuple[Floats, Floats]]:
-    """What the loop of a joint wrote: J, gamma, nu; row: the column of the first row's index."""
-    J, J_slope = _gathered(outputs[0], list(range(row + 1, row + 1 + slots)), 6 * rows, size)
-    shape = (size[0], slots, rows, 6)
-    results = {"J": (J.reshape(shape), J_slope.reshape(*shape, size[1]))}
-    for name, output in (("gamma", outputs[1]), ("nu", outputs[2])):
-        results[name] = _of_one(output, row, rows, size)
-    return results
 
 
 def _of_one(output: _Outputs, column: int, width: int, size: tuple[int, int]) -> Any:

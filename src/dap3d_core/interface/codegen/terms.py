@@ -9,10 +9,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.codegen.kernel_arguments import (
-    SEVERAL,
-    parameters,
-)
+from dap3d_core.interface.codegen.kernel_arguments import SEVERAL, parameters
 from dap3d_core.interface.codegen.specialise import bound_kernel, names_behind
 from dap3d_core.interface.codegen.type_info import TypeInfo
 

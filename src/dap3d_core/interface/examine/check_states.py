@@ -37,7 +37,10 @@ def check_states(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     for name, length in lengths.items():
         if not (isinstance(name, str) and name.isidentifier() and not iskeyword(name)):
             raise PluginError(f"{who}: {name!r} in states is no name that a kernel can take")
-        _check_length(f"{who}: states[{name!r}]", length)
+        if not isinstance(length, int) or isinstance(length, bool) or length < 1:
+            raise PluginError(
+                f"{who}: states[{name!r}] is its length, a whole number from 1 on, not {length!r}"
+            )
     if not is_abstract and not has_rate:
         names = ", ".join(lengths)
         raise PluginError(f"{who} declares the states {names}, but no rate, which returns theirs")
@@ -52,11 +55,6 @@ def check_states(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
                 f"{who}.{name}{INITIAL} is the initial value of {name}, of {length} numbers; "
                 f"it is {kind}: declare it by {wanted}, or leave it out"
             )
-
-
-def _check_length(where: str, length: Any) -> None:
-    if not isinstance(length, int) or isinstance(length, bool) or length < 1:
-        raise PluginError(f"{where} is its length, a whole number from 1 on, not {length!r}")
 
 
 def check_state_names(

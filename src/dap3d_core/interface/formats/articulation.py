@@ -9,8 +9,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.interface.formats.frames import IDENTITY, Floats, Frame
+from dap3d_core.interface.formats.frames import IDENTITY, Frame
 from dap3d_core.interface.formats.remarks import NOWHERE, Place
+from dap3d_core.kernels.array_types import Floats
 
 #: The name of what does not move, as parent or child of a joint.
 WORLD = "world"

@@ -8,9 +8,9 @@ from typing import ClassVar, Protocol
 import pluggy
 
 from dap3d_core.interface.formats.articulation import Articulation
-from dap3d_core.interface.formats.frames import Floats, Integers
 from dap3d_core.interface.formats.remarks import Place, Remarks
 from dap3d_core.interface.formats.xml_tree import XmlElement
+from dap3d_core.kernels.array_types import Floats, Integers
 
 hookspec = pluggy.HookspecMarker("dap3d")
 hookimpl = pluggy.HookimplMarker("dap3d")

@@ -7,8 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-Floats = np.ndarray[Any, np.dtype[np.float64]]
-Integers = np.ndarray[Any, np.dtype[np.int64]]
+from dap3d_core.kernels.array_types import Floats
 
 
 def _vector(value: Any) -> Floats:

@@ -6,7 +6,8 @@ from math import pi
 import numpy as np
 
 from dap3d_core.interface.formats.articulation import Inertial
-from dap3d_core.interface.formats.frames import Floats, Frame, Integers
+from dap3d_core.interface.formats.frames import Frame
+from dap3d_core.kernels.array_types import Floats, Integers
 
 
 def inertia_of_solid(kind: str, size: Sequence[float]) -> tuple[float, Floats]:

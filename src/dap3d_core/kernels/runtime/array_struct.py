@@ -17,7 +17,6 @@ from typing import Any, ClassVar, Generic, TypeVar, overload
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.kernels.compiler.intrinsics import intrinsic
 from dap3d_core.kernels.compiler.types import COMPLEX, DTYPES, FLOAT, INT, Array, Struct
@@ -26,8 +25,6 @@ from dap3d_core.kernels.compiler.units import address_of
 VECTOR, MATRIX, TENSOR = Array(FLOAT, 1), Array(FLOAT, 2), Array(FLOAT, 3)
 INTEGERS, INTEGER_MATRIX = Array(INT, 1), Array(INT, 2)
 COMPLEX_VECTOR = Array(COMPLEX, 1)
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Number = TypeVar("Number", float, int)
 
 

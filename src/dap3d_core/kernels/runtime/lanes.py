@@ -12,12 +12,13 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.lanes import widen
 from dap3d_core.kernels.compiler.types import FLOAT, Signature, Struct
 from dap3d_core.kernels.compiler.units import Entry, Unit, address_of
-from dap3d_core.kernels.runtime.array_struct import Arrays, Floats
+from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import cache_folder, names_of
 from dap3d_core.kernels.runtime.source_digest import origin
 

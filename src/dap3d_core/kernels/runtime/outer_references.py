@@ -30,7 +30,7 @@ def refuse_outer_references(*kernels: Callable[..., Any]) -> None:
     for function in reached(*kernels)[0]:
         if (function.__module__ or "").partition(".")[0] == "dap3d_core":
             continue
-        for code in _codes(function.__code__):
+        for code in codes_in(function.__code__):
             line = code.co_firstlineno
             for step in dis.get_instructions(code):
                 line = step.positions.lineno or line if step.positions else line
@@ -41,11 +41,12 @@ def refuse_outer_references(*kernels: Callable[..., Any]) -> None:
                     )
 
 
-def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
+def codes_in(code: types.CodeType) -> Iterator[types.CodeType]:
+    """A code object and those of the functions within it."""
     yield code
     for inner in code.co_consts:
         if isinstance(inner, types.CodeType):
-            yield from _codes(inner)
+            yield from codes_in(inner)
 
 
 def _reason(function: Any, step: dis.Instruction) -> str:

@@ -9,12 +9,9 @@ factored they are those of Cholesky, with inverse diagonal: products then need n
 # mypy: disable-error-code="no-any-return"
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.ldlt.plan import Integers
-
-Floats = NDArray[np.float64]
 
 
 @compiled

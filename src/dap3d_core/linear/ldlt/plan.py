@@ -10,13 +10,11 @@ from collections.abc import Sequence
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Integers
 from dap3d_core.linear.ldlt.factor_layout import Contents, FactorLayout, lay_matrix, list_updates
 from dap3d_core.linear.ordering.elimination_order import order_nodes
 from dap3d_core.linear.ordering.ordering import Ordering
-
-Integers = NDArray[np.int64]
 
 
 @attrs.frozen(eq=False)

@@ -6,10 +6,10 @@ D^ = [D_r / sqrt(m), D_w B] and a force (f, n) becomes (f / sqrt(m), B^T n). Eli
 leaves -D^ D^^T between its joints, which linear/ldlt/factor.py factors.
 """
 
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.linear.ldlt.factor import Floats, solve
-from dap3d_core.linear.ldlt.plan import Integers
+from dap3d_core.linear.ldlt.factor import solve
 
 
 @compiled

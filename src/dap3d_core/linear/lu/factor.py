@@ -10,8 +10,8 @@ empty, so factors that are zero are passed over.
 
 from typing import Any
 
+from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.ldlt.plan import Integers
 
 
 @compiled

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import attrs
 import numpy as np
 
-from dap3d_core.linear.ldlt.plan import Integers
+from dap3d_core.kernels.array_types import Integers
 from dap3d_core.linear.ordering.elimination_order import _eliminate, _waits
 from dap3d_core.linear.ordering.ordering import JointNode
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Integers = NDArray[np.int64]
+from dap3d_core.kernels.array_types import Integers
 
 #: Parts of so many nodes are not cut: minimum degree orders them as well.
 LEAF = 120

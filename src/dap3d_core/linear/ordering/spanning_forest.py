@@ -13,9 +13,9 @@ from heapq import heappop, heappush
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
-Integers = NDArray[np.int64]
+from dap3d_core.kernels.array_types import Integers
+from dap3d_core.registry.suggestions import some
 
 #: Multiplications to carry one row over one body.
 CARRY = 24
@@ -42,9 +42,7 @@ class Cut:
 
     def words(self, names: Sequence[str]) -> str:
         """The reason why its rows are kept, by the names of the model's joints."""
-        named = ", ".join(names[k] for k in self.loop[:MOST_NAMES])
-        more = f" and {len(self.loop) - MOST_NAMES} more" if len(self.loop) > MOST_NAMES else ""
-        return f"it closes a loop with {named}{more}"
+        return f"it closes a loop with {some([names[k] for k in self.loop], MOST_NAMES)}"
 
 
 @attrs.frozen(eq=False)

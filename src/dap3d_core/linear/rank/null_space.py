@@ -18,9 +18,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.ldlt.factor import Floats, assemble, factor, solve
-from dap3d_core.linear.ldlt.plan import Integers, Plan
+from dap3d_core.linear.ldlt.factor import assemble, factor, solve
+from dap3d_core.linear.ldlt.plan import Plan
 
 #: eps: above what rounding leaves of a pivot that is zero, far below any other.
 REGULAR = 1e-12

@@ -12,8 +12,9 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
-from dap3d_core.linear.ldlt.factor import Floats, assemble, factor
-from dap3d_core.linear.ldlt.plan import Integers, Plan
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.linear.ldlt.factor import assemble, factor
+from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.rank.null_space import by_elimination, by_iteration, problem_of
 
 #: Up to this many rows the rank comes from singular values of the whole Jacobian.

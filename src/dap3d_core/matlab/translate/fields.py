@@ -80,22 +80,22 @@ class Fields:
 
     def number(self, struct: Struct, field: str) -> float | None:
         """One number."""
-        value = struct.value(field)
-        if isinstance(value, Broken):
-            return None
-        if isinstance(value, np.ndarray) and value.size == 1:
-            return float(value[0, 0])
-        self.refuse(struct, field, f"should be a number; it is {kind_of(value)}")
-        return None
+        found = self._numbers(struct, field, 1, "a number")
+        return None if found is None else found[0]
 
     def vector(self, struct: Struct, field: str, count: int = 3) -> tuple[float, ...] | None:
         """A row or a column of numbers."""
+        return self._numbers(struct, field, count, f"{count} numbers")
+
+    def _numbers(
+        self, struct: Struct, field: str, count: int, should_be: str
+    ) -> tuple[float, ...] | None:
         value = struct.value(field)
         if isinstance(value, Broken):
             return None
         if isinstance(value, np.ndarray) and value.size == count and 1 in value.shape:
             return tuple(value.ravel().tolist())
-        self.refuse(struct, field, f"should be {count} numbers; it is {kind_of(value)}")
+        self.refuse(struct, field, f"should be {should_be}; it is {kind_of(value)}")
         return None
 
     def matrix(self, struct: Struct, field: str) -> tuple[tuple[float, ...], ...] | None:

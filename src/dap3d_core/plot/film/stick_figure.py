@@ -11,9 +11,9 @@ from matplotlib.colors import is_color_like, to_hex
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import euler_rates, to_global
 from dap3d_core.model.state_layout import split
-from dap3d_core.plot.curves import cubic
 from dap3d_core.plot.style import MARKERS, PALETTE
 from dap3d_core.result import Result
+from dap3d_core.result.post.smooth_parts import cubic
 from dap3d_core.scene import Scene, SceneError, load, parse
 
 if TYPE_CHECKING:

@@ -21,8 +21,9 @@ MOST_ROWS = 1000
 #: Largest number in a result: runs are stopped before.
 MOST = 1e100
 
+Test = Callable[[Any], bool]
 #: Test of an entry, and its description.
-Form = tuple[Callable[[Any], bool], str]
+Form = tuple[Test, str]
 
 
 def check_claims(file: Path, dataset: Any) -> None:
@@ -102,9 +103,29 @@ def is_number(value: Any) -> bool:
     return type(value) in (int, float) and abs(value) < 1e300
 
 
-def are_texts(value: Any) -> bool:
-    """True for a list of texts."""
-    return isinstance(value, list) and all(isinstance(v, str) for v in value)
+def is_text(value: Any) -> bool:
+    """True for a text."""
+    return isinstance(value, str)
+
+
+def list_of(fits: Test) -> Test:
+    """The test for a list whose entries all pass a test."""
+    return lambda value: isinstance(value, list) and all(map(fits, value))
+
+
+def table_of(fits: Test) -> Test:
+    """The test for a table whose values all pass a test."""
+    return lambda value: isinstance(value, dict) and all(map(fits, value.values()))
+
+
+def _or_none(fits: Test) -> Test:
+    return lambda value: value is None or fits(value)
+
+
+are_texts = list_of(is_text)
+is_table_of_texts = table_of(is_text)
+_are_numbers = table_of(is_number)
+_is_state = _or_none(list_of(is_number))
 
 
 def _is_plain(value: Any, depth: int = 3) -> bool:
@@ -141,60 +162,28 @@ def _is_tolerance(value: Any) -> bool:
     )
 
 
-def _are_numbers(value: Any) -> bool:
-    return isinstance(value, dict) and all(is_number(v) for v in value.values())
-
-
-def are_events(value: Any) -> bool:
-    """True for events of a result or a checkpoint."""
-    return isinstance(value, list) and all(isinstance(v, dict) and _is_event(v) for v in value)
-
-
-def _is_event(value: Mapping[str, Any]) -> bool:
-    changes = value.get("changes", {})
+def _is_event(value: Any) -> bool:
     return (
-        isinstance(value.get("name"), str)
+        isinstance(value, dict)
+        and is_text(value.get("name"))
         and is_number(value.get("t"))
         and value.get("direction") in ((-1, 0, 1) if value.get("kind") == "jump" else (-1, 1))
         and value.get("kind") in KINDS
         and all(_is_state(value.get(name)) for name in ("u", "u_after"))
         and is_number(value.get("work", 0.0))
-        and all(_are_values(values) for values in (changes, value.get("states", {})))
+        and all(_are_values(value.get(name, {})) for name in ("changes", "states"))
     )
 
 
-def _are_values(values: Any) -> bool:
-    return isinstance(values, dict) and all(
-        isinstance(v, dict) and _is_plain(v) for v in values.values()
-    )
-
-
-def _is_state(u: Any) -> bool:
-    return u is None or (isinstance(u, list) and all(map(is_number, u)))
-
-
-def _are_sources(value: Any) -> bool:
-    return value is None or (
-        isinstance(value, dict) and all(is_table_of_texts(of) for of in value.values())
-    )
-
-
-def is_table_of_texts(value: Any) -> bool:
-    """True for a table of texts."""
-    return isinstance(value, dict) and all(isinstance(v, str) for v in value.values())
-
-
-def _are_series(value: Any) -> bool:
-    return isinstance(value, dict) and all(
-        isinstance(series, list) and all(map(is_number, series)) for series in value.values()
-    )
-
+_are_values = table_of(lambda value: isinstance(value, dict) and _is_plain(value))
+#: Test for the events of a result or a checkpoint.
+are_events = list_of(_is_event)
 
 #: Forms of the attributes of a result.
 FORMS: dict[str, Form] = {
-    "types": (_are_sources, "a table of tables of texts"),
+    "types": (_or_none(table_of(is_table_of_texts)), "a table of tables of texts"),
     "notes": (are_texts, "a list of texts"),
-    "actuation": (_are_series, "a table of lists of numbers"),
+    "actuation": (table_of(list_of(is_number)), "a table of lists of numbers"),
     "settings": (_are_settings, "a table of numbers, words and truth values"),
     "statistics": (_are_numbers, "a table of numbers"),
     "versions": (is_table_of_texts, "a table of texts"),

@@ -145,10 +145,14 @@ def ledger_of(summary: ModelSummary, arrays: Arrays, record: RunMetadata) -> dic
         return {}
     course = LedgerSeries.of(summary, arrays, record.length)
     entries = {}
+    kinetic, work, total = course.kinetic, course.work, course.kinetic + course.potential_energy
     if not record.settings.get("work_from_energy"):  # by its definition it would agree
-        entries["energy"] = _energy(summary, course, record)
+        change = (kinetic - kinetic[0]) - (work - work[0])
+        what = "change of kinetic energy less work of forces and drivers"
+        entries["energy"] = _energy(summary, course, record, change, what)
     if summary.has_potential and _is_conservative(summary, course, record):
-        entries["total energy"] = _total_energy(summary, course, record)
+        what = "change of kinetic and potential energy"
+        entries["total energy"] = _energy(summary, course, record, total - total[0], what)
     if summary.is_isolated:
         entries["momentum"] = _momentum(summary, course, record)
     entries |= _constraints(summary, course, record)
@@ -201,15 +205,13 @@ def _inertia(summary: ModelSummary) -> float:
     return float(np.linalg.norm(summary.Jp, ord=2, axis=(1, 2)).sum())
 
 
-def _energy(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
-    """Kinetic energy against the work done by forces and drivers, dampers included."""
-    kinetic, work = course.kinetic, course.work
-    worst, when = _worst((kinetic - kinetic[0]) - (work - work[0]), course.t)
+def _energy(
+    summary: ModelSummary, course: LedgerSeries, record: RunMetadata, change: Floats, what: str
+) -> Entry:
+    """A change (nt,), J, that should be zero, relative to the energies of the run."""
+    worst, when = _worst(change, course.t)
     scale = _energy_scale(summary, course, record)
-    text = (
-        f"change of kinetic energy less work of forces and drivers: {worst:.2g} J "
-        f"at t = {when:g} s, relative to {scale:.3g} J"
-    )
+    text = f"{what}: {worst:.2g} J at t = {when:g} s, relative to {scale:.3g} J"
     return _entry(worst / scale, _energy_limit(course, record, scale), "1", text)
 
 
@@ -235,18 +237,6 @@ def _is_conservative(summary: ModelSummary, course: LedgerSeries, record: RunMet
     other = (work - work[0]) + (potential - potential[0])
     little = _largest(other) <= CONSERVATIVE * _energy_scale(summary, course, record)
     return little and bool(record.settings.get("conservative"))
-
-
-def _total_energy(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
-    """Change of kinetic and potential energy together: zero where potentials alone do work."""
-    total = course.kinetic + course.potential_energy
-    worst, when = _worst(total - total[0], course.t)
-    scale = _energy_scale(summary, course, record)
-    text = (
-        f"change of kinetic and potential energy: {worst:.2g} J at t = {when:g} s, relative to "
-        f"{scale:.3g} J"
-    )
-    return _entry(worst / scale, _energy_limit(course, record, scale), "1", text)
 
 
 def _momentum(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:

@@ -1,4 +1,4 @@
-"""Parts of a run between jumps of velocities, for what interpolates between its instants."""
+"""Interpolation between instants of a run: a cubic, within parts between jumps of velocities."""
 
 from itertools import pairwise
 
@@ -8,10 +8,14 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.result.arrays import Arrays, joined
 from dap3d_core.result.result import Result
 
+Ends = Floats | tuple[Floats, Floats]
 
-def jump_times(result: Result) -> Floats:
-    """(k,) instants at which velocities jumped, s, in order."""
-    return np.array([event.t for event in result.events if event.u_after is not None])
+
+def cubic(a: float, h: float | Floats, x: Ends, x_dot: Ends) -> Floats:
+    """Hermite interpolation at a fraction ``a`` of a step h; x, x_dot (2, ...) at its ends."""
+    s, b = a * a * (3.0 - 2.0 * a), a * (1.0 - a)
+    value: Floats = (1.0 - s) * x[0] + s * x[1] + b * h * ((1.0 - a) * x_dot[0] - a * x_dot[1])
+    return value
 
 
 def smooth_parts(result: Result) -> list[Result]:

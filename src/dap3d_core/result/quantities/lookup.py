@@ -20,6 +20,7 @@ from dap3d_core.result.quantities.catalogue import (
     QuantityOwner,
     QuantitySource,
 )
+from dap3d_core.result.quantities.own_numbers import own_names, own_quantity, states_of
 
 NORM = "norm"
 #: Names of joint coordinates, of which a joint has some.
@@ -73,10 +74,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
                 columns = _components(result, owner, attribute)
                 if not component or component in columns:
                     return _quantity(result, name, owner, attribute, component)
-            elif state := _state(result, name, owner, attribute, component):
-                return state
-            elif unknown := _unknown_of_joint(result, name, owner, attribute, component):
-                return unknown
+            elif own := own_quantity(result, name, owner, attribute, component):
+                return own
     if output := _output(result, name):
         return output
     raise _unknown(result, name)
@@ -183,52 +182,9 @@ def _columns(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tu
     """Names of the columns of a quantity."""
     if attribute == "lambda" and owner.kind == "joint":
         return tuple(str(k + 1) for k in range(result.summary.joint_rows[owner.place]))
-    known = QUANTITIES[owner.kind].get(attribute)
-    if known or not result.summary.state_names:
-        return known.components if known else ()
-    from dap3d_core.result.quantities.element_states import components_of
-
-    return components_of(result.summary, owner, attribute)
-
-
-def _state(
-    result: QuantitySource, name: str, owner: QuantityOwner, attribute: str, component: str
-) -> Quantity | None:
-    """A state of an element; None where it has none of this name."""
-    if not result.summary.state_names:
-        return None
-    from dap3d_core.result.quantities.element_states import state_quantity
-
-    return state_quantity(result, name, owner, attribute, component)
-
-
-def _unknown_of_joint(
-    result: QuantitySource, name: str, owner: QuantityOwner, attribute: str, component: str
-) -> Quantity | None:
-    """An unknown of a joint; None where it has none of this name."""
-    if owner.kind != "joint" or not result.summary.angle_count:
-        return None
-    from dap3d_core.result.quantities.joint_unknowns import unknown_quantity
-
-    return unknown_quantity(result, name, owner, attribute, component)
-
-
-def _unknown_names(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
-    """Names of the unknowns of a joint."""
-    if owner.kind != "joint" or not result.summary.angle_count:
-        return ()
-    from dap3d_core.result.quantities.joint_unknowns import unknowns_of
-
-    return tuple(unknowns_of(result, owner))
-
-
-def _state_names(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
-    """Names of the states of an element."""
-    if not result.summary.state_names:
-        return ()
-    from dap3d_core.result.quantities.element_states import states_of
-
-    return tuple(states_of(result.summary, owner))
+    if known := QUANTITIES[owner.kind].get(attribute):
+        return known.components
+    return tuple(c for c in states_of(result.summary, owner).get(attribute, {}) if c)
 
 
 def _components(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tuple[str, ...]:
@@ -305,13 +261,7 @@ def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]
     names = ACTIONS if owner.slot else QUANTITIES[owner.kind]
     is_actuator = owner.name in result.record.actuation
     known = (name for name in names if name != ACTUATION or is_actuator)
-    unknowns = _unknown_names(result, owner)
-    return (
-        *known,
-        *_state_names(result, owner),
-        *unknowns,
-        *_coordinate_names(result, owner),
-    )
+    return (*known, *own_names(result, owner), *_coordinate_names(result, owner))
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:

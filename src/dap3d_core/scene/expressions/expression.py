@@ -16,12 +16,11 @@ from typing import Any, Final, NamedTuple
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.validate.coerce_values import Fault
 
-Floats = NDArray[np.float64]
 Function = Callable[..., Any]
 
 #: Longest text, in characters, and deepest nesting of operations.

@@ -5,9 +5,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import MISSING
 from dap3d_core.scene.scene import Body
-from dap3d_core.scene.validate.coerce_columns import Floats, Keys, numbers, vectors
+from dap3d_core.scene.validate.coerce_columns import Keys, numbers, vectors
 from dap3d_core.scene.validate.coerce_values import (
     ROUNDING,
     UNIT_TOLERANCE,

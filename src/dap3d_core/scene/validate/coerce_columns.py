@@ -5,13 +5,11 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import Key
 from dap3d_core.scene.validate.coerce_values import LARGEST, Fault, number_of, numbers_of
 from dap3d_core.scene.validate.mistake_collector import Collector
-
-Floats = NDArray[np.float64]
 
 
 def numbers(report: Collector, keys: Sequence[Key], values: list[Any]) -> Floats:

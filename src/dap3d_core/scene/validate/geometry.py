@@ -8,10 +8,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import MISSING, Key
 from dap3d_core.scene.scene import GROUND, ZERO
 from dap3d_core.scene.validate.bodies import Bodies
-from dap3d_core.scene.validate.coerce_columns import Floats, Keys, tuples, vectors
+from dap3d_core.scene.validate.coerce_columns import Keys, tuples, vectors
 from dap3d_core.scene.validate.coerce_values import ROUNDING, SHORTEST, Fault, numbers_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 

@@ -9,11 +9,7 @@ from dap3d_core.registry import Registry
 from dap3d_core.scene.scene import Scene
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
-    Floats = NDArray[np.float64]
-    Integers = NDArray[np.int64]
+    from dap3d_core.kernels.array_types import Floats, Integers
 
 
 @attrs.define

@@ -26,6 +26,8 @@ from dap3d_core.result.file.validate import (
     check_forms,
     is_number,
     is_table_of_texts,
+    is_text,
+    list_of,
 )
 from dap3d_core.scene import METHODS
 from dap3d_core.simulation.errors import CheckpointError
@@ -37,10 +39,6 @@ PROGRAM = "dap3d checkpoint"
 SUFFIX = ".checkpoint"
 
 
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
-
-
 def is_count(value: Any) -> bool:
     """True for a count that a double holds exactly."""
     return type(value) is int and 0 <= value <= MOST_COUNTED
@@ -50,16 +48,12 @@ def _is_duration(value: Any) -> bool:
     return is_number(value) and value >= 0.0
 
 
-def _are_durations(value: Any) -> bool:
-    return isinstance(value, list) and all(map(_is_duration, value))
-
-
 #: Keys of a header.
 KEYS: dict[str, Form] = {
-    **dict.fromkeys(("run", "output", "scene", "driver"), (_is_text, "a text")),
+    **dict.fromkeys(("run", "output", "scene", "driver"), (is_text, "a text")),
     "method": (lambda value: value in METHODS, f"one of {', '.join(METHODS)}"),
     "integrations": (lambda value: type(value) is int and value in (1, 2), "1 or 2"),
-    "crossed": (_are_durations, "a list of times in seconds"),
+    "crossed": (list_of(_is_duration), "a list of times in seconds"),
     "until": (lambda value: value is None or _is_duration(value), "a time in seconds, or null"),
     "rows": (is_count, "a count"),
     **dict.fromkeys(("t", "wall_time_s", "compile_time_s"), (_is_duration, "a time in seconds")),

@@ -1,12 +1,13 @@
 """Controllers that a script gives a run."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import attrs
 
 from dap3d_core.simulation.control.state_view import StateView
+from dap3d_core.simulation.events.event import several
 
 
 @attrs.frozen(kw_only=True)
@@ -53,10 +54,4 @@ def checked_controllers(controllers: Any) -> tuple[Controller, ...]:
     Raises:
         TypeError: they are not several ``Controller``.
     """
-    if isinstance(controllers, Controller):
-        raise TypeError("controllers is a list of dap.Controller; write [controller] for one")
-    found = tuple(controllers) if isinstance(controllers, Iterable) else (controllers,)
-    for controller in found:
-        if not isinstance(controller, Controller):
-            raise TypeError(f"controllers is a list of dap.Controller, not of {controller!r}")
-    return found
+    return several(controllers, Controller, "controllers")

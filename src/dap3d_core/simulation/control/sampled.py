@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import Integration
 from dap3d_core.integrators.stepping.hold import Hold
 from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, Y
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import by_body
 from dap3d_core.result import INFORMATION
 from dap3d_core.result.file.validate import is_number
@@ -21,8 +21,6 @@ from dap3d_core.simulation.control.held_inputs import HeldInputs
 from dap3d_core.simulation.control.state_view import StateView
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.locate import EventLocator
-
-Floats = NDArray[np.float64]
 
 #: Seconds of holds after which a run looks about: progress, checkpoints, Ctrl-C.
 CHUNK_SECONDS = 0.1

@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.motion.joint_motion import ROTATION, TRANSLATION
 from dap3d_core.formulations import REPORT
@@ -14,11 +13,11 @@ from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.stepping.hold import T, quick_view
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import Y
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P, R, V, W
 from dap3d_core.result import Result, RunMetadata
 from dap3d_core.simulation.compiled_model import CompiledModel
 
-Floats = NDArray[np.float64]
 Getter = Callable[[], Any]
 
 #: Quantities of bodies that stand in the driver's arrays: first number, and how many.

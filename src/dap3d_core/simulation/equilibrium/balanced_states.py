@@ -1,8 +1,8 @@
 """Poses and states of elements at rest together: forces balance, and rates vanish."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.equilibrium.states_at_rest import (
     MOST_STEPS,
     OPEN,
@@ -11,8 +11,6 @@ from dap3d_core.simulation.equilibrium.states_at_rest import (
 )
 from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
 from dap3d_core.simulation.errors import AssemblyError
-
-Floats = NDArray[np.float64]
 
 
 def find_together(statics: Statics, pose: StaticPose) -> StaticPose | None:

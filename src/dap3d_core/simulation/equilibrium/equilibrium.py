@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import read_only
@@ -20,8 +19,7 @@ from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import violation
 from dap3d_core.simulation.initial.start_state import NamedState, Start, start_state
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
-
-Floats = NDArray[np.float64]
+from dap3d_core.simulation.settings import compiled_for
 
 #: Constants that a type takes from the poses of the scene are the same to this part.
 SAME_CONSTANT = 1e-8
@@ -182,9 +180,7 @@ def equilibrium(
         SimulationError: there is no equilibrium, because nothing holds a freedom, or none was
             found; names what gives way. AssemblyError: the joints cannot be assembled.
     """
-    compiled = scene
-    if not isinstance(compiled, CompiledModel):
-        compiled = CompiledModel(scene, allow_code=allow_code, announce=announce)  # type: ignore[arg-type]
+    compiled = compiled_for(scene, None, allow_code, announce)
     settings = compiled.scene.simulation
     state = None
     if start is not None:

@@ -1,11 +1,9 @@
 """Displacements of bodies in words: which bodies move most, and which way."""
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
-
-Floats = NDArray[np.float64]
 
 #: Bodies that move this part of the largest motion, or more, are named, so many of them.
 ALIKE, MOST_NAMES = 0.5, 6

@@ -3,19 +3,18 @@
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group, Model
 from dap3d_core.model.state_layout import velocities_of
+from dap3d_core.registry.suggestions import some
 from dap3d_core.result import INFORMATION
 from dap3d_core.simulation.equilibrium.motion_words import describe_motion
 from dap3d_core.simulation.equilibrium.search import Outcome, Search
 from dap3d_core.simulation.equilibrium.stability import Stability
-
-Floats = NDArray[np.float64]
 
 #: Names that a note lists.
 MOST_NAMES = 6
@@ -65,23 +64,21 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
         yield f"{INFORMATION}velocities of the start are left out"
     timed = [name for group in model.forces for name in _of_time(group, model)]
     if timed:
-        yield f"{INFORMATION}forces that depend on time are those at t = 0: {_listed(timed)}"
-    driven = [model.row_owner(int(k)) for k in np.flatnonzero(rows.nu)]
+        listed = some(timed, MOST_NAMES)
+        yield f"{INFORMATION}forces that depend on time are those at t = 0: {listed}"
+    driven = model.row_owners(np.flatnonzero(rows.nu))
     if driven:
-        yield (
-            f"{INFORMATION}drivers are at rest at their initial values: "
-            f"{_listed(list(dict.fromkeys(driven)))}"
-        )
+        listed = some(driven, MOST_NAMES)
+        yield f"{INFORMATION}drivers are at rest at their initial values: {listed}"
     if model.friction:
         yield (
             "friction is left out: with it the scene can rest at other poses near this one as well"
         )
-    rolling = [model.row_owner(int(k))
-               for k in np.flatnonzero(~model.position_row & (rows.nu == 0.0))]  # fmt: skip
+    rolling = model.row_owners(np.flatnonzero(~model.position_row & (rows.nu == 0.0)))
     if rolling:
         yield (
             f"{INFORMATION}rolling joints constrain displacements as they do velocities: "
-            f"{_listed(list(dict.fromkeys(rolling)))}; where they come to rest depends on the way"
+            f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
         )
 
 
@@ -109,8 +106,3 @@ def failure(search: Search, model: Model) -> str:
         f"not balanced along a freedom of {moves}. Start nearer to the equilibrium; the forces may "
         "jump there, or have none"
     )
-
-
-def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more

@@ -2,22 +2,16 @@
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result import INFORMATION
 from dap3d_core.simulation.equilibrium.notes import assumptions, failure, findings
-from dap3d_core.simulation.equilibrium.search import (
-    Outcome,
-    Search,
-    search_equilibrium,
-)
+from dap3d_core.simulation.equilibrium.search import Outcome, Search, search_equilibrium
 from dap3d_core.simulation.equilibrium.stability import Stability, stability_of
 from dap3d_core.simulation.equilibrium.statics import Statics
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.start_state import StartState
-
-Floats = NDArray[np.float64]
 
 #: Singular values of the Jacobian below this part are left out of the least multipliers.
 RCOND = 1e-10

@@ -10,9 +10,9 @@ from enum import Enum
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, at_rest, displacement
 from dap3d_core.simulation.equilibrium.trust_region import (
     BALANCED,
@@ -21,8 +21,6 @@ from dap3d_core.simulation.equilibrium.trust_region import (
     zero_stiffness,
 )
 from dap3d_core.simulation.errors import AssemblyError
-
-Floats = NDArray[np.float64]
 
 MOST_STEPS = 1000
 #: Length of the first step, and largest rotation of a body in any, rad or parts of the scene.

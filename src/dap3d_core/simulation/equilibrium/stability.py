@@ -6,12 +6,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.equilibrium.search import Outcome, search_equilibrium
 from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, displacement
 from dap3d_core.simulation.equilibrium.trust_region import zero_stiffness
 from dap3d_core.simulation.errors import AssemblyError
-
-Floats = NDArray[np.float64]
 
 #: K is symmetric if it is so to this part: forces with a potential act.
 SYMMETRIC = 1e-6

@@ -15,16 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.common.state_derivatives import StateDerivatives, state_derivatives
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.element_states import ElementState, first_states, width_of
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.linearization.tangent import TangentMatrices
 
-Floats = NDArray[np.float64]
 
 #: Newton steps at most; rates below this part of their terms are zero.
 MOST_STEPS, SETTLED = 50, 1e-11
@@ -48,11 +47,6 @@ def settle(evaluator: Evaluator, t: float, u: Floats) -> None:
         if left <= SETTLED:
             return
         evaluator.states = best - _inverse(evaluator, own.rate_by_states) @ own.rates
-
-
-def unsettled(evaluator: Evaluator, t: float, u: Floats) -> float:
-    """Largest rate of a state at a pose, as a part of its terms."""
-    return unsettled_part(_derivatives(evaluator, t, u), evaluator.states)
 
 
 def moving_states(evaluator: Evaluator, t: float, u: Floats) -> list[ElementState]:

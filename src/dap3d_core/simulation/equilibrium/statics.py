@@ -11,11 +11,11 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import WRENCH
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.linear.rank.rank import tolerance_of
 from dap3d_core.model.state_layout import join, split
@@ -28,8 +28,6 @@ from dap3d_core.simulation.initial.assemble import (
     weights_of,
 )
 from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
-
-Floats = NDArray[np.float64]
 
 #: Displacements of bodies, rad or parts of the scene, that show how large forces are.
 NEARBY = 1e-3
@@ -190,7 +188,7 @@ class Statics:
     def moved(self, u: Floats, x: Floats) -> Floats:
         """The state after a displacement x (6 n,), not closed."""
         change = (self.scale * x).reshape(-1, 6)
-        return displaced(u, change, len(change))
+        return displaced(u, change)
 
     def closed(self, u: Floats) -> Floats:
         """The state with its position rows closed to rounding, by least displacements.
@@ -212,7 +210,7 @@ class Statics:
             if worst == 0.0:
                 break
             change = sparse_least_change(self.evaluator, C, self.t).reshape(-1, 6)
-            u = displaced(u, -change, len(change))
+            u = displaced(u, -change)
         if not before <= limit:
             raise AssemblyError(f"the positions do not close: |C| = {before:.2g}")
         return best

@@ -10,9 +10,8 @@ equilibrium.
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from dap3d_core.kernels.array_types import Floats
 
 #: A stiffness below this part of the largest is none: rounding errors of K.
 NEUTRAL = 1e-11

@@ -2,20 +2,21 @@
 
 from collections.abc import Callable, Collection, Iterable
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.formulations import REPORT
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.parameter_change import Change, changed
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result import Result, RunMetadata
 from dap3d_core.simulation.compiled_model import CompiledModel
 
-Floats = NDArray[np.float64]
+Kind = TypeVar("Kind")
 ACTIONS = ("stop", "record")
 #: Velocities of a body that an event may set, and where they lie among its six.
 VELOCITIES = {"r_dot": slice(0, 3), "w": slice(3, 6)}
@@ -127,12 +128,23 @@ def checked_events(events: Any) -> tuple[Event, ...]:
     Raises:
         TypeError: they are not several ``Event``.
     """
-    if isinstance(events, Event):
-        raise TypeError("events is a list of dap.Event; write [event] for a single one")
-    found = tuple(events) if isinstance(events, Iterable) else (events,)
-    for event in found:
-        if not isinstance(event, Event):
-            raise TypeError(f"events is a list of dap.Event, not of {event!r}")
+    return several(events, Event, "events")
+
+
+def several(given: Any, kind: type[Kind], argument: str) -> tuple[Kind, ...]:
+    """The objects that an argument lists.
+
+    Raises:
+        TypeError: they are not several of this kind.
+    """
+    name = f"dap.{kind.__name__}"
+    if isinstance(given, kind):
+        single = argument.removesuffix("s")
+        raise TypeError(f"{argument} is a list of {name}; write [{single}] for a single one")
+    found = tuple(given) if isinstance(given, Iterable) else (given,)
+    for one in found:
+        if not isinstance(one, kind):
+            raise TypeError(f"{argument} is a list of {name}, not of {one!r}")
     return found
 
 

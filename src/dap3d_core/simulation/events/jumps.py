@@ -6,7 +6,6 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations import ACCEPTED, RHS, WATCH
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
@@ -14,12 +13,11 @@ from dap3d_core.formulations.jumps.elements import JumpRows
 from dap3d_core.formulations.jumps.law import ImpossibleJumpError, Jump, JumpLaw
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.result import INFORMATION, EventRecord
 from dap3d_core.result.file.validate import are_events, is_number
 from dap3d_core.simulation.errors import SimulationError
-
-Floats = NDArray[np.float64]
 
 #: Records of jumps that a result keeps.
 MOST_RECORDS = 1000

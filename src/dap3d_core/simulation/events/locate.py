@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.formulations import RHS
 from dap3d_core.integrators import Integration, Status
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.validate import are_events, is_number
+from dap3d_core.result.post.smooth_parts import cubic
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_events
 from dap3d_core.simulation.events.sampling import Sampler
@@ -25,7 +26,6 @@ from dap3d_core.simulation.events.sampling import Sampler
 if TYPE_CHECKING:
     from dap3d_core.simulation.events.jumps import Jumps
 
-Floats = NDArray[np.float64]
 
 EPSILON = float(np.finfo(float).eps)
 
@@ -189,7 +189,7 @@ class EventLocator:
 
         def instant(time: float) -> Instant:
             if time not in known:
-                between = hermite((time - t) / h, h, y, slope, end, last)
+                between = cubic((time - t) / h, h, (y, end), (slope, last))
                 known[time] = Instant(self.compiled, time, between, self.numbers)
             return known[time]
 
@@ -294,15 +294,6 @@ class EventLocator:
 
             self.jumps = Jumps(self.compiled.evaluator)
         return self.jumps.set_state(integration, here.velocities, here.states, event.title)
-
-
-def hermite(
-    part: float, h: float, y0: Floats, slope0: Floats, y1: Floats, slope1: Floats
-) -> Floats:
-    """The cubic through both ends of a step of length h, a part of the way along."""
-    a, b = part * part * (3.0 - 2.0 * part), part * (1.0 - part)
-    found: Floats = (1.0 - a) * y0 + a * y1 + b * h * ((1.0 - part) * slope0 - part * slope1)
-    return found
 
 
 def _are_numbers(values: Any, lengths: Collection[int]) -> bool:

@@ -4,11 +4,9 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result.file.validate import is_number
-
-Floats = NDArray[np.float64]
 
 #: Parts of a window at which a function is looked at; uneven, so that they fall in step with none.
 PARTS = (0.0, 0.17, 0.41, 0.63, 0.86, 1.0)

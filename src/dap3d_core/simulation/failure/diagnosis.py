@@ -1,19 +1,17 @@
 """Finds the body, force or joint that first produced a non-finite or overflowing value."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import KINDS
 from dap3d_core.assembly.evaluate import place_state
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.pivots import near_singular_rows
 from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.model import Group
 from dap3d_core.model.state_layout import by_body, velocities_of
 from dap3d_core.scene.validate.coerce_values import LARGEST
-
-Floats = NDArray[np.float64]
 
 #: Where to look behind the last good state, as parts of the time.
 AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
@@ -50,10 +48,8 @@ def fastest_body(evaluator: Evaluator, y: Floats) -> str:
 
 
 def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
-    bodies = by_body(evaluator.bodies_of(y))
-    for name, numbers in zip(evaluator.model.body_names, bodies, strict=True):
-        if fault := _fault(numbers):
-            return f"the state of body {name} is {fault}"
+    if fault := _fault_of_bodies(evaluator, by_body(evaluator.bodies_of(y))):
+        return f"the state of body {fault}"
     states = y[evaluator.model.integrated_layout["states"]]
     if fault := _fault(states):
         return f"the state {_worst_state(evaluator, states)} is {fault}"
@@ -124,9 +120,15 @@ def _fault(*numbers: Floats) -> str:
 
 def _accelerated(evaluator: Evaluator, t: float, y: Floats) -> str:
     """The body whose acceleration is too large, though all that acts on it is not."""
-    for name, rates in zip(evaluator.model.body_names, _rates(evaluator, t, y), strict=True):
-        if fault := _fault(rates):
-            return f"the acceleration of body {name} is {fault}"
+    fault = _fault_of_bodies(evaluator, _rates(evaluator, t, y))
+    return f"the acceleration of body {fault}" if fault else ""
+
+
+def _fault_of_bodies(evaluator: Evaluator, numbers: Floats) -> str:
+    """The first body with a fault in its numbers (n, ...), and the fault."""
+    for name, own in zip(evaluator.model.body_names, numbers, strict=True):
+        if fault := _fault(own):
+            return f"{name} is {fault}"
     return ""
 
 
@@ -145,6 +147,7 @@ def _worst_state(evaluator: Evaluator, values: Floats) -> str:
 
 
 def _fault_of(evaluator: Evaluator, q: int, k: int, kind: str, group: Group, t: float) -> str:
+    """Fault of what loop q computes for instance k of its group alone."""
     s = evaluator.system
     s.rates[:] = 0.0
     for out in (s.force, s.gamma, s.nu, s.residual, s.D, s.multipliers):
@@ -156,23 +159,10 @@ def _fault_of(evaluator: Evaluator, q: int, k: int, kind: str, group: Group, t: 
     if kind == "switch":
         joint_outs[kind] = np.zeros(len(group.type_info.outputs[kind])), np.zeros(1), np.zeros(1)
     outs = joint_outs.get(kind, (s.force, s.force, s.force))
-    _call_one(evaluator, q, k, group, t, outs)
-    return _fault(*outs, s.rates, s.F[:, :4])
-
-
-def _call_one(
-    evaluator: Evaluator,
-    q: int,
-    k: int,
-    group: Group,
-    t: float,
-    outs: tuple[Floats, Floats, Floats],
-) -> None:
-    """Call loop q for instance k of its group alone."""
-    s = evaluator.system
     i0, p0, _ = s.groups[q]
     i1, p1 = i0 + k * stride(group.type_info), p0 + k * group.type_info.layout.par_width
     call_loop(evaluator.loops, q, t, s, np.array([i1, p1, 1]), *outs)
+    return _fault(*outs, s.rates, s.F[:, :4])
 
 
 def _title(kind: str) -> str:

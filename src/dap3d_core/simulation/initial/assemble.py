@@ -11,22 +11,20 @@ from itertools import pairwise
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import System
 from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.linear.ldlt.plan import Integers
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.linear.rank.rank import DENSE_ROWS, factor_independent
 from dap3d_core.model import Model
+from dap3d_core.model.rotations import euler_rates
 from dap3d_core.model.state_layout import join, split, state_layout, velocities_of
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Body, Scene
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.failure.diagnosis import find_offender
-
-Floats = NDArray[np.float64]
 
 #: Position residuals above this are corrected; Newton stops below it.
 TOLERANCE = 1e-10
@@ -92,7 +90,8 @@ def violation(evaluator: Evaluator, u: Floats, t: float = 0.0) -> tuple[float, f
         return 0.0, 0.0
     rows = finite_rows(evaluator, t, u)
     weight = weights_of(evaluator)
-    return _largest(weight * rows.C), _largest(weight * _velocity_residual(rows, u))
+    residual = rows.product(velocities_of(u)) - rows.nu
+    return _largest(weight * rows.C), _largest(weight * residual)
 
 
 def weights_of(evaluator: Evaluator) -> Floats:
@@ -129,7 +128,7 @@ def correct_initial(
     held = np.array(sorted(hold), dtype=np.int64)
     u, passes = correct_positions(evaluator, u, t, held, metric)
     rows = finite_rows(evaluator, t, u)
-    residual = _velocity_residual(rows, u)
+    residual = rows.product(velocities_of(u)) - rows.nu
     if _largest(residual) > 0.0:
         u = u.copy()
         velocities = velocities_of(u)
@@ -147,7 +146,7 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
     position, velocity = initial.violation
     tolerance = TOLERANCE * evaluator.model.length
     if position > tolerance:
-        mark = INFORMATION if position <= ROUNDING * model_size(evaluator) else ""
+        mark = INFORMATION if position <= ROUNDING * evaluator.model.size else ""
         notes.append(
             f"{mark}initial positions corrected in {initial.passes} passes: "
             f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
@@ -181,7 +180,7 @@ def correct_positions(
     Raises:
         AssemblyError: the residual does not vanish.
     """
-    size, limit, before = model_size(evaluator), 1.0, np.inf
+    size, limit, before = evaluator.model.size, 1.0, np.inf
     length, weight = evaluator.model.length, weights_of(evaluator)
     fit = length * fit_of(evaluator.model)
     for passes in range(MOST_PASSES + 1):
@@ -199,7 +198,7 @@ def correct_positions(
         shift_limit = MOST_SHIFT * size / shift if shift else 1.0
         turn_limit = MOST_TURN / turn if turn else 1.0
         limit = min(1.0, shift_limit, turn_limit)
-        u = displaced(u, -limit * change, evaluator.model.body_count)
+        u = displaced(u, -limit * change)
     raise _failure(evaluator, rows, passes, held, is_far=limit < 1.0)
 
 
@@ -291,12 +290,14 @@ def sparse_least_change(
     return change.ravel()
 
 
-def displaced(u: Floats, change: Floats, n: int) -> Floats:
-    """The state with r + dr, and with p + 1/2 G^T dtheta of unit length (dtheta global, small)."""
+def displaced(u: Floats, change: Floats) -> Floats:
+    """The state with r + dr, and with p + 1/2 G^T dtheta of unit length (dtheta global, small).
+
+    change: (n, 6) or (6 n,) dr, dtheta of each body.
+    """
     r, p, v, w = split(u)
-    e0, e, turn = p[:, :1], p[:, 1:], 0.5 * change[:, 3:]
-    dp = np.hstack([-np.sum(e * turn, axis=1, keepdims=True), e0 * turn + np.cross(turn, e)])
-    p = p + dp
+    change = change.reshape(-1, 6)
+    p = p + euler_rates(p, change[:, 3:])
     return join(r + change[:, :3], p / np.linalg.norm(p, axis=1, keepdims=True), v, w)
 
 
@@ -314,11 +315,6 @@ def distance(u: Floats, other: Floats, n: int) -> tuple[Floats, Floats]:
     return np.max(shift, axis=-1, initial=0.0), np.max(angle, axis=-1, initial=0.0)
 
 
-def _velocity_residual(rows: ConstraintRows, u: Floats) -> Floats:
-    v = u[-rows.shape[1] :]
-    return np.bincount(rows.row, rows.value * v[rows.column], minlength=rows.shape[0]) - rows.nu
-
-
 def fit_of(model: Model) -> float:
     """Residual at which joints count as closed, as a fraction of the scene's length (FIT)."""
     return FIT * min(1.0, model.size / model.length)
@@ -332,7 +328,7 @@ def model_size(evaluator: Evaluator) -> float:
 def extent(evaluator: Evaluator, v: Floats) -> float:
     """Largest speed at velocities (6 n,), in rad/s or lengths of the model a second."""
     x = np.abs(v.reshape(-1, 6))
-    return max(_largest(x[:, :3]) / model_size(evaluator), _largest(x[:, 3:]))
+    return max(_largest(x[:, :3]) / evaluator.model.size, _largest(x[:, 3:]))
 
 
 def _largest(values: Floats) -> float:

@@ -4,15 +4,12 @@ from collections.abc import Iterable
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import Model
 from dap3d_core.model.knots import breaks_of
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Instance, Simulation, ValidatedScene
-
-Floats = NDArray[np.float64]
 
 #: Instants of a run at which functions are looked at, besides those near their breaks.
 SAMPLES = 64

@@ -5,15 +5,13 @@ few states taken at random about the start.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import ENERGY, VALUE, WRENCH
 from dap3d_core.assembly.evaluate import call_kinds, place_state
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import to_global
 from dap3d_core.model.state_layout import join, split, velocities_of
-
-Floats = NDArray[np.float64]
 
 #: States that are tried, and the largest displacement of a body there, m and rad.
 STATES, REACH = 3, 0.1

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import STATE, split, state_layout
-
-Floats = NDArray[np.float64]
 
 
 def state_of(u: ArrayLike, body_names: Sequence[str], states: int = 0) -> Floats:

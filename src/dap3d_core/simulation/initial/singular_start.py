@@ -18,10 +18,10 @@ from collections.abc import Iterator
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS, Rank
 from dap3d_core.model.state_layout import split, velocities_of
 from dap3d_core.simulation.initial.assemble import (
@@ -32,8 +32,6 @@ from dap3d_core.simulation.initial.assemble import (
     mass_scaling,
     unscaled,
 )
-
-Floats = NDArray[np.float64]
 
 #: A condition of second order counts as fulfilled below this part of the largest gamma.
 FULFILLED = 1e-6
@@ -120,9 +118,7 @@ def _loses_rank(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> bool:
     if not np.bincount(rows.row, rows.value**2, minlength=rows.shape[0]).all():
         return False  # a row without a gradient is named where the run stops
     wish = np.random.default_rng(0).standard_normal(6 * n)
-    flow = rows.value * wish[rows.column]
-    flow = np.bincount(rows.row, flow, minlength=rows.shape[0]).astype(float)
-    free = wish - least_change(evaluator, rows, flow, t)
+    free = wish - least_change(evaluator, rows, rows.product(wish), t)
     if np.linalg.norm(free) <= NONE * np.linalg.norm(wish):
         return False
     gradient = scaled_rows(rows, evaluator.model.length)[1]  # dependencies are those of scaled rows
@@ -280,8 +276,8 @@ class _Cone:
 
         way: (6 n,) velocities, or accelerations, along it.
         """
-        n, v = self.evaluator.model.body_count, velocities_of(self.u)
-        aside = displaced(self.still, ASIDE / extent(self.evaluator, way) * way.reshape(n, 6), n)
+        v = velocities_of(self.u)
+        aside = displaced(self.still, ASIDE / extent(self.evaluator, way) * way)
         acceleration = self.free + self.N @ z
         speed, rise = extent(self.evaluator, v), extent(self.evaluator, acceleration)
         first_step = 2.0 * FIRST / (speed + (speed * speed + 2.0 * rise * FIRST) ** 0.5)
@@ -330,16 +326,14 @@ def _gamma(cone: _Cone, v: Floats) -> Floats:
 
 def _third(cone: _Cone, v: Floats, a: Floats) -> Floats:
     """d/dt of lambda^T (D a - gamma) (k,) along a motion with velocities v, accelerations a."""
-    n = cone.evaluator.model.body_count
     h = SPAN / max(extent(cone.evaluator, v), extent(cone.evaluator, a) ** 0.5)
     total = np.zeros(len(cone.left))
     for k, weight in enumerate(FORWARD):
         s = k * h
-        state = displaced(cone.still, (s * v + 0.5 * s * s * a).reshape(n, 6), n)
+        state = displaced(cone.still, s * v + 0.5 * s * s * a)
         velocities_of(state)[:] = v + s * a
         rows = finite_rows(cone.evaluator, cone.t + s, state)
-        product = np.bincount(rows.row, rows.value * a[rows.column], minlength=rows.shape[0])
-        total += weight * cone.left @ (product - rows.gamma)
+        total += weight * cone.left @ (rows.product(a) - rows.gamma)
     derivative: Floats = total / (12.0 * h)
     return derivative
 

@@ -6,13 +6,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.interface import PluginError
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model, ModelError, build_model
-from dap3d_core.model.rotations import euler_rates
+from dap3d_core.model.rotations import angular_velocities, euler_rates
 from dap3d_core.model.state_layout import join, split
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Mistake, SceneError, parse
 from dap3d_core.scene import check as validate
@@ -20,7 +20,6 @@ from dap3d_core.scene import check as validate
 if TYPE_CHECKING:
     from dap3d_core.registry import Registry
 
-Floats = NDArray[np.float64]
 
 #: A time is a reported one if it differs from it by this part of the result's span.
 SAME_TIME = 1e-12
@@ -116,11 +115,6 @@ def _mistake(value: Any, what: str) -> SceneError:
     return SceneError([Mistake("start", value, what)])
 
 
-def _listed(names: list[str]) -> str:
-    more = f" and {len(names) - MOST_NAMES} more" if len(names) > MOST_NAMES else ""
-    return ", ".join(names[:MOST_NAMES]) + more
-
-
 def _matched(named: NamedState, model: Model) -> StartState:
     """The state of the model's bodies."""
     place = {body: k for k, body in enumerate(named.body_names)}
@@ -131,25 +125,27 @@ def _matched(named: NamedState, model: Model) -> StartState:
         noun = "body" if len(missing) == 1 else "bodies"
         raise _mistake(
             named.title,
-            f"it is of another scene: it has no {noun} {_listed(near)}; its bodies are "
-            f"{_listed(list(place))}",
+            f"it is of another scene: it has no {noun} {some(near, MOST_NAMES)}; its bodies are "
+            f"{some(list(place), MOST_NAMES)}",
         )
     notes = list(named.notes)
     unused = [body for body in place if body not in model.body_names]
     if unused:
-        notes.append(f"bodies of the start that the scene does not have: {_listed(unused)}")
+        listed = some(unused, MOST_NAMES)
+        notes.append(f"bodies of the start that the scene does not have: {listed}")
     index = [place[body] for body in model.body_names]
     r, p, v, w = split(named.u)
     u = join(r[index], p[index], v[index], w[index])
     names = model.angle_names
     uncounted = sorted({n.rpartition(".")[0] for n in names if n not in named.angles})
     if uncounted:
-        notes.append(f"turns are counted from zero, for the start has none: {_listed(uncounted)}")
+        listed = some(uncounted, MOST_NAMES)
+        notes.append(f"turns are counted from zero, for the start has none: {listed}")
     angles = np.array([named.angles.get(name, 0.0) for name in names]) if names else None
     labels = [label for state in model.element_states for label in state.labels]
     if missing := sorted({n.rpartition(".")[0] for n in labels if n not in named.states}):
-        notes.append(f"states begin with their initial values, for the start has none of "
-                     f"{_listed(missing)}")  # fmt: skip
+        listed = some(missing, MOST_NAMES)
+        notes.append(f"states begin with their initial values, for the start has none of {listed}")
     given = zip(labels, model.initial_states.tolist(), strict=True)
     states = np.array([named.states.get(n, value) for n, value in given]) if labels else None
     return StartState(u, angles, tuple(notes), named.is_interpolated, states)
@@ -248,8 +244,8 @@ def _state_at(result: Result, before: int, after: int, fraction: float) -> Float
     q, q_dot = _quintic(ends[0], ends[1], h, fraction)
     p, p_dot = q[:, 3:], q_dot[:, 3:]
     length = np.linalg.norm(p, axis=1, keepdims=True)
-    w = 2.0 * (p[:, :1] * p_dot[:, 1:] - p_dot[:, :1] * p[:, 1:] - np.cross(p_dot[:, 1:], p[:, 1:]))
-    return join(q[:, :3], p / length, q_dot[:, :3], w / length**2)
+    w = angular_velocities(p, p_dot) / length**2
+    return join(q[:, :3], p / length, q_dot[:, :3], w)
 
 
 def _quintic(

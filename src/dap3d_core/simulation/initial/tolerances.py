@@ -9,16 +9,15 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import Integration
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE, Y
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import split
 from dap3d_core.scene import Simulation
 from dap3d_core.scene.validate.settings import QUANTITIES, USUAL_ATOL
 
-Floats = NDArray[np.float64]
 #: A motion is resolved that is this many times what a step may be off by.
 RESOLVED = 1e3
 #: Names that a note lists.

@@ -6,12 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group, Model
 from dap3d_core.model.rotations import rotation
 from dap3d_core.model.state_layout import split
 from dap3d_core.scene import Mistake, Scene, mistake_at
-
-Floats = NDArray[np.float64]
 
 #: Points nearer to each other than this, in m, or as a part of the model's size, coincide: what is
 #: left of their distance is rounding.

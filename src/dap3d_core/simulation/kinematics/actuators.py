@@ -5,9 +5,9 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result.errors import UnknownNameError
@@ -15,8 +15,6 @@ from dap3d_core.result.post.force_output import ForceLoops, group_of
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.kinematics.driver_coordinate import driver_names
-
-Floats = NDArray[np.float64]
 
 
 @attrs.frozen(eq=False)

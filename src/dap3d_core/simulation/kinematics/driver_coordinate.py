@@ -5,13 +5,11 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
-
-Floats = NDArray[np.float64]
 
 #: Name behind that of a driver, and the forms of ``over``.
 COORDINATE = "q"
@@ -66,16 +64,14 @@ def read_coordinate(over: Any, compiled: CompiledModel) -> DriverCoordinate:
     name, _, what = label.partition(".")
     drivers = driver_names(compiled)
     if name not in drivers:
-        raise SceneError([_no_driver(over, name, what, drivers, compiled)])
+        raise SceneError([_no_driver(over, name, drivers, compiled)])
     if what not in ("", COORDINATE):
         words = f"the coordinate of a driver is called {COORDINATE}"
         raise SceneError([Mistake("over", over, words, f"{name}.{COORDINATE}")])
     return DriverCoordinate(name, values)
 
 
-def _no_driver(
-    over: Any, name: str, what: str, drivers: list[str], compiled: CompiledModel
-) -> Mistake:
+def _no_driver(over: Any, name: str, drivers: list[str], compiled: CompiledModel) -> Mistake:
     if not drivers:
         remedy = "add a driver joint, whose function the coordinate replaces"
         return Mistake("over", over, "the scene has no driver", remedy=remedy)

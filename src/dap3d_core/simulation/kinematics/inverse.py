@@ -7,9 +7,9 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.model_summary import summary_of
@@ -19,7 +19,7 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.failure.negative_reactions import Pulling
 from dap3d_core.simulation.kinematics.actuators import Actuator, DriverActuator, actuators_of
-from dap3d_core.simulation.kinematics.kinematics import check_output, compiled_exactly
+from dap3d_core.simulation.kinematics.kinematics import check_output
 from dap3d_core.simulation.kinematics.motion_data import (
     Motion,
     misfit_notes,
@@ -33,8 +33,8 @@ from dap3d_core.simulation.kinematics.pose_equations import (
     required_forces,
 )
 from dap3d_core.simulation.redundancy.freedoms import motion_words
+from dap3d_core.simulation.settings import compiled_exactly
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 
 #: What the record of a result has for its integrator.
@@ -86,7 +86,7 @@ def inverse(
     """
     check_output(output, force=force)
     given = read_motion(motion)
-    compiled = compiled_exactly(scene, allow_code=allow_code, announce=announce)
+    compiled = compiled_exactly(scene, allow_code, announce)
     with compiled.borrow_evaluator() as evaluator:
         result = _solved(compiled, evaluator, given, actuators, progress)
     if output is not None:

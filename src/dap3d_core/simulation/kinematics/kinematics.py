@@ -7,9 +7,9 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import arrays_of
 from dap3d_core.result.file.atomic_write import check_target, check_utf8
@@ -28,9 +28,8 @@ from dap3d_core.simulation.kinematics.driver_coordinate import (
 from dap3d_core.simulation.kinematics.path import KinematicPath, PathEndError, Pose
 from dap3d_core.simulation.kinematics.pose_equations import held_states, required_forces
 from dap3d_core.simulation.redundancy.freedoms import freedoms_left, motion_words
-from dap3d_core.simulation.settings import report_times, settings_of
+from dap3d_core.simulation.settings import compiled_exactly, report_times, settings_of
 
-Floats = NDArray[np.float64]
 Progress = Callable[[float, float], None]
 
 #: What the record of a result has for its integrator.
@@ -82,12 +81,12 @@ def kinematics(
     Source: Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988, chapters 3 to 5.
     """
     check_output(output, force=force)
-    compiled = compiled_exactly(scene, allow_code=allow_code, announce=announce)
+    compiled = compiled_exactly(scene, allow_code, announce)
     coordinate = None
     if over is not None:
         coordinate = _coordinate(over, compiled, t_end, dt)
         replaced = coordinate.replaced_in(compiled.scene)
-        compiled = compiled_exactly(replaced, allow_code=allow_code, announce=announce)
+        compiled = compiled_exactly(replaced, allow_code, announce)
     settings = settings_of(compiled, t_end=t_end, dt=dt)
     if coordinate is None:
         times = report_times(settings.t_end, settings.dt)
@@ -116,17 +115,6 @@ def check_output(output: str | os.PathLike[str] | None, *, force: bool) -> None:
     if output is not None:
         check_utf8("write", output)
         check_target(output, force)
-
-
-def compiled_exactly(
-    scene: Any, *, allow_code: bool, announce: Callable[[str], None] | None
-) -> CompiledModel:
-    """The compiled model of a scene, with a method whose accelerations fulfil the constraints."""
-    if isinstance(scene, CompiledModel):
-        if scene.evaluator.formulation.is_exact:
-            return scene
-        scene = scene.scene
-    return CompiledModel(scene, method="auto", allow_code=allow_code, announce=announce)
 
 
 class _Kinematics:
@@ -369,11 +357,7 @@ class _Kinematics:
             )
         share = np.abs(rows.left_out(left))
         moves = motion_words(model, motion)
-        owners = dict.fromkeys(
-            model.row_owner(int(k)) for k in np.flatnonzero(share > SHARE * np.max(share))
-        )
-        if not np.max(share) > 0.0:
-            owners = {}
+        owners = model.row_owners(np.flatnonzero(share > SHARE * np.max(share)))
         return (
             f"dead point at {self._instant(end.t)}: what {', '.join(owners) or 'the drivers'} "
             f"prescribes from there on is beyond the reach of the joints. Towards it {moves}, "

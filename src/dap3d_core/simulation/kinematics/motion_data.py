@@ -10,9 +10,10 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model.rotations import angular_velocities
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import Result, RunMetadata
 from dap3d_core.result.arrays import Arrays
@@ -23,11 +24,8 @@ from dap3d_core.result.quantities.measured_data import MeasuredData, read_measur
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import displaced, extent
-from dap3d_core.simulation.kinematics.path import spin
 from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags
 from dap3d_core.simulation.redundancy.freedoms import motion_words
-
-Floats = NDArray[np.float64]
 
 #: Degree of the splines; the fewest instants, which a spline of degree 3 goes through.
 DEGREE, FEWEST = 5, 4
@@ -136,8 +134,7 @@ def differentiated(t: Floats, u: Floats) -> tuple[Floats, Floats]:
     degree = DEGREE if len(t) > DEGREE else FEWEST - 1
     splines = [make_interp_spline(t, x, k=degree) for x in (r, p)]
     (v, rate), (a, second) = ([s(t, nu=order) for s in splines] for order in (1, 2))
-    n = r.shape[1]
-    w, rise = (spin(p.reshape(-1, 4), x.reshape(-1, 4)).reshape(-1, n, 3) for x in (rate, second))
+    w, rise = (angular_velocities(p, x) for x in (rate, second))
     return join(r, p, v, w), np.concatenate([a, rise], axis=-1).reshape(len(t), -1)
 
 
@@ -145,14 +142,14 @@ def _on_rows(
     evaluator: Evaluator, t: float, u: Floats, v_dot: Floats, chosen: Flags
 ) -> tuple[Floats, Floats]:
     """A state and accelerations brought onto the rows, by the least change."""
-    n, before = evaluator.model.body_count, np.inf
+    before = np.inf
     for _ in range(MOST_PASSES):
         rows = ChosenRows(evaluator, t, u, chosen)
         change = rows.least(rows.rows.C)
         size = extent(evaluator, change)
         if size <= SETTLED or (size <= ROUNDING and size > 0.5 * before):
             break
-        u, before = displaced(u, -change.reshape(n, 6), n), size
+        u, before = displaced(u, -change), size
     else:
         raise SimulationError(
             f"at t = {t:.6g} s the motion does not fit the joints of the scene: no pose near it is "
@@ -194,7 +191,7 @@ class _Fit:
 
     def pose(self, k: int, start: Floats) -> Floats:
         """The state (13 n,), without velocities, at instant k from one near it."""
-        t, n = float(self.data.t[k]), self.evaluator.model.body_count
+        t = float(self.data.t[k])
         target = np.array([self.data.values[label][k] for label in self._labels])
         measured = np.isfinite(target)
         u, before = start, np.inf
@@ -214,7 +211,7 @@ class _Fit:
             size = extent(self.evaluator, change)
             if not np.isfinite(size):
                 break
-            u = displaced(u, (min(1.0, MOST_CHANGE / max(size, 1e-300)) * change).reshape(n, 6), n)
+            u = displaced(u, min(1.0, MOST_CHANGE / max(size, 1e-300)) * change)
             if size <= SETTLED or (size <= ROUNDING and size > 0.5 * before):
                 found = np.abs(self._gap(target, self._values(np.array([t]), u[None])[:, 0]))
                 for label, gap in zip(self._labels, found, strict=True):
@@ -231,7 +228,7 @@ class _Fit:
         """Values (labels,) of the quantities, and slopes (labels, 6 n) by central differences."""
         n = self.evaluator.model.body_count
         steps = SPAN * np.vstack([np.zeros(6 * n), np.eye(6 * n), -np.eye(6 * n)])
-        near = np.array([displaced(u, step.reshape(n, 6), n) for step in steps])
+        near = np.array([displaced(u, step) for step in steps])
         values = self._values(np.full(len(near), t), near)
         ahead, behind = values[:, 1 : 6 * n + 1], values[:, 6 * n + 1 :]
         return values[:, 0], (ahead - behind) / (2.0 * SPAN)

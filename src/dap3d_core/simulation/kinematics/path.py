@@ -16,14 +16,13 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model.rotations import angular_velocities, euler_rates
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.simulation.initial.assemble import displaced, extent, finite_rows
 from dap3d_core.simulation.kinematics.pose_equations import LinearisedRows
-
-Floats = NDArray[np.float64]
 
 #: Newton stops behind a correction (rad, or parts of the model) whose product with the one behind
 #: which rows were factored is this: the size of the next; or where corrections no longer shrink.
@@ -182,9 +181,9 @@ class KinematicPath:
 
     def _stepped(self, start: Pose, t: float) -> tuple[Pose, float] | None:
         """The pose at t from a near one, and the size of its correction; None where none is."""
-        h, n = t - start.t, self.evaluator.model.body_count
+        h = t - start.t
         way = h * velocities_of(start.u) + 0.5 * h * h * start.v_dot
-        closed = self._newton(t, displaced(start.u, way.reshape(n, 6), n))
+        closed = self._newton(t, displaced(start.u, way))
         if closed is None:
             return None
         u, correction = closed
@@ -208,7 +207,7 @@ class KinematicPath:
 
     def _newton(self, t: float, u: Floats) -> tuple[Floats, float] | None:
         """A state whose positions are closed, and the size of the first correction; or None."""
-        first, before, n = 0.0, np.inf, self.evaluator.model.body_count
+        first, before = 0.0, np.inf
         rows = self._rows(t, u)
         C = rows.rows.C
         for passes in range(MOST_PASSES):
@@ -218,7 +217,7 @@ class KinematicPath:
                 first = factored_at = size
             if not np.isfinite(size) or size > max(MOST_TURN, 4.0 * before):
                 return None
-            u = displaced(u, -change.reshape(n, 6), n)
+            u = displaced(u, -change)
             if size * factored_at <= CLOSED or (size <= ROUNDING and size > 0.5 * before):
                 return u, first
             if factored_at > FACTORED_ANEW:
@@ -278,19 +277,7 @@ class KinematicPath:
         unit = p / np.linalg.norm(p, axis=1, keepdims=True)
         rows = self._rows(float(t), join(r, unit, 0.0 * r, 0.0 * r))
         v, w = _by_body(rows.solve(rows.rows.nu))
-        return np.concatenate([v.ravel(), turned(w, p).ravel()])
-
-
-def turned(w: Floats, p: Floats) -> Floats:
-    """(n, 4) 1/2 (0, w) o p: rates of Euler parameters at global angular velocities (n, 3)."""
-    e0, e = p[:, :1], p[:, 1:]
-    return 0.5 * np.hstack([-np.sum(e * w, axis=1, keepdims=True), e0 * w + np.cross(w, e)])
-
-
-def spin(p: Floats, rate: Floats) -> Floats:
-    """(n, 3) 2 G rate: the angular velocity of rates (n, 4) of Euler parameters, global."""
-    e0, e = p[:, :1], p[:, 1:]
-    return 2.0 * (-e * rate[:, :1] + e0 * rate[:, 1:] + np.cross(e, rate[:, 1:]))
+        return np.concatenate([v.ravel(), euler_rates(p, w).ravel()])
 
 
 def _by_body(v: Floats) -> tuple[Floats, Floats]:
@@ -308,8 +295,8 @@ def _velocity(y: Floats, y_dot: Floats, y_ddot: Floats) -> tuple[Floats, Floats]
     """(6 n,) velocities and accelerations of y = (r, p) and its derivatives."""
     (_, p), (v, rate), (a, second) = (_parts(part) for part in (y, y_dot, y_ddot))
     p, rate, second = (part.reshape(-1, 4) for part in (p, rate, second))
-    pairs = ((v, spin(p, rate)), (a, spin(p, second)))  # G_dot p_dot = 0
-    first, other = (np.hstack([x.reshape(-1, 3), w]).ravel() for x, w in pairs)
+    w, alpha = angular_velocities(p, rate), angular_velocities(p, second)  # G_dot p_dot = 0
+    first, other = (np.hstack([x.reshape(-1, 3), z]).ravel() for x, z in ((v, w), (a, alpha)))
     return first, other
 
 
@@ -320,8 +307,8 @@ def _interpolated(one: Pose, other: Pose, t: float) -> tuple[Floats, Floats, Flo
     for pose in (one, other):
         r, p, v, w = split(pose.u)
         a, alpha = _by_body(pose.v_dot)
-        rate = turned(w, p)
-        second = turned(alpha, p) + turned(w, rate)
+        rate = euler_rates(p, w)
+        second = euler_rates(p, alpha) + euler_rates(rate, w)
         ends.append([np.concatenate([x.ravel(), z.ravel()])
                      for x, z in ((r, p), (v, rate), (a, second))])  # fmt: skip
     (y0, v0, a0), (y1, v1, a1) = ends

@@ -7,12 +7,12 @@ from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import to_body, to_global
 from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.initial.assemble import finite_rows
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
 #: Motions whose singular value is below this are left out of solutions.

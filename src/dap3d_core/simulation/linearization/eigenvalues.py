@@ -13,7 +13,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from dap3d_core.kernels.array_types import Floats
+
 Complex = NDArray[np.complex128]
 
 #: A singular value below this part of the matrix's terms, times the root of their number, is zero.

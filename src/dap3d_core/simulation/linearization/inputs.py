@@ -1,24 +1,23 @@
 """Inputs of linearised equations: numbers of force elements, factors on them, drivers."""
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.loop_derivatives import differentiate_loop
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group
 from dap3d_core.model.element_states import first_states
 from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import UnknownNameError, unknown
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
 from dap3d_core.simulation.linearization.state_space import DriverRows
-
-Floats = NDArray[np.float64]
 
 #: Kinds of fields that may be inputs.
 NUMBERS = ("number", "vec3")
@@ -167,9 +166,22 @@ def _force(
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
         if kind == "wrench" and number in group.members:
             unit, columns = _columns(group, name, field) if field else ("1", [])
-            wrench[:] = _wrench(point, evaluator, loop, group, number, columns)
+            differentiated = partial(
+                differentiate_loop, group.type_info, t=point.t, arrays=evaluator.system,
+                group=tuple(evaluator.system.groups[loop].tolist()), numbers=columns,
+            )  # fmt: skip
+            mine = group.members == number
+            own = differentiated(what="wrench")
+            value, slope = own.outputs["wrench"]
+            part = slope[..., -1] if columns else value  # (m, slots, 6)
+            forces = np.zeros((point.model.body_count + 1, 6))
+            np.add.at(forces, own.bodies[mine][:, : value.shape[1]], part[mine])
+            wrench[:] = forces[1:].ravel()
             if columns and group.type_info.layout.states:
-                _rate(point, evaluator, loop, group, number, columns, rate)
+                slope = differentiated(what="rate").outputs["rate"][1][..., -1]
+                firsts = first_states(point.model.acting, group)
+                for first, part in zip(firsts[mine], slope[mine], strict=True):
+                    rate[first : first + len(part)] = part
             return unit
     raise UnknownNameError(f"input {name!r}: {element} acts by reactions of joints alone")
 
@@ -202,44 +214,3 @@ def _columns(group: Group, name: str, field: str) -> tuple[str, list[int]]:
         return specs[field].unit or "1", [offset + AXES.index(axis)]
     what = f"a component of {field} (x, y or z)" if shape == (3,) else f"{field} alone"
     raise UnknownNameError(f"input {name!r}: name {what}")
-
-
-def _rate(
-    point: OperatingPoint,
-    evaluator: Evaluator,
-    loop: int,
-    group: Group,
-    number: int,
-    columns: list[int],
-    rate: Floats,
-) -> None:
-    """Rates (s,) of the states of a force by one of its numbers."""
-    system = evaluator.system
-    i0, p0, count = system.groups[loop].tolist()
-    own = differentiate_loop(group.type_info, "rate", point.t, system, (i0, p0, count),
-                             numbers=columns)  # fmt: skip
-    slope = own.outputs["rate"][1][..., -1]
-    for first, part in zip(first_states(point.model.acting, group)[group.members == number],
-                           slope[group.members == number], strict=True):  # fmt: skip
-        rate[first : first + len(part)] = part
-
-
-def _wrench(
-    point: OperatingPoint,
-    evaluator: Evaluator,
-    loop: int,
-    group: Group,
-    number: int,
-    columns: list[int],
-) -> Floats:
-    """(6 n,) force by one input."""
-    system = evaluator.system
-    i0, p0, count = system.groups[loop].tolist()
-    own = differentiate_loop(group.type_info, "wrench", point.t, system, (i0, p0, count),
-                             numbers=columns)  # fmt: skip
-    value, slope = own.outputs["wrench"]
-    part = slope[..., -1] if columns else value  # (m, slots, 6)
-    result = np.zeros((point.model.body_count + 1, 6))
-    mine = group.members == number
-    np.add.at(result, own.bodies[mine][:, : value.shape[1]], part[mine])
-    return result[1:].ravel()

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -19,7 +20,6 @@ from dap3d_core.simulation.linearization.outputs import Outputs, output_derivati
 from dap3d_core.simulation.linearization.sparse_modes import lowest_eigenvalues
 from dap3d_core.simulation.linearization.state_space import DriverRows, StateSpace, state_space
 
-Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: Bodies beyond which only the lowest modes are computed unless more are requested.

@@ -5,13 +5,13 @@ from contextlib import suppress
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import INFORMATION, Result, RunMetadata
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import correct_initial
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
 
-Floats = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: Largest rotation of a body that is shown, rad.

@@ -6,13 +6,13 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
-from dap3d_core.formulations import FORMULATIONS, WATCH
+from dap3d_core.formulations import WATCH
 from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.reactions import reaction_names
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import dense_rank
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import join
@@ -27,8 +27,7 @@ from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
 from dap3d_core.simulation.linearization.steady_motion import SteadyFrames, steady_frames
 from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
-
-Floats = NDArray[np.float64]
+from dap3d_core.simulation.settings import compiled_exactly
 
 #: Residuals of the constraints beyond this make a state unfit, in m and m/s.
 OFF_CONSTRAINTS = 1e-6
@@ -94,11 +93,7 @@ def operating_point(
 ) -> OperatingPoint:
     """The state to linearise about; arguments and errors as of ``linearize``."""
     t = time_of(t)
-    if isinstance(scene, CompiledModel) and FORMULATIONS[scene.method].is_exact:
-        compiled = scene
-    else:
-        scene = scene.scene if isinstance(scene, CompiledModel) else scene
-        compiled = CompiledModel(scene, method="auto", allow_code=allow_code)
+    compiled = compiled_exactly(scene, allow_code)
     model = compiled.model
     notes: list[str] = []
     with compiled.borrow_evaluator() as evaluator:

@@ -9,16 +9,14 @@ from collections.abc import Sequence
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import split
 from dap3d_core.result import Result, RunMetadata, UnknownNameError, find
 from dap3d_core.simulation.linearization.inputs import Inputs
 from dap3d_core.simulation.linearization.mode_motion import displaced_state
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
 from dap3d_core.simulation.linearization.state_space import StateSpace
-
-Floats = NDArray[np.float64]
 
 #: Abscissae and weights of the sixth-order central difference.
 ABSCISSAE = np.array([-3.0, -2.0, -1.0, 1.0, 2.0, 3.0])

@@ -18,13 +18,12 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import skew
 from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.linearization.steady_motion import SteadyFrames
 from dap3d_core.simulation.linearization.tangent import TangentMatrices
-
-Floats = NDArray[np.float64]
 
 
 @attrs.frozen(eq=False, kw_only=True)

@@ -11,15 +11,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.linear.rank.rank import Dependency
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, order_of
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
 from dap3d_core.simulation.linearization.steady_motion import independent_rows
-
-Floats = NDArray[np.float64]
 
 #: sigma as a part of the frequency that the largest terms would give.
 SHIFT = 1e-4

@@ -18,11 +18,9 @@ where rows depend on them they are in x^ and v^, as those of drivers are.
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
-
-Floats = NDArray[np.float64]
 
 
 @attrs.frozen(eq=False, kw_only=True)

@@ -23,13 +23,12 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import Dependency
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.linearization.tangent import TangentMatrices
-
-Floats = NDArray[np.float64]
 
 #: Accelerations beyond those of the steady motion, as a part of those that forces would give.
 STEADY = 1e-7

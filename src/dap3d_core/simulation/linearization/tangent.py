@@ -21,18 +21,19 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.formulations.common.sparse_entries import SparseEntries, components
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.loop_derivatives import LoopDerivatives, differentiate_loop
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model import Group, Model
 from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split, velocities_of
+from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.errors import SimulationError
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.common.state_derivatives import StateDerivatives
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 
 #: Names that an error message lists.
 MOST_NAMES = 6
@@ -147,29 +148,6 @@ def _check_states(model: Model, own: "StateDerivatives", t: float) -> None:
         )
 
 
-class _Entries:
-    """Entries of a sparse matrix; those at one place add up."""
-
-    def __init__(self, rows: int, columns: int) -> None:
-        self.shape = rows, columns
-        self._parts: list[tuple[Integers, Integers, Floats]] = []
-
-    def add(self, row: Integers, column: Integers, value: Floats) -> None:
-        """Add entries; negative rows or columns are left out. Arguments broadcast."""
-        row, column, value = (x.ravel() for x in np.broadcast_arrays(row, column, value))
-        chosen = (row >= 0) & (column >= 0) & (value != 0.0)
-        self._parts.append((row[chosen], column[chosen], value[chosen]))
-
-    def matrix(self) -> Any:
-        """The matrix, as a scipy CSR array."""
-        from scipy.sparse import csr_array
-
-        none = np.zeros(0, dtype=np.int64)
-        row, column, value = zip((none, none, np.zeros(0)), *self._parts, strict=True)
-        places = np.concatenate(row), np.concatenate(column)
-        return csr_array((np.concatenate(value), places), shape=self.shape)
-
-
 class _Assembly:
     """Adds up the derivatives of all elements."""
 
@@ -182,11 +160,11 @@ class _Assembly:
         six, rows = 6 * model.body_count, model.row_count
         self.f = np.zeros(six)
         names = ("stiffness", "damping")
-        self.entries = {name: _Entries(six, six) for name in names}
-        self.entries["friction_by_multipliers"] = _Entries(six, rows)
+        self.entries = {name: SparseEntries(six, six) for name in names}
+        self.entries["friction_by_multipliers"] = SparseEntries(six, rows)
         for name in ("velocity_by_displacement", "acceleration_by_displacement",
                      "acceleration_by_velocity"):  # fmt: skip
-            self.entries[name] = _Entries(rows, six)
+            self.entries[name] = SparseEntries(rows, six)
         _, _, v, w = split(u)
         ground = np.zeros((1, 6))
         self.v = np.vstack([ground, np.hstack([v, w])])
@@ -218,7 +196,7 @@ class _Assembly:
     def _add_forces(self, kind: str, group: Group, own: LoopDerivatives) -> None:
         value, slope = own.outputs[kind]
         slots = value.shape[1]
-        row = _components(own.bodies[:, :slots])  # (m, slots, 6)
+        row = components(own.bodies[:, :slots])  # (m, slots, 6)
         np.add.at(self.f, row[row >= 0], value[row >= 0])
         self._add_by_motion(own.bodies, row, -slope, "stiffness", "damping")
         if kind == "friction":
@@ -238,7 +216,7 @@ class _Assembly:
         start = self.model.joint_start[group.members]
         row = start[:, None] + np.arange(rows)  # (m, rows)
         reaction = np.einsum("msrcd,mr->mscd", J_slope, self.multipliers[row])
-        self._add_by_motion(own.bodies, _components(bodies), -reaction, "stiffness", "damping")
+        self._add_by_motion(own.bodies, components(bodies), -reaction, "stiffness", "damping")
         rate = np.einsum("msrcd,msc->mrd", J_slope, self.v[bodies]) - own.outputs["nu"][1]
         self._add_by_motion(own.bodies, row, rate, "velocity_by_displacement", None)
         acceleration = np.einsum("msrcd,msc->mrd", J_slope, self.a_of_body[bodies])
@@ -250,7 +228,7 @@ class _Assembly:
         self, bodies: Integers, row: Integers, slope: Floats, positions: str, velocities: str | None
     ) -> None:
         """Add slopes (*row.shape, d) to the matrices of displacements and of velocities."""
-        columns = _components(bodies)  # (m, places, 6)
+        columns = components(bodies)  # (m, places, 6)
         more = (1,) * (row.ndim - 1)
         for place in range(bodies.shape[1]):
             column = columns[:, place].reshape(len(bodies), *more, 6)
@@ -270,7 +248,7 @@ class _Assembly:
         blocks[:, :3, :3] = model.mass[:, None, None] * np.eye(3)
         blocks[:, 3:, 3:] = J
         place = np.arange(6 * n).reshape(n, 6)
-        mass = _Entries(6 * n, 6 * n)
+        mass = SparseEntries(6 * n, 6 * n)
         mass.add(place[:, :, None], place[:, None, :], blocks)
         h, alpha = _times(J, w), self.a.reshape(n, 6)[:, 3:]
         self.f[place[:, 3:]] -= np.cross(w, h)
@@ -291,18 +269,11 @@ class _Assembly:
         is_joint = group.type_info.type.kind == "joint" and kind == "acceleration"
         names = model.joint_names if is_joint else model.force_names
         words = list(dict.fromkeys(names[int(k)] for k in group.members[wrong]))
-        more = f" and {len(words) - MOST_NAMES} more" if len(words) > MOST_NAMES else ""
-        listed = ", ".join(words[:MOST_NAMES]) + more
         return (
-            f"{'joint' if is_joint else 'force'} {listed} has no derivative at t = {self.t:g} s: "
-            "the equations cannot be linearised here; move the state off this point"
+            f"{'joint' if is_joint else 'force'} {some(words, MOST_NAMES)} has no derivative at "
+            f"t = {self.t:g} s: the equations cannot be linearised here; move the state off this "
+            "point"
         )
-
-
-def _components(bodies: Integers) -> Integers:
-    """(..., 6) components of bodies (...); -1 for ground."""
-    first = 6 * (bodies[..., None] - 1) + np.arange(6)
-    return np.where(bodies[..., None] > 0, first, -1)
 
 
 def _times(J: Floats, w: Floats) -> Floats:

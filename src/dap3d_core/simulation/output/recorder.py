@@ -8,9 +8,9 @@ from pathlib import Path
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.result import Result, ResultError, ResultWriter, RunMetadata, check_target
 from dap3d_core.result.arrays import LARGE, Arrays, arrays_of, joined
@@ -18,8 +18,6 @@ from dap3d_core.result.file.atomic_write import check_utf8
 from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.open import arrays_in
 from dap3d_core.simulation.failure.negative_reactions import Pulling
-
-Floats = NDArray[np.float64]
 
 #: A run that lasts longer writes its rows to disk as they come, so that it may be killed.
 SHORT_SECONDS = 1.0

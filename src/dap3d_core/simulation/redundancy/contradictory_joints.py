@@ -6,10 +6,10 @@ moment's rounding, so that the joints are put together a little later, too.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.simulation.errors import AssemblyError
@@ -19,11 +19,8 @@ from dap3d_core.simulation.initial.assemble import (
     displaced,
     extent,
     finite_rows,
-    model_size,
 )
 from dap3d_core.simulation.redundancy.near_redundant import HELD
-
-Floats = NDArray[np.float64]
 
 #: Rows beyond which nothing is looked for.
 MOST_ROWS = 300
@@ -84,8 +81,7 @@ def _out_of_reach(evaluator: Evaluator, t: float, u: Floats) -> str:
 
 def _closed(evaluator: Evaluator, u: Floats, t: float, later: float) -> Floats | None:
     """The bodies at a later time, put together; None where they cannot be."""
-    n = evaluator.model.body_count
-    moved = displaced(u, (later - t) * velocities_of(u).reshape(n, -1), n)
+    moved = displaced(u, (later - t) * velocities_of(u))
     try:
         return correct_positions(evaluator, moved, later, NONE)[0]
     except AssemblyError:
@@ -130,7 +126,7 @@ def _come_to_hold(evaluator: Evaluator, t: float, u: Floats, rank: int) -> str:
     """Joints whose rows depended on each other at the start and nearly do."""
     rows: ConstraintRows = evaluator.rows(t, u)
     left, values, _ = np.linalg.svd(rows.dense(), full_matrices=False)
-    fit = FIT * min(1.0, model_size(evaluator))
+    fit = FIT * min(1.0, evaluator.model.size)
     held = [k for k in range(rank, len(values)) if fit < values[k] < HELD * values[0]]
     if not held:
         return ""

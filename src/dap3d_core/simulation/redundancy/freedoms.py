@@ -1,16 +1,14 @@
 """Freedoms that joints and drivers leave, in words: the bodies that move, and how."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model import Model
 from dap3d_core.simulation.initial.assemble import finite_rows
 from dap3d_core.simulation.redundancy.redundancy import rank_of
-
-Floats = NDArray[np.float64]
 
 #: Parts of a motion smaller than this part of the largest are not named.
 NAMED = 1e-6

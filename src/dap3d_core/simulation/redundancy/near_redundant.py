@@ -11,22 +11,14 @@ away from it. So it is tried: who can be put together along that motion does not
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import (
-    FIT,
-    correct_positions,
-    displaced,
-    fit_of,
-    model_size,
-)
-
-Floats = NDArray[np.float64]
+from dap3d_core.simulation.initial.assemble import FIT, correct_positions, displaced, fit_of
 
 #: From this part of the largest singular value on rows are held: the root of the regularisation of
 #: lsq, 1e-9 of a row's square.
@@ -79,21 +71,19 @@ def bindings(
         if any(_leads_away(evaluator, u, t, sign * right[k]) for sign in (1.0, -1.0)):
             continue
         taking = np.abs(left[:, k]) > PART_TAKEN * np.max(np.abs(left[:, k]))
-        owners = np.searchsorted(model.joint_start, np.flatnonzero(taking), side="right") - 1
-        joints = tuple(model.joint_names[j] for j in np.unique(owners))
+        joints = tuple(model.row_owners(np.flatnonzero(taking)))
         found.append(Binding(joints, float(values[k])))
     return tuple(found)
 
 
 def _leads_away(evaluator: Evaluator, u: Floats, t: float, direction: Floats) -> bool:
     """True if the joints can be closed at another pose in this direction (6 n,)."""
-    n, size = evaluator.model.body_count, model_size(evaluator)
-    step = direction.reshape(n, 6) * np.repeat([evaluator.model.length, 1.0], 3)
+    step = direction.reshape(-1, 6) * np.repeat([evaluator.model.length, 1.0], 3)
     extent = max(
-        float(np.max(np.linalg.norm(step[:, :3], axis=1))) / (SHIFT * size),
+        float(np.max(np.linalg.norm(step[:, :3], axis=1))) / (SHIFT * evaluator.model.size),
         float(np.max(np.linalg.norm(step[:, 3:], axis=1))) / TURN,
     )
-    moved = displaced(u, step / extent, n)
+    moved = displaced(u, step / extent)
     try:
         closed, _ = correct_positions(evaluator, moved, t, np.zeros(0, dtype=np.int64))
     except AssemblyError:

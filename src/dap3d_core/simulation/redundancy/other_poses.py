@@ -7,10 +7,10 @@ position rows leave free, put together again, and the rank is taken there.
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import (
@@ -18,11 +18,8 @@ from dap3d_core.simulation.initial.assemble import (
     displaced,
     finite_rows,
     least_change,
-    model_size,
 )
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, rank_of
-
-Floats = NDArray[np.float64]
 
 #: Poses that are tried up to this many rows; beyond, the last number.
 POSES = ((300, 3), (1000, 2), (10**9, 1))
@@ -72,24 +69,21 @@ class GenericRank:
         )
 
 
-def redundancy_elsewhere(
-    evaluator: Evaluator, u: Floats, redundancy: Redundancy, t: float = 0.0
-) -> GenericRank:
-    """Take the rank at other poses that the joints allow; the same ones each time.
+def redundancy_elsewhere(evaluator: Evaluator, u: Floats, redundancy: Redundancy) -> GenericRank:
+    """Take the rank at other poses that the joints allow at t = 0; the same ones each time.
 
     Args:
         evaluator: the model.
         u: (13 n,) an assembled state.
         redundancy: that of u.
-        t: time, s; functions of time stand still.
     """
     rows = evaluator.model.row_count
     count = next(number for limit, number in POSES if rows <= limit)
     ranks = []
     for k in range(count):
-        other = _other_pose(evaluator, u, t, np.random.default_rng(k))
+        other = _other_pose(evaluator, u, np.random.default_rng(k))
         if other is not None:
-            rows_there = finite_rows(evaluator, t, other)
+            rows_there = finite_rows(evaluator, 0.0, other)
             ranks.append(
                 rank_of(evaluator, scaled_rows(rows_there, evaluator.model.length)[0]).rank
             )
@@ -99,29 +93,26 @@ def redundancy_elsewhere(
     return GenericRank(tuple(ranks), redundant, redundant == redundancy.rank.redundant)
 
 
-def _other_pose(
-    evaluator: Evaluator, u: Floats, t: float, rng: np.random.Generator
-) -> Floats | None:
+def _other_pose(evaluator: Evaluator, u: Floats, rng: np.random.Generator) -> Floats | None:
     """A state at another pose, or None where the joints allow none."""
-    n, size = evaluator.model.body_count, model_size(evaluator)
-    rows = finite_rows(evaluator, t, u)
+    n, size = evaluator.model.body_count, evaluator.model.size
+    rows = finite_rows(evaluator, 0.0, u)
     wish = rng.standard_normal((n, 6))
     wish[:, :3] *= size
     wish = wish.ravel()
-    flow = rows.value * wish[rows.column]
-    product: Floats = np.bincount(rows.row, flow, minlength=rows.shape[0]).astype(float)
-    free = (wish - least_change(evaluator, rows, product, t, NONE)).reshape(n, 6)
+    free = wish - least_change(evaluator, rows, rows.product(wish), 0.0, NONE)
+    free = free.reshape(n, 6)
     if np.linalg.norm(free) <= FREE * np.linalg.norm(wish):
         return None
     extent = max(_largest(free[:, :3]) / (SHIFT * size), _largest(free[:, 3:]) / TURN)
     for halving in range(HALVINGS + 1):
         step = free / (extent * 2.0**halving)
         try:
-            other, _ = correct_positions(evaluator, displaced(u, step, n), t, NONE)
+            other, _ = correct_positions(evaluator, displaced(u, step), 0.0, NONE)
         except AssemblyError:
             continue
         gone = np.linalg.norm(coordinates_of(other - u))
-        if gone > ANOTHER * np.linalg.norm(coordinates_of(displaced(u, step, n) - u)):
+        if gone > ANOTHER * np.linalg.norm(coordinates_of(displaced(u, step) - u)):
             return other
     return None
 

@@ -5,10 +5,10 @@ from typing import Any
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import (
     DENSE_ROWS,
     WEIGHT,
@@ -18,11 +18,10 @@ from dap3d_core.linear.rank.rank import (
     sparse_rank,
 )
 from dap3d_core.model import Model
+from dap3d_core.registry.suggestions import some
 from dap3d_core.simulation.initial.assemble import finite_rows, fit_of
 from dap3d_core.simulation.initial.singular_start import SingularStart, singular_start
 from dap3d_core.simulation.redundancy.near_redundant import Binding, bindings
-
-Floats = NDArray[np.float64]
 
 #: Redundant rows whose combination misses zero by more than this contradict each other: per unit of
 #: the largest right-hand side, where that is above one.
@@ -167,9 +166,9 @@ class Redundancy:
         alike: dict[str, list[str]] = {}
         for reaction in self.reactions():
             alike.setdefault(reaction.describe(), []).append(reaction.joint)
-        lines = [f"{words}: {some(names)}" for words, names in alike.items()]
+        lines = [f"{words}: {some(names, MOST_NAMES)}" for words, names in alike.items()]
         if lines and self.unique_joints:
-            lines.append(f"unique: {some(self.unique_joints)}")
+            lines.append(f"unique: {some(self.unique_joints, MOST_NAMES)}")
         return lines
 
     def describe(self) -> str:
@@ -188,8 +187,9 @@ class Redundancy:
     def describe_groups(self) -> str:
         """The joints that share a freedom, by groups."""
         if len(self.groups) == 1:
-            return f"The joints that share a freedom: {some(self.joints)}"
-        words = [f"{some(g.joints)} ({g.redundant} rows)" for g in self.groups[:MOST_NAMES]]
+            return f"The joints that share a freedom: {some(self.joints, MOST_NAMES)}"
+        first = self.groups[:MOST_NAMES]
+        words = [f"{some(g.joints, MOST_NAMES)} ({g.redundant} rows)" for g in first]
         more = len(self.groups) - len(words)
         words += [f"{more} more"] if more else []
         return f"The joints that share a freedom, in {len(self.groups)} groups: {'; '.join(words)}"
@@ -202,15 +202,9 @@ class Redundancy:
             "acceleration": "what they ask of the accelerations disagrees by",
         }
         return [
-            f"{some(c.joints)} contradict each other: {what[c.level]} {c.size:.3g}"
+            f"{some(c.joints, MOST_NAMES)} contradict each other: {what[c.level]} {c.size:.3g}"
             for c in self.contradictions
         ] + [binding.words for binding in self.bindings]
-
-
-def some(names: Sequence[str], most: int = MOST_NAMES) -> str:
-    """Names in a row, the first of many."""
-    more = len(names) - most
-    return ", ".join(names[:most]) + (f" and {more} more" if more > 0 else "")
 
 
 def redundancy_of(evaluator: Evaluator, u: Floats, t: float = 0.0) -> Redundancy:
@@ -301,7 +295,7 @@ def _contradictions(
     if not dependencies:
         return found
     v = u[-rows.shape[1] :] / np.tile(np.repeat([model.length, 1.0], 3), model.body_count)
-    off = np.bincount(rows.row, rows.value * v[rows.column], minlength=rows.shape[0]) - rows.nu
+    off = rows.product(v) - rows.nu
     moving_along = float(np.max(np.abs(off))) <= MOVING_ALONG * max(1.0, float(np.max(np.abs(v))))
     for dependency in dependencies:
         open_ = _judged(model, dependency, rows.C, gradient, "position")

@@ -1,14 +1,12 @@
 """The states between the steps of a run, kept as they are and reported later."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.stepping.hold import quick_view
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.control.held_inputs import HeldInputs
-
-Floats = NDArray[np.float64]
 
 #: Rows that there is room for at first; it doubles.
 FIRST_ROWS = 1024

@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.result import ResultError, current_versions
 from dap3d_core.result.arrays import LARGE
 from dap3d_core.result.file.checksum import check_checksums, check_signature
@@ -31,8 +31,6 @@ from dap3d_core.study.study import Batch, PointStatus
 if TYPE_CHECKING:
     import xarray
 
-Floats = NDArray[np.float64]
-Integers = NDArray[np.int64]
 Read = TypeVar("Read")
 
 #: Version of the format, raised when an older reader would misread it.

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.kernels.array_types import Integers
 from dap3d_core.result import ResultError
 from dap3d_core.result.file.atomic_write import cannot, put_in_place
 from dap3d_core.result.file.checksum import WHOLE, check_checksums, check_signature, write_checksums
@@ -18,8 +19,6 @@ from dap3d_core.study.study import Batch, PointStatus
 from dap3d_core.study.sweep.dataset import SweepLayout, check_format
 from dap3d_core.study.sweep.file_claim import FileLock
 from dap3d_core.study.sweep.schema import boxes, define, note_letters
-
-Integers = NDArray[np.int64]
 
 #: Seconds, and bytes of values, after which points are written.
 EVERY, MOST_WAITING = 2.0, 2**26

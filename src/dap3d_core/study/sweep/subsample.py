@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from dap3d_core.kernels.array_types import Integers
 
 if TYPE_CHECKING:
     import xarray
 
-Integers = NDArray[np.int64]
 
 #: Variables of up to so many bytes are read whole: single values from a file take far longer.
 READ_WHOLE = 2**30

@@ -6,8 +6,9 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.testing.checks.findings import FAILED, LEFT_OUT, OK, CheckOutcome, Finding
-from dap3d_core.testing.samples.random_state import Direction, Floats
+from dap3d_core.testing.samples.random_state import Direction
 from dap3d_core.testing.samples.sampled_type import Sample, SampledType
 
 #: Tolerances relative to the largest number compared: a derivative by complex step has the rounding

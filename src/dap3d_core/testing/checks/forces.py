@@ -6,9 +6,10 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.examine.random_values import numbers, random_pose
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.testing.checks.compare import Comparison, body_words, rates
 from dap3d_core.testing.checks.findings import CheckOutcome
-from dap3d_core.testing.samples.random_state import Direction, Floats, State, rotation
+from dap3d_core.testing.samples.random_state import Direction, State, rotation
 from dap3d_core.testing.samples.sampled_type import UNDEFINED, Sample, SampledType
 
 # Texts of findings: formats of the wrong number x and of further words.

@@ -6,6 +6,7 @@ import numpy as np
 
 from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.testing.checks.compare import (
     DIFFERENCE_TOLERANCE,
     Comparison,
@@ -15,7 +16,7 @@ from dap3d_core.testing.checks.compare import (
 )
 from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.checks.forces import rigid_motion
-from dap3d_core.testing.samples.random_state import Direction, Floats
+from dap3d_core.testing.samples.random_state import Direction
 from dap3d_core.testing.samples.sampled_type import (
     Sample,
     SampledType,

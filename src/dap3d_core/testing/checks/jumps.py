@@ -5,10 +5,11 @@ import numpy as np
 
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.testing.checks.compare import Comparison, body_words, rates
 from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.checks.forces import rigid_motion
-from dap3d_core.testing.samples.random_state import Direction, Floats, State, rotation
+from dap3d_core.testing.samples.random_state import Direction, State, rotation
 from dap3d_core.testing.samples.sampled_type import Sample, SampledType
 
 #: Factors of the random velocities: both senses, and fast enough for what rests below a speed.

@@ -7,12 +7,7 @@ import numpy as np
 
 from dap3d_core.assembly.motion.classify import classify_group
 from dap3d_core.assembly.motion.joint_motion import JointMotions
-from dap3d_core.assembly.motion.refusals import (
-    NOT_CLOSED,
-    ON_TIME,
-    refusal_of,
-    refused_joints,
-)
+from dap3d_core.assembly.motion.refusals import NOT_CLOSED, ON_TIME, refusal_of, refused_joints
 from dap3d_core.assembly.motion.wording import axis_words, motion_words
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import specs_of

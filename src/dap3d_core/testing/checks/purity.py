@@ -11,6 +11,7 @@ import numpy as np
 
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, kernels_of
 from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.kernels.runtime.outer_references import codes_in
 from dap3d_core.kernels.runtime.source_digest import reached
 from dap3d_core.testing.checks.compare import Comparison, left_out
 from dap3d_core.testing.checks.findings import CheckOutcome
@@ -120,17 +121,10 @@ def _outside(kernel: Callable[..., Any]) -> Iterator[str]:
         if (function.__module__ or "").partition(".")[0] == "dap3d_core":
             continue
         where = "" if function.__code__ is kernel.__code__ else f" (in {function.__name__})"
-        for code in _codes(function.__code__):
+        for code in codes_in(function.__code__):
             for step in dis.get_instructions(code):
                 if words := _about(function, step):
                     yield f"{words}{where}"
-
-
-def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
-    yield code
-    for constant in code.co_consts:
-        if isinstance(constant, types.CodeType):
-            yield from _codes(constant)
 
 
 def _about(function: Any, step: dis.Instruction) -> str:

@@ -22,10 +22,11 @@ from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, prepared, set_ends
 from dap3d_core.interface.examine.random_values import numbers, random_field
 from dap3d_core.interface.fields import FieldSpec, specs_of
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_modules import build, source_of
 from dap3d_core.testing.samples.complex_step import STEP, Stepped
-from dap3d_core.testing.samples.random_state import BODIES, Floats, State
+from dap3d_core.testing.samples.random_state import BODIES, State
 
 #: The loop of each kernel; J of a force is computed with its impulse.
 LOOP_OF = {kernel: kind for kind, kernels in LOOP_KINDS.items() for kernel in kernels}

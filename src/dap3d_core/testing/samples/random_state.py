@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 import attrs
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.interface.examine.random_values import numbers, random_pose
 from dap3d_core.interface.fields import SLOTS
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R, V, W
-
-Floats = NDArray[np.float64]
 
 #: In place of a function of time: an input, whose value stays.
 HELD = "held"

@@ -18,16 +18,10 @@ from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
 from dap3d_core.interface.examine.random_values import numbers
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.testing.samples.cubic import Cubic, CubicOfTwo
 from dap3d_core.testing.samples.random_element import Kernels, RandomElement, RefusalError, draw
-from dap3d_core.testing.samples.random_state import (
-    BODIES,
-    HELD,
-    Direction,
-    Floats,
-    State,
-    random_state,
-)
+from dap3d_core.testing.samples.random_state import BODIES, HELD, Direction, State, random_state
 
 Cached = TypeVar("Cached")
 #: |C| of an assembled pose; maximal numbers of Newton steps and of starts.

@@ -4,6 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
+from dap3d_core.interface.formats.frames import quaternion
 from dap3d_core.model.groups import Floats
 from dap3d_core.result.model_summary import ModelSummary
 from dap3d_core.view.scene3d.elements import ORIGIN, ElementGeometry
@@ -69,18 +70,4 @@ def inertia_ellipsoid(body: int, mass: float, Jp: Floats, most: float, color: st
     semi = np.maximum(semi, 0.05 * semi.max())
     semi *= min(1.0, most / semi.max())
     axes[:, 2] *= np.sign(np.linalg.det(axes))
-    return Mark("inertia", "sphere", body, ORIGIN, plain(semi), _quaternion(axes), color, name)
-
-
-def _quaternion(A: Floats) -> Point:
-    """Euler parameters of a rotation matrix (3, 3): of the four forms the best conditioned."""
-    trace = np.array([A.trace(), *A.diagonal()])
-    k = int(np.argmax(trace))
-    square = np.empty((4, 4))
-    square[0] = [1 + A.trace(), A[2, 1] - A[1, 2], A[0, 2] - A[2, 0], A[1, 0] - A[0, 1]]
-    square[1:, 1:] = A + A.T
-    square[1:, 0] = square[0, 1:]
-    for n in range(3):
-        square[n + 1, n + 1] = 1 + 2 * A[n, n] - A.trace()
-    row = square[k]
-    return plain(row / np.linalg.norm(row))
+    return Mark("inertia", "sphere", body, ORIGIN, plain(semi), quaternion(axes), color, name)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dap3d_core.cli.console.console import clean, count, plain, seconds, size, some
+from dap3d_core.cli.console.console import clean, count, plain, seconds, size
 
 
 def test_control_characters_do_not_reach_the_terminal():
@@ -23,4 +23,3 @@ def test_numbers_for_people():
     assert sizes == ["999 bytes", "1.5 kB", "2.35 MB", "5 GB"]
     counts = [count(n, "body", "bodies") for n in (0, 1, 2000)]
     assert counts == ["no bodies", "1 body", "2,000 bodies"]
-    assert some("abc", 2) == "a, b and 1 more"

@@ -48,7 +48,7 @@ def test_rates_and_their_derivatives(evaluator):
 
     for k in range(6 * n):
         step = np.eye(6 * n)[k].reshape(n, 6)
-        by_x = difference(lambda h, s=step: evaluator.state_rates(0.0, displaced(u, h * s, n)))
+        by_x = difference(lambda h, s=step: evaluator.state_rates(0.0, displaced(u, h * s)))
         assert own.rate_by_displacement.toarray()[:, k] == pytest.approx(by_x, abs=1e-6)
         along = np.concatenate([np.zeros(7 * n), step.ravel()])
         by_v = difference(lambda h, s=along: evaluator.state_rates(0.0, u + h * s))

@@ -6,7 +6,7 @@ from support.jumping import JUMPING
 
 import dap3d_core as dap
 from dap3d_core.plot import plot
-from dap3d_core.result.post.smooth_parts import jump_times, smooth_parts
+from dap3d_core.result.post.smooth_parts import smooth_parts
 
 G, V0 = 9.81, np.sqrt(2.0 * 9.81)
 
@@ -22,7 +22,8 @@ def result():
 
 def test_parts_end_before_jumps_and_begin_after_them(result):
     """All reports are in them once; speeds at the ends are those of the impacts."""
-    parts, times = smooth_parts(result), jump_times(result)
+    parts = smooth_parts(result)
+    times = np.array([event.t for event in result.events if event.u_after is not None])
     assert len(parts) == len(times) + 1 == 4
     inner = np.concatenate([part.t for part in parts])
     np.testing.assert_array_equal(np.sort(np.concatenate([result.t, times, times])), inner)
