@@ -78,7 +78,8 @@ def test_a_full_disk_is_named_and_what_was_computed_is_kept(scene_file):
 
     What the run has written is a result, and the run goes on once there is room.
     """
-    folder = scene_file(("t_end = 0.1", "t_end = 600.0")).parent
+    steps = 't_end = 600.0\nintegrator = "rk4"\nstep = 0.01'  # so many that rows come in chunks
+    folder = scene_file(("t_end = 0.1", steps)).parent
     (folder / "disk").mkdir()
     mount = f"mount -t tmpfs -o size=2m tmpfs {folder / 'disk'}"
     if in_shell(f"unshare -m {mount}", folder).returncode:

@@ -13,7 +13,7 @@ from dap3d_core.result.arrays import LARGE, Arrays
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.checksum import check_checksums, check_signature
 from dap3d_core.result.file.lazy_arrays import LazyArrays
-from dap3d_core.result.file.library import opened, reading
+from dap3d_core.result.file.library import reading, shared
 from dap3d_core.result.file.schema import CONSTANTS, CONVENTIONS, FORMAT, SWEEP, record_of
 from dap3d_core.result.file.validate import check_attributes, check_claims, check_subject
 from dap3d_core.result.metadata import RUNNING, RunMetadata
@@ -44,16 +44,13 @@ def open_result(path: str | os.PathLike[str], rebuild: Rebuild | None = None) ->
     check_signature(file)
     check_checksums(file)
     with reading(file):
-        dataset = opened(file)
-        try:
-            _check_format(file, dataset)
-            check_claims(file, dataset)
-            summary, record, arrays = _read(dataset)
-        except BaseException:
-            dataset.close()
-            raise
-        if not isinstance(arrays, LazyArrays):
-            dataset.close()
+        content = shared(file)
+        _check_format(file, content.dataset)
+        check_claims(file, content.dataset)
+        summary, record, count = _read(content.dataset)
+        arrays: Arrays = LazyArrays(content, summary, count)
+        if 8 * count * arrays.width <= LARGE:
+            arrays = arrays.part(slice(None))
     return Result(summary, arrays, record, _origin(file, summary, record, rebuild))
 
 
@@ -64,7 +61,7 @@ def arrays_in(path: Path, summary: ModelSummary, count: int) -> LazyArrays:
         ResultError: it cannot be read.
     """
     with reading(path):
-        return LazyArrays(opened(path), summary, count)
+        return LazyArrays(shared(path), summary, count)
 
 
 def _check_format(file: Path, dataset: Any) -> None:
@@ -84,7 +81,7 @@ def _check_format(file: Path, dataset: Any) -> None:
         )
 
 
-def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, Arrays]:
+def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, int]:
     # absent in files of older programs, or where there is none
     older = {"events": "[]", "run": "", "types": "null", "actuation": "{}"}
     values = older | {name: dataset.getncattr(name) for name in dataset.ncattrs()}
@@ -97,9 +94,7 @@ def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, Arrays]:
     if record.status == RUNNING:
         count = _complete_count(dataset, count)
         record = _interrupted(dataset, record, count)
-    arrays = LazyArrays(dataset, summary, count)
-    large = 8 * count * arrays.width > LARGE
-    return summary, record, arrays if large else arrays.part(slice(None))
+    return summary, record, count
 
 
 def _subject(dataset: Any, values: dict[str, Any]) -> ModelSummary:

@@ -7,7 +7,7 @@ import numpy as np
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.result.arrays import COLUMNS, U_ERROR, Arrays, column_sizes, joined
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.file.library import NETCDF
+from dap3d_core.result.file.library import NETCDF, OpenFile
 from dap3d_core.result.file.validate import check_numbers
 from dap3d_core.result.model_summary import ModelSummary
 
@@ -18,11 +18,11 @@ class LazyArrays(Arrays):
     The file stays open: another file that takes its name meanwhile changes nothing here.
     """
 
-    def __init__(self, dataset: Any, summary: ModelSummary, count: int) -> None:
-        """Args: an open netCDF4.Dataset, its model, and the number of complete instants."""
-        self._dataset, self._count = dataset, count
+    def __init__(self, file: OpenFile, summary: ModelSummary, count: int) -> None:
+        """Args: the file, its model, and the number of complete instants."""
+        self._file, self._count = file, count
         self._sizes = {"": None, **column_sizes(summary)}
-        optional = (U_ERROR,) if U_ERROR.name in dataset.variables else ()
+        optional = (U_ERROR,) if U_ERROR.name in file.dataset.variables else ()
         self._columns = {c.name: c for c in (*COLUMNS, *optional)}
 
     def __len__(self) -> int:
@@ -73,8 +73,9 @@ class LazyArrays(Arrays):
         if size == 0:
             return np.zeros(shape)
         with NETCDF:
-            values: Floats = np.asarray(self._dataset.variables[name][rows], dtype=float)
-        file = self._dataset.filepath()
+            dataset = self._file.dataset
+            values: Floats = np.asarray(dataset.variables[name][rows], dtype=float)
+            file = dataset.filepath()
         if values.shape != shape:
             raise ResultError(
                 f"cannot read {file}: {name} has the shape {values.shape}, not {shape}"

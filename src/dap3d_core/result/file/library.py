@@ -2,16 +2,82 @@
 
 import os
 import threading
+import weakref
+from collections import deque
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Literal
 
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.atomic_write import cannot
 
+
+class Lock:
+    """A re-entrant lock; while nobody holds it, the files that were dropped are closed.
+
+    The garbage collector drops a file at any moment and in any thread, also in the midst of a call
+    of the library.
+    """
+
+    def __init__(self) -> None:
+        self._lock, self._depth = threading.RLock(), 0
+        self._dropped: deque[Any] = deque()
+
+    def __enter__(self) -> None:
+        self._lock.acquire()
+        if not self._depth:
+            self._close_dropped()
+        self._depth += 1
+
+    def __exit__(self, *_: object) -> None:
+        self._depth -= 1
+        if not self._depth:
+            self._close_dropped()
+        self._lock.release()
+
+    def drop(self, dataset: Any) -> None:
+        """Close a file that nobody uses any more: now, or when the lock is free."""
+        self._dropped.append(dataset)
+        if self._lock.acquire(blocking=False):
+            if not self._depth:
+                self._close_dropped()
+            self._lock.release()
+
+    def _close_dropped(self) -> None:
+        while self._dropped:
+            with suppress(RuntimeError):  # it is closed, or cannot be
+                self._dropped.popleft().close()
+
+
 #: The NetCDF library is not thread-safe; every use of it holds this lock.
-NETCDF = threading.RLock()
+NETCDF = Lock()
+
+
+class OpenFile:
+    """A file that stays open while one of the results that share it lasts."""
+
+    def __init__(self, dataset: Any) -> None:
+        """Args: an open netCDF4.Dataset."""
+        self.dataset = dataset
+        weakref.finalize(self, NETCDF.drop, dataset)
+
+
+_OPEN: weakref.WeakValueDictionary[tuple[int, ...], OpenFile] = weakref.WeakValueDictionary()
+
+
+def shared(path: Path) -> OpenFile:
+    """A file, opened only if no result of this process has it open; NETCDF is held.
+
+    HDF5 2.2 crashes where a file with strings is open three times, two of them are closed, and it
+    is opened again.
+    """
+    about = os.stat(path)
+    key = about.st_dev, about.st_ino, about.st_size, about.st_mtime_ns
+    file = _OPEN.get(key)
+    if file is None:
+        _OPEN[key] = file = OpenFile(opened(path))
+    return file
 
 
 def guarded(path: Path, *actions: Callable[[], Any]) -> Any:

@@ -1,6 +1,7 @@
 """Results that are too large for memory stay in their file, and answer as others do."""
 
 import pickle
+import textwrap
 import tracemalloc
 from importlib import import_module
 
@@ -67,6 +68,29 @@ def test_parts_and_blocks_are_those_of_the_whole(both):
     assert len(blocks) > 5
     assert sum(len(block) for block in blocks) == len(large.arrays) == 61
     assert len(dap.view(large).html) > 1000
+
+
+def test_a_file_may_be_opened_and_dropped_in_threads(tmp_path):
+    """HDF5 crashed where some of several handles of one file were closed, or closed meanwhile."""
+    dap.simulate(problems.pendulum(), output=tmp_path / "run.nc", **SHORT)
+    code = """
+        from concurrent.futures import ThreadPoolExecutor
+        from importlib import import_module
+
+        import dap3d_core as dap
+
+        import_module("dap3d_core.result.open").LARGE = 0
+
+        def open_and_drop(_):
+            for _ in range(20):
+                result = dap.open("run.nc")
+                result.itself = result  # only the garbage collector drops it
+                assert result.u.shape == (61, 13)
+
+        with ThreadPoolExecutor(4) as pool:
+            print(len(list(pool.map(open_and_drop, range(8)))))
+    """
+    assert run(textwrap.dedent(code), cwd=tmp_path) == "8"
 
 
 @long_in_plain_python
