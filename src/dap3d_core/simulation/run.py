@@ -38,7 +38,7 @@ CHUNK_SECONDS = 0.1
 #: Right-hand sides times bodies of the first chunk, some ms, before it is known how long they take.
 FIRST_CHUNK = 5000 if jit_is_on() else 100
 #: Numbers that wait in the row buffer at most.
-BUFFER_NUMBERS = 4_000_000
+BUFFER_NUMBERS = 1_000_000
 #: Right-hand sides times bodies, about a second, from which on a note says that method joint would
 #: take less than this part of the time.
 MUCH_WORK, WORTHWHILE = 3_000_000, 0.7
