@@ -111,6 +111,16 @@ def test_a_closed_loop_moves_as_its_minimal_coordinate(suffix):
     np.testing.assert_allclose(theta, reference(result.t, 0.8, 0.0), rtol=0, atol=1e-7)
 
 
+def test_a_position_of_a_joint_that_closes_a_loop_is_not_taken_in_silence():
+    start = {"left": 0.8, "right": 0.8, "pin": -0.8, "close": (1.0, 0.0, 0.0, 0.0)}
+    _, report = dap.import_model(DATA / "parallelogram.urdf", positions=start)
+    [remark] = report.translated
+    assert str(remark) == (
+        "parallelogram.urdf:25: position or rate of close: the joint closes a loop, the others "
+        "place it"
+    )
+
+
 def test_the_formats_say_the_same_mechanism():
     """Bodies are equal to the last bit but for rounding of frames."""
     scenes = [dap.import_model(DATA / f"parallelogram.{suffix}")[0] for suffix in SUFFIXES]

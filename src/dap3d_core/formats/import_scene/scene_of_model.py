@@ -71,6 +71,10 @@ def scene_of(
     )  # fmt: skip
     if len(groups) == 1:
         raise FormatError("no link of the model moves", model.place)
+    for joint in tree.loops:
+        if joint.name in options.positions or joint.name in options.rates:
+            text = f"position or rate of {joint.name}: the joint closes a loop, the others place it"
+            remarks.translate(joint.place, text)
     placed = tree.place(options.positions, options.rates)
     scene = Scene(name=model.name)
     scene.simulation.t_end, scene.simulation.dt = DURATION, STEP
