@@ -17,10 +17,11 @@ from numpy.typing import ArrayLike, NDArray
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.integrators.added import integrator_named
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
-from dap3d_core.registry import Registry, load_registry
+from dap3d_core.registry import PluginError, Registry, load_registry
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import (
     Scene,
@@ -32,7 +33,7 @@ from dap3d_core.scene import (
     mistake_at,
 )
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
-from dap3d_core.simulation.explain import explain
+from dap3d_core.simulation.explain import MANY_BODIES, WORTHWHILE, explain
 from dap3d_core.simulation.failure.diagnosis import find_offender
 from dap3d_core.simulation.failure.narrow_forces import notes_on_laws
 from dap3d_core.simulation.initial.breakpoints import Breakpoints
@@ -100,8 +101,12 @@ class CompiledModel:
         allow_code: bool = False,
         registry: Registry | None = None,
         announce: Announce | None = None,
+        joint: bool | None = None,
     ) -> None:
-        """Check a scene, build its model, compile what it needs; arguments as for ``compile``."""
+        """Check a scene, build its model, compile what it needs; arguments as for ``compile``.
+
+        joint: whether ``auto`` may choose it; by default where the scene's integrator takes it.
+        """
         started = time.perf_counter()
         if isinstance(scene, Scene):
             scene = scene.copy()  # whoever has it may change it
@@ -117,6 +122,9 @@ class CompiledModel:
             check_simulation(settings, self.model.body_names)
         #: The requested method, perhaps "auto".
         self.requested_method = requested = method or str(scene.simulation.method)
+        self._of_bodies: CompiledModel | None = None
+        usual = takes_joint_coordinates(str(scene.simulation.integrator))
+        self._may_choose_joint = usual if joint is None else joint
         self._breakpoints: dict[float, Breakpoints] = {}
         self._starts: dict[tuple[bool, tuple[str, ...], str], InitialState] = {}
         #: Equilibria that runs start at, by the options of ``start``; each is found once.
@@ -125,6 +133,9 @@ class CompiledModel:
         self._first_method = self.method = choose_method(self.model, requested)[0]
         self._own.stack.append(self.new_evaluator(announce))
         self.method, self.reason = self.choice(requested)
+        if self.method == "joint" != self._first_method:
+            self._first_method = "joint"
+            self._own.stack[:] = [self.new_evaluator(announce)]
         self.evaluator.formulation = FORMULATIONS[self.method]
         _ = self.evaluator.functions  # compiled here, and not on the clock of the first run
         self.notes: list[str] = [
@@ -322,8 +333,34 @@ class CompiledModel:
         found = start.redundancy
         if found.rank.redundant:
             fits = (f.name for f in FORMULATIONS.values() if f.accepts_redundant and f.is_exact)
-            return next(fits), f"{found.rank.redundant} of {found.rank.rows} rows are redundant"
-        return method, f"{reason}, and their rows are independent"
+            method = next(fits)
+            reason = f"{found.rank.redundant} of {found.rank.rows} rows are redundant"
+        else:
+            reason = f"{reason}, and their rows are independent"
+        is_open = self._may_choose_joint and self.model.body_count >= MANY_BODIES
+        if is_open and found.singular is None and self.joint_cost < WORTHWHILE:
+            ratio = f"{self.joint_cost:.2g}"
+            return "joint", f"its right-hand side takes some {ratio} of the time of method {method}"
+        return method, reason
+
+    @cached_property
+    def joint_cost(self) -> float:
+        """Estimate of the time of a right-hand side by method joint, over that of the usual one."""
+        from dap3d_core.formulations.joint.coordinates import cost_over_standard
+
+        return cost_over_standard(self.model, self.evaluator.plan)
+
+    def for_integrator(self, integrator: str) -> "CompiledModel":
+        """This model, or one of body coordinates where ``auto`` chose others it does not take."""
+        is_chosen = self.requested_method == "auto" and self.method == "joint"
+        if not is_chosen or takes_joint_coordinates(integrator):
+            return self
+        if self._of_bodies is None:
+            registry = self.checked.registry
+            self._of_bodies = CompiledModel(
+                self.scene, method="auto", registry=registry, joint=False
+            )
+        return self._of_bodies
 
     def explain(self) -> str:
         """Text on what is modelled, what is left out and why, and why the method was chosen.
@@ -336,9 +373,19 @@ class CompiledModel:
             u, redundancy = start.u, start.redundancy
         except AssemblyError:
             redundancy = self.redundancy()
-        return explain(
-            self.checked, self.model, self.evaluator, self.method, self.reason, u, redundancy
-        )
+        is_left_out = self.requested_method == "auto" and self.method != "joint"
+        cost = self.joint_cost if is_left_out and self.model.row_count else None
+        method = f"{self.method}, because {self.reason}"
+        return explain(self.checked, self.evaluator, method, cost, u, redundancy)
+
+
+def takes_joint_coordinates(integrator: str) -> bool:
+    """True if an integrator takes method ``joint``; "auto" does not, which may go on with radau."""
+    try:
+        found = integrator_named(integrator)
+    except PluginError:  # whoever runs it says so
+        return False
+    return integrator != "auto" and not found.needs_body_coordinates
 
 
 def choose_method(model: Model, requested: str) -> tuple[str, str]:

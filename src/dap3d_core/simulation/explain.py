@@ -15,18 +15,30 @@ from dap3d_core.simulation.redundancy.redundancy import Redundancy
 
 #: Names that a line lists.
 MOST_NAMES = 8
+#: ``auto`` takes method ``joint`` from so many bodies on, where it takes less than this part of the
+#: time: to find the motions of the joints takes longer than many runs of fewer bodies.
+MANY_BODIES, WORTHWHILE = 16, 0.7
 
 
 def explain(
     checked: ValidatedScene,
-    model: Model,
     evaluator: Evaluator,
     method: str,
-    reason: str,
+    joint_cost: float | None,
     u: Floats,
     redundancy: Redundancy,
 ) -> str:
-    """A text for people, one fact a line; u (13 n,) is where a run would start."""
+    """A text for people, one fact a line.
+
+    Args:
+        checked: the scene.
+        evaluator: its model.
+        method: the method, and why.
+        joint_cost: estimate of the time by method joint, over that of the method, or None.
+        u: (13 n,) where a run would start.
+        redundancy: the rank of the rows there.
+    """
+    model = evaluator.model
     n = model.body_count
     lines = [f"scene {checked.scene.name or '(no name)'}"]
     own = f" and {model.state_count} of elements" if model.state_count else ""
@@ -46,11 +58,11 @@ def explain(
                 lines.append(f"  start      {redundancy.singular.describe()}")
         title, words = evaluator.coordinates.structure()
         lines.append(f"  {title:10s} {words}")
-    lines.append(f"  method     {method}, because {reason}")
-    if model.row_count and str(checked.scene.simulation.method) == "auto":
-        lines.append(f"  joint      {in_joint_coordinates(evaluator)[1]}")
-    compiled = sorted({f"{group.keyword} ({kind})" for kind, group in evaluator.loop_groups})
-    lines.append(f"  kernels    {', '.join(compiled) or 'none'}")
+    lines.append(f"  method     {method}")
+    if joint_cost is not None:
+        lines.append(f"  joint      {in_joint_coordinates(joint_cost)}")
+    kernels = sorted({f"{group.keyword} ({kind})" for kind, group in evaluator.loop_groups})
+    lines.append(f"  kernels    {', '.join(kernels) or 'none'}")
     left_out = _left_out(checked, model)
     lines.append("left out")
     lines += [f"  {line}" for line in left_out] or ["  nothing"]
@@ -59,14 +71,11 @@ def explain(
     return "\n".join(lines)
 
 
-def in_joint_coordinates(evaluator: Evaluator) -> tuple[float, str]:
-    """Estimate of the time by method joint, over that of an evaluator's; why auto leaves it."""
-    from dap3d_core.formulations.joint.coordinates import cost_over_standard
-
-    ratio = cost_over_standard(evaluator.model, evaluator.plan)
-    return ratio, (
-        f"method joint would take some {ratio:.2g} of the time of a right-hand side; auto keeps "
-        "the coordinates of bodies, which radau and packs of studies take"
+def in_joint_coordinates(ratio: float) -> str:
+    """What method joint would take of the time of a right-hand side, and when auto takes it."""
+    return (
+        f"method joint would take some {ratio:.2g} of the time of a right-hand side; auto takes it "
+        f"below {WORTHWHILE}, from {MANY_BODIES} bodies on, with integrators other than radau, auto"
     )
 
 

@@ -80,8 +80,9 @@ def rerun(
     scene.path = None if model is None else load(model).path
     try:
         compiled = CompiledModel(
-            scene, method=first.settings["method"], allow_code=allow_code, announce=announce
-        )
+            scene, method=first.settings["method"], allow_code=allow_code, announce=announce,
+            joint=first.method == "joint",
+        )  # fmt: skip
     except (PluginError, SceneError) as error:
         words = why_unmade(error, allowed=allow_code and model is not None)
         raise ResultError(f"the run cannot be made again: {words}") from error

@@ -116,8 +116,9 @@ class ResumedRun:
         scene.path = None if model is None else load(model).path
         try:
             self.compiled = CompiledModel(
-                scene, method=header["method"], allow_code=allow_code, announce=announce
-            )
+                scene, method=header["method"], allow_code=allow_code, announce=announce,
+                joint=header.get("formulation") == "joint",  # which older checkpoints lack
+            )  # fmt: skip
         except (PluginError, SceneError) as error:
             words = why_unmade(error, allowed=allow_code and model is not None)
             raise CheckpointError(f"cannot resume from {path}: {words}") from error

@@ -40,8 +40,8 @@ FIRST_CHUNK = 5000 if jit_is_on() else 100
 #: Numbers that wait in the row buffer at most.
 BUFFER_NUMBERS = 1_000_000
 #: Right-hand sides times bodies, about a second, from which on a note says that method joint would
-#: take less than this part of the time.
-MUCH_WORK, WORTHWHILE = 3_000_000, 0.7
+#: be quicker.
+MUCH_WORK = 3_000_000
 #: A second run, for the error, leaves a singular pose by a first step of this part.
 AGAIN = 0.8
 
@@ -280,9 +280,11 @@ class Run(RunState):
         """That a long run whose method was left to auto would be quicker by method joint."""
         model, work = self.evaluator.model, self.statistics().rhs * self.evaluator.model.body_count
         is_left_open = self.compiled.requested_method == "auto" and model.row_count > 0
-        if not is_left_open or work < MUCH_WORK or any(i.implicit for i in self.integrations):
+        if not is_left_open or self.evaluator.formulation.has_own_coordinates:
             return []
-        from dap3d_core.simulation.explain import in_joint_coordinates
+        if work < MUCH_WORK or any(i.implicit for i in self.integrations):
+            return []
+        from dap3d_core.simulation.explain import WORTHWHILE, in_joint_coordinates
 
-        ratio, words = in_joint_coordinates(self.evaluator)
-        return [INFORMATION + words] if ratio < WORTHWHILE else []
+        ratio = self.compiled.joint_cost
+        return [INFORMATION + in_joint_coordinates(ratio)] if ratio < WORTHWHILE else []

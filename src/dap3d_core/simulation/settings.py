@@ -23,7 +23,7 @@ from dap3d_core.scene import (
     check_simulation,
 )
 from dap3d_core.scene.validate.settings import notes_of
-from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.compiled_model import CompiledModel, takes_joint_coordinates
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.tolerances import atol_vector, resolved_atol
 
@@ -50,22 +50,28 @@ def compiled_for(
     method: str | None,
     allow_code: bool,
     announce: Callable[[str], None] | None,
+    integrator: str | None = None,
 ) -> CompiledModel:
     """The compiled model of a scene; one that was compiled before must have the requested method.
+
+    integrator: that of the runs; the scene's when left out.
 
     Raises:
         SceneError: there is no such method.
         SimulationError: it has another.
     """
     if not isinstance(scene, CompiledModel):
-        return CompiledModel(scene, method=method, allow_code=allow_code, announce=announce)
+        joint = None if integrator is None else takes_joint_coordinates(integrator)
+        return CompiledModel(
+            scene, method=method, allow_code=allow_code, announce=announce, joint=joint
+        )
     if method is not None and method not in METHODS:
         settings = attrs.evolve(scene.scene.simulation, method=method)
         check_simulation(settings, scene.model.body_names)
     if method is not None and scene.choice(method)[0] != scene.method:
         words = f"the model was compiled for method {scene.method}; compile it for {method}"
         raise SimulationError(words)
-    return scene
+    return scene.for_integrator(integrator or str(scene.scene.simulation.integrator))
 
 
 def compiled_exactly(
@@ -78,7 +84,9 @@ def compiled_exactly(
         if scene.evaluator.formulation.is_exact:
             return scene
         scene = scene.scene
-    return CompiledModel(scene, method="auto", allow_code=allow_code, announce=announce)
+    return CompiledModel(
+        scene, method="auto", allow_code=allow_code, announce=announce, joint=False
+    )
 
 
 def check_checkpoint(seconds: float | None, output: str | os.PathLike[str] | None) -> None:

@@ -65,7 +65,7 @@ def simulate(
         SimulationError (RedundantError, AssemblyError): the run stopped, or could not begin. What
             ends it (Ctrl-C, say) has what was computed as ``.result``.
     """
-    compiled = compiled_for(scene, method, allow_code, announce)
+    compiled = compiled_for(scene, method, allow_code, announce, integrator)
     settings = settings_of(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
                          rtol=rtol, atol=atol, step=step, correct=correct, project=project,
                          correct_metric=correct_metric, start=_word(start))  # fmt: skip

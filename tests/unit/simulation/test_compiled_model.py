@@ -1,9 +1,10 @@
-"""A script is informed of the first compilation, once."""
+"""Scenes made ready to run: the method that is left open, and the first compilation."""
 
 import logging
 import time
 
 import pytest
+from support import problems
 
 import dap3d_core as dap
 from dap3d_core.kernels.runtime.cache import jit_is_on
@@ -51,3 +52,49 @@ def test_a_script_is_told_of_the_first_compilation_once(tmp_path, caplog):
     dap.compile(tmp_path, allow_code=True, announce=names.append)
     assert names
     assert len([r for r in caplog.records if r.name == "dap3d"]) == 1
+
+
+def net():
+    """4 x 4 plates of 1 m, neighbours on balls in the middles of their edges: 9 loops."""
+    scene = dap.Scene(name="net")
+    for k in range(16):
+        i, j = divmod(k, 4)
+        scene.add_body(f"b{k}", mass=1.0, Jp=(0.1, 0.1, 0.2), r=(float(i), float(j), 0.0))
+        for other, edge in ((k - 4, (0.5, 0.0, 0.0)), (k - 1, (0.0, 0.5, 0.0))):
+            if other >= 0 and not (j == 0 and other == k - 1):
+                ends = {"P_i": (f"b{k}", [-x for x in edge]), "P_j": (f"b{other}", edge)}
+                names = {
+                    key: scene.add_point(f"{key}{k}_{other}", *end) for key, end in ends.items()
+                }
+                scene.add_joint("sph", f"J{k}_{other}", **names)
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("make", "method"),
+    [
+        (lambda: problems.chain(15), "standard"),  # few bodies
+        (lambda: problems.chain(16), "joint"),
+        (net, "lsq"),  # so many loops do not pay
+    ],
+)
+def test_auto_takes_joint_coordinates_of_many_bodies_where_they_pay(make, method):
+    compiled = dap.compile(make())
+    assert compiled.method == method
+    assert ("method joint would take some" in compiled.explain()) == (method != "joint")
+
+
+@pytest.mark.parametrize("integrator", ["radau", "auto"])
+def test_auto_keeps_coordinates_of_bodies_for_integrators_that_need_them(integrator):
+    """Whether the scene says so, the run of a scene, or that of a compiled model."""
+    short = {"t_end": 0.002, "dt": 0.001}
+    usual = dap.simulate(problems.chain(16), method="standard", integrator=integrator, **short)
+    scene = problems.chain(16)
+    compiled = dap.compile(scene)
+    assert compiled.method == "joint"
+    runs = [dap.simulate(one, integrator=integrator, **short) for one in (scene, compiled)]
+    scene.simulation.integrator = integrator
+    for result in (*runs, dap.simulate(scene, **short)):
+        assert result.method == "standard"
+        assert result.u.tobytes() == usual.u.tobytes()
+    assert compiled.for_integrator("radau") is compiled.for_integrator("auto")

@@ -37,6 +37,16 @@ def test_a_run_made_again_is_equal(settings, tmp_path):
     assert [f.name for f in tmp_path.iterdir()] == ["run.nc"]
 
 
+def test_a_run_is_made_again_by_the_method_that_auto_chose_then(monkeypatch):
+    """As the choice was before it looked for joint coordinates."""
+    first = dap.simulate(problems.chain(3), **SHORT)
+    monkeypatch.setattr("dap3d_core.simulation.compiled_model.MANY_BODIES", 1)
+    assert dap.simulate(problems.chain(3), t_end=0.0).method == "joint"
+    found = dap.rerun(first)
+    assert found.equal
+    assert found.again.method == "standard"
+
+
 def test_a_bit_that_differs_is_found():
     first = dap.simulate(problems.pendulum(), **SHORT)
     u = first.u.copy()

@@ -72,6 +72,8 @@ CASES = {
     "events": (stone, {"t_end": 2.0, "dt": 0.05, "events": stiffer}, 0.35),
     "jumps": (bouncing, {}, 0.6),
     "jumps in joint coordinates": (swinging, {"method": "joint"}, 0.6),
+    "joint by auto": (lambda: problems.chain(16), {"t_end": 0.4}, 0.2),
+    "radau by auto": (lambda: problems.chain(16), {"t_end": 0.2, "integrator": "radau"}, 0.1),
     "jumps by events": (stone, {"t_end": 2.0, "dt": 0.05, "events": kicks}, 0.35),
 }
 #: Tried in plain Python as well; the others take long there and keep no more than these.

@@ -133,6 +133,7 @@ def checkpoint_of(run: RunState) -> Checkpoint:
         "until": run.until if math.isfinite(run.until) else None,
         "scene": compiled.scene_text,
         "method": compiled.requested_method,
+        "formulation": compiled.method,
         "settings": attrs.asdict(run.settings),
         "estimate_error": run.estimate_error,
         "start_is_interpolated": run.start is not None and run.start.is_interpolated,

@@ -180,7 +180,7 @@ def equilibrium(
         SimulationError: there is no equilibrium, because nothing holds a freedom, or none was
             found; names what gives way. AssemblyError: the joints cannot be assembled.
     """
-    compiled = compiled_for(scene, None, allow_code, announce)
+    compiled = compiled_for(scene, None, allow_code, announce, "auto")
     settings = compiled.scene.simulation
     state = None
     if start is not None:

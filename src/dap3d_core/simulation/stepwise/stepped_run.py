@@ -239,7 +239,7 @@ def start(
         SceneError, PluginError: as ``compile``; unusable settings.
         SimulationError (RedundantError, AssemblyError): the run cannot begin.
     """
-    compiled = compiled_for(scene, method, allow_code, announce)
+    compiled = compiled_for(scene, method, allow_code, announce, integrator)
     end = HORIZON if t_end is None else t_end
     settings = settings_of(compiled, t_end=end, dt=end, method=method, integrator=integrator,
                            rtol=rtol, atol=atol, step=step, correct=correct, project=project,
