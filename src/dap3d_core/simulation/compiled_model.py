@@ -338,14 +338,18 @@ class CompiledModel:
         else:
             reason = f"{reason}, and their rows are independent"
         is_open = self._may_choose_joint and self.model.body_count >= MANY_BODIES
-        if is_open and found.singular is None and self.joint_cost < WORTHWHILE:
-            ratio = f"{self.joint_cost:.2g}"
-            return "joint", f"its right-hand side takes some {ratio} of the time of method {method}"
+        if is_open and found.singular is None:
+            cost, kept = self.joint_cost
+            if cost < WORTHWHILE and not kept:  # kept rows have singular poses, better crossed so
+                return "joint", f"the joints are a tree: some {cost:.2g} of the time of {method}"
         return method, reason
 
     @cached_property
-    def joint_cost(self) -> float:
-        """Estimate of the time of a right-hand side by method joint, over that of the usual one."""
+    def joint_cost(self) -> tuple[float, int]:
+        """Estimate of the time of a right-hand side by method joint, over that of the usual one.
+
+        And the number of joints that would keep their rows.
+        """
         from dap3d_core.formulations.joint.coordinates import cost_over_standard
 
         return cost_over_standard(self.model, self.evaluator.plan)
@@ -374,7 +378,7 @@ class CompiledModel:
         except AssemblyError:
             redundancy = self.redundancy()
         is_left_out = self.requested_method == "auto" and self.method != "joint"
-        cost = self.joint_cost if is_left_out and self.model.row_count else None
+        cost = self.joint_cost[0] if is_left_out and self.model.row_count else None
         method = f"{self.method}, because {self.reason}"
         return explain(self.checked, self.evaluator, method, cost, u, redundancy)
 
