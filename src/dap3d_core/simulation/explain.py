@@ -15,8 +15,8 @@ from dap3d_core.simulation.redundancy.redundancy import Redundancy
 
 #: Names that a line lists.
 MOST_NAMES = 8
-#: ``auto`` takes method ``joint`` for trees of so many bodies, where it takes less than this part of
-#: the time: to find the motions of the joints takes longer than many runs of fewer bodies.
+#: ``auto`` takes method ``joint`` for trees of so many bodies, where it takes less than this part
+#: of the time: to find the motions of the joints takes longer than many runs of fewer bodies.
 MANY_BODIES, WORTHWHILE = 16, 0.7
 
 

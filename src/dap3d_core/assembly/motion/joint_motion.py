@@ -126,7 +126,8 @@ class JointMotions:
         T^-1 = T0^-1 ... exp(-Ad s_2 q_2) exp(-Ad s_1 q_1), with Ad that of T0.
         """
         moved = -np.einsum("mab,mdb->mda", adjoint(self.start), self.screws)
-        screws = np.concatenate([moved[:, c] for c in reversed(self.columns)], axis=1)
+        columns = [moved[:, c] for c in reversed(self.columns)]
+        screws = np.concatenate([moved[:, :0], *columns], axis=1)  # a weld has no columns
         return attrs.evolve(
             self,
             slots=self.slots[::-1],

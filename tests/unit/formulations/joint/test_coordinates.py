@@ -5,6 +5,7 @@ import pytest
 from support import state_types, trees
 from unit.formulations.joint_loops.test_equations import ladder
 
+import dap3d_core as dap
 from dap3d_core.formulations.joint import coordinates as module
 from dap3d_core.formulations.joint.coordinates import cost_over_standard
 from dap3d_core.simulation import CompiledModel
@@ -53,6 +54,22 @@ def test_evaluations_at_a_state_know_the_states_of_elements():
         assert model.evaluator.method == method
         rates.append(model.evaluator.state_rates(0.0, model.model.u0))
     assert rates[0] == pytest.approx(rates[1], rel=1e-14)
+
+
+@pytest.mark.parametrize("ends", [("a", "b"), ("b", "a")])
+def test_a_weld_of_free_bodies_joins_them_either_way(ends):
+    """Two spinning bodies as one: the far one is carried along."""
+    scene = dap.Scene(name="welded")
+    scene.add_body("a", mass=1.0, Jp=(0.1, 0.2, 0.3), w=(0.0, 0.0, 2.0))
+    scene.add_body("b", mass=1.0, Jp=(0.1, 0.2, 0.3), r=(1.0, 0.0, 0.0), r_dot=(0.0, 2.0, 0.0),
+                   w=(0.0, 0.0, 2.0))  # fmt: skip
+    scene.add_joint("weld", "J", body_i=ends[0], body_j=ends[1])
+    result = dap.simulate(scene, method="joint", t_end=1.0, dt=0.5, rtol=1e-10)
+    c, s = np.cos(2.0 * result.t), np.sin(2.0 * result.t)
+    middle = np.stack([0.5 + 0.0 * c, result.t, 0.0 * c], axis=1)
+    arm = 0.5 * np.stack([c, s, 0.0 * c], axis=1)
+    np.testing.assert_allclose(result.r[:, 1], middle + arm, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(result.r[:, 0], middle - arm, rtol=0, atol=1e-8)
 
 
 def test_the_cost_is_known_without_a_run_by_method_joint():
