@@ -5,7 +5,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Self
@@ -33,7 +33,7 @@ from dap3d_core.scene import (
     mistake_at,
 )
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
-from dap3d_core.simulation.explain import MANY_BODIES, WORTHWHILE, explain
+from dap3d_core.simulation.explain import MANY_BODIES, explain
 from dap3d_core.simulation.failure.diagnosis import find_offender
 from dap3d_core.simulation.failure.narrow_forces import notes_on_laws
 from dap3d_core.simulation.initial.breakpoints import Breakpoints
@@ -133,9 +133,8 @@ class CompiledModel:
         self._first_method = self.method = choose_method(self.model, requested)[0]
         self._own.stack.append(self.new_evaluator(announce))
         self.method, self.reason = self.choice(requested)
-        if self.method == "joint" != self._first_method:
-            self._first_method = "joint"
-            self._own.stack[:] = [self.new_evaluator(announce)]
+        if requested == "auto" and self._may_choose_joint:
+            self._look_for_a_tree(announce)
         self.evaluator.formulation = FORMULATIONS[self.method]
         _ = self.evaluator.functions  # compiled here, and not on the clock of the first run
         self.notes: list[str] = [
@@ -178,15 +177,16 @@ class CompiledModel:
         finally:
             own.running = False
 
-    def new_evaluator(self, announce: Announce | None = None) -> Evaluator:
+    def new_evaluator(
+        self, announce: Announce | None = None, method: str | None = None
+    ) -> Evaluator:
         """An evaluator of the model with arrays of its own, for whoever changes its numbers."""
+        first = method or self._first_method
         try:
-            evaluator = Evaluator(self.model, self._first_method, announce)
+            evaluator = Evaluator(self.model, first, announce)
         except UnsuitableError as error:
-            raise SimulationError(
-                f"method {self._first_method} does not fit the scene: {error}"
-            ) from error
-        evaluator.formulation = FORMULATIONS[self.method]
+            raise SimulationError(f"method {first} does not fit the scene: {error}") from error
+        evaluator.formulation = FORMULATIONS[method or self.method]
         settings = self.scene.simulation
         evaluator.set_penalty(settings.alpha, settings.Omega, settings.mu)
         return evaluator
@@ -325,31 +325,40 @@ class CompiledModel:
         method, reason = choose_method(self.model, requested)
         if requested != "auto" or not self.model.row_count:
             return method, reason
+        start = self._start_of_scene()
+        if start is None:
+            return method, reason
+        rank = start.redundancy.rank
+        if rank.redundant:
+            fits = (f.name for f in FORMULATIONS.values() if f.accepts_redundant and f.is_exact)
+            return next(fits), f"{rank.redundant} of {rank.rows} rows are redundant"
+        return method, f"{reason}, and their rows are independent"
+
+    def _start_of_scene(self) -> InitialState | None:
+        """The initial state of a run; None where it cannot be assembled, which the run reports."""
         settings = self.scene.simulation
         try:
-            start = self.start(settings.correct, settings.hold, str(settings.correct_metric))
-        except AssemblyError:  # a run reports it
-            return method, reason
-        found = start.redundancy
-        if found.rank.redundant:
-            fits = (f.name for f in FORMULATIONS.values() if f.accepts_redundant and f.is_exact)
-            method = next(fits)
-            reason = f"{found.rank.redundant} of {found.rank.rows} rows are redundant"
-        else:
-            reason = f"{reason}, and their rows are independent"
-        is_open = self._may_choose_joint and self.model.body_count >= MANY_BODIES
-        if is_open and found.singular is None:
-            cost, kept = self.joint_cost
-            if cost < WORTHWHILE and not kept:  # kept rows have singular poses, better crossed so
-                return "joint", f"the joints are a tree: some {cost:.2g} of the time of {method}"
-        return method, reason
+            return self.start(settings.correct, settings.hold, str(settings.correct_metric))
+        except AssemblyError:
+            return None
+
+    def _look_for_a_tree(self, announce: Announce) -> None:
+        """Take joint coordinates for a tree of many bodies; in them it has no singular poses."""
+        count, start = self.model.body_count, self._start_of_scene()
+        if not MANY_BODIES <= count >= len(self.model.joint_names) > 0:
+            return
+        if start is None or start.redundancy.singular is not None:
+            return
+        with suppress(SimulationError):  # too many rows to keep
+            evaluator = self.new_evaluator(announce, "joint")
+            if not evaluator.coordinates.kept:
+                self._first_method = self.method = "joint"
+                self.reason = f"the joints of its {count} bodies are a tree"
+                self._own.stack[:] = [evaluator]
 
     @cached_property
-    def joint_cost(self) -> tuple[float, int]:
-        """Estimate of the time of a right-hand side by method joint, over that of the usual one.
-
-        And the number of joints that would keep their rows.
-        """
+    def joint_cost(self) -> float:
+        """Estimate of the time of a right-hand side by method joint, over that of the usual one."""
         from dap3d_core.formulations.joint.coordinates import cost_over_standard
 
         return cost_over_standard(self.model, self.evaluator.plan)
@@ -371,14 +380,13 @@ class CompiledModel:
 
         The rank is that where a run would start, or as given where that cannot be assembled.
         """
-        u, settings = self.model.u0, self.scene.simulation
-        try:
-            start = self.start(settings.correct, settings.hold, str(settings.correct_metric))
-            u, redundancy = start.u, start.redundancy
-        except AssemblyError:
+        u, start = self.model.u0, self._start_of_scene()
+        if start is None:
             redundancy = self.redundancy()
+        else:
+            u, redundancy = start.u, start.redundancy
         is_left_out = self.requested_method == "auto" and self.method != "joint"
-        cost = self.joint_cost[0] if is_left_out and self.model.row_count else None
+        cost = self.joint_cost if is_left_out and self.model.row_count else None
         method = f"{self.method}, because {self.reason}"
         return explain(self.checked, self.evaluator, method, cost, u, redundancy)
 

@@ -15,9 +15,11 @@ from dap3d_core.simulation.redundancy.redundancy import Redundancy
 
 #: Names that a line lists.
 MOST_NAMES = 8
-#: ``auto`` takes method ``joint`` for trees of so many bodies, where it takes less than this part
-#: of the time: to find the motions of the joints takes longer than many runs of fewer bodies.
-MANY_BODIES, WORTHWHILE = 16, 0.7
+#: ``auto`` takes method ``joint`` for trees of so many bodies: to find the motions of the joints
+#: takes as long as seconds of the motion of fewer bodies.
+MANY_BODIES = 64
+#: A note says where method joint would take less than this part of the time.
+WORTHWHILE = 0.7
 
 
 def explain(
@@ -75,7 +77,7 @@ def in_joint_coordinates(ratio: float) -> str:
     """What method joint would take of the time of a right-hand side, and when auto takes it."""
     return (
         f"method joint would take some {ratio:.2g} of the time of a right-hand side; auto takes it "
-        f"below {WORTHWHILE} for trees of {MANY_BODIES} bodies or more, if the integrator does"
+        f"for trees of {MANY_BODIES} bodies or more, with integrators that do"
     )
 
 

@@ -286,5 +286,5 @@ class Run(RunState):
             return []
         from dap3d_core.simulation.explain import WORTHWHILE, in_joint_coordinates
 
-        ratio, _ = self.compiled.joint_cost
+        ratio = self.compiled.joint_cost
         return [INFORMATION + in_joint_coordinates(ratio)] if ratio < WORTHWHILE else []

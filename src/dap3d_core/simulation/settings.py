@@ -68,7 +68,8 @@ def compiled_for(
     if method is not None and method not in METHODS:
         settings = attrs.evolve(scene.scene.simulation, method=method)
         check_simulation(settings, scene.model.body_names)
-    if method is not None and scene.choice(method)[0] != scene.method:
+    other = method not in (None, scene.requested_method)
+    if other and scene.choice(str(method))[0] != scene.method:
         words = f"the model was compiled for method {scene.method}; compile it for {method}"
         raise SimulationError(words)
     return scene.for_integrator(integrator or str(scene.scene.simulation.integrator))
@@ -179,7 +180,7 @@ def refuse_singular_start(
     if formulation.has_own_coordinates:
         raise SimulationError(
             f"the run starts at a singular pose, from which method {formulation.name} finds no "
-            "way: take method auto or lsq, or start at another pose"
+            "way: take method standard or lsq, or start at another pose"
         )
     t_end = float(settings.t_end or 0.0)
     if 0.0 < t_end < first_step:

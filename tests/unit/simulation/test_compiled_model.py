@@ -70,23 +70,35 @@ def net():
     return scene
 
 
+def driven():
+    """A chain whose first rod is turned by a function of time."""
+    scene = problems.chain(16)
+    scene.add_function("a", "motor", coeff=(0.0, 0.0, 1.0))
+    scene.add_joint("rel-rot", "driver", body_i="b0", a_j="ground.z", function="motor")
+    return scene
+
+
 @pytest.mark.parametrize(
     ("make", "method"),
     [
         (lambda: problems.chain(15), "standard"),  # few bodies
         (lambda: problems.chain(16), "joint"),
-        (net, "lsq"),  # so many loops do not pay
+        (net, "lsq"),
+        (driven, "standard"),
     ],
 )
-def test_auto_takes_joint_coordinates_of_many_bodies_where_they_pay(make, method):
+def test_auto_takes_joint_coordinates_for_trees_of_many_bodies(make, method, monkeypatch):
+    """Neither loops nor drivers, whose rows a tree has to keep."""
+    monkeypatch.setattr("dap3d_core.simulation.compiled_model.MANY_BODIES", 16)
     compiled = dap.compile(make())
     assert compiled.method == method
     assert ("method joint would take some" in compiled.explain()) == (method != "joint")
 
 
 @pytest.mark.parametrize("integrator", ["radau", "auto"])
-def test_auto_keeps_coordinates_of_bodies_for_integrators_that_need_them(integrator):
+def test_auto_keeps_coordinates_of_bodies_for_integrators_that_need_them(integrator, monkeypatch):
     """Whether the scene says so, the run of a scene, or that of a compiled model."""
+    monkeypatch.setattr("dap3d_core.simulation.compiled_model.MANY_BODIES", 16)
     short = {"t_end": 0.002, "dt": 0.001}
     usual = dap.simulate(problems.chain(16), method="standard", integrator=integrator, **short)
     scene = problems.chain(16)

@@ -88,8 +88,9 @@ def settings_of(settings):
 
 @pytest.fixture(autouse=True)
 def short_chunks(monkeypatch):
-    """As many chunks as there are steps."""
+    """As many chunks as there are steps; chains are long enough for auto to choose joint."""
     shorten_chunks(monkeypatch)
+    monkeypatch.setattr("dap3d_core.simulation.compiled_model.MANY_BODIES", 16)
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -251,17 +251,14 @@ class Coordinates:
         return tree
 
 
-def cost_over_standard(model: Model, plan: Plan) -> tuple[float, int]:
-    """Estimate of the time of a right-hand side, over that of method standard or lsq.
-
-    And the number of joints that would keep their rows.
-    """
+def cost_over_standard(model: Model, plan: Plan) -> float:
+    """Estimate of the time of a right-hand side, over that of method standard or lsq."""
     from dap3d_core.formulations.joint_loops import tables
 
     motions, tree, reasons = _tree_and_reasons(model)
     nodes = tree_nodes(tree, motions, model.body_count, model.state_count)
     kept = tables.kept_rows(tuple(reasons), model, nodes)
-    return tables.cost_ratio(kept, nodes, plan, model.body_count), len(reasons)
+    return tables.cost_ratio(kept, nodes, plan, model.body_count)
 
 
 def _tree_and_reasons(model: Model) -> tuple[ModelMotions, SpanningForest, dict[int, str]]:

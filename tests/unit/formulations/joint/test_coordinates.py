@@ -78,9 +78,5 @@ def test_the_cost_is_known_without_a_run_by_method_joint():
         CompiledModel(scene, method="standard")
         for scene in (trees.mixed_chain(20), ladder(12))
     )  # fmt: skip
-    cost, kept = cost_over_standard(chain.model, chain.evaluator.plan)
-    assert 0.2 < cost < 0.6
-    assert kept == 0
-    cost, kept = cost_over_standard(net.model, net.evaluator.plan)
-    assert cost > 1.2
-    assert kept == len(net.model.joint_names) - net.model.body_count
+    assert 0.2 < cost_over_standard(chain.model, chain.evaluator.plan) < 0.6
+    assert cost_over_standard(net.model, net.evaluator.plan) > 1.2
