@@ -89,6 +89,7 @@ def main():
     benchmarks = {
         "right_hand_side": lambda: right_hand_side.measure(arguments.against),
         "trees": trees.measure,
+        "choice": trees.choice,
         "tree_loops": tree_loops.measure,
         "kernels": kernels.measure,
         "derived": derived.measure,

@@ -12,6 +12,7 @@ from right_hand_side import repeat
 from support import trees
 from timing import wait_for_good_code
 
+import dap3d_core as dap
 from dap3d_core.simulation import CompiledModel
 
 SIZES = (1, 8, 64, 1000, 10_000)
@@ -27,6 +28,8 @@ MECHANISMS = {
     "random, of all joints": trees.random_tree,
 }
 METHODS = ("standard", "joint")
+#: Bodies of a tree from which on auto chooses joint, and durations of its runs, s.
+CHOICE_SIZES, DURATIONS = (16, 32, 64, 128, 256), (1.0, 3.0, 10.0)
 
 
 def seconds_of(scene):
@@ -59,3 +62,28 @@ def measure():
             row["ratio"] = seconds["joint"] / seconds["standard"]
             rows.append(row)
     return rows
+
+
+def choice():
+    """Whole runs, compilation of a scene that is in the cache included: joint over standard.
+
+    CPU seconds of the thread, the least of three, at rtol 1e-6.
+    """
+    rows = []
+    for name in ("spherical", "mixed", "random, of all joints"):
+        for n in CHOICE_SIZES:
+            scene, row = MECHANISMS[name](n), {"mechanism": name, "bodies": n}
+            for t in DURATIONS:
+                joint, standard = (_whole(scene, t, method) for method in ("joint", "standard"))
+                row |= {f"ratio_{t:g}_s": joint / standard, f"standard_ms_{t:g}_s": 1e3 * standard}
+            rows.append(row)
+    return rows
+
+
+def _whole(scene, t_end, method):
+    found = []
+    for _ in range(3):
+        start = time.thread_time()
+        dap.simulate(scene, t_end=t_end, dt=t_end / 50, rtol=1e-6, method=method)
+        found.append(time.thread_time() - start)
+    return min(found)

@@ -344,9 +344,10 @@ class CompiledModel:
 
     def _look_for_a_tree(self, announce: Announce) -> None:
         """Take joint coordinates for a tree of many bodies; in them it has no singular poses."""
-        count, start = self.model.body_count, self._start_of_scene()
+        count = self.model.body_count
         if not MANY_BODIES <= count >= len(self.model.joint_names) > 0:
             return
+        start = self._start_of_scene()
         if start is None or start.redundancy.singular is not None:
             return
         with suppress(SimulationError):  # too many rows to keep
