@@ -48,14 +48,23 @@ class Ensemble:
             SceneError: an unknown name, an unknown output, or mistakes of the scene.
         """
         self.requested, self.study = study, _with_end_alone(study)
-        scene = self.study.scene
-        self.compiled = CompiledModel(scene, allow_code=study.allow_code, announce=announce)
+        self._compile(announce, None)
+        if self.compiled.requested_method == "auto" and self.compiled.method == "joint":
+            runner = self._runner()
+            if runner is None or runner.parameter_map is None:  # a tree for each point costs more
+                self._compile(announce, False)
+
+    def _compile(self, announce: Callable[[str], None] | None, joint: bool | None) -> None:
+        """Compile the scene; joint: as of ``CompiledModel``."""
+        scene, allow_code = self.study.scene, self.study.allow_code
+        self.compiled = CompiledModel(scene, allow_code=allow_code, announce=announce, joint=joint)
+        self._joint = joint
         self.parameters: tuple[SceneParameter, ...] = parameters_named(
-            self.compiled.checked, study.names
+            self.compiled.checked, self.study.names
         )
         settings = scene.simulation
         self.times = report_times(settings.t_end, settings.dt)
-        self.reduction = Reduction(self.compiled, self.parameters, study.outputs)
+        self.reduction = Reduction(self.compiled, self.parameters, self.study.outputs)
         self.outputs = self.reduction.outputs
         self.labels, self.units = self.reduction.labels, self.reduction.units
         self._of_thread = threading.local()
@@ -97,7 +106,8 @@ class Ensemble:
 
     def _result(self, scene: Scene, point: Sequence[float]) -> Result:
         changed = with_values(scene, self.parameters, point)
-        return simulate(CompiledModel(changed, registry=self.compiled.checked.registry))
+        registry = self.compiled.checked.registry
+        return simulate(CompiledModel(changed, registry=registry, joint=self._joint))
 
     def _runner(self) -> "BatchRunner | None":
         """The batch runner of this thread; None where points have to be run individually."""

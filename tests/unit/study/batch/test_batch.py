@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import mechanisms, trees
+from support import mechanisms, problems, trees
 from support.on_axles import driven, stone, wheel
 from support.plain import long_in_plain_python
 
@@ -41,6 +41,23 @@ def singly(of, points):
         for output in of.outputs:
             found[output.name].append(output.value(result))
     return {name: np.array(values) for name, values in found.items()}
+
+
+@pytest.mark.parametrize(
+    ("name", "method"), [("bodies.b3.mass", "joint"), ("points.out3.sPp.x", "standard")]
+)
+def test_auto_takes_joint_coordinates_where_points_share_a_tree(name, method, monkeypatch):
+    """What moves joints has them placed anew, which would take longer than a point."""
+    monkeypatch.setattr("dap3d_core.simulation.compiled_model.MANY_BODIES", 16)
+    of = ensemble(problems.chain(16), [name], ["b9.r"], t_end=0.1, dt=0.1)
+    assert (of.compiled.method, path_of(of)) == (method, "copied")
+    batch = of.run([[0.5], [0.6]])
+    for k, value in enumerate((0.5, 0.6)):
+        single = of.result([value])
+        assert single.method == method
+        for output in of.outputs:
+            found = batch.values[output.name][k]  # of a start that is corrected: to rounding
+            assert found == pytest.approx(output.value(single), rel=1e-13)
 
 
 def pendulum():
