@@ -33,7 +33,7 @@ def measure():
     rows = []
     for joint, title in (("sph", "spherical"), ("rev", "revolute")):
         for n in SIZES:
-            compiled = CompiledModel(scenes.chain(n, joint))
+            compiled = CompiledModel(scenes.chain(n, joint), joint=False)
             evaluator, u = compiled.evaluator, compiled.start(True, ()).u
             for method in ("dopri5", "dop853"):
                 for rtol in (1e-6, 1e-9):

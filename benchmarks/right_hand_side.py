@@ -30,7 +30,7 @@ def repeat(functions, count, y, out, system, loops):
 
 def our(scene):
     """Count right-hand sides, and a function that evaluates them, for a scene."""
-    evaluator = CompiledModel(scene).evaluator
+    evaluator = CompiledModel(scene, joint=False).evaluator
     y = evaluator.integrated(evaluator.model.u0)
     out = np.zeros_like(y)
     count = max(2, WORK // evaluator.model.body_count)

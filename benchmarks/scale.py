@@ -45,7 +45,7 @@ def lap():
     clock.append(time.process_time())
     return clock[-1] - clock[-2]
 scene = scenes.planar_chain({n}); built = lap()
-compiled = CompiledModel(scene); done = lap()
+compiled = CompiledModel(scene, joint=False); done = lap()
 result = dap.simulate(compiled, t_end=1.0, dt=0.5); run = lap()
 fall = [0.5 * 9.81 * t**2 for t in result.t]
 print(json.dumps(dict(bodies={n}, scene_s=built, compile_s=done, run_s=run,
@@ -79,7 +79,7 @@ def planned(model):
 
 def row(title, scene):
     """One row of the table."""
-    compiled = CompiledModel(scene)
+    compiled = CompiledModel(scene, joint=False)
     evaluator, model = compiled.evaluator, compiled.model
     plan, plan_s, alone = planned(model)
     s, y = evaluator.system, evaluator.integrated(model.u0)

@@ -131,10 +131,9 @@ class CompiledModel:
         self.rest_states: dict[tuple[bool, tuple[str, ...], str], StartState] = {}
         self._own = _Evaluators()
         self._first_method = self.method = choose_method(self.model, requested)[0]
-        self._own.stack.append(self.new_evaluator(announce))
-        self.method, self.reason = self.choice(requested)
-        if requested == "auto" and self._may_choose_joint:
-            self._look_for_a_tree(announce)
+        if not self._is_large_tree(announce):
+            self._own.stack.append(self.new_evaluator(announce))
+            self.method, self.reason = self.choice(requested)
         self.evaluator.formulation = FORMULATIONS[self.method]
         _ = self.evaluator.functions  # compiled here, and not on the clock of the first run
         self.notes: list[str] = [
@@ -342,20 +341,30 @@ class CompiledModel:
         except AssemblyError:
             return None
 
-    def _look_for_a_tree(self, announce: Announce) -> None:
-        """Take joint coordinates for a tree of many bodies; in them it has no singular poses."""
-        count = self.model.body_count
-        if not MANY_BODIES <= count >= len(self.model.joint_names) > 0:
-            return
-        start = self._start_of_scene()
-        if start is None or start.redundancy.singular is not None:
-            return
+    def _is_large_tree(self, announce: Announce) -> bool:
+        """Take joint coordinates where ``auto`` does: for trees of many bodies.
+
+        In them a tree has no singular poses.
+        """
+        count, joints = self.model.body_count, len(self.model.joint_names)
+        is_open = self.requested_method == "auto" and self._may_choose_joint
+        if not is_open or not MANY_BODIES <= count >= joints > 0:
+            return False
+        usual = self._first_method
         with suppress(SimulationError):  # too many rows to keep
             evaluator = self.new_evaluator(announce, "joint")
-            if not evaluator.coordinates.kept:
-                self._first_method = self.method = "joint"
-                self.reason = f"the joints of its {count} bodies are a tree"
-                self._own.stack[:] = [evaluator]
+            if evaluator.coordinates.kept:
+                return False
+            self._first_method = self.method = "joint"
+            self.reason = f"the joints of its {count} bodies are a tree"
+            self._own.stack.append(evaluator)
+            start = self._start_of_scene()
+            if start is not None and start.redundancy.singular is None:
+                return True
+        self._first_method = self.method = usual
+        self._own.stack.clear()
+        self._starts.clear()
+        return False
 
     @cached_property
     def joint_cost(self) -> float:
