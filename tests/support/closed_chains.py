@@ -5,7 +5,7 @@ Each is a function that returns its motion in minimal coordinates and its joints
 
 import numpy as np
 
-from support.minimal_motion import Body, MinimalMotion, meeting, rod_axes, turned, unit
+from support.minimal_motion import Body, MinimalMotion, cross, meeting, rod_axes, turned, unit
 from support.model_files import Link
 
 X, Y, Z = np.eye(3)
@@ -14,7 +14,7 @@ X, Y, Z = np.eye(3)
 def along(a, b, normal=Y):
     """The pose of a planar rod from a to b, with its origin in the middle."""
     d = unit(b - a)
-    return 0.5 * (a + b), np.stack([d, normal + 0 * d, np.cross(d, normal)], axis=1)
+    return 0.5 * (a + b), np.stack([d, normal + 0 * d, cross(d, normal)], axis=1)
 
 
 def rod(mass, length):
@@ -82,7 +82,7 @@ def leg():
         A, at_knee, B, at_spring, C, at_ankle, top = chain(s)
         back = meeting(at_ankle, heel, top, reach[0], Y)
         x = unit(at_ankle - back)  # the tarsus points away from its heel
-        T = np.stack([x, Y + 0 * x, np.cross(x, Y)], axis=1)
+        T = np.stack([x, Y + 0 * x, cross(x, Y)], axis=1)
         at_crank, at_foot = at_ankle + T @ crank, at_ankle + T @ foot
         K = T @ turned(Y, s[3])
         end = at_crank + K @ (0.05, 0.0, 0.0)
@@ -94,7 +94,7 @@ def leg():
             "thigh": (hip + 0 * top, A), "shin": (at_knee, B), "lower": (at_spring, C),
             "tarsus": (at_ankle, T), "achilles": (lifted + 0.25 * d, rod_axes(d, Y)),
             "crank": (at_crank, K), "plantar": along(end, toe),
-            "foot": (at_foot, np.stack([f, Y + 0 * f, np.cross(f, Y)], axis=1)),
+            "foot": (at_foot, np.stack([f, Y + 0 * f, cross(f, Y)], axis=1)),
         }  # fmt: skip
 
     start = np.array([-0.2, 0.9, 0.0, 0.3])
@@ -126,7 +126,7 @@ def delta():
     R, r, L1, L2, half = 0.2, 0.06, 0.25, 0.5, 0.05
     bodies = {"platform": Body(0.5, (5e-4, 6e-4, 9e-4))}
     radial = [np.array([np.cos(a), np.sin(a), 0.0]) for a in 2.0 * np.pi * np.arange(3) / 3.0]
-    tangent = [np.cross(Z, e) for e in radial]
+    tangent = [cross(Z, e) for e in radial]
     for i in range(3):
         bodies[f"arm{i}"] = rod(0.3, L1)
         bodies |= {f"rod{i}{k}": rod(0.05, L2) for k in range(2)}
@@ -173,7 +173,7 @@ def stewart():
             for third in range(3) for a in (2.1 * third - 0.2, 2.1 * third + 0.2)]  # fmt: skip
     heads = [0.3 * np.array([np.cos(a), np.sin(a), -0.05])
              for third in range(3) for a in (2.1 * third - 0.8, 2.1 * third + 0.8)]  # fmt: skip
-    cross = [unit(np.cross(Z, foot)) for foot in feet]
+    arms = [unit(cross(Z, foot)) for foot in feet]
     bodies = {"top": Body(2.0, (0.04, 0.05, 0.08), (0.01, 0.02, 0.03))}
     for i in range(6):
         bodies |= {f"low{i}": rod(0.3, 0.4), f"up{i}": rod(0.2, 0.4)}
@@ -189,7 +189,7 @@ def stewart():
         found = {"top": top(s)}
         for i, (leg_, foot) in enumerate(zip(legs(s), feet, strict=True)):
             d = unit(leg_)
-            axes = rod_axes(d, cross[i])
+            axes = rod_axes(d, arms[i])
             found |= {f"low{i}": (foot + 0.2 * d, axes), f"up{i}": (foot + leg_ - 0.2 * d, axes)}
         return found
 
@@ -202,7 +202,7 @@ def stewart():
     for i in range(6):
         axes = here[f"low{i}"][1]
         joints[f"foot{i}"] = Link("universal", "world", f"low{i}", tuple(feet[i]),
-                                  (cross[i], axes[:, 2]))  # fmt: skip
+                                  (arms[i], axes[:, 2]))  # fmt: skip
         joints[f"slide{i}"] = Link("prismatic", f"low{i}", f"up{i}", tuple(here[f"up{i}"][0]),
                                    (axes[:, 0],), 400.0, 4.0)  # fmt: skip
     for i in range(6):
