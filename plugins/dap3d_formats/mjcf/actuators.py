@@ -85,6 +85,8 @@ def _law(element: XmlElement) -> tuple[float, float, float, float] | None:
         return 1.0, 0.0, 0.0, 0.0
     if element.name == "position":
         kp = element.number("kp", 1.0)
+        if {"kv", "dampratio"} <= element.attributes.keys():
+            raise FormatError("<position> takes kv or dampratio, not both", element.place)
         ratio = element.number("dampratio", 0.0)  # above 0, as the compiler stores it
         return kp, 0.0, -kp, ratio if ratio > 0.0 else -element.number("kv", 0.0)
     if element.name == "velocity":

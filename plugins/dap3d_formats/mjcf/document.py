@@ -67,7 +67,8 @@ class Document:
             own.setdefault(tag, {}).update(values)
         for child in element:
             if child.name != "default":
-                own.setdefault(_kind(child.name), {}).update(child.attributes)
+                tag = _kind(child.name)
+                own[tag] = _under(own.get(tag, {}), child.attributes)
         self.defaults[name] = own
         for child in element.all("default"):
             self._read_defaults(child, child.require("class"), own)
@@ -88,7 +89,7 @@ class Document:
             raise FormatError(f"there is no default class {name!r}; classes: {known}",
                               element.place)  # fmt: skip
         values = self.defaults[name].get(_kind(element.name), {})
-        return attrs.evolve(element, attributes=values | element.attributes)
+        return attrs.evolve(element, attributes=_under(values, element.attributes))
 
     def settled_equality(self, element: XmlElement) -> XmlElement:
         """An equality with the attributes of its class, which all equalities share."""
@@ -153,6 +154,12 @@ class Document:
 
 def _kind(tag: str) -> str:
     return "actuator" if tag in ACTUATORS else tag
+
+
+def _under(values: dict[str, str], own: dict[str, str]) -> dict[str, str]:
+    """Attributes of a class under those below it; `kv` and `dampratio` replace each other."""
+    replaced = {"kv": "dampratio", "dampratio": "kv"}
+    return {key: text for key, text in values.items() if replaced.get(key) not in own} | own
 
 
 def _include(source: Source, element: XmlElement) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import attrs
+import numpy as np
 
 from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.scene_of_model import ImportOptions, scene_of
@@ -17,7 +18,7 @@ from dap3d_core.interface.formats import Articulation, FormatError, Importer, Re
 from dap3d_core.interface.formats.articulation import KINDS
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.extensions import Extensions, extensions
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.scene import Scene, SceneError, check
 from dap3d_core.scene.errors import MISSING, Mistake
 
@@ -263,14 +264,19 @@ def _coordinates(
     """Coordinates of joints as tuples.
 
     Raises:
-        FormatError: there is no such joint, or it has another number of them.
+        FormatError: there is no such joint, or it has another number of them, or not numbers.
     """
-    coordinates = {}
+    coordinates, what = {}, "position" if positions else "rate"
     quaternions = {"ball": 1, "free": 1} if positions else {}
     for name, value in (given or {}).items():
         if name not in model.joints:
-            raise FormatError(f"position of {name}: there is no such joint in the file")
-        values = tuple(map(float, value if isinstance(value, Sequence) else (value,)))
+            near = nearest(name, model.joints)
+            remedy = f"did you mean {near!r}?" if near else f"it has {some([*model.joints], 8)}"
+            raise FormatError(f"{what} of {name}: there is no such joint in the file", None, remedy)
+        array = np.ravel(value)
+        if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
+            raise FormatError(f"{what} of {name} = {value!r} should be finite numbers")
+        values = tuple(map(float, array))
         kind = model.joints[name].kind
         count = KINDS[kind] + quaternions.get(kind, 0)
         if len(values) != count:

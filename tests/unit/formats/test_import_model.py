@@ -134,6 +134,17 @@ def test_a_position_has_as_many_numbers_as_its_joint_coordinates():
         dap.import_model(hand, positions={"loose": 0.1})
     with pytest.raises(dap.SceneError, match="joint loose is ball: it takes 3 numbers, not 4"):
         dap.import_model(hand, rates={"loose": (1.0, 0.0, 0.0, 0.0)})
+    dap.import_model(hand, rates={"loose": np.zeros(3)})
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), "0.1", [0.1, None]])
+def test_positions_are_finite_numbers_of_joints_of_the_file(value):
+    with pytest.raises(dap.SceneError, match=r"rate of elbow = .* should be finite numbers"):
+        dap.import_model(ARM, rates={"elbow": value})
+    with pytest.raises(dap.SceneError, match="did you mean 'elbow'"):
+        dap.import_model(ARM, positions={"elbw": value})
+    with pytest.raises(dap.SceneError, match=r"it has .*shoulder"):
+        dap.import_model(ARM, positions={"knee": value})
 
 
 SPOKE = '<body name="b"><freejoint/><geom type="box" size="0.1 0.2 0.3" pos="1 0 0"/></body>'
@@ -234,6 +245,19 @@ def test_a_servo_may_have_a_damping_ratio(tmp_path):
     damping = [scene.forces[f"{name}_spring"].fields["c"] for name in "pq"]
     expected = 2.0 * np.sqrt(50.0 * FREE[0]), 2.0 * 0.7 * 3.0 * np.sqrt(8.0 * FREE[1])
     np.testing.assert_allclose(damping, expected, rtol=1e-12)
+
+
+def test_kv_and_dampratio_replace_each_other_down_the_classes(tmp_path):
+    """A servo has one of the two; that of the lower class, or of the element, is in force."""
+    text = """<default><position kv="3"/><default class="low"><position dampratio="1"/></default>
+      </default><actuator><position class="low" joint="p" kp="50"/>
+      <position class="low" joint="q" kp="50" kv="2"/></actuator>"""
+    scene, _ = imported(tmp_path, LINE.format(first="", second="") + text)
+    damping = [scene.forces[f"{name}_spring"].fields["c"] for name in "pq"]
+    np.testing.assert_allclose(damping, (2.0 * np.sqrt(50.0 * FREE[0]), 2.0), rtol=1e-12)
+    both = text.replace('kp="50" kv', 'kp="50" dampratio="1" kv')
+    with pytest.raises(dap.SceneError, match="kv or dampratio, not both"):
+        imported(tmp_path, LINE.format(first="", second="") + both)
 
 
 def test_a_spring_by_a_time_constant_needs_a_mass(tmp_path):

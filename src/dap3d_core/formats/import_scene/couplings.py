@@ -5,6 +5,8 @@ import numpy as np
 from dap3d_core.formats.import_scene.joints import NamedEnds
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.interface.formats.articulation import Articulation, Joint
+from dap3d_core.interface.formats.remarks import FormatError
+from dap3d_core.registry.suggestions import nearest
 
 
 def add_rotor(builder: SceneBuilder, joint: Joint, inertia: float) -> None:
@@ -44,11 +46,21 @@ def follow(builder: SceneBuilder, joint: Joint, wheel: str, ratio: float, suffix
 
 
 def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
-    """Add coordinates that follow others; what cannot be coupled is left out, remarked."""
+    """Add coordinates that follow others; what cannot be coupled is left out, remarked.
+
+    Raises:
+        FormatError: a coupling names one joint twice, or one that the model does not have.
+    """
     for coupling in model.couplings:
-        pair = [model.joints.get(name) for name in (coupling.joint, coupling.other)]
-        one, other = pair
-        if one is None or other is None or {one.kind, other.kind} - {"revolute", "prismatic"}:
+        others = model.joints.keys() - {coupling.joint}
+        if coupling.joint not in model.joints or coupling.other not in others:
+            near = nearest(coupling.other, others)
+            what = (
+                f"{coupling.joint!r} follows {coupling.other!r}: should be two joints of the file"
+            )
+            raise FormatError(what, coupling.place, f"did you mean {near!r}?" if near else "")
+        one, other = model.joints[coupling.joint], model.joints[coupling.other]
+        if {one.kind, other.kind} - {"revolute", "prismatic"}:
             text = f"coupling of {coupling.joint} with {coupling.other}: joints of one coordinate "
             builder.remarks.leave_out(coupling.place, f"{text}are coupled")
             continue

@@ -12,7 +12,7 @@ from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
 from dap3d_core.interface.derive.symbolic import DerivationError, Steps, Symbols, flat
 
 #: sympy's functions that kernels have under the same name.
-WORDS = ("sin", "cos", "tanh", "atan2")
+WORDS = ("sin", "cos", "tanh", "atan2", "exp", "log", "asin", "acos", "floor")
 
 
 class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
@@ -45,6 +45,8 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
 
     def _print_Float(self, number: Any) -> str:
         return repr(float(number))
+
+    _print_Pi = _print_Exp1 = _print_Float
 
     def _print_Pow(self, power: Any, rational: bool = False) -> str:
         base, exponent = power.as_base_exp()
@@ -88,6 +90,7 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
         raise DerivationError(f"kernels have no {name}; write the formulas by hand")
 
     _print_sin = _print_cos = _print_tanh = _print_atan2 = _print_Function
+    _print_exp = _print_log = _print_asin = _print_acos = _print_floor = _print_Function
 
 
 def kernel_source(

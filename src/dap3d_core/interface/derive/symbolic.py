@@ -142,8 +142,13 @@ class Program:
 
 
 def _diff(expression: Expression, symbol: Expression) -> Expression:
-    """Derivative; that of a jump (of a sign, a branch) is zero."""
-    return sympy.diff(expression, symbol).replace(sympy.DiracDelta, lambda *_: sympy.Integer(0))
+    """Derivative; that of a jump (of a sign, a branch, ``floor``) is zero."""
+    found, zero = sympy.diff(expression, symbol), sympy.Integer(0)
+    if expression.has(sympy.floor):  # of which sympy knows no derivative
+        found = found.replace(sympy.Subs, lambda *_: zero).replace(
+            sympy.Derivative, lambda *_: zero
+        )
+    return found.replace(sympy.DiracDelta, lambda *_: zero)
 
 
 class Symbols(Mapping[str, Any]):
@@ -440,6 +445,7 @@ def derive_value(
     """(f, f', f'', f''') of a function that gives f alone; partial derivatives of one of two."""
     (f,) = traced(value, symbols, "value")[:1]
     x = symbols.value("x")
+    f = f.xreplace({symbols.value("t"): x})  # one number under two names
     if arguments > 1:
         y = symbols.value("y")
         f_x, f_y = _diff(f, x), _diff(f, y)

@@ -85,6 +85,12 @@ def _quantity(
     result: QuantitySource, name: str, owner: QuantityOwner, attribute: str, component: str
 ) -> Quantity:
     kind, unit, _, function, rate = QUANTITIES[owner.kind][attribute]
+    if attribute == ACTUATION:
+        actuators, units = (
+            str(result.record.settings.get(name, "")).split(", ")
+            for name in ("actuators", "actuation_units")
+        )
+        unit = dict(zip(actuators, units, strict=False)).get(owner.name) or unit
     label = f"{kind} of {owner.label}" + (f", {component}" if component else "")
     rate = f"{owner.label}.{rate}" if rate else ""
     values, columns = function(result, owner), _columns(result, owner, attribute)

@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group
 from dap3d_core.registry.suggestions import nearest
@@ -33,6 +34,10 @@ class DriverActuator:
         """(6 n,) force and moment on each body of a multiplier of one; D: (rows, 6 n)."""
         unit: Floats = D[self.row]
         return unit
+
+    def unit(self, D: Floats) -> str:
+        """Unit of its force: N of a row that holds translations."""
+        return "N" if D[self.row].reshape(-1, 6)[:, :3].any() else "N m"
 
     given = 0.0
 
@@ -61,6 +66,10 @@ class ForceActuator:
     def wrench(self, t: float, D: Floats) -> Floats:
         """(6 n,) force and moment on each body of an actuation of one, at the bodies as placed."""
         return np.asarray(self._at(t, "wrench", 1.0) - self._at(t, "wrench", 0.0))[6:]
+
+    def unit(self, D: Floats) -> str:
+        """Unit of its force: that of the field."""
+        return specs_of(self._group.type_info.type)[self._field].unit or "SI"
 
     def potential(self) -> float:
         """Potential energy that the force of the scene has, J, at the bodies as placed."""

@@ -103,6 +103,7 @@ class _Forces:
         Lam: (nt, m) multipliers.
         potential, angles, residuals: (nt,), (nt, a), (nt, 3) of the result.
         rank: the least of the actuation; freedoms: the most that the joints leave.
+        idle: (k,) actuators that move nothing at any instant; units: of tau.
         missing: largest part of the forces that no actuator produces, with its instant and motion.
     """
 
@@ -112,6 +113,8 @@ class _Forces:
     angles: Floats
     residuals: Floats
     rank: int
+    idle: Flags
+    units: Sequence[str] = ()
     freedoms: int = 0
     missing: tuple[float, float, Floats] | None = None
 
@@ -163,6 +166,7 @@ def _solved(
         settings={
             "t_end": float(motion.t[-1]),
             "actuators": ", ".join(actuator.name for actuator in chosen),
+            "actuation_units": ", ".join(forces.units),
             "length": model.length,
             "project": True,
             "correct": False,
@@ -187,7 +191,7 @@ def _forces(
     layout = model.report_layout
     out = _Forces(np.zeros((count, len(actuators))), np.zeros((count, model.row_count)),
                   np.zeros(count), np.zeros((count, model.angle_count)), np.zeros((count, 3)),
-                  rank=len(actuators))  # fmt: skip
+                  rank=len(actuators), idle=np.ones(len(actuators), dtype=bool))  # fmt: skip
     for k, (t, u, v_dot) in enumerate(zip(motion.t.tolist(), motion.u, motion.v_dot, strict=True)):
         evaluator.count_turns(t, u)
         report = evaluator.report(t, u)
@@ -195,6 +199,8 @@ def _forces(
         needed = required_forces(evaluator, t, u, v_dot)
         rows = ChosenRows(evaluator, t, u, held)
         wrenches = np.array([a.wrench(t, rows.all_rows) for a in actuators]).T
+        out.idle &= ~wrenches.any(axis=0)
+        out.units = out.units or [a.unit(rows.all_rows) for a in actuators]
         out.potential[k] = report[layout["potential_energy"]][0]
         out.potential[k] -= sum(a.potential() for a in actuators)
         needed = needed + wrenches @ [a.given for a in actuators]  # tau takes the place of these
@@ -232,14 +238,20 @@ def _actuation(free: Floats, wrenches: Floats, side: Floats) -> tuple[Floats, in
 def _notes(evaluator: Evaluator, actuators: list[Actuator], forces: _Forces) -> list[str]:
     """Redundant actuators, and forces that none produces, in words."""
     notes, names = [], ", ".join(actuator.name for actuator in actuators)
-    surplus = len(actuators) - forces.rank
+    surplus = len(actuators) - forces.rank - int(forces.idle.sum())
     drivers = [a.name for a in actuators if isinstance(a, DriverActuator)]
     if drivers:
         notes.append(
             f"{INFORMATION}{', '.join(drivers)} prescribe{'s' * (len(drivers) == 1)} nothing here: "
             "the motion is the one given, and the driver's multiplier is the force that it takes"
         )
-    if surplus:
+    if forces.idle.any():
+        idle = ", ".join(
+            a.name for a, is_idle in zip(actuators, forces.idle, strict=True) if is_idle
+        )
+        notes.append(f"{idle} moves nothing at any instant: an input or a function that is its "
+                     "factor is zero; give the input a value")  # fmt: skip
+    if surplus > 0:
         notes.append(
             f"the actuation is redundant: of {len(actuators)} actuators ({names}) "
             f"{forces.rank} are independent; reported are the forces of least norm, the square "

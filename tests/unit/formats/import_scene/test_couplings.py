@@ -81,6 +81,16 @@ def test_coupled_joints_share_their_inertia(tmp_path, suffix, text, armature):
         np.testing.assert_allclose(angle, ratio * expected, rtol=1e-8, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("leader", "said"), [("twoo", r"'twoo'.*\n.*mean 'two'"), ("one", "'one'")]
+)
+def test_a_joint_follows_another_one_of_the_file(tmp_path, leader, said):
+    path = tmp_path / "two.urdf"
+    path.write_text(URDF.replace('mimic joint="two"', f'mimic joint="{leader}"'))
+    with pytest.raises(dap.SceneError, match=f":8: 'one' follows {said}"):
+        dap.import_model(path)
+
+
 def test_a_screw_needs_a_type_of_others(tmp_path):
     """It is refused with its line where no package brings one: nothing is dropped in silence."""
     text = SDF.format(mimic="", sign="", gearbox="").replace(

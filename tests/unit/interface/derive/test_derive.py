@@ -32,6 +32,7 @@ from support.scenes import scene_for
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface import (
+    Function,
     Joint,
     PluginError,
     Point,
@@ -41,7 +42,7 @@ from dap3d_core.interface import (
     point,
     vector,
 )
-from dap3d_core.kernels import dot
+from dap3d_core.kernels import acos, asin, dot, exp, floor, log
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation
 from dap3d_core.model.state_layout import split
@@ -165,6 +166,28 @@ def test_a_function_by_its_value_alone_has_its_derivatives():
         slope = np.array([-1, 9, -45, 45, -9, 1]) @ lower / (60.0 * h)
         assert value(x, a, w)[order] == pytest.approx(slope, rel=1e-10)
     assert value(x, a, w)[0] == pytest.approx(a * np.sin(w * x) / np.sqrt(1.0 + x * x), rel=1e-15)
+
+
+class Words(Function):
+    """A function of time in all words that sympy has under names of its own."""
+
+    keyword = "words"
+
+    def value(t):
+        return exp(-t) * log(t + 2.0) + asin(t / 3.0) * acos(t / 4.0) + t * floor(5.0 * t)
+
+
+def test_derived_kernels_take_all_words_and_t_is_the_argument():
+    """By central differences of order 6: steps of 1e-3, in which 5 t is not a whole number."""
+    value = examine(Words).kernels["value"]
+    t, h = 0.41, 1e-3
+    exact = (math.exp(-t) * math.log(t + 2.0) + math.asin(t / 3.0) * math.acos(t / 4.0)
+             + t * math.floor(5.0 * t))  # fmt: skip
+    assert value(t)[0] == pytest.approx(exact, rel=1e-15)
+    for order in (1, 2, 3):
+        lower = [value(t + k * h)[order - 1] for k in (-3, -2, -1, 1, 2, 3)]
+        slope = np.array([-1, 9, -45, 45, -9, 1]) @ lower / (60.0 * h)
+        assert value(t)[order] == pytest.approx(slope, rel=1e-10)
 
 
 # ------------------------------------------------------------------ what cannot be derived

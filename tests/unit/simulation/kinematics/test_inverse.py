@@ -37,6 +37,7 @@ def undriven(scene):
 def test_the_motion_of_a_driver_takes_the_force_of_the_driver(scene, motion):
     """All multipliers are those of kinematics."""
     result = dap.inverse(scene, motion, "motor")
+    assert result.quantity("motor.actuation").unit == "N m"  # it holds an angle
     assert np.max(np.abs(result.Lam - motion.Lam)) < 1e-11 * np.max(np.abs(motion.Lam))
     assert np.array_equal(result.record.actuation["motor"], result.Lam[:, -1])
 
@@ -50,6 +51,20 @@ def test_a_force_element_takes_the_place_of_a_driver(scene, motion):
     assert np.max(np.abs(result.force("torque").on["i"].moment[:, 1] - moment)) < 1e-9
 
 
+def test_an_actuator_whose_input_is_zero_moves_nothing(scene, motion):
+    """A note says so, and no more that the actuation is redundant; with a value it is one."""
+    free = undriven(scene)
+    free.add_input("u")
+    free.forces["torque"].fields["input"] = "u"
+    notes = "\n".join(dap.inverse(free, motion, ["torque"]).notes)
+    assert "torque moves nothing at any instant: an input" in notes
+    assert "redundant" not in notes
+    free.inputs["u"].value = 2.0
+    found = dap.inverse(free, motion, ["torque"]).record.actuation["torque"]
+    plain = dap.inverse(undriven(scene), motion, ["torque"]).record.actuation["torque"]
+    np.testing.assert_allclose(2.0 * np.array(found), plain, rtol=1e-9, atol=1e-9)
+
+
 def test_actuation_is_stored(scene, motion, tmp_path):
     """The file gives the same numbers, also as a quantity."""
     result = dap.inverse(undriven(scene), motion, ["torque"], output=tmp_path / "a.nc")
@@ -57,6 +72,7 @@ def test_actuation_is_stored(scene, motion, tmp_path):
     assert stored.record.actuation == result.record.actuation
     quantity = find(stored, "torque.actuation")
     assert np.array_equal(quantity.values, result.record.actuation["torque"])
+    assert quantity.unit == "N m"
     assert np.array_equal(stored.force("torque").on["i"].moment,
                           result.force("torque").on["i"].moment)  # fmt: skip
 
