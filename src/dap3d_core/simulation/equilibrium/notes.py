@@ -87,7 +87,7 @@ def _of_time(group: Group, model: Model) -> Iterator[str]:
     always = "t" in parameters(group.type_info.kernels["wrench"])
     functions = len(group.type_info.layout.functions)
     for member, columns in zip(group.members, group.functions[:, :functions], strict=True):
-        if always or np.any(columns > 0):
+        if always or set(columns.tolist()) - {0, *model.input_rows.tolist()}:
             yield model.force_names[int(member)]
 
 

@@ -12,7 +12,7 @@ from dap3d_core.formulations import REPORT
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.parameter_change import Change, changed
 from dap3d_core.model.state_layout import u_from_y
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.result import Result, RunMetadata
 from dap3d_core.simulation.compiled_model import CompiledModel
 
@@ -276,8 +276,9 @@ class Numbers:
         names = self._compiled.model.force_names
         if force not in names:
             model = self._compiled.model
-            near = nearest(force, (*names, *model.body_names, *model.input_names))
-            hint = f"did you mean {near!r}?" if near else f"forces: {', '.join(names) or 'none'}"
+            known = (*names, *model.body_names, *model.input_names)
+            near = nearest(force, known)
+            hint = f"did you mean {near!r}?" if near else f"there are {some(known, 20)}"
             raise ValueError(f"there is no force, body or input {force!r}; {hint}")
         model, par = self._compiled.model, self._compiled.evaluator.system.par
         change = changed(self._compiled.checked, model, names.index(force), fields)

@@ -394,6 +394,7 @@ def test_a_state_of_another_length_is_refused():
         ("first", {"w": (1.0, np.inf, 0.0)}, "three finite numbers"),
         ("first", {"mass": 2.0}, "an event sets r_dot and w of a body"),
         ("frist", {"w": (1.0, 0.0, 0.0)}, "did you mean 'first'"),
+        ("zzz", {"w": (1.0, 0.0, 0.0)}, "there are .*first"),
     ],
 )
 def test_velocities_that_cannot_be_set_are_refused(name, fields, words):
