@@ -8,16 +8,20 @@ from dap3d_core.interface.formats.articulation import Articulation, Joint
 from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.registry.suggestions import nearest
 
+#: Mass and inertia of a wheel that couples joints, over the least of what they move. With less,
+#: methods that allow for dependent rows (lsq, joint) take the rows of two followers for one.
+LIGHT = 1e-6
+
 
 def add_rotor(builder: SceneBuilder, joint: Joint, inertia: float) -> None:
     """Add a wheel on ground that turns with a joint and so adds to its inertia alone."""
     text = "armature of a joint is a wheel on ground that turns with it"
     builder.remarks.translate(joint.place, text)
-    wheel = wheel_of(builder, joint, inertia)
+    wheel = wheel_of(builder, joint, 1.0, inertia)
     follow(builder, joint, wheel, 1.0, "rotor")
 
 
-def wheel_of(builder: SceneBuilder, joint: Joint, inertia: float) -> str:
+def wheel_of(builder: SceneBuilder, joint: Joint, mass: float, inertia: float) -> str:
     """The wheel of a joint, made if there is none yet: a body that turns about ground's z."""
     key = ("wheel", joint.name)
     wheel = builder.names.scene_names.get(key)
@@ -26,7 +30,7 @@ def wheel_of(builder: SceneBuilder, joint: Joint, inertia: float) -> str:
         wheel = builder.names.free("bodies", f"{scene_name}_rotor")
         builder.names.scene_names[key] = wheel
         rate = builder.rates.get(joint.name, (0.0,))[0]
-        builder.scene.add_body(wheel, mass=1.0, Jp=(inertia,) * 3,
+        builder.scene.add_body(wheel, mass=mass, Jp=(inertia,) * 3,
                                w=(0.0, 0.0, rate) if rate else None)  # fmt: skip
         bearing = builder.names.free("joints", f"{wheel}_bearing")
         builder.scene.add_joint("rev", bearing, P_i=f"{wheel}.O", P_j="ground.O",
@@ -67,22 +71,22 @@ def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
         if builder.moves_alone(one) or builder.moves_alone(other):
             builder.remarks.leave_out(coupling.place, "coupling of a joint that does not move")
             continue
-        inertia = _light(builder, one, other)
         had_rotor = bool(other.armature[0])
-        wheel = wheel_of(builder, other, inertia)
+        wheel = wheel_of(builder, other, *_light(builder, one, other))
         if not had_rotor and ("followed", other.name) not in builder.names.scene_names:
             builder.names.scene_names["followed", other.name] = wheel
-            text = "joints are coupled by a wheel on ground, with a billionth of the inertia"
+            text = "joints are coupled by a wheel on ground, with a millionth of the inertia"
             builder.remarks.translate(coupling.place, text)
             follow(builder, other, wheel, 1.0, "rotor")
         follow(builder, one, wheel, coupling.ratio, "coupling")
 
 
-def _light(builder: SceneBuilder, *joints: Joint) -> float:
-    """A billionth of the least moment of inertia, or mass, of what joints move."""
-    sizes = []
+def _light(builder: SceneBuilder, *joints: Joint) -> tuple[float, float]:
+    """Mass and inertia of a wheel beside what joints move: beside its mass, for a slider."""
+    masses, sizes = [], []
     for joint in joints:
         inertial = builder.groups[builder.member[joint.child][0]].inertial
         least = float(np.linalg.eigvalsh(inertial.inertia)[0])
+        masses.append(inertial.mass)
         sizes.append(inertial.mass if joint.kind == "prismatic" else least)
-    return 1e-9 * min(sizes)
+    return LIGHT * min(masses), LIGHT * min(sizes)

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 from support.plain import long_in_plain_python
+from support.process import REPOSITORY
 
 import dap3d_core as dap
+from dap3d_core.formats.import_scene.couplings import LIGHT
 
 #: Moments of inertia of two wheels, the armature of the second, and the moment on the first.
 I_1, I_2, ARMATURE, MOMENT = 0.3, 0.5, 0.2, 1.5
@@ -65,9 +67,9 @@ TENDON = """<tendon><fixed name="t">
     ids=["mimic", "sdf-mimic", "gearbox", "equality", "armature", "tendon"],
 )
 def test_coupled_joints_share_their_inertia(tmp_path, suffix, text, armature):
-    """q_1 = 2 q_2, a moment on the first: (4 I_1 + I_2 + armature) q_2'' = 2 moment.
+    """q_1 = 2 q_2, a moment on the first: (4 I_1 + I_2 + wheel) q_2'' = 2 moment.
 
-    The wheel between them has a billionth of the least inertia.
+    The wheel between them has the armature, or a millionth of the least inertia.
     """
     path = tmp_path / f"two{suffix}"
     path.write_text(text)
@@ -75,10 +77,21 @@ def test_coupled_joints_share_their_inertia(tmp_path, suffix, text, armature):
     assert not [one for one in report.left_out if "coupl" in one.text or "tendon" in one.text]
     scene.add_force("n", "push", body_i="a", n=(0.0, 0.0, MOMENT))
     result = dap.simulate(scene, t_end=1.0, dt=0.5, rtol=1e-10, atol=1e-12)
-    expected = MOMENT / (4.0 * I_1 + I_2 + armature) * result.t**2
+    expected = MOMENT / (4.0 * I_1 + I_2 + (armature or LIGHT * I_1)) * result.t**2
     for name, ratio in (("a", 2.0), ("b", 1.0)):
         angle = 2.0 * np.arctan2(*result.p[:, list(scene.bodies).index(name), [3, 0]].T)
         np.testing.assert_allclose(angle, ratio * expected, rtol=1e-8, atol=1e-9)
+
+
+def test_all_methods_find_the_reactions_of_coupled_joints():
+    """The wheel is not so light that rows of both followers are taken for one."""
+    scene, _ = dap.import_model(REPOSITORY / "models" / "robots" / "gripper.urdf")
+    forces = [
+        dap.simulate(scene, method=method, t_end=0.0).reaction("close")["i"].force
+        for method in ("standard", "lsq", "joint")
+    ]
+    assert np.linalg.norm(forces[0]) > 0.9
+    np.testing.assert_allclose(forces[1:], forces[:1] * 2, rtol=1e-6, atol=1e-7)
 
 
 @pytest.mark.parametrize(
