@@ -129,6 +129,8 @@ def main() -> int:
     """Print what was found and return the exit status."""
     packages = needed(ROOT, EXTRAS)
     faults = list(licence_faults(packages))
+    if not packages:
+        faults.append(f"{ROOT} is not installed here")
     installed = sum(p is not None for p in packages.values())
     for name in (n for n, p in packages.items() if p is None):
         print(f"skipped: {name} is not installed here")

@@ -25,7 +25,8 @@ from pathlib import Path
 import dap3d_core as dap
 from dap3d_core.simulation.checkpoint.file import read_checkpoint
 
-import_module("dap3d_core.simulation.run").CHUNK_SECONDS = 1e-3
+runs = import_module("dap3d_core.simulation.run")
+runs.CHUNK_SECONDS, runs.FIRST_CHUNK = 1e-3, 100
 import_module("dap3d_core.simulation.output.recorder").SHORT_SECONDS = 0.05
 SETTINGS = {"t_end": 6.0, "dt": 0.02}
 compiled = dap.compile("pen1")

@@ -25,6 +25,13 @@ def package(**about):
     return SimpleNamespace(metadata=found)
 
 
+def test_without_dap3d_there_is_nothing_to_audit(audit, monkeypatch, capsys):
+    monkeypatch.setattr(audit, "ROOT", "dap3d-that-is-not-there")
+    monkeypatch.setattr(audit, "known_holes", lambda packages: ([], "not asked for"))
+    assert audit.main() == 1
+    assert "dap3d-that-is-not-there is not installed here" in capsys.readouterr().out
+
+
 def test_all_that_is_installed_may_be_passed_on(audit):
     packages = audit.needed(audit.ROOT, audit.EXTRAS)
     assert {"attrs", "numpy", "llvmlite", "sympy", "trimesh"} <= set(packages)
