@@ -22,6 +22,8 @@ from dap3d_core.study.sweep.schema import boxes, define, note_letters
 
 #: Seconds, and bytes of values, after which points are written.
 EVERY, MOST_WAITING = 2.0, 2**26
+#: Seconds after which writing that a reader has hindered is tried again.
+SOON = 0.05
 #: Seconds to wait, at the end, for a reader that has locked the file.
 PATIENCE = 10.0
 #: Attributes that identify the sweep of a part, and the difference that each shows.
@@ -66,7 +68,7 @@ class SweepFile(GrowingFile):
         self.layout, self._force = layout, force
         self._waiting: list[tuple[Integers, Batch]] = []
         self._is_empty = not resume
-        self._written = time.monotonic()
+        self._due = time.monotonic() + EVERY
         self._claim = FileLock(self.target)
         try:
             with NETCDF:
@@ -93,7 +95,7 @@ class SweepFile(GrowingFile):
         self._waiting.append((places, batch))
         self._is_empty = False
         self._status[places] = batch.status
-        late = time.monotonic() - self._written > EVERY
+        late = time.monotonic() > self._due
         waiting = 8 * self.layout.width * sum(len(places) for places, _ in self._waiting)
         if late or waiting > MOST_WAITING:
             self._write(0.0)
@@ -132,7 +134,7 @@ class SweepFile(GrowingFile):
         Raises:
             ResultError: it cannot be written.
         """
-        self._written = time.monotonic()
+        self._due = time.monotonic() + EVERY
         if not self._waiting:
             return
         places = np.concatenate([places for places, _ in self._waiting])
@@ -146,6 +148,7 @@ class SweepFile(GrowingFile):
         noted = notes != ""
         with NETCDF, self._opened(patience) as dataset:
             if dataset is None:
+                self._due = time.monotonic() + SOON
                 return
 
             def write_values() -> None:

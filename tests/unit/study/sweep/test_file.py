@@ -1,6 +1,10 @@
 """A sweep's file that is not as it was written is refused before any library reads it."""
 
+import fcntl
+import os
+
 import netCDF4
+import numpy as np
 import pytest
 from support.plain import long_in_plain_python
 from unit.result.file.test_checksum import REFUSED, SIZE, changed_files, no_library, written
@@ -9,6 +13,7 @@ from unit.study.sweep.test_sweep import spring
 import dap3d_core as dap
 from dap3d_core.result import ResultError
 from dap3d_core.result.file import checksum
+from dap3d_core.study.sweep import file
 from dap3d_core.study.sweep.dataset import is_sweep
 
 __all__ = ["no_library"]  # a fixture
@@ -80,3 +85,27 @@ def test_a_sealed_part_gets_its_name(good, tmp_path):
     found = dap.sweep(spring(), **ASKED, output=tmp_path / "a.nc", resume=True)
     assert [file.name for file in tmp_path.iterdir()] == ["a.nc"]
     assert dap.open_sweep(tmp_path / "a.nc").identical(found)
+
+
+def test_what_a_reader_hindered_is_soon_written(tmp_path, monkeypatch):
+    """Not only when it would be due again: few readers keep a file for long."""
+    path, found = tmp_path / "a.nc", []
+    part = tmp_path / "a.nc.part"
+    monkeypatch.setattr(file, "EVERY", 0.0)
+    monkeypatch.setattr(file, "SOON", 0.0)
+
+    def progress(done, total):
+        if not found:  # the file is there, and no point yet
+            monkeypatch.setattr(file, "EVERY", 1000.0)
+            found.append(os.open(part, os.O_RDONLY))
+            fcntl.flock(found[0], fcntl.LOCK_EX)
+        elif len(found) == 1:
+            os.close(found[0])
+            found.append(done)
+        elif len(found) == 2:
+            found.append(int((dap.open_sweep(part)["status"] == 1).sum()))
+
+    vary = {"forces.spring.k": np.linspace(1.0, 4.0, 400)}
+    dap.sweep(spring(), vary, outputs="block.r.x", t_end=0.1, output=path, threads=1,
+              progress=progress)  # fmt: skip
+    assert found[2] > found[1] > 0
