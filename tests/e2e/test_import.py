@@ -51,6 +51,7 @@ def test_nothing_is_overwritten_without_force(dap3d, refuse, arm):
         (("import", "arm.urdf", "--root", "nowhere"), "nowhere is no folder"),
         (("import", "arm.urdf", "--position", "elbw=1"), "no such joint"),
         (("import", "arm.urdf", "--position", "elbow"), "write NAME=VALUE"),
+        (("import", "arm.urdf", "--position", "a=1", "--position", "a=2"), "more than once"),
         (("import", "arm.urdf", "--package", "a=nowhere"), "nowhere is no folder"),
         (("import", "arm.urdf", "--format", "urfd"), "did you mean 'urdf'"),
         (("export", "arm.urdf", "--format", "urfd"), "did you mean 'urdf'"),

@@ -37,6 +37,9 @@ def describe(keyword: str, *, names: bool, source: bool, allow_code: bool, as_js
 
     registry = dap.load_registry()
     if not _is_type(registry, keyword) and is_model(keyword):
+        if names or source:
+            option = "--names" if names else "--source"
+            raise Refused(f"{option} is of types, and {keyword} is a model; give a keyword")
         model = model_data(keyword, allow_code=allow_code)
         if as_json:
             print_json({"model": model})

@@ -111,6 +111,8 @@ def _pairs(option: str, words: tuple[str, ...]) -> dict[str, str]:
         name, equals, value = word.partition("=")
         if not (name and equals and value):
             raise Refused(f"{option} {word}: write NAME=VALUE")
+        if name in pairs:
+            raise Refused(f"{option} {word}: {name} is given more than once")
         pairs[name] = value
     return pairs
 

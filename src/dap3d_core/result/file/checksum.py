@@ -63,7 +63,10 @@ def check_signature(file: Path, kind: str = "result") -> None:
     begin = beginning(file, len(_SIGNATURE))
     if begin != _SIGNATURE:
         fault = "it is not a NetCDF-4 file" if begin else "the file is empty"
-        raise ResultError(f"cannot read {file}: {fault}, so no {kind} of dap3d")
+        hint = ""
+        if file.suffix == ".checkpoint":
+            hint = f"; to continue the run of a checkpoint: dap3d resume {file}"
+        raise ResultError(f"cannot read {file}: {fault}, so no {kind} of dap3d{hint}")
 
 
 def write_checksums(file: Path, rows: int, *, is_whole: bool) -> None:

@@ -47,9 +47,14 @@ class HeldInputs:
 
         Raises:
             ValueError: there is no input of such a name, or a value is no finite number.
+            TypeError: ``given`` is no mapping.
         """
         values, index, changes = self.values, self._index, False
-        for name, value in given.items():
+        try:
+            items = given.items()
+        except AttributeError:
+            raise TypeError(f"inputs are given as {{input: value}}, not as {given!r}") from None
+        for name, value in items:
             k = index.get(name)
             if k is None:
                 raise ValueError(self._unknown(name))

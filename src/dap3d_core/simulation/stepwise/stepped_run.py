@@ -84,15 +84,20 @@ class SteppedRun:
 
         Raises:
             ValueError: dt is no positive number, an input does not exist, or a value is not finite.
+            TypeError: ``inputs`` is no mapping.
             SimulationError: the run cannot go on; what was computed is ``.result``.
         """
         if self._failure:
             raise SimulationError(self._failure, self.result())
         hold = self._hold
         t = hold.t
-        end = t + dt
-        if not t < end < math.inf:
-            raise ValueError(f"dt is {dt!r}; it should be a positive number of seconds")
+        try:
+            end = t + dt
+            if not t < end < math.inf:
+                raise TypeError
+        except TypeError:
+            words = f"dt is {dt!r}; it should be a positive number of seconds"
+            raise ValueError(words) from None
         if abs(end - self._t_end) <= ALIKE * dt:
             end = self._t_end
         if inputs and self._inputs.set(inputs):

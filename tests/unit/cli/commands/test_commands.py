@@ -41,6 +41,7 @@ def folder(falling, tmp_path, monkeypatch):
     shutil.copy(falling / "fall.nc", tmp_path / "single.nc.part")
     shutil.copy(falling / "swept.nc", tmp_path / "swept.nc.part")
     (tmp_path / "foreign.nc.part").write_text("words\n")
+    (tmp_path / "foreign.checkpoint").write_text("words\n")
     (tmp_path / "words").write_text("words\n")
     (tmp_path / "words.png").write_text("words\n")
     (tmp_path / "empty.nc").write_bytes(b"")
@@ -87,6 +88,7 @@ REFUSED = [
     (("resume",), "Missing argument 'CHECKPOINT'"),
     (("resume", "."), "it is a folder"),
     (("resume", "fall.toml"), "it is no checkpoint of dap3d"),
+    (("info", "foreign.checkpoint"), "dap3d resume foreign.checkpoint"),
     (("rerun",), "Missing argument 'RESULT'"),
     (("rerun", "fall.toml"), "it is not a NetCDF-4 file"),
     # analyses
@@ -159,6 +161,7 @@ REFUSED = [
     (("models", "--jsn"), "'--json'"),
     (("describe",), "Missing argument"),
     (("describe", "shp"), "did you mean 'sph'"),
+    (("describe", "pen1", "--source"), "--source is of types, and pen1 is a model"),
     (("check-plugin", "shp"), "did you mean 'sph'"),
     (("check-plugin", "nothing.py"), "there is no file nothing.py"),
     (("check-plugin",), "give --all"),

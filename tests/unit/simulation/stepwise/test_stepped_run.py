@@ -121,13 +121,15 @@ def test_a_step_that_fails_says_why_and_keeps_what_was_computed():
         (float("nan"), None, "dt is nan"),
         (-0.1, {"push": 1.0}, "dt is -0.1"),
         (0.1, {"pusch": 1.0}, "there is no input 'pusch'; did you mean 'push'"),
+        ("soon", None, "dt is 'soon'; it should be a positive number"),
         (0.1, {"push": None}, "input push is set to None; it should be a finite number"),
+        (0.1, [1.0], r"given as \{input: value\}, not as \[1.0\]"),
     ],
 )
 def test_steps_that_make_no_sense_are_refused(dt, inputs, words):
     """Before anything is done: the run goes on."""
     run = dap.start(pushed_block(1.0))
-    with pytest.raises(ValueError, match=words):
+    with pytest.raises((ValueError, TypeError), match=words):
         run.step(dt, inputs)
     assert run.t == 0.0
     assert run.step(0.1) == 0.1
