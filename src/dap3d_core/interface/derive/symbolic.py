@@ -306,7 +306,10 @@ def traced(kernel: Callable[..., Any], symbols: Symbols, what: str) -> list[Expr
     """
     try:
         value = kernel(*(symbols.value(name) for name in parameters(kernel)))
-        return [exact(x) for x in flat(value)]
+        numbers = [exact(x) for x in flat(value)]
+        if any(x.has(sympy.Mod) for x in numbers):
+            raise TypeError("the remainder a % b is written as a - b * floor(a / b)")
+        return numbers
     except DerivationError:
         raise
     except Exception as error:

@@ -210,6 +210,10 @@ def test_what_cannot_be_derived_is_refused_with_a_remedy():
         def C(r_P_i):
             return math.sin(r_P_i[0])
 
+    class Remainder(Base):
+        def C(r_P_i):
+            return r_P_i[0] % 0.1
+
     class Quadratic(Base):
         holonomic = False
 
@@ -237,6 +241,7 @@ def test_what_cannot_be_derived_is_refused_with_a_remedy():
     for type_, words in [
         (Branch, "branch by where"),
         (Elsewhere, "from dap3d_core.kernels"),
+        (Remainder, r"is written as a - b \* floor\(a / b\)"),
         (Quadratic, "row 1 of C_dot is not linear in the velocities"),
         (Nothing, "does not define C_dot"),
         (Hidden, "gamma needs v_i, the velocity of the body, whose name a field has taken"),
