@@ -273,7 +273,10 @@ def _coordinates(
             near = nearest(name, model.joints)
             remedy = f"did you mean {near!r}?" if near else f"it has {some([*model.joints], 8)}"
             raise FormatError(f"{what} of {name}: there is no such joint in the file", None, remedy)
-        array = np.ravel(value)
+        try:
+            array = np.ravel(value)
+        except ValueError:  # rows of different lengths
+            array = np.ravel("")
         if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
             raise FormatError(f"{what} of {name} = {value!r} should be finite numbers")
         values = tuple(map(float, array))

@@ -137,7 +137,7 @@ def test_a_position_has_as_many_numbers_as_its_joint_coordinates():
     dap.import_model(hand, rates={"loose": np.zeros(3)})
 
 
-@pytest.mark.parametrize("value", [float("nan"), float("inf"), "0.1", [0.1, None]])
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), "0.1", [0.1, None], [1, [2]]])
 def test_positions_are_finite_numbers_of_joints_of_the_file(value):
     with pytest.raises(dap.SceneError, match=r"rate of elbow = .* should be finite numbers"):
         dap.import_model(ARM, rates={"elbow": value})
