@@ -402,6 +402,12 @@ class Evaluator:
         s = self.system
         call_kinds(kind, kind, float(t), s, self.loops, out1, out2, out3)
 
+    def blocks(self, rows: ConstraintRows) -> Floats:
+        """(block_size,) blocks of D for the elimination program, from rows of ``rows``."""
+        D = self.system.D.copy()
+        D[self.pattern[2]] = rows.value
+        return D
+
     @cached_property
     def pattern(self) -> tuple[Integers, Integers, Integers]:
         """Row, column and place in D of the Jacobian's entries, in the order of ``rows``."""

@@ -1,6 +1,6 @@
 """Rank of the constraint rows, and the redundant ones.
 
-Up to DENSE_ROWS rows: singular values of the whole Jacobian. Beyond, what is not part of a loop is
+Up to FEW_ROWS rows: singular values of the whole Jacobian. Beyond, what is not part of a loop is
 left out first: where one joint alone holds a body by independent rows, no combination of rows that
 vanishes can contain that joint, so it is taken away with the body, and so on. Trees vanish so.
 What remains falls into parts that share no body; small ones get their singular values, large ones
@@ -17,11 +17,15 @@ from dap3d_core.linear.ldlt.factor import assemble, factor
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.rank.null_space import by_elimination, by_iteration, problem_of
 
-#: Up to this many rows the rank comes from singular values of the whole Jacobian.
-DENSE_ROWS = 1000
+#: Up to this many rows the rank comes from singular values of the whole Jacobian: to look for
+#: leaves would take as long.
+FEW_ROWS = 30
 
 #: Up to this many rows that of a part does.
 PART_ROWS = 300
+
+#: Up to this many rows a dense Jacobian is made for what is not done by blocks.
+DENSE_ROWS = 1000
 
 #: A pivot of the block factorisation counts as zero below this part of its row's squared length.
 PIVOT_TOLERANCE = 1e-10
@@ -55,7 +59,7 @@ class Rank:
         rows, columns: size of the Jacobian.
         rank: number of independent rows.
         tolerance: below this part of the largest a singular value counts as zero.
-        method: "svd"; beyond DENSE_ROWS rows "leaves" where nothing but trees was found, "svd of
+        method: "svd"; beyond FEW_ROWS rows "leaves" where nothing but trees was found, "svd of
             parts", or "elimination" or "inverse iteration" where a part was too large for that.
         dependencies: sets of rows that depend on each other, by their first rows.
     """
@@ -180,6 +184,16 @@ def _entries(plan: Plan) -> tuple[Integers, Integers, Integers]:
     within = np.arange(heights.sum()) - np.repeat(np.cumsum(heights) - heights, heights)
     place, row = (np.repeat(plan.blocks[:, c], heights) for c in (0, 3))
     return place + 6 * within, row + within, np.repeat(plan.blocks[:, 1], heights)
+
+
+def has_loops(plan: Plan, D: Floats) -> bool:
+    """False if no rows can depend on each other, as there are nothing but trees.
+
+    Args:
+        plan: the elimination program.
+        D: (block_size,) blocks as the joints gave them.
+    """
+    return bool(_core(plan, D))
 
 
 def sparse_rank(

@@ -17,7 +17,7 @@ from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.linear.rank.rank import DENSE_ROWS, factor_independent
+from dap3d_core.linear.rank.rank import DENSE_ROWS, FEW_ROWS, factor_independent, has_loops
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.model.state_layout import join, split, state_layout, velocities_of
@@ -214,7 +214,12 @@ def least_change(
 
     With ``held`` (bodies, maybe none) on the position rows alone, and zero on these bodies.
     """
-    if evaluator.model.row_count > DENSE_ROWS:
+    count = evaluator.model.row_count
+    if count > DENSE_ROWS or (
+        count > FEW_ROWS
+        and (held is None or not len(held))
+        and not has_loops(evaluator.plan, evaluator.blocks(rows))
+    ):
         return sparse_least_change(evaluator, residual, t, held, metric)
     length = evaluator.model.length
     if length != 1.0:  # rows of very different units

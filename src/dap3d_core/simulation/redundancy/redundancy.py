@@ -10,7 +10,7 @@ from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import (
-    DENSE_ROWS,
+    FEW_ROWS,
     WEIGHT,
     Dependency,
     Rank,
@@ -240,10 +240,9 @@ def rank_of(evaluator: Evaluator, rows: ConstraintRows) -> Rank:
     opening tilts rows that would depend on each other by as much.
     """
     model, blur = evaluator.model, fit_of(evaluator.model)
-    if model.row_count <= DENSE_ROWS:
+    if model.row_count <= FEW_ROWS:
         return dense_rank(rows.dense(), blur)
-    D = evaluator.system.D.copy()
-    D[evaluator.pattern[2]] = rows.value
+    D = evaluator.blocks(rows)
     return sparse_rank(evaluator.plan, D, evaluator.system.row, 6 * model.body_count, blur)
 
 

@@ -31,8 +31,8 @@ def corrected(scene, **options):
 @pytest.fixture
 def many_rows(monkeypatch):
     """Every scene is treated as one of many rows."""
-    for module in (assemble, redundancy):
-        monkeypatch.setattr(module, "DENSE_ROWS", 0)
+    monkeypatch.setattr(assemble, "DENSE_ROWS", 0)
+    monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
 
 
 def turn_of(u, v, n):
@@ -248,8 +248,8 @@ def test_the_metric_of_many_rows_is_that_of_few(metric, monkeypatch):
     """Bodies of different mass and inertia, turned: the block factorisation weighs as numpy."""
     scene = bent_chain(5)
     _, few = corrected(scene, metric=metric)
-    for module in (assemble, redundancy):
-        monkeypatch.setattr(module, "DENSE_ROWS", 0)
+    monkeypatch.setattr(assemble, "DENSE_ROWS", 0)
+    monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
     _, many = corrected(scene, metric=metric)
     assert many.u == pytest.approx(few.u, abs=1e-10)
     assert few.u[:35] != pytest.approx(corrected(scene)[1].u[:35], abs=1e-4) or metric == "unit"
@@ -363,8 +363,8 @@ def test_the_correction_of_many_rows_is_that_of_few(scene, monkeypatch):
     """The block factorisation finds the least change that numpy finds, redundant rows or not: both
     end within 1e-10 of the constraints, after passes that agree to rounding times the condition."""
     _, few = corrected(scene)
-    for module in (assemble, redundancy):
-        monkeypatch.setattr(module, "DENSE_ROWS", 0)
+    monkeypatch.setattr(assemble, "DENSE_ROWS", 0)
+    monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
     evaluator, many = corrected(scene)
     metric = evaluator.system.metric.copy()
     assert many.passes == few.passes > 0

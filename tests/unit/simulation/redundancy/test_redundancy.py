@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.mechanisms import (
+    bent_chain,
     bricard,
     door,
     four_bar_row,
@@ -69,7 +70,7 @@ def test_a_row_of_four_bars_has_three_redundant_rows_a_loop(way, monkeypatch):
     has two rows, 6N+2 in all, and every one counts: 6N+3 freedoms of the plane less that is 1. Out
     of the plane nothing moves: rank 3 (2N+1). So rank 12N+5 and 3N rows too many."""
     N = 8
-    monkeypatch.setattr(redundancy, "DENSE_ROWS", 0)
+    monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
     if way != "svd of parts":
         monkeypatch.setattr(rank, "PART_ROWS", 0)
     if way == "inverse iteration":
@@ -84,10 +85,17 @@ def test_a_row_of_four_bars_has_three_redundant_rows_a_loop(way, monkeypatch):
     assert {(r.force, r.moment) for r in found.reactions()} == {("xy", "z")}
 
 
+@pytest.mark.parametrize(("n", "way"), [(4, "svd"), (12, "leaves")])
+def test_trees_need_no_singular_values(n, way):
+    """Only where there are so few rows that to look for leaves takes as long."""
+    found = dap.compile(bent_chain(n)).redundancy()
+    assert (found.rank.method, found.rank.redundant) == (way, 0)
+
+
 def test_what_hangs_on_a_loop_takes_no_part(monkeypatch):
     """A pendulum on each coupler of a row of four-bars adds five independent rows and a freedom
     each; elimination still is a proof, and the pendulums' reactions are unique."""
-    monkeypatch.setattr(redundancy, "DENSE_ROWS", 0)
+    monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
     monkeypatch.setattr(rank, "PART_ROWS", 0)
     scene = four_bar_row(4, 0.3)
     for k in range(1, 5):
@@ -139,7 +147,7 @@ def test_what_is_redundant_at_one_pose_alone(rows, monkeypatch):
     eight rows are redundant there alone, six everywhere."""
     if rows == "many":
         monkeypatch.setattr("dap3d_core.simulation.initial.assemble.DENSE_ROWS", 0)
-        monkeypatch.setattr(redundancy, "DENSE_ROWS", 0)
+        monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
     found, elsewhere = elsewhere_of(four_bar_row(2, np.pi / 2))
     assert (found.rank.rank, found.rank.redundant, found.rank.dof) == (27, 8, 3)
     assert elsewhere.everywhere is False
