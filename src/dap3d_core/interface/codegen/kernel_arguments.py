@@ -5,7 +5,7 @@ other names of a body are reserved.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from inspect import Parameter, signature
+from inspect import unwrap
 from typing import Any
 
 import attrs
@@ -295,8 +295,8 @@ def _tuple(pattern: str, n: int) -> str:
 
 def parameters(kernel: Callable[..., Any]) -> tuple[str, ...]:
     """The parameters of a kernel."""
-    positional = (Parameter.POSITIONAL_OR_KEYWORD, Parameter.POSITIONAL_ONLY)
-    return tuple(n for n, p in signature(kernel).parameters.items() if p.kind in positional)
+    code = unwrap(kernel).__code__
+    return code.co_varnames[: code.co_argcount]
 
 
 def in_order(names: Mapping[str, KernelArgument], wanted: Iterable[str]) -> list[KernelArgument]:

@@ -20,7 +20,7 @@ from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.types import BOOL, FLOAT, INT, NOTHING, Scalar, Signature
 from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, kind_of, type_of
 from dap3d_core.kernels.runtime.folder_security import distrust
-from dap3d_core.kernels.runtime.source_digest import digest, origin, source_digest
+from dap3d_core.kernels.runtime.source_digest import bytecode, digest, origin, source_digest
 
 _RESULTS = {type_.name: type_ for type_ in (NOTHING, BOOL, INT, FLOAT)}
 _units: dict[str, Unit] = {}
@@ -177,7 +177,7 @@ def names_of(label: str, functions: Sequence[Any], *parts: str | bytes) -> tuple
         parts: digests, sources and names that decide the code.
     """
     ready = source_digest(*parts, objects.compiler())
-    codes = [function.__code__.co_code for function in functions]
+    codes = [part for function in functions for part in bytecode(function)]
     return f"{label}-{ready}", f"{label}-{digest(ready, *codes, objects.identity())}"
 
 

@@ -14,6 +14,7 @@ one list and is never recompiled for a new type:
 
 import threading
 from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any, NamedTuple
 
 from dap3d_core.kernels import table_lookup
@@ -79,7 +80,12 @@ def unit_names(loop: Loop, text: str) -> tuple[str, str]:
     layout = repr(array_members())
     functions, _ = reached(*kernels)  # a kernel may be given others
     return names_of("loop", functions, text, layout, *places(*kernels),
-                    *sources(*kernels, *_SUPPORT))  # fmt: skip
+                    *sources(*kernels), *_support_sources())  # fmt: skip
+
+
+@cache
+def _support_sources() -> list[str | bytes]:
+    return sources(*_SUPPORT)
 
 
 def build_wide(loop: Loop, count: int) -> Entry:

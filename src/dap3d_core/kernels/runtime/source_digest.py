@@ -5,6 +5,7 @@ import inspect
 import os
 import sys
 import types
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -125,4 +126,18 @@ def places(*functions) -> list[str]:
 
 def identities(*functions) -> list[str | bytes]:
     """The same, and their bytecode: a file may have changed since it was loaded."""
-    return [*places(*functions), *(function.__code__.co_code for function in functions)]
+    return [*places(*functions), *(part for f in functions for part in bytecode(f))]
+
+
+def bytecode(function) -> Iterator[str | bytes]:
+    """Instructions of a function and of those within it, with the names and constants in them."""
+    codes = [function.__code__]
+    for code in codes:
+        yield code.co_code
+        yield repr(code.co_names)
+        for constant in code.co_consts:
+            if isinstance(constant, types.CodeType):
+                codes.append(constant)
+            else:  # the order of a set is another one in each process
+                yield repr(sorted(map(repr, constant)) if isinstance(constant, frozenset)
+                           else constant)  # fmt: skip

@@ -70,6 +70,23 @@ def test_a_change_in_a_helper_that_is_cached_changes_the_sources(tmp_path):
     assert source_digest.sources(one) != source_digest.sources(other)
 
 
+def test_a_kernel_is_told_from_that_of_a_file_that_changed_since(tmp_path):
+    """A process that goes on with the old code would leave it in the cache for the new."""
+    path = tmp_path / "kernel.py"
+
+    def loaded(factor, word="abs"):
+        text = f"def kernel(x):\n    return {factor} * {word}(x)\n"
+        path.write_text(text)
+        namespace = {"__name__": "package"}
+        exec(compile(text, str(path), "exec"), namespace)
+        return namespace["kernel"]
+
+    kernels = [loaded(2.0, "sum"), loaded(2.0), loaded(3.0)]
+    loops = [Loop("one", {"kernel_C": kernel}, ["pass"]) for kernel in kernels]
+    names = [unit_names(loop, source_of(loop))[1] for loop in loops]
+    assert len(set(names)) == 3
+
+
 def test_the_layout_of_its_arrays_is_in_both_names_of_a_loop(monkeypatch):
     """Its code reads addresses by their positions in the struct."""
     loop = Loop("nothing", {}, ["pass"])
