@@ -47,6 +47,7 @@ from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.ordering.spanning_forest import SpanningForest, spanning_forest
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import split, u_from_y, velocities_of
+from dap3d_core.registry.suggestions import some
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
@@ -134,6 +135,12 @@ class Coordinates:
             notes.append(
                 f"method joint takes some {self._cost_ratio:.2g} times as long as standard or lsq "
                 "here: its kept rows meet far from ground, or many of them do; auto takes those"
+            )
+        elif forces := self.evaluator.model.iterated_forces:
+            notes.append(
+                "method joint takes two to three times as long as standard here: at each pass of "
+                f"the iteration for {some(forces, MOST_NAMES)} it solves the whole tree; auto "
+                "takes standard"
             )
         return notes
 
