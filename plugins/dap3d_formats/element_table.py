@@ -2,7 +2,8 @@
 
 A table maps an element, ``parent/name`` where its meaning depends on its parent, to a word for
 itself (key "") and for each attribute: TAKEN, or a pair of NOTED, TRANSLATED or REFUSED and the
-reason. An element that is NOTED is left out with all that it holds.
+reason. A key ``name=value`` is of an attribute with this value alone. An element that is NOTED is
+left out with all that it holds.
 """
 
 from collections.abc import Mapping
@@ -63,7 +64,8 @@ def note_elements(root: XmlElement, table: Table, remarks: Remarks) -> None:
 def _note(element: XmlElement, name: str, row: Mapping[str, Word], remarks: Remarks) -> None:
     if name.startswith("xmlns") or ":" in name:
         return
-    state, words = row.get(name, (NOTED, "an unknown attribute"))
+    usual = row.get(name, (NOTED, "an unknown attribute"))
+    state, words = row.get(f"{name}={element.attributes[name].strip()}", usual)
     if state == REFUSED:
         raise FormatError(f"{name} of <{element.name}>: {words}", element.place)
     if state == NOTED:

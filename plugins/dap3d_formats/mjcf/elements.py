@@ -99,6 +99,7 @@ MJCF: Table = {
     | taken("name class type size fromto mesh mass density group rgba material")
     | noted("shellinertia hfield fitscale", "not drawn")
     | noted("fluidshape fluidcoef", "fluids")
+    | taken("contype=0 conaffinity=0", "no contact, as everywhere in dap3d")
     | noted(
         "contype conaffinity condim priority friction solmix solref solimp margin gap", _CONTACT
     )

@@ -26,6 +26,13 @@ COMMANDS = {
     )
 } | {"import": "dap3d_core.cli.commands.import_model"}  # fmt: skip
 
+#: What else a command is called, as in Python or in other programs.
+SYNONYMS = {
+    "simulate": "run", "continue": "resume", "repeat": "rerun", "linearize": "modes",
+    "linearise": "modes", "eigenvalues": "modes", "validate": "check", "list": "models",
+    "open": "info", "help": "--help",
+}  # fmt: skip
+
 
 class _Commands(Mapping[str, click.Command]):
     """The commands by name, imported on access."""
@@ -57,7 +64,7 @@ class App(click.Group):
         if name not in COMMANDS and not name.startswith("-"):
             from dap3d_core.registry.suggestions import nearest
 
-            near = nearest(name, list(COMMANDS))
+            near = SYNONYMS.get(name) or nearest(name, list(COMMANDS))
             hint = f"did you mean {near!r}?" if near else f"commands: {', '.join(COMMANDS)}"
             raise click.UsageError(f"there is no command {name!r}; {hint}", ctx)
         return super().resolve_command(ctx, args)

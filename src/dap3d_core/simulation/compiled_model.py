@@ -344,10 +344,11 @@ class CompiledModel:
     def _is_large_tree(self, announce: Announce) -> bool:
         """Take joint coordinates where ``auto`` does: for trees of many bodies.
 
-        In them a tree has no singular poses.
+        In them a tree has no singular poses. Forces that depend on multipliers cost more there.
         """
         count, joints = self.model.body_count, len(self.model.joint_names)
         is_open = self.requested_method == "auto" and self._may_choose_joint
+        is_open = is_open and not self.model.iterated_forces
         if not is_open or not MANY_BODIES <= count >= joints > 0:
             return False
         usual = self._first_method
@@ -367,10 +368,15 @@ class CompiledModel:
         return False
 
     @cached_property
-    def joint_cost(self) -> float:
-        """Estimate of the time of a right-hand side by method joint, over that of the usual one."""
+    def joint_cost(self) -> float | None:
+        """Estimate of the time of a right-hand side by method joint, over that of the usual one.
+
+        None where forces depend on multipliers: method joint takes longer then.
+        """
         from dap3d_core.formulations.joint.coordinates import cost_over_standard
 
+        if self.model.iterated_forces:
+            return None
         return cost_over_standard(self.model, self.evaluator.plan)
 
     def for_integrator(self, integrator: str) -> "CompiledModel":

@@ -77,7 +77,8 @@ def in_joint_coordinates(ratio: float) -> str:
     """What method joint would take of the time of a right-hand side, and when auto takes it."""
     return (
         f"method joint would take some {ratio:.2g} of the time of a right-hand side; auto takes it "
-        f"for trees of {MANY_BODIES} bodies or more, with integrators that do"
+        f"for {MANY_BODIES} bodies or more whose joints all form a tree, with integrators that "
+        "take it"
     )
 
 

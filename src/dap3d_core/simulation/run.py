@@ -287,4 +287,6 @@ class Run(RunState):
         from dap3d_core.simulation.explain import WORTHWHILE, in_joint_coordinates
 
         ratio = self.compiled.joint_cost
-        return [INFORMATION + in_joint_coordinates(ratio)] if ratio < WORTHWHILE else []
+        if ratio is None or ratio >= WORTHWHILE:
+            return []
+        return [INFORMATION + in_joint_coordinates(ratio)]

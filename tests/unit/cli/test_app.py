@@ -3,10 +3,11 @@
 import subprocess
 import sys
 
+import pytest
 from click.testing import CliRunner
 
 from dap3d_core.cli import main
-from dap3d_core.cli.app import COMMANDS, dap3d
+from dap3d_core.cli.app import COMMANDS, SYNONYMS, dap3d
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.scene import INTEGRATORS, METHODS
 
@@ -26,6 +27,14 @@ def test_main_takes_the_words_and_returns_the_exit_code(capsys):
     assert capsys.readouterr().out.startswith("dap3d, version")
     assert main(["nothing"]) == exit_codes.REFUSED
     assert "there is no command 'nothing'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("word", "command"), list(SYNONYMS.items()))
+def test_a_command_by_another_name_is_suggested(word, command, capsys):
+    """Where the nearest spelling is another command: linearize is no inverse."""
+    assert command in {*COMMANDS, "--help"}
+    assert main([word]) == exit_codes.REFUSED
+    assert f"did you mean '{command}'?" in capsys.readouterr().err
 
 
 def test_help_names_every_method_and_integrator():

@@ -95,6 +95,20 @@ def test_auto_takes_joint_coordinates_for_trees_of_many_bodies(make, method, mon
     assert ("method joint would take some" in compiled.explain()) == (method != "joint")
 
 
+def test_auto_keeps_coordinates_of_bodies_where_joints_rub(monkeypatch):
+    """There method joint takes longer: nothing recommends it, and its runs say so."""
+    monkeypatch.setattr("dap3d_core.simulation.compiled_model.MANY_BODIES", 16)
+    monkeypatch.setattr("dap3d_core.simulation.run.MUCH_WORK", 1)
+    scene = problems.chain(16)
+    scene.add_force("friction", "rubbing", joint="J3", mu=0.1, radius=0.02)
+    result = dap.simulate(scene, t_end=0.002, dt=0.001)
+    compiled = dap.compile(scene)
+    assert compiled.method == result.method == "standard"
+    assert "method joint" not in compiled.explain() + "".join(result.notes)
+    slow = dap.simulate(scene, t_end=0.002, dt=0.001, method="joint")
+    assert any("two to three times" in note and "rubbing" in note for note in slow.notes)
+
+
 @pytest.mark.parametrize("integrator", ["radau", "auto"])
 def test_auto_keeps_coordinates_of_bodies_for_integrators_that_need_them(integrator, monkeypatch):
     """Whether the scene says so, the run of a scene, or that of a compiled model."""

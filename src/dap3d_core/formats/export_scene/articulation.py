@@ -11,6 +11,9 @@ from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.scene.scene import GROUND, Scene
 
+#: Kinds of joints whose points may be apart along the axis.
+SLIDERS = ("prismatic", "cylindrical")
+
 
 def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
     """The articulated model of a scene; its joints are zero in the poses of the scene.
@@ -93,11 +96,15 @@ def _add_joint(builder: ModelBuilder, joint: SceneJoint, *, closes: bool) -> Non
         builder.in_link(joint.body_j, there), builder.in_link(joint.body_i, here),
         axes=tuple(tuple(axis.tolist()) for axis in joint.axes), closes=closes,
     )  # fmt: skip
-    gap = float(np.abs((j @ there).r - (i @ here).r).max())
-    if gap > 1e-6 and joint.kind != "prismatic":
+    d, slides = (j @ there).r - (i @ here).r, joint.kind in SLIDERS
+    if slides:  # along the axis it is free
+        axis = i.A @ joint.axes[0]
+        d = d - axis * (axis @ d)
+    gap = float(np.abs(d).max())
+    if gap > 1e-6:
         what = f"joint {joint.name} is open by {gap:.3g} m in the poses of the scene"
         raise FormatError(what, remedy="correct them: dap3d equilibrium, or a run, has them right")
-    if joint.kind == "prismatic":
+    if slides:
         made.in_parent = Frame(builder.in_link(joint.body_j, j.inverse() @ (i @ here)).r, there.A)
     builder.model.joints[joint.name] = made
     builder.placed[joint.name] = made

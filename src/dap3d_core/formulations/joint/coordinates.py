@@ -47,6 +47,7 @@ from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.ordering.spanning_forest import SpanningForest, spanning_forest
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import split, u_from_y, velocities_of
+from dap3d_core.registry.suggestions import some
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
@@ -60,6 +61,11 @@ QUANTITIES = {
     "angles": "p", "lengths": "r", "rotations": "pppp", "poses": "rrrpppp",
     "angle_rates": "w", "length_rates": "v", "rotation_rates": "www", "pose_rates": "vvvwww",
     "states": "z",
+}  # fmt: skip
+#: Motion of a node -> its noun, of one and of several.
+NOUNS = {
+    REVOLUTE: ("angle", "angles"), PRISMATIC: ("length", "lengths"),
+    SPHERICAL: ("ball", "balls"), FREE: ("free body", "free bodies"),
 }  # fmt: skip
 #: Segments of rates.
 RATES = ("angle_rates", "length_rates", "rotation_rates", "pose_rates")
@@ -120,10 +126,10 @@ class Coordinates:
     def structure(self) -> tuple[str, str]:
         """As of ``formulations.coordinates.Coordinates``."""
         table = self.nodes.table[1:, MOTION]
-        names = {REVOLUTE: "angles", PRISMATIC: "lengths", SPHERICAL: "balls", FREE: "free bodies"}
-        counts = {name: int(np.count_nonzero(table == motion)) for motion, name in names.items()}
-        parts = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
-        words = f"{len(table)} nodes: {parts or 'nothing moves'}"
+        counts = {motion: int(np.count_nonzero(table == motion)) for motion in NOUNS}
+        parts = [f"{n} {NOUNS[motion][n > 1]}" for motion, n in counts.items() if n]
+        nodes = f"{len(table)} node{'s' if len(table) != 1 else ''}"
+        words = f"{nodes}: {', '.join(parts) or 'nothing moves'}"
         return "tree", f"{words}; {self._kept_words()}" if self.kept else words
 
     @property
@@ -135,6 +141,12 @@ class Coordinates:
                 f"method joint takes some {self._cost_ratio:.2g} times as long as standard or lsq "
                 "here: its kept rows meet far from ground, or many of them do; auto takes those"
             )
+        elif forces := self.evaluator.model.iterated_forces:
+            notes.append(
+                "method joint takes two to three times as long as standard here: at each pass of "
+                f"the iteration for {some(forces, MOST_NAMES)} it solves the whole tree; auto "
+                "takes standard"
+            )
         return notes
 
     def _kept_words(self) -> str:
@@ -143,7 +155,7 @@ class Coordinates:
         named = [f"{model.joint_names[k]} ({self.kept[k]})" for k in kept[:MOST_NAMES]]
         more = f" and {len(kept) - MOST_NAMES} more" if len(kept) > MOST_NAMES else ""
         count = int(np.sum(model.joint_rows[kept]))
-        return f"{count} rows kept, of {', '.join(named)}{more}"
+        return f"{count} row{'s' if count != 1 else ''} kept, of {', '.join(named)}{more}"
 
     def start(self, u: Floats) -> Floats:
         """The state y of a run from a state u (13 n,), whose poses become the reference.

@@ -281,11 +281,20 @@ def _too_deep(path: Path) -> SceneError:
 
 
 def _not_found(path: Path, text: str, models: dict[str, Path]) -> SceneError:
-    near = nearest(text, models)
+    near = nearest(path.name, _scene_files(path.parent))
+    near = str(path.with_name(near)) if near else nearest(text, models)
     what = f"there is no file or folder {text!r}, and no shipped model of that name"
     if near:
         what += f"; did you mean {near!r}?"
     return file_error("", what, remedy=f"shipped models: {', '.join(models) or 'none'}")
+
+
+def _scene_files(folder: Path) -> list[str]:
+    """Names of the scene files in a folder."""
+    try:
+        return sorted(f.name for f in folder.glob("*.toml"))
+    except (OSError, ValueError):
+        return []
 
 
 def _no_scene_in(path: Path, models: dict[str, Path]) -> SceneError:

@@ -6,6 +6,9 @@ from pathlib import Path
 from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.scene.errors import file_error
 
+#: The first bytes of HDF5 files, and so of results.
+HDF5 = b"\x89HDF"
+
 
 def read_text(path: Path, largest: int, remedy: str = "save it as UTF-8") -> str:
     """The text of a file of at most ``largest`` bytes, without a byte order mark.
@@ -25,7 +28,8 @@ def read_text(path: Path, largest: int, remedy: str = "save it as UTF-8") -> str
     except OSError as error:
         raise unreadable(path, error) from None
     if b"\0" in data:
-        raise file_error(path, "is not a text file: it holds NUL bytes")
+        hint = "it may be a result: dap3d info describes it" if data.startswith(HDF5) else ""
+        raise file_error(path, "is not a text file: it holds NUL bytes", remedy=hint)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -166,7 +166,7 @@ def test_a_state_at_a_knot_is_refused_by_linearisation(method):
 def test_the_explanation_has_the_tree():
     """Nodes and coordinates by their sort, in place of the matrix."""
     text = dap.compile("pen2", method="joint").explain()
-    assert "tree       2 nodes: 1 angles, 1 balls" in text
+    assert "tree       2 nodes: 1 angle, 1 ball" in text
     assert "matrix" not in text
 
 

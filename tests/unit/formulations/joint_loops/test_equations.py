@@ -194,6 +194,10 @@ def test_kept_joints_are_named_with_their_reasons():
     assert any(f"method joint: {words}" in note for note in compiled.notes)
     assert words in compiled.explain()
     assert not any("kept" in note for note in dap.compile("pen2", method="joint").notes)
+    scene = trees.mixed_chain(2)
+    scene.add_joint("rel-rot", "lock", body_i="b0", a_j="ground.y")
+    explained = dap.compile(scene, method="joint").explain()
+    assert "2 nodes: 1 angle, 1 ball; 1 row kept, of lock (" in explained
 
 
 def test_a_screw_is_kept_by_name():

@@ -77,6 +77,14 @@ def test_a_missing_model_names_the_nearest():
     assert ", ".join(shipped_models()) in said
 
 
+def test_a_missing_file_names_the_nearest_in_its_folder(tmp_path, monkeypatch):
+    (tmp_path / "crane.toml").write_text(TEXT)
+    near = str(tmp_path / "crane.toml")
+    assert f"did you mean {near!r}?" in refused(tmp_path / "crane.tml")
+    monkeypatch.chdir(tmp_path)
+    assert "did you mean 'crane.toml'?" in refused("crane")
+
+
 @pytest.mark.parametrize(
     ("source", "words"),
     [
@@ -124,6 +132,7 @@ def test_a_loop_of_links_is_refused(tmp_path):
 
 BAD_CONTENT = {
     "image": (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", ["NUL bytes"]),
+    "result": (b"\x89HDF\r\n\x1a\n\0", ["NUL bytes", "dap3d info describes it"]),
     "NUL": (TEXT.encode() + b"x = '\0'", ["NUL bytes"]),
     "UTF-16": (TEXT.encode("utf-16"), ["NUL bytes"]),
     "latin-1": (TEXT.encode() + "# ü".encode("latin-1"), [":7:", "0xfc", "UTF-8"]),
