@@ -38,7 +38,7 @@ class OfScaledArgument(Grid):
 
 class Noisy(Grid):
     def value(x, y, rows, columns, cells):
-        return surface(x, y * random.choice((1.0, 2.0)), rows, columns, cells)
+        return surface(x, y * random.choice((1.0, 1.0)), rows, columns, cells)
 
 
 class Branching(Grid):
