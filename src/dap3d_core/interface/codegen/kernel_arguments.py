@@ -6,6 +6,7 @@ other names of a body are reserved.
 
 from collections.abc import Callable, Iterable, Mapping
 from inspect import unwrap
+from types import CodeType
 from typing import Any
 
 import attrs
@@ -295,7 +296,7 @@ def _tuple(pattern: str, n: int) -> str:
 
 def parameters(kernel: Callable[..., Any]) -> tuple[str, ...]:
     """The parameters of a kernel."""
-    code = unwrap(kernel).__code__
+    code: CodeType = unwrap(kernel).__code__
     return code.co_varnames[: code.co_argcount]
 
 
