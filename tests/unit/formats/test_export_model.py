@@ -228,3 +228,70 @@ def test_names_are_written_as_data(tmp_path):
     dap.export_model(scene, path, format="mjcf")
     back, _ = dap.import_model(path)
     assert (back.name, list(back.bodies)) == (scene.name, list(scene.bodies))
+
+
+#: A motor between two links, one on a slider between two, a servo on ground, with gears.
+DRIVEN = """<mujoco model="driven"><option gravity="0 0 0"/><compiler angle="radian"/><worldbody>
+  <body name="a" euler="0.3 0.2 0.1"><joint name="p" axis="0 1 1"/>
+    <inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.2 0.25"/>
+    <body name="b" pos="0.3 0 0" euler="0 0.4 0.5"><joint name="q" axis="1 2 0" pos="0 0 0.1"/>
+      <inertial pos="0.1 0 0" mass="1" diaginertia="0.1 0.2 0.25"/>
+      <body name="c" pos="0.2 0 0.1" euler="0.5 0 0"><joint name="s" type="slide" axis="1 0 2"/>
+        <inertial pos="0.1 0.2 0" mass="1" diaginertia="0.1 0.2 0.25"/></body></body></body>
+  </worldbody><actuator><position name="servo" joint="p" kp="5" kv="0.5"/>
+  <motor name="turn" joint="q" gear="-3"/><motor name="push" joint="s" gear="2"/></actuator>
+</mujoco>"""
+
+
+def test_actuators_read_back(tmp_path):
+    """An input that acts in a joint, equal and opposite on its bodies, is a motor of MJCF."""
+    (tmp_path / "a.xml").write_text(DRIVEN)
+    scene, _ = dap.import_model(tmp_path / "a.xml")
+    assert list(scene.inputs) == ["servo", "turn", "push"]
+    report = dap.export_model(scene, tmp_path / "b.xml", format="mjcf")
+    assert not report.left_out
+    back, _ = dap.import_model(tmp_path / "b.xml")
+    assert_same(scene, back)
+    for name, force in scene.forces.items():
+        assert force.fields.get("input") == back.forces[name].fields.get("input")
+        for key in {"np", "fp"} & force.fields.keys():
+            other = back.forces[name].fields[key]
+            np.testing.assert_allclose(force.fields[key], other, rtol=0, atol=1e-14)
+    left = dap.export_model(scene, format="urdf").left_out
+    assert sum("actuator" in str(one) for one in left) == 3
+
+
+def test_a_joint_that_closes_a_loop_has_no_actuator(tmp_path):
+    """It is an equality in MJCF, on which nothing acts."""
+    scene, _ = dap.import_model(DATA / "parallelogram.sdf")
+    ball = scene.joints.pop("close")
+    ends = {f"a_{e}": f"{scene.points[ball.fields[f'P_{e}']].body}.y" for e in "ij"}
+    scene.add_joint("rev", "close", **ball.fields, **ends)
+    for name, joint in scene.joints.items():
+        scene.add_input(f"turn_{name}", 0.0)
+        for end, sign in (("a_i", 1.0), ("a_j", -1.0)):
+            body = joint.fields[end].removesuffix(".y")
+            if body != "ground":
+                scene.add_force("np", f"{name}_{body}", body_i=body, np=(0.0, sign, 0.0),
+                                input=f"turn_{name}")  # fmt: skip
+    report = dap.export_model(scene, tmp_path / "a.xml", format="mjcf")
+    back, _ = dap.import_model(tmp_path / "a.xml")
+    assert set(back.inputs) == {"turn_left", "turn_right", "turn_pin"}
+    assert sum("of type np" in str(one) for one in report.left_out) == 2
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        lambda forces, inputs: forces.pop("turn_j"),
+        lambda forces, inputs: forces["turn_j"].fields.update(np=(0.0, 1.0, 0.0)),
+        lambda forces, inputs: forces["push_j"].fields.update(P_i="b.O"),
+        lambda forces, inputs: inputs["turn"].__setattr__("value", 1.0),
+    ],
+    ids=["on one body", "not opposite", "on another line", "held"],
+)
+def test_inputs_that_are_no_actuators_are_left_out(tmp_path, change):
+    (tmp_path / "a.xml").write_text(DRIVEN)
+    scene, _ = dap.import_model(tmp_path / "a.xml")
+    change(scene.forces, scene.inputs)
+    assert dap.export_model(scene, format="mjcf").left_out

@@ -1,10 +1,11 @@
-"""Forces of a scene as springs, dampers, limits, friction and rotors of the joints of a model."""
+"""Forces of a scene as what acts in the joints of a model: springs, stops, friction, actuators."""
 
 from math import inf
 from typing import Any
 
 import numpy as np
 
+from dap3d_core.formats.export_scene.actuators import add_actuators
 from dap3d_core.formats.export_scene.elements import SceneJoint, leave_out
 from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.interface.formats.articulation import Coupling, Joint, Limits
@@ -40,7 +41,10 @@ def add_gravity(builder: ModelBuilder, scene: Scene) -> None:
 def add_forces(builder: ModelBuilder, scene: Scene) -> None:
     """Add forces on coordinates of joints, and rotors; others are left out, remarked."""
     springs = {"rot_sda": _of_hinge, "tran_sda": _of_slider, "ptp": _on_line}
+    taken = add_actuators(builder, scene)
     for element in scene.forces.values():
+        if element.name in taken:
+            continue
         if element.type == "sph_sd":
             _add_to_ball(builder, element)
         elif element.type in FRICTION:
