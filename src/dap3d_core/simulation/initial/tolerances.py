@@ -115,8 +115,9 @@ def rounding_notes(runs: Sequence[Integration], evaluator: Evaluator) -> list[st
         return []
     words = ", ".join(bodies[:MOST_NAMES]) + (", ..." if len(bodies) > MOST_NAMES else "")
     return [
-        f"the accuracy of {words} is limited by rounding, not by the tolerances: its inertias are "
-        "very different, or it is far from the origin; smaller tolerances change nothing there"
+        f"the accuracy of {words} is limited by rounding, not by the tolerances: very different "
+        "inertias, a place far from the origin or a very fast motion do that; smaller tolerances "
+        "change nothing there"
     ]
 
 
