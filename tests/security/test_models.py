@@ -84,6 +84,17 @@ def test_meshes_elsewhere_are_refused(tmp_path, uri, words):
     assert "arm.urdf:14: " in said
 
 
+def test_no_file_has_a_name_that_is_too_long(tmp_path):
+    """Whatever the file system says of it; nor has one that the user names."""
+    name = f"{'x' * 5000}.xml"
+    text = f'<mujoco><include file="{name}"/></mujoco>'
+    assert "there is no file x" in refusal(tmp_path / "a.xml", text)
+    with pytest.raises(dap.SceneError, match="there is no file x"):
+        dap.import_model(name)
+    with pytest.raises(dap.SceneError, match="is no folder"):
+        dap.import_model(tmp_path / "a.xml", root=name)
+
+
 def test_a_package_that_the_user_names_is_read(tmp_path):
     folder, package = tmp_path / "model", tmp_path / "p"
     folder.mkdir()

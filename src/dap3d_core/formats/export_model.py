@@ -73,7 +73,7 @@ def export_model(
 
 
 def _write(path: Path, text: str, *, force: bool) -> None:
-    if not force and path.exists():
+    if not force and os.path.exists(path):
         raise FileExistsError(f"{path} exists; force overwrites it")
     temporary = path.with_name(f".{path.name}.part")
     try:

@@ -178,10 +178,10 @@ def read_articulation(
     _require_file(file)
     folders = {name: Path(os.fsdecode(folder)) for name, folder in (packages or {}).items()}
     for name, folder in folders.items():
-        if not folder.is_dir():
+        if not os.path.isdir(folder):
             raise FormatError(f"package {name}: {folder} is no folder")
     folder = file.parent if root is None else Path(os.fsdecode(root))
-    if not folder.is_dir():
+    if not os.path.isdir(folder):
         raise FormatError(f"root: {folder} is no folder")
     source = SourceFiles(file, folder, folders, allow_code, shapes)
     importer, keyword = _importer(source, format)
@@ -199,11 +199,11 @@ def _require_file(file: Path) -> None:
     Raises:
         FormatError: it is missing or a folder; with names of files that may be meant.
     """
-    if file.is_dir():
+    if os.path.isdir(file):
         models = sorted(one.name for one in file.iterdir() if one.suffix in SUFFIXES)
         names = f", such as {', '.join(models[:5])}" if models else ""
         raise FormatError(f"{file} is a folder", remedy=f"name a file in it{names}")
-    if not file.exists():
+    if not os.path.exists(file):
         near = nearest(file.name, _names_in(file.parent))
         hint = f"; did you mean {near!r}?" if near else ""
         raise FormatError(f"there is no file {file}{hint}")

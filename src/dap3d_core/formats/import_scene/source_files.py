@@ -60,7 +60,7 @@ class SourceFiles:
             FormatError: it is not found, lies elsewhere, or includes itself.
         """
         path = self._inside(name, place, base or self.path.parent)
-        if not path.is_file():
+        if not os.path.isfile(path):
             raise FormatError(f"there is no file {name}", place)
         resolved = path.resolve()
         self._count += 1
@@ -93,9 +93,9 @@ class SourceFiles:
         if not self.shapes and not required:
             return None
         path = self._inside(uri, place, base or self.path.parent)
-        if not path.is_file() and required:
+        if not os.path.isfile(path) and required:
             raise FormatError(f"there is no file {uri}, whose mass properties count", place)
-        if not path.is_file():
+        if not os.path.isfile(path):
             self.remarks.leave_out(place, f"there is no file {uri}: its shape is not drawn")
             return None
         return path
