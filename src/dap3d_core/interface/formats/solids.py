@@ -38,12 +38,12 @@ def inertia_of_solid(kind: str, size: Sequence[float]) -> tuple[float, Floats]:
 
 def _capsule(r: float, length: float) -> tuple[float, Floats]:
     """A cylinder with two half balls, whose mass centres lie 3/8 r beyond its ends."""
-    tube, ball = pi * r * r * length, 4.0 / 3.0 * pi * r**3
-    volume = tube + ball
-    along = (tube * r * r / 2.0 + ball * 0.4 * r * r) / volume
+    whole = length + 4.0 / 3.0 * r  # of a cylinder of the same volume
+    tube, ball = length / whole, 4.0 / 3.0 * r / whole
+    along = (tube / 2.0 + ball * 0.4) * r * r
     across = tube * (r * r / 4.0 + length * length / 12.0)
     across += ball * (0.4 * r * r + length * length / 4.0 + 3.0 / 8.0 * length * r)
-    return volume, np.diag([across / volume, across / volume, along])
+    return pi * r * r * whole, np.diag([across, across, along])
 
 
 def inertia_of_mesh(

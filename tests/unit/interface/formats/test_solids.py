@@ -52,6 +52,12 @@ def test_solids_against_sums_over_points(kind, size, inside):
     np.testing.assert_allclose(np.trace(second) * np.eye(3) - second, J, rtol=0.02, atol=1e-3)
 
 
+def test_a_capsule_whose_volume_is_below_all_numbers():
+    volume, J = inertia_of_solid("capsule", (1e-320, 2.0))
+    assert volume == 0.0
+    np.testing.assert_allclose(np.diag(J), (4.0 / 12.0, 4.0 / 12.0, 0.0))
+
+
 def test_parts_together():
     """Two halves of a box are the box."""
     volume, J = inertia_of_solid("box", (1.0, 3.0, 5.0))
