@@ -1,6 +1,5 @@
 """A sweep's file that is not as it was written is refused before any library reads it."""
 
-import fcntl
 import os
 
 import netCDF4
@@ -89,6 +88,7 @@ def test_a_sealed_part_gets_its_name(good, tmp_path):
 
 def test_what_a_reader_hindered_is_soon_written(tmp_path, monkeypatch):
     """Not only when it would be due again: few readers keep a file for long."""
+    fcntl = pytest.importorskip("fcntl")
     path, found = tmp_path / "a.nc", []
     part = tmp_path / "a.nc.part"
     monkeypatch.setattr(file, "EVERY", 0.0)
