@@ -2,17 +2,14 @@
 
 import numpy as np
 
-from dap3d_core.formats.export_scene.elements import SceneJoint
+from dap3d_core.formats.export_scene.elements import ALIGNED, SceneJoint
 from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.interface.formats.articulation import Actuator
 from dap3d_core.interface.formats.remarks import NOWHERE
-from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import GROUND, Element, Scene
 
 #: Kind of a joint -> the type of force, in axes of its body, that acts on its coordinate.
 TYPES = {"revolute": "np", "prismatic": "fp"}
-#: Forces along an axis and on one line, up to this part of them, or m.
-ALIGNED = 1e-9
 
 
 def add_actuators(builder: ModelBuilder, scene: Scene) -> set[str]:
@@ -48,22 +45,21 @@ def _gear(builder: ModelBuilder, joint: SceneJoint, users: list[Element]) -> flo
     forces = [np.asarray(acting[one.body_i].fields[type_], dtype=float) for one in moving]
     gear = float(forces[0] @ moving[0].axes[0])
     apart = max(np.abs(f - gear * one.axes[0]).max() for f, one in zip(forces, moving, strict=True))
-    places = [_place(builder, acting[one.body_i]) for one in moving]
-    pose = builder.elements.bodies[moving[0].body_i].pose
-    lever = np.cross(places[-1] - places[0], pose.A @ moving[0].axes[0])
-    is_off = type_ == "fp" and np.abs(lever).max() > ALIGNED
-    return 0.0 if is_off or apart > ALIGNED * abs(gear) else gear
+    if apart > ALIGNED * abs(gear):
+        return 0.0
+    if type_ == "fp":  # on one line
+        places = [builder.elements.at(_point_of(acting[one.body_i])) for one in moving]
+        axis = builder.elements.bodies[moving[0].body_i].pose.A @ moving[0].axes[0]
+        if np.abs(np.cross(places[-1] - places[0], axis)).max() > ALIGNED:
+            return 0.0
+    return gear
 
 
 def _body_of(builder: ModelBuilder, element: Element) -> str:
     """The body on which a force acts."""
-    point = element.fields.get("P_i")
-    return str(element.fields["body_i"]) if point is None else builder.elements.point(point)[0]
+    return builder.elements.point(_point_of(element))[0]
 
 
-def _place(builder: ModelBuilder, element: Element) -> Floats:
-    """The point at which a force acts, in global axes."""
-    body, point = _body_of(builder, element), element.fields.get("P_i")
-    pose = builder.elements.bodies[body].pose
-    s = np.zeros(3) if point is None else builder.elements.point(point)[1]
-    return np.asarray(pose.r + pose.A @ s)
+def _point_of(element: Element) -> str:
+    """The point at which a force acts."""
+    return str(element.fields.get("P_i") or f"{element.fields['body_i']}.O")

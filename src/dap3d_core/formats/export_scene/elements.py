@@ -13,6 +13,8 @@ from dap3d_core.scene.scene import GROUND, Element, Scene
 #: Type of a joint of a scene -> kind of a joint of a model.
 KINDS = {"rev": "revolute", "tran": "prismatic", "sph": "ball", "cyl": "cylindrical",
          "univ": "universal"}  # fmt: skip
+#: Parallel axes and points on a line, up to this.
+ALIGNED = 1e-9
 
 
 class SceneBody(NamedTuple):
@@ -93,6 +95,12 @@ class SceneElements:
             return body, np.zeros(3)
         point = self.scene.points[name]
         return str(point.body), np.asarray(point.sPp, dtype=float)
+
+    def at(self, name: str) -> Floats:
+        """A point in global axes."""
+        body, s = self.point(name)
+        pose = self.bodies[body].pose
+        return np.asarray(pose.r + pose.A @ s)
 
     def vector(self, name: str) -> tuple[str, Floats]:
         """The body of a vector, and its direction."""

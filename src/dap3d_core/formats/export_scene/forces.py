@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.formats.export_scene.actuators import add_actuators
-from dap3d_core.formats.export_scene.elements import SceneJoint, leave_out
+from dap3d_core.formats.export_scene.elements import ALIGNED, SceneJoint, leave_out
 from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.interface.formats.articulation import Coupling, Joint, Limits
 from dap3d_core.interface.formats.frames import from_quaternion
@@ -16,8 +16,6 @@ from dap3d_core.scene.scene import Element, Scene
 
 #: Stops beyond this are none, rad or m.
 NO_STOP = 1e6
-#: Parallel axes and points on a line, up to this.
-ALIGNED = 1e-9
 #: Orientations that are one, up to this.
 SAME = 1e-12
 #: Type of dry friction -> kind of its joint, its axis, and its size.
@@ -118,10 +116,8 @@ def _on_line(builder: ModelBuilder, element: Element) -> tuple[Joint, float, flo
 
 def _between(builder: ModelBuilder, fields: dict[str, Any]) -> Floats:
     """The vector from P_i to P_j in global axes."""
-    elements = builder.elements
-    (i, r_i), (j, r_j) = (elements.point(end) for end in elements.ends(fields))
-    pose_i, pose_j = elements.bodies[i].pose, elements.bodies[j].pose
-    return np.asarray(pose_j.r + pose_j.A @ r_j - pose_i.r - pose_i.A @ r_i)
+    P_i, P_j = builder.elements.ends(fields)
+    return builder.elements.at(P_j) - builder.elements.at(P_i)
 
 
 def _add_friction(builder: ModelBuilder, element: Element) -> None:

@@ -5,8 +5,7 @@ other names of a body are reserved.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from inspect import unwrap
-from types import CodeType
+from inspect import Parameter, signature
 from typing import Any
 
 import attrs
@@ -296,8 +295,8 @@ def _tuple(pattern: str, n: int) -> str:
 
 def parameters(kernel: Callable[..., Any]) -> tuple[str, ...]:
     """The parameters of a kernel."""
-    code: CodeType = unwrap(kernel).__code__
-    return code.co_varnames[: code.co_argcount]
+    positional = (Parameter.POSITIONAL_OR_KEYWORD, Parameter.POSITIONAL_ONLY)
+    return tuple(n for n, p in signature(kernel).parameters.items() if p.kind in positional)
 
 
 def in_order(names: Mapping[str, KernelArgument], wanted: Iterable[str]) -> list[KernelArgument]:

@@ -137,19 +137,19 @@ class SweepFile(GrowingFile):
         self._due = time.monotonic() + EVERY
         if not self._waiting:
             return
-        places = np.concatenate([places for places, _ in self._waiting])
-        order = np.argsort(places)
-        places = places[order]
-        batches = [batch for _, batch in self._waiting]
-        names = [output.name for output in self.layout.outputs]
-        values = {n: np.concatenate([b.values[n] for b in batches])[order] for n in names}
-        status = np.concatenate([batch.status for batch in batches])[order]
-        notes = np.array([note for b in batches for note in b.notes], dtype=object)[order]
-        noted = notes != ""
         with NETCDF, self._opened(patience) as dataset:
             if dataset is None:
                 self._due = time.monotonic() + SOON
                 return
+            places = np.concatenate([places for places, _ in self._waiting])
+            order = np.argsort(places)
+            places = places[order]
+            batches = [batch for _, batch in self._waiting]
+            names = [output.name for output in self.layout.outputs]
+            values = {n: np.concatenate([b.values[n] for b in batches])[order] for n in names}
+            status = np.concatenate([batch.status for batch in batches])[order]
+            notes = np.array([note for b in batches for note in b.notes], dtype=object)[order]
+            noted = notes != ""
 
             def write_values() -> None:
                 for name in names:

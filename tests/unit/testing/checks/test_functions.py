@@ -37,6 +37,8 @@ class OfScaledArgument(Grid):
 
 
 class Noisy(Grid):
+    """Always of one value: others would make its derivatives wrong as well, now and then."""
+
     def value(x, y, rows, columns, cells):
         return surface(x, y * random.choice((1.0, 1.0)), rows, columns, cells)
 
