@@ -59,8 +59,7 @@ def _read(reader: MjcfReader, element: XmlElement, inertia: StartInertia) -> Non
             text = "dampratio: links without mass, or too many, for a mass matrix"
             remarks.leave_out(element.place, text)
         rate *= -_critical(gain, gear, moved or 0.0)
-    reference = reader.references.get(joint, 0.0)
-    _add_law(target, gear * constant + gear * gear * position * reference,
+    _add_law(target, gear * constant + gear * gear * position * target.reference,
              -gear * gear * position, -gear * gear * rate)  # fmt: skip
     if gear * constant and not target.stiffness[0]:
         remarks.leave_out(element.place, "a constant force of an actuator")

@@ -127,8 +127,6 @@ def _couple(reader: MjcfReader, element: XmlElement) -> None:
     reader.model.couplings.append(
         Coupling(element.get("name") or "", joint, other, a1, a0, element.place)
     )
-    if a0:
-        one.position = (a0,)
 
 
 def _hold(reader: MjcfReader, joint: Joint, q: float) -> None:

@@ -38,7 +38,6 @@ class MjcfReader:
         model: the model so far.
         geoms: reader of geoms.
         sites: name of a site -> its link and frame.
-        references: joint -> its coordinate in the file where the model's is zero.
         given: names of bodies and joints in the file, which those without a name do not take.
         joints: names of the joints that have been read.
         springdampers: joint -> time constant and damping ratio that give its spring and damper.
@@ -48,7 +47,6 @@ class MjcfReader:
     model: Articulation = attrs.field(init=False)
     geoms: Geoms = attrs.field(init=False)
     sites: dict[str, tuple[str, Frame]] = attrs.Factory(dict)
-    references: dict[str, float] = attrs.Factory(dict)
     given: set[str] = attrs.Factory(set)
     joints: set[str] = attrs.Factory(set)
     springdampers: dict[str, tuple[float, ...]] = attrs.Factory(dict)
@@ -252,8 +250,7 @@ class MjcfReader:
         def turned(value: float) -> float:
             return self.document.angle(value) if joint.kind == "revolute" else value
 
-        reference = turned(element.number("ref", 0.0))
-        self.references[joint.name] = reference
+        joint.reference = reference = turned(element.number("ref", 0.0))
         for key, attribute in (("damping", "damping"), ("stiffness", "stiffness"),
                                ("friction", "frictionloss"), ("armature", "armature")):  # fmt: skip
             first, *others = element.numbers(attribute, None, (0.0,))
@@ -270,13 +267,12 @@ class MjcfReader:
         limited = element.get("limited", "auto")
         if limited == "true" or (limited == "auto" and "range" in element.attributes
                                  and self.document.flag("autolimits", True)):  # fmt: skip
-            low, high = element.numbers("range", 2)
+            low, high = element.numbers("range", 2, unbounded=True)
             if joint.kind == "ball":
                 joint.limits = (Limits(upper=self.document.angle(high)),)
-            elif low > high:
-                raise FormatError(f"range = {low:g} {high:g} is empty", element.place)
-            else:
-                joint.limits = (Limits(turned(low) - reference, turned(high) - reference),)
+            elif low != high or limited == "true":  # of equal ones MuJoCo makes no limit
+                joint.limits = (Limits.between(turned(low) - reference, turned(high) - reference,
+                                               joint.name, element.place),)  # fmt: skip
         if not any((joint.damping[0], joint.stiffness[0])):
             joint.limits = joint.limits or (Limits(-inf, inf),)
 

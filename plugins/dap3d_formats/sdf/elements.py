@@ -10,8 +10,7 @@ SDF: Table = {
     "gazebo": taken() | taken("version"),
     "world": taken() | taken("name"),
     "world/gravity": taken(),
-    "model": taken() | taken("name placement_frame")
-    | noted("canonical_link", "which link a model is reported by")
+    "model": taken() | taken("name placement_frame canonical_link")
     | noted("namespace", "names of messages"),
     "include": taken() | taken("placement_frame") | noted("merge", "names keep the model's name"),
     "uri": taken(),

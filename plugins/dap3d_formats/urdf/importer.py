@@ -206,20 +206,15 @@ class _Reader:
         if limited and limit is None:
             raise FormatError(f"joint {joint.name} has no <limit>; it is required", joint.place)
         if limit is not None and limited:
-            lower, upper = limit.number("lower", 0.0), limit.number("upper", 0.0)
-            if lower > upper:
-                what = f"joint {joint.name}: lower = {lower:g} lies above upper = {upper:g}"
-                raise FormatError(what, limit.place)
+            lower, upper = (limit.number(key, 0.0, unbounded=True) for key in ("lower", "upper"))
             if lower == upper == 0.0 and "lower" not in limit.attributes:
                 lower, upper = -inf, inf
-            joint.limits = (Limits(lower, upper),)
+            joint.limits = (Limits.between(lower, upper, joint.name, limit.place),)
         mimic = element.first("mimic")
         if mimic is not None:
             ratio, offset = mimic.number("multiplier", 1.0), mimic.number("offset", 0.0)
             coupling = Coupling("", joint.name, mimic.require("joint"), ratio, offset, mimic.place)
             self.model.couplings.append(coupling)
-            if offset:
-                joint.position = (offset,)
 
     def _loop(self, element: XmlElement) -> None:
         """A joint that closes a loop: ``<constraint>``, a proposed extension of URDF.
