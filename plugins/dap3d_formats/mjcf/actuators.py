@@ -2,16 +2,22 @@
 
 from math import sqrt
 
-from dap3d_core.interface.formats import Actuator, FormatError, Joint, XmlElement
+from dap3d_core.interface.formats import (
+    LEAST,
+    Actuator,
+    FormatError,
+    Joint,
+    JointInertia,
+    XmlElement,
+)
 from dap3d_formats.mjcf.document import ACTUATORS
 from dap3d_formats.mjcf.reader import MjcfReader
-from dap3d_formats.mjcf.start_inertia import LEAST, StartInertia
 
 #: Joints with one coordinate.
 SCALAR = ("revolute", "prismatic")
 
 
-def read_actuators(reader: MjcfReader, inertia: StartInertia) -> None:
+def read_actuators(reader: MjcfReader, inertia: JointInertia) -> None:
     """Read actuators on joints whose force is linear; others are left out, remarked.
 
     Args:
@@ -36,7 +42,7 @@ def read_actuators(reader: MjcfReader, inertia: StartInertia) -> None:
                 _read(reader, element, inertia)
 
 
-def _read(reader: MjcfReader, element: XmlElement, inertia: StartInertia) -> None:
+def _read(reader: MjcfReader, element: XmlElement, inertia: JointInertia) -> None:
     remarks = reader.document.source.remarks
     name = element.get("name") or f"actuator{len(reader.model.actuators) + 1}"
     joint = element.get("joint") or element.get("jointinparent")

@@ -1,7 +1,5 @@
 """Equalities of MJCF, with the tendons that they hold."""
 
-import attrs
-
 from dap3d_core.interface.formats import (
     WORLD,
     Coupling,
@@ -10,8 +8,8 @@ from dap3d_core.interface.formats import (
     Joint,
     Place,
     XmlElement,
-    axis_angle,
     from_quaternion,
+    held,
 )
 from dap3d_formats.mjcf.reader import MjcfReader
 
@@ -117,7 +115,7 @@ def _couple(reader: MjcfReader, element: XmlElement) -> None:
     if other is None:
         text = "an equality of one joint holds it fixed"
         remarks.translate(element.place, text)
-        _hold(reader, one, a0)
+        reader.model.joints[joint] = held(one, a0)
         return
     _joint(reader, other, element.place)
     if any(higher):
@@ -127,15 +125,6 @@ def _couple(reader: MjcfReader, element: XmlElement) -> None:
     reader.model.couplings.append(
         Coupling(element.get("name") or "", joint, other, a1, a0, element.place)
     )
-
-
-def _hold(reader: MjcfReader, joint: Joint, q: float) -> None:
-    """Make a joint a fixed one at a coordinate."""
-    axis = joint.axes[0]
-    moved = Frame(A=axis_angle(axis, q)) if joint.kind == "revolute" else Frame(
-        tuple(q * x for x in axis))  # fmt: skip
-    held = attrs.evolve(joint, kind="fixed", in_parent=joint.in_parent @ moved)
-    reader.model.joints[joint.name] = held
 
 
 def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:

@@ -8,12 +8,14 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.formats import (
+    LEAST,
     WORLD,
     Articulation,
     FormatError,
     Frame,
     Inertial,
     Joint,
+    JointInertia,
     Limits,
     Link,
     XmlElement,
@@ -23,7 +25,6 @@ from dap3d_core.interface.formats import (
 from dap3d_formats.axes import unit
 from dap3d_formats.mjcf.document import Document
 from dap3d_formats.mjcf.geoms import Geoms
-from dap3d_formats.mjcf.start_inertia import LEAST, StartInertia
 
 #: Type -> kind of a joint.
 KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
@@ -276,7 +277,12 @@ class MjcfReader:
         if not any((joint.damping[0], joint.stiffness[0])):
             joint.limits = joint.limits or (Limits(-inf, inf),)
 
-    def scale_springs(self, inertia: StartInertia) -> None:
+    def inertia(self) -> JointInertia:
+        """Inertias of the joints at zero coordinates, by which the compiler scales springs."""
+        links, joints = dict(self.model.links), self.model.joints.values()
+        return JointInertia(links, {joint.child: joint for joint in joints}, list(links))
+
+    def scale_springs(self, inertia: JointInertia) -> None:
         """Set the springs and dampers of joints that are given by their time constants."""
         for name, (time, ratio) in self.springdampers.items():
             joint, moved = self.model.joints[name], inertia.of(name)

@@ -10,14 +10,14 @@ import attrs
 import numpy as np
 
 from dap3d_core.formats.import_scene.names import Names
-from dap3d_core.formats.import_scene.scene_of_model import ImportOptions, scene_of
+from dap3d_core.formats.import_scene.scene_of_model import LIMITS, ImportOptions, scene_of
 from dap3d_core.formats.import_scene.shapes import MeshFiles
 from dap3d_core.formats.import_scene.source_files import SourceFiles
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import Articulation, FormatError, Importer, Remark, Remarks
 from dap3d_core.interface.formats.articulation import KINDS
 from dap3d_core.registry import Registry, load_registry
-from dap3d_core.registry.extensions import Extensions, extensions
+from dap3d_core.registry.extensions import extensions
 from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.scene import Scene, SceneError, check
 from dap3d_core.scene.errors import MISSING, Mistake
@@ -72,9 +72,11 @@ def import_model(
     free_base: bool = False,
     keep_fixed: bool = False,
     balance_inertia: bool = False,
+    limits: str = "soft",
     shapes: bool = True,
     strict: bool = False,
     allow_code: bool = False,
+    arguments: Mapping[str, Any] | None = None,
     positions: Mapping[str, float | Sequence[float]] | None = None,
     rates: Mapping[str, float | Sequence[float]] | None = None,
     registry: Registry | None = None,
@@ -89,10 +91,14 @@ def import_model(
         free_base: links without a joint to a parent are free, where the format leaves it open.
         keep_fixed: fixed joints between moving links stay joints.
         balance_inertia: principal moments of inertia that no body has are replaced by their mean.
+        limits: of joints: "soft", springs with dampers, critically damped for the inertia that they
+            see; "hard", stops at which a rate ends at once; "off", none.
         shapes: links have their shapes; without, files of meshes are not looked for.
         strict: refuse a model of which something would be left out.
         allow_code: evaluate the expressions of a xacro file.
-        positions, rates: of joints where the scene starts, by name.
+        arguments: of a xacro file, by name.
+        positions, rates: of joints where the scene starts, by name, as the file counts them (qpos
+            of MJCF); joints that are coupled with these follow.
         registry: the installed types; by default all.
 
     Returns:
@@ -102,14 +108,20 @@ def import_model(
         SceneError: the file cannot be imported; with its line.
     """
     file = _path(path)
+    if limits not in LIMITS:
+        what = f"limits = {limits!r}: should be one of {', '.join(LIMITS)}"
+        raise _refusal(FormatError(what), file)
     meshes, names = MeshFiles(), Names()
     try:
         model, source, keyword = read_articulation(
-            file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes
-        )
+            file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes,
+            arguments=arguments,
+        )  # fmt: skip
         options = ImportOptions(
-            free_base, keep_fixed, balance_inertia, *_states(positions, rates, model)
-        )
+            free_base, keep_fixed, balance_inertia, limits,
+            _coordinates(positions, model, positions=True),
+            _coordinates(rates, model, positions=False),
+        )  # fmt: skip
         scene = scene_of(model, source.remarks, options, meshes=meshes, names=names)
         scene.description = f"From {file.name}."
         checked = check(scene, load_registry() if registry is None else registry)
@@ -168,6 +180,7 @@ def read_articulation(
     root: str | os.PathLike[str] | None = None,
     allow_code: bool = False,
     shapes: bool = True,
+    arguments: Mapping[str, Any] | None = None,
 ) -> tuple[Articulation, SourceFiles, str]:
     """The model in a file before it becomes a scene, its files, and the importer's keyword.
 
@@ -183,10 +196,15 @@ def read_articulation(
     folder = file.parent if root is None else Path(os.fsdecode(root))
     if not os.path.isdir(folder):
         raise FormatError(f"root: {folder} is no folder")
-    source = SourceFiles(file, folder, folders, allow_code, shapes)
+    given = {name: str(value) for name, value in (arguments or {}).items()}
+    source = SourceFiles(file, folder, folders, allow_code, shapes, given)
     importer, keyword = _importer(source, format)
     try:
-        return importer.read(source), source, keyword
+        model = importer.read(source)
+        if source.unused:
+            what = f"takes no argument {min(source.unused)!r}"
+            raise FormatError(what, None, "arguments are those that a xacro file declares")
+        return model, source, keyword
     except (FormatError, PluginError):
         raise
     except RecursionError:
@@ -217,7 +235,9 @@ def _names_in(folder: Path) -> list[str]:
 
 
 def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
-    """The importer of a file: the one wanted, by its suffix, or by the root of its XML.
+    """The importer of a file: the one wanted, named like its suffix, or of its suffix and root.
+
+    They are loaded one after the other until one fits, those of dap3d itself first.
 
     Raises:
         FormatError: no installed format is that of the file.
@@ -225,37 +245,27 @@ def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
     formats = extensions("importer")
     if wanted is not None:
         return formats.load(wanted)(), wanted
-    suffix, loaded = source.path.suffix.lower(), _usable(formats)
-    fitting = {k: one for k, one in loaded.items() if suffix in one.suffixes}
-    if len(fitting) != 1:
-        name = source.xml().name
-        fitting = {k: one for k, one in loaded.items() if name in one.roots} or fitting
+    suffixes = [one.lower() for one in source.path.suffixes]
+    loaded: dict[str, Importer] = {}
+    fitting: dict[str, Importer] = {}
+    named = [one[1:] for one in suffixes if one[1:] in formats.keywords]
+    for keyword in [*named, *(one for one in formats.first if one not in named)]:
+        try:
+            loaded[keyword] = importer = formats.load(keyword)()
+        except PluginError:  # a broken one hurts its own files alone
+            continue
+        if suffixes[-1:] and suffixes[-1] in importer.suffixes:
+            fitting[keyword] = importer
+            if keyword in named or not importer.roots or source.xml().name in importer.roots:
+                return importer, keyword
+    name = source.xml().name
+    fitting = {k: one for k, one in loaded.items() if name in one.roots} or fitting
     if len(fitting) == 1:
         keyword, importer = next(iter(fitting.items()))
         return importer, keyword
     known = ", ".join(f"{k} ({' '.join(one.suffixes)})" for k, one in loaded.items())
     what = f"is no file of a format that is installed: {known or 'none is'}"
     raise FormatError(what, remedy="name its format with --format")
-
-
-def _usable(formats: Extensions) -> dict[str, Importer]:
-    """The importers that can be loaded: a broken one hurts its own files alone."""
-    usable: dict[str, Importer] = {}
-    for keyword in formats.keywords:
-        try:
-            usable[keyword] = formats.load(keyword)()
-        except PluginError:
-            continue
-    return usable
-
-
-def _states(
-    positions: Mapping[str, Any] | None, rates: Mapping[str, Any] | None, model: Articulation
-) -> tuple[dict[str, tuple[float, ...]], dict[str, tuple[float, ...]]]:
-    return (
-        _coordinates(positions, model, positions=True),
-        _coordinates(rates, model, positions=False),
-    )
 
 
 def _coordinates(

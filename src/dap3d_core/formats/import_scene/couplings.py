@@ -4,6 +4,7 @@ import numpy as np
 
 from dap3d_core.formats.import_scene.joints import NamedEnds
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
+from dap3d_core.formats.import_scene.start import couples
 from dap3d_core.interface.formats.articulation import Articulation, Joint
 from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.registry.suggestions import nearest
@@ -29,7 +30,7 @@ def wheel_of(builder: SceneBuilder, joint: Joint, mass: float, inertia: float) -
         scene_name = builder.names.scene_names["joints", joint.name]
         wheel = builder.names.free("bodies", f"{scene_name}_rotor")
         builder.names.scene_names[key] = wheel
-        rate = builder.rates.get(joint.name, (0.0,))[0]
+        rate = (*joint.rate, 0.0)[0]
         builder.scene.add_body(wheel, mass=mass, Jp=(inertia,) * 3,
                                w=(0.0, 0.0, rate) if rate else None)  # fmt: skip
         bearing = builder.names.free("joints", f"{wheel}_bearing")
@@ -64,12 +65,13 @@ def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
             )
             raise FormatError(what, coupling.place, f"did you mean {near!r}?" if near else "")
         one, other = model.joints[coupling.joint], model.joints[coupling.other]
-        if {one.kind, other.kind} - {"revolute", "prismatic"}:
+        if not couples(model, coupling):
             text = f"coupling of {coupling.joint} with {coupling.other}: joints of one coordinate "
-            builder.remarks.leave_out(coupling.place, f"{text}are coupled")
+            builder.remarks.leave_out(coupling.place, f"{text}are coupled", motion=True)
             continue
         if builder.moves_alone(one) or builder.moves_alone(other):
-            builder.remarks.leave_out(coupling.place, "coupling of a joint that does not move")
+            text = "coupling of a joint that does not move"
+            builder.remarks.leave_out(coupling.place, text, motion=True)
             continue
         had_rotor = bool(other.armature[0])
         wheel = wheel_of(builder, other, *_light(builder, one, other))
