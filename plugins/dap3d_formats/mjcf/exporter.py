@@ -1,6 +1,9 @@
 """Writes MJCF."""
 
 from math import isfinite, isinf
+from typing import Any
+
+import numpy as np
 
 from dap3d_core.interface.formats import (
     NOWHERE,
@@ -10,6 +13,7 @@ from dap3d_core.interface.formats import (
     FormatError,
     Frame,
     Geometry,
+    Inertial,
     Joint,
     Link,
     Remarks,
@@ -23,6 +27,9 @@ TYPES = {
     "revolute": ("hinge",), "prismatic": ("slide",), "ball": ("ball",), "fixed": (),
     "universal": ("hinge", "hinge"), "cylindrical": ("slide", "hinge"),
 }  # fmt: skip
+#: Least mass, and least moment of inertia, of a body that MuJoCo reads, some times its own limits
+#: of 1e-15 and 1e-14, and the part of the largest moment that it resolves.
+LEAST_MASS, LEAST_MOMENT, LEAST_PART = 2e-15, 2e-14, 1e-12
 #: Coordinates beyond stand for no limit on one side.
 UNLIMITED = 1e6
 
@@ -61,7 +68,8 @@ class _Writer:
         if self.meshes:
             text.open("asset")
             for (file, scale), name in self.meshes.items():
-                text.empty("mesh", name=name, file=file, scale=words(scale))
+                # its mass counts for nothing; a flat one has a volume of a shell alone
+                text.empty("mesh", name=name, file=file, scale=words(scale), inertia="shell")
             text.close("asset")
         text.open("worldbody")
         for name in self.children.get(WORLD, []):
@@ -88,15 +96,28 @@ class _Writer:
         if joint is not None:
             self._joint(joint)
         if link.inertial is not None:
-            J = link.inertial.inertia
+            mass, J = self._mass(link, link.inertial)
             full = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
-            text.empty("inertial", pos=words(link.inertial.com), mass=words([link.inertial.mass]),
+            text.empty("inertial", pos=words(link.inertial.com), mass=words([mass]),
                        fullinertia=words(full))  # fmt: skip
         for geometry in link.geometries:
             self._geom(geometry)
         for name in self.children.get(link.name, []):
             self._body(self.model.links[name])
         text.close("body")
+
+    def _mass(self, link: Link, inertial: Inertial) -> tuple[float, Any]:
+        """Mass and inertia of a link, not below the least that MuJoCo reads."""
+        J = inertial.inertia
+        moments, axes = np.linalg.eigh(0.5 * (J + J.T))
+        least = max(LEAST_MOMENT, LEAST_PART * float(moments[-1]))
+        mass = max(inertial.mass, LEAST_MASS)
+        if mass > inertial.mass or moments[0] < least:
+            text = f"mass or inertia of {link.name} is raised to the least that MuJoCo reads"
+            self.remarks.translate(NOWHERE, text, motion=True)
+        if moments[0] < least:
+            J = axes @ np.diag(np.maximum(moments, least)) @ axes.T
+        return mass, J
 
     def _joint(self, joint: Joint) -> None:
         if joint.kind == "free":
