@@ -61,7 +61,7 @@ def _close(reader: MjcfReader, element: XmlElement) -> None:
             in_parent, in_child = _weld(reader, element, parent, child)
     if "solref" in element.attributes or "solimp" in element.attributes:
         text = "softness of an equality (solref, solimp): it holds exactly"
-        reader.document.source.remarks.translate(element.place, text)
+        reader.document.source.remarks.translate(element.place, text, motion=True)
     model.joints[name] = Joint(name, kind, parent, child, in_parent, in_child, closes=True,
                                place=element.place)  # fmt: skip
 
@@ -120,7 +120,7 @@ def _couple(reader: MjcfReader, element: XmlElement) -> None:
     _joint(reader, other, element.place)
     if any(higher):
         text = "an equality of joints with a polynomial of a higher degree"
-        remarks.leave_out(element.place, text)
+        remarks.leave_out(element.place, text, motion=True)
         return
     reader.model.couplings.append(
         Coupling(element.get("name") or "", joint, other, a1, a0, element.place)
@@ -138,12 +138,14 @@ def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:
     simple = tendon.name == "fixed" and len(terms) == 2 and "tendon2" not in element.attributes
     polycoef = element.numbers("polycoef", None, (0.0, 1.0))
     if not simple or polycoef[0]:
-        remarks.leave_out(element.place, "an equality of tendons but fixed ones of two joints")
+        text = "an equality of tendons but fixed ones of two joints"
+        remarks.leave_out(element.place, text, motion=True)
         return
     (c1, q1), (c2, q2) = ((t.number("coef"), t.require("joint")) for t in terms)
     for joint in (q1, q2):
         _joint(reader, joint, element.place)
     if not c1:
-        remarks.leave_out(element.place, "an equality of a tendon with a coefficient of 0")
+        text = "an equality of a tendon with a coefficient of 0"
+        remarks.leave_out(element.place, text, motion=True)
         return
     reader.model.couplings.append(Coupling(name, q1, q2, -c2 / c1, 0.0, element.place))

@@ -157,7 +157,8 @@ class _Writer:
             low = limits.lower if isfinite(limits.lower) else -UNLIMITED
             high = limits.upper if isfinite(limits.upper) else UNLIMITED
             attributes["range"] = words([low, high])
-            self.remarks.translate(NOWHERE, "stops are limits, whose stiffness is the solver's")
+            text = "stops are limits, whose stiffness is the solver's"
+            self.remarks.translate(NOWHERE, text, motion=True)
         return attributes
 
     def _geom(self, geometry: Geometry) -> None:

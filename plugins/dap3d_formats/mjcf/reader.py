@@ -258,7 +258,7 @@ class MjcfReader:
             setattr(joint, key, (first,))
             if any(others):
                 text = f"{attribute} of a joint: higher coefficients of its polynomial"
-                self.document.source.remarks.leave_out(element.place, text)
+                self.document.source.remarks.leave_out(element.place, text, motion=True)
         joint.rest = (turned(element.number("springref", 0.0)) - reference,)
         both = element.numbers("springdamper", 2, (0.0, 0.0))
         if min(both) > 0.0:
@@ -288,7 +288,7 @@ class MjcfReader:
             joint, moved = self.model.joints[name], inertia.of(name)
             if moved is None:
                 text = "springdamper: links without mass, or too many, for a mass matrix"
-                self.document.source.remarks.leave_out(joint.place, text)
+                self.document.source.remarks.leave_out(joint.place, text, motion=True)
                 continue
             joint.stiffness = (moved / max(LEAST, (time * ratio) ** 2),)
             joint.damping = (2.0 * moved / max(LEAST, time),)

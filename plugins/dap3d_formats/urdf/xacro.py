@@ -23,9 +23,17 @@ def expanded(source: Source, root: XmlElement) -> XmlElement:
     try:
         packages.update_package_cache({k: str(v) for k, v in source.packages.items()})
         names = _Names(source.arguments)
-        document = XacroDoc.from_file(str(source.path), subargs=names, resolve_packages=False)
+        options = {"subargs": names, "resolve_packages": False}
+        with_defaults = _with_defaults(source, root)
+        if with_defaults:
+            packages.walk_up_from(source.path)
+            document = XacroDoc.from_string(with_defaults, rootdir=source.path.parent, **options)
+        else:
+            document = XacroDoc.from_file(str(source.path), **options)
         text = document.to_urdf_string()
         source.unused.difference_update(names.asked)
+    except FormatError:
+        raise
     except BaseException as error:  # code of the file: it may raise anything
         if isinstance(error, KeyboardInterrupt):
             raise
@@ -37,6 +45,31 @@ def expanded(source: Source, root: XmlElement) -> XmlElement:
         what = f"has no argument {min(source.unused)!r}; it has {', '.join(sorted(names.asked))}"
         raise FormatError(what if names.asked else "has no arguments", root.place)
     return parse_xml(text, f"{source.path.name} (expanded)")
+
+
+def _with_defaults(source: Source, root: XmlElement) -> str:
+    """The text of the file with defaults for arguments without one; "" where there are none.
+
+    xacrodoc wants a default of each argument, ROS's launch files do not.
+
+    Raises:
+        FormatError: the user gives no value either.
+    """
+    bare = [one for one in root.all("xacro:arg") if one.get("default") is None]
+    for element in bare:
+        name = element.require("name")
+        if name not in source.arguments:
+            what = f"the argument {name} has no default"
+            raise FormatError(what, element.place, f"give it a value: --arg {name}:=VALUE")
+    if not bare:
+        return ""
+    from xml.dom import minidom
+
+    document = minidom.parse(str(source.path))
+    for one in document.getElementsByTagName("xacro:arg"):
+        if not one.hasAttribute("default"):
+            one.setAttribute("default", "")
+    return str(document.toxml())
 
 
 class _Names(dict[str, str]):

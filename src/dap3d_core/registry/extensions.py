@@ -44,6 +44,7 @@ class Extensions:
     @property
     def first(self) -> tuple[str, ...]:
         """Their names, those of dap3d itself before those of other packages."""
+
         def others(keyword: str) -> bool:
             return self.sources[keyword][0].distribution != "dap3d"
 

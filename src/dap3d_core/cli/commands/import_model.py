@@ -11,7 +11,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
-    from dap3d_core.formats import ImportReport
+    from dap3d_core.formats.import_model import ImportReport
     from dap3d_core.scene import Scene
 
 
@@ -142,8 +142,13 @@ def _as_data(report: "ImportReport") -> dict[str, Any]:
 
     def remarks(listed: Any) -> list[dict[str, Any]]:
         return [
-            {"file": one.place.file, "line": one.place.line, "text": one.text, "count": one.count,
-             "motion": one.motion}
+            {
+                "file": one.place.file,
+                "line": one.place.line,
+                "text": one.text,
+                "count": one.count,
+                "motion": one.motion,
+            }
             for one in listed
         ]
 

@@ -228,14 +228,14 @@ def _add_rotors(builder: ModelBuilder) -> None:
         for follower, fields in rotor.followers:
             joint = _followed(builder, fields)
             if joint is None:
-                builder.remarks.leave_out(
-                    NOWHERE, f"{follower} of type follow: it follows no joint"
-                )
+                text = f"{follower} of type follow: it follows no joint"
+                builder.remarks.leave_out(NOWHERE, text, motion=True)
                 continue
             pairs.append((joint.name, float(fields.get("ratio", 1.0))))
         leader = next((one for one, ratio in pairs if ratio == 1.0), None)
         if leader is None:
-            builder.remarks.leave_out(NOWHERE, f"wheel {name}: no joint turns as it does")
+            text = f"wheel {name}: no joint turns as it does"
+            builder.remarks.leave_out(NOWHERE, text, motion=True)
             continue
         builder.placed[leader].armature = (rotor.inertia,)
         first = True

@@ -65,7 +65,8 @@ def rigid_groups(
         if joint is None and fixed_base:
             member[name] = (WORLD, model.base_poses.get(name, IDENTITY))
             text = "fixed to ground, and its mass without effect; --free-base frees it"
-            remarks.translate(link.place, f"{name} has no joint to a parent: {text}")
+            text = f"{name} has no joint to a parent: {text}"
+            remarks.translate(link.place, text, motion=True)
         elif joint is not None and joint.kind == "fixed":
             group, frame = member[joint.parent]
             if group == WORLD or not keep_fixed:
@@ -108,7 +109,7 @@ def _checked(link: Link, remarks: Remarks, balance_inertia: bool) -> Inertial:
     if least < -ASYMMETRY * scale or least + middle < most * (1.0 - ASYMMETRY):
         if balance_inertia:
             text = "principal moments of inertia that no body has are replaced by their mean"
-            remarks.translate(link.place, text)
+            remarks.translate(link.place, text, motion=True)
             mean = (least + middle + most) / 3.0
             return Inertial(inertial.mass, inertial.com, mean * np.eye(3))
         what = f"link {link.name}: no body has the principal moments of inertia {least:.4g}, "

@@ -134,7 +134,8 @@ def _is_base_fixed(model: Articulation, remarks: Remarks, *, free_base: bool) ->
         return model.fixed_base
     moves = any(joint.kind != "fixed" for joint in model.joints.values())
     if not moves and not free_base:
-        remarks.translate(model.place, "no joint of the model moves: its base is free")
+        text = "no joint of the model moves: its base is free"
+        remarks.translate(model.place, text, motion=True)
     return moves and not free_base
 
 

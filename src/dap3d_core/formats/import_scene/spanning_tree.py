@@ -12,6 +12,7 @@ from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.suggestions import nearest
 
+
 @attrs.frozen(eq=False)
 class Placed:
     """A link in the world: its pose, its velocity (3,) m/s and angular velocity (3,) rad/s."""

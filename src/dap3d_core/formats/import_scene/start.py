@@ -88,7 +88,7 @@ class _Start:
             low, high = joint.limits[0].lower, joint.limits[0].upper
             if joint.kind in SCALAR and low == high and name not in coupled | self.closing:
                 text = "limits that are equal hold a joint: it is fixed"
-                self.remarks.translate(joint.place, text)
+                self.remarks.translate(joint.place, text, motion=True)
                 joints[name] = held(joint, low)
 
     def move(self, given: Given) -> None:
