@@ -2,8 +2,8 @@
 
 A table maps an element, ``parent/name`` where its meaning depends on its parent, to a word for
 itself (key "") and for each attribute: TAKEN, or a pair of NOTED, MOVES, TRANSLATED or REFUSED and
-the reason. What is NOTED or MOVES is left out; without what MOVES the motion is another. A key ``name=value`` is of an attribute with this value alone. An element
-that is left out is so with all that it holds.
+the reason. What is NOTED or MOVES is left out, an element with all that it holds; without what
+MOVES the motion is another. A key ``name=value`` is of an attribute with this value alone.
 """
 
 from collections.abc import Mapping

@@ -29,7 +29,7 @@ def test_the_report_for_programs(dap3d, arm):
     done = dap3d("import", "arm.urdf", "-o", "out", "--json", "--position", "shoulder=0.5")
     data = json.loads(done.stdout)
     assert data["taken"] == {"links": 4, "joints": 3, "couplings": 0, "actuators": 0}
-    assert {"file", "line", "text", "count"} == set(data["left_out"][0])
+    assert {"file", "line", "text", "count", "motion"} == set(data["left_out"][0])
     assert (arm / "out" / "scene.toml").is_file()
 
 

@@ -14,7 +14,7 @@ from dap3d_core.interface.formats import (
     XmlElement,
 )
 from dap3d_formats.axes import unit
-from dap3d_formats.sdf.reader import SdfReader, scoped, text_of
+from dap3d_formats.sdf.reader import SdfReader, scoped
 
 #: Type -> kind of a joint.
 KINDS = {
@@ -87,8 +87,9 @@ def _geared(
     """
     link = _end(reader, element, scope, end)
     ends = {_holder(reader, reference), _holder(reader, link)}
-    joint = next((j for j in reader.model.joints.values() if j.kind == "revolute"
-                  and {_holder(reader, j.parent), _holder(reader, j.child)} == ends), None)  # fmt: skip
+    hinges = [one for one in reader.model.joints.values() if one.kind == "revolute"]
+    joint = next((one for one in hinges if ends ==
+                  {_holder(reader, one.parent), _holder(reader, one.child)}), None)  # fmt: skip
     name = scoped(scope, element.require("name"))
     if joint is None:
         what = f"gearbox {name}: no revolute joint holds {link} on {reference}"

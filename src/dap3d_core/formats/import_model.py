@@ -10,7 +10,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formats.import_scene.names import Names
-from dap3d_core.formats.import_scene.scene_of_model import LIMITS, ImportOptions, scene_of
+from dap3d_core.formats.import_scene.scene_of_model import ImportOptions, scene_of
 from dap3d_core.formats.import_scene.shapes import MeshFiles
 from dap3d_core.formats.import_scene.source_files import SourceFiles
 from dap3d_core.interface.errors import PluginError
@@ -91,47 +91,57 @@ def import_model(
         free_base: links without a joint to a parent are free, where the format leaves it open.
         keep_fixed: fixed joints between moving links stay joints.
         balance_inertia: principal moments of inertia that no body has are replaced by their mean.
-        limits: of joints: "soft", springs with dampers, critically damped for the inertia that they
-            see; "hard", stops at which a rate ends at once; "off", none.
+        limits: of joints: "soft", springs critically damped for the inertia that they see; "hard",
+            stops at which a rate ends at once; "off", none.
         shapes: links have their shapes; without, files of meshes are not looked for.
         strict: refuse a model of which something would be left out.
         allow_code: evaluate the expressions of a xacro file.
         arguments: of a xacro file, by name.
-        positions, rates: of joints where the scene starts, by name, as the file counts them (qpos
-            of MJCF); joints that are coupled with these follow.
+        positions, rates: of joints where the scene starts, by name, as the file counts them; joints
+            that are coupled with these follow.
         registry: the installed types; by default all.
 
     Returns:
-        The scene, checked, and a report of what was taken, translated and left out.
+        The scene and a report of what was taken, translated and left out.
 
     Raises:
         SceneError: the file cannot be imported; with its line.
     """
     file = _path(path)
-    if limits not in LIMITS:
-        what = f"limits = {limits!r}: should be one of {', '.join(LIMITS)}"
-        raise _refusal(FormatError(what), file)
-    meshes, names = MeshFiles(), Names()
+    meshes = MeshFiles()
     try:
+        options = ImportOptions(free_base, keep_fixed, balance_inertia, limits)
         model, source, keyword = read_articulation(
             file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes,
-            arguments=arguments,
-        )  # fmt: skip
-        options = ImportOptions(
-            free_base, keep_fixed, balance_inertia, limits,
-            _coordinates(positions, model, positions=True),
-            _coordinates(rates, model, positions=False),
-        )  # fmt: skip
-        scene = scene_of(model, source.remarks, options, meshes=meshes, names=names)
-        scene.description = f"From {file.name}."
-        checked = check(scene, load_registry() if registry is None else registry)
+            arguments=arguments)  # fmt: skip
+        for what, given in ((options.positions, positions), (options.rates, rates)):
+            what.update(_coordinates(given, model, positions=given is positions))
+        scene, notes = _checked_scene(model, source, options, meshes, registry)
     except FormatError as error:
         raise _refusal(error, file) from None
-    except SceneError as error:
-        raise SceneError(_relocated(m, names, file) for m in error.mistakes) from None
     if strict:
         _refuse_omissions(source.remarks)
-    return scene, _report(file, keyword, model, source.remarks, checked.notes, meshes)
+    return scene, _report(file, keyword, model, source.remarks, notes, meshes)
+
+
+def _checked_scene(
+    model: Articulation, source: SourceFiles, options: ImportOptions, meshes: MeshFiles,
+    registry: Registry | None,
+) -> tuple[Scene, Sequence[str]]:  # fmt: skip
+    """The scene of a model, and the notes of its check.
+
+    Raises:
+        FormatError: the model is no mechanism.
+        SceneError: the scene is invalid; with lines of the file.
+    """
+    names = Names()
+    scene = scene_of(model, source.remarks, options, meshes=meshes, names=names)
+    scene.description = f"From {source.path.name}."
+    try:
+        checked = check(scene, load_registry() if registry is None else registry)
+    except SceneError as error:
+        raise SceneError(_relocated(m, names, source.path) for m in error.mistakes) from None
+    return scene, checked.notes
 
 
 def _path(path: Any) -> Path:

@@ -31,8 +31,8 @@ if TYPE_CHECKING:
                  "several numbers with commas. Joints that are coupled with it follow. May be "
                  "repeated."),
     click.option("--limits", type=click.Choice(["off", "soft", "hard"]), default="soft",
-                 help="Limits of joints: soft stops, by default; hard ones, at which a rate ends at "
-                 "once; or off."),
+                 help="Limits of joints: soft stops, by default; hard ones, at which a rate ends "
+                 "at once; or off."),
     click.option("--free-base", is_flag=True,
                  help="Free the base, where the format leaves open whether it is fixed."),
     click.option("--keep-fixed", is_flag=True, help="Keep fixed joints; do not merge their links."),

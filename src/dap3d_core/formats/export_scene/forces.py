@@ -189,7 +189,7 @@ def _add(builder: ModelBuilder, element: Element, joint: Joint, sense: float, ze
 
 
 def _add_stop(builder: ModelBuilder, element: Element) -> None:
-    """Add a stop as a limit of a joint: the gap is its distance and a multiple of the coordinate."""
+    """Add a stop as a limit of a joint, whose coordinate is sense (x - zero) for its x."""
     fields = element.fields
     if element.type == "rot_stop":
         found = _of_hinge(builder, element)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dap3d_core.formats.import_scene.joints import NamedEnds
+from dap3d_core.formats.import_scene.joints import NamedEnds, from_ground
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.formats.import_scene.start import couples
 from dap3d_core.interface.formats.articulation import Articulation, Joint
@@ -41,10 +41,10 @@ def wheel_of(builder: SceneBuilder, joint: Joint, mass: float, inertia: float) -
 
 def follow(builder: SceneBuilder, joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
     """Couple the coordinate of a joint with a wheel."""
-    ends = NamedEnds(builder, joint)
+    ends = NamedEnds(builder, from_ground(builder, joint))
     name = builder.names.free("joints", f"{ends.name}_{suffix}")
     builder.scene.add_joint(
-        "follow", name, body_i=ends.child, a_j=ends.vector("j", joint.axes[0], "_axis"),
+        "follow", name, body_i=ends.child, a_j=ends.vector("j", ends.joint.axes[0], "_axis"),
         a_k=f"{wheel}.z", ratio=None if ratio == 1.0 else ratio,
         along=True if joint.kind == "prismatic" else None,
     )  # fmt: skip
@@ -87,7 +87,8 @@ def _light(builder: SceneBuilder, *joints: Joint) -> tuple[float, float]:
     """Mass and inertia of a wheel beside what joints move: beside its mass, for a slider."""
     masses, sizes = [], []
     for joint in joints:
-        inertial = builder.groups[builder.member[joint.child][0]].inertial
+        child = from_ground(builder, joint).child
+        inertial = builder.groups[builder.member[child][0]].inertial
         least = float(np.linalg.eigvalsh(inertial.inertia)[0])
         masses.append(inertial.mass)
         sizes.append(inertial.mass if joint.kind == "prismatic" else least)

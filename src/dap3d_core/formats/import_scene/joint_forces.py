@@ -9,7 +9,7 @@ import numpy as np
 from dap3d_core.formats.import_scene.couplings import add_rotor
 from dap3d_core.formats.import_scene.joints import NamedEnds, from_ground
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
-from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Limits
+from dap3d_core.interface.formats.articulation import Articulation, Joint, Limits
 from dap3d_core.interface.formats.frames import quaternion
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import GROUND
@@ -163,9 +163,7 @@ class JointCoordinate:
 
     def _own_inertia(self) -> float:
         """Mass, or inertia about the axis, of the child alone, where no mass matrix has it."""
-        group, frame = self.builder.member[self.joint.child]
-        if group == WORLD:
-            group, frame = self.builder.member[self.joint.parent]
+        group, _ = self.builder.member[self.ends.joint.child]
         body, axis = self.builder.groups[group].inertial, self.ends.on_child.A @ self.axis
         arm = np.cross(axis, self.ends.on_child.r)
         turning = float(axis @ body.inertia @ axis + body.mass * (arm @ arm))

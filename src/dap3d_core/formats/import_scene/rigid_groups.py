@@ -14,8 +14,9 @@ STAND_IN = 1e-11
 #: Inertias below this part of that of what the joint carries are lost to rounding in a matrix that
 #: holds their reciprocals.
 LIGHT = 1e-9
-#: Principal moments below this part of the largest count as zero.
-SMALLEST = 1e-12
+#: Principal moments below this part of the largest count as zero, and below this part of that of
+#: what the joint carries: beside it they are below rounding.
+SMALLEST, LOST = 1e-12, 1e-14
 #: Departure from symmetry up to which an inertia matrix counts as symmetric, relative.
 ASYMMETRY = 1e-6
 
@@ -168,7 +169,7 @@ def _complete(group: RigidGroup, scale: tuple[float, float], remarks: Remarks) -
     inertia = old.inertia
     least, _, most = np.linalg.eigvalsh(inertia).tolist()
     moment = STAND_IN * max(scale[1], most)
-    if least <= SMALLEST * most:
+    if least <= max(SMALLEST * most, LOST * scale[1]):
         inertia = inertia + (moment - min(least, 0.0)) * np.eye(3)
     if not old.mass:
         text = f"a link without mass that moves has {STAND_IN:g} of the mass that it carries"

@@ -28,6 +28,11 @@ DURATION, STEP = 1.0, 0.01
 LIMITS = ("off", "soft", "hard")
 
 
+def _checked_limits(_: Any, __: Any, value: Any) -> None:
+    if value not in LIMITS:
+        raise FormatError(f"limits = {value!r}: should be one of {', '.join(LIMITS)}")
+
+
 @attrs.frozen
 class ImportOptions:
     """Choices of the user that a model leaves open.
@@ -43,9 +48,9 @@ class ImportOptions:
     free_base: bool = False
     keep_fixed: bool = False
     balance_inertia: bool = False
-    limits: str = "soft"
-    positions: Mapping[str, Sequence[float]] = attrs.Factory(dict)
-    rates: Mapping[str, Sequence[float]] = attrs.Factory(dict)
+    limits: str = attrs.field(default="soft", validator=_checked_limits)
+    positions: dict[str, Sequence[float]] = attrs.Factory(dict)
+    rates: dict[str, Sequence[float]] = attrs.Factory(dict)
 
 
 def scene_of(
@@ -69,11 +74,11 @@ def scene_of(
         FormatError: the model is no mechanism, or holds a joint without a counterpart.
     """
     options = options or ImportOptions()
+    base_fixed = _is_base_fixed(model, remarks, free_base=options.free_base)
     limited = options.limits != "off"
     model = start_of(model, options.positions, options.rates, remarks, limited=limited)
     model = split_planar(model, remarks)
     tree = SpanningTree.of(model)
-    base_fixed = _is_base_fixed(model, remarks, free_base=options.free_base)
     groups, member = rigid_groups(
         tree, remarks, fixed_base=base_fixed, keep_fixed=options.keep_fixed,
         balance_inertia=options.balance_inertia,
@@ -98,6 +103,15 @@ def scene_of(
         if group.name != WORLD:
             _add_body(builder, group, placed[group.name])
     _add_gravity(scene, model.gravity)
+    _add_joints(builder, model)
+    for group in groups.values():
+        for link, _ in group.links:
+            add_shapes(builder, link, MeshFiles() if meshes is None else meshes)
+    return scene
+
+
+def _add_joints(builder: SceneBuilder, model: Articulation) -> None:
+    """Add joints, what acts in them, and what couples them."""
     for joint in model.joints.values():
         if builder.moves_alone(joint):
             continue
@@ -106,10 +120,6 @@ def scene_of(
         add_joint_forces(builder, joint)
     add_couplings(builder, model)
     add_inputs(builder, model)
-    for group in groups.values():
-        for link, _ in group.links:
-            add_shapes(builder, link, MeshFiles() if meshes is None else meshes)
-    return scene
 
 
 def _inertia(tree: SpanningTree, groups: Mapping[str, RigidGroup]) -> JointInertia:

@@ -7,7 +7,11 @@ import numpy as np
 
 from dap3d_core.interface.formats.articulation import KINDS, WORLD, Articulation, Joint
 from dap3d_core.interface.formats.frames import IDENTITY, Frame
-from dap3d_core.interface.formats.joint_motion import joint_motion, rest_coordinates
+from dap3d_core.interface.formats.joint_motion import (
+    joint_motion,
+    rest_coordinates,
+    reversed_joint,
+)
 from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.suggestions import nearest
@@ -55,6 +59,8 @@ class SpanningTree:
                 loops.append(joint)
             else:
                 placing[joint.child] = joint
+        if model.fixed_base is False:
+            _hang_parents(placing, loops)
         roots = [name for name in model.links if name not in placing]
         order, children = list(roots), _children(placing)
         order += children.get(WORLD, [])
@@ -89,6 +95,22 @@ class SpanningTree:
         while link in self.placing:
             yield self.placing[link].name
             link = self.placing[link].parent
+
+
+def _hang_parents(placing: dict[str, Joint], loops: list[Joint]) -> None:
+    """Let joints place their parents where these hang from nothing.
+
+    Such a joint is taken the other way round, with the same coordinate.
+    """
+    reversible = ("fixed", "revolute", "prismatic", "screw", "cylindrical")
+    for joint in tuple(loops):
+        above = joint.child
+        while above in placing and above != joint.parent:
+            above = placing[above].parent
+        held = joint.parent == WORLD or joint.parent in placing or above == joint.parent
+        if joint.kind in reversible and not (joint.closes or held):
+            placing[joint.parent] = reversed_joint(joint)
+            loops.remove(joint)
 
 
 def _children(placing: Mapping[str, Joint]) -> dict[str, list[str]]:

@@ -89,6 +89,14 @@ class Link:
     place: Place = NOWHERE
 
 
+def _lower(value: float) -> float:
+    return value if value > -UNLIMITED else -inf
+
+
+def _upper(value: float) -> float:
+    return value if value < UNLIMITED else inf
+
+
 @attrs.frozen
 class Limits:
     """Limits of a coordinate.
@@ -98,8 +106,8 @@ class Limits:
         stiffness: of the stops, N m/rad or N/m; None where the format says none.
     """
 
-    lower: float = attrs.field(default=-inf, converter=lambda x: x if x > -UNLIMITED else -inf)
-    upper: float = attrs.field(default=inf, converter=lambda x: x if x < UNLIMITED else inf)
+    lower: float = attrs.field(default=-inf, converter=_lower)
+    upper: float = attrs.field(default=inf, converter=_upper)
     stiffness: float | None = None
 
     @property

@@ -70,3 +70,10 @@ def held(joint: Joint, q: float) -> Joint:
     moved, _, _ = joint_motion(joint, (q,), (0.0,))
     return attrs.evolve(joint, kind="fixed", in_parent=joint.in_parent @ moved,
                         position=(), rate=())  # fmt: skip
+
+
+def reversed_joint(joint: Joint) -> Joint:
+    """The same joint with parent and child exchanged; its coordinate keeps its sense."""
+    axes = tuple(tuple(-x for x in axis) for axis in reversed(joint.axes))
+    return attrs.evolve(joint, parent=joint.child, child=joint.parent, in_parent=joint.in_child,
+                        in_child=joint.in_parent, axes=axes)  # fmt: skip
