@@ -123,11 +123,17 @@ class _Writer:
         joint, children = self.placing.get(link.name), self.children.get(link.name, [])
         if joint is None or len(children) != 1 or link.geometries or link.inertial is None:
             return None
-        below, carried = self.placing[children[0]], self.model.links[children[0]].inertial
+        below = self.placing[children[0]]
         looped = any(link.name in (one.parent, one.child) for one in self.loops)
         single = {joint.kind, below.kind} <= {"revolute", "prismatic"}
-        light = carried is not None and link.inertial.mass < WITHOUT_MASS * carried.mass
+        light = link.inertial.mass < WITHOUT_MASS * self._carried(children[0])
         return below if single and light and not looped else None
+
+    def _carried(self, link: str) -> float:
+        """The mass of a link and of all that hangs from it."""
+        inertial = self.model.links[link].inertial
+        own = 0.0 if inertial is None else inertial.mass
+        return own + sum(map(self._carried, self.children.get(link, [])))
 
     def _mass(self, link: Link, inertial: Inertial) -> tuple[float, Any]:
         """Mass and inertia of a link, not below the least that MuJoCo reads."""
