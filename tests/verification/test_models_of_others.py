@@ -299,6 +299,24 @@ def test_a_soft_stop_is_critically_damped(tmp_path, kind, inertia):
     assert rate == pytest.approx(-2.0 * np.exp(-2.0), rel=1e-7)
 
 
+@pytest.mark.parametrize("start", [5.0, -5.5, 9.9])
+def test_a_joint_that_starts_beyond_half_a_turn_meets_its_own_stop(tmp_path, start):
+    """A limit of 6 rad is 1 rad from a start at 5 rad: it is met after 0.5 s at 2 rad/s."""
+    text = hinge("xml", -10.0, start + 1.0)
+    scene, _ = imported(tmp_path, text, "xml", positions={"q": start}, rates={"q": 2.0},
+                        limits="hard")  # fmt: skip
+    (jump,) = [one for one in dap.simulate(scene, t_end=1.0).events if one.kind == "jump"]
+    assert jump.t == pytest.approx(0.5, abs=1e-9)
+
+
+def test_a_spring_is_wound_by_whole_turns(tmp_path):
+    """k (q - springref), at 7 rad and -9 rad of a joint that may turn more than once."""
+    text = hinge("xml", -20.0, 20.0).replace('name="q"', 'name="q" stiffness="3" springref="-9"')
+    scene, _ = imported(tmp_path, text, "xml", positions={"q": 7.0})
+    result = dap.simulate(scene, t_end=0.0)
+    assert result.wd[0, 0, 2] == pytest.approx(-3.0 * 16.0 / 0.3, rel=1e-13)
+
+
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
 def test_a_hard_stop_ends_the_rate_at_once(tmp_path, kind):
     """At 0.1 / 2 = 0.05 s, to the rounding of the instant; it stays there, and may leave."""

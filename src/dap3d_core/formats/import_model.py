@@ -206,7 +206,7 @@ def read_articulation(
     folder = file.parent if root is None else Path(os.fsdecode(root))
     if not os.path.isdir(folder):
         raise FormatError(f"root: {folder} is no folder")
-    given = {name: str(value) for name, value in (arguments or {}).items()}
+    given = {name: str(value) for name, value in _named("arguments", arguments).items()}
     source = SourceFiles(file, folder, folders, allow_code, shapes, given)
     importer, keyword = _importer(source, format)
     try:
@@ -288,7 +288,7 @@ def _coordinates(
     """
     coordinates, what = {}, "position" if positions else "rate"
     quaternions = {"ball": 1, "free": 1} if positions else {}
-    for name, value in (given or {}).items():
+    for name, value in _named(f"{what}s", given).items():
         if name not in model.joints:
             near = nearest(name, model.joints)
             remedy = f"did you mean {near!r}?" if near else f"it has {some([*model.joints], 8)}"
@@ -308,6 +308,17 @@ def _coordinates(
             )
         coordinates[name] = values
     return coordinates
+
+
+def _named(what: str, given: Any) -> Mapping[str, Any]:
+    """Values by name, none for None.
+
+    Raises:
+        FormatError: they are something else.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise FormatError(f"{what} = {given!r}: should be a dictionary of names and values")
+    return given or {}
 
 
 def _relocated(mistake: Mistake, names: Names, file: Path) -> Mistake:

@@ -1,7 +1,7 @@
 """What acts on the coordinates of joints: springs, dampers, stops, dry friction, inputs."""
 
 import re
-from math import isfinite
+from math import atan2, cos, isfinite, sin
 from typing import Any
 
 import numpy as np
@@ -114,6 +114,11 @@ class JointCoordinate:
         """The end that the axis is fixed in: the child, but for the first of a universal joint."""
         return "j" if len(self.joint.axes) == 2 and self.at == 0 else "i"
 
+    def _as_counted(self, q: float) -> float:
+        """A coordinate as a force counts it, whose angle begins within half a turn of zero."""
+        start = self.joint.position[self.k] if self.joint.position else 0.0
+        return q - (start - atan2(sin(start), cos(start)) if self.turns else 0.0)
+
     def add_spring(self) -> None:
         """Add a linear spring without force at ``rest``, and a linear damper."""
         k, c = self._value("stiffness"), self._value("damping")
@@ -121,7 +126,7 @@ class JointCoordinate:
             return
         fields: dict[str, Any] = {}
         if k:
-            rest = self._value("rest") or None
+            rest = self._as_counted(self._value("rest")) or None
             fields = {"theta_0": rest, "turns": True} if self.turns else {"x_0": rest}
         keyword = "rot_sda" if self.turns else "tran_sda"
         self._add("spring" if k else "damper", keyword, k=k or None, c=c or None, **fields)
@@ -152,7 +157,8 @@ class JointCoordinate:
     def _add_stop(self, side: str, bound: float, fields: dict[str, Any]) -> None:
         """Add the stop of one limit."""
         if self.turns:
-            self._add(f"{side}_stop", "rot_stop", theta_stop=bound, side=side, **fields)
+            at = self._as_counted(bound)
+            self._add(f"{side}_stop", "rot_stop", theta_stop=at, side=side, **fields)
             return
         ends, way = self.ends, 1.0 if side == "min" else -1.0
         plane = ends.point("j", bound * self.axis, f"_{side}")
