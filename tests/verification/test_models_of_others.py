@@ -192,6 +192,52 @@ def test_coupled_joints_keep_to_the_limits_of_all(tmp_path, suffix):
     assert "joint qb starts at -1.1, beyond its limits" in texts(report.translated)
 
 
+@pytest.mark.parametrize("suffix", FINGERS)
+def test_joints_that_are_coupled_with_a_fixed_one_are_fixed(tmp_path, suffix):
+    """q_a at 0.3 by equal limits, or by an equality of its own, holds b and c as well."""
+    links = (*CHAIN, ("d", None, 1.0, 0.0))
+    text = chain(suffix, links)
+    for wide, narrow in ((">-9<", ">0.3<"), (">9<", ">0.3<"), ('lower="-9"', 'lower="0.3"'),
+                         ('upper="9"', 'upper="0.3"')):  # fmt: skip
+        text = text.replace(wide, narrow, 1)
+    text = text.replace("<equality>", '<equality><joint joint1="qa" polycoef="0.3 0 0 0 0"/>')
+    scene, report = imported(tmp_path, text, suffix)
+    assert list(scene.bodies) == ["d"]
+    assert "coupling" not in texts(report.left_out)
+    with pytest.raises(dap.SceneError, match=r"position of qc = 1: it is coupled with q[ab]"):
+        imported(tmp_path, text, suffix, positions={"qc": 1.0} | ({} if suffix == "xml" else
+                                                                   {"qa": 0.3}))  # fmt: skip
+
+
+def test_a_joint_that_follows_a_fixed_one_is_where_that_puts_it(tmp_path):
+    """A fixed joint of URDF is at zero: q_b = 0.25."""
+    text = chain("urdf", (("a", None, 1.0, 0.0), ("b", "a", -2.0, 0.25), ("c", None, 1.0, 0.0)))
+    text = text.replace('name="qa" type="prismatic"', 'name="qa" type="fixed"')
+    text = text.replace('<link name="b">', '<link name="b"><visual><geometry><box size="1 1 1"/>'
+                        '</geometry></visual>')  # fmt: skip
+    scene, _ = imported(tmp_path, text, "urdf")
+    assert list(scene.bodies) == ["c"]
+    assert scene.shapes["b_box"].fields["at"] == (0.0, 0.25, 0.0)
+
+
+@pytest.mark.parametrize("ixx", ["0", "1e-20", "0.01"])
+def test_coupled_links_may_have_no_inertia(tmp_path, ixx):
+    """Points of 1 and 3 kg at 0.5 m and 0.2 m about vertical axes, q_b = -2 q_a, a moment on a."""
+    link = """<link name="{0}"><inertial><origin xyz="{1} 0 0"/><mass value="{2}"/>
+      <inertia ixx="{3}" iyy="{3}" izz="{3}"/></inertial></link><joint name="q{0}"
+      type="continuous"><parent link="base"/><child link="{0}"/><axis xyz="0 0 1"/>{4}</joint>"""
+    text = link.format("a", 0.5, 1, ixx, "")
+    text += link.format("b", 0.2, 3, ixx, '<mimic joint="qa" multiplier="-2"/>')
+    text = f'<robot name="p"><link name="base"/>{text}</robot>'
+    scene, _ = imported(tmp_path, text, "urdf", positions={"qa": 0.4})
+    scene.add_force("n", "t", body_i="a", n=(0.0, 0.0, 1.5))
+    result = dap.simulate(scene, t_end=0.5, dt=0.25)
+    inertia = 0.25 + float(ixx) + 4.0 * (3.0 * 0.04 + float(ixx))
+    # the wheel between them adds a millionth of the least inertia
+    np.testing.assert_allclose(result.wd[:, 0, 2], 1.5 / inertia, rtol=1e-6)
+    np.testing.assert_allclose(result.w[:, 1, 2], -2.0 * result.w[:, 0, 2], rtol=1e-9, atol=1e-12)
+
+
 def test_a_start_is_counted_as_the_file_counts_it(tmp_path):
     """qpos of MJCF: ref is the coordinate of the pose that the file draws, here 30 deg and 0.2."""
     text = """<mujoco><worldbody>

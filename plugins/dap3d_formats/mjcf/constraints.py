@@ -101,7 +101,7 @@ def _pose(reader: MjcfReader, link: str) -> Frame:
 
 def _joint(reader: MjcfReader, name: str, place: Place) -> Joint:
     joint = reader.model.joints.get(name)
-    if joint is None or joint.kind not in SCALAR:
+    if joint is None or joint.kind not in (*SCALAR, "fixed"):  # fixed by an equality of its own
         raise FormatError(f"there is no hinge or slide {name!r}", place)
     return joint
 

@@ -65,6 +65,8 @@ def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
             )
             raise FormatError(what, coupling.place, f"did you mean {near!r}?" if near else "")
         one, other = model.joints[coupling.joint], model.joints[coupling.other]
+        if one.kind == other.kind == "fixed":
+            continue
         if not couples(model, coupling):
             text = f"coupling of {coupling.joint} with {coupling.other}: joints of one coordinate "
             builder.remarks.leave_out(coupling.place, f"{text}are coupled", motion=True)
@@ -87,9 +89,9 @@ def _light(builder: SceneBuilder, *joints: Joint) -> tuple[float, float]:
     """Mass and inertia of a wheel beside what joints move: beside its mass, for a slider."""
     masses, sizes = [], []
     for joint in joints:
-        child = from_ground(builder, joint).child
-        inertial = builder.groups[builder.member[child][0]].inertial
-        least = float(np.linalg.eigvalsh(inertial.inertia)[0])
-        masses.append(inertial.mass)
-        sizes.append(inertial.mass if joint.kind == "prismatic" else least)
+        group = builder.groups[builder.member[from_ground(builder, joint).child][0]]
+        mass, least = group.inertial.mass, float(np.linalg.eigvalsh(group.inertial.inertia)[0])
+        seen = builder.inertia.of_alone(joint.name, 0) if group.light else None
+        masses.append(seen or mass)
+        sizes.append(seen or (mass if joint.kind == "prismatic" else least))
     return LIGHT * min(masses), LIGHT * min(sizes)

@@ -140,7 +140,9 @@ class JointCoordinate:
             text = "limits of joints are left out: limits = off"
             builder.remarks.translate(joint.place, text, motion=True)
             return
-        inertia = builder.inertia.of(joint.name, self.k) or self._own_inertia()
+        seen = builder.inertia
+        inertia = seen.of(joint.name, self.k) or seen.of_alone(joint.name, self.k)
+        inertia = inertia or self._own_inertia()
         hard, given = builder.limits == "hard", limits.stiffness
         k = inertia / STOP_TIME[builder.limits] ** 2 if hard or given is None else given
         text = "limits of a joint are stops at which its rate ends at once, without rebound"

@@ -24,6 +24,11 @@ def couples(model: Articulation, coupling: Coupling) -> bool:
     return all(one is not None and one.kind in SCALAR for one in ends)
 
 
+def _coordinate(joint: Joint) -> float:
+    """The coordinate of a joint that has one, or had one before it was fixed."""
+    return joint.position[0] if joint.position else 0.0
+
+
 def start_of(
     model: Articulation, positions: Given, rates: Given, remarks: Remarks, *, limited: bool
 ) -> Articulation:
@@ -68,28 +73,52 @@ class _Start:
 
     def __init__(self, model: Articulation, remarks: Remarks, limited: bool) -> None:
         self.model, self.remarks, self.limited = model, remarks, limited
-        self.couplings = [one for one in model.couplings if couples(model, one)]
+        self.couplings: list[Coupling] = []
+        self.locked: list[str] = []
         tree = SpanningTree.of(model)
         self.in_loops, self.closing = tree.in_loops(), {joint.name for joint in tree.loops}
 
     def place(self, given: Given) -> None:
         """Set the coordinates."""
         joints = self.model.joints
+        self._hold_followers(given)
         start = {name: joint.position[0] for name, joint in joints.items() if joint.kind in SCALAR}
         for name, q in self._followed(start, given, "position").items():
             joints[name].position = (q,)
-        if not self.limited:
-            return
-        coupled = {name for one in self.couplings for name in (one.joint, one.other)}
-        for name, joint in joints.items():
-            if joint.kind == "universal" and len(joint.limits) == 2:
+        for name in self.locked:
+            text = "limits that are equal hold a joint: it is fixed"
+            self.remarks.translate(joints[name].place, text, motion=True)
+            joints[name] = held(joints[name], joints[name].position[0])
+        for joint in joints.values():
+            if self.limited and joint.kind == "universal" and len(joint.limits) == 2:
                 pairs = zip(joint.position, joint.limits, strict=True)
                 joint.position = tuple(self._inside(joint, q, one) for q, one in pairs)
-            low, high = joint.limits[0].lower, joint.limits[0].upper
-            if joint.kind in SCALAR and low == high and name not in coupled | self.closing:
-                text = "limits that are equal hold a joint: it is fixed"
-                self.remarks.translate(joint.place, text, motion=True)
-                joints[name] = held(joint, low)
+
+    def _hold_followers(self, given: Given) -> None:
+        """Fix joints that are coupled with fixed ones.
+
+        Raises:
+            FormatError: one is given another position.
+        """
+        joints, waiting = self.model.joints, True
+        while waiting:
+            waiting = False
+            for one in self.model.couplings:
+                ends = [joints.get(name) for name in (one.joint, one.other)]
+                kinds = [None if end is None else end.kind for end in ends]
+                if kinds[1] == "fixed" and kinds[0] in SCALAR:
+                    joint, q = one.joint, one.offset + one.ratio * _coordinate(joints[one.other])
+                elif kinds[0] == "fixed" and kinds[1] in SCALAR and one.ratio:
+                    joint, q = one.other, (_coordinate(joints[one.joint]) - one.offset) / one.ratio
+                else:
+                    continue
+                if joint in given and abs(_coordinate(joints[joint]) - q) > AGREE:
+                    leader = one.other if joint == one.joint else one.joint
+                    self._refuse(leader, joint, "position", q, _coordinate(joints[joint]))
+                text = "a joint that is coupled with a fixed one is fixed"
+                self.remarks.translate(one.place, text)
+                joints[joint], waiting = held(joints[joint], q), True
+        self.couplings = [one for one in self.model.couplings if couples(self.model, one)]
 
     def move(self, given: Given) -> None:
         """Set the rates of joints that follow others.
@@ -99,8 +128,9 @@ class _Start:
         """
         for name in given:
             if self.model.joints[name].kind == "fixed":
-                what = f"rate of {name}: it does not move, since its limits are equal"
+                what = f"rate of {name}: it is fixed"
                 raise FormatError(what, self.model.joints[name].place)
+        self.couplings = [one for one in self.couplings if couples(self.model, one)]
         start = {name: (*joint.rate, 0.0)[0] for name, joint in self.model.joints.items()}
         for name, rate in self._followed(start, given, "rate").items():
             if given:
@@ -169,6 +199,7 @@ class _Start:
                 low, high = max(low, ends[0]), min(high, ends[1])
         if self.limited and low <= high and not self.in_loops & chain.keys():
             at = min(max(s, low), high)
+            self.locked += chain if low == high else ()
         for name, (a, b) in chain.items():
             if self.limited:
                 self._remark(self.model.joints[name], a + b * s, a + b * at)

@@ -43,14 +43,20 @@ class JointInertia:
 
         It is None where links have no mass, where it does not move, or the model is too large.
         """
-        inverse = self._inverse
-        place = self._columns.get(joint)
+        inverse, place = self._inverse, self._columns.get(joint)
         if inverse is None or place is None:
             return None
         own = inverse[place] if k is None else inverse[place][k : k + 1]
         if not len(own) or not own.mean() > 0.0:
             return None
         return float(1.0 / max(LEAST, own.mean()))
+
+    def of_alone(self, joint: str, k: int) -> float | None:
+        """The inertia of coordinate k of a joint while all others are held."""
+        place = self._columns.get(joint)
+        if self._masses is None or place is None:
+            return None
+        return float(self._masses[0][place.start + k, place.start + k]) or None
 
     @cached_property
     def _columns(self) -> dict[str, slice]:
@@ -62,25 +68,29 @@ class JointInertia:
         return columns
 
     @cached_property
+    def _masses(self) -> tuple[Floats, dict[str, Floats]] | None:
+        """The mass matrix, and the rates of each link; None for a model that is too large."""
+        size = max((place.stop for place in self._columns.values()), default=0)
+        return self._matrix(size) if 0 < size <= MOST else None
+
+    @cached_property
     def _inverse(self) -> Floats | None:
         """The diagonal of the inverse of the mass matrix, of all motions that are left."""
-        size = max((place.stop for place in self._columns.values()), default=0)
-        if not 0 < size <= MOST:
+        if self._masses is None or not (np.diag(self._masses[0]) > 0.0).all():
             return None
-        M, rates = self._matrix(size)
-        held = [*self._coupled(size), *self._closed(rates)]
-        if not held:
-            if not np.linalg.cond(M) < 1.0 / np.finfo(float).eps:
-                return None
-            return np.asarray(np.diag(np.linalg.inv(M)))
-        _, sizes, rows = np.linalg.svd(np.array(held))
-        free = rows[int((sizes > DEPENDENT * sizes.max(initial=0.0)).sum()) :].T
-        left = free.T @ M @ free
+        M, rates = self._masses
+        scale = np.sqrt(np.diag(M))  # links may be light: their coordinates are scaled
+        held = [*self._coupled(len(M)), *self._closed(rates)]
+        free = np.eye(len(M))
+        if held:
+            _, sizes, rows = np.linalg.svd(np.array(held) / scale)
+            free = rows[int((sizes > DEPENDENT * sizes.max(initial=0.0)).sum()) :].T
+        left = free.T @ (M / np.outer(scale, scale)) @ free
         if not free.size or not np.linalg.cond(left) < 1.0 / np.finfo(float).eps:
             return None
         inverse = np.einsum("ij,jk,ik->i", free, np.linalg.inv(left), free)
         moves = np.sqrt((free * free).sum(axis=1)) > DEPENDENT
-        return np.asarray(np.where(moves, inverse, 0.0))
+        return np.asarray(np.where(moves, inverse, 0.0) / scale**2)
 
     def _matrix(self, size: int) -> tuple[Floats, dict[str, Floats]]:
         """The mass matrix, and the rates of each link: of its point at the origin, and angular."""

@@ -66,10 +66,10 @@ def joint_motion(
 
 
 def held(joint: Joint, q: float) -> Joint:
-    """A hinge or a slider that is fixed at a coordinate."""
+    """A hinge or a slider that is fixed at a coordinate, which is still its position."""
     moved, _, _ = joint_motion(joint, (q,), (0.0,))
     return attrs.evolve(joint, kind="fixed", in_parent=joint.in_parent @ moved,
-                        position=(), rate=())  # fmt: skip
+                        position=(q,), rate=())  # fmt: skip
 
 
 def reversed_joint(joint: Joint) -> Joint:
