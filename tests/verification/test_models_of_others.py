@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.formats.import_scene.joint_forces import STOP_TIME
@@ -410,6 +411,29 @@ def test_stops_of_a_loop_see_what_the_loop_moves(tmp_path):
     scene, _ = imported(tmp_path, text, "xml")
     seen = [scene.forces[f"{name}_min_stop"].fields["J_c"] for name in "lr"]
     np.testing.assert_allclose(seen, 2.0 * 0.2 + 2.0 * 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("slide", ["slide0", "slide3"])
+def test_stops_of_a_platform_see_the_mass_that_a_force_moves(slide):
+    """By the accelerations of the scene itself, of six loops, with and without 1 N on a slide.
+
+    The leg's foot lies on the axis, along which its end slides: to rounding of sums, 1e-12.
+    """
+    accelerations = []
+    for force in (0.0, 1.0):
+        scene, _ = dap.import_model(REPOSITORY / "models" / "robots" / "stewart.xml", shapes=False)
+        slider, stop = scene.joints[slide].fields, scene.forces[f"{slide}_min_stop"].fields
+        ends = {key: slider[key] for key in ("P_i", "P_j", "a_j")}
+        scene.add_force("tran_sda", "push", f_a=-force, **ends)
+        result = dap.simulate(scene, t_end=0.0)
+        inner, foot = slider["P_i"].removesuffix(".O"), scene.points[slider["P_j"]]
+        i, j = (list(scene.bodies).index(name) for name in (inner, foot.body))
+        A = rotation(result.p[0, j])
+        assert slider["a_j"] == f"{foot.body}.x"
+        apart = result.rdd[0, i] - result.rdd[0, j] - np.cross(result.wd[0, j], A @ foot.sPp)
+        accelerations.append(A[:, 0] @ apart)
+    seen = 1.0 / (accelerations[1] - accelerations[0])
+    assert stop["m_c"] == pytest.approx(seen, rel=1e-12)
 
 
 # --------------------------------------------------------------------------- inertias of zero
