@@ -193,6 +193,14 @@ def test_coupled_joints_keep_to_the_limits_of_all(tmp_path, suffix):
     assert "joint qb starts at -1.1, beyond its limits" in texts(report.translated)
 
 
+def test_limits_that_leave_coupled_joints_no_room_are_said(tmp_path):
+    """q_b = -2 q_a with both in 0 to 0.5: they stand between stops, and are not merged."""
+    pair = (("a", None, 1.0, 0.0), ("b", "a", -2.0, 0.0))
+    scene, report = imported(tmp_path, chain("urdf", pair, limits="0 0.5"), "urdf")
+    assert {"a", "b"} <= scene.bodies.keys()
+    assert "limits of qa, qb, which are coupled, leave them no room" in texts(report.translated)
+
+
 @pytest.mark.parametrize("suffix", FINGERS)
 def test_joints_that_are_coupled_with_a_fixed_one_are_fixed(tmp_path, suffix):
     """q_a at 0.3 by equal limits, or by an equality of its own, holds b and c as well."""

@@ -191,15 +191,20 @@ class _Start:
 
     def _within(self, chain: Mapping[str, tuple[float, float]], s: float) -> float:
         """The coordinate of a joint, moved until all that move with it are within their limits."""
-        low, high, at = -inf, inf, s
+        low, high, at, equal = -inf, inf, s, False
         for name, (a, b) in chain.items():
             limits = self.model.joints[name].limits[0]
+            equal = equal or limits.lower == limits.upper
             if b:
                 ends = sorted(((limits.lower - a) / b, (limits.upper - a) / b))
                 low, high = max(low, ends[0]), min(high, ends[1])
         if self.limited and low <= high and not self.in_loops & chain.keys():
             at = min(max(s, low), high)
-            self.locked += chain if low == high else ()
+            self.locked += chain if equal else ()
+        if self.limited and low >= high and not equal:
+            joint = self.model.joints[next(iter(chain))]
+            text = f"limits of {', '.join(chain)}, which are coupled, leave them no room to move"
+            self.remarks.translate(joint.place, text, motion=True)
         for name, (a, b) in chain.items():
             if self.limited:
                 self._remark(self.model.joints[name], a + b * s, a + b * at)
