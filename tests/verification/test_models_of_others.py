@@ -364,6 +364,12 @@ def test_a_joint_that_starts_beyond_half_a_turn_meets_its_own_stop(tmp_path, sta
     assert jump.t == pytest.approx(0.5, abs=1e-9)
 
 
+def test_limits_within_half_a_turn_keep_their_digits(tmp_path):
+    scene, _ = imported(tmp_path, hinge("xml", 0.1, 0.4), "xml", positions={"q": 0.3})
+    bounds = [scene.forces[f"q_{side}_stop"].fields["theta_stop"] for side in ("min", "max")]
+    assert bounds == [0.1, 0.4]
+
+
 def test_a_spring_is_wound_by_whole_turns(tmp_path):
     """k (q - springref), at 7 rad and -9 rad of a joint that may turn more than once."""
     text = hinge("xml", -20.0, 20.0).replace('name="q"', 'name="q" stiffness="3" springref="-9"')

@@ -1,7 +1,7 @@
 """What acts on the coordinates of joints: springs, dampers, stops, dry friction, inputs."""
 
 import re
-from math import atan2, cos, isfinite, sin
+from math import atan2, cos, isfinite, pi, sin
 from typing import Any
 
 import numpy as np
@@ -116,8 +116,8 @@ class JointCoordinate:
 
     def _as_counted(self, q: float) -> float:
         """A coordinate as a force counts it, whose angle begins within half a turn of zero."""
-        start = self.joint.position[self.k] if self.joint.position else 0.0
-        return q - (start - atan2(sin(start), cos(start)) if self.turns else 0.0)
+        start = self.joint.position[self.k] if self.joint.position and self.turns else 0.0
+        return q - 2.0 * pi * round((start - atan2(sin(start), cos(start))) / (2.0 * pi))
 
     def add_spring(self) -> None:
         """Add a linear spring without force at ``rest``, and a linear damper."""
