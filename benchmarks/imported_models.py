@@ -73,15 +73,14 @@ def scene_at(model, state, *, balance_inertia):
     forced = attrs.evolve(model, actuators=[
         Actuator(f"{name} force", name, value) for name, value in torques.items()
     ], couplings=[])  # fmt: skip
-    options = ImportOptions(False, False, balance_inertia, positions, rates)
+    options = ImportOptions(False, False, balance_inertia, "off", positions, rates)
     names = Names()
     scene = scene_of(forced, Remarks(), options, names=names)
     for one in scene.inputs.values():
         one.value = 1.0
     off = ("rot_friction", "tran_friction")
-    for name in [n for n, e in scene.forces.items() if e.type in off or "function" in e.fields]:
-        del scene.forces[name]  # friction, and stops
-    scene.functions.clear()
+    for name in [n for n, e in scene.forces.items() if e.type in off]:
+        del scene.forces[name]
     return scene, names
 
 

@@ -1,7 +1,7 @@
 """Stop of a ball, or a point, at a plane."""
 
-from dap3d_core.interface import Force, Point, Vector, hookimpl, number, point, vector
-from dap3d_core.kernels import cross, dot, neg, scale, sub
+from dap3d_core.interface import Force, Point, Vector, choice, hookimpl, number, point, vector
+from dap3d_core.kernels import cross, dot, neg, scale, sub, where
 from dap3d_forces.rebound import carried, rebound, reduced, stored
 
 interface_version = 1
@@ -12,8 +12,9 @@ class PlaneStop(Force):
 
     The gap is g = a_j . (r_P_i - r_P_j) - radius. Where it closes faster than v_rest an impulse
     along a_j makes g_dot of it -e g_dot, the joints of the bodies held (docs/jumps.md); slower
-    contact is carried by a spring and damper, of stiffness k and of the damping ratio zeta for the
-    two bodies alone, that pushes and does not pull.
+    contact is carried by a spring and damper, of stiffness k and of the damping ratio zeta, that
+    pushes and does not pull. zeta is that of the mass ``m_c`` on the spring, by default of the two
+    bodies alone. Without ``rebound`` all contact is carried.
     """
 
     keyword = "plane_stop"
@@ -27,9 +28,12 @@ class PlaneStop(Force):
     e: float = number(default=0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution")
     k: float = number(unit="N/m", positive=True, doc="stiffness of contact at rest")
     zeta: float = number(default=1.0, minimum=0.0, doc="damping ratio of contact at rest")
+    m_c: float = number(default=0.0, unit="kg", minimum=0.0,
+                        doc="mass of zeta; 0 for that of the two bodies alone")  # fmt: skip
     v_rest: float = number(
         default=1e-3, unit="m/s", minimum=0.0, doc="speed below which contact does not rebound"
     )
+    rebound: bool = choice((True, False), default=True, doc="whether fast contact rebounds")
 
     def switch(r_P_i, r_P_j, a_j, radius):
         return dot(a_j, sub(r_P_i, r_P_j)) - radius
@@ -42,15 +46,23 @@ class PlaneStop(Force):
         return rebound(Jv, e, v_rest)
 
     def wrench(
-        r_P_i, s_P_i, v_P_i, r_P_j, v_P_j, r_j, a_j, w_j, mass_i, mass_j, radius, k, zeta
+        r_P_i, s_P_i, v_P_i, r_P_j, v_P_j, r_j, a_j, w_j, mass_i, mass_j, radius, k, zeta, m_c
     ):  # fmt: skip
         d = sub(r_P_i, r_P_j)
         g, g_dot = dot(a_j, d) - radius, dot(a_j, sub(sub(v_P_i, v_P_j), cross(w_j, d)))
-        F = scale(carried(g, g_dot, k, zeta, reduced(mass_i, mass_j)), a_j)
+        m = where(m_c > 0.0, m_c, reduced(mass_i, mass_j))
+        F = scale(carried(g, g_dot, k, zeta, m), a_j)
         return (F, cross(s_P_i, F)), (neg(F), neg(cross(sub(r_P_i, r_j), F)))
 
     def energy(r_P_i, r_P_j, a_j, radius, k):
         return stored(dot(a_j, sub(r_P_i, r_P_j)) - radius, k)
+
+
+class SoftPlaneStop(PlaneStop, rebound=False):
+    """The spring and damper carry all contact."""
+
+    unilateral, restitution = (), ""
+    J = impulse = None
 
 
 @hookimpl

@@ -1,7 +1,7 @@
 """Stop of the angle between two bodies."""
 
 from dap3d_core.interface import Force, Vector, angle, choice, hookimpl, number, vector
-from dap3d_core.kernels import dot, neg, rotate, scale
+from dap3d_core.kernels import dot, neg, rotate, scale, where
 from dap3d_forces.rebound import carried, rebound, reduced, stored
 
 interface_version = 1
@@ -16,7 +16,8 @@ class RotationStop(Force):
     is g = theta - theta_stop for side "min", g = theta_stop - theta for side "max". Where it closes
     faster than w_rest an impulsive moment along u makes g_dot of it -e g_dot, the joints of the
     bodies held (docs/jumps.md); slower contact is carried by a spring and damper, of stiffness k
-    and of the damping ratio zeta for the two bodies alone, that pushes and does not pull.
+    and of the damping ratio zeta, that pushes and does not pull. zeta is that of the inertia
+    ``J_c``, by default of the two bodies alone. Without ``rebound`` all contact is carried.
     """
 
     keyword = "rot_stop"
@@ -33,9 +34,12 @@ class RotationStop(Force):
     e: float = number(default=0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution")
     k: float = number(unit="N m/rad", positive=True, doc="stiffness of contact at rest")
     zeta: float = number(default=1.0, minimum=0.0, doc="damping ratio of contact at rest")
+    J_c: float = number(default=0.0, unit="kg m^2", minimum=0.0,
+                        doc="inertia of zeta; 0 for that of the two bodies alone")  # fmt: skip
     w_rest: float = number(
         default=1e-3, unit="rad/s", minimum=0.0, doc="speed below which contact does not rebound"
     )
+    rebound: bool = choice((True, False), default=True, doc="whether fast contact rebounds")
 
     def prepare(self, bodies):
         return {"way": 1.0 if self.side == "min" else -1.0}
@@ -50,14 +54,22 @@ class RotationStop(Force):
     def impulse(Jv, e, w_rest):
         return rebound(Jv, e, w_rest)
 
-    def wrench(axis, theta, theta_dot, A_i, A_j, Jp_i, Jp_j, theta_stop, way, k, zeta):
-        m = reduced(inertia(A_i, Jp_i, axis), inertia(A_j, Jp_j, axis))
+    def wrench(axis, theta, theta_dot, A_i, A_j, Jp_i, Jp_j, theta_stop, way, k, zeta, J_c):
+        two = reduced(inertia(A_i, Jp_i, axis), inertia(A_j, Jp_j, axis))
+        m = where(J_c > 0.0, J_c, two)
         g = way * (theta - theta_stop)
         moment = scale(way * carried(g, way * theta_dot, k, zeta, m), axis)
         return (ZERO, neg(moment)), (ZERO, moment)
 
     def energy(theta, theta_stop, way, k):
         return stored(way * (theta - theta_stop), k)
+
+
+class SoftRotationStop(RotationStop, rebound=False):
+    """The spring and damper carry all contact."""
+
+    unilateral, restitution = (), ""
+    J = impulse = None
 
 
 def inertia(A, Jp, u):

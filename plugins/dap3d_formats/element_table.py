@@ -1,9 +1,9 @@
 """What becomes of each element and attribute of a format: tables that readers and the docs share.
 
 A table maps an element, ``parent/name`` where its meaning depends on its parent, to a word for
-itself (key "") and for each attribute: TAKEN, or a pair of NOTED, TRANSLATED or REFUSED and the
-reason. A key ``name=value`` is of an attribute with this value alone. An element that is NOTED is
-left out with all that it holds.
+itself (key "") and for each attribute: TAKEN, or a pair of NOTED, MOVES, TRANSLATED or REFUSED and
+the reason. What is NOTED or MOVES is left out, an element with all that it holds; without what
+MOVES the motion is another. A key ``name=value`` is of an attribute with this value alone.
 """
 
 from collections.abc import Mapping
@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dap3d_core.interface.formats import FormatError, Remarks, XmlElement
 
 TAKEN, TRANSLATED, NOTED, REFUSED = "taken", "translated", "noted", "refused"
+MOVES = "noted, changes the motion"
 
 Word = tuple[str, str]
 Table = Mapping[str, Mapping[str, Word]]
@@ -29,6 +30,11 @@ def translated(names: str, words: str) -> dict[str, Word]:
 def noted(names: str, words: str) -> dict[str, Word]:
     """Attributes, or the element itself for "", that are left out with a note."""
     return dict.fromkeys(names.split() or [""], (NOTED, words))
+
+
+def moves(names: str, words: str) -> dict[str, Word]:
+    """As ``noted``, of what changes the motion."""
+    return dict.fromkeys(names.split() or [""], (MOVES, words))
 
 
 def refused(names: str, words: str) -> dict[str, Word]:
@@ -53,8 +59,9 @@ def note_elements(root: XmlElement, table: Table, remarks: Remarks) -> None:
         state, words = row.get("", (TAKEN, ""))
         if state == REFUSED:
             raise FormatError(f"<{element.name}>: {words}", element.place)
-        if state == NOTED:
-            remarks.leave_out(element.place, f"<{element.name}>: {words}")
+        if state in (NOTED, MOVES):
+            text = f"<{element.name}>: {words}"
+            remarks.leave_out(element.place, text, motion=state == MOVES)
             continue
         for name in element.attributes:
             _note(element, name, row, remarks)
@@ -68,5 +75,6 @@ def _note(element: XmlElement, name: str, row: Mapping[str, Word], remarks: Rema
     state, words = row.get(f"{name}={element.attributes[name].strip()}", usual)
     if state == REFUSED:
         raise FormatError(f"{name} of <{element.name}>: {words}", element.place)
-    if state == NOTED:
-        remarks.leave_out(element.place, f"{name} of <{element.name}>: {words}")
+    if state in (NOTED, MOVES):
+        text = f"{name} of <{element.name}>: {words}"
+        remarks.leave_out(element.place, text, motion=state == MOVES)

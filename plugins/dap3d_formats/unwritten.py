@@ -18,4 +18,4 @@ def leave_out_forces(joint: Joint, remarks: Remarks, keys: tuple[str, ...] = tup
         if key == "limits":
             values = [isfinite(one.lower) or isfinite(one.upper) for one in values]
         if any(values):
-            remarks.leave_out(NOWHERE, f"{WORDS[key]} of joint {joint.name}")
+            remarks.leave_out(NOWHERE, f"{WORDS[key]} of joint {joint.name}", motion=True)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dap3d_core.exchange import export
-    from dap3d_core.formats import export_model, import_model
+    from dap3d_core.formats.export_model import export_model
+    from dap3d_core.formats.import_model import import_model
     from dap3d_core.interface import PluginError
     from dap3d_core.matlab import import_matlab
     from dap3d_core.plot import animate, plot
@@ -63,10 +64,10 @@ _HOMES = {
     "compile": ("simulation", "compile_scene"),
     "equilibrium": ("simulation.equilibrium.equilibrium", "equilibrium"),
     "export": ("exchange", "export"),
-    "export_model": ("formats", "export_model"),
+    "export_model": ("formats.export_model", "export_model"),
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
-    "import_model": ("formats", "import_model"),
+    "import_model": ("formats.import_model", "import_model"),
     "inverse": ("simulation.kinematics.inverse", "inverse"),
     "kinematics": ("simulation.kinematics.kinematics", "kinematics"),
     "linearize": ("simulation.linearization.linearization", "linearize"),

@@ -29,8 +29,17 @@ def test_the_report_for_programs(dap3d, arm):
     done = dap3d("import", "arm.urdf", "-o", "out", "--json", "--position", "shoulder=0.5")
     data = json.loads(done.stdout)
     assert data["taken"] == {"links": 4, "joints": 3, "couplings": 0, "actuators": 0}
-    assert {"file", "line", "text", "count"} == set(data["left_out"][0])
+    assert {"file", "line", "text", "count", "motion"} == set(data["left_out"][0])
     assert (arm / "out" / "scene.toml").is_file()
+
+
+def test_limits_may_be_hard_or_off(dap3d, arm):
+    """What changes the motion is said first."""
+    said = dap3d("import", "arm.urdf", "--limits", "hard").stdout
+    assert said.index("the motion is another") < said.index("left out\n")
+    assert (arm / "arm" / "scene.toml").read_text().count('type = "rot_stop"') == 2
+    assert dap3d("import", "arm.urdf", "--limits", "off", "-o", "free").returncode == 0
+    assert "_stop" not in (arm / "free" / "scene.toml").read_text()
 
 
 def test_nothing_is_overwritten_without_force(dap3d, refuse, arm):
@@ -53,6 +62,10 @@ def test_nothing_is_overwritten_without_force(dap3d, refuse, arm):
         (("import", "arm.urdf", "--position", "elbow"), "write NAME=VALUE"),
         (("import", "arm.urdf", "--position", "a=1", "--position", "a=2"), "more than once"),
         (("import", "arm.urdf", "--package", "a=nowhere"), "nowhere is no folder"),
+        (("import", "arm.urdf", "--limits", "softly"), "'off', 'soft', 'hard'"),
+        (("import", "arm.urdf", "--position", "elbow=1,x"), "is no number"),
+        (("import", "arm.urdf", "--arg", "L=2"), "write NAME:=VALUE"),
+        (("import", "arm.urdf", "--arg", "L:=2"), "takes no argument 'L'"),
         (("import", "arm.urdf", "--format", "urfd"), "did you mean 'urdf'"),
         (("export", "arm.urdf", "--format", "urfd"), "did you mean 'urdf'"),
         (("run", "arm.urdf"), "dap3d import arm.urdf"),

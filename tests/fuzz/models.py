@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from support.process import REPOSITORY
 
-from dap3d_core.formats import import_model
+from dap3d_core.formats.import_model import import_model
 from dap3d_core.scene import SceneError
 from fuzz.acceptable import registry, strict
 from fuzz.damage import seeds

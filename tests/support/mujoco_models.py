@@ -31,7 +31,7 @@ class Oracle:
             d.qvel[v : v + size] = rng.uniform(-1.0, 1.0, size)
             if size == 1:
                 d.qpos[a] = m.qpos0[a] + rng.uniform(-1.0, 1.0)
-                q[name] = float(d.qpos[a] - m.qpos0[a])
+                q[name] = float(d.qpos[a])
             else:
                 turn = rng.normal(size=4)
                 d.qpos[a : a + size - 3] = rng.normal(size=size - 3)

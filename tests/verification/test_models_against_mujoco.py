@@ -46,7 +46,7 @@ def test_masses_and_kinematics(pair):
     rng = np.random.default_rng(1)
     for _ in range(100):
         positions, rates = oracle.randomise(rng)
-        scene, _ = dap.import_model(path, positions=positions, rates=rates)
+        scene, _ = dap.import_model(path, positions=positions, rates=rates, limits="off")
         assert bodies_of(oracle, scene)
         for b, name in bodies_of(oracle, scene):
             body, (mass, com, J) = scene.bodies[name], oracle.group(b)
@@ -67,10 +67,7 @@ def test_accelerations(pair):
     rng = np.random.default_rng(2)
     for _ in range(5):
         positions, rates = oracle.randomise(rng)
-        scene, _ = dap.import_model(path, positions=positions, rates=rates)
-        for name in [n for n, e in scene.forces.items() if "function" in e.fields]:
-            del scene.forces[name]  # stops
-        scene.functions.clear()
+        scene, _ = dap.import_model(path, positions=positions, rates=rates, limits="off")
         for name in [n for n, e in scene.joints.items() if e.type == "sph" and n == "close"]:
             del scene.joints[name]  # MuJoCo's equalities are soft
         v_dot = body_accelerations(scene)
@@ -79,6 +76,95 @@ def test_accelerations(pair):
         for b, name in bodies_of(oracle, scene):
             expected = oracle.acceleration(b, oracle.group(b)[1])
             np.testing.assert_allclose(v_dot[places[name]], expected, rtol=0, atol=1e-9 * scale)
+
+
+FOLLOWING = """<mujoco><compiler angle="{angle}"/><worldbody>
+  <body name="a"><joint name="p" axis="0 0 1" ref="{ref}"/><geom size="0.1" pos="1 0 0"/></body>
+  <body name="b"><joint name="q" type="slide" axis="0 1 0" ref="0.2"/><geom size="0.1"/></body>
+  <body name="c"><joint name="r" axis="1 0 0"/><geom size="0.1" pos="0 1 0"/></body>
+  </worldbody><equality><joint joint1="q" joint2="p" polycoef="{a0} {a1} 0 0 0"/>
+  <joint joint1="r" joint2="q" polycoef="0.1 -3 0 0 0"/></equality></mujoco>"""
+
+
+@pytest.mark.parametrize(("a0", "a1"), [(0.0, 1.0), (0.05, -0.4), (-0.3, 2.0)])
+@pytest.mark.parametrize(("angle", "ref"), [("degree", 40.0), ("radian", -0.7)])
+@pytest.mark.parametrize(("joint", "value"), [("p", 0.9), ("q", -0.35), ("r", 1.2)])
+def test_a_start_by_qpos_fulfils_the_equalities(tmp_path, a0, a1, angle, ref, joint, value):
+    """MuJoCo finds its equalities fulfilled where the scene starts, with the qpos that is given."""
+    import mujoco
+
+    path = tmp_path / "a.xml"
+    path.write_text(FOLLOWING.format(a0=a0, a1=a1, angle=angle, ref=ref))
+    scene, _ = dap.import_model(path, positions={joint: value})
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    turned = [rotation(np.array(scene.bodies[name].p)) for name in "ac"]
+    data.qpos[0] = model.qpos0[0] + np.arctan2(turned[0][1, 0], turned[0][0, 0])
+    data.qpos[1] = model.qpos0[1] + scene.bodies["b"].r[1]
+    data.qpos[2] = np.arctan2(turned[1][2, 1], turned[1][1, 1])
+    # angles are known but for whole turns
+    assert np.exp(1j * data.qpos["pqr".index(joint)]) == pytest.approx(
+        np.exp(1j * value), abs=1e-12
+    )
+    q = data.qpos[1] - 0.2
+    p = (q - a0) / a1
+    assert np.exp(1j * (data.qpos[0] - model.qpos0[0])) == pytest.approx(np.exp(1j * p), abs=1e-12)
+    data.qpos[:] = model.qpos0[0] + p, 0.2 + q, 0.1 - 3.0 * q
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.efc_pos[: model.neq], 0.0, rtol=0, atol=1e-14)
+    for name in "abc":
+        at = data.xipos[model.body(name).id]
+        np.testing.assert_allclose(scene.bodies[name].r, at, rtol=0, atol=1e-12)
+
+
+LIGHT = """<mujoco><worldbody><body name="cup"><joint name="x" type="slide" axis="1 0 0" {x}/>
+  <joint name="y" axis="0 1 1" pos="0.1 0.2 0"/><joint name="z" type="slide" axis="0 0 1"/>
+  <geom size=".02" mass="{mass}" pos="0.3 0 0"/><body name="in"><joint name="w" axis="1 1 0"/>
+  <geom size=".01" mass="{mass}" pos="0 0.1 0"/></body></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("mass", [0.05, 1e-9, 3.0])
+@pytest.mark.parametrize("x", ["", 'range="-1 2" damping="0.3"'])
+def test_exported_light_links_are_read(tmp_path, mass, x):
+    """Links without mass between joints are joints of one body; accelerations are the same."""
+    import mujoco
+
+    (tmp_path / "a.xml").write_text(LIGHT.format(mass=mass, x=x))
+    scene, _ = dap.import_model(tmp_path / "a.xml")
+    dap.export_model(scene, tmp_path / "b.xml", format="mjcf")
+    found = []
+    for name in ("a.xml", "b.xml"):
+        model = mujoco.MjModel.from_xml_path(str(tmp_path / name))
+        data = mujoco.MjData(model)
+        data.qvel[:] = 0.3, -0.2, 0.1, 0.7
+        mujoco.mj_forward(model, data)
+        assert model.nbody == 3
+        found.append(data.qacc.copy())
+    np.testing.assert_allclose(found[1], found[0], rtol=1e-9)
+
+
+def test_exported_meshes_are_found_at_the_default_place(tmp_path, monkeypatch):
+    """Next to the folder of the scene, in it, and elsewhere; also a flat one."""
+    import mujoco
+
+    (tmp_path / "part.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+    )
+    (tmp_path / "flat.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nf 1 2 3\nf 2 4 3\n")
+    shapes = "".join(
+        f'<visual><geometry><mesh filename="{name}.obj"/></geometry></visual>'
+        for name in ("part", "flat")
+    )
+    (tmp_path / "r.urdf").write_text(f"""<robot name="r"><link name="base"/><link name="a">{shapes}
+      <inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>
+      <joint name="j" type="continuous"><parent link="base"/><child link="a"/></joint></robot>""")
+    monkeypatch.chdir(tmp_path)
+    scene, report = dap.import_model("r.urdf")
+    report.save(scene, "m")
+    (tmp_path / "x" / "y").mkdir(parents=True)
+    for target in ("m.xml", "m/in.xml", "x/y/out.xml", str(tmp_path / "x" / "abs.xml")):
+        dap.export_model("m", target, format="mjcf")
+        assert mujoco.MjModel.from_xml_path(target).nmesh == 2
 
 
 def test_motors_and_servos():
@@ -111,11 +197,8 @@ def test_accelerations_with_torques_against_pinocchio():
         names = ("shoulder", "elbow")
         scene, _ = dap.import_model(
             DATA / "arm.urdf", positions=dict(zip(names, angles.tolist(), strict=True)),
-            rates=dict(zip(names, rates.tolist(), strict=True)),
+            rates=dict(zip(names, rates.tolist(), strict=True)), limits="off",
         )  # fmt: skip
-        for name in [n for n, e in scene.forces.items() if "function" in e.fields]:
-            del scene.forces[name]
-        scene.functions.clear()
         scene.add_force("np", "m0", body_i="upper", np=(0.0, torques[0], 0.0))
         scene.add_force("np", "m1", body_i="lower", np=(0.0, torques[1], 0.0))
         scene.add_force("np", "m2", body_i="upper", np=(0.0, -torques[1], 0.0))

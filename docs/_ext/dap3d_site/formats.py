@@ -20,7 +20,8 @@ def _formats() -> Iterator[str]:
     yield (
         "What `dap3d import` makes of each element and attribute ([how](../how-to/robots.md)): "
         "*taken*, *translated* into something else, *noted* in the report and left out, or "
-        "*refused*. An element that is noted is left out with all that it holds. Elements and "
+        "*refused*; the report begins with what changes the motion. An element that is noted is "
+        "left out with all that it holds. Elements and "
         "attributes that are not listed are noted as unknown."
     )
     for title, elements in TABLES.items():

@@ -9,7 +9,8 @@ SECTIONS = {
     "Scenes": (
         ("load", "shipped_models", "Scene", "import_matlab", "import_model", "export_model"),
         ("scene.Simulation", "scene.Body", "scene.Animation", "scene.Mistake",
-         "matlab.ImportReport", "formats.ImportReport", "formats.ExportReport"),
+         "matlab.ImportReport", "formats.import_model.ImportReport",
+         "formats.export_model.ExportReport"),
     ),
     "Runs": (
         ("simulate", "compile", "Event", "Controller", "start", "resume", "rerun"),

@@ -2,16 +2,22 @@
 
 from math import sqrt
 
-from dap3d_core.interface.formats import Actuator, FormatError, Joint, XmlElement
+from dap3d_core.interface.formats import (
+    LEAST,
+    Actuator,
+    FormatError,
+    Joint,
+    JointInertia,
+    XmlElement,
+)
 from dap3d_formats.mjcf.document import ACTUATORS
 from dap3d_formats.mjcf.reader import MjcfReader
-from dap3d_formats.mjcf.start_inertia import LEAST, StartInertia
 
 #: Joints with one coordinate.
 SCALAR = ("revolute", "prismatic")
 
 
-def read_actuators(reader: MjcfReader, inertia: StartInertia) -> None:
+def read_actuators(reader: MjcfReader, inertia: JointInertia) -> None:
     """Read actuators on joints whose force is linear; others are left out, remarked.
 
     Args:
@@ -36,20 +42,21 @@ def read_actuators(reader: MjcfReader, inertia: StartInertia) -> None:
                 _read(reader, element, inertia)
 
 
-def _read(reader: MjcfReader, element: XmlElement, inertia: StartInertia) -> None:
+def _read(reader: MjcfReader, element: XmlElement, inertia: JointInertia) -> None:
     remarks = reader.document.source.remarks
     name = element.get("name") or f"actuator{len(reader.model.actuators) + 1}"
     joint = element.get("joint") or element.get("jointinparent")
     law = _law(element)
     if joint is None or law is None:
         what = "its law" if joint else "on tendons, sites and bodies"
-        remarks.leave_out(element.place, f"an actuator <{element.name}>: {what}")
+        remarks.leave_out(element.place, f"an actuator <{element.name}>: {what}", motion=True)
         return
     if joint not in reader.model.joints:
         raise FormatError(f"actuator {name}: there is no joint {joint!r}", element.place)
     target = reader.model.joints[joint]
     if target.kind not in SCALAR:
-        remarks.leave_out(element.place, "actuators of joints with several coordinates")
+        text = "actuators of joints with several coordinates"
+        remarks.leave_out(element.place, text, motion=True)
         return
     gear = element.numbers("gear", None, (1.0,))[0]
     gain, constant, position, rate = law
@@ -57,13 +64,12 @@ def _read(reader: MjcfReader, element: XmlElement, inertia: StartInertia) -> Non
         moved = inertia.of(joint)
         if moved is None:
             text = "dampratio: links without mass, or too many, for a mass matrix"
-            remarks.leave_out(element.place, text)
+            remarks.leave_out(element.place, text, motion=True)
         rate *= -_critical(gain, gear, moved or 0.0)
-    reference = reader.references.get(joint, 0.0)
-    _add_law(target, gear * constant + gear * gear * position * reference,
+    _add_law(target, gear * constant + gear * gear * position * target.reference,
              -gear * gear * position, -gear * gear * rate)  # fmt: skip
     if gear * constant and not target.stiffness[0]:
-        remarks.leave_out(element.place, "a constant force of an actuator")
+        remarks.leave_out(element.place, "a constant force of an actuator", motion=True)
     if position or rate:
         text = "a servo is an input, and a spring and a damper of its joint"
         remarks.translate(element.place, text)

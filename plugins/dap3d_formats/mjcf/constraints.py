@@ -1,7 +1,5 @@
 """Equalities of MJCF, with the tendons that they hold."""
 
-import attrs
-
 from dap3d_core.interface.formats import (
     WORLD,
     Coupling,
@@ -10,8 +8,8 @@ from dap3d_core.interface.formats import (
     Joint,
     Place,
     XmlElement,
-    axis_angle,
     from_quaternion,
+    held,
 )
 from dap3d_formats.mjcf.reader import MjcfReader
 
@@ -63,7 +61,7 @@ def _close(reader: MjcfReader, element: XmlElement) -> None:
             in_parent, in_child = _weld(reader, element, parent, child)
     if "solref" in element.attributes or "solimp" in element.attributes:
         text = "softness of an equality (solref, solimp): it holds exactly"
-        reader.document.source.remarks.translate(element.place, text)
+        reader.document.source.remarks.translate(element.place, text, motion=True)
     model.joints[name] = Joint(name, kind, parent, child, in_parent, in_child, closes=True,
                                place=element.place)  # fmt: skip
 
@@ -103,7 +101,7 @@ def _pose(reader: MjcfReader, link: str) -> Frame:
 
 def _joint(reader: MjcfReader, name: str, place: Place) -> Joint:
     joint = reader.model.joints.get(name)
-    if joint is None or joint.kind not in SCALAR:
+    if joint is None or joint.kind not in (*SCALAR, "fixed"):  # fixed by an equality of its own
         raise FormatError(f"there is no hinge or slide {name!r}", place)
     return joint
 
@@ -117,27 +115,16 @@ def _couple(reader: MjcfReader, element: XmlElement) -> None:
     if other is None:
         text = "an equality of one joint holds it fixed"
         remarks.translate(element.place, text)
-        _hold(reader, one, a0)
+        reader.model.joints[joint] = held(one, a0)
         return
     _joint(reader, other, element.place)
     if any(higher):
         text = "an equality of joints with a polynomial of a higher degree"
-        remarks.leave_out(element.place, text)
+        remarks.leave_out(element.place, text, motion=True)
         return
     reader.model.couplings.append(
         Coupling(element.get("name") or "", joint, other, a1, a0, element.place)
     )
-    if a0:
-        one.position = (a0,)
-
-
-def _hold(reader: MjcfReader, joint: Joint, q: float) -> None:
-    """Make a joint a fixed one at a coordinate."""
-    axis = joint.axes[0]
-    moved = Frame(A=axis_angle(axis, q)) if joint.kind == "revolute" else Frame(
-        tuple(q * x for x in axis))  # fmt: skip
-    held = attrs.evolve(joint, kind="fixed", in_parent=joint.in_parent @ moved)
-    reader.model.joints[joint.name] = held
 
 
 def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:
@@ -151,12 +138,14 @@ def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:
     simple = tendon.name == "fixed" and len(terms) == 2 and "tendon2" not in element.attributes
     polycoef = element.numbers("polycoef", None, (0.0, 1.0))
     if not simple or polycoef[0]:
-        remarks.leave_out(element.place, "an equality of tendons but fixed ones of two joints")
+        text = "an equality of tendons but fixed ones of two joints"
+        remarks.leave_out(element.place, text, motion=True)
         return
     (c1, q1), (c2, q2) = ((t.number("coef"), t.require("joint")) for t in terms)
     for joint in (q1, q2):
         _joint(reader, joint, element.place)
     if not c1:
-        remarks.leave_out(element.place, "an equality of a tendon with a coefficient of 0")
+        text = "an equality of a tendon with a coefficient of 0"
+        remarks.leave_out(element.place, text, motion=True)
         return
     reader.model.couplings.append(Coupling(name, q1, q2, -c2 / c1, 0.0, element.place))

@@ -1,6 +1,6 @@
 """Elements and attributes of MJCF, and what becomes of them."""
 
-from dap3d_formats.element_table import Table, noted, refused, taken, translated
+from dap3d_formats.element_table import Table, moves, noted, refused, taken, translated
 
 _SOLVER = "settings of a solver"
 _CONTACT = "contact properties; bodies do not touch each other"
@@ -14,8 +14,8 @@ _ACTUATOR = (
     | taken("group")
     | translated("dampratio", "damping, by the mass matrix where the model starts")
     | noted("user", _DRAWING)
-    | noted("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
-    | noted(
+    | moves("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
+    | moves(
         "ctrllimited forcelimited actlimited ctrlrange forcerange actrange lengthrange actdim "
         "dynprm actearly plugin "
         "timeconst inheritrange kd gain bias area diameter scale range force vmax fpmax fvmax "
@@ -43,7 +43,7 @@ MJCF: Table = {
     ),
     "lengthrange": noted("", "muscles"),
     "option": taken() | taken("gravity actuatorgroupdisable")
-    | noted("wind density viscosity magnetic", "fluids and fields")
+    | moves("wind density viscosity magnetic", "fluids and fields")
     | noted(
         "timestep impratio tolerance ls_tolerance noslip_tolerance ccd_tolerance sleep_tolerance "
         "o_margin o_solref o_solimp o_friction integrator cone jacobian solver iterations "
@@ -52,11 +52,11 @@ MJCF: Table = {
         _SOLVER,
     ),
     "flag": taken() | taken("gravity")
-    | noted(
+    | moves(
         "constraint equality frictionloss limit contact passive spring damper clampctrl warmstart "
         "filterparent actuation refsafe sensor midphase eulerdamp autoreset nativeccd island "
         "override energy fwdinv invdiscrete multiccd sleep diagexact ipc speculative",
-        _SOLVER,
+        "what a solver leaves out",
     ),
     "size": noted("", "memory of a simulator"),
     "visual": noted("", _DRAWING),
@@ -82,7 +82,7 @@ MJCF: Table = {
     "worldbody": taken(),
     "body": taken() | _FRAME | taken("name childclass")
     | translated("mocap", "a part of ground")
-    | noted("gravcomp", "compensation of gravity: add a force")
+    | moves("gravcomp", "compensation of gravity: add a force")
     | noted("user sleep fuse simple", "data of a simulator"),
     "frame": taken() | _FRAME | taken("name childclass"),
     "inertial": taken() | _FRAME | taken("mass diaginertia fullinertia"),
@@ -90,21 +90,21 @@ MJCF: Table = {
     | taken("name class type pos axis range limited ref springref stiffness damping armature")
     | translated("frictionloss", "it fades at low rates, and does not stick")
     | translated("springdamper", "stiffness and damping, by the mass matrix where the model starts")
-    | noted("springyield", "springs do not yield")
-    | noted("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
-    | noted("actuatorfrcrange actuatorfrclimited actuatorgravcomp", "limits of actuators")
+    | moves("springyield", "springs do not yield")
+    | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
+    | moves("actuatorfrcrange actuatorfrclimited actuatorgravcomp", "limits of actuators")
     | noted("group user align", _DRAWING),
     "freejoint": taken() | taken("name") | noted("group align", _DRAWING),
     "geom": taken() | _FRAME
     | taken("name class type size fromto mesh mass density group rgba material")
     | noted("shellinertia hfield fitscale", "not drawn")
-    | noted("fluidshape fluidcoef", "fluids")
+    | moves("fluidshape fluidcoef", "fluids")
     | taken("contype=0 conaffinity=0", "no contact, as everywhere in dap3d")
-    | noted(
+    | moves(
         "contype conaffinity condim priority friction solmix solref solimp margin gap", _CONTACT
     )
     | noted("user castshadow", _DRAWING)
-    | noted("adhesion surfacevel", _CONTACT),
+    | moves("adhesion surfacevel", _CONTACT),
     "site": taken() | _FRAME | taken("name class fromto")
     | noted("type size group material rgba user mesh", _DRAWING),
     "camera": noted("", _DRAWING),
@@ -114,36 +114,36 @@ MJCF: Table = {
     "flexcomp": refused("", "deformable bodies"),
     "replicate": taken() | taken("count sep offset euler"),
     "attach": refused("", "models are not attached; save the compiled model in MuJoCo"),
-    "deformable": noted("", "deformable bodies"),
-    "contact": noted("", _CONTACT),
-    "pair": noted("", _CONTACT),
+    "deformable": moves("", "deformable bodies"),
+    "contact": moves("", _CONTACT),
+    "pair": moves("", _CONTACT),
     "equality": taken() | _EQUALITY,
     "connect": taken() | _EQUALITY | taken("body1 body2 anchor site1 site2"),
     "weld": taken() | _EQUALITY | taken("body1 body2 relpose anchor site1 site2")
-    | noted("torquescale", _SOFT),
+    | moves("torquescale", _SOFT),
     "equality/joint": taken() | _EQUALITY | taken("joint1 joint2 polycoef"),
     "equality/tendon": taken() | _EQUALITY | taken("tendon1 tendon2 polycoef"),
-    "flex": noted("", "deformable bodies"),
+    "flex": moves("", "deformable bodies"),
     "flexstrain": noted("", "deformable bodies"),
     "flexvert": noted("", "deformable bodies"),
-    "distance": noted("", "distances"),
+    "distance": moves("", "distances"),
     "tendon": taken(),
     "default/tendon": noted("", "tendons but those of equalities"),
     "fixed": translated("", "where an equality holds it; else left out") | taken("name class")
-    | noted(
+    | moves(
         "group limited actuatorfrclimited range actuatorfrcrange solreflimit solimplimit "
         "solreffriction solimpfriction frictionloss margin springlength width material rgba "
         "stiffness damping armature user springyield",
         "forces and limits of tendons",
     ),
     "fixed/joint": taken() | taken("joint coef"),
-    "spatial": noted("", "tendons over sites and pulleys"),
+    "spatial": moves("", "tendons over sites and pulleys"),
     "actuator": taken(),
     **dict.fromkeys(("motor", "general", "position", "velocity"), taken() | _ACTUATOR),
     **dict.fromkeys(
         ("intvelocity", "damper", "cylinder", "muscle", "adhesion",
          "dcmotor", "orientation", "pid"),
-        noted("", _LAW) | _ACTUATOR,
+        moves("", _LAW) | _ACTUATOR,
     ),
     "actuator/plugin": noted("", "plugins of a simulator are not run"),
     "sensor": noted("", "sensors"),

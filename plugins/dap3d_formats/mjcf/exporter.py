@@ -1,6 +1,10 @@
 """Writes MJCF."""
 
 from math import isfinite, isinf
+from typing import Any
+
+import attrs
+import numpy as np
 
 from dap3d_core.interface.formats import (
     NOWHERE,
@@ -10,6 +14,7 @@ from dap3d_core.interface.formats import (
     FormatError,
     Frame,
     Geometry,
+    Inertial,
     Joint,
     Link,
     Remarks,
@@ -23,6 +28,11 @@ TYPES = {
     "revolute": ("hinge",), "prismatic": ("slide",), "ball": ("ball",), "fixed": (),
     "universal": ("hinge", "hinge"), "cylindrical": ("slide", "hinge"),
 }  # fmt: skip
+#: Least mass, and least moment of inertia, of a body that MuJoCo reads, some times its own limits
+#: of 1e-15 and 1e-14, and the part of the largest moment that it resolves.
+LEAST_MASS, LEAST_MOMENT, LEAST_PART = 2e-15, 2e-14, 1e-12
+#: A link of less than this part of the mass of the next one counts as one without.
+WITHOUT_MASS = 1e-9
 #: Coordinates beyond stand for no limit on one side.
 UNLIMITED = 1e6
 
@@ -42,6 +52,7 @@ class _Writer:
 
     def __init__(self, model: Articulation, remarks: Remarks) -> None:
         self.model, self.remarks, self.text = model, remarks, XmlText()
+        self.loops = [joint for joint in model.joints.values() if joint.closes]
         self.placing = {j.child: j for j in model.joints.values() if not j.closes}
         self.children: dict[str, list[str]] = {}
         for name in model.links:
@@ -61,7 +72,8 @@ class _Writer:
         if self.meshes:
             text.open("asset")
             for (file, scale), name in self.meshes.items():
-                text.empty("mesh", name=name, file=file, scale=words(scale))
+                # its mass counts for nothing; a flat one has a volume of a shell alone
+                text.empty("mesh", name=name, file=file, scale=words(scale), inertia="shell")
             text.close("asset")
         text.open("worldbody")
         for name in self.children.get(WORLD, []):
@@ -78,25 +90,63 @@ class _Writer:
 
     def _body(self, link: Link) -> None:
         text, joint = self.text, self.placing.get(link.name)
-        pose = Frame()
+        joints = [] if joint is None else [joint]
+        while (inner := self._below(link)) is not None:
+            link = self.model.links[inner.child]
+            step = (inner.in_parent @ inner.in_child.inverse()).inverse()
+            joints = [attrs.evolve(one, in_child=step @ one.in_child) for one in joints]
+            joints.append(inner)
         if joint is not None and joint.kind == "free":
             pos, quat = joint.position[:3], joint.position[3:]
         else:
-            pose = pose if joint is None else joint.in_parent @ joint.in_child.inverse()
+            pose = joints[0].in_parent @ joints[0].in_child.inverse() if joints else Frame()
             pos, quat = tuple(pose.r), quaternion(pose.A)
         text.open("body", name=link.name, pos=words(pos), quat=words(quat))
-        if joint is not None:
-            self._joint(joint)
+        for one in joints:
+            self._joint(one)
         if link.inertial is not None:
-            J = link.inertial.inertia
+            mass, J = self._mass(link, link.inertial)
             full = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
-            text.empty("inertial", pos=words(link.inertial.com), mass=words([link.inertial.mass]),
+            text.empty("inertial", pos=words(link.inertial.com), mass=words([mass]),
                        fullinertia=words(full))  # fmt: skip
         for geometry in link.geometries:
             self._geom(geometry)
         for name in self.children.get(link.name, []):
             self._body(self.model.links[name])
         text.close("body")
+
+    def _below(self, link: Link) -> Joint | None:
+        """The joint of the link that one without mass carries: both joints are those of one body.
+
+        Such links stand between the joints in a row that an import makes of those of a body.
+        """
+        joint, children = self.placing.get(link.name), self.children.get(link.name, [])
+        if joint is None or len(children) != 1 or link.geometries or link.inertial is None:
+            return None
+        below = self.placing[children[0]]
+        looped = any(link.name in (one.parent, one.child) for one in self.loops)
+        single = {joint.kind, below.kind} <= {"revolute", "prismatic"}
+        light = link.inertial.mass < WITHOUT_MASS * self._carried(children[0])
+        return below if single and light and not looped else None
+
+    def _carried(self, link: str) -> float:
+        """The mass of a link and of all that hangs from it."""
+        inertial = self.model.links[link].inertial
+        own = 0.0 if inertial is None else inertial.mass
+        return own + sum(map(self._carried, self.children.get(link, [])))
+
+    def _mass(self, link: Link, inertial: Inertial) -> tuple[float, Any]:
+        """Mass and inertia of a link, not below the least that MuJoCo reads."""
+        J = inertial.inertia
+        moments, axes = np.linalg.eigh(0.5 * (J + J.T))
+        least = max(LEAST_MOMENT, LEAST_PART * float(moments[-1]))
+        mass = max(inertial.mass, LEAST_MASS)
+        if mass > inertial.mass or moments[0] < least:
+            text = f"mass or inertia of {link.name} is raised to the least that MuJoCo reads"
+            self.remarks.translate(NOWHERE, text, motion=True)
+        if moments[0] < least:
+            J = axes @ np.diag(np.maximum(moments, least)) @ axes.T
+        return mass, J
 
     def _joint(self, joint: Joint) -> None:
         if joint.kind == "free":
@@ -136,7 +186,8 @@ class _Writer:
             low = limits.lower if isfinite(limits.lower) else -UNLIMITED
             high = limits.upper if isfinite(limits.upper) else UNLIMITED
             attributes["range"] = words([low, high])
-            self.remarks.translate(NOWHERE, "stops are limits, whose stiffness is the solver's")
+            text = "stops are limits, whose stiffness is the solver's"
+            self.remarks.translate(NOWHERE, text, motion=True)
         return attributes
 
     def _geom(self, geometry: Geometry) -> None:
@@ -158,11 +209,10 @@ class _Writer:
         self.text.empty("geom", **attributes)
 
     def _equalities(self) -> None:
-        loops = [joint for joint in self.model.joints.values() if joint.closes]
-        if not loops and not self.model.couplings:
+        if not self.loops and not self.model.couplings:
             return
         self.text.open("equality")
-        for joint in loops:
+        for joint in self.loops:
             leave_out_forces(joint, self.remarks)
             self._loop(joint)
         for coupling in self.model.couplings:

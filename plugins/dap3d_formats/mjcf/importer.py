@@ -1,14 +1,6 @@
 """MJCF, the format of MuJoCo."""
 
 from dap3d_core.interface.formats import Articulation, Importer, Source
-from dap3d_formats.element_table import note_elements
-from dap3d_formats.mjcf.actuators import read_actuators
-from dap3d_formats.mjcf.constraints import read_equalities
-from dap3d_formats.mjcf.document import Document
-from dap3d_formats.mjcf.elements import MJCF
-from dap3d_formats.mjcf.reader import MjcfReader
-from dap3d_formats.mjcf.replicate import expand_replicas
-from dap3d_formats.mjcf.start_inertia import StartInertia
 
 
 class MjcfImporter(Importer):
@@ -19,13 +11,21 @@ class MjcfImporter(Importer):
 
     def read(self, source: Source) -> Articulation:
         """The model in a file."""
+        from dap3d_formats.element_table import note_elements
+        from dap3d_formats.mjcf.actuators import read_actuators
+        from dap3d_formats.mjcf.constraints import read_equalities
+        from dap3d_formats.mjcf.document import Document
+        from dap3d_formats.mjcf.elements import MJCF
+        from dap3d_formats.mjcf.reader import MjcfReader
+        from dap3d_formats.mjcf.replicate import expand_replicas
+
         document = Document.of(source)
         note_elements(document.root, MJCF, source.remarks)
         expand_replicas(document)
         reader = MjcfReader(document)
         reader.read_bodies()
         reader.scale_masses()
-        inertia = StartInertia(reader.model)
+        inertia = reader.inertia()
         reader.scale_springs(inertia)
         read_equalities(reader)
         read_actuators(reader, inertia)

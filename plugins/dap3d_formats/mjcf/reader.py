@@ -8,12 +8,14 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.formats import (
+    LEAST,
     WORLD,
     Articulation,
     FormatError,
     Frame,
     Inertial,
     Joint,
+    JointInertia,
     Limits,
     Link,
     XmlElement,
@@ -23,7 +25,6 @@ from dap3d_core.interface.formats import (
 from dap3d_formats.axes import unit
 from dap3d_formats.mjcf.document import Document
 from dap3d_formats.mjcf.geoms import Geoms
-from dap3d_formats.mjcf.start_inertia import LEAST, StartInertia
 
 #: Type -> kind of a joint.
 KINDS = {"hinge": "revolute", "slide": "prismatic", "ball": "ball", "free": "free"}
@@ -38,7 +39,6 @@ class MjcfReader:
         model: the model so far.
         geoms: reader of geoms.
         sites: name of a site -> its link and frame.
-        references: joint -> its coordinate in the file where the model's is zero.
         given: names of bodies and joints in the file, which those without a name do not take.
         joints: names of the joints that have been read.
         springdampers: joint -> time constant and damping ratio that give its spring and damper.
@@ -48,7 +48,6 @@ class MjcfReader:
     model: Articulation = attrs.field(init=False)
     geoms: Geoms = attrs.field(init=False)
     sites: dict[str, tuple[str, Frame]] = attrs.Factory(dict)
-    references: dict[str, float] = attrs.Factory(dict)
     given: set[str] = attrs.Factory(set)
     joints: set[str] = attrs.Factory(set)
     springdampers: dict[str, tuple[float, ...]] = attrs.Factory(dict)
@@ -252,15 +251,14 @@ class MjcfReader:
         def turned(value: float) -> float:
             return self.document.angle(value) if joint.kind == "revolute" else value
 
-        reference = turned(element.number("ref", 0.0))
-        self.references[joint.name] = reference
+        joint.reference = reference = turned(element.number("ref", 0.0))
         for key, attribute in (("damping", "damping"), ("stiffness", "stiffness"),
                                ("friction", "frictionloss"), ("armature", "armature")):  # fmt: skip
             first, *others = element.numbers(attribute, None, (0.0,))
             setattr(joint, key, (first,))
             if any(others):
                 text = f"{attribute} of a joint: higher coefficients of its polynomial"
-                self.document.source.remarks.leave_out(element.place, text)
+                self.document.source.remarks.leave_out(element.place, text, motion=True)
         joint.rest = (turned(element.number("springref", 0.0)) - reference,)
         both = element.numbers("springdamper", 2, (0.0, 0.0))
         if min(both) > 0.0:
@@ -270,23 +268,27 @@ class MjcfReader:
         limited = element.get("limited", "auto")
         if limited == "true" or (limited == "auto" and "range" in element.attributes
                                  and self.document.flag("autolimits", True)):  # fmt: skip
-            low, high = element.numbers("range", 2)
+            low, high = element.numbers("range", 2, unbounded=True)
             if joint.kind == "ball":
                 joint.limits = (Limits(upper=self.document.angle(high)),)
-            elif low > high:
-                raise FormatError(f"range = {low:g} {high:g} is empty", element.place)
-            else:
-                joint.limits = (Limits(turned(low) - reference, turned(high) - reference),)
+            elif low != high or limited == "true":  # of equal ones MuJoCo makes no limit
+                joint.limits = (Limits.between(turned(low) - reference, turned(high) - reference,
+                                               joint.name, element.place),)  # fmt: skip
         if not any((joint.damping[0], joint.stiffness[0])):
             joint.limits = joint.limits or (Limits(-inf, inf),)
 
-    def scale_springs(self, inertia: StartInertia) -> None:
+    def inertia(self) -> JointInertia:
+        """Inertias of the joints at zero coordinates, by which the compiler scales springs."""
+        links, joints = dict(self.model.links), self.model.joints.values()
+        return JointInertia(links, {joint.child: joint for joint in joints}, list(links))
+
+    def scale_springs(self, inertia: JointInertia) -> None:
         """Set the springs and dampers of joints that are given by their time constants."""
         for name, (time, ratio) in self.springdampers.items():
             joint, moved = self.model.joints[name], inertia.of(name)
             if moved is None:
                 text = "springdamper: links without mass, or too many, for a mass matrix"
-                self.document.source.remarks.leave_out(joint.place, text)
+                self.document.source.remarks.leave_out(joint.place, text, motion=True)
                 continue
             joint.stiffness = (moved / max(LEAST, (time * ratio) ** 2),)
             joint.damping = (2.0 * moved / max(LEAST, time),)

@@ -1,6 +1,6 @@
 """Elements and attributes of SDF, and what becomes of them."""
 
-from dap3d_formats.element_table import Table, noted, taken, translated
+from dap3d_formats.element_table import Table, moves, noted, taken, translated
 
 _SIMULATOR = "settings of a simulator"
 _CONTACT = "contact properties; bodies do not touch each other"
@@ -10,8 +10,7 @@ SDF: Table = {
     "gazebo": taken() | taken("version"),
     "world": taken() | taken("name"),
     "world/gravity": taken(),
-    "model": taken() | taken("name placement_frame")
-    | noted("canonical_link", "which link a model is reported by")
+    "model": taken() | taken("name placement_frame canonical_link")
     | noted("namespace", "names of messages"),
     "include": taken() | taken("placement_frame") | noted("merge", "names keep the model's name"),
     "uri": taken(),
@@ -33,7 +32,7 @@ SDF: Table = {
     "radius": taken(), "length": taken(), "scale": taken(),
     "mesh": taken() | noted("optimization", "for contacts"),
     "convex_decomposition": noted("", "for contacts"),
-    "model_state": noted("", "states of a simulator"),
+    "model_state": moves("", "states of a simulator"),
     "namespace": noted("", "names of messages"),
     "submesh": noted("", "the whole mesh is drawn"),
     "plane": noted("", "planes are not drawn"),
@@ -56,17 +55,17 @@ SDF: Table = {
     "parent": taken(), "child": taken(),
     "axis": taken(), "axis2": taken(),
     "xyz": taken() | taken("expressed_in"),
-    "initial_position": noted("", "joints start at zero; --position gives another"),
+    "initial_position": moves("", "joints start at zero; --position gives another"),
     "use_parent_model_frame": taken(),
-    "limit": translated("", "elastic stops"),
+    "limit": translated("", "stops, with --limits soft, hard or off"),
     "lower": taken(), "upper": taken(), "stiffness": taken(),
     "effort": noted("", "limits of forces are those of a controller"),
     "velocity": noted("", "limits of speeds are those of a controller"),
-    "dissipation": noted("", "stops have no damping"),
+    "dissipation": moves("", "stops are critically damped"),
     "dynamics": taken(), "damping": taken(), "spring_reference": taken(),
     "spring_stiffness": taken(),
     "friction": translated("", "it fades at low rates, and does not stick"),
-    "mimic": translated("", "a joint follow of the same rates; the offset is that of the start")
+    "mimic": translated("", "a joint follow of the same rates, and the start by ratio and offset")
     | taken("joint axis"),
     "multiplier": taken(), "offset": taken(), "reference": taken(),
     "gearbox_ratio": taken(), "gearbox_reference_body": taken(),
@@ -76,19 +75,19 @@ SDF: Table = {
     "light": noted("", "lights"), "scene": noted("", _SIMULATOR), "gui": noted("", _SIMULATOR),
     "audio": noted("", _SIMULATOR), "wind": noted("", _SIMULATOR), "road": noted("", _SIMULATOR),
     "atmosphere": noted("", _SIMULATOR), "magnetic_field": noted("", _SIMULATOR),
-    "spherical_coordinates": noted("", _SIMULATOR), "state": noted("", "states of a simulator"),
+    "spherical_coordinates": noted("", _SIMULATOR), "state": moves("", "states of a simulator"),
     "population": noted("", _SIMULATOR), "actor": noted("", "animated figures"),
-    "surface": noted("", _CONTACT), "max_contacts": noted("", _CONTACT),
-    "self_collide": noted("", _CONTACT), "laser_retro": noted("", "sensors"),
-    "gravity": noted("", "gravity acts on every body"),
-    "kinematic": noted("", _SIMULATOR), "enable_wind": noted("", _SIMULATOR),
+    "surface": moves("", _CONTACT), "max_contacts": moves("", _CONTACT),
+    "self_collide": moves("", _CONTACT), "laser_retro": noted("", "sensors"),
+    "gravity": moves("", "gravity acts on every body"),
+    "kinematic": moves("", _SIMULATOR), "enable_wind": noted("", _SIMULATOR),
     "allow_auto_disable": noted("", _SIMULATOR), "must_be_base_link": noted("", _SIMULATOR),
-    "velocity_decay": noted("", "damping of a simulator"),
+    "velocity_decay": moves("", "damping of a simulator"),
     "gripper": noted("", _SIMULATOR), "audio_source": noted("", _SIMULATOR),
     "audio_sink": noted("", _SIMULATOR), "battery": noted("", _SIMULATOR),
     "projector": noted("", _SIMULATOR), "particle_emitter": noted("", _SIMULATOR),
     "cast_shadows": noted("", "lighting"), "transparency": noted("", "opacity"),
     "visibility_flags": noted("", "drawing"), "meta": noted("", "drawing"),
     "density": noted("", "give mass and inertia"), "auto_inertia_params": noted("", "not read"),
-    "fluid_added_mass": noted("", "added mass of a fluid"),
+    "fluid_added_mass": moves("", "added mass of a fluid"),
 }  # fmt: skip

@@ -11,7 +11,8 @@ class FrameGraph:
 
     Attributes:
         poses: frame -> the frame that it is given in, and its pose there.
-        attached: frame of a <frame> or a joint -> the frame that it is attached to.
+        attached: frame -> the frame that it is attached to: of a <frame>, a joint, a nested model,
+            a model with a canonical link.
     """
 
     poses: dict[str, tuple[str, Frame, Place]] = attrs.Factory(dict)
@@ -77,7 +78,7 @@ class FrameGraph:
         """
         path = [name]
         while name not in links and name != WORLD:
-            if name.endswith("__model__"):
+            if name.endswith("__model__") and name not in self.attached:
                 scope = name.removesuffix("__model__")
                 inner = (link for link in links if link.startswith(scope))
                 name = next(inner, WORLD)

@@ -1,8 +1,6 @@
 """SDF, the format of Gazebo and Drake: frames, nested models, closed loops."""
 
 from dap3d_core.interface.formats import Articulation, FormatError, Importer, Source
-from dap3d_formats.sdf.joints import read_gearbox, read_joint
-from dap3d_formats.sdf.reader import SdfReader
 
 
 class SdfImporter(Importer):
@@ -13,6 +11,9 @@ class SdfImporter(Importer):
 
     def read(self, source: Source) -> Articulation:
         """The model in a file."""
+        from dap3d_formats.sdf.joints import read_gearbox, read_joint
+        from dap3d_formats.sdf.reader import SdfReader
+
         root = source.xml()
         if root.name not in self.roots:
             raise FormatError(f"an SDF file is an <sdf>, not a <{root.name}>", root.place)

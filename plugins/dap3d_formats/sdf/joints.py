@@ -14,15 +14,15 @@ from dap3d_core.interface.formats import (
     XmlElement,
 )
 from dap3d_formats.axes import unit
-from dap3d_formats.sdf.reader import SdfReader, scoped, text_of
+from dap3d_formats.sdf.reader import SdfReader, scoped
 
 #: Type -> kind of a joint.
 KINDS = {
     "revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed",
     "ball": "ball", "universal": "universal", "screw": "screw", "revolute2": "universal",
 }  # fmt: skip
-#: Limits beyond are none.
-UNLIMITED = 1e15
+#: Axes are parallel up to this departure of the cosine of their angle from 1.
+PARALLEL = 1e-6
 #: Stiffness of limits beyond is the default of the format, which no spring of a model has.
 RIGID = 1e8
 
@@ -59,27 +59,76 @@ def read_joint(reader: SdfReader, element: XmlElement, scope: str) -> None:
 def read_gearbox(reader: SdfReader, element: XmlElement, scope: str) -> None:
     """Read a gearbox: a coupling of two joints on its reference body.
 
-    theta_1 = -ratio theta_2, of the parent and the child against the reference body.
+    theta_2 = -ratio theta_1: angles of the child about axis2 and of the parent about axis, each
+    against the reference body (SDF 1.5 to 1.12, element gearbox_ratio).
 
     Raises:
-        FormatError: its parent or child has no joint on the reference body.
+        FormatError: its parent or child has no joint on the reference body along its axis.
     """
     name = scoped(scope, element.require("name"))
-    reference = scoped(scope, text_of(element, "gearbox_reference_body"))
+    reference = _end(reader, element, scope, "gearbox_reference_body")
+    leader, first = _geared(reader, element, scope, reference, "parent", "axis")
+    follower, second = _geared(reader, element, scope, reference, "child", "axis2")
+    if leader == follower:
+        raise FormatError(f"gearbox {name}: its parent is its child", element.place)
     ratio = element.first("gearbox_ratio")
-    pair = []
-    for tag in ("parent", "child"):
-        link = _end(reader, element, scope, tag)
-        joint = next((j for j in reader.model.joints.values() if {j.parent, j.child} ==
-                      {reference, link} and j.kind == "revolute"), None)  # fmt: skip
-        if joint is None:
-            what = f"gearbox {name}: no revolute joint holds {link} on {reference}"
-            raise FormatError(what, element.place)
-        pair.append((joint.name, 1.0 if joint.child == link else -1.0))
-    (first, sign), (second, other) = pair
-    factor = -(1.0 if ratio is None else ratio.content(1)[0]) * sign * other
-    reader.model.couplings.append(Coupling(name, first, second, factor, place=element.place))
+    factor = -(1.0 if ratio is None else ratio.content(1)[0]) * first * second
+    reader.model.couplings.append(Coupling(name, follower, leader, factor, place=element.place))
     reader.remarks.translate(element.place, "a gearbox couples the rates of two joints")
+
+
+def _geared(
+    reader: SdfReader, element: XmlElement, scope: str, reference: str, end: str, tag: str
+) -> tuple[str, float]:
+    """The joint of an end of a gearbox on the reference body, and 1 or -1 to make it theta.
+
+    Raises:
+        FormatError: there is none, or it turns about another axis.
+    """
+    link = _end(reader, element, scope, end)
+    ends = {_holder(reader, reference), _holder(reader, link)}
+    hinges = [one for one in reader.model.joints.values() if one.kind == "revolute"]
+    joint = next((one for one in hinges if ends ==
+                  {_holder(reader, one.parent), _holder(reader, one.child)}), None)  # fmt: skip
+    name = scoped(scope, element.require("name"))
+    if joint is None:
+        what = f"gearbox {name}: no revolute joint holds {link} on {reference}"
+        raise FormatError(what, element.place)
+    direction = _direction(reader, name, element, tag, scope)
+    here, there = (reader.frames.in_world(one, element.place).A for one in (name, joint.name))
+    along = float((here @ direction) @ (there @ joint.axes[0]))
+    if abs(along) < 1.0 - PARALLEL:
+        what = f"gearbox {name}: its <{tag}> is not parallel to that of joint {joint.name}"
+        raise FormatError(what, element.place)
+    moves = _holder(reader, joint.child) == _holder(reader, link)
+    return joint.name, (1.0 if moves else -1.0) * (1.0 if along > 0.0 else -1.0)
+
+
+def _holder(reader: SdfReader, link: str) -> str:
+    """The link, or the world, that a link is fixed to by fixed joints; itself otherwise."""
+    path = [link]
+    fixed = [j for j in reader.model.joints.values() if j.kind == "fixed"]
+    while (joint := next((j for j in fixed if j.child == path[-1]), None)) is not None:
+        if joint.parent in path:
+            break
+        path.append(joint.parent)
+    return path[-1]
+
+
+def _direction(
+    reader: SdfReader, name: str, element: XmlElement, tag: str, scope: str
+) -> tuple[float, ...]:
+    """The direction of an axis of a joint, in the frame of the joint.
+
+    Raises:
+        FormatError: there is no such axis.
+    """
+    axis = element.first(tag)
+    if axis is None:
+        raise FormatError(f"joint {name} has no <{tag}>; it is required", element.place)
+    xyz = axis.first("xyz")
+    direction = (0.0, 0.0, 1.0) if xyz is None else unit(xyz.content(3), xyz)
+    return _expressed(reader, name, axis, direction, scope)
 
 
 def _end(reader: SdfReader, element: XmlElement, scope: str, tag: str) -> str:
@@ -99,18 +148,14 @@ def _of_link(reader: SdfReader, link: str, place: Place) -> Frame:
 def _axes(reader: SdfReader, joint: Joint, element: XmlElement, scope: str) -> None:
     """Axes, limits and dynamics of a joint."""
     tags = ("axis", "axis2") if joint.kind == "universal" else ("axis",)
-    default = {"axis": (0.0, 0.0, 1.0), "axis2": (0.0, 0.0, 1.0)}
     axes, limits = [], []
     keys = ("damping", "friction", "stiffness", "rest")
     columns: dict[str, list[float]] = {key: [] for key in keys}
     for tag in tags:
-        axis = element.first(tag)
-        if axis is None:
-            raise FormatError(f"joint {joint.name} has no <{tag}>; it is required", joint.place)
-        xyz = axis.first("xyz")
-        direction = default[tag] if xyz is None else unit(xyz.content(3), xyz)
-        axes.append(_expressed(reader, joint, axis, direction, scope))
-        limits.append(_limits(axis, unlimited=element.get("type") == "continuous"))
+        axes.append(_direction(reader, joint.name, element, tag, scope))
+        axis: Any = element.first(tag)
+        unlimited = element.get("type") == "continuous"
+        limits.append(Limits() if unlimited else _limits(axis, joint.name))
         for key, value in _dynamics(axis).items():
             columns[key].append(value)
         _mimic(reader, joint, axis, scope)
@@ -130,7 +175,7 @@ def _reflected(element: XmlElement) -> float:
 
 
 def _expressed(
-    reader: SdfReader, joint: Joint, axis: XmlElement, direction: Any, scope: str
+    reader: SdfReader, joint: str, axis: XmlElement, direction: Any, scope: str
 ) -> tuple[float, ...]:
     """The direction of an axis in the frame of its joint."""
     xyz = axis.first("xyz")
@@ -141,32 +186,21 @@ def _expressed(
     if not frame:
         return tuple(direction)
     there = reader.frames.in_world(scoped(scope, frame), axis.place)
-    here = reader.frames.in_world(joint.name, axis.place)
+    here = reader.frames.in_world(joint, axis.place)
     return tuple(float(x) for x in here.A.T @ there.A @ direction)
 
 
-def _limits(axis: XmlElement, *, unlimited: bool) -> Limits:
+def _limits(axis: XmlElement, joint: str) -> Limits:
     limit = axis.first("limit")
-    if limit is None or unlimited:
+    if limit is None:
         return Limits()
     used = ("lower", "upper", "stiffness")
-    values = {child.name: _number(child) for child in limit if child.name in used}
-    lower, upper = values.get("lower", -inf), values.get("upper", inf)
-    if lower > upper:
-        raise FormatError(f"lower = {lower:g} lies above upper = {upper:g}", limit.place)
+    values = {c.name: c.content(1, unbounded=True)[0] for c in limit if c.name in used}
     stiffness = values.get("stiffness", RIGID)
-    return Limits(
-        lower if lower > -UNLIMITED else -inf, upper if upper < UNLIMITED else inf,
+    return Limits.between(
+        values.get("lower", -inf), values.get("upper", inf), joint, limit.place,
         stiffness if 0.0 < stiffness < RIGID else None,
     )  # fmt: skip
-
-
-def _number(element: XmlElement) -> float:
-    """A number that may be infinite."""
-    text = element.text.strip().lower()
-    if text in ("inf", "+inf", "-inf"):
-        return float(text)
-    return element.content(1)[0]
 
 
 def _dynamics(axis: XmlElement) -> dict[str, float]:
@@ -191,8 +225,6 @@ def _mimic(reader: SdfReader, joint: Joint, axis: XmlElement, scope: str) -> Non
     offset = values.get("offset", 0.0) - ratio * values.get("reference", 0.0)
     leader = scoped(scope, mimic.require("joint"))
     reader.model.couplings.append(Coupling("", joint.name, leader, ratio, offset, mimic.place))
-    if offset:
-        joint.position = (offset,)
 
 
 def _pitch(element: XmlElement) -> float:

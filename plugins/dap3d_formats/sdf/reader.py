@@ -12,7 +12,6 @@ from dap3d_core.interface.formats import (
     Inertial,
     Joint,
     Link,
-    Place,
     Source,
     XmlElement,
     from_quaternion,
@@ -33,7 +32,7 @@ class SdfReader:
         self.model = Articulation(source.path.stem, gravity=(0.0, 0.0, -9.8), fixed_base=False,
                                   place=root.place)  # fmt: skip
         self.elements: list[tuple[XmlElement, str]] = []
-        self.static: list[tuple[str, Place]] = []
+        self.static: list[str] = []  # what names of links in static models begin with
 
     def read_links(self) -> None:
         """Read links and frames; joints are gathered in ``elements``."""
@@ -46,16 +45,23 @@ class SdfReader:
             x, y, z = gravity.content(3)
             self.model.gravity = (x, y, z)
         models, includes = holder.all("model"), holder.all("include")
-        alone = len(models) + len(includes) == 1
+        joints = [] if world is None else world.all("joint")
+        frames = [] if world is None else world.all("frame")
+        alone = len(models) + len(includes) == 1 and not (joints or frames)
         if alone and models:
             self.model.name = models[0].get("name") or self.model.name
         for element in models:
             self._model(element, "", "" if alone else element.require("name"))
         for element in includes:
             self._include(element, "", "" if alone else None)
-        for name, place in self.static:
-            pose = self.frames.in_world(name, place)
-            self.model.joints[name] = Joint(name, "fixed", WORLD, name, pose, place=place)
+        for element in frames:
+            self._frame(element, "", WORLD)
+        for element in joints:
+            self._joint_frame(element, "")
+        for name, link in self.model.links.items():
+            if any(name.startswith(scope) for scope in self.static):
+                pose = self.frames.in_world(name, link.place)
+                self.model.joints[name] = Joint(name, "fixed", WORLD, name, pose, place=link.place)
 
     def finish(self) -> Articulation:
         """The model; links that no joint places are where the file has them."""
@@ -99,6 +105,11 @@ class SdfReader:
         placement = element.get("placement_frame") or text_of(element, "placement_frame")
         self.frames.add(inner, parent, pose, element.place,
                         placement=scoped(scope, placement) if placement else "")  # fmt: skip
+        if scope:  # the name of a model is that of its frame
+            self.frames.add(scope, inner, Frame(), element.place)
+            self.frames.attached[scope] = inner
+        if canonical := element.get("canonical_link"):
+            self.frames.attached[inner] = scoped(scope, canonical)
         for child in element.all("link"):
             self._link(child, scope)
         for child in element.all("model"):
@@ -109,20 +120,13 @@ class SdfReader:
             self._frame(child, scope)
         for child in element.all("joint"):
             self._joint_frame(child, scope)
-            self.elements.append((child, scope))
         if text_of(element, "static") in ("true", "1"):
-            self._fix(element, scope)
+            self.remarks.translate(element.place, "a static model is a part of ground")
+            self.static.append(scoped(scope, ""))
 
-    def _fix(self, element: XmlElement, scope: str) -> None:
-        """A static model: its links stand still."""
-        self.remarks.translate(element.place, "a static model is a part of ground")
-        for child in element.all("link"):
-            name = scoped(scope, child.require("name"))
-            self.static.append((name, child.place))
-
-    def _frame(self, element: XmlElement, scope: str) -> None:
+    def _frame(self, element: XmlElement, scope: str, holder: str = "__model__") -> None:
         pose, relative = self.pose(element)
-        attached = element.get("attached_to") or "__model__"
+        attached = element.get("attached_to") or holder
         name = scoped(scope, element.require("name"))
         self.frames.add(name, scoped(scope, relative or attached), pose, element.place)
         self.frames.attached[name] = scoped(scope, attached)
@@ -135,6 +139,7 @@ class SdfReader:
         name = scoped(scope, element.require("name"))
         self.frames.add(name, scoped(scope, relative or child), pose, element.place)
         self.frames.attached[name] = scoped(scope, child)
+        self.elements.append((element, scope))
 
     def _link(self, element: XmlElement, scope: str) -> None:
         name = scoped(scope, element.require("name"))

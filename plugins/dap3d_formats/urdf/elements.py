@@ -1,6 +1,6 @@
 """Elements and attributes of URDF, and what becomes of them."""
 
-from dap3d_formats.element_table import Table, noted, taken, translated
+from dap3d_formats.element_table import Table, moves, noted, taken, translated
 
 _CONTACT = "contact properties; bodies do not touch each other"
 
@@ -24,24 +24,24 @@ URDF: Table = {
     "color": translated("", "without its opacity") | taken("rgba"),
     "texture": noted("", "textures are not drawn"),
     "verbose": noted("", "no effect"),
-    "contact": noted("", _CONTACT),
-    "contact_coefficients": noted("", _CONTACT),
-    "self_collision_checking": noted("", _CONTACT),
+    "contact": moves("", _CONTACT),
+    "contact_coefficients": moves("", _CONTACT),
+    "self_collision_checking": moves("", _CONTACT),
     "joint": taken() | taken("name type"),
     "parent": taken() | taken("link"),
     "child": taken() | taken("link"),
     "axis": taken() | taken("xyz"),
     "dynamics": taken() | taken("damping")
     | translated("friction", "it fades at low rates, and does not stick"),
-    "limit": translated("", "elastic stops") | taken("lower upper")
+    "limit": translated("", "stops, with --limits soft, hard or off") | taken("lower upper")
     | noted("effort velocity", "limits of forces and speeds are those of a controller"),
-    "mimic": translated("", "a joint follow of the same rates; the offset is that of the start")
+    "mimic": translated("", "a joint follow of the same rates, and the start by ratio and offset")
     | taken("joint multiplier offset"),
     "calibration": noted("", "reference positions of encoders"),
     "safety_controller": noted("", "limits of a controller"),
     "constraint": translated("", "a joint that closes a loop") | taken("name type"),
     "child_origin": taken() | taken("xyz rpy"),
-    "transmission": noted("", "motors and gears; add forces of your own"),
+    "transmission": moves("", "motors and gears; add forces of your own"),
     "gazebo": noted("", "settings of a simulator"),
     "ros2_control": noted("", "settings of a controller"),
     "sensor": noted("", "sensors"),

@@ -54,13 +54,13 @@ def _note(model: Articulation, remarks: Remarks) -> None:
         text = (
             f"gravity {words(model.gravity)} m/s^2: URDF has none, and readers take 9.81 along -z"
         )
-        remarks.leave_out(NOWHERE, text)
+        remarks.leave_out(NOWHERE, text, motion=True)
     for actuator in model.actuators:
         text = f"actuator {actuator.name} of joint {actuator.joint}: URDF has none"
-        remarks.leave_out(NOWHERE, text)
+        remarks.leave_out(NOWHERE, text, motion=True)
     if any(joint.closes for joint in model.joints.values()):
         text = "loops are <constraint> elements, an extension of URDF that most readers pass over"
-        remarks.translate(NOWHERE, text)
+        remarks.translate(NOWHERE, text, motion=True)
 
 
 def _write_link(text: XmlText, link: Link) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import attrs
 
 from dap3d_core.formats.export_scene.articulation import articulation_of
-from dap3d_core.interface.formats import FormatError, Remark, Remarks
+from dap3d_core.interface.formats import Articulation, FormatError, Geometry, Remark, Remarks
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.extensions import extensions
 from dap3d_core.scene import Scene, SceneError, check, load
@@ -43,7 +43,8 @@ def export_model(
 
     Args:
         scene: the scene; or its name, folder or file.
-        path: the file; None writes none.
+        path: the file; None writes none. Files of meshes are named from its folder, and without
+            it from that of the scene.
         format: keyword of an exporter.
         strict: refuse a scene of which something would be left out.
         force: overwrites an existing file.
@@ -59,7 +60,10 @@ def export_model(
     check(given, load_registry() if registry is None else registry)
     remarks = Remarks()
     try:
-        text = exporter.write(articulation_of(given.resolved(), remarks), remarks)
+        model = articulation_of(given.resolved(), remarks)
+        if path is not None and given.path is not None:
+            model = _beside(model, Path(given.path).parent, Path(path).parent)
+        text = exporter.write(model, remarks)
     except FormatError as error:
         mistake = Mistake("", MISSING, f"{format}: {error.what}", remedy=error.remedy)
         raise SceneError([mistake]) from None
@@ -70,6 +74,23 @@ def export_model(
     if path is not None:
         _write(Path(path), text, force=force)
     return ExportReport(format, text, remarks.translated, remarks.left_out)
+
+
+def _beside(model: Articulation, scene: Path, target: Path) -> Articulation:
+    """The same model with files of meshes as they are named from another folder."""
+
+    def named(one: Geometry) -> Geometry:
+        if one.kind != "mesh":
+            return one
+        try:
+            mesh = os.path.relpath(os.path.abspath(scene / one.mesh), os.path.abspath(target))
+        except ValueError:  # on another drive
+            mesh = os.path.abspath(scene / one.mesh)
+        return attrs.evolve(one, mesh=Path(mesh).as_posix())
+
+    for link in model.links.values():
+        link.geometries = [named(one) for one in link.geometries]
+    return model
 
 
 def _write(path: Path, text: str, *, force: bool) -> None:

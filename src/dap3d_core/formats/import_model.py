@@ -17,7 +17,7 @@ from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import Articulation, FormatError, Importer, Remark, Remarks
 from dap3d_core.interface.formats.articulation import KINDS
 from dap3d_core.registry import Registry, load_registry
-from dap3d_core.registry.extensions import Extensions, extensions
+from dap3d_core.registry.extensions import extensions
 from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.scene import Scene, SceneError, check
 from dap3d_core.scene.errors import MISSING, Mistake
@@ -72,9 +72,11 @@ def import_model(
     free_base: bool = False,
     keep_fixed: bool = False,
     balance_inertia: bool = False,
+    limits: str = "soft",
     shapes: bool = True,
     strict: bool = False,
     allow_code: bool = False,
+    arguments: Mapping[str, Any] | None = None,
     positions: Mapping[str, float | Sequence[float]] | None = None,
     rates: Mapping[str, float | Sequence[float]] | None = None,
     registry: Registry | None = None,
@@ -89,37 +91,57 @@ def import_model(
         free_base: links without a joint to a parent are free, where the format leaves it open.
         keep_fixed: fixed joints between moving links stay joints.
         balance_inertia: principal moments of inertia that no body has are replaced by their mean.
+        limits: of joints: "soft", springs critically damped for the inertia that they see; "hard",
+            stops at which a rate ends at once; "off", none.
         shapes: links have their shapes; without, files of meshes are not looked for.
         strict: refuse a model of which something would be left out.
         allow_code: evaluate the expressions of a xacro file.
-        positions, rates: of joints where the scene starts, by name.
+        arguments: of a xacro file, by name.
+        positions, rates: of joints where the scene starts, by name, as the file counts them; joints
+            that are coupled with these follow.
         registry: the installed types; by default all.
 
     Returns:
-        The scene, checked, and a report of what was taken, translated and left out.
+        The scene and a report of what was taken, translated and left out.
 
     Raises:
         SceneError: the file cannot be imported; with its line.
     """
     file = _path(path)
-    meshes, names = MeshFiles(), Names()
+    meshes = MeshFiles()
     try:
+        options = ImportOptions(free_base, keep_fixed, balance_inertia, limits)
         model, source, keyword = read_articulation(
-            file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes
-        )
-        options = ImportOptions(
-            free_base, keep_fixed, balance_inertia, *_states(positions, rates, model)
-        )
-        scene = scene_of(model, source.remarks, options, meshes=meshes, names=names)
-        scene.description = f"From {file.name}."
-        checked = check(scene, load_registry() if registry is None else registry)
+            file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes,
+            arguments=arguments)  # fmt: skip
+        for what, given in ((options.positions, positions), (options.rates, rates)):
+            what.update(_coordinates(given, model, positions=given is positions))
+        scene, notes = _checked_scene(model, source, options, meshes, registry)
     except FormatError as error:
         raise _refusal(error, file) from None
-    except SceneError as error:
-        raise SceneError(_relocated(m, names, file) for m in error.mistakes) from None
     if strict:
         _refuse_omissions(source.remarks)
-    return scene, _report(file, keyword, model, source.remarks, checked.notes, meshes)
+    return scene, _report(file, keyword, model, source.remarks, notes, meshes)
+
+
+def _checked_scene(
+    model: Articulation, source: SourceFiles, options: ImportOptions, meshes: MeshFiles,
+    registry: Registry | None,
+) -> tuple[Scene, Sequence[str]]:  # fmt: skip
+    """The scene of a model, and the notes of its check.
+
+    Raises:
+        FormatError: the model is no mechanism.
+        SceneError: the scene is invalid; with lines of the file.
+    """
+    names = Names()
+    scene = scene_of(model, source.remarks, options, meshes=meshes, names=names)
+    scene.description = f"From {source.path.name}."
+    try:
+        checked = check(scene, load_registry() if registry is None else registry)
+    except SceneError as error:
+        raise SceneError(_relocated(m, names, source.path) for m in error.mistakes) from None
+    return scene, checked.notes
 
 
 def _path(path: Any) -> Path:
@@ -168,6 +190,7 @@ def read_articulation(
     root: str | os.PathLike[str] | None = None,
     allow_code: bool = False,
     shapes: bool = True,
+    arguments: Mapping[str, Any] | None = None,
 ) -> tuple[Articulation, SourceFiles, str]:
     """The model in a file before it becomes a scene, its files, and the importer's keyword.
 
@@ -183,10 +206,15 @@ def read_articulation(
     folder = file.parent if root is None else Path(os.fsdecode(root))
     if not os.path.isdir(folder):
         raise FormatError(f"root: {folder} is no folder")
-    source = SourceFiles(file, folder, folders, allow_code, shapes)
+    given = {name: str(value) for name, value in _named("arguments", arguments).items()}
+    source = SourceFiles(file, folder, folders, allow_code, shapes, given)
     importer, keyword = _importer(source, format)
     try:
-        return importer.read(source), source, keyword
+        model = importer.read(source)
+        if source.unused:
+            what = f"takes no argument {min(source.unused)!r}"
+            raise FormatError(what, None, "arguments are those that a xacro file declares")
+        return model, source, keyword
     except (FormatError, PluginError):
         raise
     except RecursionError:
@@ -217,7 +245,9 @@ def _names_in(folder: Path) -> list[str]:
 
 
 def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
-    """The importer of a file: the one wanted, by its suffix, or by the root of its XML.
+    """The importer of a file: the one wanted, named like its suffix, or of its suffix and root.
+
+    They are loaded one after the other until one fits, those of dap3d itself first.
 
     Raises:
         FormatError: no installed format is that of the file.
@@ -225,37 +255,27 @@ def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
     formats = extensions("importer")
     if wanted is not None:
         return formats.load(wanted)(), wanted
-    suffix, loaded = source.path.suffix.lower(), _usable(formats)
-    fitting = {k: one for k, one in loaded.items() if suffix in one.suffixes}
-    if len(fitting) != 1:
-        name = source.xml().name
-        fitting = {k: one for k, one in loaded.items() if name in one.roots} or fitting
+    suffixes = [one.lower() for one in source.path.suffixes]
+    loaded: dict[str, Importer] = {}
+    fitting: dict[str, Importer] = {}
+    named = [one[1:] for one in suffixes if one[1:] in formats.keywords]
+    for keyword in [*named, *(one for one in formats.first if one not in named)]:
+        try:
+            loaded[keyword] = importer = formats.load(keyword)()
+        except PluginError:  # a broken one hurts its own files alone
+            continue
+        if suffixes[-1:] and suffixes[-1] in importer.suffixes:
+            fitting[keyword] = importer
+            if keyword in named or not importer.roots or source.xml().name in importer.roots:
+                return importer, keyword
+    name = source.xml().name
+    fitting = {k: one for k, one in loaded.items() if name in one.roots} or fitting
     if len(fitting) == 1:
         keyword, importer = next(iter(fitting.items()))
         return importer, keyword
     known = ", ".join(f"{k} ({' '.join(one.suffixes)})" for k, one in loaded.items())
     what = f"is no file of a format that is installed: {known or 'none is'}"
     raise FormatError(what, remedy="name its format with --format")
-
-
-def _usable(formats: Extensions) -> dict[str, Importer]:
-    """The importers that can be loaded: a broken one hurts its own files alone."""
-    usable: dict[str, Importer] = {}
-    for keyword in formats.keywords:
-        try:
-            usable[keyword] = formats.load(keyword)()
-        except PluginError:
-            continue
-    return usable
-
-
-def _states(
-    positions: Mapping[str, Any] | None, rates: Mapping[str, Any] | None, model: Articulation
-) -> tuple[dict[str, tuple[float, ...]], dict[str, tuple[float, ...]]]:
-    return (
-        _coordinates(positions, model, positions=True),
-        _coordinates(rates, model, positions=False),
-    )
 
 
 def _coordinates(
@@ -268,7 +288,7 @@ def _coordinates(
     """
     coordinates, what = {}, "position" if positions else "rate"
     quaternions = {"ball": 1, "free": 1} if positions else {}
-    for name, value in (given or {}).items():
+    for name, value in _named(f"{what}s", given).items():
         if name not in model.joints:
             near = nearest(name, model.joints)
             remedy = f"did you mean {near!r}?" if near else f"it has {some([*model.joints], 8)}"
@@ -288,6 +308,17 @@ def _coordinates(
             )
         coordinates[name] = values
     return coordinates
+
+
+def _named(what: str, given: Any) -> Mapping[str, Any]:
+    """Values by name, none for None.
+
+    Raises:
+        FormatError: they are something else.
+    """
+    if given is not None and not isinstance(given, Mapping):
+        raise FormatError(f"{what} = {given!r}: should be a dictionary of names and values")
+    return given or {}
 
 
 def _relocated(mistake: Mistake, names: Names, file: Path) -> Mistake:

@@ -41,6 +41,15 @@ class Extensions:
         """Their names, sorted."""
         return tuple(sorted(self.sources))
 
+    @property
+    def first(self) -> tuple[str, ...]:
+        """Their names, those of dap3d itself before those of other packages."""
+
+        def others(keyword: str) -> bool:
+            return self.sources[keyword][0].distribution != "dap3d"
+
+        return tuple(sorted(self.keywords, key=others))
+
     def load(self, keyword: str) -> Any:
         """What the hook of a module returns with this keyword, checked: a class, or a method.
 

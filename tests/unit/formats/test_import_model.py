@@ -71,14 +71,19 @@ def test_joint_coordinates_have_the_sign_of_the_file():
 
 
 def test_stops_push_back_and_dampers_brake():
-    """The moments of an elastic stop and a damper on the joint, by their laws."""
+    """The moments of a soft stop and a damper on the joint, by their laws, 0.1 rad beyond it."""
     scene, report = dap.import_model(ARM, positions={"shoulder": 2.1}, rates={"shoulder": 0.5})
+    assert any("it is put at 2" in remark.text for remark in report.translated)
+    stop = scene.forces["shoulder_max_stop"].fields
+    assert stop["theta_stop"] == 2.0
+    stop["theta_stop"] = 1.9
     result = dap.simulate(scene, t_end=0.0)
     moments = {name: result.force(name).on["i"].moment[0] for name in scene.forces if "sho" in name}
-    assert set(moments) == {"shoulder_damper", "shoulder_stops"}
+    assert set(moments) == {"shoulder_damper", "shoulder_min_stop", "shoulder_max_stop"}
     np.testing.assert_allclose(moments["shoulder_damper"], (0.0, -0.3 * 0.5, 0.0), atol=1e-15)
-    np.testing.assert_allclose(moments["shoulder_stops"], (0.0, -1e4 * 0.1, 0.0), rtol=1e-12)
-    assert any("beyond its limits" in remark.text for remark in report.translated)
+    moment = stop["k"] * 0.1 + 2.0 * np.sqrt(stop["k"] * stop["J_c"]) * 0.5
+    np.testing.assert_allclose(moments["shoulder_max_stop"], (0.0, -moment, 0.0), rtol=1e-12)
+    np.testing.assert_array_equal(moments["shoulder_min_stop"], 0.0)
 
 
 def test_what_is_left_out_is_said_with_its_line_and_strict_refuses_it():

@@ -108,6 +108,21 @@ def test_formats_are_imported_by_their_commands_alone():
     assert not found & {"trimesh", "xacrodoc", "lxml", "mujoco", "llvmlite"}
 
 
+@pytest.mark.parametrize(
+    ("file", "needed"),
+    [("arm.urdf", "urdf"), ("parallelogram.sdf", "sdf"), ("parallelogram.xml", "mjcf")],
+)
+def test_an_import_loads_one_format(file, needed):
+    """The importer of the file, without what other formats, exports and macros need."""
+    path = REPOSITORY / "tests" / "data" / "formats" / file
+    found = imported(f"import dap3d_core as dap\ndap.import_model({str(path)!r})")
+    others = {"urdf", "sdf", "mjcf"} - {needed}
+    assert f"dap3d_formats.{needed}.reader" in found
+    assert not [m for m in found if m.startswith(tuple(f"dap3d_formats.{one}" for one in others))]
+    assert not [m for m in found if "export" in m and m.startswith("dap3d")]
+    assert "dap3d_formats.urdf.xacro" not in found
+
+
 def test_inputs_and_what_sets_them_are_imported_where_a_scene_has_some():
     """A run without them brings in nothing of them; a loop of a script does."""
     names = {

@@ -89,7 +89,7 @@ def _export_model(
     """Write a model by an exporter of a plugin."""
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
-    from dap3d_core.cli.framework.paths import writable, write_text
+    from dap3d_core.cli.framework.paths import writable
     from dap3d_core.exchange import FORMATS
     from dap3d_core.registry.extensions import extensions
     from dap3d_core.registry.suggestions import nearest
@@ -103,8 +103,10 @@ def _export_model(
     name = Path(model).stem if Path(model).is_file() else Path(model).name
     target = Path(output) if output is not None else Path(name + formats.load(kind).suffix)
     writable(target, force=force, sources=(scene.path,))
-    report = dap.export_model(scene, format=kind, strict=strict)
-    write_text(target, report.text)
+    try:
+        report = dap.export_model(scene, target, format=kind, strict=strict, force=True)
+    except OSError as error:
+        raise Refused(f"cannot write {target}: {error.strerror or error}") from error
     remarks = {
         key: [one.text for one in getattr(report, key)] for key in ("translated", "left_out")
     }

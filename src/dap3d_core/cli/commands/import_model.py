@@ -11,7 +11,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
-    from dap3d_core.formats import ImportReport
+    from dap3d_core.formats.import_model import ImportReport
     from dap3d_core.scene import Scene
 
 
@@ -27,7 +27,12 @@ if TYPE_CHECKING:
     click.option("--root", type=click.Path(), metavar="FOLDER",
                  help="Files that the model names must lie in it; by default the file's folder."),
     click.option("--position", "positions", multiple=True, metavar="JOINT=VALUE",
-                 help="Start a joint there, in rad or m; may be repeated."),
+                 help="Start a joint there, in rad or m, as the file counts them (qpos of MJCF); "
+                 "several numbers with commas. Joints that are coupled with it follow. May be "
+                 "repeated."),
+    click.option("--limits", type=click.Choice(["off", "soft", "hard"]), default="soft",
+                 help="Limits of joints: soft stops, by default; hard ones, at which a rate ends "
+                 "at once; or off."),
     click.option("--free-base", is_flag=True,
                  help="Free the base, where the format leaves open whether it is fixed."),
     click.option("--keep-fixed", is_flag=True, help="Keep fixed joints; do not merge their links."),
@@ -37,6 +42,8 @@ if TYPE_CHECKING:
     click.option("--strict", is_flag=True, help="Refuse a model if something would be left out."),
     click.option("--allow-code", is_flag=True,
                  help="Evaluate the expressions of a xacro file, which are code."),
+    click.option("--arg", "arguments", multiple=True, metavar="NAME:=VALUE",
+                 help="An argument of a xacro file; may be repeated."),
     options.FORCE, options.JSON,
     saves=True, name="import",
 )  # fmt: skip
@@ -48,12 +55,14 @@ def import_model(
     packages: tuple[str, ...],
     root: str | None,
     positions: tuple[str, ...],
+    limits: str,
     free_base: bool,
     keep_fixed: bool,
     balance_inertia: bool,
     no_shapes: bool,
     strict: bool,
     allow_code: bool,
+    arguments: tuple[str, ...],
     force: bool,
     as_json: bool,
 ) -> int:
@@ -75,8 +84,9 @@ def import_model(
 
     scene, report = dap.import_model(
         file, format=kind, packages=_pairs("--package", packages), root=root, free_base=free_base,
-        keep_fixed=keep_fixed, balance_inertia=balance_inertia, shapes=not no_shapes, strict=strict,
-        allow_code=allow_code, positions=_numbers(positions),
+        keep_fixed=keep_fixed, balance_inertia=balance_inertia, limits=limits,
+        shapes=not no_shapes, strict=strict, allow_code=allow_code,
+        arguments=_pairs("--arg", arguments, ":="), positions=_numbers(positions),
     )  # fmt: skip
     folder = Path(output or Path(file).stem)
     if folder.is_file():
@@ -104,24 +114,24 @@ def _make(folder: Path) -> None:
         raise Refused(f"cannot make the folder {folder}: {error.strerror or error}") from error
 
 
-def _pairs(option: str, words: tuple[str, ...]) -> dict[str, str]:
-    """NAME=VALUE words as a dictionary."""
+def _pairs(option: str, words: tuple[str, ...], sign: str = "=") -> dict[str, str]:
+    """NAME=VALUE words as a dictionary; arguments of macros may be empty, as in ROS."""
     pairs = {}
     for word in words:
-        name, equals, value = word.partition("=")
-        if not (name and equals and value):
-            raise Refused(f"{option} {word}: write NAME=VALUE")
+        name, equals, value = word.partition(sign)
+        if not (name and equals and (value or sign == ":=")):
+            raise Refused(f"{option} {word}: write NAME{sign}VALUE")
         if name in pairs:
             raise Refused(f"{option} {word}: {name} is given more than once")
         pairs[name] = value
     return pairs
 
 
-def _numbers(words: tuple[str, ...]) -> dict[str, float]:
+def _numbers(words: tuple[str, ...]) -> dict[str, list[float]]:
     numbers = {}
     for name, value in _pairs("--position", words).items():
         try:
-            numbers[name] = float(value)
+            numbers[name] = [float(part) for part in value.split(",")]
         except ValueError:
             raise Refused(f"--position {name}={value}: {value!r} is no number") from None
     return numbers
@@ -132,7 +142,13 @@ def _as_data(report: "ImportReport") -> dict[str, Any]:
 
     def remarks(listed: Any) -> list[dict[str, Any]]:
         return [
-            {"file": one.place.file, "line": one.place.line, "text": one.text, "count": one.count}
+            {
+                "file": one.place.file,
+                "line": one.place.line,
+                "text": one.text,
+                "count": one.count,
+                "motion": one.motion,
+            }
             for one in listed
         ]
 
@@ -149,8 +165,11 @@ def _show(console: "Terminal", scene: "Scene", report: "ImportReport", target: P
     console.title(f"{report.format} model {scene.name}")
     taken = ", ".join(f"{number} {part}" for part, number in report.taken.items() if number)
     console.facts([("taken", taken)])
-    console.section("translated with a difference", [str(one) for one in report.translated])
-    console.section("left out", [str(one) for one in report.left_out])
+    both = {"translated with a difference": report.translated, "left out": report.left_out}
+    for motion, word in ((True, " (the motion is another)"), (False, "")):
+        for heading, remarks in both.items():
+            lines = [str(one) for one in remarks if one.motion == motion]
+            console.section(f"{heading}{word}", lines)
     console.section("notes", list(report.notes))
     parts = (scene.bodies, "body", "bodies"), (scene.joints, "joint"), (scene.forces, "force")
     holds = ", ".join(count(len(part), *words) for part, *words in parts)

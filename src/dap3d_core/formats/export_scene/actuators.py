@@ -28,7 +28,8 @@ def add_actuators(builder: ModelBuilder, scene: Scene) -> set[str]:
                 builder.model.actuators.append(Actuator(name, joint.name, gear))
                 taken |= {element.name for element in users}
                 if given.value:
-                    builder.remarks.leave_out(NOWHERE, f"the value of input {name} at the start")
+                    text = f"the value of input {name} at the start"
+                    builder.remarks.leave_out(NOWHERE, text, motion=True)
                 break
     return taken
 

@@ -45,7 +45,7 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
         elif body in model.links:
             model.links[body].geometries = geometries
     if any(any(body.r_dot) or any(body.w) for body in scene.bodies.values()):
-        remarks.leave_out(NOWHERE, "initial velocities")
+        remarks.leave_out(NOWHERE, "initial velocities", motion=True)
     return model
 
 

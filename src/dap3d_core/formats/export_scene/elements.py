@@ -173,6 +173,7 @@ class SceneElements:
                           axes, turn)  # fmt: skip
 
 
-def leave_out(remarks: Remarks, element: Element, why: str) -> None:
+def leave_out(remarks: Remarks, element: Element, why: str, *, motion: bool = True) -> None:
     """Remark that an element of a scene is left out."""
-    remarks.leave_out(NOWHERE, f"{element.name} of type {element.type}: {why}")
+    text = f"{element.name} of type {element.type}: {why}"
+    remarks.leave_out(NOWHERE, text, motion=motion)

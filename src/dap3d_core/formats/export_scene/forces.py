@@ -12,7 +12,7 @@ from dap3d_core.interface.formats.articulation import Coupling, Joint, Limits
 from dap3d_core.interface.formats.frames import from_quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.scene.scene import Element, Scene
+from dap3d_core.scene.scene import GROUND, Element, Scene
 
 #: Stops beyond this are none, rad or m.
 NO_STOP = 1e6
@@ -47,6 +47,8 @@ def add_forces(builder: ModelBuilder, scene: Scene) -> None:
             _add_to_ball(builder, element)
         elif element.type in FRICTION:
             _add_friction(builder, element)
+        elif element.type in ("rot_stop", "plane_stop"):
+            _add_stop(builder, element)
         elif element.type != "weight":
             of = springs.get(str(element.type))
             found = None if of is None else of(builder, element)
@@ -186,6 +188,39 @@ def _add(builder: ModelBuilder, element: Element, joint: Joint, sense: float, ze
         joint.rest = (sense * (rest - zero) + 0.0,)
 
 
+def _add_stop(builder: ModelBuilder, element: Element) -> None:
+    """Add a stop as a limit of a joint, whose coordinate is sense (x - zero) for its x."""
+    fields = element.fields
+    if element.type == "rot_stop":
+        found = _of_hinge(builder, element)
+        at = float(fields["theta_stop"])
+    else:
+        found = _of_plane(builder, element)
+        at = float(fields.get("radius", 0.0))
+    if found is None:
+        leave_out(builder.remarks, element, NO_JOINT)
+        return
+    joint, sense, zero = found
+    bound, is_least = sense * (at - zero) + 0.0, fields.get("side", "min") == "min"
+    low, high = joint.limits[0].lower, joint.limits[0].upper
+    ends = (max(low, bound), high) if is_least == (sense > 0.0) else (low, min(high, bound))
+    joint.limits = (Limits(*ends, float(fields["k"])),)
+
+
+def _of_plane(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
+    """The joint of a ball at a plane, the sense of its distance, and that where q = 0."""
+    elements = builder.elements
+    fields = {"P_j": f"{GROUND}.O", "a_j": f"{GROUND}.z"} | element.fields
+    i, j = (elements.point(fields[end])[0] for end in ("P_i", "P_j"))
+    found = _joint_along(builder, "prismatic", {i, j}, fields["a_j"])
+    if found is None or elements.vector(fields["a_j"])[0] != j:
+        return None
+    joint, along = found
+    axis = along * (elements.bodies[joint.body_i].pose.A @ joint.axes[0])
+    distance = -float(axis @ _between(builder, fields))
+    return builder.placed[joint.name], along * (1.0 if i == joint.body_i else -1.0), distance
+
+
 def _add_rotors(builder: ModelBuilder) -> None:
     """Add wheels as armature of the joint that turns as they do, and couplings of others."""
     for name, rotor in builder.elements.rotors.items():
@@ -193,14 +228,14 @@ def _add_rotors(builder: ModelBuilder) -> None:
         for follower, fields in rotor.followers:
             joint = _followed(builder, fields)
             if joint is None:
-                builder.remarks.leave_out(
-                    NOWHERE, f"{follower} of type follow: it follows no joint"
-                )
+                text = f"{follower} of type follow: it follows no joint"
+                builder.remarks.leave_out(NOWHERE, text, motion=True)
                 continue
             pairs.append((joint.name, float(fields.get("ratio", 1.0))))
         leader = next((one for one, ratio in pairs if ratio == 1.0), None)
         if leader is None:
-            builder.remarks.leave_out(NOWHERE, f"wheel {name}: no joint turns as it does")
+            text = f"wheel {name}: no joint turns as it does"
+            builder.remarks.leave_out(NOWHERE, text, motion=True)
             continue
         builder.placed[leader].armature = (rotor.inertia,)
         first = True

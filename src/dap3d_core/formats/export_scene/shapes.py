@@ -35,7 +35,7 @@ def geometries_of(builder: ModelBuilder, scene: Scene, body: str) -> list[Geomet
             scale = (float(fields.get("scale", 1.0)),) * 3
             geometries.append(Geometry("mesh", (), pose, fields["file"], scale, color))
         else:
-            leave_out(builder.remarks, element, "no shape of a model")
+            leave_out(builder.remarks, element, "no shape of a model", motion=False)
     return geometries
 
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from dap3d_core.formats.import_scene.joints import NamedEnds
+from dap3d_core.formats.import_scene.joints import NamedEnds, from_ground
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
+from dap3d_core.formats.import_scene.start import couples
 from dap3d_core.interface.formats.articulation import Articulation, Joint
 from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.registry.suggestions import nearest
@@ -29,7 +30,7 @@ def wheel_of(builder: SceneBuilder, joint: Joint, mass: float, inertia: float) -
         scene_name = builder.names.scene_names["joints", joint.name]
         wheel = builder.names.free("bodies", f"{scene_name}_rotor")
         builder.names.scene_names[key] = wheel
-        rate = builder.rates.get(joint.name, (0.0,))[0]
+        rate = (*joint.rate, 0.0)[0]
         builder.scene.add_body(wheel, mass=mass, Jp=(inertia,) * 3,
                                w=(0.0, 0.0, rate) if rate else None)  # fmt: skip
         bearing = builder.names.free("joints", f"{wheel}_bearing")
@@ -40,10 +41,10 @@ def wheel_of(builder: SceneBuilder, joint: Joint, mass: float, inertia: float) -
 
 def follow(builder: SceneBuilder, joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
     """Couple the coordinate of a joint with a wheel."""
-    ends = NamedEnds(builder, joint)
+    ends = NamedEnds(builder, from_ground(builder, joint))
     name = builder.names.free("joints", f"{ends.name}_{suffix}")
     builder.scene.add_joint(
-        "follow", name, body_i=ends.child, a_j=ends.vector("j", joint.axes[0], "_axis"),
+        "follow", name, body_i=ends.child, a_j=ends.vector("j", ends.joint.axes[0], "_axis"),
         a_k=f"{wheel}.z", ratio=None if ratio == 1.0 else ratio,
         along=True if joint.kind == "prismatic" else None,
     )  # fmt: skip
@@ -64,12 +65,15 @@ def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
             )
             raise FormatError(what, coupling.place, f"did you mean {near!r}?" if near else "")
         one, other = model.joints[coupling.joint], model.joints[coupling.other]
-        if {one.kind, other.kind} - {"revolute", "prismatic"}:
+        if one.kind == other.kind == "fixed":
+            continue
+        if not couples(model, coupling):
             text = f"coupling of {coupling.joint} with {coupling.other}: joints of one coordinate "
-            builder.remarks.leave_out(coupling.place, f"{text}are coupled")
+            builder.remarks.leave_out(coupling.place, f"{text}are coupled", motion=True)
             continue
         if builder.moves_alone(one) or builder.moves_alone(other):
-            builder.remarks.leave_out(coupling.place, "coupling of a joint that does not move")
+            text = "coupling of a joint that does not move"
+            builder.remarks.leave_out(coupling.place, text, motion=True)
             continue
         had_rotor = bool(other.armature[0])
         wheel = wheel_of(builder, other, *_light(builder, one, other))
@@ -85,8 +89,9 @@ def _light(builder: SceneBuilder, *joints: Joint) -> tuple[float, float]:
     """Mass and inertia of a wheel beside what joints move: beside its mass, for a slider."""
     masses, sizes = [], []
     for joint in joints:
-        inertial = builder.groups[builder.member[joint.child][0]].inertial
-        least = float(np.linalg.eigvalsh(inertial.inertia)[0])
-        masses.append(inertial.mass)
-        sizes.append(inertial.mass if joint.kind == "prismatic" else least)
+        group = builder.groups[builder.member[from_ground(builder, joint).child][0]]
+        mass, least = group.inertial.mass, float(np.linalg.eigvalsh(group.inertial.inertia)[0])
+        seen = builder.inertia.of_alone(joint.name, 0) if group.light else None
+        masses.append(seen or mass)
+        sizes.append(seen or (mass if joint.kind == "prismatic" else least))
     return LIGHT * min(masses), LIGHT * min(sizes)

@@ -1,7 +1,7 @@
 """What acts on the coordinates of joints: springs, dampers, stops, dry friction, inputs."""
 
 import re
-from math import isfinite, pi
+from math import atan2, cos, isfinite, pi, sin
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,9 @@ from dap3d_core.interface.formats.frames import quaternion
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import GROUND
 
-#: Stiffness of stops where the format says none, N m/rad and N/m.
-STOP_STIFFNESS = {True: 1e4, False: 1e6}
+#: Time constant of stops where the format says no stiffness: of soft ones, and of contact at rest
+#: at hard ones, s. Critically damped, what they stop stands still within some of it.
+STOP_TIME = {"soft": 2e-3, "hard": 1e-4}
 #: Rate below which dry friction fades, rad/s and m/s.
 FADING = 1e-2
 #: What may act on each coordinate of a joint -> its name in a remark.
@@ -36,7 +37,8 @@ def add_joint_forces(builder: SceneBuilder, joint: Joint) -> None:
     taken = TAKEN.get(joint.kind, ())
     for key in given:
         if key not in taken:
-            builder.remarks.leave_out(joint.place, f"{WORDS[key]} of a {joint.kind} joint")
+            text = f"{WORDS[key]} of a {joint.kind} joint"
+            builder.remarks.leave_out(joint.place, text, motion=True)
     if not set(given) & set(taken):
         return
     if joint.kind == "ball":
@@ -54,7 +56,7 @@ def add_joint_forces(builder: SceneBuilder, joint: Joint) -> None:
 def _acts(value: float | Limits) -> bool:
     """True for a number but zero, or a finite limit."""
     if isinstance(value, Limits):
-        return isfinite(value.lower) or isfinite(value.upper)
+        return value.finite
     return bool(value)
 
 
@@ -90,15 +92,14 @@ class JointCoordinate:
         values = getattr(self.joint, key)
         return values[self.k] if self.k < len(values) else Limits() if key == "limits" else 0.0
 
-    def _add(self, what: str, **fields: Any) -> None:
-        """Add a spring, damper and stops on the coordinate."""
+    def _add(self, what: str, keyword: str, **fields: Any) -> None:
+        """Add a force on the coordinate: a spring and damper, or a stop of an angle."""
         ends, axis = self.ends, self.axis
         if not self.turns:
-            keyword = "tran_sda"
             fields |= {"P_i": ends.point("i"), "P_j": ends.point("j"),
                        "a_j": ends.vector("j", axis)}  # fmt: skip
         else:
-            keyword, suffix = "rot_sda", "" if self.k == 0 else f"_{self.k + 1}"
+            suffix = "" if self.k == 0 else f"_{self.k + 1}"
             two = len(self.joint.axes) == 2
             across = np.asarray(ends.joint.axes[1 - self.at]) if two else perpendicular(axis)
             fields |= {  # of the parent against the child about the opposite axis: q
@@ -113,6 +114,11 @@ class JointCoordinate:
         """The end that the axis is fixed in: the child, but for the first of a universal joint."""
         return "j" if len(self.joint.axes) == 2 and self.at == 0 else "i"
 
+    def _as_counted(self, q: float) -> float:
+        """A coordinate as a force counts it, whose angle begins within half a turn of zero."""
+        start = self.joint.position[self.k] if self.joint.position and self.turns else 0.0
+        return q - 2.0 * pi * round((start - atan2(sin(start), cos(start))) / (2.0 * pi))
+
     def add_spring(self) -> None:
         """Add a linear spring without force at ``rest``, and a linear damper."""
         k, c = self._value("stiffness"), self._value("damping")
@@ -120,46 +126,70 @@ class JointCoordinate:
             return
         fields: dict[str, Any] = {}
         if k:
-            rest = self._value("rest") or None
+            rest = self._as_counted(self._value("rest")) or None
             fields = {"theta_0": rest, "turns": True} if self.turns else {"x_0": rest}
-        self._add("spring" if k else "damper", k=k or None, c=c or None, **fields)
+        keyword = "rot_sda" if self.turns else "tran_sda"
+        self._add("spring" if k else "damper", keyword, k=k or None, c=c or None, **fields)
 
     def add_stops(self) -> None:
-        """Add elastic stops at the limits."""
+        """Add a stop at each limit: soft, a spring and damper; hard, where velocities end."""
         limits, builder, joint = self._value("limits"), self.builder, self.joint
-        if not _acts(limits):
+        if not limits.finite:
             return
-        stiffness = limits.stiffness or STOP_STIFFNESS[self.turns]
-        unit = "N m/rad" if self.turns else "N/m"
-        text = f"limits of a joint are elastic stops of {stiffness:g} {unit} without damping"
-        builder.remarks.translate(joint.place, text)
-        name = builder.names.free("functions", f"{self.name}_stops")
-        wide = max(1e6, *(abs(x) for x in (limits.lower, limits.upper) if isfinite(x)))
-        builder.scene.add_function(
-            "stops", name, k=stiffness,
-            lower=limits.lower if isfinite(limits.lower) else -2.0 * wide,
-            upper=limits.upper if isfinite(limits.upper) else 2.0 * wide,
-        )  # fmt: skip
-        beyond = self.turns and max(abs(limits.lower), abs(limits.upper)) > 0.75 * pi
-        self._add("stops", function=name, **({"turns": True} if beyond else {}))
-        q = builder.positions.get(joint.name, joint.position) or (0.0,) * len(joint.axes)
-        if not limits.lower <= q[self.k] <= limits.upper:
-            text = f"joint {joint.name} starts at {q[self.k]:g}, beyond its limits "
-            text += f"{limits.lower:g} and {limits.upper:g}: the stops push it back"
-            builder.remarks.translate(joint.place, text)
+        if builder.limits == "off":
+            text = "limits of joints are left out: limits = off"
+            builder.remarks.translate(joint.place, text, motion=True)
+            return
+        seen = builder.inertia
+        inertia = seen.of(joint.name, self.k) or seen.of_alone(joint.name, self.k)
+        inertia = inertia or self._own_inertia()
+        hard, given = builder.limits == "hard", limits.stiffness
+        k = inertia / STOP_TIME[builder.limits] ** 2 if hard or given is None else given
+        text = "limits of a joint are stops at which its rate ends at once, without rebound"
+        if not hard:
+            text = "limits of a joint are soft stops, critically damped for the inertia that they "
+            text += "see, of a time constant of 2 ms" if given is None else "see"
+        builder.remarks.translate(joint.place, text, motion=True)
+        fields = {"k": k, "J_c" if self.turns else "m_c": inertia}
+        fields |= {"e": 0.0} if hard else {"rebound": False}
+        for side, bound in (("min", limits.lower), ("max", limits.upper)):
+            if isfinite(bound):
+                self._add_stop(side, bound, fields)
+
+    def _add_stop(self, side: str, bound: float, fields: dict[str, Any]) -> None:
+        """Add the stop of one limit."""
+        if self.turns:
+            at = self._as_counted(bound)
+            self._add(f"{side}_stop", "rot_stop", theta_stop=at, side=side, **fields)
+            return
+        ends, way = self.ends, 1.0 if side == "min" else -1.0
+        plane = ends.point("j", bound * self.axis, f"_{side}")
+        normal = ends.vector("j", way * self.axis, "" if side == "min" else "_back")
+        name = self.builder.names.free("forces", f"{self.name}_{side}_stop")
+        self.builder.scene.add_force("plane_stop", name, P_i=ends.point("i"), P_j=plane, a_j=normal,
+                                     **fields)  # fmt: skip
+
+    def _own_inertia(self) -> float:
+        """Mass, or inertia about the axis, of the child alone, where no mass matrix has it."""
+        group, _ = self.builder.member[self.ends.joint.child]
+        body, axis = self.builder.groups[group].inertial, self.ends.on_child.A @ self.axis
+        arm = np.cross(axis, self.ends.on_child.r)
+        turning = float(axis @ body.inertia @ axis + body.mass * (arm @ arm))
+        return turning if self.turns else body.mass
 
     def add_friction(self) -> None:
         """Add dry friction, which fades at low rates."""
         friction, builder, ends = self._value("friction"), self.builder, self.ends
         if friction < 0.0:
-            builder.remarks.leave_out(self.joint.place, "friction below 0, which would drive")
+            text = "friction below 0, which would drive"
+            builder.remarks.leave_out(self.joint.place, text, motion=True)
         if friction <= 0.0:
             return
         unit = "rad/s" if self.turns else "m/s"
         text = (
             f"dry friction of a joint fades below {FADING:g} {unit}: it creeps, and does not stick"
         )
-        builder.remarks.translate(self.joint.place, text)
+        builder.remarks.translate(self.joint.place, text, motion=True)
         name = builder.names.free("forces", f"{self.name}_friction")
         if self.turns:
             axis = ends.vector(self._holder(), self.axis)
@@ -185,8 +215,9 @@ def add_inputs(builder: SceneBuilder, model: Articulation) -> None:
     scene, names = builder.scene, builder.names
     for actuator in model.actuators:
         joint = from_ground(builder, model.joints[actuator.joint])
-        if builder.moves_alone(joint):
-            builder.remarks.leave_out(actuator.place, "an actuator of a joint that does not move")
+        if joint.kind == "fixed" or builder.moves_alone(joint):
+            text = "an actuator of a joint that does not move"
+            builder.remarks.leave_out(actuator.place, text, motion=True)
             continue
         others = (scene.bodies, scene.points, scene.joints, scene.forces)
         clash = any(actuator.name in table for table in others)

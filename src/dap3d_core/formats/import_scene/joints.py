@@ -2,12 +2,12 @@
 
 from typing import Any
 
-import attrs
 import numpy as np
 
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
 from dap3d_core.interface.formats.articulation import WORLD, Joint
 from dap3d_core.interface.formats.frames import Frame
+from dap3d_core.interface.formats.joint_motion import reversed_joint
 from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.kernels.array_types import Floats
 
@@ -32,9 +32,7 @@ def from_ground(builder: SceneBuilder, joint: Joint) -> Joint:
     """The same joint, with parent and child exchanged where the child is ground: body i moves."""
     if builder.member[joint.child][0] != WORLD:
         return joint
-    axes = tuple(tuple(-x for x in axis) for axis in reversed(joint.axes))
-    return attrs.evolve(joint, parent=joint.child, child=joint.parent, in_parent=joint.in_child,
-                        in_child=joint.in_parent, axes=axes)  # fmt: skip
+    return reversed_joint(joint)
 
 
 class JointEnds:

@@ -9,10 +9,14 @@ from dap3d_core.interface.formats.frames import IDENTITY, Frame
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
 from dap3d_core.interface.formats.solids import inertia_moved, total_inertia
 
-#: Mass and inertia of a link without any that moves, as a part of what it carries.
+#: Mass and inertia of a link without any that moves, as a part of what its joint carries.
 STAND_IN = 1e-11
-#: Principal moments below this part of the largest count as zero.
-SMALLEST = 1e-12
+#: Inertias below this part of that of what the joint carries are lost to rounding in a matrix that
+#: holds their reciprocals.
+LIGHT = 1e-9
+#: Principal moments below this part of the largest count as zero, and below this part of that of
+#: what the joint carries: beside it they are below rounding.
+SMALLEST, LOST = 1e-12, 1e-14
 #: Departure from symmetry up to which an inertia matrix counts as symmetric, relative.
 ASYMMETRY = 1e-6
 
@@ -25,13 +29,13 @@ class RigidGroup:
         name: of the link that the others are fixed to; WORLD for what does not move.
         links: the links, with their frames in that one.
         inertial: mass and inertia together, in the axes of that link.
-        has_mass: False where the mass is a stand-in.
+        light: True where mass or inertia are stand-ins, or as small beside what it carries.
     """
 
     name: str
     links: list[tuple[Link, Frame]]
     inertial: Inertial = attrs.Factory(lambda: Inertial(0.0))
-    has_mass: bool = True
+    light: bool = False
 
 
 def rigid_groups(
@@ -62,7 +66,8 @@ def rigid_groups(
         if joint is None and fixed_base:
             member[name] = (WORLD, model.base_poses.get(name, IDENTITY))
             text = "fixed to ground, and its mass without effect; --free-base frees it"
-            remarks.translate(link.place, f"{name} has no joint to a parent: {text}")
+            text = f"{name} has no joint to a parent: {text}"
+            remarks.translate(link.place, text, motion=True)
         elif joint is not None and joint.kind == "fixed":
             group, frame = member[joint.parent]
             if group == WORLD or not keep_fixed:
@@ -105,7 +110,7 @@ def _checked(link: Link, remarks: Remarks, balance_inertia: bool) -> Inertial:
     if least < -ASYMMETRY * scale or least + middle < most * (1.0 - ASYMMETRY):
         if balance_inertia:
             text = "principal moments of inertia that no body has are replaced by their mean"
-            remarks.translate(link.place, text)
+            remarks.translate(link.place, text, motion=True)
             mean = (least + middle + most) / 3.0
             return Inertial(inertial.mass, inertial.com, mean * np.eye(3))
         what = f"link {link.name}: no body has the principal moments of inertia {least:.4g}, "
@@ -123,41 +128,54 @@ def _stand_in(
 ) -> None:
     """Give groups that move without mass, or without inertia, the least that can be computed.
 
-    It is a part of what the group carries. Method ``joint`` loses nothing to rounding by it, since
-    it adds inertias along the tree; a saddle-point matrix would hold its reciprocal.
+    It is a part of what the joint of the group carries, which is what the joint feels: of mass, and
+    of inertia about it. Method ``joint`` loses nothing to rounding by it, since it adds inertias
+    along the tree; a saddle-point matrix would hold its reciprocal.
     """
-    moving = [g for g in groups.values() if g.name != WORLD]
-    masses = [g.inertial.mass for g in moving if g.inertial.mass > 0.0]
-    principal = [np.linalg.eigvalsh(g.inertial.inertia) for g in moving]
-    moments = [m for three in principal for m in three if m > SMALLEST * three[-1]]
-    usual = min(masses, default=1.0), min(moments, default=1.0)
-    carried: dict[str, tuple[float, float]] = {}
+    carried = _carried(tree, groups, member)
+    scales: dict[str, tuple[float, float]] = {WORLD: (1.0, 1.0)}
+    for name in tree.order:
+        if name in groups:
+            joint = tree.placing.get(name)
+            above = scales[WORLD if joint is None else member[joint.parent][0]]
+            own = carried[name]
+            scales[name] = (own[0] or above[0], own[1] or above[1])
+            _complete(groups[name], scales[name], remarks)
+
+
+def _carried(
+    tree: SpanningTree, groups: dict[str, RigidGroup], member: dict[str, tuple[str, Frame]]
+) -> dict[str, tuple[float, float]]:
+    """Mass of each group and of all that it carries, and its mean inertia about its joint."""
+    parts = {name: [group.inertial] for name, group in groups.items()}
+    carried = {}
     for name in reversed(tree.order):
         if name not in groups:
             continue
-        group = groups[name]
-        _complete(group, carried.get(name, usual), remarks)
-        joint = tree.placing.get(name)
+        joint, total = tree.placing.get(name), total_inertia(parts[name])
+        arm = total.com - (np.zeros(3) if joint is None else joint.in_child.r)
+        mean = float(np.trace(total.inertia)) / 3.0 + total.mass * float(arm @ arm) * 2.0 / 3.0
+        carried[name] = total.mass, mean
         if joint is not None:
-            mean = float(np.trace(group.inertial.inertia)) / 3.0
-            own = (group.inertial.mass, mean) if group.has_mass else carried.get(name, usual)
-            carried.setdefault(member[joint.parent][0], own)
+            holder, frame = member[joint.parent]
+            pose = frame @ joint.in_parent @ joint.in_child.inverse()
+            parts[holder].append(inertia_moved(total, pose))
+    return carried
 
 
 def _complete(group: RigidGroup, scale: tuple[float, float], remarks: Remarks) -> None:
     """Complete mass and inertia of a group by parts of a mass and a moment of inertia."""
     place, old = group.links[0][0].place, group.inertial
-    mass = STAND_IN * scale[0]
-    group.has_mass = old.mass > 0.0
     inertia = old.inertia
     least, _, most = np.linalg.eigvalsh(inertia).tolist()
     moment = STAND_IN * max(scale[1], most)
-    if least <= SMALLEST * most:
+    if least <= max(SMALLEST * most, LOST * scale[1]):
         inertia = inertia + (moment - min(least, 0.0)) * np.eye(3)
     if not old.mass:
         text = f"a link without mass that moves has {STAND_IN:g} of the mass that it carries"
         remarks.translate(place, text)
     elif inertia is not old.inertia:
-        text = f"a moment of inertia of 0 is {STAND_IN:g} of the least of the others"
+        text = f"a moment of inertia of 0 is {STAND_IN:g} of that of what the joint carries"
         remarks.translate(place, text)
-    group.inertial = Inertial(old.mass or mass, old.com, inertia)
+    group.light = not old.mass or most < LIGHT * scale[1]
+    group.inertial = Inertial(old.mass or STAND_IN * scale[0], old.com, inertia)

@@ -1,6 +1,5 @@
 """A scene in the making, of an articulated model."""
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -9,6 +8,7 @@ from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.rigid_groups import RigidGroup
 from dap3d_core.interface.formats.articulation import WORLD, Joint
 from dap3d_core.interface.formats.frames import Frame
+from dap3d_core.interface.formats.joint_inertia import JointInertia
 from dap3d_core.interface.formats.remarks import Remarks
 from dap3d_core.scene.scene import Scene
 
@@ -24,15 +24,16 @@ class SceneBuilder:
         groups: by name.
         bodies: group -> name of its body.
         names: names in the scene.
-        positions, rates: joint -> its coordinates where the model starts, and their rates.
+        inertia: the inertias that joints see.
+        limits: what becomes of limits of joints: "off", "soft" or "hard".
     """
 
     scene: Scene
     remarks: Remarks
     groups: dict[str, RigidGroup]
     member: dict[str, tuple[str, Frame]]
-    positions: Mapping[str, Sequence[float]]
-    rates: Mapping[str, Sequence[float]]
+    inertia: JointInertia
+    limits: str
     names: Names = attrs.Factory(Names)
     bodies: dict[str, str] = attrs.Factory(dict)
 

@@ -14,14 +14,23 @@ from dap3d_core.formats.import_scene.rigid_groups import RigidGroup, rigid_group
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
 from dap3d_core.formats.import_scene.shapes import MeshFiles, add_shapes
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
+from dap3d_core.formats.import_scene.start import couples, start_of
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Link
-from dap3d_core.interface.formats.frames import quaternion
+from dap3d_core.interface.formats.frames import IDENTITY, quaternion
+from dap3d_core.interface.formats.joint_inertia import JointInertia
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import GROUND, Scene
 
 #: Steps of a settled result: a model does not say how long to simulate.
 DURATION, STEP = 1.0, 0.01
+#: Limits of joints: left out, springs with dampers, or stops that velocities end at.
+LIMITS = ("off", "soft", "hard")
+
+
+def _checked_limits(_: Any, __: Any, value: Any) -> None:
+    if value not in LIMITS:
+        raise FormatError(f"limits = {value!r}: should be one of {', '.join(LIMITS)}")
 
 
 @attrs.frozen
@@ -32,14 +41,16 @@ class ImportOptions:
         free_base: links without a joint to a parent are free, where the format leaves it open.
         keep_fixed: fixed joints between moving links stay joints.
         balance_inertia: principal moments that no body has are replaced by their mean.
-        positions, rates: of joints where the scene starts, by name.
+        limits: of joints: one of LIMITS.
+        positions, rates: of joints where the scene starts, by name, as the file counts them.
     """
 
     free_base: bool = False
     keep_fixed: bool = False
     balance_inertia: bool = False
-    positions: Mapping[str, Sequence[float]] = attrs.Factory(dict)
-    rates: Mapping[str, Sequence[float]] = attrs.Factory(dict)
+    limits: str = attrs.field(default="soft", validator=_checked_limits)
+    positions: dict[str, Sequence[float]] = attrs.Factory(dict)
+    rates: dict[str, Sequence[float]] = attrs.Factory(dict)
 
 
 def scene_of(
@@ -63,32 +74,44 @@ def scene_of(
         FormatError: the model is no mechanism, or holds a joint without a counterpart.
     """
     options = options or ImportOptions()
+    base_fixed = _is_base_fixed(model, remarks, free_base=options.free_base)
+    limited = options.limits != "off"
+    model = start_of(model, options.positions, options.rates, remarks, limited=limited)
     model = split_planar(model, remarks)
     tree = SpanningTree.of(model)
     groups, member = rigid_groups(
-        tree, remarks, fixed_base=_is_base_fixed(model, remarks, free_base=options.free_base),
-        keep_fixed=options.keep_fixed, balance_inertia=options.balance_inertia,
+        tree, remarks, fixed_base=base_fixed, keep_fixed=options.keep_fixed,
+        balance_inertia=options.balance_inertia,
     )  # fmt: skip
     if len(groups) == 1:
         raise FormatError("no link of the model moves", model.place)
     for joint in tree.loops:
         if joint.name in options.positions or joint.name in options.rates:
             text = f"position or rate of {joint.name}: the joint closes a loop, the others place it"
-            remarks.translate(joint.place, text)
-    placed = tree.place(options.positions, options.rates)
+            remarks.translate(joint.place, text, motion=True)
+    placed = tree.place()
     scene = Scene(name=model.name)
     scene.simulation.t_end, scene.simulation.dt = DURATION, STEP
-    if not all(group.has_mass for group in groups.values()):
+    if any(group.light for group in groups.values()):
         scene.simulation.method = "joint"
-        text = "method joint, for links without mass: others lose digits to them"
+        text = "method joint, for links without mass or inertia: others lose digits to them"
         remarks.translate(model.place, text)
-    builder = SceneBuilder(scene, remarks, groups, member, options.positions, options.rates,
+    builder = SceneBuilder(scene, remarks, groups, member, _inertia(tree, groups), options.limits,
                            names or Names())  # fmt: skip
     builder.bodies[WORLD] = GROUND
     for group in groups.values():
         if group.name != WORLD:
             _add_body(builder, group, placed[group.name])
     _add_gravity(scene, model.gravity)
+    _add_joints(builder, model)
+    for group in groups.values():
+        for link, _ in group.links:
+            add_shapes(builder, link, MeshFiles() if meshes is None else meshes)
+    return scene
+
+
+def _add_joints(builder: SceneBuilder, model: Articulation) -> None:
+    """Add joints, what acts in them, and what couples them."""
     for joint in model.joints.values():
         if builder.moves_alone(joint):
             continue
@@ -97,10 +120,22 @@ def scene_of(
         add_joint_forces(builder, joint)
     add_couplings(builder, model)
     add_inputs(builder, model)
-    for group in groups.values():
-        for link, _ in group.links:
-            add_shapes(builder, link, MeshFiles() if meshes is None else meshes)
-    return scene
+
+
+def _inertia(tree: SpanningTree, groups: Mapping[str, RigidGroup]) -> JointInertia:
+    """The inertias that joints see: of the bodies of the scene, with loops and couplings."""
+    model, placing = tree.model, dict(tree.placing)
+    links = {
+        name: Link(name, groups[name].inertial if name in groups else None) for name in model.links
+    }
+    poses = {WORLD: IDENTITY}
+    for name in tree.roots:
+        pose = poses[name] = model.base_poses.get(name, IDENTITY)
+        if name in groups:
+            placing[name] = Joint(name, "free", WORLD, name,
+                                  position=(*pose.r.tolist(), *quaternion(pose.A)))  # fmt: skip
+    couplings = [one for one in model.couplings if couples(model, one)]
+    return JointInertia(links, placing, tree.order, couplings, tree.loops, poses)
 
 
 def _is_base_fixed(model: Articulation, remarks: Remarks, *, free_base: bool) -> bool:
@@ -109,7 +144,8 @@ def _is_base_fixed(model: Articulation, remarks: Remarks, *, free_base: bool) ->
         return model.fixed_base
     moves = any(joint.kind != "fixed" for joint in model.joints.values())
     if not moves and not free_base:
-        remarks.translate(model.place, "no joint of the model moves: its base is free")
+        text = "no joint of the model moves: its base is free"
+        remarks.translate(model.place, text, motion=True)
     return moves and not free_base
 
 
@@ -169,7 +205,8 @@ def split_planar(model: Articulation, remarks: Remarks) -> Articulation:
             part = name if k == 2 else between[k]
             joints[part] = Joint(
                 part, kind, ends[k], ends[k + 1], axes=(tuple(axis),), position=(q[k],),
-                damping=joint.damping, friction=joint.friction, place=joint.place,
+                rate=joint.rate[k : k + 1], damping=joint.damping, friction=joint.friction,
+                place=joint.place,
             )  # fmt: skip
         joints[between[0]].in_parent, joints[name].in_child = joint.in_parent, joint.in_child
     return attrs.evolve(model, links=links, joints=joints)

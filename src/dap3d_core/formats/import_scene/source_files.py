@@ -31,6 +31,8 @@ class SourceFiles:
         packages: name of a package -> its folder.
         allow_code: whether the user allows that code of the file is run.
         shapes: whether files of shapes are looked for.
+        arguments: of macros, by name.
+        unused: names of arguments that the file has not asked for.
         remarks: of the import.
         text: replaces the contents of the file, as the output of a macro processor.
     """
@@ -40,6 +42,8 @@ class SourceFiles:
     packages: Mapping[str, Path] = attrs.Factory(dict)
     allow_code: bool = False
     shapes: bool = True
+    arguments: Mapping[str, str] = attrs.Factory(dict)
+    unused: set[str] = attrs.Factory(lambda self: set(self.arguments), takes_self=True)
     remarks: Remarks = attrs.Factory(Remarks)
     text: bytes | str | None = None
     _open: list[Path] = attrs.Factory(list)

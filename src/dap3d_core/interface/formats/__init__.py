@@ -22,6 +22,8 @@ from dap3d_core.interface.formats.frames import (
     rpy,
     rpy_of,
 )
+from dap3d_core.interface.formats.joint_inertia import LEAST, JointInertia
+from dap3d_core.interface.formats.joint_motion import held
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Place, Remark, Remarks
 from dap3d_core.interface.formats.solids import (
     inertia_moved,
@@ -35,6 +37,7 @@ from dap3d_core.interface.types import INTERFACE_VERSION
 __all__ = [
     "IDENTITY",
     "INTERFACE_VERSION",
+    "LEAST",
     "NOWHERE",
     "WORLD",
     "Actuator",
@@ -47,6 +50,7 @@ __all__ = [
     "Importer",
     "Inertial",
     "Joint",
+    "JointInertia",
     "Limits",
     "Link",
     "Place",
@@ -57,6 +61,7 @@ __all__ = [
     "axis_angle",
     "euler_angles",
     "from_quaternion",
+    "held",
     "hookimpl",
     "inertia_moved",
     "inertia_of_mesh",

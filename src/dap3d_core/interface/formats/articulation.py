@@ -4,13 +4,14 @@ Every importer makes one and every exporter is given one, so that a format is tr
 each direction. Lengths in m, angles in rad, masses in kg.
 """
 
+from math import inf, isfinite
 from typing import Any
 
 import attrs
 import numpy as np
 
 from dap3d_core.interface.formats.frames import IDENTITY, Frame
-from dap3d_core.interface.formats.remarks import NOWHERE, Place
+from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Place
 from dap3d_core.kernels.array_types import Floats
 
 #: The name of what does not move, as parent or child of a joint.
@@ -22,6 +23,8 @@ KINDS = {
     "fixed": 0, "revolute": 1, "prismatic": 1, "screw": 1, "cylindrical": 2, "universal": 2,
     "ball": 3, "planar": 3, "free": 6,
 }  # fmt: skip
+#: Limits of this size and beyond are none, rad or m: files have 1e16, and the largest numbers.
+UNLIMITED = 1e6
 
 
 def _floats(value: Any) -> Floats:
@@ -86,18 +89,47 @@ class Link:
     place: Place = NOWHERE
 
 
+def _lower(value: float) -> float:
+    return value if value > -UNLIMITED else -inf
+
+
+def _upper(value: float) -> float:
+    return value if value < UNLIMITED else inf
+
+
 @attrs.frozen
 class Limits:
     """Limits of a coordinate.
 
     Attributes:
-        lower, upper: rad or m; infinite for none.
+        lower, upper: rad or m; infinite for none, also for those of files beyond UNLIMITED.
         stiffness: of the stops, N m/rad or N/m; None where the format says none.
     """
 
-    lower: float = -float("inf")
-    upper: float = float("inf")
+    lower: float = attrs.field(default=-inf, converter=_lower)
+    upper: float = attrs.field(default=inf, converter=_upper)
     stiffness: float | None = None
+
+    @property
+    def finite(self) -> bool:
+        """True if there is a limit on one side at least."""
+        return isfinite(self.lower) or isfinite(self.upper)
+
+    @classmethod
+    def between(
+        cls, lower: float, upper: float, joint: str, place: Place, stiffness: float | None = None
+    ) -> "Limits":
+        """The limits of a joint that a file gives.
+
+        Raises:
+            FormatError: no coordinate lies between them.
+        """
+        if not lower <= upper or lower == inf or upper == -inf:
+            what = f"joint {joint}: lower = {lower:g} lies above upper = {upper:g}"
+            if lower == upper:
+                what = f"joint {joint}: no coordinate is as large as its limits, {lower:g}"
+            raise FormatError(what, place)
+        return cls(lower, upper, stiffness)
 
 
 @attrs.define(eq=False)
@@ -115,7 +147,8 @@ class Joint:
         limits, damping, friction, stiffness, rest, armature: of each coordinate: a number, or a
             tuple for kinds with several axes. Forces are N m or N; ``rest`` is the coordinate
             without force of the spring.
-        position: coordinate or coordinates where the model starts.
+        reference: the coordinate in the file where the joint's is zero, as ``ref`` of MJCF.
+        position, rate: coordinate or coordinates where the model starts, and their rates.
         closes: True for a joint that closes a loop: it does not place its child.
         place: its place in the file.
     """
@@ -134,7 +167,9 @@ class Joint:
     stiffness: tuple[float, ...] = (0.0,)
     rest: tuple[float, ...] = (0.0,)
     armature: tuple[float, ...] = (0.0,)
+    reference: float = 0.0
     position: tuple[float, ...] = ()
+    rate: tuple[float, ...] = ()
     closes: bool = False
     place: Place = NOWHERE
 

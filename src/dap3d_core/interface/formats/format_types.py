@@ -27,12 +27,17 @@ class Source(Protocol):
         remarks: takes what is translated with a difference and what is left out.
         allow_code: whether the user allows that code of the file is run.
         packages: name of a package -> its folder.
+        arguments: values that the user gives for names in the file, as those of macros.
+        unused: names of arguments; an importer removes those that the file has, and what is left is
+            refused.
     """
 
     path: Path
     remarks: Remarks
     allow_code: bool
     packages: Mapping[str, Path]
+    arguments: Mapping[str, str]
+    unused: set[str]
 
     def xml(self) -> XmlElement:
         """The root of the file itself."""

@@ -46,11 +46,13 @@ class Remark:
         place: the place in the file.
         text: the remark.
         count: number of places with the same remark, of which this is the first.
+        motion: True where the difference changes the motion.
     """
 
     place: Place
     text: str
     count: int = 1
+    motion: bool = False
 
     def __str__(self) -> str:
         more = f" ({self.count} times)" if self.count > 1 else ""
@@ -61,6 +63,8 @@ class Remark:
 @attrs.define
 class Remarks:
     """Remarks on an import or export, each once, with the first of its places.
+
+    Those of what changes the motion come first.
 
     Attributes:
         translated: contents that the scene says in another way, with the difference.
@@ -73,27 +77,29 @@ class Remarks:
     @property
     def translated(self) -> tuple[Remark, ...]:
         """Contents that the scene says in another way, with the difference."""
-        return tuple(self._translated.values())
+        return _ordered(self._translated)
 
     @property
     def left_out(self) -> tuple[Remark, ...]:
         """Contents without a counterpart."""
-        return tuple(self._left_out.values())
+        return _ordered(self._left_out)
 
-    def translate(self, place: Place, text: str) -> None:
-        """Remark that something is said in another way."""
-        _add(self._translated, place, text)
+    def translate(self, place: Place, text: str, *, motion: bool = False) -> None:
+        """Remark that something is said in another way, with ``motion`` if that changes it."""
+        _add(self._translated, place, text, motion)
 
-    def leave_out(self, place: Place, text: str) -> None:
-        """Remark that something is left out, and why."""
-        _add(self._left_out, place, text)
+    def leave_out(self, place: Place, text: str, *, motion: bool = False) -> None:
+        """Remark that something is left out, and why, with ``motion`` if that changes it."""
+        _add(self._left_out, place, text, motion)
 
     def __iter__(self) -> Iterator[Remark]:
         yield from (*self.translated, *self.left_out)
 
 
-def _add(remarks: dict[str, Remark], place: Place, text: str) -> None:
-    first = remarks.get(text)
-    remarks[text] = (
-        Remark(place, text) if first is None else attrs.evolve(first, count=first.count + 1)
-    )
+def _ordered(remarks: dict[str, Remark]) -> tuple[Remark, ...]:
+    return tuple(sorted(remarks.values(), key=lambda one: not one.motion))
+
+
+def _add(remarks: dict[str, Remark], place: Place, text: str, motion: bool) -> None:
+    first = remarks.get(text, Remark(place, text, 0))
+    remarks[text] = attrs.evolve(first, count=first.count + 1, motion=first.motion or motion)

@@ -57,17 +57,24 @@ class XmlElement:
             raise FormatError(f"<{self.name}> has no {key}; it is required", self.place)
         return value
 
-    def number(self, key: str, default: float | None = None) -> float:
+    def number(self, key: str, default: float | None = None, *, unbounded: bool = False) -> float:
         """An attribute that is a number.
+
+        Args:
+            key: the attribute.
+            default: where it is missing.
+            unbounded: it may be infinite, or the largest number of a program, as limits are.
 
         Raises:
             FormatError: it is no finite number, or missing without a default.
         """
         if default is not None and key not in self.attributes:
             return default
-        return self.numbers(key, 1)[0]
+        return self.numbers(key, 1, unbounded=unbounded)[0]
 
-    def numbers(self, key: str, count: int | None = None, default: Any = None) -> tuple[float, ...]:
+    def numbers(
+        self, key: str, count: int | None = None, default: Any = None, *, unbounded: bool = False
+    ) -> tuple[float, ...]:
         """An attribute of several numbers, separated by spaces.
 
         Raises:
@@ -76,30 +83,34 @@ class XmlElement:
         if default is not None and key not in self.attributes:
             return tuple(default)
         label = f"{key} of <{self.name}>"
-        return numbers_in(self.require(key), label, self.place, count)
+        return numbers_in(self.require(key), label, self.place, count, unbounded=unbounded)
 
-    def content(self, count: int | None = None) -> tuple[float, ...]:
+    def content(self, count: int | None = None, *, unbounded: bool = False) -> tuple[float, ...]:
         """The numbers in its text.
 
         Raises:
             FormatError: they are not ``count`` finite numbers.
         """
-        return numbers_in(self.text, f"<{self.name}>", self.place, count)
+        return numbers_in(self.text, f"<{self.name}>", self.place, count, unbounded=unbounded)
 
 
-def numbers_in(text: str, label: str, place: Place, count: int | None) -> tuple[float, ...]:
+def numbers_in(
+    text: str, label: str, place: Place, count: int | None, *, unbounded: bool = False
+) -> tuple[float, ...]:
     """Numbers separated by spaces.
 
     Raises:
-        FormatError: they are not ``count`` finite numbers.
+        FormatError: they are not ``count`` numbers, finite ones unless ``unbounded``.
     """
     try:
         values = tuple(map(float, text.split()))
     except ValueError:
         values = (math.nan,)
-    if (count is not None and len(values) != count) or not all(abs(x) <= LARGEST for x in values):
-        wanted = {None: "finite numbers", 1: "a finite number"}.get(
-            count, f"{count} finite numbers"
+    largest = math.inf if unbounded else LARGEST
+    if (count is not None and len(values) != count) or not all(abs(x) <= largest for x in values):
+        finite = "" if unbounded else "finite "
+        wanted = {None: f"{finite}numbers", 1: f"a {finite}number"}.get(
+            count, f"{count} {finite}numbers"
         )
         shown = text.strip() if len(text) <= 60 else f"{text.strip()[:56]} ..."
         raise FormatError(f"{label} = {shown!r} should be {wanted}", place)
@@ -109,6 +120,8 @@ def numbers_in(text: str, label: str, place: Place, count: int | None) -> tuple[
 def parse_xml(text: str | bytes, file: str) -> XmlElement:
     """The root of an XML document.
 
+    Its comments may hold ``--``: XML forbids it, and the readers of Gazebo and MuJoCo allow it.
+
     Raises:
         FormatError: it is not well-formed, has a document type, or too many or too deep elements.
     """
@@ -117,11 +130,35 @@ def parse_xml(text: str | bytes, file: str) -> XmlElement:
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
+        # Latin-1 has a character for each byte, whatever the encoding is
+        bare = _repaired(text if isinstance(text, str) else text.decode("latin-1"))
+        repaired = bare if isinstance(text, str) else bare.encode("latin-1")
+        if repaired != text:
+            return parse_xml(repaired, file)
         what = f"is not well-formed XML: {expat.errors.messages[error.code]}"
         raise FormatError(what, Place(file, error.lineno)) from None
     except (UnicodeError, LookupError, ValueError) as error:
         raise FormatError(f"is no text that can be read: {error}", Place(file)) from None
     return builder.root
+
+
+def _repaired(text: str) -> str:
+    """The text with an empty comment for each that holds ``--``; lines keep their numbers."""
+    parts, done = [], 0
+    while (start := text.find("<!--", done)) >= 0:
+        data = text.find("<![CDATA[", done, start)
+        opening, closing = (start + 4, "-->") if data < 0 else (data, "]]>")
+        stop = text.find(closing, opening)
+        if stop < 0:
+            break
+        after = stop + len(closing)
+        comment = "" if data >= 0 else text[opening:stop]
+        if "--" in comment or comment.endswith("-"):
+            parts.append(text[done:start] + "<!--" + "\n" * comment.count("\n") + "-->")
+        else:
+            parts.append(text[done:after])
+        done = after
+    return "".join([*parts, text[done:]])
 
 
 class _Builder:

@@ -36,9 +36,11 @@ SDF = """
 </model></sdf>
 """
 MIMIC = '<mimic joint="two" axis="axis"><multiplier>2</multiplier></mimic>'
-# theta of the parent = -ratio theta of the child, each against the reference body
-GEARBOX = """<joint name="g" type="gearbox"><parent>a</parent><child>b</child>
-  <gearbox_ratio>2</gearbox_ratio><gearbox_reference_body>world</gearbox_reference_body></joint>"""
+# theta of the child about axis2 = -ratio theta of the parent about axis, each against the reference
+# body (sdformat.org/spec, joint, gearbox_ratio)
+GEARBOX = """<joint name="g" type="gearbox"><parent>b</parent><child>a</child>
+  <gearbox_ratio>2</gearbox_ratio><gearbox_reference_body>world</gearbox_reference_body>
+  <axis><xyz>0 0 1</xyz></axis><axis2><xyz>0 0 -1</xyz></axis2></joint>"""
 MJCF = """
 <mujoco model="two"><worldbody>
   <body name="a"><joint name="one" axis="0 0 1"/>
@@ -59,7 +61,7 @@ TENDON = """<tendon><fixed name="t">
     [
         (".urdf", URDF, 0.0),
         (".sdf", SDF.format(mimic=MIMIC, sign="", gearbox=""), 0.0),
-        (".sdf", SDF.format(mimic="", sign="-", gearbox=GEARBOX), 0.0),
+        (".sdf", SDF.format(mimic="", sign="", gearbox=GEARBOX), 0.0),
         (".xml", MJCF.format(armature=0.0, more=EQUALITY), 0.0),
         (".xml", MJCF.format(armature=ARMATURE, more=EQUALITY), ARMATURE),
         (".xml", MJCF.format(armature=0.0, more=TENDON), 0.0),
