@@ -20,7 +20,10 @@ from dap3d_core.simulation.kinematics.driver_coordinate import driver_names
 
 @attrs.frozen(eq=False)
 class DriverActuator:
-    """A driver, whose multiplier is its force: it holds no position any more.
+    """A driver, whose force takes the place of its multiplier: it holds no position any more.
+
+    The force is that on a body, N, or the moment, N m, however long the row of the driver is: that
+    of a driven leg is d, not a unit vector.
 
     Attributes:
         name: of the joint.
@@ -31,9 +34,11 @@ class DriverActuator:
     row: int
 
     def wrench(self, t: float, D: Floats) -> Floats:
-        """(6 n,) force and moment on each body of a multiplier of one; D: (rows, 6 n)."""
-        unit: Floats = D[self.row]
-        return unit
+        """(6 n,) force and moment on each body of a force or moment of one; D: (rows, 6 n)."""
+        row = D[self.row]
+        forces, moments = row.reshape(-1, 2, 3).transpose(1, 0, 2)
+        size = np.linalg.norm(forces if forces.any() else moments, axis=1).max()
+        return np.asarray(row / size if size else row)
 
     def unit(self, D: Floats) -> str:
         """Unit of its force: N of a row that holds translations."""
