@@ -9,14 +9,14 @@ interface_version = 1
 class SphericalSpherical(Joint):
     """The distance of P_i and P_j stays the length of a massless link (manual: ``sph-sph``).
 
-    Spec 4.3. One row, with d the vector from P_i to P_j and l its length:
+    With a function of time it is a driven leg, without mass: l = length + f, and a growing f
+    increases the length (``Leg``). Spec 4.3. One row, with d the vector from P_i to P_j and l its length:
 
         C     = (d . d - l^2) / 2
         J_i   = [-d^T, -(s_i x d)^T],  J_j = [d^T, (s_j x d)^T]
         gamma = d . (w_i x s_i_dot - w_j x s_j_dot) - d_dot . d_dot
 
-    lambda |d| is the force in the link, negative in tension; also with a function of time, which
-    makes of it a driven leg, without mass: l = length + f, which a growing f makes longer (``Leg``).
+    lambda |d| is the force in the link, negative in tension, also with a function.
     """
 
     keyword, rows = "sph-sph", 1

@@ -217,8 +217,7 @@ def _product(one: Carried, other: Carried) -> Carried:
             return one * other
         one, other = other, one
     if isinstance(other, float):
-        size = abs(other)
-        return one if size in (0.0, 1.0) else one._replace(factor=one.factor * size, exact=False)
+        return one._replace(factor=one.factor * (abs(other) or 1.0), exact=False)
     if one.powers is None or other.powers is None:
         return UNKNOWN
     powers = {symbol: one.powers.get(symbol, Fraction(0)) + other.powers.get(symbol, Fraction(0))
