@@ -35,10 +35,13 @@ class DriverActuator:
 
     def wrench(self, t: float, D: Floats) -> Floats:
         """(6 n,) force and moment on each body of a force or moment of one; D: (rows, 6 n)."""
-        row = D[self.row]
-        forces, moments = row.reshape(-1, 2, 3).transpose(1, 0, 2)
-        size = np.linalg.norm(forces if forces.any() else moments, axis=1).max()
-        return np.asarray(row / size if size else row)
+        return np.asarray(D[self.row] / self.size(D))
+
+    def size(self, D: Floats) -> float:
+        """The force, or moment, of a multiplier of one; 1 where it does nothing."""
+        forces, moments = D[self.row].reshape(-1, 2, 3).transpose(1, 0, 2)
+        sizes = np.linalg.norm(forces if forces.any() else moments, axis=1)
+        return float(sizes.max()) or 1.0
 
     def unit(self, D: Floats) -> str:
         """Unit of its force: N of a row that holds translations."""
