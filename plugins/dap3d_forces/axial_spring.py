@@ -19,15 +19,16 @@ interface_version = 1
 class AxialSpring(Force):
     """Spring, damper and actuator, in parallel, along the axis a_j of body j.
 
-    What ``rot_sda`` is for hinges, for sliders: x is how far P_i lies beyond P_j along a_j, of any
-    sign, and x_dot its rate as seen from body j. With d = r_Pi - r_Pj:
+    A positive f_a increases x, and with it the length that a ``tran`` or ``cyl`` of the same bodies
+    i and j reports. x is how far P_i lies beyond P_j along a_j, of any sign, and x_dot its rate as
+    seen from body j. With d = r_Pi - r_Pj:
 
         x = a_j . d,  x_dot = a_j . (v_Pi - v_Pj - w_j x d)
-        F = k (x - x_0) + c x_dot + f_a,  force -F a_j at P_i on body i, F a_j there on body j
-        energy = k (x - x_0)^2 / 2 + f_a x
+        F = k (x - x_0) + c x_dot - f_a,  force -F a_j at P_i on body i, F a_j there on body j
+        energy = k (x - x_0)^2 / 2 - f_a x
 
-    A function of x - x_0 takes the place of k (x - x_0), without an energy. An input multiplies
-    f_a, which then counts as work.
+    What ``rot_sda`` is for hinges, for sliders. A function of x - x_0 takes the place of
+    k (x - x_0), without an energy. An input multiplies f_a, which then counts as work.
     """
 
     keyword = "tran_sda"
@@ -38,17 +39,17 @@ class AxialSpring(Force):
     k: float = number(default=0.0, unit="N/m", usual=(0.0, None), doc="stiffness")
     c: float = number(default=0.0, unit="N s/m", usual=(0.0, None), doc="damping coefficient")
     x_0: float = number(default=0.0, unit="m", doc="x without force of the spring")
-    f_a: float = number(default=0.0, unit="N", doc="force of the actuator, as of a spring")
+    f_a: float = number(default=0.0, unit="N", doc="force of the actuator; x grows by it")
     input: str = input_(doc="factor of f_a, an input")
     function: str = function(argument="x - x_0", doc="force, N, in place of k (x - x_0)")
 
     def wrench(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j, s_P_i, r_j, k, c, x_0, f_a):
         x, x_dot = along(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j)
-        return pull(k * (x - x_0) + c * x_dot + f_a, a_j, s_P_i, r_P_i, r_j)
+        return pull(k * (x - x_0) + c * x_dot - f_a, a_j, s_P_i, r_P_i, r_j)
 
     def energy(a_j, r_P_i, r_P_j, k, x_0, f_a):
         x = dot(a_j, sub(r_P_i, r_P_j))
-        return 0.5 * k * (x - x_0) * (x - x_0) + f_a * x
+        return 0.5 * k * (x - x_0) * (x - x_0) - f_a * x
 
 
 class Actuated(AxialSpring, function=False, input=True):
@@ -58,7 +59,7 @@ class Actuated(AxialSpring, function=False, input=True):
 
     def wrench(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j, s_P_i, r_j, k, c, x_0, f_a, input):
         x, x_dot = along(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j)
-        return pull(k * (x - x_0) + c * x_dot + input * f_a, a_j, s_P_i, r_P_i, r_j)
+        return pull(k * (x - x_0) + c * x_dot - input * f_a, a_j, s_P_i, r_P_i, r_j)
 
     def energy(a_j, r_P_i, r_P_j, k, x_0):
         x = dot(a_j, sub(r_P_i, r_P_j)) - x_0
@@ -72,7 +73,7 @@ class Curve(AxialSpring, function=True, input=False):
 
     def wrench(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j, s_P_i, r_j, c, x_0, f_a, f):
         x, x_dot = along(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j)
-        return pull(f(x - x_0) + c * x_dot + f_a, a_j, s_P_i, r_P_i, r_j)
+        return pull(f(x - x_0) + c * x_dot - f_a, a_j, s_P_i, r_P_i, r_j)
 
 
 class ActuatedCurve(AxialSpring, function=True, input=True):
@@ -82,7 +83,7 @@ class ActuatedCurve(AxialSpring, function=True, input=True):
 
     def wrench(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j, s_P_i, r_j, c, x_0, f_a, f, input):
         x, x_dot = along(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j)
-        return pull(f(x - x_0) + c * x_dot + input * f_a, a_j, s_P_i, r_P_i, r_j)
+        return pull(f(x - x_0) + c * x_dot - input * f_a, a_j, s_P_i, r_P_i, r_j)
 
 
 def along(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j):

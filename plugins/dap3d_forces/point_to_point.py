@@ -9,7 +9,8 @@ interface_version = 1
 class PointToPoint(Force):
     """Spring, damper and actuator, in parallel, on the line from P_i to P_j (manual: ``ptp``).
 
-    Spec 6. With l = |d|, u = d / l and l_dot = u . d_dot, tension positive:
+    Sign of the manual: a positive f_a is a tension, and decreases the length. Spec 6. With
+    l = |d|, u = d / l and l_dot = u . d_dot:
 
         F = k (l - l0) + c l_dot + f_a,  force F u at P_i on body i and -F u at P_j on body j
         energy = k (l - l0)^2 / 2 + f_a l

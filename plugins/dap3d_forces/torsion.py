@@ -21,8 +21,10 @@ ZERO = (0.0, 0.0, 0.0)
 class Torsion(Force):
     """Spring, damper and actuator, in parallel, about an axis u common to two bodies.
 
-    Manual: ``rot_sda``; spec 6. theta is the angle of body j relative to body i about u, from v_i
-    to v_j, both projected on the plane normal to u; theta_dot = u . (w_j - w_i):
+    A positive n_a increases the angle that a ``rev`` or ``cyl`` about u of the same bodies i and j
+    reports; it decreases theta, which has the sign of the manual (``rot_sda``; spec 6): theta is
+    the angle of body j relative to body i about u, from v_i to v_j, both projected on the plane
+    normal to u; theta_dot = u . (w_j - w_i):
 
         theta = atan2(u . (v_i x v_j), v_i . v_j - (v_i . u) (v_j . u))
         T = k x + c theta_dot + n_a, moment T u on body i and -T u on body j
@@ -45,7 +47,7 @@ class Torsion(Force):
     k: float = number(default=0.0, unit="N m/rad", usual=(0.0, None), doc="stiffness")
     c: float = number(default=0.0, unit="N m s/rad", usual=(0.0, None), doc="damping coefficient")
     theta_0: float = number(default=0.0, unit="rad", doc="angle without moment of the spring")
-    n_a: float = number(default=0.0, unit="N m", doc="moment of the actuator, as of a spring")
+    n_a: float = number(default=0.0, unit="N m", doc="moment of the actuator; theta falls by it")
     turns: bool = choice((False, True), default=False, doc="whether whole turns are counted")
     input: str = input_(doc="factor of n_a, an input")
     function: str = function(argument="theta - theta_0", doc="moment, N m, in place of k x")

@@ -9,27 +9,28 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 class DrivenRotation(Joint):
-    """Body j has turned against body i about a_j, since the start, by theta = f(t) - f(0).
+    """Body i has turned against body j about a_j, since the start, by theta = f(t) - f(0).
 
-    As ``rel-rot``, and held at position level too, so that the angle does not drift; spec 4.7.
-    Without a function it locks the angle. n_j and m_j complete a_j to a triad on body j; u_i,
-    fixed in body i, is n_j in the poses as given. With X = n_j . u_i, Y = m_j . u_i and
-    Z = a_j . u_i, theta = -atan2(Y, X), and C is brought into (-pi, pi]:
+    A growing f increases the angle that a ``rev`` or ``cyl`` of the same bodies i and j reports.
+    ``rel-rot`` has the opposite sign, that of the manual, and no position level: there the angle
+    drifts. Without a function it locks the angle. Spec 4.7; n_j and m_j complete a_j to a triad on
+    body j; u_i, fixed in body i, is n_j in the poses as given. With X = n_j . u_i, Y = m_j . u_i
+    and Z = a_j . u_i, theta = atan2(Y, X), and C is brought into (-pi, pi]:
 
         C     = theta - (f - f_0)
         h     = a_j - Z (X n_j + Y m_j) / (X^2 + Y^2) = (a_j - Z u_i) / (1 - Z^2)
-        J_i   = [0, -h^T],  J_j = [0, h^T],  nu = f_dot
-        gamma = f_ddot - h_dot . (w_j - w_i)
+        J_i   = [0, h^T],  J_j = [0, -h^T],  nu = f_dot
+        gamma = f_ddot - h_dot . (w_i - w_j)
 
     h = a_j where a revolute or cylindrical joint holds a_j along the same axis of body i. Turns
-    are not counted, nor need they be. With ground as body j a growing f turns body i about -a_j.
+    are not counted, nor need they be.
     """
 
     keyword, rows = "drive-rot", 1
     symbol = "ring"
     drives = True
-    body_i: Body = body(doc="body whose rotation the driver is measured from")
-    body_j: Body = body(default="ground", doc="body that is turned")
+    body_i: Body = body(doc="body that is turned")
+    body_j: Body = body(default="ground", doc="body that the rotation is measured from")
     a_j: Vector = vector(doc="axis, on body j")
     function: str = function(doc="angle, rad, as a function of time; counted from f(0)")
 
@@ -41,12 +42,12 @@ class DrivenRotation(Joint):
     def C(n_j, m_j, u_i, f, f_0):
         X, Y = dot(n_j, u_i), dot(m_j, u_i)
         c, s = cos(f - f_0), sin(f - f_0)
-        return atan2(-(X * s + Y * c), X * c - Y * s)
+        return atan2(Y * c - X * s, X * c + Y * s)
 
     def J(a_j, u_i):
         Z = dot(a_j, u_i)
         h = scale(1.0 / (1.0 - Z * Z), sub(a_j, scale(Z, u_i)))
-        return row(ZERO, neg(h)), row(ZERO, h)
+        return row(ZERO, h), row(ZERO, neg(h))
 
     def nu(f_dot):
         return f_dot
@@ -57,7 +58,7 @@ class DrivenRotation(Joint):
         h = scale(square, sub(a_j, scale(Z, u_i)))
         turn = sub(a_j_dot, add(scale(Z_dot, u_i), scale(Z, u_i_dot)))
         h_dot = scale(square, add(turn, scale(2.0 * Z * Z_dot, h)))
-        return f_ddot - dot(h_dot, sub(w_j, w_i))
+        return f_ddot - dot(h_dot, sub(w_i, w_j))
 
 
 @hookimpl

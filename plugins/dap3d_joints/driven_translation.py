@@ -1,4 +1,4 @@
-"""Translation driver at position level: prescribes how far one point lies from another."""
+"""Translation driver at position level: prescribes how far one point lies beyond another."""
 
 from dap3d_core.interface import (
     Body,
@@ -18,22 +18,23 @@ interface_version = 1
 
 
 class DrivenTranslation(Joint):
-    """Point P_j lies a prescribed distance beyond P_i along a_j.
+    """Point P_i lies a prescribed distance beyond P_j along a_j.
 
-    As ``rel-tran``, but at position level, of any two points, and right where body j turns; spec
-    4.8. Without points those of the mass centres; without a function it locks the distance. With
-    d = r_Pj - r_Pi:
+    A growing f increases the length that a ``tran`` or ``cyl`` of the same bodies i and j reports.
+    ``rel-tran`` has the opposite sign, that of the manual, and no position level; this one takes
+    any two points, and is right where body j turns. Spec 4.8; without points those of the mass
+    centres; without a function it locks the distance. With d = r_Pj - r_Pi:
 
-        C     = a_j . d - length - f                 length given
-        C     = a_j . (d - d(0)) - (f - f_0)         length left out: C = 0 in the poses as given
-        J_i   = [-a_j^T, -(s_i x a_j)^T],  J_j = [a_j^T, ((s_j - d) x a_j)^T],  nu = f_dot
-        gamma = (w_i x s_i_dot) . a_j + (w_j x d + s_j_dot - 2 d_dot) . a_j_dot + f_ddot
+        C     = -a_j . d - length - f                length given
+        C     = a_j . (d(0) - d) - (f - f_0)         length left out: C = 0 in the poses as given
+        J_i   = [a_j^T, (s_i x a_j)^T],  J_j = [-a_j^T, ((d - s_j) x a_j)^T],  nu = f_dot
+        gamma = f_ddot - (w_i x s_i_dot) . a_j - (w_j x d + s_j_dot - 2 d_dot) . a_j_dot
     """
 
     keyword, rows = "drive-tran", 1
     drives = True
-    body_i: Body = body(default=None, doc="body the motion is measured from; that of P_i")
-    body_j: Body = body(default=None, doc="body that is moved; that of P_j and a_j")
+    body_i: Body = body(default=None, doc="body that is moved; that of P_i")
+    body_j: Body = body(default=None, doc="body the motion is measured from; that of P_j and a_j")
     P_i: Point = point(default=None, doc="on body i; the mass centre when left out")
     P_j: Point = point(default=None, doc="on body j; the mass centre when left out")
     a_j: Vector = vector(doc="direction, on body j")
@@ -45,15 +46,15 @@ class DrivenTranslation(Joint):
     def prepare(self, bodies):
         if self.length is not None:
             return {"length": self.length, "counted": 0.0}
-        d = sub(bodies["j"].place(self.P_j), bodies["i"].place(self.P_i))
+        d = sub(bodies["i"].place(self.P_i), bodies["j"].place(self.P_j))
         return {"length": dot(bodies["j"].to_global(self.a_j), d), "counted": 1.0}
 
     def C(a_j, r_P_i, r_P_j, length, counted, f, f_0):
-        return dot(a_j, sub(r_P_j, r_P_i)) - length - (f - counted * f_0)
+        return dot(a_j, sub(r_P_i, r_P_j)) - length - (f - counted * f_0)
 
     def J(a_j, s_P_i, r_P_i, r_j):
         arm = sub(r_P_i, r_j)  # s_j - d
-        return row(neg(a_j), neg(cross(s_P_i, a_j))), row(a_j, cross(arm, a_j))
+        return row(a_j, cross(s_P_i, a_j)), row(neg(a_j), neg(cross(arm, a_j)))
 
     def nu(f_dot):
         return f_dot
@@ -61,7 +62,7 @@ class DrivenTranslation(Joint):
     def gamma(a_j, a_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j, f_ddot):
         d, d_dot = sub(r_P_j, r_P_i), sub(v_P_j, v_P_i)
         slide = sub(add(cross(w_j, d), s_P_j_dot), scale(2.0, d_dot))
-        return dot(cross(w_i, s_P_i_dot), a_j) + dot(slide, a_j_dot) + f_ddot
+        return f_ddot - dot(cross(w_i, s_P_i_dot), a_j) - dot(slide, a_j_dot)
 
 
 @hookimpl

@@ -11,6 +11,9 @@ ZERO = (0.0, 0.0, 0.0)
 class Follower(Joint):
     """The rate of body i against body j about a_j is ``ratio`` times that of body k about a_k.
 
+    It transmits moments about the axes, or along a_j a force, and no force of teeth, belt or rack
+    between wheel and body: the bearings of both carry what else acts on them, and nothing of it.
+
     One row, of the velocity level alone, as those of ``rel-rot`` and ``rel-tran``. Body k, a wheel,
     turns against ground:
 

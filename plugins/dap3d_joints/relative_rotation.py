@@ -11,14 +11,15 @@ ZERO = (0.0, 0.0, 0.0)
 class RelativeRotation(Joint):
     """The rate of rotation of body j against body i along a_j is f_dot(t) (manual: ``rel-rot``).
 
+    Sign of the manual: a growing f, or a positive input, decreases the angle that a ``rev`` or
+    ``cyl`` of the same bodies i and j reports; ``drive-rot`` increases it.
+
     Spec 4.7. One row, of the velocity level alone; without a function it locks the rotation. An
     input may give the rate in place of f_dot: it is held, and velocities jump where it is set.
 
         J v   = a_j . (w_j - w_i) = f_dot = nu
         J_i   = [0, -a_j^T],  J_j = [0, a_j^T]
         gamma = f_ddot - a_j . (w_j x w_i)
-
-    With ground as body j a positive f_dot turns body i by -f_dot about a_j.
     """
 
     keyword, rows, holonomic = "rel-rot", 1, False

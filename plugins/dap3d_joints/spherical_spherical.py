@@ -1,7 +1,7 @@
 """Spherical-spherical joint: a massless link of given length between two points."""
 
 from dap3d_core.interface import Joint, Vector2, function, hookimpl, number, vector2
-from dap3d_core.kernels import cross, dot, neg, norm2, row, scale, sqrt, sub
+from dap3d_core.kernels import abs, cross, dot, neg, norm2, row, sub, where
 
 interface_version = 1
 
@@ -9,14 +9,14 @@ interface_version = 1
 class SphericalSpherical(Joint):
     """The distance of P_i and P_j stays the length of a massless link (manual: ``sph-sph``).
 
-    Spec 4.3. One row, with d the vector from P_i to P_j and l its length:
+    With a function of time it is a driven leg, without mass: l = length + f, and a growing f
+    increases the length (``Leg``). Spec 4.3. One row, with d the vector from P_i to P_j and l its length:
 
         C     = (d . d - l^2) / 2
         J_i   = [-d^T, -(s_i x d)^T],  J_j = [d^T, (s_j x d)^T]
         gamma = d . (w_i x s_i_dot - w_j x s_j_dot) - d_dot . d_dot
 
-    lambda |d| is the force in the link, negative in tension. With a function of time it is a driven
-    leg, without mass (``Leg``).
+    lambda |d| is the force in the link, negative in tension, also with a function.
     """
 
     keyword, rows = "sph-sph", 1
@@ -51,12 +51,12 @@ class SphericalSpherical(Joint):
 class Leg(SphericalSpherical, function=True):
     """A driven leg: the length is l = length + f(t), or where it is left out l(0) + f(t) - f(0).
 
-    One row, of the length itself, so that -lambda is the force of the actuator, tension positive;
-    with s = |d|, u = d / s:
+    The row is that of the link, so that lambda |d| is the force of the leg, negative in tension:
 
-        C     = s - l
-        J_i   = [-u^T, -(s_i x u)^T],  J_j = [u^T, (s_j x u)^T],  nu = f_dot
-        gamma = u . (w_i x s_i_dot - w_j x s_j_dot) - (d_dot . d_dot - (u . d_dot)^2) / s + f_ddot
+        C     = (d . d - l |l|) / 2,  nu = |l| f_dot
+        gamma = d . (w_i x s_i_dot - w_j x s_j_dot) - d_dot . d_dot + |l| f_ddot + sign(l) f_dot^2
+
+    A leg is not turned round: where l would be negative there is no position.
     """
 
     drives = True
@@ -66,21 +66,19 @@ class Leg(SphericalSpherical, function=True):
         return {"length": self.length, **constants, "counted": 1.0 if constants else 0.0}
 
     def C(d, length, counted, f, f_0):
-        return sqrt(dot(d, d)) - length - (f - counted * f_0)
+        l = length + f - counted * f_0
+        return 0.5 * (dot(d, d) - l * abs(l))
 
-    def J(d, s_P_i, s_P_j):
-        u = scale(1.0 / sqrt(dot(d, d)), d)
-        return row(neg(u), cross(u, s_P_i)), row(u, cross(s_P_j, u))
+    def nu(length, counted, f, f_0, f_dot):
+        return abs(length + f - counted * f_0) * f_dot
 
-    def nu(f_dot):
-        return f_dot
-
-    def gamma(d, d_dot, w_i, w_j, s_P_i_dot, s_P_j_dot, f_ddot):
-        s = sqrt(dot(d, d))
-        u = scale(1.0 / s, d)
-        arms = dot(u, sub(cross(w_i, s_P_i_dot), cross(w_j, s_P_j_dot)))
-        across = dot(d_dot, d_dot) - dot(u, d_dot) ** 2
-        return arms - across / s + f_ddot
+    def gamma(
+        d, d_dot, w_i, w_j, s_P_i_dot, s_P_j_dot, length, counted, f, f_0, f_dot, f_ddot
+    ):  # fmt: skip
+        l = length + f - counted * f_0
+        arms = dot(d, sub(cross(w_i, s_P_i_dot), cross(w_j, s_P_j_dot)))
+        driven = abs(l) * f_ddot + where(l < 0.0, -1.0, 1.0) * f_dot * f_dot
+        return arms - dot(d_dot, d_dot) + driven
 
 
 @hookimpl

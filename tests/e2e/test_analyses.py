@@ -46,9 +46,9 @@ def test_a_dead_point_saves_what_was_found_before(dap3d):
     scene.add_joint("drive-tran", "ram", P_i="slider.O", P_j="guide", a_j="ground.x",
                     function="turning")  # fmt: skip
     scene.save(dap3d.folder / "press.toml")
-    done = dap3d("kinematics", "press.toml", "--over", "ram.q=0:-1:101", "-o", "a.nc")
+    done = dap3d("kinematics", "press.toml", "--over", "ram.q=0:1:101", "-o", "a.nc")
     assert done.returncode == 3
-    assert "dead point at ram.q = -0.0" in " ".join(done.stderr.split())
+    assert "dead point at ram.q = 0.0" in " ".join(done.stderr.split())
     kept = dap.open(dap3d.folder / "a.nc")
     assert kept.status == "stopped"
     assert kept.t[-1] == 0.0

@@ -162,8 +162,8 @@ def slider_crank_scene(q, coefficients, a=0.1, b=0.35, offset=0.02):
     scene.add_joint("sph", "wrist", P_i="C_rod", P_j="slider.O")
     scene.add_joint("tran", "way", P_i="slider.O", P_j="guide", a_j="ground.x")
     scene.add_function("a", "turning", coeff=coefficients)
-    # q grows about -y; with ground as body j a growing f turns the crank about -y
-    scene.add_joint("drive-rot", "motor", body_i="crank", a_j="ground.y", function="turning")
+    scene.add_vector("back", body="ground", sp=[0.0, -1.0, 0.0])  # q grows about it
+    scene.add_joint("drive-rot", "motor", body_i="crank", a_j="back", function="turning")
     scene.add_force("weight", "gravity")
     return scene
 
@@ -208,7 +208,8 @@ def four_bar_scene(q, coefficients, a=0.2, b=0.5, c=0.4, d=0.6):
         second = "ground" if second == "post" else second
         scene.add_joint("rev", name, P_i=i, P_j=j, a_i=f"{first}.y", a_j=f"{second}.y")
     scene.add_function("a", "turning", coeff=coefficients)
-    scene.add_joint("drive-rot", "motor", body_i="crank", a_j="ground.y", function="turning")
+    scene.add_vector("back", body="ground", sp=[0.0, -1.0, 0.0])  # q grows about it
+    scene.add_joint("drive-rot", "motor", body_i="crank", a_j="back", function="turning")
     scene.add_force("weight", "gravity")
     return scene
 

@@ -137,9 +137,9 @@ def error_of(found, reference):
 
 
 def driven_four_bar():
-    """One parallelogram of A02 without its freedom: the first crank is turned at -1 rad/s."""
+    """One parallelogram of A02 without its freedom: the first crank is turned at 1 rad/s."""
     scene = four_bars(1)
-    scene.add_function("a", "turn", coeff=(0.0, -1.0, 0.0))
+    scene.add_function("a", "turn", coeff=(0.0, 1.0, 0.0))
     scene.add_joint("drive-rot", "motor", body_i="crank0", body_j="ground", a_j="ground.z",
                     function="turn")  # fmt: skip
     return scene
@@ -167,7 +167,7 @@ def dead_centre():
     scene.add_joint("sph", "B", P_i="rod_start", P_j="crank_end")
     scene.add_joint("univ", "C", P_i="rod_end", P_j="slider.O", a_i="rod.z", n_j="slider.x")
     scene.add_joint("tran", "S", P_i="slider.O", P_j="ground.O", a_j="ground.x")
-    scene.add_function("a", "push", coeff=(0.0, -1.0, 0.5))
+    scene.add_function("a", "push", coeff=(0.0, 1.0, -0.5))
     scene.add_joint("drive-tran", "drive", P_i="slider.O", P_j="ground.O", a_j="ground.x",
                     function="push")  # fmt: skip
     return scene

@@ -68,7 +68,7 @@ def dead_centre():
         for end, at in (("0", -0.5), ("1", 0.5)):
             scene.add_point(name + end, name, (at * length, 0.0, 0.0))
     scene.add_body("slider", mass=1.0, Jp=(0.1,) * 3, r=(x, 0, 0), r_dot=(speed, 0, 0))
-    scene.add_function("a", "push", coeff=(0.0, -1.0, 0.5))
+    scene.add_function("a", "push", coeff=(0.0, 1.0, -0.5))
     ends = {"P_i": "slider.O", "P_j": "ground.O", "a_j": "ground.x"}
     scene.add_joint("rev", "A", P_i="crank0", P_j="ground.O", a_i="crank.z", a_j="ground.z")
     scene.add_joint("sph", "B", P_i="rod0", P_j="crank1")
@@ -99,7 +99,7 @@ def car():
     scene, radius, speed = dap.Scene(name="car"), 0.3, 5.0
     scene.add_body("chassis", mass=800.0, Jp=(200.0, 800.0, 900.0), r=(0, 0, 0.5),
                    r_dot=(speed, 0, 0))  # fmt: skip
-    scene.add_function("harmonic", "steer", amplitude=0.3, frequency=0.5)
+    scene.add_function("harmonic", "steer", amplitude=-0.3, frequency=0.5)
     for name, x, y in (("fl", 1.2, 0.7), ("fr", 1.2, -0.7), ("rl", -1.2, 0.7), ("rr", -1.2, -0.7)):
         wheel, centre, holder = f"w{name}", f"c{name}", "chassis"
         scene.add_body(wheel, mass=20.0, Jp=(0.6, 1.0, 0.6), r=(x, y, radius),

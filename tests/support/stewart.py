@@ -46,8 +46,8 @@ def stewart(platform, leg, push, *, spins=True):
         scene.add_point(f"head{k}", body="top", sPp=head - [0.0, 0.0, 1.0])
         scene.add_point(f"low_end{k}", body=f"low{k}", sPp=[-0.25 * length, 0.0, 0.0])
         scene.add_point(f"up_end{k}", body=f"up{k}", sPp=[0.25 * length, 0.0, 0.0])
-        scene.add_function("harmonic", f"stroke{k}", amplitude=STROKE, frequency=3.0 + k,
-                           offset=0.5 * length)  # fmt: skip
+        scene.add_function("harmonic", f"stroke{k}", amplitude=-STROKE, frequency=3.0 + k,
+                           offset=-0.5 * length)  # fmt: skip
         slide = {"P_i": f"up{k}.O", "P_j": f"low{k}.O", "a_j": f"low{k}.x"}
         if spins:
             scene.add_joint("sph", f"S{k}", P_i=f"low_end{k}", P_j=f"foot{k}")

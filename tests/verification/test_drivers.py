@@ -32,29 +32,29 @@ def heading(result, body=0):
 
 
 def test_a_driven_wheel_has_the_angle_of_its_function():
-    """drive-rot: the angle since the start is -(f - f(0)) for body i, ground j, over many turns."""
+    """drive-rot: the angle since the start is f - f(0) for body i, ground j, over many turns."""
     scene = wheel()
     scene.add_function("a", "motor", coeff=(1.7, 9.0, 0.5))
     scene.add_joint("drive-rot", "drive", body_i="wheel", a_j="ground.z", function="motor")
     result = dap.simulate(scene, t_end=5.0, dt=0.1, **TIGHT)
-    expected = 0.3 - (9.0 * result.t + 0.5 * result.t**2)
-    assert expected[-1] < -18.0 * np.pi
+    expected = 0.3 + 9.0 * result.t + 0.5 * result.t**2
+    assert expected[-1] > 18.0 * np.pi
     off = np.exp(1j * (heading(result) - expected)) - 1.0
     assert np.max(np.abs(off)) < 1e-11
-    assert result.w[:, 0, 2] == pytest.approx(-(9.0 + result.t), abs=1e-11)
-    # the motor gives J f'' = 0.3 N m, about -z on the wheel
-    assert result.reaction("drive")["i"].moment[:, 2] == pytest.approx(-0.3, abs=1e-10)
+    assert result.w[:, 0, 2] == pytest.approx(9.0 + result.t, abs=1e-11)
+    # the motor gives J f'' = 0.3 N m
+    assert result.reaction("drive")["i"].moment[:, 2] == pytest.approx(0.3, abs=1e-10)
 
 
 def test_a_driven_angle_does_not_drift():
     """drive-rot keeps the angle to rounding at a loose tolerance, where rel-rot lets it drift."""
     found = {}
-    for word in ("drive-rot", "rel-rot"):
+    for word, sense in (("drive-rot", 1.0), ("rel-rot", -1.0)):  # the manual's sign
         scene = wheel(0.0)
         scene.add_function("harmonic", "motor", amplitude=2.0, frequency=3.0)
         scene.add_joint(word, "drive", body_i="wheel", a_j="ground.z", function="motor")
         result = dap.simulate(scene, t_end=5.0, dt=0.1, rtol=1e-4, atol=1e-6)
-        found[word] = np.max(np.abs(heading(result) + 2.0 * np.sin(3.0 * result.t)))
+        found[word] = np.max(np.abs(heading(result) - sense * 2.0 * np.sin(3.0 * result.t)))
     assert found["drive-rot"] < 1e-10
     assert found["rel-rot"] > 1e-7
 
@@ -69,7 +69,7 @@ def test_a_driven_angle_is_pulled_back_by_the_correction():
     scene.add_joint("drive-rot", "drive", body_i="wheel", a_j="ground.z", function="motor")
     result = dap.simulate(scene, t_end=1.0, dt=0.25, **TIGHT)
     assert heading(result, 1) - heading(result, 0) == pytest.approx(0.5, abs=1e-11)
-    assert heading(result, 0) == pytest.approx(-2.0 * result.t, abs=1e-11)
+    assert heading(result, 0) == pytest.approx(2.0 * result.t, abs=1e-11)
 
 
 def test_a_lock_carries_the_moment():
@@ -88,18 +88,18 @@ def slide(length):
     scene.add_body("arm", mass=1.0, Jp=(0.3, 0.3, 0.5))
     scene.add_body("bead", mass=0.5, Jp=(0.1, 0.1, 0.1), r=(1.0, 0.0, 0.0))
     scene.add_joint("rev", "axle", P_i="arm.O", P_j="ground.O", a_i="arm.z", a_j="ground.z")
-    scene.add_function("a", "turn", coeff=(0.0, -2.0, 0.0))
+    scene.add_function("a", "turn", coeff=(0.0, 2.0, 0.0))
     scene.add_joint("drive-rot", "motor", body_i="arm", a_j="ground.z", function="turn")
     scene.add_joint("tran", "guide", a_j="arm.x", P_i="bead.O", P_j="arm.O")
-    scene.add_function("a", "stroke", coeff=(0.4, -0.3, -0.2))
+    scene.add_function("a", "stroke", coeff=(-0.4, 0.3, 0.2))
     given = {} if length is None else {"length": length}
     scene.add_joint("drive-tran", "push", body_i="bead", a_j="arm.x", function="stroke", **given)
     return scene
 
 
-@pytest.mark.parametrize(("length", "start"), [(None, 1.0), (-1.6, 1.2)])
+@pytest.mark.parametrize(("length", "start"), [(None, 1.0), (1.6, 1.2)])
 def test_a_bead_is_pushed_along_a_turning_arm(length, start):
-    """drive-tran: arm_x . (r_arm - r_bead) = length + f, also where the arm turns (spec 4.8).
+    """drive-tran: arm_x . (r_bead - r_arm) = length + f, also where the arm turns (spec 4.8).
 
     Left out, the length makes C = 0 at the start. With rho the distance from the axle, the guide
     gives the Coriolis force 2 m Omega rho', and the driver m (rho'' - Omega^2 rho).
@@ -123,9 +123,9 @@ def test_a_driver_between_points():
     scene.add_body("cabin", mass=3.0, Jp=(1.0, 1.0, 1.0), r=(0.0, 0.0, -2.0))
     scene.add_point("roof", "cabin", (0.0, 0.0, 1.0))
     scene.add_joint("tran", "shaft", a_j="ground.z", P_i="cabin.O", P_j="ground.O")
-    scene.add_function("step", "ride", x_end=2.0, f_end=-1.5)
+    scene.add_function("step", "ride", x_end=2.0, f_end=1.5)
     scene.add_joint("drive-tran", "rope", P_i="roof", P_j="ground.O", a_j="ground.z",
-                    function="ride", length=1.0)  # fmt: skip
+                    function="ride", length=-1.0)  # fmt: skip
     scene.add_force("weight", "gravity")
     result = dap.simulate(scene, t_end=1.0, dt=0.25, **TIGHT)
     u = result.t / 2.0

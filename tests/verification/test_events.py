@@ -275,8 +275,8 @@ def arm():
         along = {"a_i": f"{link}.{axis}", "a_j": f"{before}.{axis}"}
         scene.add_joint("rev", f"hinge{k}", P_i=inner, P_j=outer, **along)
         scene.add_function(
-            "harmonic", f"turn{k}", amplitude=-amplitude, frequency=2.0 * np.pi * frequency
-        )  # the angle that is driven is that of the link before against this one
+            "harmonic", f"turn{k}", amplitude=amplitude, frequency=2.0 * np.pi * frequency
+        )
         motor = {"body_i": link, "body_j": before, "a_j": f"{before}.{axis}"}
         scene.add_joint("drive-rot", f"motor{k}", **motor, function=f"turn{k}")
         outer, before = scene.add_point(f"out{k}", link, (0.5 * LINK, 0.0, 0.0)), link

@@ -77,12 +77,12 @@ def test_a_bead_on_a_turning_rod(fields):
     scene.add_body("bead", mass=m, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 0.4), w=(0.0, 0.0, spin))
     scene.add_point("P", "rod", (0.0, 0.0, 0.4))
     scene.add_joint("rev", "axle", P_i="rod.O", P_j="ground.O", a_i="rod.z", a_j="ground.z")
-    scene.add_function("a", "turning", coeff=(0.0, -spin, 0.0))
+    scene.add_function("a", "turning", coeff=(0.0, spin, 0.0))
     scene.add_function("a", "law", coeff=(0.0, k, 0.0))
     scene.add_joint("drive-rot", "motor", body_i="rod", body_j="ground", a_j="ground.z",
                     function="turning")  # fmt: skip
     scene.add_joint("tran", "way", P_i="bead.O", P_j="P", a_j="rod.x")
-    scene.add_force("tran_sda", "spring", P_i="bead.O", P_j="P", a_j="rod.x", x_0=x_0, c=c, f_a=-f,
+    scene.add_force("tran_sda", "spring", P_i="bead.O", P_j="P", a_j="rod.x", x_0=x_0, c=c, f_a=f,
                     **fields)  # fmt: skip
     result = dap.simulate(scene, t_end=2.0, dt=0.1, **TIGHT)
     stiff, decay = k - m * spin**2, c / (2.0 * m)

@@ -106,7 +106,7 @@ def driven_parallelogram():
         ("r", "k_Q", "c1_Q", "z_c1"),
     ):
         scene.add_joint("rev", name, P_i=i, P_j=j, a_i=f"z_{i[:-2]}", a_j=a_j)
-    scene.add_function("a", "turn", coeff=[0.0, 1.0, 0.0])
+    scene.add_function("a", "turn", coeff=[0.0, -1.0, 0.0])
     scene.add_joint(
         "drive-rot", "motor", body_i="c0", body_j="ground", a_j="ground.z", function="turn"
     )

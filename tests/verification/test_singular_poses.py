@@ -116,7 +116,7 @@ def test_a_driven_parallelogram_turns_through_all_crossings(rtol, rate):
     was taken: the cranks stay parallel, to rounding over the distance of a report from a crossing
     (1e-16 / 1e-3), or to the error of the interpolation where that is nearer."""
     scene = redundant.four_bars(1)
-    scene.add_function("a", "turn", coeff=(0.0, rate, 0.0))
+    scene.add_function("a", "turn", coeff=(0.0, -rate, 0.0))
     scene.add_joint("drive-rot", "motor", body_i="crank0", a_j="ground.z", function="turn")
     result = dap.simulate(scene, t_end=10.0, dt=0.1, rtol=rtol, atol=rtol / 100)
     turned = rate * result.t

@@ -28,7 +28,7 @@ def write_mat(result: Result, path: Path, *, reactions: bool) -> None:
         name = {"time": "t"}.get(str(word), str(word))
         values = array.values
         variables[name] = values.astype(object) if values.dtype.kind in "OUS" else values
-        units[name] = str(array.attrs.get("units", "1"))
+        units[name] = str(array.attrs.get("units", ""))
     about = {
         "title": result.record.title,
         "status": result.status,

@@ -139,8 +139,8 @@ class RunMetadata:
 
     @property
     def outputs(self) -> dict[str, Any]:
-        """Expressions of the outputs of the scene by name, as written."""
-        if "[outputs]" not in self.scene_text:  # reading the text of a large scene takes time
+        """Expressions of the outputs of the scene by name, or tables of them, as written."""
+        if "[outputs" not in self.scene_text:  # reading the text of a large scene takes time
             return {}
         try:
             outputs = tables_of(self.scene_text).get("outputs", {})

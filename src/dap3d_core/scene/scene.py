@@ -186,7 +186,7 @@ class Scene(SceneDisplay):
             file order.
         requires: ranges of versions of the distributions that bring its types, by name.
         parameters: numbers by name, for expressions in place of numbers (text that begins with =).
-        outputs: expressions of quantities, by name.
+        outputs: expressions of quantities, by name; or tables of ``value`` and ``unit``.
         animation, simulation: points to draw; settings of a run.
         path: the file this was read from, or None.
         faults: mistakes found in reading (unknown keys, wrong tables); ``check`` reports them.
@@ -233,7 +233,7 @@ class Scene(SceneDisplay):
             simulation=_copied(self.simulation),
             requires=dict(self.requires),
             parameters=dict(self.parameters),
-            outputs=dict(self.outputs),
+            outputs={name: plain(output) for name, output in self.outputs.items()},
             faults=list(self.faults),
             notes=list(self.notes),
             **named,
@@ -362,19 +362,21 @@ class Scene(SceneDisplay):
         self.parameters[name] = plain(value)
         return name
 
-    def add_output(self, name: str, expression: str) -> str:
+    def add_output(self, name: str, expression: str, unit: str | None = None) -> str:
         """Add an output, a quantity of results, and return its name.
 
         Args:
             name: a word, not used by another output.
             expression: of quantities, such as ``"0.5 * (left.r.z + right.r.z)"``; it is parsed with
                 the check of the whole scene.
+            unit: of its value, such as ``"deg"``; left out, as the expression has it.
 
         Raises:
             SceneError: the name is taken or illegal.
         """
         self._check_name("outputs", self.outputs, name)
-        self.outputs[name] = plain(expression)
+        value = plain(expression)
+        self.outputs[name] = value if unit is None else {"value": value, "unit": plain(unit)}
         return name
 
     def add_animation_point(self, body: str, sPp: Any) -> None:

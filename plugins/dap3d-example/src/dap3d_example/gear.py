@@ -9,6 +9,11 @@ interface_version = 1
 class Gear(Joint):
     """Gears i and j, which turn against the carrier k about their axes, stay in mesh.
 
+    It transmits moments alone, about a_i and a_j, and the carrier takes their sum: motion and power
+    are right, and there is no tooth force. The bearings of the gears carry what else acts on the
+    gears, and neither the tooth force T / r nor what a pressure angle or a helix adds to it: of an
+    idler between two gears they carry nothing of 2 T / r.
+
     theta_i and theta_j are the angles of the gears against the carrier about a_i and a_j, zero in
     the poses as given, z_i and z_j their numbers of teeth. One row, the angle of gear i:
 
@@ -18,8 +23,8 @@ class Gear(Joint):
     inside. Whole turns of a gear are whole numbers of teeth, so no turns need be counted: what is
     wrapped into (-pi, pi], half a tooth, is the error alone. J and gamma are derived from C.
 
-    The bearings are joints of their own. With bevel gears a_i and a_j differ in direction; with
-    a_i and a_j both pointing away from the meeting point of the axes s = 1 is right.
+    With bevel gears a_i and a_j differ in direction; with both pointing away from the meeting point
+    of the axes s = 1 is right.
     """
 
     keyword, rows = "gear", 1

@@ -8,7 +8,7 @@ from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R
 from dap3d_core.model.groups import Group
-from dap3d_core.model.rigid_motion import Pose, compose, identity, matrices
+from dap3d_core.model.rigid_motion import Pose, compose, identity, inverse, matrices
 
 #: The loops in the list: C; J; the angles whose turns are counted.
 POSITION, ACCELERATION, ANGLE = range(3)
@@ -18,7 +18,7 @@ _KINDS = ("position", "acceleration", "angle")
 class JointRows:
     """Evaluates the rows of the joints of a group, apart from the mechanism that they belong to.
 
-    Every joint has two bodies of its own. Where body j is ground it stays there; body i never is.
+    Every joint has two bodies of its own. Where one of them is ground it stays there.
 
     Attributes:
         count, row_count: joints, and rows of each.
@@ -37,6 +37,7 @@ class JointRows:
         self._slots = len(group.type_info.layout.slots)
         m, bodies = self.count, group.bodies
         self._on_ground = (bodies[:, 1] == 0) if self._slots == 2 else np.ones(m, dtype=bool)
+        self._from_ground = bodies[:, 0] == 0
         rows = 1 + np.arange(m)[:, None] + m * np.arange(self._slots)  # in ``_body``, by slot
         self._body = np.zeros((1 + rows.size, BODY_WIDTH))
         self._body[0, A : A + 9 : 4] = self._body[0, P] = 1.0
@@ -76,8 +77,9 @@ class JointRows:
         m = self.count
         ground = identity(m)
         base = ground if base is None else base
-        held = self._on_ground[:, None]
-        base = Pose(np.where(held, ground.r, base.r), np.where(held, ground.p, base.p))
+        for held, at in ((self._on_ground, ground), (self._from_ground, inverse(pose))):
+            held = held[:, None]
+            base = Pose(np.where(held, at.r, base.r), np.where(held, at.p, base.p))
         for slot, at in enumerate((compose(base, pose), base)[: self._slots]):
             rows = self._body[1 + m * slot : 1 + m * (slot + 1)]
             rows[:, R : R + 3], rows[:, P : P + 4] = at.r, at.p

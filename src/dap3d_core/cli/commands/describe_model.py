@@ -41,9 +41,9 @@ def model_data(model: str, *, allow_code: bool) -> dict[str, Any]:
             for name, given in scene.parameters.items()
         ],
         "outputs": [
-            {"name": name, "expression": text, "unit": quantity.unit,
+            {"name": name, "expression": expression.text, "unit": quantity.unit,
              "components": list(quantity.components)}
-            for name, text in scene.outputs.items()
+            for name, expression in probe.outputs.items()
             for quantity in [find(probe, name)]
         ],
     }  # fmt: skip

@@ -49,8 +49,8 @@ NAMES = {
 
 
 def about(unit: str, meaning: str) -> dict[str, str]:
-    """Attributes of a variable."""
-    return {"units": unit, "long_name": meaning}
+    """Attributes of a variable, without ``units`` where its unit is not known."""
+    return {"units": unit, "long_name": meaning} if unit else {"long_name": meaning}
 
 
 def attributes(summary: ModelSummary, record: RunMetadata) -> dict[str, Any]:

@@ -34,12 +34,14 @@ class Quantity(NamedTuple):
         values: (nt,), or (nt, components).
         kind: what it is, without its owner: "velocity".
         label: what it is in words: "velocity of crank, z".
-        unit: SI unit, "1" for none, "SI" where it depends on the row.
+        unit: SI unit, "1" for none, "SI" where it depends on the row; of an output as declared, ""
+            where it is not known.
         components: names of the columns; empty for (nt,).
         owner: "body", "point", "joint", "force", "input" or "output"; "coordinate" for one of a
             joint, "state" for one of its own of a joint or a force; "" for one of the whole system.
         rate: name of the quantity that is its time derivative, "" for none.
         operands: names of the quantities that an output is computed from.
+        exact: False where a number in an output may have a unit of its own.
     """
 
     name: str
@@ -51,6 +53,7 @@ class Quantity(NamedTuple):
     owner: str = ""
     rate: str = ""
     operands: tuple[str, ...] = ()
+    exact: bool = True
 
 
 class QuantitySource(Protocol):

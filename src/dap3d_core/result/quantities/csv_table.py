@@ -33,12 +33,12 @@ class TableColumn(NamedTuple):
 
     @property
     def heading(self) -> str:
-        """Head of the column, ``crank.r.x [m]``.
+        """Head of the column, ``crank.r.x [m]``; the name alone where the unit is not known.
 
         An apostrophe precedes a name that a spreadsheet would evaluate as a formula.
         """
         mark = "'" if self.name.startswith(FORMULA) else ""
-        return f"{mark}{self.name} [{self.unit}]"
+        return f"{mark}{self.name} [{self.unit}]" if self.unit else f"{mark}{self.name}"
 
 
 def columns_of(result: "Result", reactions: bool = True) -> list[TableColumn]:

@@ -215,7 +215,7 @@ def _contents(file: Any) -> list[dict[str, Any]]:
             "name": name,
             "dimensions": list(variable.dimensions),
             "shape": list(variable.shape),
-            "unit": str(getattr(variable, "units", "1")),
+            "unit": str(getattr(variable, "units", "")),
             "meaning": str(getattr(variable, "long_name", "")),
         }
         for name, variable in file.variables.items()

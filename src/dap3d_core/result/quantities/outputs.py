@@ -11,14 +11,7 @@ from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.quantities.catalogue import Quantity
 from dap3d_core.scene.expressions.expression import Expression, ExpressionError
-
-#: Functions whose value has no dimension, is an angle, has the unit of their arguments.
-PURE = {"sin", "cos", "tan", "exp", "log", "tanh",
-        "<", "<=", ">", ">=", "==", "!=", "and", "or", "not"}  # fmt: skip
-ANGLES = {"asin", "acos", "atan2"}
-ALIKE = {"+", "-", "%", "neg", "abs", "floor", "norm", "hypot", "minimum", "maximum", "where"}
-#: Unit of what depends on the expression; unit of a number without dimension.
-UNKNOWN, NONE = "SI", "1"
+from dap3d_core.scene.expressions.units import UNKNOWN, Unit, contradiction, text_of, unit_of
 
 
 def output_quantity(
@@ -36,18 +29,19 @@ def output_quantity(
         A scalar (nt,), or a vector (nt, components); NaN where it has no finite value.
 
     Raises:
-        ResultError: a function of vectors has numbers, vectors have different components.
+        ResultError: a function of vectors has numbers, vectors have different components, unlike
+            units are added.
     """
     try:
         values = expression.evaluate({n: q.values for n, q in operands.items()})
+        unit, exact = _unit(expression, operands)
     except ExpressionError as error:
         raise ResultError(f"the output {name}: {error}") from error
     if not values.ndim:
         values = np.full(shape, values)
     components = _components(operands, values)
-    unit = _unit(expression, operands)
     return Quantity(name, read_only(values), name, name, unit, components, "output", "",
-                    tuple(operands))  # fmt: skip
+                    tuple(operands), exact)  # fmt: skip
 
 
 def note_of_undefined(output: Quantity, operands: Iterable[Quantity], t: Floats) -> str:
@@ -79,28 +73,21 @@ def _components(operands: Mapping[str, Quantity], values: Any) -> tuple[str, ...
     return next(names, AXES)
 
 
-def _unit(expression: Expression, operands: Mapping[str, Quantity]) -> str:
-    """The unit of an expression where sums and simple products tell it, else "SI"."""
-    unit = expression.fold(lambda name: operands[name].unit, _unit_of_call)
-    return unit if isinstance(unit, str) else NONE  # of a number
+def _unit(expression: Expression, operands: Mapping[str, Quantity]) -> tuple[str, bool]:
+    """The unit of an expression, as declared or as computed, and whether that is certain.
+
+    Raises:
+        ExpressionError: it adds unlike units, or its value has another unit than is declared.
+    """
+    units = {name: _of_operand(quantity) for name, quantity in operands.items()}
+    carried = expression.carried_unit(units)
+    if expression.unit:
+        if fault := contradiction(expression.unit, carried):
+            raise ExpressionError(f"{fault}; convert the value, as angle/deg or x/mm")
+        return expression.unit, True
+    return text_of(carried), not isinstance(carried, Unit) or carried.exact
 
 
-def _unit_of_call(word: str, *arguments: str | float) -> str:
-    """The unit of a call, from those of its arguments; a number has any."""
-    if word in PURE:
-        return NONE
-    if word in ANGLES:
-        return "rad"
-    values = arguments[1:] if word == "where" else arguments
-    units = {unit for unit in values if isinstance(unit, str)}
-    dimensions = [unit for unit in values if isinstance(unit, str) and unit != NONE]
-    if not dimensions:
-        return NONE
-    first = dimensions[0]
-    if word in ALIKE:
-        return first if units == {first} else UNKNOWN
-    if word == "*" and len(dimensions) == 1:
-        return first
-    if word == "/" and len(dimensions) == 1:
-        return first if values[0] == first else UNKNOWN
-    return NONE if word == "/" and units == {first} != {UNKNOWN} else UNKNOWN
+def _of_operand(quantity: Quantity) -> Unit:
+    """The unit of an operand; inputs are numbers of any unit."""
+    return UNKNOWN if quantity.owner == "input" else unit_of(quantity.unit, exact=quantity.exact)

@@ -19,13 +19,23 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.suggestions import nearest
+from dap3d_core.scene.expressions.units import (
+    Carried,
+    UnitError,
+    constant,
+    number_of_call,
+    unit_of_call,
+)
 from dap3d_core.scene.validate.coerce_values import Fault
 
 Function = Callable[..., Any]
 
 #: Longest text, in characters, and deepest nesting of operations.
 LONGEST, DEEPEST = 2000, 100
-CONSTANTS: Final[Mapping[str, float]] = {"pi": math.pi}
+CONSTANTS: Final[Mapping[str, float]] = {
+    "pi": math.pi,
+    **{symbol: constant(symbol) for symbol in ("deg", "rpm", "mm", "g0")},
+}
 
 
 class Word(NamedTuple):
@@ -131,11 +141,13 @@ class Expression:
         text: as written.
         root: its tree.
         names: the names in it, each once, in their order.
+        unit: the unit that is declared for its value; "" for none.
     """
 
     text: str
     root: Node = attrs.field(repr=False)
     names: tuple[str, ...]
+    unit: str = ""
 
     def evaluate(self, values: Mapping[str, Any]) -> Any:
         """The value of the expression, NaN where it is not finite.
@@ -152,6 +164,18 @@ class Expression:
         with np.errstate(all="ignore"):
             value = np.asarray(self.fold(lambda name: np.asarray(values[name], float), _apply))
         return np.where(np.isfinite(value), value, np.nan)
+
+    def carried_unit(self, units: Mapping[str, Carried]) -> Carried:
+        """The unit of its value from those of its names.
+
+        Raises:
+            ExpressionError: it adds or compares unlike units.
+        """
+        try:
+            carried: Carried = self.fold(units.__getitem__, unit_of_call)
+        except UnitError as error:
+            raise ExpressionError(str(error)) from None
+        return carried
 
     def fold(self, of_name: Callable[[str], Any], of_call: Callable[..., Any]) -> Any:
         """Replaces names, then calls from the inside, as ``of_call(word, *arguments)``."""
@@ -245,7 +269,10 @@ def _call(word: str, *arguments: Node) -> Node:
     if not math.isfinite(value):
         listed = " and ".join(f"{number:g}" for number in numbers)
         raise ExpressionError(f"'{word}' of {listed} is not a finite number")
-    return value
+    try:
+        return number_of_call(value, word, *numbers)
+    except UnitError as error:
+        raise ExpressionError(str(error)) from None
 
 
 def _node(tree: ast.AST, depth: int) -> Node:

@@ -4,6 +4,9 @@ from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
+import attrs
+
+from dap3d_core.scene.errors import MISSING
 from dap3d_core.scene.expressions.expression import Expression, fault_of_word, read_expression
 from dap3d_core.scene.scene import Scene, fault_of_name
 from dap3d_core.scene.validate.coerce_values import Fault
@@ -13,6 +16,8 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 OWNERS = ("bodies", "points", "joints", "forces", "inputs")
 #: Names of dimensions and variables of every data set.
 DIMENSIONS = ("time", "point", "axis", "euler", "status", "note")
+#: Keys of an output that is a table; longest text of a unit.
+KEYS, LONGEST_UNIT = ("value", "unit"), 40
 #: Outputs that name outputs that name outputs ...: longest chain.
 LONGEST_CHAIN = 50
 
@@ -24,10 +29,25 @@ def read_outputs(report: Collector) -> dict[str, Expression]:
         key = ("outputs", str(name))
         if fault := fault_of_quantity(report.scene, name):
             report.add(key, name, f"not a name for an output: {fault}")
+        unit = ""
+        if isinstance(value, dict):
+            report.add_unknown_keys(key, value, KEYS, in_order=True)
+            if "unit" in value:
+                unit = report.read((*key, "unit"), value["unit"], _read_unit)
+            key, value = (*key, "value"), value.get("value", MISSING)
         expression = report.read(key, value, read_expression)
-        if not isinstance(expression, Fault):
-            expressions[name] = expression
+        if not isinstance(expression, Fault) and not isinstance(unit, Fault):
+            expressions[name] = attrs.evolve(expression, unit=unit)
     return _in_order(report, expressions)
+
+
+def _read_unit(value: Any) -> str | Fault:
+    """The text of a unit, or its fault."""
+    if isinstance(value, str) and value.strip() and value.isprintable():
+        if len(value) <= LONGEST_UNIT:
+            return value.strip()
+        return Fault(f"is too long: at most {LONGEST_UNIT} characters")
+    return Fault('should be a unit in quotes, such as "deg"', 'write unit = "1" for none')
 
 
 def outputs_of(outputs: Mapping[str, Any]) -> dict[str, Expression]:

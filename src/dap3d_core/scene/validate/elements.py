@@ -311,23 +311,19 @@ class _Reading:
                 self.report_conflict(name, slot, body)
 
     def check_slots(self) -> None:
-        """The bodies of an element are known, different, and the first is not ground."""
+        """The bodies of an element are known and different, and one of them is not ground."""
         bodies, slots, names = self.bodies, self.reader.slots, self.reader.body_names
         if not bodies:
             return
         if _UNKNOWN not in bodies:
             self.check_others()
-        if bodies[0] > 0 and bodies[-1] >= 0 and len(set(bodies)) == len(bodies) < 3:
+        if min(bodies) >= 0 < max(bodies) and len(set(bodies)) == len(bodies):
             return  # nearly all elements
         if self.good and _UNKNOWN in bodies:
             letter = slots[bodies.index(_UNKNOWN)]
             fields = [f.name for f in self.reader.fields if slot_of(f.name) == letter]
             self.refuse("", f"which body is {letter}? Give {' or '.join(fields)}")
-        if bodies[0] == 0 and len(slots) > 1:
-            what = "body i is ground; if one of the bodies is ground it is body j"
-            remedy = "exchange the two bodies (all of _i and _j)"
-            self.refuse(self.given_by[0], what, remedy=remedy)
-        elif bodies[0] == 0:
+        if bodies == [0]:
             what = "the only body of this element is ground, which is fixed"
             self.refuse(self.given_by[0], what)
         for n, body in enumerate(bodies):

@@ -110,7 +110,7 @@ def two_ends(
 
 
 def _vector2(report: Collector, geometry: Geometry, name: str) -> tuple[Located, Located] | None:
-    """The ends of a declared vector of type 2: on two bodies, the first not ground."""
+    """The ends of a declared vector of type 2: on two bodies."""
     vector2, key = report.scene.vectors2[name], ("vectors2", name)
     ends = two_ends(report, geometry, key, vector2.P_i, vector2.P_j)
     if ends is None:
@@ -118,10 +118,6 @@ def _vector2(report: Collector, geometry: Geometry, name: str) -> tuple[Located,
     if ends[0][0] == ends[1][0]:
         body = [GROUND, *geometry.bodies.body_names][ends[0][0]]
         report.add((*key, "P_j"), vector2.P_j, f"both ends are on {body}; they lie on two bodies")
-        return None
-    if ends[0][0] == 0:
-        what = "the vector starts on ground; an end on ground is P_j"
-        report.add((*key, "P_i"), vector2.P_i, what, remedy="exchange P_i and P_j")
         return None
     return ends
 

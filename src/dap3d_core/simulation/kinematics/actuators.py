@@ -20,7 +20,10 @@ from dap3d_core.simulation.kinematics.driver_coordinate import driver_names
 
 @attrs.frozen(eq=False)
 class DriverActuator:
-    """A driver, whose multiplier is its force: it holds no position any more.
+    """A driver, whose force takes the place of its multiplier: it holds no position any more.
+
+    The force is that on a body, N, or the moment, N m, however long the row of the driver is: that
+    of a driven leg is d, not a unit vector.
 
     Attributes:
         name: of the joint.
@@ -31,9 +34,14 @@ class DriverActuator:
     row: int
 
     def wrench(self, t: float, D: Floats) -> Floats:
-        """(6 n,) force and moment on each body of a multiplier of one; D: (rows, 6 n)."""
-        unit: Floats = D[self.row]
-        return unit
+        """(6 n,) force and moment on each body of a force or moment of one; D: (rows, 6 n)."""
+        return np.asarray(D[self.row] / self.size(D))
+
+    def size(self, D: Floats) -> float:
+        """The force, or moment, of a multiplier of one; 1 where it does nothing."""
+        forces, moments = D[self.row].reshape(-1, 2, 3).transpose(1, 0, 2)
+        sizes = np.linalg.norm(forces if forces.any() else moments, axis=1)
+        return float(sizes.max()) or 1.0
 
     def unit(self, D: Floats) -> str:
         """Unit of its force: N of a row that holds translations."""

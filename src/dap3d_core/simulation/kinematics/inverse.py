@@ -76,7 +76,8 @@ def inverse(
 
     Returns:
         A result with the motion, the reactions, and for each actuator the quantity
-        ``NAME.actuation``: the multiplier of a driver, the force f_a of a ``ptp``, N or N m.
+        ``NAME.actuation``: the force or moment of a driver, positive where it drives its
+            coordinate on, the force f_a of a ``ptp``, N or N m.
 
     Raises:
         SceneError, PluginError, ResultError: as ``compile``; unusable motion, actuators or output.
@@ -208,7 +209,7 @@ def _forces(
         out.Lam[k, held] = rows.multipliers(needed - wrenches @ out.tau[k])
         for place, actuator in enumerate(actuators):
             if isinstance(actuator, DriverActuator):
-                out.Lam[k, actuator.row] = out.tau[k, place]
+                out.Lam[k, actuator.row] = out.tau[k, place] / actuator.size(rows.all_rows)
         v = u[-6 * model.body_count :]
         out.residuals[k] = (np.max(np.abs(rows.rows.C[held]), initial=0.0),
                             rows.residual(v, rows.rows.nu),
@@ -243,7 +244,7 @@ def _notes(evaluator: Evaluator, actuators: list[Actuator], forces: _Forces) -> 
     if drivers:
         notes.append(
             f"{INFORMATION}{', '.join(drivers)} prescribe{'s' * (len(drivers) == 1)} nothing here: "
-            "the motion is the one given, and the driver's multiplier is the force that it takes"
+            "the motion is the one given, and the driver's actuation is the force that it takes"
         )
     if forces.idle.any():
         idle = ", ".join(

@@ -19,7 +19,8 @@ def check_outputs(scene: Scene, scene_text: str, evaluator: Evaluator) -> None:
     mistakes: list[tuple[Key, Mistake]] = []
     probe = probe_of(scene_text, evaluator)
     reserved = {name.partition(".")[0] for name in SYSTEM}
-    for name, text in scene.outputs.items():
+    for name, output in scene.outputs.items():
+        text = output.get("value") if isinstance(output, dict) else output
         key = f"outputs.{name}"
         if name in reserved:
             what = "not a name for an output: every result has a quantity of this name"

@@ -20,7 +20,7 @@ from dap3d_core.result import ResultError, current_versions
 from dap3d_core.result.arrays import LARGE
 from dap3d_core.result.file.checksum import check_checksums, check_signature
 from dap3d_core.result.file.library import NETCDF, unreadable
-from dap3d_core.result.file.schema import SWEEP
+from dap3d_core.result.file.schema import SWEEP, about
 from dap3d_core.result.file.validate import check_claims
 from dap3d_core.result.metadata import to_json
 from dap3d_core.simulation.output.type_sources import digests_of
@@ -124,13 +124,12 @@ def layout_of(ensemble: Ensemble, design: Design, points: Floats) -> SweepLayout
     sizes = dict(zip(design.dimensions, design.shape, strict=True))
     if any(output.reduction == "series" for output in ensemble.outputs):
         sizes["time"] = len(ensemble.times)
-        about = {"long_name": "time", "units": "s"}
-        coordinates.append(Coordinate("time", ("time",), about, ensemble.times))
+        coordinates.append(Coordinate("time", ("time",), about("s", "time"), ensemble.times))
     outputs = [
         Variable(
             output.name,
             (*design.dimensions, "time") if output.reduction == "series" else design.dimensions,
-            {"long_name": ensemble.labels[output.name], "units": ensemble.units[output.name]},
+            about(ensemble.units[output.name], ensemble.labels[output.name]),
         )
         for output in ensemble.outputs
     ]

@@ -29,7 +29,7 @@ OUTPUTS = {
     "drift": "bob.p * t",
 }
 UNITS = {"angle": "rad", "arm": "m", "reach": "m", "pull": "N", "row": "SI", "late": "1",
-         "turns": "rad", "share": "1", "mixed": "SI", "fixed": "1", "drift": "s"}  # fmt: skip
+         "turns": "", "share": "1", "mixed": "m^2/s^2", "fixed": "1", "drift": "s"}  # fmt: skip
 
 
 @pytest.fixture(scope="module")

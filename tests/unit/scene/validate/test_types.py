@@ -136,9 +136,9 @@ OWN_MISTAKES = [
         "body i and body k are both a",
     ),
     (
-        '[joints.j]\ntype = "between"\nP_i = "ground.O"\nP_j = "b.O"\nP_k = "a.O"\n',
-        "joints.j.P_i",
-        "body i is ground",
+        '[joints.j]\ntype = "between"\nP_i = "ground.O"\nP_j = "ground.O"\nP_k = "a.O"\n',
+        "joints.j.P_j",
+        "body i and body j are both ground",
     ),
     ('[joints.j]\ntype = "rail"\n', "joints.j", "which body is i? Give body_i or P_i"),
     (

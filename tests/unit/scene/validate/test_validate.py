@@ -127,8 +127,8 @@ def test_all_mistakes_are_reported_at_once_in_the_order_of_the_file(scene_of, re
 def test_a_mistake_is_reported_once_and_not_again_where_it_is_used(scene_of, registry):
     text = BASE.replace('body = "rocker"', 'body = "roker"')
     assert [m.key for m in mistakes_of(scene_of(text), registry)] == ["points.B.body"]
-    text = BASE.replace('P_i = "A"\nP_j = "C"', 'P_i = "C"\nP_j = "A"')
-    assert [m.key for m in mistakes_of(scene_of(text), registry)] == ["vectors2.d1.P_i"]
+    text = BASE.replace('P_i = "A"\nP_j = "C"', 'P_i = "C"\nP_j = "ground.O"')
+    assert [m.key for m in mistakes_of(scene_of(text), registry)] == ["vectors2.d1.P_j"]
 
 
 def test_empty_and_bodiless_scenes_are_refused(scene_of, registry):

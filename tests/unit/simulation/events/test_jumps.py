@@ -205,7 +205,7 @@ def test_a_driver_that_moves_a_body_into_a_stop_is_refused():
     scene = dap.Scene(name="driven")
     scene.add_body("block", mass=1.0, Jp=(1.0, 1.0, 1.0))
     scene.add_joint("tran", "guide", P_i="block.O", P_j="ground.O", a_j="ground.x")
-    scene.add_function("a", "speed", coeff=(0.0, 1.0, 0.0))
+    scene.add_function("a", "speed", coeff=(0.0, -1.0, 0.0))
     scene.add_joint("drive-tran", "drive", body_i="block", P_i="block.O", P_j="ground.O",
                     a_j="ground.x", function="speed")  # fmt: skip
     scene.add_point("post", body="ground", sPp=(-1.0, 0.0, 0.0))

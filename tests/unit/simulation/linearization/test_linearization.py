@@ -255,12 +255,12 @@ def test_picture_of_the_eigenvalues():
         dap.plot(lin, "cart.r.x", ax=ax)
 
 
-@pytest.mark.parametrize("level", ["drive-tran", "rel-tran"])
-def test_driver_as_input(level):
+@pytest.mark.parametrize(("level", "sense"), [("drive-tran", 1.0), ("rel-tran", -1.0)])
+def test_driver_as_input(level, sense):
     """A cart that a driver moves: its acceleration swings the pendulum, and the driver's force.
 
-    (J + m l^2) phi'' + m g l phi = m l x'' about y. The driver moves ground beyond the cart, so
-    that x'' = -a, and pushes the cart with (M + m) x'' - m l phi''.
+    (J + m l^2) phi'' + m g l phi = m l x'' about y. The driver moves the cart, x'' = a, and pushes
+    it with (M + m) x'' - m l phi''; rel-tran has the sign of the manual, x'' = -a.
     """
     scene = cart()
     for name in ("spring", "push"):
@@ -269,8 +269,8 @@ def test_driver_as_input(level):
     scene.add_joint(level, "drive", body_i="cart", a_j="ground.x", **fields)
     lin = dap.linearize(scene, inputs=("drive",), outputs=("bob.w.y", "cart.r.x", "drive.force.x"))
     s = 0.4 + 1.7j
-    phi = -0.5 / (0.27 * s**2 + 0.5 * 9.81)
-    expected = [s * phi, -1 / s**2, -3.0 - 0.5 * phi * s**2]
+    phi = sense * 0.5 / (0.27 * s**2 + 0.5 * 9.81)
+    expected = [s * phi, sense / s**2, sense * 3.0 - 0.5 * phi * s**2]
     np.testing.assert_allclose(transfer(lin, s)[:, 0], expected, rtol=1e-11)
     # at the velocity level alone the place of the cart is free: an eigenvalue of zero besides
     np.testing.assert_allclose(np.abs(lin.eigenvalues[-2:]), np.sqrt(0.5 * 9.81 / 0.27))
@@ -283,7 +283,7 @@ def test_driver_at_a_later_time():
                    r_dot=[0, 2.0, 0])  # fmt: skip
     scene.add_point("pin", "crank", [-1.0, 0, 0])
     scene.add_joint("rev", "J", P_i="pin", P_j="ground.O", a_i="crank.z", a_j="ground.z")
-    scene.add_function("a", "turn", coeff=[0.0, -2.0, 0.0])
+    scene.add_function("a", "turn", coeff=[0.0, 2.0, 0.0])
     scene.add_joint("drive-rot", "motor", body_i="crank", a_j="ground.z", function="turn")
     lin = dap.linearize(scene, t=0.4)
     np.testing.assert_allclose(lin.u[:3], [np.cos(0.8), np.sin(0.8), 0.0], atol=1e-9)
