@@ -15,12 +15,16 @@ from dap3d_core.formulations.common.constraints import (
     solve_equations,
     solve_rows,
 )
+from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: How often the rows are solved.
 SOLVES = 3
 #: The same, at most, where masses differ much; and how much less of a residual a pass is to leave.
 MORE_SOLVES, FALLING = 12, 0.5
+#: Passes at most that find what D^T does not see of the multipliers, and what each is to leave of
+#: the change of the one before: more would gather rounding.
+LEAST_SOLVES, LEFT = 6, 0.5
 
 
 @compiled
@@ -48,6 +52,36 @@ def solve(system: System) -> None:
         add_pass(system)
     for k in range(system.total.shape[0]):
         system.multipliers[k] = system.total[k]
+    if has_friction(system):
+        least_weighted_multipliers(system)
+
+
+@compiled
+def least_weighted_multipliers(system: System) -> None:
+    """Replace ``multipliers`` by those with the same D^T lambda of least lambda . E lambda.
+
+    So forces read numbers that are free of rounding, and that units of the scene do not change.
+    n -> (D^ D^^T + E)^-1 E n keeps what D^T does not see, and takes away the rest.
+    """
+    n, x, E = system.right_side, system.multipliers, system.compliance
+    before = np.inf
+    for k in range(n.shape[0]):
+        n[k] = system.total[k]
+    for _ in range(LEAST_SOLVES):
+        for k in range(n.shape[0]):
+            x[k] = E[k] * n[k]
+        zero(system.change)
+        solve_rows(system, system.change)
+        change = 0.0
+        for k in range(n.shape[0]):
+            x[k] = -x[k] if E[k] != 0.0 else 0.0  # else a hub's place
+            change = max(change, abs(x[k] - n[k]))
+            n[k] = x[k]
+        if not change < LEFT * before:
+            break
+        before = change
+    for k in range(n.shape[0]):
+        x[k] = system.total[k] - n[k]
 
 
 @compiled
