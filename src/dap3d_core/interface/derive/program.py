@@ -101,7 +101,9 @@ class Program:
                 if weight != 0:
                     give_all(expression, guard, weight)
         program = attrs.evolve(self, steps=steps)
-        sums = {s: [x for terms in by_guard.values() for x in terms] for s, by_guard in found.items()}
+        sums = {
+            s: [x for terms in by_guard.values() for x in terms] for s, by_guard in found.items()
+        }
         return program, {s: sympy.Add(*terms) for s, terms in sums.items()}
 
     def plain(self, result: int) -> Expression:

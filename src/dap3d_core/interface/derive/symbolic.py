@@ -374,7 +374,9 @@ def derive_value(
     if arguments > 1:
         y = symbols.value("y")
         f_x, f_y = derivative(f, x), derivative(f, y)
-        return {"value": [f, f_x, f_y, derivative(f_x, x), derivative(f_x, y), derivative(f_y, y)]}, {}
+        return {
+            "value": [f, f_x, f_y, derivative(f_x, x), derivative(f_x, y), derivative(f_y, y)]
+        }, {}
     found = [f]
     for _ in range(3):
         found.append(derivative(found[-1], x))

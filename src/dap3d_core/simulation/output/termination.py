@@ -25,9 +25,9 @@ def doubts(evaluator: Evaluator) -> list[str]:
     notes = []
     if (count := evaluator.friction_failure_count) and evaluator.model.friction:
         notes.append(
-            f"friction: the multipliers did not converge in {PASSES} passes, {count} times, with "
-            "reports and projections; the last ones were used. Motion there is uncertain: a high mu may lock the "
-            "joint by itself"
+            f"friction: the multipliers did not settle in {PASSES} passes, {count} times, "
+            "reports included; the last ones were used. Motion there is uncertain: a high mu may "
+            "lock the joint by itself"
         )
     if count := evaluator.singular_reports:
         notes.append(
