@@ -10,7 +10,7 @@ Weights that follow the length of their rows make the motion independent of how 
 
 Accelerations are unique, multipliers are not: reported are those of least |lambda|, what
 numpy.linalg.lstsq or pinv give. Where forces depend on multipliers accelerations are not unique
-either: such forces read those of least lambda . E lambda (decision 0074), which are then reported.
+either: such forces read those of least lambda . w lambda (decision 0074), which are then reported.
 """
 
 # What a compiled function returns is Any to mypy.
