@@ -204,15 +204,11 @@ def _rest_states(sample: Sample) -> Iterator[tuple[str, State]]:
     aligned = attrs.evolve(still, p=np.tile((1.0, 0.0, 0.0, 0.0), (BODIES, 1)))
     yield "where no body is turned", aligned
     yield "where all bodies are at the origin", attrs.evolve(aligned, r=np.zeros((BODIES, 3)))
-    numbers = sample.kernels.type_info.layout.numbers
-    if {"P_i", "P_j"} <= set(numbers):
-        one, other = (np.array(sample.element.par[numbers[n][0] :][:3]) for n in ("P_i", "P_j"))
-        slots = sample.kernels.type_info.layout.slots
-        if "j" in slots:
-            r = aligned.r.copy()
-            i, j = (slots.index(s) + 1 for s in "ij")
-            r[i] = r[j] + other - one
-            yield "where P_i and P_j coincide", attrs.evolve(aligned, r=r)
+    layout, r = sample.kernels.type_info.layout, np.zeros((BODIES, 3))
+    for k, slot in enumerate(layout.slots, start=1):
+        if (place := layout.numbers.get(f"P_{slot}")) is not None:
+            r[k] = -np.array(sample.element.par[place[0] : place[0] + 3])
+    yield "where its points coincide", attrs.evolve(aligned, r=r)
 
 
 def _has_slopes(sample: Sample, name: str) -> bool:
