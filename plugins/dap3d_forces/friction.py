@@ -1,6 +1,6 @@
 """Coulomb friction in a joint."""
 
-from dap3d_core.interface import Force, hookimpl, joint, number
+from dap3d_core.interface import Force, choice, hookimpl, joint, number
 
 interface_version = 1
 
@@ -13,6 +13,10 @@ class Friction(Force):
     slip ``xyz``). lambda depends on friction and friction on lambda, which are made to agree by
     iteration. There is no sticking: below v_tol friction fades, and a body that should stick creeps
     at a part of v_tol.
+
+    Redundant joints can share their load in many ways, each with another friction and motion: a run
+    is refused, but with shared = "least", which goes on with the least lambda (method lsq) and
+    notes how much the work of friction depends on it.
     """
 
     keyword = "friction"
@@ -26,6 +30,11 @@ class Friction(Force):
         unit="m",
         positive=True,
         doc="of the ball, pin or rod that turns; required for sph, rev, cyl",
+    )
+    shared: str = choice(
+        ("refuse", "least"),
+        default="refuse",
+        doc="where the joint's load is not unique: whether to take the least, with a note",
     )
 
 

@@ -92,7 +92,9 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
                 float(any(group.read for group in model.forces)),
             ]
         ),
-        friction=np.zeros(memory_size(n + 1, plan.row_size) if model.iterated_forces else 0),
+        friction=np.zeros(
+            memory_size(n + 1, plan.row_size, plan.matrix_size) if model.iterated_forces else 0
+        ),
         idx=idx,
         groups=groups,
         kinds=starts,

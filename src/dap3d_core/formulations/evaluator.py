@@ -390,6 +390,26 @@ class Evaluator:
             gradients = scaled_rows(self.rows(0.0, model.u0), model.length)[1]
             good = np.where(np.isfinite(gradients), gradients, 1.0)
             self.system.weight[self.system.row] = model.length / good
+        if model.iterated_forces and model.row_count:
+            self._weigh_multipliers()
+
+    def _weigh_multipliers(self) -> None:
+        """Weights of multipliers, by which those of least lambda . w lambda are a choice.
+
+        They make forces of them: of rows that turn alone, moments over the size of the parts. So
+        neither units, nor axes, nor how a row is scaled matter (formulations/regularised.py).
+        """
+        model, s = self.model, self.system
+        rows = self.rows(0.0, model.u0)
+        moves = rows.column % 6 < 3
+        moving, turning = (
+            np.bincount(rows.row[of], rows.value[of] ** 2, minlength=model.row_count)
+            for of in (moves, ~moves)
+        )
+        turns_alone = moving <= 1e-12 * turning / model.part_size**2
+        w = np.where(turns_alone, turning / model.part_size**2, moving)
+        last = s.friction.size - s.K.size
+        s.friction[last - s.total.size : last][s.row] = np.where(np.isfinite(w) & (w > 0.0), w, 1.0)
 
     @IGNORE_FLOAT_ERRORS
     def place(self, t: float, u: ArrayLike) -> None:

@@ -9,7 +9,8 @@ where s is the squared singular value of the scaled rows, so a few passes stand 
 Weights that follow the length of their rows make the motion independent of how rows are scaled.
 
 Accelerations are unique, multipliers are not: reported are those of least |lambda|, what
-numpy.linalg.lstsq or pinv give.
+numpy.linalg.lstsq or pinv give. Where forces depend on multipliers accelerations are not unique
+either: such forces read those of least lambda . w lambda (decision 0074), which are then reported.
 """
 
 # What a compiled function returns is Any to mypy.
@@ -28,6 +29,7 @@ from dap3d_core.formulations.common.constraints import (
     report_multipliers,
     solve_rows,
 )
+from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.formulations.regularised import accelerate
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.ldlt.factor import assemble, factor, regularise, weigh_rows
@@ -111,5 +113,6 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     accelerate(t, y, system, loops)
     global_accelerations(system.metric, system.acceleration, out)
     report_levels(t, out, system, loops)
-    minimum_norm_multipliers(system)
+    if not has_friction(system):  # else they are those that forces have read
+        minimum_norm_multipliers(system)
     report_multipliers(system, out)

@@ -8,19 +8,25 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import EVEN, Floats, System
-from dap3d_core.assembly.evaluate import zero
+from dap3d_core.assembly.evaluate import largest, zero
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,
     solve_equations,
     solve_rows,
 )
+from dap3d_core.formulations.common.friction import has_friction
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.linear.ldlt.factor import assemble, factor, regularise, weigh_rows
 
 #: How often the rows are solved.
 SOLVES = 3
 #: The same, at most, where masses differ much; and how much less of a residual a pass is to leave.
 MORE_SOLVES, FALLING = 12, 0.5
+#: For the least multipliers: e w as part of the longest row's square, and passes at most. D^T may
+#: see this part of what is taken away; else e is smaller, by so much at a time, down to a least one.
+LEAST_PART, LEAST_SOLVES = 1e-4, 50
+SEEN, SMALLER, SMALLEST = 1e-11, 1e-2, 1e-4
 
 
 @compiled
@@ -48,6 +54,59 @@ def solve(system: System) -> None:
         add_pass(system)
     for k in range(system.total.shape[0]):
         system.multipliers[k] = system.total[k]
+    if has_friction(system):
+        least_multipliers(system)
+
+
+@compiled
+def least_multipliers(system: System) -> None:
+    """Replace ``multipliers`` by those with the same D^T lambda of least lambda . w lambda.
+
+    So forces read numbers that are free of rounding. n -> (D^ D^^T + e w)^-1 e w n keeps what D^T
+    does not see, and takes away the rest: with one factorisation, and fewer where e is small
+    enough for rows that hold only weakly.
+    """
+    K, n, rows = system.K, system.right_side, system.total.shape[0]
+    last = system.friction.shape[0] - K.shape[0]
+    w, kept = system.friction[last - rows : last], system.friction[last:]
+    for k in range(K.shape[0]):
+        kept[k] = K[k]
+    weigh_rows(system.blocks, system.D, 1.0, system.compliance)
+    e = LEAST_PART * largest(system.compliance) / largest(w)
+    for k in range(rows):
+        n[k] = system.total[k] = system.multipliers[k]
+    limit, smallest = SEEN * largest(system.total), SMALLEST * e
+    while take_seen(system, n, w, e) > limit and e > smallest:
+        e *= SMALLER
+    for k in range(K.shape[0]):
+        K[k] = kept[k]
+    for k in range(rows):
+        system.multipliers[k] = system.total[k] - n[k]
+
+
+@compiled
+def take_seen(system: System, n: Floats, w: Floats, e: float) -> float:
+    """Take from n what D^T sees, as far as weights e w do; the largest change of the last pass."""
+    x, before, change = system.multipliers, np.inf, np.inf
+    for k in range(n.shape[0]):
+        system.compliance[k] = e * w[k]
+    assemble(system.targets, system.contributions, system.D, system.K)
+    regularise(system.nodes, system.compliance, system.K)
+    factor(system.nodes, system.columns, system.updates, system.K, system.smallest, False)
+    for _ in range(LEAST_SOLVES):
+        for k in range(n.shape[0]):
+            x[k] = e * w[k] * n[k]
+        zero(system.change)
+        solve_rows(system, system.change)
+        change = 0.0
+        for k in range(n.shape[0]):
+            x[k] = -x[k] if w[k] != 0.0 else 0.0  # else a hub's place
+            change = max(change, abs(x[k] - n[k]))
+            n[k] = x[k]
+        if not change < 0.5 * before:
+            break
+        before = change
+    return change
 
 
 @compiled

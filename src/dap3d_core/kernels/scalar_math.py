@@ -40,7 +40,10 @@ def _generic(name: str, outside: Callable[[float], float] = lambda x: math.nan) 
     @intrinsic(name)
     def function(x):
         if isinstance(x, complex):
-            return _like(x, other(x))
+            try:
+                return _like(x, other(x))
+            except (ValueError, OverflowError):
+                return _like(x, complex(outside(x.real), math.nan))
         if _symbolic(x):
             return getattr(_library(x), name)(x)
         try:

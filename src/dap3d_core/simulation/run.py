@@ -10,6 +10,7 @@ from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators import IMPLICIT, Integration, Status
 from dap3d_core.integrators.added import integrator_named
 from dap3d_core.integrators.stepping.singular_poses import begin_singular
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import INFORMATION, Result, ResultError
 from dap3d_core.scene import Mistake, SceneError, Simulation
@@ -21,6 +22,7 @@ from dap3d_core.simulation.initial_state import InitialState, start_notes
 from dap3d_core.simulation.output.error_estimate import StepLimits, add_error
 from dap3d_core.simulation.output.termination import doubts, event_notes, why_stopped
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
+from dap3d_core.simulation.redundancy.redundancy import Redundancy
 from dap3d_core.simulation.run_state import RunState
 from dap3d_core.simulation.settings import (
     check_fit,
@@ -32,6 +34,7 @@ from dap3d_core.simulation.settings import (
 if TYPE_CHECKING:
     from dap3d_core.simulation.checkpoint.save import CheckpointWriter
     from dap3d_core.simulation.events.jumps import Jumps
+    from dap3d_core.simulation.redundancy.shared_reactions import SharedLaw
 
 #: Seconds that a compiled chunk should take: Ctrl-C and the progress bar wait for its end.
 CHUNK_SECONDS = 0.1
@@ -51,6 +54,7 @@ class Run(RunState):
 
     checkpoint_writer: "CheckpointWriter | None" = None
     singular: SingularStart | None = None
+    shared_laws: "tuple[SharedLaw, ...]" = ()
 
     def save_every(self, seconds: float, *, force: bool) -> None:
         """Write checkpoints next to the output; arguments and errors as of ``CheckpointWriter``."""
@@ -174,12 +178,30 @@ class Run(RunState):
             raise RedundantError(words)
         if singular is not None:
             refuse_singular_start(self.settings, singular.first_step, formulation)
-        least = " (reported are those of least |lambda|)" if formulation.is_exact else ""
-        self.notes.append(
-            f"{words}. Accelerations are unique; reactions in these joints are not{least}"
-        )
+        self._judge_shared_reactions(u, redundancy)
+        if self.shared_laws:
+            unique = "Reactions in these joints are not unique, and forces read them"
+        else:
+            least = " (reported are those of least |lambda|)" if formulation.is_exact else ""
+            unique = f"Accelerations are unique; reactions in these joints are not{least}"
+        self.notes.append(f"{words}. {unique}")
         if singular is not None:
             self.notes.append(singular.describe())
+
+    def _judge_shared_reactions(self, u: Floats, redundancy: Redundancy) -> None:
+        """Refuse forces that read reactions which are not unique, or follow what comes of it."""
+        if not self.evaluator.model.iterated_forces:
+            return
+        from dap3d_core.simulation.redundancy import shared_reactions
+
+        integrator = self.settings.integrator
+        implicit = integrator if integrator == IMPLICIT.name else ""
+        self.shared_laws = shared_reactions.shared_laws(
+            self.compiled.checked, self.evaluator, u, redundancy
+        )
+        shared_reactions.refuse_shared(self.shared_laws, self.evaluator, implicit)
+        if self.shared_laws:
+            self.recorder.spread = shared_reactions.ShareSpread(self.evaluator, self.shared_laws)
 
     def _integration(self, start: InitialState) -> Integration:
         evaluator, settings, singular, u0 = self.evaluator, self.settings, self.singular, start.u
@@ -194,7 +216,9 @@ class Run(RunState):
         integrator = integrator_named(settings.integrator)
         check_fit(integrator, evaluator.formulation)
         if settings.integrator == "auto":
-            options = options | {"stop_when_stiff": fits(IMPLICIT, evaluator.formulation)}
+            options = options | {
+                "stop_when_stiff": fits(IMPLICIT, evaluator.formulation) and not self.shared_laws
+            }
         try:
             integration = integrator.make(evaluator, y0, self.times, **options)
         except ValueError as error:
@@ -262,11 +286,12 @@ class Run(RunState):
     def _closing_notes(self) -> list[str]:
         """Notes on a run that has come to an end."""
         recorder, event_locator = self.recorder, self.event_locator
-        notes = doubts(self.evaluator, self.statistics().rhs)
+        notes = doubts(self.evaluator)
         if self.settings.step is None and recorder.count:
             notes += motion_notes(recorder.low, recorder.high, self.settings)
             notes += rounding_notes(self.integrations, self.evaluator)
         notes += recorder.pulling.notes()
+        notes += [recorder.spread.note()] if recorder.spread is not None else []
         notes += event_locator.notes() if event_locator else []
         notes += self.jumps.notes(self.present) if self.jumps is not None else []
         notes += event_notes(self.integrations, self.events())

@@ -12,7 +12,15 @@ from dap3d_core.interface.codegen.reactions import joints_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.testing.checks import forces, functions, joints, plain_kernels, purity, states
+from dap3d_core.testing.checks import (
+    branches,
+    forces,
+    functions,
+    joints,
+    plain_kernels,
+    purity,
+    states,
+)
 from dap3d_core.testing.checks.findings import (
     FAILED,
     LEFT_OUT,
@@ -153,6 +161,8 @@ def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
             ground = joints.against_ground(subject)
             checks.append(Check("rate", subject, "", states.tangent))
             checks.append(Check("rate frame", subject, ground, states.frame))
+        checks.append(Check("branches", subject, "", branches.switches))
+        checks.append(Check("rest", subject, "", branches.rest))
         checks.append(Check("purity", subject, "", purity.purity))
         checks.append(Check("plain", subject, "", plain_kernels.plain))
         checks.append(Check("compiled", subject, "", purity.compiled))
@@ -218,15 +228,25 @@ def _of_jumps(subject: SampledType) -> list[Check]:
     from dap3d_core.testing.checks import jumps
 
     ground = joints.against_ground(subject)
+    gives = "" if jumps.follows_velocities(subject) else "its impulse does not follow velocities"
+    if subject.type.gives_energy:
+        gives = "it declares gives_energy"
+    if subject.type.kind == "force" and subject.type.restitution:
+        gives = "the check restitution sees energy created"
+    energy = Check("impulse energy", subject, gives, jumps.energy)
     if not jumps.has_rows(subject):
         return [
-            Check(name, subject, ground, partial(run, kernel="impulse"))
-            for name, run in (
-                ("jump frame", forces.frame),
-                ("impulse and reaction", forces.balance),
-            )
+            energy,
+            *(
+                Check(name, subject, ground, partial(run, kernel="impulse"))
+                for name, run in (
+                    ("jump frame", forces.frame),
+                    ("impulse and reaction", forces.balance),
+                )
+            ),
         ]
     checks = [
+        energy,
         Check("jump rows", subject, jumps.why_no_gap(subject), jumps.rows),
         Check("round", subject, "", jumps.settling),
         Check("jump frame", subject, ground, jumps.frame),

@@ -65,6 +65,7 @@ def _data(compiled: "CompiledModel", metric: str | None) -> dict[str, Any]:
     model, settings = compiled.model, compiled.scene.simulation
     u, initial = model.u0, None
     mistakes: list[dict[str, Any]] = []
+    shared: list[str] = []
     try:
         metric = metric or str(settings.correct_metric)
         start = compiled.start(bool(settings.correct), settings.hold, metric)
@@ -74,7 +75,14 @@ def _data(compiled: "CompiledModel", metric: str | None) -> dict[str, Any]:
     except AssemblyError as error:
         mistakes.append({"key": "joints", "what": str(error)})
         redundancy = compiled.redundancy()
-    rank = redundancy.rank
+    rank, is_assembled = redundancy.rank, not mistakes
+    if is_assembled and rank.redundant and model.iterated_forces:
+        from dap3d_core.simulation.redundancy.shared_reactions import shared_laws, why_refused
+
+        laws = shared_laws(compiled.checked, compiled.evaluator, u, redundancy)
+        shared = [law.force for law in laws]
+        if words := why_refused(laws):
+            mistakes.append({"key": "forces", "what": words})
     position, velocity = violation(compiled.evaluator, model.u0)
     return {
         "scene": compiled.scene.name,
@@ -85,7 +93,7 @@ def _data(compiled: "CompiledModel", metric: str | None) -> dict[str, Any]:
         "dof": rank.dof,
         "joints": list(redundancy.joints),
         "contradiction": redundancy.contradiction,
-        **_redundancy_data(compiled, u, redundancy, assembled=not mistakes),
+        **_redundancy_data(compiled, u, redundancy, shared, assembled=is_assembled),
         "violation": {"position": position, "velocity": velocity},
         "initial": initial,
         "method": compiled.method,
@@ -99,7 +107,12 @@ def _data(compiled: "CompiledModel", metric: str | None) -> dict[str, Any]:
 
 
 def _redundancy_data(
-    compiled: "CompiledModel", u: Any, redundancy: "Redundancy", *, assembled: bool
+    compiled: "CompiledModel",
+    u: Any,
+    redundancy: "Redundancy",
+    shared: list[str],
+    *,
+    assembled: bool,
 ) -> dict[str, Any]:
     """Redundancy as data; ``about`` has the same in sentences."""
     import attrs
@@ -127,6 +140,7 @@ def _redundancy_data(
         "reactions": {
             "unique": list(redundancy.unique_joints),
             "shared": {r.joint: attrs.asdict(r) for r in redundancy.reactions()},
+            "read_by": shared,
         },
         "about": about,
         "about_reactions": redundancy.describe_reactions(),
@@ -184,4 +198,7 @@ def _show_redundancy(console: "Terminal", data: dict[str, Any]) -> None:
             "--method lsq"
         )
     console.items(about)
-    console.section("reactions (accelerations are unique)", data["about_reactions"])
+    read = data["reactions"]["read_by"]
+    title = f"reactions (read by {', '.join(read)})" if read else "reactions"
+    title += "" if read else " (accelerations are unique)"
+    console.section(title, data["about_reactions"])

@@ -63,9 +63,13 @@ def apply_friction(t: float, system: System, loops: Any) -> float:
     return power
 
 
-def memory_size(bodies: int, rows: int) -> int:
-    """Numbers of ``System.friction``: forces of the bodies (ground too), passes of the rows."""
-    return 12 * bodies + (3 + 2 * DEPTH) * rows
+def memory_size(bodies: int, rows: int, matrix: int) -> int:
+    """Numbers of ``System.friction``.
+
+    They are forces of the bodies (ground too), passes of the rows; then weights of the rows and a
+    copy of ``K`` (regularised.py).
+    """
+    return 12 * bodies + (4 + 2 * DEPTH) * rows + matrix
 
 
 @compiled

@@ -62,7 +62,7 @@ def derive(
 
     given = {n: k for n, k in type_.kernels().items() if n in _given_of(type_.kind, wanted)}
     offered, here = [repr(q) for q in names.values()], Path(__file__)
-    how = [here.with_name(f"{n}.py").read_bytes() for n in ("derive", "symbolic", "kernel_printer")]
+    how = [path.read_bytes() for path in sorted(here.parent.glob("*.py"))]
     kernels = given.values()
     key = digest(*wanted, *offered, *how, *identities(*kernels), *sources(*kernels))
     name = f"derived-{key}"

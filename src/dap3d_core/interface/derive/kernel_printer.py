@@ -9,7 +9,8 @@ import sympy
 from sympy.printing.pycode import PythonCodePrinter
 
 from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
-from dap3d_core.interface.derive.symbolic import DerivationError, Steps, Symbols, flat
+from dap3d_core.interface.derive.program import Steps
+from dap3d_core.interface.derive.symbolic import DerivationError, Symbols, flat
 
 #: sympy's functions that kernels have under the same name.
 WORDS = ("sin", "cos", "tanh", "atan2", "exp", "log", "asin", "acos", "floor")
@@ -71,13 +72,23 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
         (x,) = tangent.args
         return f"({self._call('sin', x)} / {self._call('cos', x)})"
 
-    def _print_Piecewise(self, branches: Any) -> str:
-        *first, (last, _) = branches.args
-        text = str(self._print(last))
-        for value, condition in reversed(first):
-            self.used.add("where")
-            text = f"where({self._print(condition)}, {self._print(value)}, {text})"
-        return text
+    def _print_Branch(self, branch: Any) -> str:
+        return self._call("where", *branch.args)
+
+    def _print_And(self, conditions: Any) -> str:
+        return self._joined(conditions, " & ")
+
+    def _print_Or(self, conditions: Any) -> str:
+        return self._joined(conditions, " | ")
+
+    def _print_Xor(self, conditions: Any) -> str:
+        return self._joined(conditions, " ^ ")
+
+    def _print_Not(self, condition: Any) -> str:
+        return f"({self._print(condition.args[0])} ^ True)"
+
+    def _joined(self, conditions: Any, operator: str) -> str:
+        return f"({operator.join(map(self._print, conditions.args))})"
 
     def _print_Function(self, call: Any) -> str:
         name = type(call).__name__

@@ -9,12 +9,10 @@ its body, W_i x s_P_i. With V_i, W_i the velocities of the bodies this gives, fo
 Imported only for a type with formulas to be derived, as it imports sympy.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import attrs
 import sympy
-from sympy.logic.boolalg import Boolean
 
 from dap3d_core.interface.codegen.kernel_arguments import (
     SEVERAL,
@@ -22,11 +20,10 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     derivative_names,
     parameters,
 )
+from dap3d_core.interface.derive.branches import Branch, as_argument, expression_of, is_condition
+from dap3d_core.interface.derive.program import Expression, Program, Steps, derivative
 from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.kernels import add, cross, dot, sub
-
-Expression = Any
-Steps = dict[Expression, Expression]
 
 
 class DerivationError(ValueError):
@@ -64,91 +61,7 @@ def flat(value: Any) -> list[Expression]:
     """The numbers of a nested tuple, in order."""
     if isinstance(value, (tuple, list)):
         return [x for part in value for x in flat(part)]
-    return [sympy.sympify(value)]
-
-
-@attrs.frozen
-class Program:
-    """Expressions with common parts in steps, so that derivatives of steps are steps.
-
-    Attributes:
-        steps: symbol -> expression over the symbols before it.
-        results: expressions over all of them.
-        fresh: symbols for further steps; numbered from zero in each derivation, as the order of a
-            sum depends on names.
-    """
-
-    steps: dict[Expression, Expression]
-    results: list[Expression]
-    fresh: Iterator[Expression]
-
-    @classmethod
-    def of(cls, results: Sequence[Expression], fresh: Iterator[Expression]) -> "Program":
-        """A step for each common subexpression, and for each argument of a function."""
-        common, reduced = sympy.cse(results, symbols=fresh)
-        steps: dict[Expression, Expression] = {}
-        known: dict[Expression, Expression] = {}
-
-        def named(x: Expression) -> Expression:
-            if x.is_Atom:
-                return x
-            if x not in known:
-                known[x] = next(fresh)
-                steps[known[x]] = x
-            return known[x]
-
-        def split(x: Expression) -> Expression:
-            if x.is_Atom or isinstance(x, (sympy.Piecewise, Boolean)):
-                return x
-            arguments = [split(a) for a in x.args]
-            if isinstance(x, sympy.Function) or (x.is_Pow and not x.exp.is_Integer):
-                arguments = [named(a) for a in arguments]
-            return x.func(*arguments)
-
-        for symbol, expression in common:
-            steps[symbol] = split(expression)
-        return cls(steps, [split(x) for x in reduced], fresh)
-
-    def gradient(self, result: int) -> tuple["Program", dict[Expression, Expression]]:
-        """Derivatives of one result by the symbols that are not steps (reverse accumulation).
-
-        Returns:
-            the program with the steps that they need, and the derivatives by symbol.
-        """
-        steps = dict(self.steps)
-        found: dict[Expression, list[Expression]] = {}
-
-        def give(expression: Expression, weight: Expression) -> None:
-            for s in sorted(expression.free_symbols, key=str):
-                found.setdefault(s, []).append(weight * _diff(expression, s))
-
-        give(self.results[result], sympy.Integer(1))
-        for symbol, expression in reversed(self.steps.items()):
-            weight = sympy.Add(*found.pop(symbol, ()))
-            if not weight.is_Atom:
-                step = next(self.fresh)
-                steps[step], weight = weight, step
-            if weight != 0:
-                give(expression, weight)
-        program = attrs.evolve(self, steps=steps)
-        return program, {s: sympy.Add(*x) for s, x in found.items()}
-
-    def plain(self, result: int) -> Expression:
-        """One result without steps."""
-        known: dict[Expression, Expression] = {}
-        for symbol, expression in self.steps.items():
-            known[symbol] = expression.xreplace(known)
-        return self.results[result].xreplace(known)
-
-
-def _diff(expression: Expression, symbol: Expression) -> Expression:
-    """Derivative; that of a jump (of a sign, a branch, ``floor``) is zero."""
-    found, zero = sympy.diff(expression, symbol), sympy.Integer(0)
-    if expression.has(sympy.floor):  # of which sympy knows no derivative
-        found = found.replace(sympy.Subs, lambda *_: zero).replace(
-            sympy.Derivative, lambda *_: zero
-        )
-    return found.replace(sympy.DiracDelta, lambda *_: zero)
+    return [expression_of(value)]
 
 
 class Symbols(Mapping[str, Any]):
@@ -252,18 +165,30 @@ class Symbols(Mapping[str, Any]):
     def d_dt(self, program: Program) -> Program:
         """Rates of a program's results, at V_dot = W_dot = 0; named rates appear by name."""
         steps = dict(program.steps)
+
+        def named(rate: Expression) -> Expression:
+            if rate.is_Atom:
+                return rate
+            step = next(self.fresh)
+            steps[step] = rate
+            return step
+
         for symbol, expression in program.steps.items():
-            if symbol not in self._steps:
+            if symbol in self._steps:
+                continue
+            if is_condition(expression):
+                rate = sympy.Integer(0)
+            elif isinstance(expression, Branch):
+                condition, *sides = expression.args
+                rate = Branch(condition, *(named(self._d_dt(x)) for x in sides))
+            else:
                 rate = self._d_dt(expression)
-                if not rate.is_Atom:
-                    step = next(self.fresh)
-                    steps[step], rate = rate, step
-                self._steps[symbol] = rate
+            self._steps[symbol] = named(rate)
         return Program(steps, [self._d_dt(x) for x in program.results], self.fresh)
 
     def _d_dt(self, expression: Expression) -> Expression:
         symbols = sorted(expression.free_symbols, key=str)
-        return sympy.Add(*(_diff(expression, s) * self._dot(s) for s in symbols))
+        return sympy.Add(*(derivative(expression, s) * self._dot(s) for s in symbols))
 
     def _dot(self, symbol: Expression) -> Expression:
         if symbol in self._steps:
@@ -305,11 +230,8 @@ def traced(kernel: Callable[..., Any], symbols: Symbols, what: str) -> list[Expr
         DerivationError: it cannot be evaluated symbolically; gives the remedy.
     """
     try:
-        value = kernel(*(symbols.value(name) for name in parameters(kernel)))
-        numbers = [exact(x) for x in flat(value)]
-        if any(x.has(sympy.Mod) for x in numbers):
-            raise TypeError("the remainder a % b is written as a - b * floor(a / b)")
-        return numbers
+        value = kernel(*(as_argument(symbols.value(name)) for name in parameters(kernel)))
+        return [exact(x) for x in flat(value)]
     except DerivationError:
         raise
     except Exception as error:
@@ -451,9 +373,11 @@ def derive_value(
     f = f.xreplace({symbols.value("t"): x})  # one number under two names
     if arguments > 1:
         y = symbols.value("y")
-        f_x, f_y = _diff(f, x), _diff(f, y)
-        return {"value": [f, f_x, f_y, _diff(f_x, x), _diff(f_x, y), _diff(f_y, y)]}, {}
+        f_x, f_y = derivative(f, x), derivative(f, y)
+        return {
+            "value": [f, f_x, f_y, derivative(f_x, x), derivative(f_x, y), derivative(f_y, y)]
+        }, {}
     found = [f]
     for _ in range(3):
-        found.append(_diff(found[-1], x))
+        found.append(derivative(found[-1], x))
     return {"value": found}, {}

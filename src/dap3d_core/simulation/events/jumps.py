@@ -18,6 +18,7 @@ from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.result import INFORMATION, EventRecord
 from dap3d_core.result.file.validate import are_events, is_number
 from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
 
 #: Records of jumps that a result keeps.
 MOST_RECORDS = 1000
@@ -74,7 +75,10 @@ class Jumps:
 
     def begin(self, integration: Integration) -> None:
         """Let what touches and approaches at the start of a run jump there."""
-        self._jump(integration, np.zeros(integration.work.switches.shape[1]), None)
+        crossing = np.zeros(integration.work.switches.shape[1])
+        crossing[self._closing(integration)] = -1.0
+        crossing[self._contact.pushes] = 0.0  # rows that push need not cross to answer
+        self._jump(integration, crossing, None)
 
     def restart(self, integration: Integration) -> None:
         """Forget the jumps so far, and begin again."""
@@ -101,7 +105,7 @@ class Jumps:
             evaluator.functions[WATCH](
                 integration.t, integration.y, values, evaluator.system, evaluator.loops
             )
-        passed = self._is_bare & (values < -PASSED * evaluator.model.length)
+        passed = self._contact.pushes & (values < -PASSED * evaluator.model.length)
         return notes + [
             f"{self._title(k)}: its switch is {values[k]:.3g} at the end. Contact stayed, and "
             "nothing carried it: its type has no wrench, and acts by jumps alone"
@@ -168,6 +172,7 @@ class Jumps:
             ) from error
         if not jump.elements:
             self._record_crossings(t, crossing)
+            self._refuse_what_nothing_carries(integration)
             return
         self.lose |= abs(jump.work) > LOSSLESS * jump.exchanged
         after = self._take(integration, u, jump)
@@ -204,8 +209,7 @@ class Jumps:
 
     def _refuse_what_nothing_carries(self, integration: Integration) -> None:
         """SimulationError for contact that stays, of a type without a force that could hold it."""
-        stays = self._is_bare & (integration.work.switches[at.SIDE] < 0.0)
-        for k in np.flatnonzero(stays).tolist():
+        for k in self._closing(integration):
             raise SimulationError(
                 f"the run stopped at t = {integration.t:.9g} s: {self._title(k)} comes to rest "
                 "in contact, and nothing carries it: its type has no wrench, and the bodies would "
@@ -213,15 +217,14 @@ class Jumps:
                 "and its like have, or end the run by an event before"
             )
 
+    def _closing(self, integration: Integration) -> list[int]:
+        """Switches at which contact stays that nothing carries."""
+        sides, span = integration.work.switches[at.SIDE], self._span_of(integration)
+        return self._contact.closing(integration.t, integration.y, sides, span)
+
     @cached_property
-    def _is_bare(self) -> Any:
-        """(switches,) truth values: of rows that push, of a type without a wrench."""
-        types = [switch.group.type_info for switch in self._evaluator.switches]
-        pushes = [bool(getattr(info.type, "unilateral", ())) for info in types]
-        bare = [
-            push and "wrench" not in info.kernels for push, info in zip(pushes, types, strict=True)
-        ]
-        return self._law.elements.is_jump & np.array(bare, dtype=bool)
+    def _contact(self) -> UncarriedContact:
+        return UncarriedContact(self._evaluator, self._law)
 
     def _title(self, k: int) -> str:
         """Kind and name of the element of a switch."""

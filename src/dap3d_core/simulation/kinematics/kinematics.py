@@ -266,6 +266,13 @@ class _Kinematics:
             raise RedundantError(words)
         if redundancy.rank.dof:
             raise SimulationError(self._freedoms(start))
+        if redundancy.rank.redundant and compiled.model.iterated_forces:
+            from dap3d_core.simulation.redundancy import shared_reactions
+
+            laws = shared_reactions.shared_laws(
+                compiled.checked, self.evaluator, start.u, redundancy
+            )
+            shared_reactions.refuse_shared(laws, self.evaluator)
         if redundancy.rank.redundant:
             self.notes.append(
                 f"{words}. The motion is unique; reactions in these joints are not (reported are "

@@ -126,6 +126,11 @@ def operating_point(
             "linearisation does not know states whose rates depend on the reactions of joints: "
             f"leave {', '.join(rated)} out of the scene"
         )
+    if model.iterated_forces and redundancy.rank.redundant:
+        from dap3d_core.simulation.redundancy import shared_reactions
+
+        laws = shared_reactions.shared_laws(compiled.checked, evaluator, u, redundancy, t)
+        shared_reactions.refuse_shared(laws, evaluator)
     if model.friction:
         notes.append(
             "joints with friction: linearised with the smooth law of friction at this state, "

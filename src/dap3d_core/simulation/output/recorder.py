@@ -5,6 +5,7 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -19,6 +20,9 @@ from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.open import arrays_in
 from dap3d_core.simulation.failure.negative_reactions import Pulling
 
+if TYPE_CHECKING:
+    from dap3d_core.simulation.redundancy.shared_reactions import ShareSpread
+
 #: A run that lasts longer writes its rows to disk as they come, so that it may be killed.
 SHORT_SECONDS = 1.0
 
@@ -31,6 +35,7 @@ class ResultRecorder:
         output: the file that is wanted in the end, or None.
         count: instants reported so far.
         pulling: multipliers that must not be negative, and were.
+        spread: what depends on the share of loads that are not unique; None where nothing does.
     """
 
     def __init__(
@@ -62,6 +67,7 @@ class ResultRecorder:
         self._subject = summary_of(model)
         self._parts: list[Arrays] = []
         self.pulling = Pulling(model)
+        self.spread: ShareSpread | None = None
         self._bytes = 0
         self._writer: ResultWriter | None = None
         #: (13 n,) the least and the largest value of each component so far.
@@ -80,6 +86,8 @@ class ResultRecorder:
             self.low = np.minimum(self.low, np.min(arrays.u, axis=0))
             self.high = np.maximum(self.high, np.max(arrays.u, axis=0))
         self.pulling.look(arrays)
+        if self.spread is not None:
+            self.spread.look(arrays)
         self._bytes += 8 * len(arrays) * arrays.width
         large = self._bytes > LARGE
         if self._writer is None:

@@ -20,14 +20,14 @@ REASONS = {
 }
 
 
-def doubts(evaluator: Evaluator, rhs: int) -> list[str]:
-    """Notes on what was computed less surely than all else; rhs: evaluations of the run."""
+def doubts(evaluator: Evaluator) -> list[str]:
+    """Notes on what was computed less surely than all else."""
     notes = []
     if (count := evaluator.friction_failure_count) and evaluator.model.friction:
         notes.append(
-            f"friction: the multipliers did not settle in {PASSES} passes, {count} times of {rhs} "
-            "or more; the last ones were used. Motion there is uncertain: a high mu may lock the "
-            "joint by itself"
+            f"friction: the multipliers did not settle in {PASSES} passes, {count} times, "
+            "reports included; the last ones were used. Motion there is uncertain: a high mu may "
+            "lock the joint by itself"
         )
     if count := evaluator.singular_reports:
         notes.append(

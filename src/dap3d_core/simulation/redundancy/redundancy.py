@@ -143,7 +143,7 @@ class Redundancy:
         model, D = self._model, self._rows.sparse()
         changes: dict[int, list[Floats]] = {}
         for dependency in self.rank.dependencies:
-            for k, mine in _by_joint(model, dependency.rows):
+            for k, mine in by_joint(model, dependency.rows):
                 body = next(b for b in model.joint_slots[k] if b)
                 D_b = D[dependency.rows[mine], 6 * body - 6 : 6 * body].toarray()
                 changes.setdefault(k, []).append(dependency.combinations[:, mine] @ D_b)
@@ -218,7 +218,7 @@ def redundancy_of(evaluator: Evaluator, u: Floats, t: float = 0.0) -> Redundancy
         return Redundancy(Rank(0, 6 * model.body_count, 0, 0.0, "svd"))
     rows, gradient = scaled_rows(finite_rows(evaluator, t, u), model.length)
     rank = rank_of(evaluator, rows)
-    involved = sorted({k for d in rank.dependencies for k, _ in _by_joint(model, d.rows)})
+    involved = sorted({k for d in rank.dependencies for k, _ in by_joint(model, d.rows)})
     binding = bindings(evaluator, rows, u, t) if rank.redundant else ()
     return Redundancy(
         rank,
@@ -246,7 +246,7 @@ def rank_of(evaluator: Evaluator, rows: ConstraintRows) -> Rank:
     return sparse_rank(evaluator.plan, D, evaluator.system.row, 6 * model.body_count, blur)
 
 
-def _by_joint(model: Model, rows: Any) -> list[tuple[int, Any]]:
+def by_joint(model: Model, rows: Any) -> list[tuple[int, Any]]:
     """Joints that rows (ascending) belong to, and the places of each one's."""
     owner = np.searchsorted(model.joint_start, rows, side="right") - 1
     joints, first = np.unique(owner, return_index=True)
@@ -259,7 +259,7 @@ def _groups(model: Model, dependencies: Sequence[Dependency]) -> tuple[Shared, .
     groups: list[tuple[set[int], int]] = []
     of_joint: dict[int, int] = {}
     for dependency in dependencies:
-        joints = {k for k, _ in _by_joint(model, dependency.rows)}
+        joints = {k for k, _ in by_joint(model, dependency.rows)}
         redundant = len(dependency.combinations)
         for old in {of_joint[k] for k in joints if k in of_joint}:
             joints |= groups[old][0]
@@ -317,5 +317,5 @@ def _judged(
         return None
     missed = np.abs(gap @ dependency.combinations)
     chosen = dependency.rows[missed > 0.01 * np.max(missed)]
-    names = tuple(model.joint_names[k] for k, _ in _by_joint(model, chosen))
+    names = tuple(model.joint_names[k] for k, _ in by_joint(model, chosen))
     return Contradiction(level, names, _size(dependency, side, gradient))

@@ -50,6 +50,8 @@ def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner
     takes_rows = not redundancy.rank.redundant or compiled.evaluator.formulation.accepts_redundant
     if not redundancy.is_plain or not takes_rows:
         return None
+    if redundancy.rank.redundant and compiled.model.iterated_forces:
+        return None  # a run judges whether they read what is not unique
     return BatchRunner(start, reduction, times, pack)
 
 

@@ -42,6 +42,11 @@ _RESTLESS = (
     "impulse does not come to rest: with the velocities that it asked for, J v of row {x.n} being "
     "{rate:.6g}, it asks for a further change {x.is_:.6g}; the next round would not be the last"
 )
+_GROWTH = (
+    "impulse creates energy: crossing to {side}, the kinetic energy of free bodies grows by "
+    "{percent:.3g} %, from {before:.6g} to {after:.6g} J, by an impulse that follows their "
+    "velocities; of a type that is to drive them say gives_energy = True"
+)
 _BALANCE = (
     "row {x.n} of J has no reaction: the {what} that its impulse makes on all bodies sum to "
     "{x.is_:.3g} along {axis} and should to zero"
@@ -56,9 +61,10 @@ _FRAME_IMPULSE = (
 )
 
 
-def has_rows(subject: SampledType) -> bool:
+def has_rows(subject: SampledType | Sample) -> bool:
     """True for a force whose jumps are given by rows."""
-    return subject.type.kind == "force" and "J" in subject.kernels.names()
+    type_info = subject.kernels.type_info
+    return type_info.type.kind == "force" and "J" in subject.kernels.names()
 
 
 def why_no_gap(subject: SampledType) -> str:
@@ -171,6 +177,78 @@ def frame(subject: SampledType) -> CheckOutcome:
     return c.outcome()
 
 
+def energy(subject: SampledType) -> CheckOutcome:
+    """Impulses of free bodies that follow their velocities add no kinetic energy."""
+    c = Comparison("impulse energy", subject, "impulse", "kinetic energy after against before")
+    for sample, state in _in_motion(subject):
+        for side in (1.0, -1.0):
+            there = attrs.evolve(sample, kernels=attrs.evolve(sample.kernels, crossing=side))
+            dv = _change(there, state)
+            if dv is None or not np.any(dv):
+                continue
+            along = attrs.evolve(state, v=_along(state, dv, 0), w=_along(state, dv, 1))
+            for moving in (state, along):
+                before = _kinetic(moving)
+                dv = _change(there, moving)
+                after = 0.0 if dv is None else _kinetic(
+                    attrs.evolve(moving, v=moving.v + dv[0], w=moving.w + dv[1]))  # fmt: skip
+                growth = after / before - 1.0 if before > 0.0 else 0.0
+                c.compare(there, np.array([max(growth, 0.0)]), 0.0, _GROWTH,
+                          words={"side": f"{side:+.0f}", "percent": 100.0 * growth,
+                                 "before": before, "after": after})  # fmt: skip
+    return c.outcome(sized=False)
+
+
+def follows_velocities(subject: SampledType) -> bool:
+    """True if an impulse depends on velocities: what does not is a charge of its own."""
+    info = subject.type_info
+    names = set(parameters(info.kernels["impulse"])) - {"crossing"}
+    return any(n not in info.names or info.names[n].velocity for n in names)
+
+
+def _change(sample: Sample, state: State) -> tuple[Floats, Floats] | None:
+    """Changes of all velocities by an impulse on free bodies; None where rows depend."""
+    impulse = sample.value("impulse", state)
+    if has_rows(sample):
+        J = sample.value("J", state)
+        active = impulse != 0.0
+        if not active.any():
+            return None
+        moved = _after(J[:, active], impulse[active], state)
+        return None if moved is None else (moved.v - state.v, moved.w - state.w)
+    dv, dw = np.zeros_like(state.v), np.zeros_like(state.w)
+    for slot, (force, moment) in enumerate(impulse):
+        if state.mass[slot + 1] > 0.0:
+            dv[slot + 1] = force / state.mass[slot + 1]
+            dw[slot + 1] = np.linalg.solve(_inertia(state, slot + 1), moment)
+    return dv, dw
+
+
+def _along(state: State, dv: tuple[Floats, Floats], which: int) -> Floats:
+    """Velocities or angular velocities along those that an impulse has changed, as they were."""
+    inertia = [_inertia(state, b) for b in range(len(state.mass))]
+    mass = state.mass[:, None]
+
+    def product(a: tuple[Floats, Floats], b: tuple[Floats, Floats]) -> float:
+        return float(np.sum(mass * a[0] * b[0]) + np.einsum("bi,bij,bj", a[1], inertia, b[1]))
+
+    size = product(dv, dv)
+    return dv[which] * (product(dv, (state.v, state.w)) / size if size > 0.0 else 0.0)
+
+
+def _kinetic(state: State) -> float:
+    """Kinetic energy of all bodies, J."""
+    terms = [w @ _inertia(state, b) @ w for b, w in enumerate(state.w)]
+    return 0.5 * float(np.sum(state.mass[:, None] * state.v**2) + sum(terms))
+
+
+def _inertia(state: State, b: int) -> Floats:
+    """(3, 3) inertia of a body, global axes."""
+    A = rotation(state.p[b][None])[0]
+    J: Floats = A @ state.Jp[b].reshape(3, 3) @ A.T
+    return J
+
+
 def _in_motion(subject: SampledType) -> list[tuple[Sample, State]]:
     """The samples with their states at several speeds."""
     return [
@@ -191,9 +269,9 @@ def _after(J: Floats, change: Floats, state: State) -> State | None:
     """The state with velocities changed by impulses of rows J; None where rows depend."""
     of_impulse = np.zeros_like(J)  # velocities that a unit impulse of each row gives
     for slot in range(len(J)):
-        mass, A = state.mass[slot + 1], rotation(state.p[slot + 1][None])[0]
+        mass = state.mass[slot + 1]
         if mass > 0.0:  # ground has none
-            inertia = A @ state.Jp[slot + 1].reshape(3, 3) @ A.T
+            inertia = _inertia(state, slot + 1)
             of_impulse[slot, :, :3] = J[slot, :, :3] / mass
             of_impulse[slot, :, 3:] = np.linalg.solve(inertia, J[slot, :, 3:].T).T
     K = np.einsum("src,sqc->rq", J, of_impulse)

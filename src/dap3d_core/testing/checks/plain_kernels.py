@@ -36,7 +36,7 @@ class Condition:
         caller = sys._getframe(1).f_globals.get("__name__", "")
         if not caller.startswith("dap3d_core.kernels"):
             raise BranchError("a branch on a number")
-        return self.holds
+        return bool(self.holds)
 
     def __and__(self, other: Any) -> "Condition":
         return Condition(self.holds & getattr(other, "holds", other))
@@ -44,7 +44,13 @@ class Condition:
     def __or__(self, other: Any) -> "Condition":
         return Condition(self.holds | getattr(other, "holds", other))
 
-    __rand__, __ror__ = __and__, __or__
+    def __xor__(self, other: Any) -> "Condition":
+        return Condition(self.holds ^ getattr(other, "holds", other))
+
+    def __invert__(self) -> "Condition":
+        return Condition(not self.holds)
+
+    __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
 
 
 def _compared(name: str) -> Callable[[Any, Any], Condition]:

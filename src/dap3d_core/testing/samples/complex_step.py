@@ -10,6 +10,8 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 STEP = 1e-100
 
 
@@ -17,16 +19,20 @@ def _wrapped(name: str) -> Callable[..., Any]:
     operation = getattr(complex, name)
 
     def method(self: "Stepped", *others: Any) -> Any:
-        result = operation(self, *others)
+        try:
+            result = operation(self, *others)
+        except ZeroDivisionError:  # on a side of a branch that is not taken, as a rule
+            result = complex(math.nan, math.nan)
         return result if result is NotImplemented else type(self)(result)
 
     method.__name__ = name
     return method
 
 
-def _by_real_part(name: str) -> Callable[[Any, Any], bool]:
+def _by_real_part(name: str) -> Callable[[Any, Any], np.bool_]:
     compare = getattr(operator, name)
-    return lambda self, other: bool(compare(self.real, _real(other)))
+    # of numpy, whose ~ is a negation
+    return lambda self, other: np.bool_(compare(self.real, _real(other)))
 
 
 class Stepped(complex):

@@ -90,6 +90,20 @@ class Kernels:
         own = state.own.astype(object)
         return self._run(name, element, float(state.t), body, table, own).astype(float)
 
+    @np.errstate(all="ignore")  # as compiled code does
+    def ieee_value(self, name: str, element: RandomElement, state: State) -> Floats:
+        """The same by IEEE arithmetic: what is undefined is infinite or no number."""
+        arrays = state.body(), state.table(), state.own
+        return self._run(name, element, np.float64(state.t), *arrays).astype(float)
+
+    def value_with(
+        self, number: Any, name: str, element: RandomElement, state: State
+    ) -> NDArray[Any]:
+        """The same of numbers of a class, which is called with each."""
+        to_numbers = np.frompyfunc(number, 1, 1)
+        arrays = (to_numbers(x) for x in (state.body(), state.table(), state.own.astype(object)))
+        return self._run(name, element, number(state.t), *arrays)
+
     def state_rate(self, element: RandomElement, state: State, along: Any) -> Floats:
         """The rates of the element's states along a direction."""
         rate = np.zeros(len(state.own))

@@ -74,7 +74,7 @@ class Sample:
         The bound is large where a branch lies among the samples: ten times the difference of two
         step sizes, and of the bend between the sides that does not shrink with the step.
         """
-        return self._difference(lambda state: self.value(name, state), along)
+        return self.difference_of(lambda state: self.value(name, state), along)
 
     def bend(self, along: Direction) -> tuple[Floats, Floats]:
         """The second derivative of C along a direction, and an error bound."""
@@ -85,11 +85,12 @@ class Sample:
             except Exception:  # of a kernel that takes floats alone
                 return attrs.evolve(self, state=state).difference("C", along)[0]
 
-        return self._difference(slope, along)
+        return self.difference_of(slope, along)
 
-    def _difference(
+    def difference_of(
         self, value: Callable[[State], Floats], along: Direction
     ) -> tuple[Floats, Floats]:
+        """The derivative of a function of the state along a direction, as ``difference``."""
         h, here = 1e-3, value(self.state)
         odd, even = {}, {}
         own = self.kernels.state_rate(self.element, self.state, along)

@@ -1,0 +1,230 @@
+"""Checks of laws where they have branches, and where bodies rest exactly.
+
+A law that jumps where a condition of ``where`` changes needs a ``switch`` that changes its sign
+there: else steps go across the jump. A formula that is derived must have a value where the one that
+it is derived from has a slope.
+"""
+
+from collections.abc import Iterator
+from typing import Any, ClassVar
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.derive.derive import missing
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.testing.checks.compare import Comparison, body_words
+from dap3d_core.testing.checks.findings import CheckOutcome
+from dap3d_core.testing.samples.complex_step import Stepped
+from dap3d_core.testing.samples.random_state import BODIES, Direction, State
+from dap3d_core.testing.samples.sampled_type import UNDEFINED, Sample, SampledType
+
+#: Kernels that make the motion jump where they do, by kind of type.
+LAWS = {"force": ("wrench", "rate"), "joint": ("C", "nu", "gamma", "rate"), "function": ()}
+#: Samples whose surroundings are searched, distance on both sides and places on the way.
+SAMPLES, REACH, PLACES = 2, 1.5, 25
+#: Halvings of an interval in which a condition changes; a jump is more than this part of the law.
+HALVINGS, JUMP = 60, 1e-6
+#: A switch changes its sign within this distance of the place.
+NEAR = 1e-6
+#: A slope is one where its error bound is less than this part of it.
+SMOOTH = 1e-4
+
+
+class ComparedNumber(Stepped):
+    """A number that remembers with what it is compared."""
+
+    __slots__ = ()
+    __hash__ = complex.__hash__
+    results: ClassVar[list[bool]] = []
+
+    __eq__, __ne__ = Stepped.__eq__, Stepped.__ne__
+
+
+def _compared(name: str) -> Any:
+    compare = getattr(Stepped, name)
+
+    def method(self: ComparedNumber, other: Any) -> Any:
+        holds = compare(self, other)
+        ComparedNumber.results.append(bool(holds))
+        return holds
+
+    return method
+
+
+for _name in ("__lt__", "__le__", "__gt__", "__ge__"):
+    setattr(ComparedNumber, _name, _compared(_name))
+
+
+def switches(subject: SampledType) -> CheckOutcome:
+    """Where a law jumps, a switch changes its sign."""
+    words = "a law jumps only where a switch changes its sign"
+    c = Comparison("branches", subject, "", words)
+    for name in LAWS[subject.type.kind]:
+        if name in subject.kernels.names():
+            c.kernel = name
+            for sample in subject.samples[:SAMPLES]:
+                if finding := _unseen_jump(sample, name):
+                    c.fail(finding, sample)
+                    break
+    return c.outcome(sized=False)
+
+
+def _unseen_jump(sample: Sample, name: str) -> str:
+    """The first jump of a law along the directions of its bodies that no switch sees, in words."""
+    for words, along in _directions(sample):
+        path = _Path(sample, name, along)
+        for place in path.changes():
+            before, after = (path.value(place + h) for h in (-NEAR, NEAR))
+            close = [path.value(x) for x in path.bracket(place)]
+            if any(value is None for value in (before, after, *close)):
+                continue
+            jump = np.abs(close[1] - close[0])
+            size = 1.0 + float(np.max(np.abs(close)))
+            if not np.max(jump) > JUMP * size:
+                continue
+            sides = [path.switch(place + h) for h in (-NEAR, NEAR)]
+            if np.any(sides[0] * sides[1] <= 0.0):
+                continue
+            there = "no switch is defined"
+            if sides[0].size:
+                values = ", ".join(f"{x:.4g}" for x in np.ravel(sides[0]))
+                there = f"no switch changes its sign there (it is {values})"
+            return (
+                f"{name} jumps by {np.max(jump):.6g} where a condition of where changes, along "
+                f"{words}, and {there}: steps go across the jump. Let switch be zero there, or let "
+                "the law change over a small range"
+            )
+    return ""
+
+
+def _directions(sample: Sample) -> Iterator[tuple[str, Direction]]:
+    """Directions in which the arguments of an element change, in words."""
+    layout = sample.kernels.type_info.layout
+    is_joint = sample.kernels.type_info.type.kind == "joint"  # its poses are those with C = 0
+    turns = not layout.angles  # a counted angle jumps, if its body does, by whole turns
+    for slot, letter in enumerate(layout.slots):
+        if sample.state.mass[slot + 1] <= 0.0:
+            continue  # ground
+        for column in range(0 if is_joint else 6 if turns else 3):
+            yield body_words(sample, slot, column), Direction.of(slot, column)
+        for column in range(6):
+            axis, what = "xyz"[column % 3], "angular velocity" if column > 2 else "velocity"
+            yield f"the {what} of body {letter} along {axis}", _Speeding.of(slot, column)
+    yield "time", Direction.in_time()
+
+
+class _Speeding(Direction):
+    """A direction of velocities: ``move`` and ``turn`` are rates of them."""
+
+
+class _Path:
+    """A kernel along a direction from a sample."""
+
+    def __init__(self, sample: Sample, name: str, along: Direction) -> None:
+        self._sample, self._name, self._along = sample, name, along
+        self._width = 2.0 * REACH / (PLACES - 1)
+
+    def changes(self) -> Iterator[float]:
+        """Distances at which a condition of the kernel changes."""
+        places = np.linspace(-REACH, REACH, PLACES)
+        results = [self._results(x) for x in places]
+        if not any(results):
+            return
+        for k in range(PLACES - 1):
+            one, other = results[k], results[k + 1]
+            for which in np.flatnonzero(np.array(one) != np.array(other)):
+                yield self._located(places[k], places[k + 1], int(which), one[which])
+
+    def _located(self, a: float, b: float, which: int, first: bool) -> float:
+        for _ in range(HALVINGS):
+            middle = 0.5 * (a + b)
+            a, b = (middle, b) if self._results(middle)[which] == first else (a, middle)
+        return float(b)
+
+    def bracket(self, place: float) -> tuple[float, float]:
+        """Distances just before and behind a place."""
+        gap = 4.0 * np.finfo(float).eps * (1.0 + abs(place))
+        return place - gap, place + gap
+
+    def value(self, x: float) -> Floats | None:
+        """The kernel; None where it has no finite value."""
+        value = self._sample.kernels.ieee_value(self._name, self._sample.element, self._at(x))
+        return value if np.isfinite(value).all() else None
+
+    def switch(self, x: float) -> Floats:
+        """The switches of the type; empty where it has none."""
+        if "switch" not in self._sample.kernels.names():
+            return np.zeros(0)
+        return self._sample.value("switch", self._at(x))
+
+    def _results(self, x: float) -> list[bool]:
+        """Results of all comparisons that the kernel makes."""
+        ComparedNumber.results.clear()
+        self._sample.kernels.value_with(
+            ComparedNumber, self._name, self._sample.element, self._at(x)
+        )
+        return list(ComparedNumber.results)
+
+    def _at(self, x: float) -> State:
+        state, along = self._sample.state, self._along
+        if isinstance(along, _Speeding):
+            return attrs.evolve(state, v=state.v + x * along.move, w=state.w + x * along.turn)
+        return state.moved(along, x)
+
+
+def rest(subject: SampledType) -> CheckOutcome:
+    """Derived formulas have values at exact rest where the given ones have slopes."""
+    words = "derived formulas are finite at rest, at identical poses, at zero length"
+    c = Comparison("rest", subject, "", words)
+    derived = missing(subject.type, "value" in subject.kernels.names())
+    source = {"joint": "C", "force": "energy", "function": "value"}[subject.type.kind]
+    names = subject.kernels.names()
+    for sample in subject.samples if source in names else ():
+        for where, state in _rest_states(sample):
+            there = attrs.evolve(sample, state=state)
+            for name in (n for n in derived if n in names):
+                if np.isfinite(_value(there, name)).all():
+                    continue
+                c.kernel = name
+                text = f"{name} is no finite number {where}"
+                if _has_slopes(there, source):
+                    c.fail(
+                        f"{text}, and {source} is smooth there: guard the formula by where", there
+                    )
+                else:
+                    c.note(f"{text}, where {source} has no slope: no scene can begin there")
+    return c.outcome(sized=False)
+
+
+def _rest_states(sample: Sample) -> Iterator[tuple[str, State]]:
+    """States at rest of a sample, with what is special of them."""
+    still = attrs.evolve(sample.state.at_rest(), t=0.0)
+    yield "at rest", still
+    aligned = attrs.evolve(still, p=np.tile((1.0, 0.0, 0.0, 0.0), (BODIES, 1)))
+    yield "where no body is turned", aligned
+    yield "where all bodies are at the origin", attrs.evolve(aligned, r=np.zeros((BODIES, 3)))
+    layout, r = sample.kernels.type_info.layout, np.zeros((BODIES, 3))
+    for k, slot in enumerate(layout.slots, start=1):
+        if (place := layout.numbers.get(f"P_{slot}")) is not None:
+            r[k] = -np.array(sample.element.par[place[0] : place[0] + 3])
+    yield "where its points coincide", attrs.evolve(aligned, r=r)
+
+
+def _has_slopes(sample: Sample, name: str) -> bool:
+    """True if a kernel has slopes along all directions, by differences."""
+    layout = sample.kernels.type_info.layout
+    along = [Direction.of(s, k) for s in range(len(layout.slots)) for k in range(6)]
+    for direction in (*along, Direction.in_time()):
+        slope, bound = sample.difference_of(lambda state: _value(sample, name, state), direction)
+        if not np.all(bound <= SMOOTH * (1.0 + np.abs(slope))):
+            return False
+    return True
+
+
+def _value(sample: Sample, name: str, state: State | None = None) -> Floats:
+    here = sample.state if state is None else state
+    try:
+        return sample.kernels.ieee_value(name, sample.element, here)
+    except UNDEFINED:
+        return np.full(1, np.nan)
