@@ -155,6 +155,8 @@ class RunState:
         if self.limits is not None:
             integration.tstops = halved(integration.tstops)
             integration.work.longest_step = self.limits.longest
+        if self.event_locator is not None:
+            integration.follow_steps()
         before = time.perf_counter()
         integration.compile()
         spent = time.perf_counter() - before
