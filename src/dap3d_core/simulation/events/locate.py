@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 
 EPSILON = float(np.finfo(float).eps)
+#: Of the search for a root: bisection, which it falls back to, squared.
+MAX_ITERATIONS = 3000
 
 
 @attrs.frozen
@@ -276,20 +278,22 @@ class EventLocator:
             return past
         from scipy.optimize import brentq
 
+        first = self._values[k]
+        known = {start: first if first * side > 0.0 else side * float(np.finfo(float).tiny)}
+
         def value(t: float) -> float:
             nonlocal past
-            if t == start:
-                found = self._values[k]
-                return found if found * side > 0.0 else side * float(np.finfo(float).tiny)
-            found = self.events[k].value(go_to(t))
-            if found * side <= 0.0:
-                past = min(past, t)
-            return found
+            if t not in known:
+                known[t] = self.events[k].value(go_to(t))
+                if known[t] * side <= 0.0:
+                    past = min(past, t)
+            return known[t]
 
         if value(end) * side < 0.0:  # else it was the interpolation's mistake
             before = before if value(before) * side > 0.0 else start
             resolution = 2.0 * EPSILON * max(abs(start), abs(end))
-            brentq(value, before, past, xtol=resolution, rtol=4.0 * EPSILON)
+            options = {"xtol": resolution, "rtol": 4.0 * EPSILON, "maxiter": MAX_ITERATIONS}
+            brentq(value, before, past, **options)
         return past
 
     def _take_notice(self, integration: Integration, here: Instant) -> None:

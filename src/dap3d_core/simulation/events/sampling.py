@@ -1,13 +1,14 @@
 """Sampling of the function of an event within a step, as closely as it changes.
 
 A window of the step is sampled at six instants. The quintic through them shows where the function
-turns; what each sample misses of the value that the others predict bounds how far the quintic is
-wrong. Where that is more than the distance of a turning point from the level, two crossings can
-hide there, and the window is narrowed.
+turns towards its level, and is sampled there, too. What the samples miss of the values that the
+others predict, and those at the turning points of the quintic, bounds how far the quintic is wrong.
+Where that is more than the distance of a turning point from the level, two crossings can hide
+there, and the window is narrowed.
 """
 
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,9 +29,11 @@ NEAR_LEVEL = 1e-3
 NARROWER, WIDER = 0.25, 2.0
 #: The narrowest window, as a part of a step; and how many in a row may not be followed: in one
 #: there may be a jump.
-NARROWEST, MAX_LOST = 2.0**-14, 2
-#: The narrowest window about a kink, and how many of the kind are tried until a wider one follows.
+NARROWEST, MAX_LOST = 2.0**-12, 2
+#: The narrowest window about a kink, and how many more of the kind than of others are tried.
 NARROWEST_AT_KINK, MAX_KINK_WINDOWS = 2.0**-40, 128
+#: Windows that are tried in a step at most, but for those that ``every`` requires.
+MAX_WINDOWS = 2**13
 #: Instants at which the slope of the quintic is evaluated, to find its turning points.
 GRID = np.linspace(0.0, 1.0, 49)
 
@@ -63,13 +66,42 @@ WIDEST_GAP = float(np.max(np.diff(FRACTIONS)))
 def turning_points(values: Floats) -> list[tuple[float, float]]:
     """(fraction of the window, value) of the extrema of the quintic through the values."""
     coefficients = COEFFICIENTS @ values
-    slopes = GRID_SLOPES @ coefficients
-    before = np.flatnonzero(slopes[:-1] * slopes[1:] < 0.0)
+    slopes = np.sign(GRID_SLOPES @ coefficients)
+    before = np.flatnonzero(slopes[:-1] * slopes[1:] < 0.0).tolist()
+    slope = np.polynomial.polynomial.polyder(coefficients).tolist() if before else []
     found = []
-    for k in before.tolist():
-        fraction = GRID[k] + (GRID[k + 1] - GRID[k]) * slopes[k] / (slopes[k] - slopes[k + 1])
-        found.append((float(fraction), float(fraction**POWERS @ coefficients)))
+    for k in before:
+        low, high = GRID[k : k + 2].tolist()
+        while low < (middle := 0.5 * (low + high)) < high:
+            if _polynomial(slope, middle) * slopes[k] > 0.0:
+                low = middle
+            else:
+                high = middle
+        found.append((middle, _polynomial(coefficients.tolist(), middle)))
     return found
+
+
+def _polynomial(coefficients: list[float], x: float) -> float:
+    """Value of a polynomial, its lowest coefficient first."""
+    value = 0.0
+    for coefficient in reversed(coefficients):
+        value = value * x + coefficient
+    return value
+
+
+class Turn(NamedTuple):
+    """A turning point towards the level.
+
+    Attributes:
+        after: index of the sample of the window before it.
+        t, value: s, the function there.
+        miss: difference of the quintic.
+    """
+
+    after: int
+    t: float
+    value: float
+    miss: float
 
 
 class Sampler:
@@ -124,27 +156,30 @@ class Sampler:
 
         value, exact: the function, by dense output, and at the end of a step to that instant.
         """
-        step, lost = end - a, 0
+        step, lost, left = end - a, 0, MAX_WINDOWS + 4.0 * (end - a) / self._widest
         resolution = 8.0 * np.finfo(float).eps * max(abs(a), abs(end))
         while a < end:
             b = a + self._width
             b = b if b < end - 0.1 * self._width else end
             instants = [*(a + FRACTIONS[1:-1] * (b - a)).tolist(), b]
             values = np.array([first, *map(value, instants)])
-            miss, turns = self._misfit(values), turning_points(values)
+            left -= 1.0
+            miss, turns = self._misfit(values), self._turns(value, a, b, values)
             followed = miss <= MISFIT * np.ptp(values) + ROUNDING * self._largest
             if self._may_hide(values, miss, turns, followed):
                 least = self._narrowest(step, resolution)
-                if b - a > least:
+                if b - a > least and left > 0.0:
                     self._kink_windows += b - a < NARROWEST * step
                     self._width = max(NARROWER * (b - a), least)
                     continue
                 lost = 0 if followed else lost + 1
-            elif b - a >= NARROWEST * step:
-                lost = self._kink_windows = 0
+            else:
+                lost = 0
+            if b - a >= NARROWEST * step:
+                self._kink_windows = max(0, self._kink_windows - 1)
             self._width = min(WIDER * (b - a), self._widest)
-            yield from self._with_turns(value, exact, a, instants, values, turns)
-            if lost > MAX_LOST:
+            yield from self._with_turns(exact, instants, values, turns)
+            if lost > MAX_LOST or (left <= 0.0 and b < end):
                 self.lost = a if self.lost is None else self.lost
                 yield end, value(end)
                 return
@@ -155,17 +190,36 @@ class Sampler:
         self._largest = max(self._largest, float(np.max(np.abs(values))))
         return float(np.max(np.abs(MISFITS @ values)))
 
+    def _turns(
+        self, value: Callable[[float], float], a: float, b: float, values: Floats
+    ) -> list[Turn]:
+        """The turning points of a window that are at or across the level, or towards it."""
+        found = []
+        for fraction, expected in turning_points(values):
+            k = int(np.searchsorted(FRACTIONS, fraction)) - 1
+            sides = np.sign(expected) * values[k : k + 2]
+            if np.all(sides > abs(expected)) or np.any(sides <= 0.0):
+                t = a + fraction * (b - a)
+                here = value(t)
+                found.append(Turn(k, t, here, abs(here - expected)))
+        return found
+
     def _may_hide(
-        self, values: Floats, miss: float, turns: list[tuple[float, float]], followed: bool
+        self, values: Floats, miss: float, turns: list[Turn], followed: bool
     ) -> bool:
         """True if a window may have crossings that its samples and turning points do not show."""
+        miss = max([miss, *(turn.miss for turn in turns)])
         if miss <= ROUNDING * self._largest:
             return False
-        if any(abs(turn) <= miss for _, turn in turns):
+        if any(abs(turn.value) <= CLEARANCE * miss for turn in turns):
+            return True
+        nearest = np.abs(values).tolist()
+        ends = [x for x in (nearest[0], nearest[-1]) if x > ROUNDING * self._largest]
+        is_alike = np.sign(values[0]) * np.sign(values[-1]) > 0.0
+        if is_alike and min(ends, default=np.inf) <= CLEARANCE * miss:
             return True
         one_side = bool(np.all(values > 0.0) or np.all(values < 0.0))
-        is_clear = one_side and float(np.min(np.abs(values))) > CLEARANCE * miss
-        return not (followed or is_clear)
+        return not (followed or (one_side and min(nearest) > CLEARANCE * miss))
 
     def _narrowest(self, step: float, resolution: float) -> float:
         """Width below which a window is not narrowed."""
@@ -174,26 +228,20 @@ class Sampler:
 
     def _with_turns(
         self,
-        value: Callable[[float], float],
         exact: Callable[[float], float],
-        a: float,
         instants: list[float],
         values: Floats,
-        turns: list[tuple[float, float]],
+        turns: list[Turn],
     ) -> Iterator[tuple[float, float]]:
-        """The samples of a window and, in between, turning points at or across the level."""
+        """The samples of a window and its turning points, in order."""
         near = NEAR_LEVEL * float(np.ptp(values))
-        width = instants[-1] - a
         for k, sample in enumerate(zip(instants, values[1:].tolist(), strict=True)):
-            for fraction, turn in turns:
-                if not FRACTIONS[k] < fraction < FRACTIONS[k + 1]:
+            for turn in turns:
+                if turn.after != k:
                     continue
-                t = a + fraction * width
-                if abs(turn) <= near:
-                    found = exact(t)
-                    if self.touch is None and abs(found) <= ROUNDING * self._largest:
-                        self.touch = t
-                    yield t, found
-                elif min(turn * values[k], turn * values[k + 1]) <= 0.0:
-                    yield t, value(t)
+                is_near = abs(turn.value) <= near
+                found = exact(turn.t) if is_near else turn.value
+                if is_near and self.touch is None and abs(found) <= ROUNDING * self._largest:
+                    self.touch = turn.t
+                yield turn.t, found
             yield sample
