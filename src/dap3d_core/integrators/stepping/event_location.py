@@ -69,6 +69,9 @@ EULER_STEP_FRACTION = 1e-9
 CROSSING_MARGIN, MAX_CROSSING_MARGIN = 1e-4, 0.05
 #: How often an Euler step towards a crossing that is nearer than rounding is doubled at most.
 MAX_STALLS = 20
+#: The same until what is zero is taken to stay so: a slow passage, by less than a bit in such a
+#: step, leaves zero in one of them, of a millionth of a usual step.
+MAX_STALLS_AT_ZERO = 10
 #: Attempts in a row that may be cut because a cubic, and no sample, shows two crossings; and the
 #: error of the cubic, as a part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
 MAX_SUSPICIONS, CUBIC_ERROR = 8, 0.25
@@ -293,10 +296,16 @@ def bisect_crossing(
         work.segment_step += 1
     work.first_stage_valid = work.switch_rates_valid = work.cut_attempts = 0
     work.step_limit_at_switch = np.inf
-    work.stalled_steps = 0 if crossed or work.stalled_steps == 0 else work.stalled_steps + 1
+    stays = 0
     for k in range(s.shape[1]):
-        if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0:
-            s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
+        if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0 and s[SIDE, k] != 0.0:
+            stays = 1
+            if work.stalled_steps >= MAX_STALLS_AT_ZERO:
+                s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
+    if crossed:
+        work.stalled_steps = 0
+    elif work.stalled_steps != 0 or stays != 0:
+        work.stalled_steps += 1
     if crossed:
         reset_step_control(work)
         for k in range(s.shape[1]):
