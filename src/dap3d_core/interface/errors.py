@@ -1,6 +1,7 @@
 """The error of an unusable type: where the fault is in the author's file, and its remedy."""
 
 from collections.abc import Callable
+from errno import ENOMEM
 from inspect import get_annotations, getsourcefile, unwrap
 from traceback import extract_tb
 from typing import Any
@@ -11,10 +12,26 @@ from dap3d_core.interface.fields import specs_of
 
 #: The maker of a field by its annotation; of numbers by default.
 MAKERS = {"Point": "point", "Vector": "vector", "Vector2": "vector2", "Body": "body"}
+#: Of the dynamic linker, and of threads.
+MEMORY_WORDS = ("failed to map segment", "cannot allocate memory", "can't start new thread")
 
 
 class PluginError(Exception):
     """A type or a plugin cannot be used; the message names file, type, function and remedy."""
+
+
+def is_out_of_memory(error: BaseException | None) -> bool:
+    """True if an exception, or one that it arose from, is due to a lack of memory.
+
+    A library whose file does not fit into the address space is reported as one that is not found.
+    """
+    while error is not None:
+        text = str(error).lower()
+        is_lack = isinstance(error, MemoryError) or getattr(error, "errno", None) == ENOMEM
+        if is_lack or any(words in text for words in MEMORY_WORDS):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
 
 
 def plain_words() -> str:

@@ -14,7 +14,7 @@ from typing import Any
 
 import pluggy
 
-from dap3d_core.interface.errors import PluginError
+from dap3d_core.interface.errors import PluginError, is_out_of_memory
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source
 
 #: Plugins are loaded one at a time: the guard changes state of the whole process.
@@ -76,6 +76,8 @@ def guard(source: Source, notes: list[str]) -> Iterator[None]:
             f"{_title(source)}: wrong hook: {' '.join(str(error).split())}. {_remedy(source)}"
         ) from error
     except BaseException as error:  # SystemExit too: a plugin does not end the program
+        if is_out_of_memory(error):
+            raise MemoryError from error
         raise PluginError(f"{_title(source)}: {_reason(error)}. {_remedy(source)}") from error
 
 

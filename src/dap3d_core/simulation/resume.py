@@ -147,6 +147,9 @@ class ResumedRun:
             self._restore(run)
             for block in earlier:
                 run.recorder.add(block, lambda: run.record("done"))
+            if self._is_ours(target) and run.recorder.count:  # else each kill leaves one more
+                run.recorder.to_disk(lambda: run.record("done"))
+                remove_parts(self.output, header["run"], kept=run.recorder.part)
 
         with self.compiled.borrow_evaluator():
             run = Run(self.compiled, self._settings(),

@@ -13,7 +13,7 @@ from dap3d_core.integrators import Integration, StepCounts
 from dap3d_core.result import INFORMATION, EventRecord, RunMetadata, RunStatistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.events.event import Event
+from dap3d_core.simulation.events.event import Event, check_every
 from dap3d_core.simulation.events.locate import EventLocator
 from dap3d_core.simulation.initial.tolerances import atol_notes, resolved_atol
 from dap3d_core.simulation.output.error_estimate import StepLimits, halved
@@ -114,6 +114,8 @@ class RunState:
         self.until = np.inf
         self.options: dict[str, Any] = {}
         self.event_locator = EventLocator(compiled, events) if events else None
+        if self.event_locator is not None:
+            check_every(self.event_locator.events, self.t_end)
         self.jumps = jumps_of(self.evaluator)
         if self.event_locator is not None:
             self.event_locator.jumps = self.jumps
@@ -155,6 +157,8 @@ class RunState:
         if self.limits is not None:
             integration.tstops = halved(integration.tstops)
             integration.work.longest_step = self.limits.longest
+        if self.event_locator is not None:
+            integration.follow_steps()
         before = time.perf_counter()
         integration.compile()
         spent = time.perf_counter() - before

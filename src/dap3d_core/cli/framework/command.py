@@ -6,6 +6,7 @@ from typing import Any
 import click
 
 from dap3d_core.cli.process import exit_codes
+from dap3d_core.cli.process.memory import check_memory
 from dap3d_core.cli.process.signals import SignalHandler
 from dap3d_core.cli.process.streams import stdout_fault
 
@@ -91,6 +92,7 @@ class Command(click.Command):
         try:
             with SignalHandler() as signals:
                 ctx.meta["dap3d.signals"] = signals
+                check_memory()
                 return self._report_lost_output(ctx, super().invoke(ctx))
         except (click.ClickException, click.exceptions.Exit):
             raise

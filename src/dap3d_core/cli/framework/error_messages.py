@@ -8,6 +8,7 @@ from typing import Any
 
 from dap3d_core.cli.console.console import Terminal, plain, print_json, stderr
 from dap3d_core.cli.process import exit_codes
+from dap3d_core.cli.process.memory import address_space
 from dap3d_core.cli.process.streams import leave_stderr
 
 
@@ -63,7 +64,10 @@ def _show_mistakes(console: Terminal, error: Any) -> None:
 
 def _judge(error: BaseException) -> tuple[int, str]:
     """Exit code and text of an error."""
-    from dap3d_core.interface import PluginError
+    from dap3d_core.interface.errors import PluginError, is_out_of_memory
+
+    if is_out_of_memory(error):
+        return exit_codes.FAILED, f"there is not enough memory for this{_memory_limit()}"
     from dap3d_core.scene import SceneError
 
     if isinstance(error, KeyboardInterrupt):
@@ -73,8 +77,6 @@ def _judge(error: BaseException) -> tuple[int, str]:
         return exit_codes.FAILED, f"{error}; nothing was computed yet"
     if isinstance(error, (SceneError, PluginError, exit_codes.Refused)):
         return exit_codes.REFUSED, str(error)
-    if isinstance(error, MemoryError):
-        return exit_codes.FAILED, "there is not enough memory for this"
     if _is_unexpected(error):
         text = " ".join(str(error).split())
         return exit_codes.FAILED, f"unexpected {type(error).__name__}{text and f': {text}'}"
@@ -92,6 +94,12 @@ def _judge(error: BaseException) -> tuple[int, str]:
     return exit_codes.FAILED, str(error)
 
 
+def _memory_limit() -> str:
+    """The limit on the memory of the process, in words; "" without one."""
+    limit = address_space()
+    return "" if limit is None else f"; it may take {limit // 1024:,} kB (ulimit -v)"
+
+
 def _folder_is_gone() -> bool:
     """True if the working folder was removed; its entry "." exists all the same."""
     try:
@@ -103,7 +111,9 @@ def _folder_is_gone() -> bool:
 
 def _is_unexpected(error: BaseException) -> bool:
     """True if the library does not raise such an error on purpose."""
-    if isinstance(error, (OSError, MemoryError, exit_codes.Terminated)):
+    from dap3d_core.interface.errors import is_out_of_memory
+
+    if is_out_of_memory(error) or isinstance(error, (OSError, exit_codes.Terminated)):
         return False
     # Looked up, not imported: the broken module may be of the library itself.
     module = sys.modules.get("dap3d_core.simulation.errors")

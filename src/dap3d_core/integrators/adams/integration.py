@@ -12,7 +12,7 @@ from dap3d_core.integrators.adams.formulas import (
     allowed_adams_integers,
     make_table,
 )
-from dap3d_core.integrators.adams.step import advance_adams
+from dap3d_core.integrators.adams.step import advance_adams, state_at
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.restore import restored
 from dap3d_core.kernels.array_types import Floats
@@ -71,6 +71,12 @@ class AdamsIntegration(Integration):
     def allowed_integers(self, found: Mapping[str, int]) -> dict[str, Container[int]]:
         """As ``Integration.allowed_integers``."""
         return super().allowed_integers(found) | allowed_adams_integers(found)
+
+    def state_within(self, t: float) -> Floats | None:
+        """As ``Integration.state_within``."""
+        if self.work.first_stage_valid == 0 or self.work.step_count == 0:
+            return None
+        return self._interpolated(state_at, t)
 
     @property
     def dy_dt(self) -> Floats | None:

@@ -35,7 +35,12 @@ from dap3d_core.integrators.stepping.integration_state import (
     Function,
     Y,
 )
-from dap3d_core.integrators.stepping.output import dense_state, may_step, project_state
+from dap3d_core.integrators.stepping.output import (
+    dense_state,
+    may_step,
+    needs_dense,
+    project_state,
+)
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.step_control import (
     LARGEST,
@@ -258,7 +263,7 @@ def complete_step(
         return NOT_FINITE
     if work.switch_count != 0 and end_is_across(work, t1, slope, watch, system, loops):
         return STEP_CUT
-    if work.has_dense_output != 0 and work.times[work.next_report] < t1:
+    if needs_dense(work, t1):
         prepare_dense(h, work)
     return RUNNING
 

@@ -46,7 +46,12 @@ from dap3d_core.integrators.stepping.integration_state import (
     Function,
     Y,
 )
-from dap3d_core.integrators.stepping.output import dense_state, may_step, project_state
+from dap3d_core.integrators.stepping.output import (
+    dense_state,
+    may_step,
+    needs_dense,
+    project_state,
+)
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.singular_poses import (
     is_approaching,
@@ -401,7 +406,7 @@ def complete_step(
     trial, result = work.state[TRIAL], work.stage_count
     known, watched = work.error_uses_last_stage != 0, work.switch_count != 0
     here, controlled = known and not near, work.fixed_step == 0.0 and not near
-    if work.has_dense_output != 0 and times[work.next_report] < t1:
+    if needs_dense(work, t1):
         if not known:
             work.rhs_count += 1
             if not has_rates:

@@ -53,6 +53,8 @@ from dap3d_core.integrators.stepping.switch_values import (
     evaluate_start,
     find_switch_rates,
     is_across,
+    may_rest,
+    near_edge,
     record_crossing,
     time_span,
     usual_step,
@@ -67,8 +69,12 @@ EULER_STEP_FRACTION = 1e-9
 CROSSING_MARGIN, MAX_CROSSING_MARGIN = 1e-4, 0.05
 #: How often an Euler step towards a crossing that is nearer than rounding is doubled at most.
 MAX_STALLS = 20
-#: Attempts in a row that may be cut because a cubic, and no sample, shows two crossings.
-MAX_SUSPICIONS = 8
+#: The same until what is zero is taken to stay so: a slow passage, by less than a bit in such a
+#: step, leaves zero in one of them, of a millionth of a usual step.
+MAX_STALLS_AT_ZERO = 10
+#: Attempts in a row that may be cut because a cubic, and no sample, shows two crossings; and the
+#: error of the cubic, as a part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
+MAX_SUSPICIONS, CUBIC_ERROR = 8, 0.25
 #: A switch that changes its sign more often than this while time advances by less than this part of
 #: the run chatters.
 CHATTER, CHATTER_SPAN = 100, 1e-6
@@ -85,13 +91,13 @@ def next_length(
     """
     longest = min(end, work.t_limit) - work.t
     h = longest
+    short = max(EULER_STEP_FRACTION * usual_step(work), 4.0 * FLOOR * time_span(work))
     if work.switch_count != 0:
         if work.switch_rates_valid == 0:
             evaluate_start(work, slope, watch, system, loops)
             if work.end_status != 0:
                 return 0.0
-        h = distance_to_crossing(work, h)
-    short = max(EULER_STEP_FRACTION * usual_step(work), 4.0 * FLOOR * time_span(work))
+        h = distance_to_crossing(work, h, short)
     short *= 2.0 ** min(work.stalled_steps, MAX_STALLS)
     if h > short or h == end - work.t:
         return h
@@ -114,8 +120,11 @@ def time_to_zero(value: float, rate: float, bend: float) -> float:
 
 
 @compiled
-def distance_to_crossing(work: IntegrationState, h: float) -> float:
-    """Length of a step that may have length h: it ends shortly before the next crossing."""
+def distance_to_crossing(work: IntegrationState, h: float, short: float) -> float:
+    """Length of a step that may have length h: it ends shortly before the next crossing.
+
+    short: the length up to which an Euler step is taken.
+    """
     s, longest = work.switches, h
     h = min(h, work.step_limit_at_switch)
     for k in range(s.shape[1]):
@@ -123,9 +132,9 @@ def distance_to_crossing(work: IntegrationState, h: float) -> float:
         if side == 0.0:
             continue
         value, rate, bend = side * s[VALUE, k], side * s[RATE, k], side * s[BEND, k]
-        if value < 2.0 * s[BAND, k]:
-            continue  # it may be at rest there, and its rate is rounding
-        left = time_to_zero(value, rate, bend)
+        if may_rest(s, k) and value + short * rate >= 0.0:
+            continue  # its rate is rounding
+        left = time_to_zero(value - near_edge(s, k), rate, bend)
         if left < longest:
             doubt = 0.5 * left * bend / rate if rate < 0.0 else 1.0
             h = min(h, left * (1.0 - min(MAX_CROSSING_MARGIN, CROSSING_MARGIN + doubt * doubt)))
@@ -159,11 +168,11 @@ def cut_step(work: IntegrationState, row: int, h: float) -> None:
     s = work.switches
     left = h
     for k in range(s.shape[1]):
-        side, value, found = s[SIDE, k], s[VALUE, k], s[row, k]
-        if side != 0.0 and found * side <= 0.0:
-            rate = s[RATE, k]
+        side, edge = s[SIDE, k], near_edge(s, k)
+        value, rate, found = side * s[VALUE, k], side * s[RATE, k], side * s[row, k]
+        if side != 0.0 and found <= edge:
             bend = 2.0 * (found - value - rate * h) / (h * h)
-            left = min(left, time_to_zero(side * value, side * rate, side * bend))
+            left = min(left, time_to_zero(value - edge, rate, bend))
     work.cut_attempts += 1
     work.rejected_count += 1
     # samples are as good as the stages they belong to: trusted less from attempt to attempt
@@ -202,9 +211,10 @@ def end_is_across(
 
 @compiled
 def cubic_minimum(a: float, b: float, c: float, d: float) -> float:
-    """Abscissa in (0, 1) of a negative minimum of the cubic with values a, c, slopes b, d at 0, 1.
+    """Abscissa in (0, 1) of the minimum of the cubic with values a, c, slopes b, d at 0, 1.
 
-    1 where it is not.
+    1 where there is none, or where it is clear of zero: by more than a cubic errs, which is a part
+    of the drop to it from the nearer end.
     """
     if not b < 0.0 < d:
         return 1.0
@@ -214,7 +224,8 @@ def cubic_minimum(a: float, b: float, c: float, d: float) -> float:
     if inside < 0.0 or p2 + math.sqrt(inside) <= 0.0:
         return 1.0
     x = -b / (p2 + math.sqrt(inside))
-    if not 0.0 < x < 1.0 or a + x * (b + x * (p2 + x * p3)) >= 0.0:
+    low = a + x * (b + x * (p2 + x * p3))
+    if not 0.0 < x < 1.0 or low >= CUBIC_ERROR * (min(a, c) - low):
         return 1.0
     return x
 
@@ -285,10 +296,16 @@ def bisect_crossing(
         work.segment_step += 1
     work.first_stage_valid = work.switch_rates_valid = work.cut_attempts = 0
     work.step_limit_at_switch = np.inf
-    work.stalled_steps = 0 if crossed or work.stalled_steps == 0 else work.stalled_steps + 1
+    stays = 0
     for k in range(s.shape[1]):
-        if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0:
-            s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
+        if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0 and s[SIDE, k] != 0.0:
+            stays = 1
+            if work.stalled_steps >= MAX_STALLS_AT_ZERO:
+                s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
+    if crossed:
+        work.stalled_steps = 0
+    elif work.stalled_steps != 0 or stays != 0:
+        work.stalled_steps += 1
     if crossed:
         reset_step_control(work)
         for k in range(s.shape[1]):

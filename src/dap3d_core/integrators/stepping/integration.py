@@ -15,7 +15,7 @@ from dap3d_core.integrators.stepping.input_checks import (
     check_state_and_times,
 )
 from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState, Status
-from dap3d_core.integrators.stepping.output import FAILED
+from dap3d_core.integrators.stepping.output import FAILED, dense_state
 from dap3d_core.integrators.stepping.restore import Restorable
 from dap3d_core.integrators.stepping.rounding import tolerance_of
 from dap3d_core.kernels.array_types import Floats
@@ -265,6 +265,26 @@ class Integration(Restorable):
         work.first_stage_valid = work.switch_rates_valid = 0
         work.last_rejected = work.cut_attempts = 0
         work.switches[at.SIDE] = 0.0
+
+    def follow_steps(self) -> None:
+        """Prepare dense output of each step, for ``state_within``."""
+        self.work.follows_steps = 1
+
+    def state_within(self, t: float) -> Floats | None:
+        """(n,) state at a time within the last step, by its dense output; None where it has none.
+
+        It is not projected.
+        """
+        work = self.work
+        if not work.t_dense < t <= work.t_dense + work.h_dense:
+            return None
+        return self._interpolated(dense_state, t)
+
+    def _interpolated(self, state_at: Any, t: float) -> Floats:
+        y = self.y
+        with np.errstate(all="ignore"):  # as compiled code does
+            state_at(self.work, t, y)
+        return y
 
     def end(self) -> None:
         """End the run here: the next ``advance`` reports this state, and stops."""

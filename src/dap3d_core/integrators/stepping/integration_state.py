@@ -139,6 +139,7 @@ class IntegrationState(Arrays):
     stalled_steps = _integer()  # in a row, too short to change a switch by a bit
     rounding_state = _integer()  # of errors: 1 to be measured, 2 dominant (rounding.py)
     sampled_switch_count = _integer()  # a setting: switches that stages must not cross
+    follows_steps = _integer()  # a setting: dense output of each step, not of reports alone
 
     real: Floats  # (MEASURES + m,) scalars; m singularity measures that project gives
     integer: Integers  # scalars
@@ -159,7 +160,7 @@ REAL_SETTINGS = ("rtol", "fixed_step", "exponent", "beta", "factor_min", "factor
 INTEGER_SETTINGS = ("stage_count", "order", "error_size", "estimate_count",
                     "error_uses_last_stage", "has_dense_output", "projects", "calls_accepted",
                     "switch_count", "stiffness_stage", "stops_when_stiff",
-                    "sampled_switch_count")  # fmt: skip
+                    "sampled_switch_count", "follows_steps")  # fmt: skip
 #: Nothing is counted beyond: a count, and twice that, are exact in double precision.
 MOST_COUNTED = 2**52
 

@@ -54,6 +54,13 @@ def project_state(
 
 
 @compiled
+def needs_dense(work: Any, t1: float) -> bool:
+    """True if dense output of a step to t1 is to be prepared."""
+    is_read = work.follows_steps != 0 or work.times[work.next_report] < t1
+    return work.has_dense_output != 0 and is_read
+
+
+@compiled
 def dense_state(work: Any, t: float, y: Floats) -> None:
     """The state at an instant of the last step, by the terms of its dense output."""
     interpolate(y, work.terms, (t - work.t_dense) / work.h_dense)

@@ -45,6 +45,21 @@ def evaluate(
 
 
 @compiled
+def may_rest(s: Floats, k: int) -> bool:
+    """True if switch k may be at rest where it is zero: it is in its band, or as near to it."""
+    return s[SIDE, k] * s[VALUE, k] < 2.0 * s[BAND, k]
+
+
+@compiled
+def near_edge(s: Floats, k: int) -> float:
+    """The value of switch k, times its side, at which samples of a step reach the other law.
+
+    The near edge of its band, unless it may be at rest in it. Where it is UNSEEN both laws are one.
+    """
+    return 0.0 if may_rest(s, k) or s[DOES, k] == UNSEEN else s[BAND, k]
+
+
+@compiled
 def evaluate_start(
     work: IntegrationState, slope: Floats, watch: Function, system: Any, loops: Any
 ) -> None:
@@ -96,7 +111,7 @@ def changes_sign(s: Floats, row: int) -> bool:
     """True if a switch is on another side, or zero: then it is not known which law holds."""
     found = 0
     for k in range(s.shape[1]):
-        found |= (s[SIDE, k] != 0.0) & (s[row, k] * s[SIDE, k] <= 0.0)
+        found |= (s[SIDE, k] != 0.0) & (s[row, k] * s[SIDE, k] <= near_edge(s, k))
     return found != 0
 
 

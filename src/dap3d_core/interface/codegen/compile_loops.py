@@ -19,7 +19,7 @@ from dap3d_core.interface.codegen.loop_source import (
 from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.interface.codegen.type_info import TypeInfo
-from dap3d_core.interface.errors import PluginError, where_is
+from dap3d_core.interface.errors import PluginError, is_out_of_memory, where_is
 from dap3d_core.kernels.runtime.loop_modules import Loop, build
 
 
@@ -80,6 +80,8 @@ def compiled_loop(
     try:
         return build(loop, announce)
     except Exception as error:
+        if is_out_of_memory(error):
+            raise MemoryError from error
         raise PluginError(
             f"{where_is(type_info.type)}: its kernels cannot be compiled ({loop.name}): {error}. "
             "A kernel is plain: tuples of numbers, the words of dap3d_core.kernels, where() for "

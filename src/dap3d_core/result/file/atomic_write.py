@@ -27,9 +27,21 @@ def cannot(verb: str, path: Path, error: BaseException) -> ResultError:
         from_library = os.access(path.parent, os.W_OK)  # its word for all failures
     if verb == "write" and from_library and _is_full(path.parent):
         reason = os.strerror(errno.ENOSPC)
+    elif verb == "write" and from_library and (limit := file_size_limit()) is not None:
+        reason = f"files may have {limit // 1024:,} kB at most (ulimit -f)"
     elif "HDF error" in reason:
         reason = f"the library says {reason!r}; is the disk full?"
     return ResultError(f"cannot {verb} {path}: {reason}")
+
+
+def file_size_limit() -> int | None:
+    """The limit on the size of files that the process writes, bytes; None without one."""
+    try:
+        import resource
+    except ImportError:  # not on every system
+        return None
+    limit = resource.getrlimit(resource.RLIMIT_FSIZE)[0]
+    return None if limit == resource.RLIM_INFINITY else limit
 
 
 def _is_full(folder: Path) -> bool:

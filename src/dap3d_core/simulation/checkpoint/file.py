@@ -4,6 +4,7 @@ The archive checks its own parts (CRC), so that a file that was cut off or damag
 is written under another name, brought to the disk, and renamed: there is always a whole one.
 """
 
+import hashlib
 import json
 import math
 import os
@@ -33,8 +34,10 @@ from dap3d_core.scene import METHODS
 from dap3d_core.simulation.errors import CheckpointError
 
 #: Version of this layout, raised when an older reader would misread it.
-FORMAT = 2
+FORMAT = 3
 PROGRAM = "dap3d checkpoint"
+#: Key of the digest of all the rest.
+DIGEST = "digest"
 #: Added to the name of the result file.
 SUFFIX = ".checkpoint"
 
@@ -50,7 +53,7 @@ def _is_duration(value: Any) -> bool:
 
 #: Keys of a header.
 KEYS: dict[str, Form] = {
-    **dict.fromkeys(("run", "output", "scene", "driver"), (is_text, "a text")),
+    **dict.fromkeys(("run", "output", "scene", "driver", DIGEST), (is_text, "a text")),
     "method": (lambda value: value in METHODS, f"one of {', '.join(METHODS)}"),
     "integrations": (lambda value: type(value) is int and value in (1, 2), "1 or 2"),
     "crossed": (list_of(_is_duration), "a list of times in seconds"),
@@ -104,6 +107,7 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
         "versions": current_versions(),
         **checkpoint.header,
     }
+    header[DIGEST] = digest_of(header, checkpoint.arrays)
     with (
         whole_file(path, force=True) as part,
         zipfile.ZipFile(part, "w", zipfile.ZIP_STORED, allowZip64=True) as archive,
@@ -113,6 +117,17 @@ def write_checkpoint(path: Path, checkpoint: Checkpoint) -> None:
             with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                 plain = np.ascontiguousarray(array)
                 np.lib.format.write_array(member, plain, (1, 0), allow_pickle=False)
+
+
+def digest_of(header: Mapping[str, Any], arrays: Mapping[str, NDArray[Any]]) -> str:
+    """Digest of all that a checkpoint holds, as hexadecimal digits."""
+    text = json.dumps(header, sort_keys=True)
+    digest = hashlib.sha256(text.encode("utf-8", "surrogatepass"))
+    for name in sorted(arrays):
+        array = np.ascontiguousarray(arrays[name])
+        digest.update(f"\n{name} {array.dtype.str} {array.shape}\n".encode())
+        digest.update(array.tobytes())
+    return digest.hexdigest()
 
 
 def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
@@ -134,6 +149,11 @@ def read_checkpoint(path: str | os.PathLike[str]) -> Checkpoint:
                 for info in infos
                 if info.filename.endswith(".npy")
             }
+        if header.pop(DIGEST) != digest_of(header, arrays):
+            raise CheckpointError(
+                f"cannot resume from {file}: it was changed since it was written (its digest is of "
+                "other numbers). Resume from a copy that was not, or run the scene anew"
+            )
     except CheckpointError:
         raise
     except _UNREADABLE as error:

@@ -113,10 +113,11 @@ def parts_of(output: Path) -> list[Path]:
     return sorted(output.parent.glob(f"{output.name}.part*"))
 
 
-def remove_parts(output: Path, run: str) -> None:
-    """Remove the unfinished files that a run has left next to its result file."""
+def remove_parts(output: Path, run: str, *, kept: Path | None = None) -> None:
+    """Remove the unfinished files that a run has left next to its result file, except one."""
     for part, _ in results_of(parts_of(output), run):
-        part.unlink()
+        if part != kept:
+            part.unlink()
 
 
 def checkpoint_of(run: RunState) -> Checkpoint:

@@ -1,6 +1,6 @@
 """Events that a script asks for: what is watched, and what is done where it passes a level."""
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Callable, Collection, Iterable, Sequence
 from functools import cached_property
 from typing import Any, TypeVar
 
@@ -18,6 +18,8 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 
 Kind = TypeVar("Kind")
 ACTIONS = ("stop", "record")
+#: Samples of an event in a run, some minutes, that ``every`` may require.
+MAX_SAMPLES = 1e6
 #: Velocities of a body that an event may set, and where they lie among its six.
 VELOCITIES = {"r_dot": slice(0, 3), "w": slice(3, 6)}
 
@@ -120,6 +122,22 @@ def _is_number(value: Any) -> bool:
     """True for one finite real number; a truth value is none."""
     number = np.asarray(value)
     return number.dtype.kind in "iuf" and not number.shape and bool(np.isfinite(number))
+
+
+def check_every(events: Sequence[Event], t_end: float) -> None:
+    """Check that a run to t_end does not sample an event without end.
+
+    Raises:
+        ValueError: the ``every`` of an event is too short for the run.
+    """
+    least = t_end / MAX_SAMPLES
+    for event in events:
+        if event.every is not None and event.every < least:
+            raise ValueError(
+                f"event {event.title}: every = {event.every:g} s would sample it "
+                f"{t_end / event.every:.3g} times in a run of {t_end:g} s; every should be at "
+                f"least {least:g} s. Leave it out: an event is sampled as closely as it changes"
+            )
 
 
 def checked_events(events: Any) -> tuple[Event, ...]:

@@ -28,6 +28,24 @@ if TYPE_CHECKING:
 
 
 EPSILON = float(np.finfo(float).eps)
+#: Of the search for a root: bisection, which it falls back to, squared.
+MAX_ITERATIONS = 3000
+
+
+@attrs.frozen
+class Passage:
+    """A change of sign within a step, as samples show it.
+
+    Attributes:
+        side: +1 or -1, the side of the level before it.
+        before, after: instants of the samples about it, s.
+        is_sought: whether it is in the direction of the event.
+    """
+
+    side: float
+    before: float
+    after: float
+    is_sought: bool
 
 
 class EventLocator:
@@ -97,12 +115,19 @@ class EventLocator:
         return {force for one in self.occurrences for force in one.changes}
 
     def notes(self) -> list[str]:
-        """Notes on events that changed faster than they could be sampled."""
-        return [
+        """Notes on events that were not followed, or of which a passage cannot be decided."""
+        pairs = list(zip(self.events, self._samplers, strict=True))
+        touches = [
+            f"event {event.title}: at t = {sampler.touch:.9g} s it turned within rounding of its "
+            "level; whether it passed there cannot be decided"
+            for event, sampler in pairs
+            if sampler.touch is not None
+        ]
+        return touches + [
             f"event {event.title}: from t = {sampler.lost:.6g} s on it changed too fast to be "
             "followed, at some times at least: it may have passed its level unseen. Let it change "
             "more slowly, or give a shorter step"
-            for event, sampler in zip(self.events, self._samplers, strict=True)
+            for event, sampler in pairs
             if sampler.lost is not None
         ]
 
@@ -144,11 +169,15 @@ class EventLocator:
         if integration.t == t:
             return
         here = self._instant(integration)
-        within = self._within(integration, here, t, y, slope)
-        found = {k: self._ahead(k, values) for k, values in enumerate(within)}
-        ends = [self._end(go_to, t, k, *ahead) for k, ahead in found.items() if ahead]
+        within = self._within(integration, go_to, here, t, y, slope)
+        ahead = [self._ahead(k, t, values) for k, values in enumerate(within)]
+        ends = {k: self._locate(go_to, t, k, found) for k, found in enumerate(ahead) if found}
         if ends:
-            here = go_to(min(ends))
+            end = min(ends.values())
+            here = go_to(end)
+            for k, found in enumerate(ahead):
+                if found and ends[k] == end:
+                    self._sides[k] = found.side
         self._take_notice(integration, here)
 
     def _arrays(self, integration: Integration) -> list[Any]:
@@ -179,66 +208,92 @@ class EventLocator:
         return found
 
     def _within(
-        self, integration: Integration, here: Instant, t: float, y: Floats, slope: Floats
+        self,
+        integration: Integration,
+        go_to: Callable[[float], Instant],
+        here: Instant,
+        t: float,
+        y: Floats,
+        slope: Floats,
     ) -> list[Iterator[tuple[float, float]]]:
         """For each event instants within the step from t, and its values there, in order."""
-        last, h = self._slope(integration), here.t - t
+        last, h, y_end = self._slope(integration), here.t - t, integration.y
         expected = y + 0.5 * h * (slope + last)
-        end = self.compiled.evaluator.coordinates.continued(expected, integration.y)
+        end = self.compiled.evaluator.coordinates.continued(expected, y_end)
         known: dict[float, Instant] = {here.t: here}
 
         def instant(time: float) -> Instant:
             if time not in known:
-                between = cubic((time - t) / h, h, (y, end), (slope, last))
+                between = integration.state_within(time)
+                if between is None:  # a method without dense output, as accurate as a cubic
+                    between = cubic((time - t) / h, h, (y, end), (slope, last))
                 known[time] = Instant(self.compiled, time, between, self.numbers)
             return known[time]
 
         def value(event: Event, time: float) -> float:
             return event.value(instant(time))
 
+        def exact(event: Event, time: float) -> float:
+            found = event.value(go_to(time))
+            go_to(here.t)  # dense output is that of the whole step again
+            return found
+
         return [
-            sampler.look(partial(value, event), t, first, here.t)
+            sampler.samples(partial(value, event), partial(exact, event), t, first, here.t)
             for event, sampler, first in zip(self.events, self._samplers, self._values, strict=True)
         ]
 
-    def _ahead(self, k: int, values: Iterator[tuple[float, float]]) -> tuple[float, bool] | None:
-        """A time in the step at which event k is past, and whether in its direction.
+    def _ahead(
+        self, k: int, start: float, values: Iterator[tuple[float, float]]
+    ) -> "Passage | None":
+        """Where event k passes its level in the step; None where it does not in its direction.
 
         One in the other direction is reported where the event comes after it in the same step.
         """
-        side, passed = self._sides[k], None
+        side, before, passed = self._sides[k], start, None
         for time, value in values:
-            if side == 0.0 or value * side > 0.0:
+            if value * side > 0.0 or (side == 0.0 and value == 0.0):
+                before = time
                 continue
-            if self.events[k].sense * side <= 0.0:
-                return (time, True) if passed is None else (passed, False)
-            side, passed = -side, time
+            if side == 0.0:
+                side, before = float(np.sign(value)), time
+                continue
+            found = Passage(side, before, time, self.events[k].sense * side <= 0.0)
+            if found.is_sought:
+                return passed or found
+            side, before, passed = -side, time, passed or found
         return None
 
-    def _end(
-        self, go_to: Callable[[float], Instant], start: float, k: int, end: float, sought: bool
+    def _locate(
+        self, go_to: Callable[[float], Instant], start: float, k: int, passage: "Passage"
     ) -> float:
-        """Time at which a step shall end for event k."""
-        return self._locate(go_to, start, k, end) if sought else end
+        """The time at which the step from ``start`` shall end for event k.
 
-    def _locate(self, go_to: Callable[[float], Instant], start: float, k: int, end: float) -> float:
-        """The first time after ``start`` at which event k is past, to the last digits."""
+        It is the first one at which the level is passed, to the last digits; where it is passed in
+        the other direction, any behind it.
+        """
+        side, before, end = passage.side, passage.before, passage.after
+        past = end
+        if not passage.is_sought:
+            return past
         from scipy.optimize import brentq
 
-        past = end
+        first = self._values[k]
+        known = {start: first if first * side > 0.0 else side * float(np.finfo(float).tiny)}
 
         def value(t: float) -> float:
             nonlocal past
-            if t == start:
-                return self._values[k] or self._sides[k] * float(np.finfo(float).tiny)
-            found = self.events[k].value(go_to(t))
-            if self._is_past(k, found):
-                past = min(past, t)
-            return found
+            if t not in known:
+                known[t] = self.events[k].value(go_to(t))
+                if known[t] * side <= 0.0:
+                    past = min(past, t)
+            return known[t]
 
-        if value(end) * self._sides[k] < 0.0:  # else it was the interpolation's mistake
+        if value(end) * side < 0.0:  # else it was the interpolation's mistake
+            before = before if value(before) * side > 0.0 else start
             resolution = 2.0 * EPSILON * max(abs(start), abs(end))
-            brentq(value, start, end, xtol=resolution, rtol=4.0 * EPSILON)
+            options = {"xtol": resolution, "rtol": 4.0 * EPSILON, "maxiter": MAX_ITERATIONS}
+            brentq(value, before, past, **options)
         return past
 
     def _take_notice(self, integration: Integration, here: Instant) -> None:
@@ -250,7 +305,7 @@ class EventLocator:
             if not self._is_past(k, value):
                 self._sides[k] = side or float(np.sign(value))
                 continue
-            self._sides[k] = -side
+            self._sides[k] = float(np.sign(value))  # 0 where it is reached: until it leaves
             if event.sense * side <= 0.0:
                 changes |= self._act(integration, event, int(-side))
         if changes:  # numbers may jump with them: that is no event

@@ -7,12 +7,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+from dap3d_core.result.file.atomic_write import file_size_limit
 from dap3d_core.scene import MISSING, Mistake, SceneError
 
 #: Reports of less are not worth a look at the machine, bytes.
 ALWAYS = 64 * 2**20
 #: A result is there twice, in memory or on the disk, while it is put together.
 COPIES = 2
+#: What a file holds besides the reports, bytes: scene, model, settings.
+DESCRIPTION = 2**16
 
 
 def check_room(
@@ -29,10 +32,11 @@ def check_room(
     Raises:
         SceneError: says how much there would be, how much room there is, and what to do.
     """
-    needed = 8 * rows * numbers * COPIES
-    if needed <= ALWAYS:
-        return
-    place, room = _room(output)
+    needed, limit = 8 * rows * numbers * COPIES, file_size_limit()
+    place, room = _room(output) if needed > ALWAYS else ("", None)
+    if output is not None and limit is not None and needed > COPIES * (limit - DESCRIPTION):
+        place, room = "in files, by their limit (ulimit -f)", COPIES * limit
+        needed = max(needed, room + 1)
     if room is None or needed <= room:
         return
     what = (
@@ -103,7 +107,7 @@ def _bounds() -> Iterator[int]:
 
 
 def _size(byte_count: float) -> str:
-    return f"{byte_count / 2**30:,.3g} GiB"
+    return f"{byte_count / 2**30:,.3g} GiB" if byte_count >= 2**27 else f"{byte_count / 1e6:,.3g} MB"
 
 
 def row_width(evaluator: Any) -> int:

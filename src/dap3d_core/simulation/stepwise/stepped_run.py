@@ -2,6 +2,7 @@
 
 import math
 import os
+import threading
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
@@ -39,6 +40,8 @@ USUAL_STEPS = 1000
 class SteppedRun:
     """A run that waits for ``step``; ``dap.start`` makes it.
 
+    Threads may share it: each call of ``step``, ``reset`` and ``result`` waits for the one before.
+
     Attributes:
         compiled: the model.
         state: the present state, a ``StateView``: ``run.state["crank.r.z"]``.
@@ -47,6 +50,8 @@ class SteppedRun:
 
     def __init__(self, run: Run, *, record: bool) -> None:
         """Args: a run that was not begun; whether the states between steps are kept."""
+        #: Held by the thread in ``step``, ``reset`` or ``result``, which call each other.
+        self._lock = threading.RLock()
         self.compiled, self._run = run.compiled, run
         evaluator = self._evaluator = run.evaluator = run.compiled.new_evaluator()
         run.initialise()
@@ -87,6 +92,11 @@ class SteppedRun:
             TypeError: ``inputs`` is no mapping.
             SimulationError: the run cannot go on; what was computed is ``.result``.
         """
+        with self._lock:
+            return self._step(dt, inputs)
+
+    def _step(self, dt: float, inputs: Mapping[str, float] | None) -> float:
+        """As ``step``, by the thread that has the lock."""
         if self._failure:
             raise SimulationError(self._failure, self.result())
         hold = self._hold
@@ -122,6 +132,11 @@ class SteppedRun:
             ValueError: u is not 13 n finite numbers.
             SimulationError: no state on the constraints was found near u.
         """
+        with self._lock:
+            self._reset(u)
+
+    def _reset(self, u: ArrayLike | None) -> None:
+        """As ``reset``, by the thread that has the lock."""
         run, evaluator = self._run, self._evaluator
         run.integrations[:] = [self._integration]
         run.crossed, run.until = [], math.inf
@@ -148,6 +163,11 @@ class SteppedRun:
 
         Accelerations and reactions are computed here. Without ``record`` the present state alone.
         """
+        with self._lock:
+            return self._result()
+
+    def _result(self) -> Result:
+        """As ``result``, by the thread that has the lock."""
         log, t = self._log, self.t
         record = self._run.record("stopped" if self._failure else "done")
         more = {"t_end": t, "dt": None, "controllers": ["steps of a script"]}
