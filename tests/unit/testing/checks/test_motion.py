@@ -112,7 +112,7 @@ def test_a_joint_that_cannot_be_closed_is_refused_and_reported():
 class Either(Between):
     """A ball on a plane, or in a socket: a field says which."""
 
-    keyword = "either"
+    keyword, rows = "either", 3
     held: str = choice(("plane", "socket"))
 
     def prepare(self, bodies):
