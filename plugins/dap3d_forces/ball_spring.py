@@ -1,7 +1,17 @@
 """Spring and damper of the relative orientation of two bodies."""
 
 from dap3d_core.interface import Body, Force, body, hookimpl, number, numbers
-from dap3d_core.kernels import add, atan2, cross, dot, neg, scale, sqrt, sub, where
+from dap3d_core.kernels import (
+    add,
+    conjugate,
+    dot,
+    neg,
+    quaternion_product,
+    rotation_vector,
+    scale,
+    sqrt,
+    sub,
+)
 
 interface_version = 1
 
@@ -38,27 +48,17 @@ class BallSpring(Force):
         return {"p_c": tuple(x / size for x in self.p_c)}
 
     def wrench(p_i, p_j, p_c, w_i, w_j, k, c):
-        M = add(scale(k, rotation_vector(p_i, p_j, p_c)), scale(c, sub(w_j, w_i)))
+        M = add(scale(k, turn(p_i, p_j, p_c)), scale(c, sub(w_j, w_i)))
         return (ZERO, M), (ZERO, neg(M))
 
     def energy(p_i, p_j, p_c, k):
-        phi = rotation_vector(p_i, p_j, p_c)
+        phi = turn(p_i, p_j, p_c)
         return 0.5 * k * dot(phi, phi)
 
 
-def rotation_vector(p_i, p_j, p_c):
-    """The vector of the turn from p_i o p_c to p_j."""
-    rest = product(p_i, p_c)
-    q0, *e = product(p_j, (rest[0], -rest[1], -rest[2], -rest[3]))
-    sine = sqrt(dot(e, e) + 1e-300)  # so that the limit without a turn is found, and its slope
-    half = atan2(sine, where(q0 < 0.0, -q0, q0))
-    return scale(where(q0 < 0.0, -2.0, 2.0) * half / sine, e)
-
-
-def product(a, b):
-    """The quaternion product a o b."""
-    u, v = a[1:], b[1:]
-    return (a[0] * b[0] - dot(u, v), *add(add(scale(a[0], v), scale(b[0], u)), cross(u, v)))
+def turn(p_i, p_j, p_c):
+    """phi, the rotation vector of the turn from p_i o p_c to p_j."""
+    return rotation_vector(quaternion_product(p_j, conjugate(quaternion_product(p_i, p_c))))
 
 
 @hookimpl

@@ -1,7 +1,8 @@
 """Rotation driver at position level: prescribes the angle of one body against another."""
 
 from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, vector
-from dap3d_core.kernels import add, atan2, cos, dot, neg, normals, row, scale, sin, sub
+from dap3d_core.kernels import atan2, cos, dot, neg, normals, row, sin, sub
+from dap3d_joints.relative_rows import turning, turning_rate
 
 interface_version = 1
 
@@ -45,19 +46,14 @@ class DrivenRotation(Joint):
         return atan2(Y * c - X * s, X * c + Y * s)
 
     def J(a_j, u_i):
-        Z = dot(a_j, u_i)
-        h = scale(1.0 / (1.0 - Z * Z), sub(a_j, scale(Z, u_i)))
+        h = turning(a_j, u_i)
         return row(ZERO, h), row(ZERO, neg(h))
 
     def nu(f_dot):
         return f_dot
 
     def gamma(a_j, u_i, a_j_dot, u_i_dot, w_i, w_j, f_ddot):
-        Z, Z_dot = dot(a_j, u_i), dot(a_j_dot, u_i) + dot(a_j, u_i_dot)
-        square = 1.0 / (1.0 - Z * Z)
-        h = scale(square, sub(a_j, scale(Z, u_i)))
-        turn = sub(a_j_dot, add(scale(Z_dot, u_i), scale(Z, u_i_dot)))
-        h_dot = scale(square, add(turn, scale(2.0 * Z * Z_dot, h)))
+        h_dot = turning_rate(a_j, u_i, a_j_dot, u_i_dot)
         return f_ddot - dot(h_dot, sub(w_i, w_j))
 
 

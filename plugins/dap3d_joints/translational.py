@@ -5,6 +5,7 @@ from dap3d_core.kernels import (
     add,
     cross,
     dot,
+    euler_parameters,
     eye,
     hstack,
     neg,
@@ -15,7 +16,7 @@ from dap3d_core.kernels import (
     tanh,
 )
 from dap3d_joints.coulomb import magnitude
-from dap3d_joints.orientation import error, error_rate, quaternion, turn
+from dap3d_joints.orientation import error, error_rate, turn
 
 interface_version = 1
 
@@ -52,7 +53,7 @@ class Translational(Joint):
     def prepare(self, bodies):
         n, m = normals(self.a_j)
         check_rotation(self.A_c)
-        return {"n_j": n, "m_j": m, "p_c": quaternion(self.A_c)}
+        return {"n_j": n, "m_j": m, "p_c": euler_parameters(self.A_c)}
 
     def C(p_i, p_j, p_c, d, n_j, m_j):
         _, e = error(p_j, p_c, p_i)

@@ -1,8 +1,19 @@
 """Weld: two bodies keep the pose to each other that they were given."""
 
 from dap3d_core.interface import Body, Joint, body, hookimpl
-from dap3d_core.kernels import add, cross, eye, hstack, neg, scale, skew, sub
-from dap3d_joints.orientation import conjugate, error, error_rate, product, turn
+from dap3d_core.kernels import (
+    add,
+    conjugate,
+    cross,
+    eye,
+    hstack,
+    neg,
+    quaternion_product,
+    scale,
+    skew,
+    sub,
+)
+from dap3d_joints.orientation import error, error_rate, turn
 
 interface_version = 1
 
@@ -31,7 +42,7 @@ class Weld(Joint):
         one, other = bodies["i"], bodies["j"]
         return {
             "d_j": other.to_local(sub(one.r, other.r)),
-            "p_c": product(conjugate(other.p), one.p),
+            "p_c": quaternion_product(conjugate(other.p), one.p),
         }
 
     def C(r_i, r_j, p_i, p_j, d_j, p_c):

@@ -10,7 +10,6 @@ from support.joint_types import (
     OnGround,
     Parabola,
     PinInSlot,
-    Planar,
     RepeatedRow,
     Rising,
     Shelf,
@@ -63,7 +62,7 @@ def pair(seed=1, *, on_ground=False):
     return scene
 
 
-OWN = (from_C_alone(Universal, "derived-univ"), Planar, PinInSlot, TwoHinges, Parabola, RepeatedRow,
+OWN = (from_C_alone(Universal, "derived-univ"), PinInSlot, TwoHinges, Parabola, RepeatedRow,
        Upright, Rising, OnGround, Shelf, Sleeve, Trolley)  # fmt: skip
 
 

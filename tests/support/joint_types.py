@@ -17,15 +17,6 @@ class Between(Joint):
         return {"n_j": n, "m_j": m}
 
 
-class Planar(Between):
-    """Body i slides and turns on the plane through P_j normal to a_j."""
-
-    keyword, rows = "planar", 3
-
-    def C(r_P_i, r_P_j, a_i, a_j, n_j, m_j):
-        return dot(a_j, sub(r_P_i, r_P_j)), dot(a_i, n_j), dot(a_i, m_j)
-
-
 class PinInSlot(Between):
     """A pin a_i of body i in a slot along a_j of body j; the pin keeps the direction m_j."""
 

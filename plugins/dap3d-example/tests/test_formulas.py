@@ -3,7 +3,6 @@
 import pytest
 
 from dap3d_core.testing import checks_for
-from dap3d_example.bushing import Bushing
 from dap3d_example.clutch import Clutch
 from dap3d_example.cycloid import Cycloid
 from dap3d_example.cylinder import Cylinder
@@ -12,14 +11,12 @@ from dap3d_example.gear import Gear
 from dap3d_example.motor import Motor
 from dap3d_example.point_on_plane import PointOnPlane
 from dap3d_example.point_on_surface import PointOnSurface
-from dap3d_example.screw import Screw
 from dap3d_example.servo import Servo
 from dap3d_example.stage import Stage
 from dap3d_example.tyre import Tyre
 
 TYPES = (
-    Screw, Gear, PointOnPlane, PointOnSurface, Bushing, Motor, Cylinder, Servo, Tyre, Clutch, Stage,
-    Engine, Cycloid
+    Gear, PointOnPlane, PointOnSurface, Motor, Cylinder, Servo, Tyre, Clutch, Stage, Engine, Cycloid
 )  # fmt: skip
 CHECKS = [(type_, check) for type_ in TYPES for check in checks_for(type_)]
 

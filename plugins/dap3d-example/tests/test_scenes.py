@@ -23,17 +23,6 @@ def run(name, **changes):
     return dap.simulate(scene, **({"rtol": 1e-10, "atol": 1e-12} | changes))
 
 
-def test_a_nut_sinks_slowly():
-    """m a + J (2 pi / pitch)^2 a = m g, and the nut turns 2 pi x / pitch, 77 times."""
-    result = run("screw")
-    a = 9.81 / (1.0 + 2e-4 * (2.0 * np.pi / 0.01) ** 2 / 0.5)
-    x = -0.5 * a * result.t**2
-    np.testing.assert_allclose(result.r[:, 0, 2], x, atol=1e-9)
-    np.testing.assert_allclose(result.w[:, 0, 2], -2.0 * np.pi / 0.01 * a * result.t, rtol=1e-8)
-    turned = 2.0 * np.pi * x / 0.01
-    np.testing.assert_allclose(np.abs(result.p[:, 0, 0]), np.abs(np.cos(turned / 2)), atol=1e-6)
-
-
 def test_a_planetary_gear_divides_speed_and_adds_up_inertia():
     """Willis: w_c = w_s z_s / (z_s + z_r); the inertia at the sun sums ratio^2 J."""
     result = run("gear")
@@ -94,32 +83,6 @@ def test_a_free_bead_runs_along_a_geodesic():
     angle = result.t / 0.2
     circle = 0.2 * np.column_stack([np.cos(angle), 0.6 * np.sin(angle), 0.8 * np.sin(angle)])
     np.testing.assert_allclose(x, circle, atol=1e-7)
-
-
-MASS, INERTIA = 120.0, (4.0, 8.0, 9.0)
-STIFF_T, STIFF_R = (2e5, 2e5, 6e5), (1500.0, 1500.0, 900.0)
-DAMP_T, DAMP_R = (400.0, 400.0, 900.0), (8.0, 8.0, 6.0)
-
-
-def damped(t, mass, c, k, speed):
-    """Displacement of m x'' + c x' + k x = 0 from x = 0 with a speed."""
-    decay = c / (2.0 * mass)
-    omega = np.sqrt(k / mass - decay**2)
-    return speed / omega * np.exp(-decay * t) * np.sin(omega * t)
-
-
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_a_bushing_swings_in_each_of_six_directions(axis):
-    """A shift along an axis and a turn about it are two damped oscillators, for any angle."""
-    scene = dap.load(SCENES / "bushing.toml")
-    along = np.eye(3)[axis]
-    scene.bodies["engine"].r_dot, scene.bodies["engine"].w = 0.5 * along, 12.0 * along
-    result = dap.simulate(scene, rtol=1e-10, atol=1e-12)
-    x = damped(result.t, MASS, DAMP_T[axis], STIFF_T[axis], 0.5)
-    angle = damped(result.t, INERTIA[axis], DAMP_R[axis], STIFF_R[axis], 12.0)
-    assert np.max(np.abs(angle)) > 0.5, "not a small one"
-    np.testing.assert_allclose(result.r[:, 0, axis], x, atol=1e-9)
-    np.testing.assert_allclose(result.p[:, 0, 1 + axis], np.sin(angle / 2), atol=1e-8)
 
 
 def test_a_motor_at_its_limit():

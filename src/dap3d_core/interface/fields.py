@@ -26,7 +26,7 @@ class FieldSpec:
     """Properties of a field, for validation, documentation and the generation of loops.
 
     Attributes:
-        kind: body, point, vector, vector2, number, numbers, vec3, matrix, table, function,
+        kind: body, point, vector, vector2, number, numbers, vec3, matrix, square, table, function,
             functions, input, choice, joint or angle.
         default: value where the scene gives none; REQUIRED where it must.
         unit: SI unit of a number, "" for none.
@@ -43,9 +43,9 @@ class FieldSpec:
         ground: a vector must be fixed in ground.
         argument: the argument of a function, or both of one of two; "" for time.
         arguments: how many a function takes.
-        columns: numbers in a row of a table; count of ``numbers``.
+        columns: numbers in a row of a table; count of ``numbers``; size of a square matrix.
         given: a table is given in the scene; False: ``prepare`` returns it.
-        by_rows: a table is given as rows of equal length, for ``prepare`` alone.
+        by_rows: a table is given as rows of equal length.
         axes: the fields an angle is measured between: two vectors, and the axis.
         rows: number of rows that a joint must have; None for any.
         instead_of: field that an input takes the place of; "" for none.
@@ -74,6 +74,11 @@ class FieldSpec:
     axes: tuple[str, str, str] = ("", "", "")
     rows: int | None = None
     instead_of: str = ""
+
+    @property
+    def for_prepare(self) -> bool:
+        """True if ``prepare`` alone reads the field, and no kernel."""
+        return self.by_rows or self.kind == "square"
 
     @property
     def required(self) -> bool:
@@ -151,6 +156,11 @@ def numbers(count: int, default: Any = REQUIRED, *, unit: str = "", doc: str = "
 def matrix(default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
     """A 3x3 matrix of finite numbers, by rows."""
     return _field(FieldSpec("matrix", default, unit, doc))
+
+
+def square(size: int, default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
+    """A symmetric matrix, or its diagonal alone as ``size`` numbers; ``prepare`` alone reads it."""
+    return _field(FieldSpec("square", default, unit, doc, columns=size))
 
 
 def table(

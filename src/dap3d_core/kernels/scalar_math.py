@@ -59,6 +59,10 @@ def _generic(name: str, outside: Callable[[float], float] = lambda x: math.nan) 
 sqrt = _generic("sqrt")
 sin = _generic("sin")
 cos = _generic("cos")
+tan = _generic("tan")
+atan = _generic("atan")
+sinh = _generic("sinh", lambda x: math.copysign(math.inf, x))
+cosh = _generic("cosh", lambda x: math.inf)
 tanh = _generic("tanh")
 asin = _generic("asin")
 acos = _generic("acos")
@@ -108,6 +112,11 @@ def abs(x):
     return where(_order(x) < 0.0, -x, x + 0.0)
 
 
+def sign(x):
+    """1 for a positive number, -1 for a negative one, 0 for zero and for NaN."""
+    return where(_order(x) > 0.0, 1.0, where(_order(x) < 0.0, -1.0, 0.0))
+
+
 def hypot(x, y):
     """The length of (x, y)."""
     return sqrt(x * x + y * y)
@@ -120,3 +129,8 @@ def floor(x):
     if _symbolic(x):
         return _library(x).floor(x)
     return _like(x, math.floor(x)) if math.isfinite(x) else x
+
+
+def mod(x, y):
+    """What is left of x / y after whole multiples: x - y floor(x / y), of the sign of y."""
+    return x - y * floor(x / y)

@@ -12,7 +12,14 @@ from dap3d_core.model.groups import Floats, Group, Grouping, Integers
 from dap3d_core.model.model import Model
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import ValidatedScene
-from dap3d_core.scene.validate.coerce_values import Fault, bounded, matrix_of, number_of, numbers_of
+from dap3d_core.scene.validate.coerce_values import (
+    Fault,
+    bounded,
+    matrix_of,
+    number_of,
+    numbers_of,
+    square_of,
+)
 
 
 class Change(NamedTuple):
@@ -48,7 +55,8 @@ def changed(checked: ValidatedScene, model: Model, place: int, fields: Mapping[s
 
 def _value(force: str, specs: Mapping[str, FieldSpec], name: str, value: Any) -> Any:
     """The value of a field, checked as in a scene."""
-    numeric = [n for n, s in specs.items() if s.kind in ("number", "numbers", "vec3", "matrix")]
+    kinds = ("number", "numbers", "vec3", "matrix", "square")
+    numeric = [n for n, s in specs.items() if s.kind in kinds]
     if name not in numeric:
         near = nearest(name, numeric)
         hint = f"did you mean {near!r}?" if near else f"it has {', '.join(numeric) or 'none'}"
@@ -58,6 +66,8 @@ def _value(force: str, specs: Mapping[str, FieldSpec], name: str, value: Any) ->
     if spec.kind == "number":
         limits = {n: getattr(spec, n) for n in ("positive", "minimum", "maximum", "whole")}
         found = bounded(number_of(value), **limits)
+    elif spec.kind == "square":
+        found = square_of(value, spec.columns)
     else:
         count = {"vec3": 3, "numbers": spec.columns}.get(spec.kind, 0)
         found = numbers_of(value, count) if count else matrix_of(value)

@@ -25,7 +25,7 @@ TABLES = (
 #: Those of them without parts that have names.
 FLAT = ("parameters", "simulation")
 #: Kinds of fields that are numeric also where the scene leaves them to their type.
-NUMERIC = ("number", "numbers", "vec3", "matrix")
+NUMERIC = ("number", "numbers", "vec3", "matrix", "square")
 #: Defaults of a body (scene/validate/bodies.py).
 BODY_DEFAULTS: dict[str, Any] = {"mass": 1.0, "Jp": (1.0, 1.0, 1.0)}
 #: Units of fields that do not belong to a type.

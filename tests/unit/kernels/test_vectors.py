@@ -15,29 +15,42 @@ from dap3d_core.kernels import (
     acos,
     add,
     asin,
+    atan,
     atan2,
+    conjugate,
     cos,
+    cosh,
     cross,
     dot,
+    euler_parameters,
     exp,
     eye,
     floor,
     hstack,
     hypot,
     log,
+    matmul,
     maximum,
     minimum,
+    mod,
     neg,
     norm2,
     normals,
+    quaternion_product,
     rotate,
+    rotation_matrix,
+    rotation_vector,
     row,
     scale,
+    sign,
     sin,
+    sinh,
     skew,
     sqrt,
     sub,
+    tan,
     tanh,
+    transpose,
     where,
 )
 from dap3d_core.kernels.runtime.cache import jit_is_on
@@ -157,6 +170,10 @@ ONE = [
     (sin, math.sin, math.cos, [-3.0, -1e-8, 0.5, 2.0]),
     (cos, math.cos, lambda x: -math.sin(x), [-3.0, 1e-8, 0.5, 2.0]),
     (tanh, math.tanh, lambda x: 1.0 - math.tanh(x) ** 2, [-2.0, 0.0, 0.5, 5.0]),
+    (tan, math.tan, lambda x: 1.0 + math.tan(x) ** 2, [-1.0, 0.0, 1.5]),
+    (atan, math.atan, lambda x: 1.0 / (1.0 + x * x), [-30.0, 0.0, 0.5]),
+    (sinh, math.sinh, math.cosh, [-2.0, 0.0, 5.0]),
+    (cosh, math.cosh, math.sinh, [-2.0, 0.5, 5.0]),
 ]
 one = pytest.mark.parametrize(
     ("function", "real", "slope", "x"),
@@ -295,19 +312,33 @@ def formula(a0, a1, a2, b0, b1, b2):
         exp(0.3 * a0) * log(1.0 + b0 * b0),
         asin(tanh(a0)) + acos(tanh(b0)),
         floor(3.0 * a0),
+        tan(a0) + atan(b0),
+        sinh(0.3 * a1) + cosh(0.3 * b1),
+        sign(a0) + mod(b0, 0.3),
     )
 
 
-def test_the_formula_uses_every_word():
+def turns(a0, a1, a2, b0, b1, b2):
+    """The words of rotations; apart, as symbols make branches of branches of them."""
+    a, b = (a0, a1, a2), (b0, b1, b2)
+    return (
+        *rotation_vector(quaternion_product(conjugate((0.8, *scale(0.1, a))), (0.6, *b))),
+        *rotation_vector(matmul(transpose(rotation_matrix(a)), rotation_matrix(b))),
+        *euler_parameters(rotation_matrix(scale(2.0, b))),
+    )
+
+
+def test_the_formulas_use_every_word():
     """What the tests above and below run over is complete: all public words, but for ``normals``
     and ``lookup``, which reads tables (interface/codegen/test_specialise.py)."""
-    used = set(formula.__code__.co_names)
+    used = set(formula.__code__.co_names) | set(turns.__code__.co_names)
     assert used == set(kernels.__all__) - {"normals", "lookup"}
     assert all(inspect.getdoc(getattr(kernels, word)) for word in kernels.__all__)
 
 
 @pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled with DAP3D_PLAIN=1")
-def test_compiled_words_are_the_plain_ones():
+@pytest.mark.parametrize("formula", [formula, turns])
+def test_compiled_words_are_the_plain_ones(formula):
     """In all bits; NaN is NaN."""
     count = len(formula(*(6 * [0.5])))
     lines = ["out = kernel_formula(par[0], par[1], par[2], par[3], par[4], par[5])"]

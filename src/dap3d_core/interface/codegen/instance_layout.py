@@ -122,7 +122,7 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> InstanceLa
     width = 0
     shapes = {"number": (), "point": (3,), "vector": (3,), "vec3": (3,), "matrix": (3, 3)}
     for name, spec in specs_of(type_).items():
-        if spec.by_rows:
+        if spec.for_prepare:
             continue
         if spec.kind == "table":
             tables[name] = width, spec.columns

@@ -13,7 +13,8 @@ from dap3d_core.interface.derive.program import Steps
 from dap3d_core.interface.derive.symbolic import DerivationError, Symbols, flat
 
 #: sympy's functions that kernels have under the same name.
-WORDS = ("sin", "cos", "tanh", "atan2", "exp", "log", "asin", "acos", "floor")
+WORDS = ("sin", "cos", "tan", "sinh", "cosh", "tanh", "atan", "atan2", "exp", "log", "asin", "acos",
+         "floor")  # fmt: skip
 
 
 class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
@@ -68,10 +69,6 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
         (x,) = sign.args
         return self._call("where", x > 0, sympy.Integer(1), sympy.Integer(-1))
 
-    def _print_tan(self, tangent: Any) -> str:
-        (x,) = tangent.args
-        return f"({self._call('sin', x)} / {self._call('cos', x)})"
-
     def _print_Branch(self, branch: Any) -> str:
         return self._call("where", *branch.args)
 
@@ -101,6 +98,7 @@ class KernelPrinter(PythonCodePrinter):  # type: ignore[misc]
         raise DerivationError(f"kernels have no {name}; write the formulas by hand")
 
     _print_sin = _print_cos = _print_tanh = _print_atan2 = _print_Function
+    _print_tan = _print_sinh = _print_cosh = _print_atan = _print_Function
     _print_exp = _print_log = _print_asin = _print_acos = _print_floor = _print_Function
 
 

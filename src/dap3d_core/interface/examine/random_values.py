@@ -67,7 +67,7 @@ def random_field(spec: FieldSpec, rng: random.Random) -> Any:
         return None
     if spec.kind in ("point", "vec3", "vector2"):
         return numbers(rng, 3)
-    if spec.kind == "numbers":
+    if spec.kind in ("numbers", "square"):
         return numbers(rng, spec.columns)
     if spec.kind == "vector":
         return unit(numbers(rng, 3))

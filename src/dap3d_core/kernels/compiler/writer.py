@@ -12,8 +12,8 @@ from dap3d_core.kernels.compiler import types as t
 EXACT = ("sqrt", "fabs", "floor", "ceil", "rint")
 #: Functions of the C library, which plain Python calls as well. LLVM must not replace them
 #: (nobuiltin): its own versions may round differently.
-LIBRARY = ("sin", "cos", "tan", "tanh", "exp", "log", "asin", "acos", "atan", "atan2", "pow",
-           "hypot", "nextafter")  # fmt: skip
+LIBRARY = ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "asin", "acos", "atan",
+           "atan2", "pow", "hypot", "nextafter")  # fmt: skip
 
 
 class Writer:

@@ -125,6 +125,26 @@ def matrix_of(value: Any) -> Any:
     return _entries(value, lambda row: numbers_of(row, 3), f"{should}; row")
 
 
+def square_of(value: Any, size: int) -> Any:
+    """A symmetric matrix as rows, or its diagonal."""
+    value = plain(value)
+    if type(value) is not tuple or not value or type(value[0]) is not tuple:
+        return numbers_of(value, size)
+    should = f"should be {size} numbers, or {size} rows of {size}"
+    if len(value) != size:
+        return Fault(f"{should}; it has {len(value)} rows")
+    rows = _entries(value, lambda row: numbers_of(row, size), f"{should}; row")
+    if isinstance(rows, Fault):
+        return rows
+    largest = max(abs(x) for row in rows for x in row)
+    for m, row in enumerate(rows):
+        for n in range(m):
+            if abs(row[n] - rows[n][m]) > 1e-12 * largest:
+                places = f"row {m + 1}, column {n + 1} is {row[n]:g}, its mirror {rows[n][m]:g}"
+                return Fault(f"should be symmetric; {places}")
+    return rows
+
+
 def list_of(value: Any) -> Any:
     """One or more finite numbers as a tuple."""
     value = plain(value)

@@ -18,6 +18,7 @@ from dap3d_core.scene.validate.coerce_values import (
     number_of,
     numbers_of,
     rows_of,
+    square_of,
     word_of,
 )
 from dap3d_core.scene.validate.geometry import (
@@ -53,6 +54,7 @@ READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
     "numbers": lambda spec, value: numbers_of(value, spec.columns),
     "vec3": lambda spec, value: numbers_of(value, 3),
     "matrix": lambda spec, value: matrix_of(value),
+    "square": lambda spec, value: square_of(value, spec.columns),
     "table": lambda spec, value: rows_of(value) if spec.by_rows else list_of(value),
     "choice": lambda spec, value: word_of(value, spec.choices, spec.aliases),
 }
@@ -386,6 +388,7 @@ def _of(field: _Field) -> str:
         "vec3": "3 numbers",
         "numbers": f"{field.spec.columns} numbers",
         "matrix": "3x3 numbers",
+        "square": f"{field.spec.columns} numbers, or as many rows of as many",
         "choice": "a word",
         "table": "rows of numbers" if field.spec.by_rows else "numbers",
         "functions": "names",

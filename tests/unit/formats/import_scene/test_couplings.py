@@ -106,15 +106,10 @@ def test_a_joint_follows_another_one_of_the_file(tmp_path, leader, said):
         dap.import_model(path)
 
 
-def test_a_screw_needs_a_type_of_others(tmp_path):
-    """It is refused with its line where no package brings one: nothing is dropped in silence."""
+def test_a_screw_is_imported(tmp_path):
     text = SDF.format(mimic="", sign="", gearbox="").replace(
         '"one" type="revolute"', '"one" type="screw"'
     )
     path = tmp_path / "a.sdf"
     path.write_text(text)
-    if "screw" in dap.load_registry().keywords("joint"):
-        assert dap.import_model(path)[0].joints["one"].type == "screw"
-        return
-    with pytest.raises(dap.SceneError, match=r"a\.sdf:6: .*no joint type 'screw'"):
-        dap.import_model(path)
+    assert dap.import_model(path)[0].joints["one"].type == "screw"

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from support.plain import long_in_plain_python
-from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError, UnknownNameError, names_of
@@ -57,9 +56,14 @@ def test_a_joint_with_an_angle_and_a_length():
     assert result.coordinates("hinge").q.shape == (len(result.t), 2)
 
 
-def test_a_type_of_others_has_coordinates():
-    """The screw of the example package: it turns by its advance over its pitch."""
-    result = dap.simulate(REPOSITORY / "plugins/dap3d-example/scenes/screw.toml", t_end=0.5)
+def test_a_screw_has_coordinates():
+    """It turns by its advance over its pitch."""
+    scene = dap.Scene(name="screw")
+    scene.add_body("nut", mass=0.5, Jp=(2e-4, 2e-4, 2e-4))
+    scene.add_joint("screw", "thread", P_i="nut.O", P_j="ground.O", a_i="nut.z", a_j="ground.z",
+                    pitch=0.01)  # fmt: skip
+    scene.add_force("weight")
+    result = dap.simulate(scene, t_end=0.5, dt=0.05, rtol=1e-10, atol=1e-12)
     angle, z = result.quantity("thread.angle").values, result.quantity("nut.r.z").values
     pitch = 0.01 / (2 * np.pi)
     np.testing.assert_allclose(pitch * angle, z, atol=1e-12)

@@ -49,8 +49,8 @@ def test_the_scene_at_rest_can_be_saved_and_is_at_rest(tmp_path):
 def test_references_that_the_scene_at_rest_changes_are_named():
     """A bushing is unloaded in the poses of its scene."""
     scene = at_rest.ball()
-    scene.add_force("bushing", "mount", P_i="ball.O", P_j="ground.O", k_t=(1e3, 1e3, 1e3),
-                    k_r=(10.0, 10.0, 10.0))  # fmt: skip
+    scene.add_force("bushing", "mount", P_i="ball.O", P_j="ground.O",
+                    k=(1e3, 1e3, 1e3, 10.0, 10.0, 10.0))  # fmt: skip
     scene.add_force("n", body_i="ball", n=(1.0, 0.0, 0.0))
     found = dap.equilibrium(scene)
     assert found.r[0, 2] == pytest.approx(-at_rest.G / 1e3, rel=1e-12)

@@ -2,10 +2,10 @@
 
 import pytest
 from support.joint_types import (
+    Between,
     OnGround,
     Parabola,
     PinInSlot,
-    Planar,
     RepeatedRow,
     Rising,
     Shelf,
@@ -20,6 +20,7 @@ from dap3d_core.registry import load_registry
 from dap3d_core.testing import check_type
 from dap3d_core.testing.kit import type_motions
 from dap3d_forces.weight import Weight
+from dap3d_joints.planar import Planar
 
 ON_TIME = "refused: its rows depend on time"
 ONE_ROW = "refused: its 1 row costs less than 5 joint coordinates"
@@ -42,13 +43,17 @@ INSTALLED = {
     "drive-tran": [ON_TIME],
     "rel-rot": [ON_VELOCITY, ON_VELOCITY],
     "rel-tran": [ON_VELOCITY, ON_VELOCITY],
+    "planar": ["2 translations along n_j and m_j and 1 rotation about a_j, constant in body j"],
+    "parallel": ["refused: its 2 rows cost less than 4 joint coordinates"],
+    "inline": ["refused: its 2 rows cost less than 4 joint coordinates"],
+    "inplane": [ONE_ROW],
+    "cv": ["refused: the axes of its free motions are constant in neither body"],
     "gear": ["refused: it joins three bodies"],
     "follow": ["refused: it joins three bodies"] * 2,
     "point-on-plane": [ONE_ROW],
     "point-on-surface": [ONE_ROW],
 }
 OWN = {
-    Planar: "2 translations along n_j and m_j and 1 rotation about a_j, constant in body j",
     PinInSlot: (
         "1 translation along a_j, constant in body j, and 1 rotation about a_i, constant in body i"
     ),
@@ -104,10 +109,10 @@ def test_a_joint_that_cannot_be_closed_is_refused_and_reported():
     assert motion.words == "refused: no pose with C = 0 was found from the one given"
 
 
-class Either(Planar):
+class Either(Between):
     """A ball on a plane, or in a socket: a field says which."""
 
-    keyword = "either"
+    keyword, rows = "either", 3
     held: str = choice(("plane", "socket"))
 
     def prepare(self, bodies):
