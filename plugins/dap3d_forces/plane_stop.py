@@ -28,11 +28,11 @@ class PlaneStop(Force):
     e: float = number(default=0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution")
     k: float = number(unit="N/m", positive=True, doc="stiffness of contact at rest")
     zeta: float = number(default=1.0, minimum=0.0, doc="damping ratio of contact at rest")
-    m_c: float = number(default=0.0, unit="kg", minimum=0.0,
-                        doc="mass of zeta; 0 for that of the two bodies alone")  # fmt: skip
     v_rest: float = number(
         default=1e-3, unit="m/s", minimum=0.0, doc="speed below which contact does not rebound"
     )
+    m_c: float = number(default=0.0, unit="kg", minimum=0.0,
+                        doc="mass of zeta; 0 for that of the two bodies alone")  # fmt: skip
     rebound: bool = choice((True, False), default=True, doc="whether fast contact rebounds")
 
     def switch(r_P_i, r_P_j, a_j, radius):

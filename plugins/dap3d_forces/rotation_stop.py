@@ -34,11 +34,11 @@ class RotationStop(Force):
     e: float = number(default=0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution")
     k: float = number(unit="N m/rad", positive=True, doc="stiffness of contact at rest")
     zeta: float = number(default=1.0, minimum=0.0, doc="damping ratio of contact at rest")
-    J_c: float = number(default=0.0, unit="kg m^2", minimum=0.0,
-                        doc="inertia of zeta; 0 for that of the two bodies alone")  # fmt: skip
     w_rest: float = number(
         default=1e-3, unit="rad/s", minimum=0.0, doc="speed below which contact does not rebound"
     )
+    J_c: float = number(default=0.0, unit="kg m^2", minimum=0.0,
+                        doc="inertia of zeta; 0 for that of the two bodies alone")  # fmt: skip
     rebound: bool = choice((True, False), default=True, doc="whether fast contact rebounds")
 
     def prepare(self, bodies):

@@ -438,7 +438,7 @@ def test_stops_of_a_platform_see_the_mass_that_a_force_moves(slide):
         scene, _ = dap.import_model(REPOSITORY / "models" / "robots" / "stewart.xml", shapes=False)
         slider, stop = scene.joints[slide].fields, scene.forces[f"{slide}_min_stop"].fields
         ends = {key: slider[key] for key in ("P_i", "P_j", "a_j")}
-        scene.add_force("tran_sda", "push", f_a=-force, **ends)
+        scene.add_force("tran_sda", "push", f_a=force, **ends)
         result = dap.simulate(scene, t_end=0.0)
         inner, foot = slider["P_i"].removesuffix(".O"), scene.points[slider["P_j"]]
         i, j = (list(scene.bodies).index(name) for name in (inner, foot.body))

@@ -73,6 +73,9 @@ class NoReaction(RotationStop):
     def J(axis, way):
         return ((*ZERO, *ZERO),), ((*ZERO, *scale(way, axis)),)
 
+    def impulse(Jv, e):  # without a least speed: at all samples that approach
+        return where(Jv < 0.0, -(1.0 + e) * Jv, 0.0)
+
 
 class GroundAxes(Clutch):
     def J():
