@@ -87,7 +87,7 @@ def test_one_type_of_each_kind(type_):
 def test_checks_are_named_and_called():
     """Names are ids of tests; a check that does not apply is left out."""
     names = [str(check) for check in checks_for(Weight)]
-    assert names == ["energy", "purity", "plain", "compiled"]
+    assert names == ["energy", "branches", "rest", "purity", "plain", "compiled"]
     for check in checks_for(Weight, poses=1):
         check()
     with pytest.raises(ValueError, match="poses is 0"):

@@ -347,7 +347,7 @@ PLANTED = [
     (ReadingTable, {"purity"}, "it reads LIMITS, a dict that anyone may change; make it a tuple"),
     (Printing, {"purity"}, r"prints? is not shown: 'the stiffness is .*it calls print\(\)"),
     (Branching, {"plain"}, r"wrench branches on a number \[.*\]; branch by where\("),
-    (Limited, {"plain"}, r"wrench branches on a number \[.*min or max"),
+    (Limited, {"plain", "branches"}, r"wrench branches on a number \[.*min or max"),
     (MathExp, {"plain"},
      r"wrench takes floats alone \(TypeError: .*\) \[.*take .*sqrt, .*not from math"),
     (Bessel, {"plain"}, r"wrench takes floats alone \(a function of numpy or scipy\) \["),
