@@ -184,3 +184,33 @@ def test_ctrl_c_while_options_are_parsed_is_an_interruption(monkeypatch, capfd):
     monkeypatch.setattr(Command, "parse_args", interrupted)
     assert main(["models"]) == 130
     assert capfd.readouterr().err.strip() == "interrupted"
+
+
+# ---------------------------------------------------------------- limits
+
+
+linux = pytest.mark.skipif(not Path("/proc").exists(), reason="limits as Linux has them")
+
+
+@linux
+@pytest.mark.parametrize("limit", [150_000, 200_000, 250_000, 300_000, 350_000])
+def test_a_limit_on_memory_is_named(scene_file, limit):
+    """Whatever library fails first: no type is to blame, and no Ctrl-C was pressed."""
+    folder = scene_file().parent
+    found = in_shell(f"ulimit -v {limit}; $DAP3D run fall.toml", folder)
+    assert found.returncode == 1, found
+    assert found.stderr == (
+        f"there is not enough memory for this; it may take {limit:,} kB (ulimit -v)\n"
+    )
+
+
+@linux
+def test_a_limit_on_files_is_named_before_the_run(scene_file):
+    """The unit of dash is 512 bytes, that of bash 1024: the figure says which bound it."""
+    folder = scene_file().parent
+    found = in_shell("ulimit -f 200; $DAP3D run fall.toml --t-end 2000 --dt 0.01", folder)
+    assert found.returncode == 2, found
+    assert "in files, by their limit (ulimit -f)" in found.stderr
+    assert "dt of at least" in found.stderr
+    found = in_shell("ulimit -f 2000; $DAP3D run fall.toml --t-end 1 --dt 0.5", folder)
+    assert found.returncode == 0, found

@@ -155,7 +155,9 @@ def test_several_events_in_one_step_in_order(flight):
     for k, z in enumerate(levels):
         half = np.sqrt(2.0 * (50.0 / G - z) / G)
         expected += [(10.0 / G - half, f"{k}"), (10.0 / G + half, f"{k}")]
-    assert [e.t for e in result.events] == pytest.approx([t for t, _ in sorted(expected)], abs=1e-12)
+    assert [e.t for e in result.events] == pytest.approx(
+        [t for t, _ in sorted(expected)], abs=1e-12
+    )
     assert sorted(e.name for e in result.events) == sorted(2 * "0123")
 
 
@@ -188,7 +190,9 @@ def test_an_every_without_end_is_refused(flight, every):
 
 @pytest.mark.parametrize("every", [2e-3, 1.0, 1e300])
 def test_every_changes_no_event(flight, every):
-    result = dap.simulate(flight, t_end=2.0, dt=1.0, events=[dap.Event("b.r.z", at=5.0, every=every)])
+    result = dap.simulate(
+        flight, t_end=2.0, dt=1.0, events=[dap.Event("b.r.z", at=5.0, every=every)]
+    )
     half = np.sqrt(2.0 * (50.0 / G - 5.0) / G)
     assert [e.t for e in result.events] == pytest.approx(
         [10.0 / G - half, 10.0 / G + half], abs=1e-13

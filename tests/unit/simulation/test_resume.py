@@ -403,3 +403,38 @@ def test_another_output_leaves_what_there_is(copied):
     assert same_bits(dap.resume(copied, output=other, force=True), whole)
     assert sorted(f.name for f in copied.parent.iterdir()) == ["other.nc", "run.nc"]
     assert dap.open(copied.with_name("run.nc")).status == "stopped"
+
+
+@pytest.mark.parametrize("name", ["0.tolerance.npy", "0.state.npy", "0.real.npy"])
+def test_an_array_that_was_changed_by_hand_is_refused(name, tmp_path):
+    """By its last bit: the digest is of all numbers."""
+    checkpoint = leave(problems.pendulum(), tmp_path, 0.3, t_end=1.0, dt=0.1)
+    with zipfile.ZipFile(checkpoint) as archive:
+        members = {i.filename: archive.read(i) for i in archive.infolist()}
+    content = bytearray(members[name])
+    content[-8] ^= 1
+    members[name] = bytes(content)
+    with zipfile.ZipFile(checkpoint, "w") as archive:
+        for other, text in members.items():
+            archive.writestr(other, text)
+    with pytest.raises(CheckpointError, match="it was changed since it was written"):
+        dap.resume(checkpoint)
+
+
+def test_a_resumed_run_removes_the_parts_of_a_killed_one(tmp_path, monkeypatch):
+    """Its rows are copied first: killed again and again, a run has one unfinished file."""
+    settings = {"t_end": 1.0, "dt": 0.01}
+    checkpoint = leave(problems.pendulum(), tmp_path, 0.3, **settings)
+    output = path_of(checkpoint).with_name(read_checkpoint(checkpoint).header["output"])
+    for number in ("", "2", "3"):  # as kills of earlier versions left them
+        shutil.copy(output, f"{output}.part{number}")
+    output.unlink()
+    kept = []
+
+    def look(t, t_end):
+        kept.append(sorted(p.name for p in tmp_path.glob("*.part*")))
+
+    result = dap.resume(checkpoint, progress=look)
+    assert all(len(names) == 1 for names in kept), kept
+    assert same_bits(result, dap.simulate(problems.pendulum(), **settings))
+    assert not list(tmp_path.glob("*.part*"))

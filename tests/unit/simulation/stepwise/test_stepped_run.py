@@ -1,5 +1,7 @@
 """Runs that a script takes step by step."""
 
+import threading
+
 import numpy as np
 import pytest
 from support.arm import NAMES, arm_scene
@@ -187,3 +189,28 @@ def test_velocities_jump_within_a_step(method):
     assert [event.t for event in second.events] == [event.t for event in first.events]
     run.reset(first.u[100])
     assert bounces(150).events[0].t == pytest.approx(impact - 0.2, abs=1e-12)
+
+
+def test_threads_take_turns_in_a_run():
+    """Each step is taken by one thread at a time: the states are those of a single thread."""
+    alone = dap.start("pen1")
+    for _ in range(60):
+        alone.step(0.01)
+    shared, failures = dap.start("pen1"), []
+
+    def work():
+        try:
+            for _ in range(15):
+                shared.step(0.01)
+        except Exception as error:
+            failures.append(error)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not failures
+    found, wanted = shared.result(), alone.result()
+    np.testing.assert_array_equal(found.t, wanted.t)
+    np.testing.assert_array_equal(found.u, wanted.u)
