@@ -10,7 +10,8 @@ class SphericalSpherical(Joint):
     """The distance of P_i and P_j stays the length of a massless link (manual: ``sph-sph``).
 
     With a function of time it is a driven leg, without mass: l = length + f, and a growing f
-    increases the length (``Leg``). Spec 4.3. One row, with d the vector from P_i to P_j and l its length:
+    increases the length (``Leg``). Spec 4.3. One row, with d the vector from P_i to P_j and l its
+    length:
 
         C     = (d . d - l^2) / 2
         J_i   = [-d^T, -(s_i x d)^T],  J_j = [d^T, (s_j x d)^T]

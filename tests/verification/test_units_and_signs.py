@@ -144,7 +144,7 @@ def test_a_positive_force_of_an_actuator_increases_the_length(fields, joint, i, 
 @pytest.mark.parametrize("fields", [{}, {"input": "u"}, {"factor": "one"}])
 def test_tension_of_a_spring_between_points_decreases_the_length(fields, i, j):
     """ptp keeps the sign of the manual: f_a pulls, here at a point beyond P_j along the axis."""
-    scene, axis = pair("tran", i, j)
+    scene, _ = pair("tran", i, j)
     z = np.array([0.0, np.sin(0.8), np.cos(0.8)]) if j == "ground" else (0.0, 0.0, 1.0)
     scene.add_point("near", j, tuple(-2.0 * np.asarray(z)))
     scene.add_function("a", "one", coeff=(1.0, 0.0, 0.0))
@@ -156,7 +156,7 @@ def test_tension_of_a_spring_between_points_decreases_the_length(fields, i, j):
 @pytest.mark.parametrize(("i", "j"), ORDERS)
 def test_a_leg_grows_with_its_function(i, j):
     """sph-sph from 2 m before P_j to P_i: its length is 2 m + f."""
-    scene, axis = pair("tran", i, j)
+    scene, _ = pair("tran", i, j)
     z = np.array([0.0, np.sin(0.8), np.cos(0.8)]) if j == "ground" else (0.0, 0.0, 1.0)
     scene.add_point("near", j, tuple(-2.0 * np.asarray(z)))
     scene.add_joint("sph-sph", "leg", P_i=f"{i}.O", P_j="near", function="law")
@@ -219,6 +219,61 @@ def test_describe_says_the_sign_in_its_first_lines(type_):
     text = described(type_)[:900]
     words = ("increases", "decreases")
     assert any(word in " ".join(text.split()) for word in words)
+
+
+# ---------------------------------------------------------------------------- ground as body i
+
+
+def hanging(type_, ground_first):
+    """Two bodies that hang from ground by a joint and a ball, with springs to ground."""
+    scene = dap.Scene(name="hanging")
+    scene.add_body("a", mass=2.0, Jp=(0.2, 0.3, 0.4), r=(0.5, 0.0, 0.0))
+    scene.add_body("b", mass=1.0, Jp=(0.1, 0.15, 0.12), r=(1.5, 0.0, 0.0))
+    for name, body, x in (("A", "a", -0.5), ("B", "a", 0.5), ("C", "b", -0.5)):
+        scene.add_point(name, body, (x, 0.0, 0.0))
+    for body in ("a", "ground"):
+        scene.add_vector(f"{body}_u", body, (0.6, 0.8, 0.0))
+        scene.add_vector(f"{body}_n", body, (-0.8, 0.6, 0.0))
+    (i, P), (j, Q) = ("a", "A"), ("ground", "ground.O")
+    if ground_first:
+        i, j, P, Q = j, i, Q, P
+    first, second = ("n", "u") if ground_first else ("u", "n")  # the arms of a cross
+    fields = {
+        "rev": {"P_i": P, "P_j": Q, "a_i": f"{i}_u", "a_j": f"{j}_u"},
+        "tran": {"P_i": P, "P_j": Q, "a_j": f"{j}_u"},
+        "sph": {"P_i": P, "P_j": Q},
+        "univ": {"P_i": P, "P_j": Q, "a_i": f"{i}_{first}", "n_j": f"{j}_{second}"},
+        "weld": {"body_i": i, "body_j": j},
+    }
+    fields["cyl"] = fields["rev"]
+    scene.add_joint(type_, "q", **fields[type_])
+    scene.add_joint("sph", "ball", P_i="C", P_j="B")
+    ends = {"P_i": "C", "P_j": "ground.O"}
+    scene.add_vector2("d", *(reversed(ends.values()) if ground_first else ends.values()))
+    scene.add_force("ptp", "spring", d="d", k=30.0, c=0.5, l0=0.8)
+    scene.add_force("sph_sd", "bush", body_i=i, body_j=j, k=1.0, c=0.1)
+    scene.add_force("rot_friction", "drag", body_i=i, body_j=j, axis="ground_u", n_c=0.2, w_tol=0.1)
+    scene.add_force("weight", "gravity")
+    return scene
+
+
+@pytest.mark.parametrize("type_", ["rev", "cyl", "tran", "sph", "univ", "weld"])
+@pytest.mark.parametrize(
+    ("method", "integrator"),
+    [("standard", "dop853"), ("joint", "dop853"), ("lsq", "dopri5"), ("standard", "radau")],
+)
+def test_bodies_of_a_joint_to_ground_may_be_exchanged(type_, method, integrator):
+    """The motion, the reactions and the energy stay; rtol 1e-10 leaves some 1e-8."""
+    settings = {"t_end": 0.5, "dt": 0.25, "method": method, "integrator": integrator,
+                "rtol": 1e-10, "atol": 1e-12}  # fmt: skip
+    usual, exchanged = (
+        dap.simulate(hanging(type_, ground_first), **settings) for ground_first in (False, True)
+    )
+    assert exchanged.u == pytest.approx(usual.u, abs=1e-7)
+    forces = [usual.reaction("q")["i"].force, exchanged.reaction("q")["j"].force]
+    assert forces[1] == pytest.approx(forces[0], abs=1e-5)
+    assert exchanged.energy.total == pytest.approx(usual.energy.total, abs=1e-7)
+    assert exchanged.ledger["energy"].ok
 
 
 # ---------------------------------------------------------------------------- legs

@@ -61,7 +61,7 @@ def probe():
 
 #: A product with a bare number that may be a conversion has no known unit.
 CONVERSIONS = [
-    "h.angle * 180 / pi", "h.angle / (2 * pi)", "h.angle * 57.29577951308232", "(h.angle) / 6.2832",
+    "h.angle * 180 / pi", "h.angle / (2 * pi)", "h.angle * 57.29577951308232", "h.angle / 6.2832",
     "180 / pi * h.angle", "h.angle_rate * 60 / (2 * pi)", "h.angle_rate * 9.549296585513721",
     "rod.r.x * 1000", "rod.r.x * 1e3", "1e3 * rod.r.x", "rod.r.x / 0.001", "rod.r * 100",
     "rod.rd.x * 3.6", "norm(h.force) / 9.81", "t / 60", "-(h.angle - 0.5) * 180 / pi",
@@ -74,8 +74,8 @@ KNOWN = {
     "0.25 * e.r.x + 0.75 * rod.r.x": "m", "rod.r.x - 0.3": "m", "0.3 - rod.r.x": "m",
     "2 * rod.r.x": "m", "maximum(rod.r.x, 0)": "m", "where(t < 1, rod.r.x, 0)": "m",
     "rod.r.x - 30 * mm": "m", "h.angle - 90 * deg": "rad", "minimum(h.angle_rate, 300 * rpm)":
-    "rad/s", "rod.rdd.z + g0": "m/s^2", "90 * deg": "rad", "h.angle / deg": "1", "rod.r.x / mm": "1",
-    "h.angle_rate / rpm": "1", "rod.rdd.z / g0": "1", "rod.r.x / e.v.x": "s",
+    "rad/s", "rod.rdd.z + g0": "m/s^2", "90 * deg": "rad", "h.angle / deg": "1",
+    "rod.r.x / mm": "1", "h.angle_rate / rpm": "1", "rod.rdd.z / g0": "1", "rod.r.x / e.v.x": "s",
     "rod.r.x * 1000 / 1000": "m", "h.angle * 180 / pi * pi / 180": "rad",
     "sqrt(rod.r.x**2 + rod.r.z**2)": "m", "sqrt(rod.r.x)": "m^(1/2)", "rod.r.x**2": "m^2",
     "hypot(rod.r.x, rod.r.z)": "m", "atan2(rod.r.z, rod.r.x)": "rad", "1 / t": "1/s",
@@ -90,12 +90,14 @@ KNOWN = {
 }  # fmt: skip
 #: Sums and comparisons of unlike units, with both of them.
 UNLIKE = {
-    "rod.r.x + t": ("m", "s"), "rod.r.x - rod.rd.x": ("m", "m/s"), "h.angle + rod.r.x": ("rad", "m"),
+    "rod.r.x + t": ("m", "s"), "rod.r.x - rod.rd.x": ("m", "m/s"),
+    "h.angle + rod.r.x": ("rad", "m"),
     "norm(h.force) + norm(h.moment)": ("N", "N m"), "energy.kinetic - h.force.x": ("J", "N"),
     "rod.r + rod.rd": ("m", "m/s"), "hypot(rod.r.x, t)": ("m", "s"),
     "maximum(rod.r.x, h.angle)": ("m", "rad"), "atan2(rod.r.x, rod.rd.x)": ("m", "m/s"),
     "where(t < 1, rod.r.x, rod.rd.x)": ("m", "m/s"), "where(t < rod.r.x, 1, 0)": ("s", "m"),
-    "rod.r.x == h.angle": ("m", "rad"), "rod.r.x % t": ("m", "s"), "h.angle - 30 * mm": ("rad", "m"),
+    "rod.r.x == h.angle": ("m", "rad"), "rod.r.x % t": ("m", "s"),
+    "h.angle - 30 * mm": ("rad", "m"),
     "rod.r.x - 90 * deg": ("m", "rad"), "rod.rdd.x + 3 * rpm": ("m/s^2", "rad/s"),
     "(rod.r.x + 0.3) * (rod.r.z + t)": ("m", "s"), "rod.r.x / e.r.x + t": ("1", "s"),
     "rod.r.x**2 + rod.r.x": ("m^2", "m"), "2 * deg + 3 * mm": ("rad", "m"),
@@ -133,9 +135,9 @@ def test_constants_stand_in_parameters():
     resolved = scene.resolved().parameters
     assert resolved["lean"] == pytest.approx(np.pi / 6, rel=1e-15)
     assert resolved["long"] == pytest.approx(0.02, rel=1e-15)
+    clash = _parsed("")
+    clash.add_parameter("mm", 1.0)
     with pytest.raises(dap.SceneError, match="a function or a constant of this name"):
-        clash = _parsed("")
-        clash.add_parameter("mm", 1.0)
         dap.compile(clash)
 
 
@@ -223,8 +225,8 @@ def test_a_declared_unit_is_everywhere(tmp_path, monkeypatch):
     labels = [ax.get_ylabel() for ax in dap.plot(result, "heading", "turns").figure.axes]
     assert [label for label in labels if "[deg]" in label]
     assert not [label for label in labels if "rad" in label]
-    swept = dap.sweep("s.toml", {"bodies.rod.mass": [1.0, 2.0]}, outputs=["heading:max", "turns:max"],
-                      t_end=0.2)  # fmt: skip
+    outputs = ["heading:max", "turns:max"]
+    swept = dap.sweep("s.toml", {"bodies.rod.mass": [1.0, 2.0]}, outputs=outputs, t_end=0.2)
     assert swept["heading:max"].attrs["units"] == "deg"
     assert "units" not in swept["turns:max"].attrs
     described = json.loads(run("describe", "s.toml", "--json"))["model"]["outputs"]

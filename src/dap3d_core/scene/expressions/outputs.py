@@ -6,7 +6,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.scene.errors import MISSING
+from dap3d_core.scene.errors import MISSING, Key
 from dap3d_core.scene.expressions.expression import Expression, fault_of_word, read_expression
 from dap3d_core.scene.scene import Scene, fault_of_name
 from dap3d_core.scene.validate.coerce_values import Fault
@@ -26,7 +26,7 @@ def read_outputs(report: Collector) -> dict[str, Expression]:
     """The outputs of a scene by name, those first that others name; mistakes are reported."""
     expressions = {}
     for name, value in report.scene.outputs.items():
-        key = ("outputs", str(name))
+        key: Key = ("outputs", str(name))
         if fault := fault_of_quantity(report.scene, name):
             report.add(key, name, f"not a name for an output: {fault}")
         unit = ""

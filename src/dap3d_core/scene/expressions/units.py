@@ -232,9 +232,10 @@ def _product(one: Carried, other: Carried) -> Carried:
 
 
 def _power(base: Carried, exponent: Carried) -> Carried:
-    if isinstance(base, float) or not isinstance(exponent, float):
-        is_number = isinstance(base, float) and isinstance(exponent, float) and base
-        return abs(base) ** exponent if is_number else PLAIN if _is_plain(base) else UNKNOWN
+    if not isinstance(exponent, float):
+        return PLAIN if isinstance(base, float) or base.powers == {} else UNKNOWN
+    if isinstance(base, float):
+        return float(abs(base) ** exponent) if base else PLAIN
     power = Fraction(exponent).limit_denominator(100)
     if base.powers is None or BY_ROW in base.powers or not math.isclose(power, exponent):
         return UNKNOWN
@@ -244,10 +245,6 @@ def _power(base: Carried, exponent: Carried) -> Carried:
         return UNKNOWN
     powers = {symbol: one * power for symbol, one in base.powers.items() if power}
     return base._replace(powers=powers, factor=factor)
-
-
-def _is_plain(unit: Carried) -> bool:
-    return isinstance(unit, float) or unit.powers == {}
 
 
 def _parsed(text: str) -> Powers:

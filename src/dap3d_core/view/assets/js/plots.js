@@ -72,7 +72,7 @@ class Plots {
     }));
     const drop = make("button", "\u00d7", { title: "Remove the last curve", "aria-label": "Remove the last curve" });
     drop.addEventListener("click", () => this.remove(panel, panel.quantities.at(-1)));
-    panel.top.replaceChildren(make("span", panel.unit === "1" ? "" : `[${unitText(panel.unit)}]`), drop);
+    panel.top.replaceChildren(make("span", ["", "1"].includes(panel.unit) ? "" : `[${unitText(panel.unit)}]`), drop);
   }
 
   draw(panel) {
