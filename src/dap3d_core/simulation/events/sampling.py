@@ -204,9 +204,7 @@ class Sampler:
                 found.append(Turn(k, t, here, abs(here - expected)))
         return found
 
-    def _may_hide(
-        self, values: Floats, miss: float, turns: list[Turn], followed: bool
-    ) -> bool:
+    def _may_hide(self, values: Floats, miss: float, turns: list[Turn], followed: bool) -> bool:
         """True if a window may have crossings that its samples and turning points do not show."""
         miss = max([miss, *(turn.miss for turn in turns)])
         if miss <= ROUNDING * self._largest:

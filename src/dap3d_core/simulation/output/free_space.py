@@ -107,7 +107,9 @@ def _bounds() -> Iterator[int]:
 
 
 def _size(byte_count: float) -> str:
-    return f"{byte_count / 2**30:,.3g} GiB" if byte_count >= 2**27 else f"{byte_count / 1e6:,.3g} MB"
+    return (
+        f"{byte_count / 2**30:,.3g} GiB" if byte_count >= 2**27 else f"{byte_count / 1e6:,.3g} MB"
+    )
 
 
 def row_width(evaluator: Any) -> int:
