@@ -28,7 +28,12 @@ BEHIND = 3.0
 #: A length that goes to zero with a higher power of the time left than this is not near zero.
 HIGHEST = 6.0
 #: How an integration ends that does not get through a singular pose.
-FAILURES = (Status.STEP_FLOOR, Status.NOT_FINITE, Status.PROJECTION_FAILED)
+FAILURES = (
+    Status.STEP_FLOOR,
+    Status.NOT_FINITE,
+    Status.PROJECTION_FAILED,
+    Status.STALLED,
+)
 
 
 def hand_over(run: RunState) -> bool:
@@ -80,7 +85,8 @@ def take_over(integration: Integration, before: Integration) -> None:
     work.t_stiff, work.status = np.inf, Status.RUNNING
     work.error_across_singularity = work.failed_error_rate = 0.0
     work.near_singular_landings = work.stalled_steps = 0
-    work.stiff_steps = work.nonstiff_steps = 0
+    work.stiff_steps = work.nonstiff_steps = work.attempt_count = 0
+    work.t_attempted, work.stall_start = before.t, work.rhs_count
     if not integration.implicit:
         forget_measures(work)
     integration.restart()

@@ -25,7 +25,7 @@ from dap3d_core.scene import (
 from dap3d_core.scene.validate.settings import notes_of
 from dap3d_core.simulation.compiled_model import CompiledModel, takes_joint_coordinates
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.initial.tolerances import atol_vector, resolved_atol
+from dap3d_core.simulation.initial.tolerances import atol_vector, kinds_of, resolved_atol
 
 
 def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:
@@ -136,6 +136,7 @@ def integration_options(evaluator: Evaluator, settings: Simulation) -> dict[str,
         "error_size": evaluator.coordinates.size,  # the work does not steer the step
         "report_size": evaluator.report_size,
         "ends": effects_of(evaluator.switches),
+        "kinds": kinds_of(evaluator),
     }
 
 

@@ -14,6 +14,10 @@ displacement and v a velocity:
     turning   d(D v - nu) / dx, laid out as D
     force_by_lambda  d(forces that read multipliers) / dlambda, blocks of rows x 6 (transposed)
 
+A fine tangent (``Tangent.fine``) is that of laws which bend within such a step, as contact at rest
+and friction below its v_tol do: there the step is shortened until the derivative no longer depends
+on it.
+
 In body axes a mechanism that turns as a whole keeps its tangent. What a wrench owes to the body
 axes in which its moment acts is in it; the gyroscopic moment is added in closed form.
 """
@@ -38,6 +42,11 @@ PART = 6e-6
 #: Least step of a velocity in m/s (times PART), and least size of an element in m: below the
 #: velocities at which Coulomb friction turns.
 SLOWEST, SMALLEST = 0.1, 1e-4
+#: Steps of a fine tangent: the next one as part of the one before, how many there are, and to which
+#: part two differences agree. Changes of so many roundings of what an element returns say nothing.
+FINER, LEVELS, AGREEMENT, NOISY = 0.0625, 8, 0.1, 1e3 * 2.220446049250313e-16
+#: ``Tangent.fine`` where a law did bend.
+BENT = 2.0
 #: What an element is; the last two only of types with states of their own (state_tangent.py).
 WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT, RATE_ELEMENT, POSITION_ELEMENT = range(5)
 #: Columns of ``elements``.
@@ -45,6 +54,12 @@ WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT, RATE_ELEMENT, POSITION_ELEMENT 
     LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY, FIRST_READING,
     JOINTS_READ, ELEMENT_WIDTH
 ) = range(12)  # fmt: skip
+#: Columns of ``StateTangent.records``: number of states; places in ``values`` of rate by z (m x m),
+#: of rate by each slot (m x 12), of force by z of each slot (6 x m), of C and of D v - nu by z
+#: (rows x m); slots; rows.
+COUNT, RATE_BY_STATE, RATE_BY_BODY, FORCE_BY_STATE, C_BY_STATE, NU_BY_STATE, SLOTS_OF, ROWS_OF = (
+    range(8)
+)
 #: Columns of ``readings``.
 PLACE, BODY, FIRST_ROW, ROW_COUNT = range(4)
 
@@ -92,6 +107,11 @@ class Tangent(Arrays):
     saved: Floats  # (BODY_WIDTH,) scratch
     ahead: Floats  # (outputs,) what the element returns with a body moved forwards
     behind: Floats  # (outputs,) the same backwards
+    here: Floats  # (outputs,) the same as it is placed
+    column: Floats  # (outputs,) derivatives by a coordinate
+    coarser: Floats  # (outputs,) the same by a longer step
+    one_sided: Floats  # (outputs,) the same by the side on which it does not jump
+    fine: Floats  # (1,) 1 where laws may bend within the usual step, BENT once one did
     states: StateTangent
 
 
@@ -167,6 +187,100 @@ def call_element(
 
 
 @compiled
+def call_any(
+    t: float, e: int, q: int, x: Floats, out: Floats, system: System, loops: Any, tangent: Tangent
+) -> None:
+    """What instance q of group e returns: rates, C, or as ``call_element``."""
+    row = tangent.elements[e]
+    if row[KIND] != RATE_ELEMENT and row[KIND] != POSITION_ELEMENT:
+        call_element(t, e, q, x, out, system, loops, tangent)
+        return
+    g = row[LOOP]
+    i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[WIDTH]
+    if row[KIND] == POSITION_ELEMENT:
+        call_loop(loops, g, t, system, (i0, p0, 1), tangent.gamma, x, x)
+        first = system.idx[i0 + row[ROW_AT]]
+        for k in range(row[ROWS]):
+            out[k] = tangent.gamma[first + k]
+        return
+    call_loop(loops, g, t, system, (i0, p0, 1), tangent.force, x, x)
+    first = system.idx[i0 + tangent.states.at[e]]
+    for k in range(tangent.states.records[tangent.states.record[first], COUNT]):
+        out[k] = system.rates[first + k]
+
+
+@compiled
+def find_column(
+    t: float, e: int, q: int, x: Floats, c: int, step: float, size: int, s: Floats, system: System,
+    loops: Any, tangent: Tangent,
+) -> None:  # fmt: skip
+    """Derivatives of what an element returns, ``size`` numbers, by coordinate c of body row s.
+
+    s is left moved; ``tangent.saved`` has it as it is.
+    """
+    column, coarser = tangent.column, tangent.coarser
+    if tangent.fine[0] != 0.0:
+        move_body(s, tangent.saved, c, 0.0)
+        call_any(t, e, q, x, tangent.here, system, loops, tangent)
+    bent = bends(t, e, q, x, c, step, size, s, system, loops, tangent)
+    if tangent.fine[0] == 0.0:
+        return
+    find_smooth_side(step, size, tangent)
+    for _ in range(LEVELS):
+        step *= FINER
+        was_bent, most, apart = bent, 0.0, 0.0
+        for k in range(size):
+            coarser[k] = column[k]
+        bent = bends(t, e, q, x, c, step, size, s, system, loops, tangent)
+        change = here = 0.0
+        for k in range(size):
+            most, apart = max(most, abs(column[k])), max(apart, abs(column[k] - coarser[k]))
+            change = max(change, step * abs(column[k]))
+            here = max(here, abs(tangent.here[k]))
+        agree = not bent and apart <= AGREEMENT * most
+        if change <= NOISY * here or (agree and not was_bent):
+            for k in range(size):
+                column[k] = coarser[k]
+            return
+        tangent.fine[0] = BENT
+        if agree:
+            return
+    for k in range(size):  # it jumps here
+        column[k] = tangent.one_sided[k]
+
+
+@compiled
+def find_smooth_side(step: float, size: int, tangent: Tangent) -> None:
+    """The lesser of both one-sided differences: a jump lies on the other side."""
+    ahead, behind, here = tangent.ahead, tangent.behind, tangent.here
+    rise = fall = 0.0
+    for k in range(size):
+        rise, fall = max(rise, abs(ahead[k] - here[k])), max(fall, abs(here[k] - behind[k]))
+    for k in range(size):
+        change = ahead[k] - here[k] if rise < fall else here[k] - behind[k]
+        tangent.one_sided[k] = change / step
+
+
+@compiled
+def bends(
+    t: float, e: int, q: int, x: Floats, c: int, step: float, size: int, s: Floats, system: System,
+    loops: Any, tangent: Tangent,
+) -> bool:  # fmt: skip
+    """Central differences into ``tangent.column``; whether they differ from one-sided ones."""
+    ahead, behind, here = tangent.ahead, tangent.behind, tangent.here
+    move_body(s, tangent.saved, c, step)
+    call_any(t, e, q, x, ahead, system, loops, tangent)
+    move_body(s, tangent.saved, c, -step)
+    call_any(t, e, q, x, behind, system, loops, tangent)
+    half, bend, rise = 0.5 / step, 0.0, 0.0
+    for k in range(size):
+        tangent.column[k] = half * (ahead[k] - behind[k])
+        bend = max(bend, abs(ahead[k] - 2.0 * here[k] + behind[k]))
+        rise = max(rise, max(abs(ahead[k] - here[k]), abs(behind[k] - here[k])))
+    return bend > AGREEMENT * rise
+
+
+@compiled
 def sizes_of(e: int, q: int, system: System, tangent: Tangent) -> tuple[float, float]:
     """Extent of an element, m, and its velocity, m/s: what its steps are parts of."""
     row = tangent.elements[e]
@@ -196,7 +310,8 @@ def differentiate_element(
     i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
     first_pair = row[FIRST_PAIR] + q * slots * slots
     extent, speed = sizes_of(e, q, system, tangent)
-    saved, ahead, behind = tangent.saved, tangent.ahead, tangent.behind
+    saved, column = tangent.saved, tangent.column
+    size = 6 * slots + (rows if kind == JOINT_ELEMENT else 0)
     for m in range(slots):
         b = system.idx[i0 + m]
         if tangent.pairs[first_pair + m * slots + m] < 0:  # ground, or a body met before
@@ -208,23 +323,16 @@ def differentiate_element(
             scale = extent if c < 3 else 1.0
             if c >= 6:
                 scale = speed if c < 9 else speed / extent
-            step = PART * scale
-            move_body(s, saved, c, step)
-            call_element(t, e, q, x, ahead, system, loops, tangent)
-            move_body(s, saved, c, -step)
-            call_element(t, e, q, x, behind, system, loops, tangent)
-            half = 0.5 / step
+            find_column(t, e, q, x, c, PART * scale, size, s, system, loops, tangent)
             for n in range(slots):
                 o = tangent.pairs[first_pair + n * slots + m]
                 if o >= 0:
                     for k in range(6):
-                        rise = ahead[6 * n + k] - behind[6 * n + k]
-                        tangent.coupling[o + 12 * k + c] += half * rise
+                        tangent.coupling[o + 12 * k + c] += column[6 * n + k]
             if kind == JOINT_ELEMENT:
                 d = system.idx[i0 + row[ROW_AT] + 1 + m] + c
                 for r in range(rows):
-                    rise = ahead[6 * slots + r] - behind[6 * slots + r]
-                    tangent.turning[d + 6 * r] += half * rise
+                    tangent.turning[d + 6 * r] += column[6 * slots + r]
         for k in range(s.shape[0]):
             s[k] = saved[k]
 

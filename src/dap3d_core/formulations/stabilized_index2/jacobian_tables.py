@@ -27,6 +27,8 @@ _KINDS = {
 }  # fmt: skip
 #: The same of types with states of their own, as their derivatives by states need them.
 _WITH_STATES = {"rate": RATE_ELEMENT, "position": POSITION_ELEMENT}
+#: Arrays of what an element returns.
+OUTPUTS = ("ahead", "behind", "here", "column", "coarser", "one_sided")
 #: Numbers of a block of ``coupling``.
 _BLOCK = 72
 
@@ -79,8 +81,8 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         nu=np.zeros(plan.row_size),
         force=np.zeros(len(system.force)),
         saved=np.zeros(BODY_WIDTH),
-        ahead=np.zeros(widest),
-        behind=np.zeros(widest),
+        **{name: np.zeros(widest) for name in OUTPUTS},
+        fine=np.zeros(1),
         states=_state_tangent(evaluator.model, at),
     )
 

@@ -20,33 +20,32 @@ from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.evaluate import zero
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
 from dap3d_core.formulations.stabilized_index2.jacobian import (
+    C_BY_STATE,
+    COUNT,
+    FORCE_BY_STATE,
     JOINT_ELEMENT,
     KIND,
     LOOP,
+    NU_BY_STATE,
     PART,
     POSITION_ELEMENT,
+    RATE_BY_BODY,
+    RATE_BY_STATE,
     RATE_ELEMENT,
-    ROW_AT,
     ROWS,
+    ROWS_OF,
     SLOT_COUNT,
+    SLOTS_OF,
     STRIDE,
     VELOCITY,
-    WIDTH,
     Tangent,
-    call_element,
-    move_body,
+    call_any,
+    find_column,
     scale_columns,
     sizes_of,
 )
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.runtime.function_lists import call_loop
 
-#: Columns of ``StateTangent.records``: number of states; places in ``values`` of rate by z (m x m),
-#: of rate by each slot (m x 12), of force by z of each slot (6 x m), of C and of D v - nu by z
-#: (rows x m); slots; rows.
-COUNT, RATE_BY_STATE, RATE_BY_BODY, FORCE_BY_STATE, C_BY_STATE, NU_BY_STATE, SLOTS_OF, ROWS_OF = (
-    range(8)
-)
 #: Columns of ``StageMatrix.state_nodes``: first state, first unknown, place of the diagonal block;
 #: of the block (joint, states): place, rows of the joint's node, of these the first of the joint,
 #: and that in row vectors; number of states.
@@ -71,29 +70,6 @@ def differentiate_states(t: float, x: Floats, system: System, loops: Any, tangen
             if row[KIND] == RATE_ELEMENT:
                 differentiate_rate(t, e, q, x, system, loops, tangent)
     scale_state_tangent(system, tangent)
-
-
-@compiled
-def call_any(
-    t: float, e: int, q: int, x: Floats, out: Floats, system: System, loops: Any, tangent: Tangent
-) -> None:
-    """What element q of group e returns: rates, C, or as ``call_element``."""
-    row = tangent.elements[e]
-    if row[KIND] != RATE_ELEMENT and row[KIND] != POSITION_ELEMENT:
-        call_element(t, e, q, x, out, system, loops, tangent)
-        return
-    g = row[LOOP]
-    i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[WIDTH]
-    if row[KIND] == POSITION_ELEMENT:
-        call_loop(loops, g, t, system, (i0, p0, 1), tangent.gamma, x, x)
-        first = system.idx[i0 + row[ROW_AT]]
-        for k in range(row[ROWS]):
-            out[k] = tangent.gamma[first + k]
-        return
-    call_loop(loops, g, t, system, (i0, p0, 1), tangent.force, x, x)
-    first = system.idx[i0 + tangent.states.at[e]]
-    for k in range(tangent.states.records[tangent.states.record[first], COUNT]):
-        out[k] = system.rates[first + k]
 
 
 @compiled
@@ -142,7 +118,7 @@ def differentiate_rate(
     record = own.records[own.record[system.idx[i0 + tangent.states.at[e]]]]
     m = record[COUNT]
     extent, speed = sizes_of(e, q, system, tangent)
-    saved, ahead, behind = tangent.saved, tangent.ahead, tangent.behind
+    saved = tangent.saved
     for n in range(row[SLOT_COUNT]):
         b, o = system.idx[i0 + n], record[RATE_BY_BODY] + 12 * m * n
         if b == 0:
@@ -154,13 +130,9 @@ def differentiate_rate(
             scale = extent if c < 3 else 1.0
             if c >= 6:
                 scale = speed if c < 9 else speed / extent
-            step = PART * scale
-            move_body(s, saved, c, step)
-            call_any(t, e, q, x, ahead, system, loops, tangent)
-            move_body(s, saved, c, -step)
-            call_any(t, e, q, x, behind, system, loops, tangent)
+            find_column(t, e, q, x, c, PART * scale, m, s, system, loops, tangent)
             for k in range(m):
-                own.values[o + 12 * k + c] = 0.5 / step * (ahead[k] - behind[k])
+                own.values[o + 12 * k + c] = tangent.column[k]
         for k in range(s.shape[0]):
             s[k] = saved[k]
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from dap3d_core.integrators.stepping.integration_state import (
     ABSOLUTE,
+    MOST,
     MOST_COUNTED,
     NOISE,
     SCRATCH,
@@ -163,6 +164,7 @@ def difference_norms(work: AdamsState, k: int, h: float) -> tuple[float, float, 
     for i in range(size):
         a, b = abs(y[i]), abs(trial[i])
         noise, wide = tolerance[NOISE, i], tolerance[ABSOLUTE, i] + rtol * (a if a > b else b)
+        noise = min(noise, tolerance[MOST, i] / h)
         scale = 1.0 / (h * noise if h * noise > wide else wide)
         d0 = change[i]
         d1 = d0 + star[last, i]

@@ -17,6 +17,8 @@ SLOWEST = 0.99
 ROUNDINGS, LOOSEST = 10.0, 0.1
 #: Where multipliers fall by this much in an iteration the stages are yet to follow them.
 SETTLING = 0.1
+#: Changes up to this many roundings of a state show no rate of convergence.
+RATELESS = 1e3
 #: Changes up to this many limits may be rounding where the iteration stagnates, if they are up
 #: to this many roundings: near a singular pose a state is known to one over its distance squared.
 STALLED, MOST_ROUNDINGS = 10.0, 1e6
@@ -39,6 +41,29 @@ def newton_limit(work: RadauState) -> float:
             limit = max(limit, ROUNDINGS * EPSILON * top / (atol + rtol * low))
         first += count
     return min(limit, LOOSEST)
+
+
+@compiled
+def is_at_rounding(change: float, limit: float, work: RadauState) -> bool:
+    """True if a change says nothing of how an iteration converges.
+
+    A larger one does, though it be within the limit: where a law bends within the tolerance, as
+    friction below its v_tol may, stages that jump from one side to the other are not found.
+    """
+    return change <= min(limit, RATELESS * EPSILON / work.rtol)
+
+
+@compiled
+def is_exact(change: float, before: float, limit: float, work: RadauState) -> bool:
+    """True if the last changes are rounding alone, which shows no rate of convergence.
+
+    before: the change before; LARGEST where one change of zero counts, and no other.
+    """
+    if change > 0.0 and not is_at_rounding(max(before, change), limit, work):
+        return False
+    if change > 0.0:
+        work.convergence_rate = 0.0
+    return True
 
 
 @compiled

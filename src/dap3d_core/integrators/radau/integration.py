@@ -20,6 +20,7 @@ from dap3d_core.integrators.radau.newton import (
     find_stages,
     find_tangent,
 )
+from dap3d_core.integrators.radau.rounding import measure_stage_noise
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.step import advance
 from dap3d_core.integrators.radau.tableau import ORDER, radau_method
@@ -225,7 +226,10 @@ class RadauIntegration(Integration):
             RadauState.type_of(), System.type_of(), LOOP_LIST, Tangent.type_of(),
             StageMatrix.type_of(),
         )  # fmt: skip
-        parts = (find_tangent, factorise_both, find_stages, estimate_error, find_slope)
+        parts = (
+            find_tangent, factorise_both, find_stages, estimate_error, find_slope,
+            measure_stage_noise,
+        )  # fmt: skip
         return table_of(signature, parts)
 
     def _advance(self, budget: int) -> None:

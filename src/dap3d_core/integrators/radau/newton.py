@@ -18,7 +18,12 @@ from dap3d_core.assembly.evaluate import largest, place, zero
 from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
-from dap3d_core.formulations.stabilized_index2.jacobian import SMALLEST, Tangent, differentiate
+from dap3d_core.formulations.stabilized_index2.jacobian import (
+    BENT,
+    SMALLEST,
+    Tangent,
+    differentiate,
+)
 from dap3d_core.formulations.stabilized_index2.stage_equations import (
     StageMatrix,
     add_transposed,
@@ -35,6 +40,8 @@ from dap3d_core.formulations.stabilized_index2.state_tangent import differentiat
 from dap3d_core.integrators.radau.convergence import (
     SLOWEST,
     converges,
+    is_at_rounding,
+    is_exact,
     is_settling,
     is_stalled,
     newton_limit,
@@ -52,9 +59,14 @@ MOST, MOST_FIXED = 10, 40
 PATIENCE = 5
 #: Factors that belong to a step this near the present one are used for it.
 SAME_STEP = 1e-3
+#: Across a bend changes below this part of the limit have a rate of no more than this: the step may
+#: grow, with a new tangent.
+UNSEEN_CHANGE, UNSEEN_RATE = 0.1, 2e-3
 #: A step whose stages were not found is halved.
 UNFOUND = 0.5
 LARGEST = 1.7976931348623157e308
+#: What the work of a step may be off by, as part of the tolerance.
+WORK_TOLERANCE = 0.1
 
 
 @compiled
@@ -130,13 +142,15 @@ def factorise_both(
 
 
 @compiled
-def predict(h: float, work: RadauState) -> None:
+def predict(h: float, work: RadauState, prolong: bool) -> None:
     """Starting values of the stages: the polynomials of the last step, prolonged (HW IV.8).
+
+    Or the state as it is, where they are not to be prolonged, or there was no step before.
 
     mu is no smooth function: it has the same values at the stages of each step, but for h^3.
     """
     c, stages, old, now = work.method.c, work.Z, work.Z_old, work.multipliers
-    if work.has_last_step == 0:
+    if work.has_last_step == 0 or not prolong:
         for i in range(3):
             zero(stages[i])
             for k in range(now.shape[2]):
@@ -218,13 +232,16 @@ def evaluate_stages(
 ) -> None:
     """Residuals of the three stages: F - A^-1 Z / h into R, those of the rows into G."""
     y, argument, c = work.state[Y], work.state[SCRATCH], work.method.c
-    stages, inverse = work.Z, work.method.inverse
+    stages, inverse, last = work.Z, work.method.inverse, y.shape[0] - 1
+    work.power_change = 0.0
     for i in range(3):
+        power = work.F[i, last]
         for k in range(y.shape[0]):
             argument[k] = y[k] + stages[i, k]
         evaluate_stage(t + c[i] * h, argument, work.multipliers[i], matrix.held, work.F[i],
                        work.G[i], system, loops)  # fmt: skip
         keep_frames(system.body, work.frames[i])
+        work.power_change = max(work.power_change, abs(work.F[i, last] - power))
         a0, a1, a2 = inverse[i, 0] / h, inverse[i, 1] / h, inverse[i, 2] / h
         for k in range(y.shape[0]):
             rate = a0 * stages[0, k] + a1 * stages[1, k] + a2 * stages[2, k]
@@ -274,15 +291,21 @@ def change_stages(h: float, work: RadauState, system: System) -> float:
 
 
 @compiled
+def is_power_known(h: float, ratio: float, work: RadauState) -> bool:
+    """True if the last change of the stages has changed the work of a step h by little.
+
+    The power was evaluated before it. ratio: of that change to the one before, 1 in the first
+    iteration, whose power is compared with that of the last step.
+    """
+    size = max(work.largest_work, h * abs(work.F[2, work.F.shape[1] - 1]))
+    return h * work.power_change * ratio <= WORK_TOLERANCE * work.rtol * size
+
+
+@compiled
 def find_stages(
-    t: float,
-    h: float,
-    work: RadauState,
-    system: System,
-    loops: Any,
-    tangent: Tangent,
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Tangent,
     matrix: StageMatrix,
-) -> float:
+) -> float:  # fmt: skip
     """Newton's iteration for the stages of a step h.
 
     Returns:
@@ -291,9 +314,11 @@ def find_stages(
     """
     limit = newton_limit(work)
     work.convergence_factor = max(work.convergence_factor, ROUNDING) ** 0.8
-    before = ratio_before = states = multipliers = 1.0
+    before = ratio = ratio_before = states = multipliers = 1.0
+    was_found = False
     fixed = work.fixed_step != 0.0
     most = MOST_FIXED if fixed else MOST
+    least = 2 if tangent.fine[0] == BENT else 1  # rates of other steps say nothing across a bend
     for done in range(1, most + 1):
         evaluate_stages(t, h, work, system, loops, matrix)
         solve_stages(h, work, system, matrix)
@@ -302,7 +327,7 @@ def find_stages(
         work.last_iterations = done
         if not change <= LARGEST:
             return math.nan
-        if change == 0.0:  # rounding alone, which shows no rate of convergence
+        if was_found or is_exact(change, before if done == least > 1 else LARGEST, limit, work):
             return 0.0
         if done > 1:
             ratio = change / before
@@ -314,12 +339,14 @@ def find_stages(
             work.convergence_rate = theta
             patient = fixed or (slow and is_settling(multipliers, work))
             if theta >= SLOWEST:
-                if change <= limit:
+                if is_at_rounding(change, limit, work):
                     return 0.0
                 if done > PATIENCE or not patient:
                     return UNFOUND
                 work.convergence_rate = SLOWEST
             theta = work.convergence_rate
+            if least > 1 and max(before, change) <= UNSEEN_CHANGE * limit:
+                work.convergence_rate = min(theta, UNSEEN_RATE)
             work.convergence_factor = theta / (1.0 - theta)
             left = work.convergence_factor * change * theta ** (most - 1 - done) / limit
             if done < most and left >= 1.0 and not patient:
@@ -327,8 +354,10 @@ def find_stages(
                 return 0.8 * excess ** (-1.0 / (3.0 + most - done))
         before = max(change, ROUNDING)
         states, multipliers = work.state_change, work.multiplier_change
-        if work.convergence_factor * change <= limit:
+        found = work.convergence_factor * change <= limit and done >= least
+        if found and ((done == 1 and change <= 1.0) or is_power_known(h, ratio, work)):
             return 0.0
+        was_found = found and done > 1
     return UNFOUND
 
 

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from dap3d_core.assembly.arrays import System
-from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
+from dap3d_core.formulations.stabilized_index2.jacobian import BENT, Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
-from dap3d_core.integrators.radau.convergence import newton_limit
+from dap3d_core.integrators.radau.convergence import is_at_rounding, newton_limit
 from dap3d_core.integrators.radau.dense_output import prepare_dense
 from dap3d_core.integrators.radau.newton import MOST, SAME_STEP, predict
 from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, RadauState
@@ -41,7 +41,7 @@ from dap3d_core.integrators.stepping.output import (
     needs_dense,
     project_state,
 )
-from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
+from dap3d_core.integrators.stepping.rounding import can_measure, record_failure
 from dap3d_core.integrators.stepping.step_control import (
     LARGEST,
     STEP_AFTER_FAILURE,
@@ -86,13 +86,16 @@ def advance(
     watch = functions[4] if work.switch_count != 0 else rhs
     limit = work.rhs_count + budget
     while may_step(work, dense_state, limit, project, report, system, loops):
-        steps, rejected, h = work.step_count, work.rejected_count, work.h
+        steps, rejected = work.step_count, work.rejected_count
         if work.first_stage_valid == 0:
+            tangent.fine[0] = 0.0
             start(work, rhs, project, system, loops)
         else:
             step(work, parts, project, watch, system, loops, tangent, matrix)
-            if work.rounding_state != 0:  # a step that rounding failed
-                update_rounding(work, work.state[SLOPE], h, rejected, rhs, system, loops)
+            h = work.factored_step
+            if work.rounding_state != 0 and h > 0.0 and can_measure(work, rejected):
+                measure = parts[5]
+                measure(work.t, h, work, system, loops, tangent, matrix)
         if work.calls_accepted != 0 and work.step_count > steps:
             functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
 
@@ -116,6 +119,7 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
         work.state[SLOPE, k] = work.k[0, k]
     work.first_stage_valid = work.tangent_needed = 1
     work.has_last_step = 0
+    work.convergence_factor = 1.0
     if work.fixed_step == 0.0 and work.h == 0.0:
         work.h = first_step(work, work.k, rhs, system, loops)  # fmt: skip
 
@@ -142,11 +146,7 @@ def step(
         if h == 0.0:
             return
         t1 = t1 if h == longest else t + h
-    predict(h, work)
-    shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
-    if shorter > 0.0 and work.convergence_rate < HOPELESS:  # once more, with the tangent at the end
-        work.tangent_needed = 1
-        shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+    shorter = search(t, h, work, parts, system, loops, tangent, matrix)
     if shorter != 0.0:
         reject_iteration(work, t1, h, shorter)
         return
@@ -197,6 +197,32 @@ def stage_is_across(
 
 
 @compiled
+def search(
+    t: float,
+    h: float,
+    work: RadauState,
+    parts: Sequence[Any],
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: StageMatrix,
+) -> float:
+    """Predict and find the stages of a step h, by up to three attempts; as find_stages."""
+    predict(h, work, True)
+    shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+    if shorter > 0.0 and work.convergence_rate < HOPELESS:  # once more, with the tangent at the end
+        work.tangent_needed = 1
+        shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+    if shorter > 0.0 and tangent.fine[0] == BENT:  # the prediction may lie beyond the bend
+        predict(h, work, False)
+        work.tangent_needed = 1
+        shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+    if shorter != 0.0 and work.tangent_is_current != 0:
+        tangent.fine[0] = max(tangent.fine[0], 1.0)
+    return shorter
+
+
+@compiled
 def iterate(
     t: float,
     h: float,
@@ -227,7 +253,7 @@ def reject_iteration(work: RadauState, t1: float, h: float, shorter: float) -> N
     if not shorter > 0.0:  # NaN
         reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
     elif work.fixed_step == 0.0 or not stale:
-        if work.state_change > newton_limit(work):
+        if not is_at_rounding(work.state_change, newton_limit(work), work):
             record_failure(work, work.state_change, h, work.last_rejected != 0)
         reject(work, t1, h * shorter, STEP_FLOOR)
 

@@ -17,8 +17,9 @@ from dap3d_core.integrators.stepping.integration_state import OTHER, TRIAL, Y
 from dap3d_core.integrators.stepping.vector_ops import combine
 from dap3d_core.kernels.runtime.cache import compiled
 
-#: Steps between two looks; every step once one looked stiff.
-EVERY = 20
+#: Steps between two looks; every step once one looked stiff. A prime: friction whose sign changes
+#: in each step falls into cycles of a few steps, of which some do not look stiff.
+EVERY = 19
 #: Steps that look stiff until the scene is called so, and steps in a row that clear it of it.
 STIFF, CLEARED = 15, 6
 #: h |lambda| from which a component that decays looks stiff; squared cosine from which it decays.

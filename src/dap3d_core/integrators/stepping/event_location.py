@@ -298,6 +298,8 @@ def bisect_crossing(
     work.step_limit_at_switch = np.inf
     stays = 0
     for k in range(s.shape[1]):
+        if s[FOUND, k] == s[VALUE, k] and s[SIDE, k] * s[RATE, k] < 0.0:
+            stays = 1  # a step to a crossing that changes no digit of its switch
         if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0 and s[SIDE, k] != 0.0:
             stays = 1
             if work.stalled_steps >= MAX_STALLS_AT_ZERO:

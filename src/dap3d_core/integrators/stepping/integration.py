@@ -74,6 +74,9 @@ class Integration(Restorable):
         becomes negative; the integration BEGINS anew where it changes its sign
         (stepping/event_location.py), which is noted down, or UNSEEN. And how far beyond zero it may
         be until that is so.
+    kinds
+        (n - 1,) for each component the first one of its kind: what its rounding is small against
+        (stepping/rounding.py). Each is a kind of its own by default.
 
     Raises
     ------
@@ -115,6 +118,7 @@ class Integration(Restorable):
         length_count: int = 0,
         watched: bool = False,
         ends: ArrayLike = (),
+        kinds: ArrayLike = (),
     ) -> None:
         self._arguments = (functions, system, loops)
         y = np.array(y0, dtype=np.float64)
@@ -136,7 +140,7 @@ class Integration(Restorable):
             rows=np.empty((buffer_rows, 1 + y.size + report_size)),
             switches=np.zeros((at.SWITCH_ROWS, count)),
             crossings=np.zeros((at.LOGGED if count else 0, 3)),
-            tolerance=tolerance_of(y.size, atol),
+            tolerance=tolerance_of(y.size, atol, kinds),
             **self.own_arrays(y.size, length_count),
         )
         work = self.work

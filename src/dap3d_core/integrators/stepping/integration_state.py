@@ -28,6 +28,7 @@ class Status(IntEnum):
     ENDED = 7  # a user event requested it
     STIFF = 8  # the scene has become stiff, and the integration was to stop then
     JUMPED = 9  # velocities or states jump here; who advances it changes them and goes on
+    STALLED = 10  # steps are so short that the run would not end
 
 
 # The same as plain integers, for compiled code.
@@ -35,11 +36,13 @@ RUNNING, FINISHED = int(Status.RUNNING), int(Status.FINISHED)
 STEP_FLOOR, NOT_FINITE = int(Status.STEP_FLOOR), int(Status.NOT_FINITE)
 PROJECTION_FAILED, SWITCHED = int(Status.PROJECTION_FAILED), int(Status.SWITCHED)
 CHATTERED, STIFF, JUMPED = int(Status.CHATTERED), int(Status.STIFF), int(Status.JUMPED)
+STALLED = int(Status.STALLED)
 
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
 Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
-# Rows of ``tolerance``: absolute tolerance; change of dy/dt by the rounding of y (rounding.py).
-ABSOLUTE, NOISE, TOLERANCES = range(3)
+# Rows of ``tolerance``: absolute tolerance; change of dy/dt by the rounding of y, most that a step
+# may be off by for that, first of the components that are of the same kind (rounding.py).
+ABSOLUTE, NOISE, MOST, KIND, TOLERANCES = range(5)
 # Rows of ``switches``: value, side (the sign that it keeps; 0: none yet), rate and bend (change of
 # the rate in time) at t; value and rate at the trial state; value at a sample; what it does
 # (assembly.system); how far beyond zero it is left on its side; since when its changes are counted,
@@ -96,6 +99,7 @@ class IntegrationState(Arrays):
     t_stiff = _real()  # when the scene became stiff
     largest_work = _real()  # magnitude of the last component at an accepted state
     failed_error_rate = _real()  # error per length of the last step that failed
+    t_attempted = _real()  # t when attempts were counted last (output.py)
     longest_step = _real()  # a setting
     # output of project, followed by the singularity measures
     projection_moved = _real()
@@ -137,6 +141,8 @@ class IntegrationState(Arrays):
     stiff_steps = _integer()  # and those in a row since that were not (stiffness.py)
     nonstiff_steps = _integer()
     stalled_steps = _integer()  # in a row, too short to change a switch by a bit
+    attempt_count = _integer()  # of steps, since t_attempted
+    stall_start = _integer()  # rhs_count where steps became too short for the run to end
     rounding_state = _integer()  # of errors: 1 to be measured, 2 dominant (rounding.py)
     sampled_switch_count = _integer()  # a setting: switches that stages must not cross
     follows_steps = _integer()  # a setting: dense output of each step, not of reports alone
@@ -180,7 +186,7 @@ def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
     if work.fixed_step != 0.0:
         most_steps = math.ceil((work.times[-1] - work.times[0]) / work.fixed_step) + 1
     return {
-        "status": {*range(SWITCHED), Status.ENDED, *by_switch, *by_method},
+        "status": {*range(SWITCHED), Status.ENDED, STALLED, *by_switch, *by_method},
         "next_report": range(instants if running else instants + 1),
         "row_count": (0,),
         **dict.fromkeys(("first_stage_valid", "last_rejected", "switch_rates_valid"), (0, 1)),
@@ -192,7 +198,8 @@ def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
         **dict.fromkeys(
             ("step_count", "rejected_count", "rhs_count", "projection_count", "report_count",
              "near_singular_landings", "cut_attempts", "crossing_count", "stiff_steps",
-             "nonstiff_steps", "stalled_steps"), range(MOST_COUNTED)
+             "nonstiff_steps", "stalled_steps", "attempt_count", "stall_start"),
+            range(MOST_COUNTED),
         ),
     }  # fmt: skip
 
@@ -204,7 +211,7 @@ def allowed_reals(work: Any) -> dict[str, tuple[float, float]]:
     largest = 1.7976931348623157e308
     return {
         "t": (first, last),
-        **dict.fromkeys(("t_dense", "segment_start", "t_stop"), (0.0, last)),
+        **dict.fromkeys(("t_dense", "segment_start", "t_stop", "t_attempted"), (0.0, last)),
         **dict.fromkeys(("h", "h_dense", "last_error", "error_across_singularity"), (0.0, largest)),
         "t_limit": (math.inf, math.inf),
         **dict.fromkeys(

@@ -12,6 +12,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     PROJECTED,
     PROJECTION_FAILED,
     RUNNING,
+    STALLED,
     STIFF,
     TRIAL,
     Function,
@@ -23,6 +24,9 @@ from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: What project says in out[1]: it failed; the state is good, but too close to a singular one.
 FAILED, NEAR_SINGULAR = 1.0, 2.0
+#: Steps that are a smaller part of the run, on average over so many attempts, stall it; after so
+#: many right-hand sides, times components, about a second, it ends.
+STALLED_STEP, ATTEMPTS, STALL_WORK = 1e-9, 1000, 10_000_000
 
 
 @compiled
@@ -94,8 +98,31 @@ def may_step(
         else:
             work_done = abs(work.state[Y, work.state.shape[1] - 1])
             work.largest_work = max(work.largest_work, work_done)
-            return work.rhs_count <= limit and work.t < work.t_limit
+            if work.rhs_count > limit or work.t >= work.t_limit:
+                return False
+            if not is_stalled(work):
+                return True
+            work.t_stop, work.status = work.t, STALLED
+            if work.stops_when_stiff != 0:  # the other integration may get on
+                work.status = STIFF
     return False
+
+
+@compiled
+def is_stalled(work: Any) -> bool:
+    """True if steps are so short that the run would not end, for about a second of work.
+
+    Called before each attempt. What is to be reached is ``t_limit``, or the end of the run.
+    """
+    work.attempt_count += 1
+    if work.attempt_count < ATTEMPTS:
+        return False
+    work.attempt_count = 0
+    done, work.t_attempted = work.t - work.t_attempted, work.t
+    asked = min(work.times[-1] - work.times[0], work.t_limit - work.t)
+    if done > ATTEMPTS * STALLED_STEP * asked or work.fixed_step != 0.0:
+        work.stall_start = work.rhs_count
+    return (work.rhs_count - work.stall_start) * work.state.shape[1] > STALL_WORK
 
 
 @compiled_into

@@ -43,7 +43,7 @@ class Restorable:
         check_crossings(new["crossings"], integers["crossing_count"], self.work)
         if not np.isfinite(new["state"][at.Y]).all():
             raise ValueError("its state is not finite")
-        noise = new["tolerance"][at.NOISE]
+        noise = new["tolerance"][[at.NOISE, at.MOST]]
         if not (np.isfinite(noise) & (noise >= 0.0)).all():
             raise ValueError("tolerance: no rounding can be so large")
         for name, array in self.all_arrays():
@@ -61,7 +61,7 @@ class Restorable:
             "integer": self.indices("integer", at.INTEGER_SETTINGS),
             "switches": (at.DOES, at.BAND),
             "table": range(len(array)),
-            "tolerance": (at.ABSOLUTE,),
+            "tolerance": (at.ABSOLUTE, at.KIND),
         }
         return restored(name, array, found, own.get(name, ()))
 

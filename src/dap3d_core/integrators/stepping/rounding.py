@@ -5,6 +5,10 @@ or far away, or a spring stiff, that is more than a tolerance asks for: a torque
 1e-16 N m spins a wire of 1e-12 kg m^2 up at 1e-4 rad/s^2. A step that was made shorter and has no
 less error per length is a sign of that: then the change is measured, and what of an error is h
 times that is not counted. Where it is far below the tolerances nothing changes.
+
+It is measured as the method propagates it (docs/decisions/0071): an implicit one damps the
+rounding of a stiff direction (radau/rounding.py), and an explicit one takes no step in which
+changes grow. A step may never be off by more than 1e-6 of the largest component of a kind for that.
 """
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
@@ -17,6 +21,8 @@ from numpy.typing import ArrayLike
 
 from dap3d_core.integrators.stepping.integration_state import (
     ABSOLUTE,
+    KIND,
+    MOST,
     NOISE,
     OTHER,
     RUNNING,
@@ -39,15 +45,20 @@ ROUNDINGS = 6.0
 SAME = 0.5
 #: Rounding above this part of a tolerance counts.
 COUNTS = 0.1
+#: What is not counted of an error, as part of the largest component of its kind (r, p, v or w); the
+#: rest may be as much again, so that a step is never off by more than 1e-6 for rounding.
+LARGEST_EXCUSE = 5e-7
 #: Steps after which it is measured again, and without a reason: control that has settled in the
 #: noise gives none.
 EVERY, PROBE = 8, 96
 
 
-def tolerance_of(size: int, atol: ArrayLike) -> Floats:
+def tolerance_of(size: int, atol: ArrayLike, kinds: ArrayLike) -> Floats:
     """(TOLERANCES, n) the absolute tolerance of each component; nothing known of its rounding."""
     tolerance = np.zeros((TOLERANCES, size))
     tolerance[ABSOLUTE] = np.maximum(atol, SMALLEST_ATOL)
+    first = np.asarray(kinds, dtype=np.int64)
+    tolerance[KIND] = np.append(first, np.arange(len(first), size))
     return tolerance
 
 
@@ -64,24 +75,40 @@ def update_rounding(
     )
     if not (work.rounding_state != 0 or (due and work.step_count != 0)):
         return
-    if work.status != RUNNING or work.first_stage_valid == 0:
+    if not can_measure(work, rejected):
         return
-    if (
-        work.rounding_state == 2
-        and work.rejected_count == rejected
-        and work.step_count % EVERY != 0
-    ):
-        return
-    tolerance, argument, out = work.tolerance, work.state[SCRATCH], work.state[OTHER]
+    argument, out = work.state[SCRATCH], work.state[OTHER]
     work.rhs_count += SAMPLES + 1
-    measure_noise(work.t, work.state[Y], f, h, tolerance, argument, out, rhs, system, loops)
+    measure_noise(work, f, h, argument, out, rhs, system, loops)
+    judge_noise(work, h)
+
+
+@compiled
+def can_measure(work: Any, rejected: int) -> bool:
+    """True if the rounding of rates can be measured, and was not in one of the last steps."""
+    if work.status != RUNNING or work.first_stage_valid == 0:
+        return False
+    fails = work.rounding_state != 2 or work.rejected_count != rejected
+    return fails or work.step_count % EVERY == 0
+
+
+@compiled
+def judge_noise(work: Any, h: float) -> None:
+    """Bound what was measured in a step h; forget it where it is far below the tolerances."""
+    y, tolerance, size = work.state[Y], work.tolerance, work.state[SCRATCH]
+    for i in range(y.size):
+        size[i] = 0.0
+    for i in range(y.size):
+        first = int(tolerance[KIND, i])
+        size[first] = max(size[first], abs(y[i]))
     work.rounding_state = 0
     for i in range(work.error_size):
-        scale = tolerance[ABSOLUTE, i] + work.rtol * abs(work.state[Y, i])
+        scale = tolerance[ABSOLUTE, i] + work.rtol * abs(y[i])
         if h * tolerance[NOISE, i] > COUNTS * scale:
             work.rounding_state = 2
-    if work.rounding_state == 0:
-        for i in range(argument.size):
+    for i in range(y.size):
+        tolerance[MOST, i] = LARGEST_EXCUSE * size[int(tolerance[KIND, i])]
+        if work.rounding_state == 0:
             tolerance[NOISE, i] = 0.0
 
 
@@ -94,32 +121,46 @@ def record_failure(work: Any, error: float, h: float, again: bool) -> None:
 
 
 @compiled
+def change_digits(y: Floats, sample: int, argument: Floats) -> None:
+    """The state y with the last digit of each component up or down, into ``argument``."""
+    for i in range(y.size):
+        up = (i // (1 + sample % SAMPLES)) % 2 == 0
+        argument[i] = y[i] * (1.0 + DIGIT) if up else y[i] * (1.0 - DIGIT)
+
+
+@compiled
 def measure_noise(
-    t: float,
-    y: Floats,
+    work: Any,
     f: Floats,
     h: float,
-    tolerance: Floats,
     argument: Floats,
     out: Floats,
     rhs: Function,
     system: Any,
     loops: Any,
 ) -> None:
-    """Uncertainty of dy/dt at (t, y), which is f, in a step h, into ``tolerance``.
+    """Uncertainty of dy/dt at the state, which is f, in an explicit step h, into ``tolerance``.
 
-    By the last digits of y, and by what these make of y itself in the step. argument, out: scratch.
+    By the last digits of y, and by what these make of y itself in the step. Where that would grow
+    in the step the step is longer than the method is stable for: it counts as if it did not.
+    argument, out: scratch.
     """
-    noise = tolerance[NOISE]
+    y, tolerance, noise = work.state[Y], work.tolerance, work.tolerance[NOISE]
     for i in range(y.size):
         noise[i] = 0.0
-    for sample in range(SAMPLES + 1):
+    for sample in range(SAMPLES):
+        change_digits(y, sample, argument)
+        rhs(work.t, argument, out, system, loops)
         for i in range(y.size):
-            up = (i // (1 + sample % SAMPLES)) % 2 == 0
-            argument[i] = y[i] * (1.0 + DIGIT) if up else y[i] * (1.0 - DIGIT)
-            if sample == SAMPLES:
-                argument[i] += h * noise[i]
-        rhs(t, argument, out, system, loops)
-        part = ROUNDINGS if sample < SAMPLES else 1.0
-        for i in range(y.size):
-            noise[i] = max(noise[i], part * abs(out[i] - f[i]))
+            noise[i] = max(noise[i], ROUNDINGS * abs(out[i] - f[i]))
+    change_digits(y, SAMPLES, argument)
+    for i in range(y.size):
+        argument[i] += h * noise[i]
+    rhs(work.t, argument, out, system, loops)
+    before = after = 0.0
+    for i in range(work.error_size):
+        scale = tolerance[ABSOLUTE, i] + work.rtol * abs(y[i])
+        before, after = max(before, noise[i] / scale), max(after, abs(out[i] - f[i]) / scale)
+    growth = after / before if after > before > 0.0 else 1.0
+    for i in range(y.size):
+        noise[i] = max(noise[i], abs(out[i] - f[i]) / growth)

@@ -4,7 +4,7 @@ Loops run over the components innermost, four stages at a time, so that a sum of
 and writes its result a few times only; the terms come from ``tableau.combinations``.
 """
 
-from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, NOISE
+from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, MOST, NOISE
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -77,7 +77,7 @@ def scaled_largest(
         a, b = abs(y0[i]), abs(y1[i])
         atol = tolerance[ABSOLUTE, i]
         scale = (atol if atol > least else least) + rtol * (a if a > b else b)
-        noise = h * tolerance[NOISE, i]
+        noise = min(h * tolerance[NOISE, i], tolerance[MOST, i])
         ratio = (abs(x[i]) - noise) / (noise if noise > scale else scale)
         if not ratio <= largest:
             largest = ratio

@@ -145,6 +145,15 @@ def atol_vector(atol: float | Mapping[str, float], evaluator: Evaluator) -> floa
     return every
 
 
+def kinds_of(evaluator: Evaluator) -> list[int]:
+    """First component of the quantity that each component of y is of; states are their own."""
+    first: dict[str, int] = {}
+    return [
+        i if quantity == "z" else first.setdefault(quantity, i)
+        for i, quantity in enumerate(evaluator.coordinates.quantities)
+    ]
+
+
 def tighter(atol: float | Mapping[str, float], factor: float) -> float | dict[str, float]:
     """Absolute tolerances divided by a factor."""
     if isinstance(atol, Mapping):

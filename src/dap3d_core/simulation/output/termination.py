@@ -11,12 +11,14 @@ from dap3d_core.integrators.stepping.integration_state import LOGGED
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.result import INFORMATION, EventRecord
 from dap3d_core.simulation.failure.diagnosis import AHEAD, fastest_body, find_offender
+from dap3d_core.simulation.failure.stall import describe_stall
 from dap3d_core.simulation.redundancy.contradictory_joints import find_contradiction
 
 REASONS = {
     Status.STEP_FLOOR: "the step size fell to the resolution of time",
     Status.NOT_FINITE: "a number came up that is beyond 1e+100, infinite or not a number",
     Status.PROJECTION_FAILED: "the state could not be projected onto the constraints",
+    Status.STALLED: "its steps are so short that it would not end",
 }
 
 
@@ -58,6 +60,8 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
         culprit = find_contradiction(evaluator, t, y, rank)
         if culprit:
             return f"{head}: {culprit}"
+    if integration.status is Status.STALLED:
+        return f"{message}. {describe_stall(evaluator, integration)}"
     culprit = jammed_forces(evaluator, t, y) or find_offender(evaluator, t, y, t_stop)
     if not culprit and integration.status is Status.NOT_FINITE:
         culprit = fastest_body(evaluator, y)

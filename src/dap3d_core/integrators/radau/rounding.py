@@ -1,0 +1,67 @@
+"""Rounding of the rates as a Radau step propagates it: what Newton's iteration makes of it.
+
+A change of the residuals of a stage by delta changes the stage by (gamma / h - J)^-1 delta. Where
+a direction is soft that is h / gamma times delta, as in an explicit method; in a stiff one it is
+J^-1 delta, of the size of the last digits of the state that made it, however long the step. In the
+estimate of the error the stages have weights e of 12 in all (newton.py).
+"""
+
+# An element of an array is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.arrays import System
+from dap3d_core.assembly.evaluate import zero
+from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
+from dap3d_core.formulations.stabilized_index2.stage_equations import (
+    StageMatrix,
+    evaluate_stage,
+    keep_frames,
+)
+from dap3d_core.integrators.radau.newton import solve_first
+from dap3d_core.integrators.radau.state import RadauState
+from dap3d_core.integrators.stepping.integration_state import NOISE, SCRATCH, Y
+from dap3d_core.integrators.stepping.rounding import (
+    ROUNDINGS,
+    SAMPLES,
+    change_digits,
+    judge_noise,
+)
+from dap3d_core.kernels.runtime.cache import compiled
+
+
+@compiled
+def measure_stage_noise(
+    t: float,
+    h: float,
+    work: RadauState,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: StageMatrix,
+) -> float:
+    """Uncertainty of dy/dt at (t, y) in a step h, the factors of which are known."""
+    y, argument, noise = work.state[Y], work.state[SCRATCH], work.tolerance[NOISE]
+    now, changed, e = work.last_multipliers[2], work.multipliers[0], work.method.e
+    size = ROUNDINGS * (abs(e[0]) + abs(e[1]) + abs(e[2])) / h
+    zero(noise)
+    zero(now[0])
+    zero(changed[0])
+    work.rhs_count += SAMPLES + 1
+    evaluate_stage(t, y, now, matrix.held, work.R[1], work.G[1], system, loops)
+    for sample in range(SAMPLES):
+        change_digits(y, sample, argument)
+        change_digits(now[1], sample, changed[1])
+        evaluate_stage(t, argument, changed, matrix.held, work.R[0], work.G[0], system, loops)
+        keep_frames(system.body, work.frames[0])
+        for k in range(y.shape[0]):
+            work.R[0, k] -= work.R[1, k]
+        for r in range(2):
+            for k in range(work.G.shape[2]):
+                work.G[0, r, k] -= work.G[1, r, k]
+        solve_first(h, work, system, matrix)
+        for k in range(y.shape[0]):
+            noise[k] = max(noise[k], size * abs(work.R[0, k]))
+    judge_noise(work, h)
+    return 0.0
