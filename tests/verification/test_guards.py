@@ -1,4 +1,4 @@
-"""Branches that guard a formula guard what is derived from it: J, gamma, nu, wrench, f', and theirs.
+"""Branches that guard a formula guard what is derived from it, and the derivatives of that.
 
 Each type leaves a formula to be derived and guards it where it has no value by itself: a root, a
 quotient, an angle, a power or a logarithm at zero, in one branch or nested ones, in helpers, by

@@ -71,7 +71,7 @@ class SymbolicNumber:
     """
 
     __slots__ = ("expression",)
-    __hash__ = None  # type: ignore[assignment]
+    __hash__ = None
     tracer = _Functions()
 
     def __init__(self, expression: Expression) -> None:
