@@ -45,8 +45,7 @@ def rows_of_door():
     """(10, 6) rows of the two hinges by (force, moment about the mass centre), axes of the leaf."""
     rows = []
     for z in HEIGHTS:
-        for e in np.eye(3):
-            rows.append([*-e, *-np.cross((-ARM, 0.0, z), e)])
+        rows += [[*-e, *-np.cross((-ARM, 0.0, z), e)] for e in np.eye(3)]
         rows += [[0, 0, 0, 1, 0, 0], [0, 0, 0, 0, 1, 0]]
     return np.array(rows, dtype=float)
 

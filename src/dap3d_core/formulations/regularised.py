@@ -24,7 +24,7 @@ SOLVES = 3
 #: The same, at most, where masses differ much; and how much less of a residual a pass is to leave.
 MORE_SOLVES, FALLING = 12, 0.5
 #: For the least multipliers: e w as part of the longest row's square, and passes at most. D^T may
-#: see this part of what is taken away; else e is smaller, by so much at a time, down to a least one.
+#: see this part of what is taken away; else e is smaller, by so much at a time, to a least one.
 LEAST_PART, LEAST_SOLVES = 1e-4, 50
 SEEN, SMALLER, SMALLEST = 1e-11, 1e-2, 1e-4
 

@@ -87,7 +87,7 @@ class SymbolicNumber:
     __xor__, __rxor__ = _binary(operator.xor)
     __lt__, __le__ = _binary(sympy.Lt)[0], _binary(sympy.Le)[0]
     __gt__, __ge__ = _binary(sympy.Gt)[0], _binary(sympy.Ge)[0]
-    __eq__, __ne__ = _binary(sympy.Eq)[0], _binary(sympy.Ne)[0]  # type: ignore[assignment]
+    __eq__, __ne__ = _binary(sympy.Eq)[0], _binary(sympy.Ne)[0]
 
     def __neg__(self) -> "SymbolicNumber":
         return SymbolicNumber(-self.expression)

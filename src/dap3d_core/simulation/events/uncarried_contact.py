@@ -34,7 +34,7 @@ class UncarriedContact:
     def __init__(self, evaluator: Evaluator, law: JumpLaw) -> None:
         """Args: evaluator and law of jumps of a run."""
         self._evaluator, self._law = evaluator, law
-        types = [switch.group.type_info for switch in evaluator.switches]
+        types: list[Any] = [switch.group.type_info for switch in evaluator.switches]
         bare = [info.type.kind == "joint" or "wrench" not in info.kernels for info in types]
         pushes = [info.type.kind == "force" and bool(info.type.unilateral) for info in types]
         self.is_bare = law.elements.is_jump & np.array(bare, dtype=bool)

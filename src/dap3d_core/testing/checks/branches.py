@@ -38,8 +38,6 @@ class ComparedNumber(Stepped):
     __hash__ = complex.__hash__
     results: ClassVar[list[bool]] = []
 
-    __eq__, __ne__ = Stepped.__eq__, Stepped.__ne__
-
 
 def _compared(name: str) -> Any:
     compare = getattr(Stepped, name)
@@ -80,9 +78,8 @@ def _unseen_jump(sample: Sample, name: str) -> str:
     for words, along in _directions(sample):
         path = _Path(sample, name, along)
         for place in path.changes():
-            before, after = (path.value(place + h) for h in (-NEAR, NEAR))
-            close = [path.value(x) for x in path.bracket(place)]
-            if any(value is None for value in (before, after, *close)):
+            close = [x for x in map(path.value, path.bracket(place)) if x is not None]
+            if len(close) < 2:
                 continue
             jump = np.abs(close[1] - close[0])
             size = 1.0 + float(np.max(np.abs(close)))

@@ -63,9 +63,9 @@ class OpaqueNumber(Stepped):
 
     __slots__ = ()
     __hash__ = complex.__hash__
-    __eq__, __ne__ = _compared("__eq__"), _compared("__ne__")  # type: ignore[assignment]
-    __lt__, __le__ = _compared("__lt__"), _compared("__le__")  # type: ignore[assignment]
-    __gt__, __ge__ = _compared("__gt__"), _compared("__ge__")  # type: ignore[assignment]
+    __eq__, __ne__ = _compared("__eq__"), _compared("__ne__")
+    __lt__, __le__ = _compared("__lt__"), _compared("__le__")
+    __gt__, __ge__ = _compared("__gt__"), _compared("__ge__")
 
     def __bool__(self) -> bool:
         raise BranchError("a branch on a number")

@@ -29,7 +29,7 @@ def _wrapped(name: str) -> Callable[..., Any]:
     return method
 
 
-def _by_real_part(name: str) -> Callable[[Any, Any], np.bool_]:
+def _by_real_part(name: str) -> Any:
     compare = getattr(operator, name)
     # of numpy, whose ~ is a negation
     return lambda self, other: np.bool_(compare(self.real, _real(other)))
