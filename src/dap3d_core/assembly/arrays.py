@@ -33,8 +33,8 @@ ENDS, BEGINS, UNSEEN, JUMPS = 1, 0, -1, 2
 # Places in ``settings``: projection tolerances of position and velocity, a scratch number, how
 # often the multipliers did not settle with friction, the numbers of the penalty formulation, how
 # often a pose was singular where something was reported, the length that tolerances speak of
-# (Model.length), 1.0 where pivots are those of equal masses, how often the turns of an angle
-# were in doubt, and 1.0 where forces read reactions: multipliers that do not settle end a run.
+# (Model.length), 1.0 where pivots are those of equal masses, a scratch number of angles whose turns
+# are in doubt, and 1.0 where forces read reactions: multipliers that do not settle end a run.
 (
     TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, LENGTH, EVEN,
     DOUBTFUL, JAMS, SETTINGS
@@ -49,7 +49,17 @@ class System(LoopArrays):
         "metric": MATRIX,
         **dict.fromkeys(("kinds", "row"), INTEGERS),
         **dict.fromkeys(
-            ("groups", "blocks", "targets", "contributions", "nodes", "columns", "updates", "hubs"),
+            (
+                "groups",
+                "blocks",
+                "targets",
+                "contributions",
+                "nodes",
+                "columns",
+                "updates",
+                "hubs",
+                "turns",
+            ),
             INTEGER_MATRIX,
         ),
         "tree": TreeArrays.type_of(),
@@ -83,6 +93,7 @@ class System(LoopArrays):
     columns: Integers
     updates: Integers
     hubs: Integers
+    turns: Integers  # (angles of joints, COLUMNS) as in assembly/turns.py
     tree: Any = None  # TreeArrays, where the state is that of a tree in joint coordinates
 
 

@@ -6,6 +6,16 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import EVEN, KINDS, LENGTH, Floats, Integers, System
+from dap3d_core.assembly.turns import (
+    BODY_I,
+    BODY_J,
+    COLUMNS,
+    CONSTANT_WIDTH,
+    CONSTANTS,
+    ROTATION,
+    STATE,
+    STATE_WIDTH,
+)
 from dap3d_core.formulations.common.friction import memory_size
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
 from dap3d_core.interface.codegen.loop_source import computes_rate, stride
@@ -75,11 +85,12 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
     metric = np.zeros((n + 1, 16))
     set_metric(metric, model.mass, model.Jp)
     idx, par, groups, starts = _tables(model, plan, what)
+    turns, counted = turn_tables(model, len(par))
     return System(
         body=body,
         metric=metric,
         F=np.zeros((model.function_count + 1, 5)),
-        par=par,
+        par=np.concatenate([par, counted]),
         states=model.initial_states.copy(),
         **{name: np.zeros(6 * (n + 1)) for name in BODY_VECTORS},
         **{name: np.zeros(plan.row_size) for name in ROW_VECTORS},
@@ -106,7 +117,25 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         columns=plan.columns,
         updates=plan.updates,
         hubs=plan.hubs,
+        turns=turns,
     )
+
+
+def turn_tables(model: Model, first: int) -> tuple[Integers, Floats]:
+    """``System.turns``, and the numbers of angles of joints that are behind others in ``par``.
+
+    first: index of the first of these numbers: their states, then their constants.
+    """
+    angles = model.joint_angles
+    count = model.joint_angle_count
+    table = np.full((count, COLUMNS), -1, dtype=np.int64)
+    states = STATE_WIDTH * count
+    if not angles:
+        return table, np.zeros(0)
+    table[:, BODY_I : BODY_J + 1], table[:, ROTATION] = angles.bodies, angles.rotations
+    table[:, STATE] = first + STATE_WIDTH * np.arange(count)
+    table[:, CONSTANTS] = first + states + CONSTANT_WIDTH * np.arange(count)
+    return table, np.concatenate([np.zeros(states), angles.constants.ravel()])
 
 
 def load_numbers(
@@ -132,9 +161,12 @@ def load_numbers(
             seen.add(id(group))
             parts.append(twins[id(group)].packed_numbers(p0))
             p0 += parts[-1].size
-    if p0 != system.par.size or len(model.mass) != len(other.mass):
+    turns, counted = turn_tables(other, p0)
+    if p0 + counted.size != system.par.size or len(model.mass) != len(other.mass):
         raise ValueError("models of different structure")
-    system.par[:] = np.concatenate([np.zeros(0), *parts])
+    if not np.array_equal(turns[:, BODY_I:], system.turns[:, BODY_I:]):
+        raise ValueError("models of different structure")
+    system.par[:] = np.concatenate([np.zeros(0), *parts, counted])
     system.body[1:, MASS] = other.mass
     system.body[1:, JP : JP + 9] = other.Jp.reshape(-1, 9)
     set_metric(system.metric, other.mass, other.Jp)

@@ -12,7 +12,6 @@ from dap3d_core.assembly.arrays import (
     ACCELERATION,
     ALPHA,
     ANGLE,
-    DOUBTFUL,
     MU,
     OMEGA,
     POSITION,
@@ -26,6 +25,16 @@ from dap3d_core.assembly.arrays import (
     System,
 )
 from dap3d_core.assembly.evaluate import call_kinds, place_state
+from dap3d_core.assembly.motion.joint_angles import with_motions
+from dap3d_core.assembly.turns import ANGLE as AT_STEP
+from dap3d_core.assembly.turns import (
+    COORDINATE,
+    STATE,
+    STATE_WIDTH,
+    begin_turns,
+    follow_poses,
+    report_turns,
+)
 from dap3d_core.formulations import FORMULATIONS, REPORT, RHS
 from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
@@ -61,11 +70,11 @@ class Evaluator:
         method: name of the formulation, a key of ``FORMULATIONS``.
         announce: called with the name of each group loop that has to be compiled.
         """
-        self.model = model
         self.states: Floats = model.initial_states
         self.formulation = FORMULATIONS[method]
         self.plan: Plan = make_plan(model.body_count, model.joint_slots, model.joint_rows.tolist())
         self.loops, self.loop_groups = build_loops(model, self.formulation.loops, announce)
+        self.model = model = with_motions(model)
         self.system: System = build_system(model, self.plan, self.loop_groups)
         self.store_initial_function_values()
         self._seek_unknowns()
@@ -92,8 +101,19 @@ class Evaluator:
     @property
     def counts_turns(self) -> bool:
         """True if the model has angles; their turns are counted at accepted steps."""
+        return self.has_own_angles or self.model.joint_angle_count > 0
+
+    @property
+    def has_own_angles(self) -> bool:
+        """True if elements of the model have angles of their own."""
         kinds = self.system.kinds
         return bool(kinds[ANGLE + 1] > kinds[ANGLE])
+
+    @property
+    def watched(self) -> int:
+        """0 without angles; 1 where all are coordinates; 2 where they limit the steps."""
+        limits = self.has_own_angles or bool(np.any(self.system.turns[:, COORDINATE] < 0))
+        return int(self.counts_turns) + int(limits)
 
     @cached_property
     def has_unknowns(self) -> bool:
@@ -115,17 +135,13 @@ class Evaluator:
         """Number of reports since the start at singular poses."""
         return int(self.system.settings[SINGULAR])
 
-    @property
-    def doubtful_turns(self) -> int:
-        """Number of steps since the start too long to count the turns of an angle safely."""
-        return int(self.system.settings[DOUBTFUL])
-
     def load(self, model: Model) -> None:
         """Evaluate another model of the same structure from here on; nothing is compiled.
 
         Raises:
             ValueError: the structure is another.
         """
+        model = with_motions(model, self.model)
         self.loop_groups = load_numbers(self.system, self.model, model, self.loop_groups)
         self.model, self.states = model, model.initial_states
         self.__dict__.pop("switches", None)  # they name groups
@@ -152,12 +168,22 @@ class Evaluator:
         """
         self.states = self.model.initial_states if states is None else states
         self._seek_unknowns()
+        self.begin_turns(t, u, angles)
+        self.system.settings[[UNSETTLED, SINGULAR]] = 0.0
+
+    @IGNORE_FLOAT_ERRORS
+    def begin_turns(self, t: float, u: ArrayLike, angles: Floats | None = None) -> None:
+        """Count whole turns from a state u (13 n,); angles as of ``start``."""
+        s = self.system
         for places in self.turn_places(of_unknowns=False):
-            self.system.par[places] = 0.0
+            s.par[places] = 0.0
         if angles is not None:
             self._set_angles(angles)
-        self.count_turns(t, u)
-        self.system.settings[[UNSETTLED, SINGULAR, DOUBTFUL]] = 0.0
+        self._count_own(t, u)
+        if len(s.turns):
+            y = self.coordinates.start(np.asarray(u, dtype=float))
+            self.place(t, u)
+            begin_turns(float(t), y, s)
 
     def _set_angles(self, angles: Floats) -> None:
         s = self.system
@@ -168,14 +194,21 @@ class Evaluator:
                 for offset, column in zip(layout.angles.values(), columns, strict=True):
                     end = p0 + layout.par_width * group.count
                     s.par[p0 + offset : end : layout.par_width] = angles[column]
+        s.par[s.turns[:, STATE] + AT_STEP] = angles[self.model.own_angle_count :]
 
     @IGNORE_FLOAT_ERRORS
     def count_turns(self, t: float, u: ArrayLike) -> None:
         """Count whole turns of angles up to a state u (13 n,), less than half a turn further."""
-        s = self.system
-        if s.kinds[ANGLE] < s.kinds[ANGLE + 1]:
+        self._count_own(t, u)
+        if len(self.system.turns):
             self.place(t, u)
-            self._call(ANGLE, t, s.force, s.force, s.force)
+            follow_poses(float(t), self.system)
+
+    def _count_own(self, t: float, u: ArrayLike) -> None:
+        """Count the angles of elements, and find the unknowns of joints, at a state u (13 n,)."""
+        if self.has_own_angles:
+            self.place(t, u)
+            self._call(ANGLE, t, np.zeros(1), np.ones(1), np.zeros(1))
 
     def _seek_unknowns(self) -> None:
         """Find the unknowns of joints at the poses as given, from where their fields begin."""
@@ -190,11 +223,11 @@ class Evaluator:
                 self.system.par[places[0]] = group.numbers[:, layout.numbers[f"{name}{START}"][0]]
                 signs.append(places[-1])
         for _ in range(SEEKING if signs else 0):
-            self.count_turns(0.0, self.model.u0)
+            self._count_own(0.0, self.model.u0)
         for place in signs:  # of what was found
             self.system.par[place] = 0.0
         if signs:
-            self.count_turns(0.0, self.model.u0)
+            self._count_own(0.0, self.model.u0)
 
     @IGNORE_FLOAT_ERRORS
     def counted_angles(self, t: float, u: ArrayLike) -> Floats:
@@ -202,6 +235,7 @@ class Evaluator:
         angles, scratch = np.zeros(self.model.angle_count), np.zeros(1)
         self.place(t, u)
         self._call(TURNED, t, angles, scratch, scratch)
+        report_turns(float(t), angles[:0], angles[self.model.own_angle_count :], self.system)
         return angles
 
     def turn_places(self, *, of_unknowns: bool = True) -> Iterator[slice]:
@@ -215,6 +249,8 @@ class Evaluator:
                         continue
                     for k in range(offset, offset + ANGLE_WIDTH):
                         yield slice(p0 + k, p0 + width * group.count, width)
+        if len(turns := self.system.turns):
+            yield slice(int(turns[0, STATE]), int(turns[-1, STATE]) + STATE_WIDTH)
 
     @property
     def inputs(self) -> Floats:
@@ -351,6 +387,8 @@ class Evaluator:
         out = np.zeros(self.report_size)
         with self.coordinates.at(np.asarray(u, dtype=float)) as y:
             self.functions[REPORT](float(t), y, out, self.system, self.loops)
+        if self.formulation.has_own_coordinates:  # the coordinates are not those of the run
+            out[self.model.report_layout["angles"]] = self.counted_angles(t, u)
         whole: Floats = self.with_inputs(out[None])[0]
         return whole
 

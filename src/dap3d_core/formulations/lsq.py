@@ -112,7 +112,7 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     accelerate(t, y, system, loops)
     global_accelerations(system.metric, system.acceleration, out)
-    report_levels(t, out, system, loops)
+    report_levels(t, y, out, system, loops)
     if not has_friction(system):  # else they are those that forces have read
         minimum_norm_multipliers(system)
     report_multipliers(system, out)

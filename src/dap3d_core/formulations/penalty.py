@@ -94,4 +94,4 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     accelerate(t, y, system, loops)
     global_accelerations(system.metric, system.acceleration, out)
     report_multipliers(system, out)
-    report_levels(t, out, system, loops)
+    report_levels(t, y, out, system, loops)

@@ -100,7 +100,7 @@ def report_accelerations(t: float, y: Floats, out: Floats, system: System, loops
     global_accelerations(system.metric, system.acceleration, out)
     report_multipliers(system, out)
     refine(system, out)
-    report_levels(t, out, system, loops)
+    report_levels(t, y, out, system, loops)
 
 
 @compiled

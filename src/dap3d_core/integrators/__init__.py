@@ -48,7 +48,7 @@ def _radau(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integra
 
 def _placed_steps(evaluator: Evaluator) -> dict[str, Any]:
     """Options of explicit integrators for singular poses and the counting of turns."""
-    return {"length_count": evaluator.length_count, "watched": evaluator.counts_turns}
+    return {"length_count": evaluator.length_count, "watched": evaluator.watched}
 
 
 @attrs.frozen

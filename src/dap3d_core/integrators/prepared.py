@@ -28,20 +28,21 @@ class PreparedRun:
         """Args: an integration at its start, whose buffer takes all rows of a run.
 
         Raises:
-            ValueError: it has begun, its buffer is too small, or it stops at break points or counts
-                turns, which lie outside its own arrays.
+            ValueError: it has begun, its buffer is too small, or it stops at break points.
         """
         work = integration.work
         if work.step_count or work.next_report:
             raise ValueError("the integration has begun: prepare a new one")
         if len(work.rows) < len(work.times):
             raise ValueError(f"the buffer takes {len(work.rows)} of {len(work.times)} rows")
-        if integration.tstops or work.calls_accepted:
-            raise ValueError("break points and counted turns are not put back to the start")
+        if integration.tstops:
+            raise ValueError("break points are not put back to the start")
         self.integration = integration
         arrays = integration.state_arrays()
         if isinstance(integration, RungeKutta):  # what else it has is written before it is read
             arrays = [work.real, work.integer, work.switches, work.tolerance, work.lengths]
+        if work.calls_accepted:  # the turns that are counted
+            arrays.append(integration._arguments[1].par)
         self._arrays = [(array, array.copy()) for array in arrays if array.size]
         self._first: Floats = work.state[Y].copy()
         self._call: Any = integration.prepared() if jit_is_on() else integration._call_compiled

@@ -6,7 +6,7 @@ of every body.
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.codegen.reactions import joint_fields
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
+from dap3d_core.model.joint_angles import JointAngles, joint_angle_name
 from dap3d_core.model.rotations import read_only, to_global
 from dap3d_core.model.state_layout import (
     COORDINATES,
@@ -60,6 +61,8 @@ class Model:
         input_rows, input_values: (inputs,) their rows of F, and their values at the start of a run.
         point_names, point_body (points,), point_local (points, 3): for rP; animation points last.
         notes: what types warned about.
+        motions: of the joints (assembly/motion); joint_angles: those that are counted. None until
+            they are looked for.
     """
 
     body_names: tuple[str, ...]
@@ -88,6 +91,8 @@ class Model:
     input_names: tuple[str, ...] = ()
     input_rows: Integers = attrs.field(factory=lambda: np.zeros(0, dtype=np.int64))
     input_values: Floats = attrs.field(factory=lambda: np.zeros(0))
+    motions: Any = None
+    joint_angles: JointAngles | None = None
 
     @property
     def body_count(self) -> int:
@@ -100,9 +105,19 @@ class Model:
         return int(self.joint_start[-1])
 
     @cached_property
-    def angle_count(self) -> int:
-        """Number of angles whose turns are counted."""
+    def own_angle_count(self) -> int:
+        """Number of angles of their own that forces and joints count."""
         return sum(g.count * len(g.type_info.layout.angles) for g in self.acting)
+
+    @property
+    def joint_angle_count(self) -> int:
+        """Number of angles between the bodies of joints."""
+        return 0 if self.joint_angles is None else self.joint_angles.count
+
+    @property
+    def angle_count(self) -> int:
+        """Number of angles whose turns are counted: those of elements, then those of joints."""
+        return self.own_angle_count + self.joint_angle_count
 
     def angles_of(self, group: Group, places: Integers) -> Integers:
         """(k, angles) where those of instances of a group stand among all that are reported."""
@@ -117,7 +132,7 @@ class Model:
     @cached_property
     def angle_names(self) -> tuple[str, ...]:
         """Names of the angles whose turns are counted, in the order in which they are reported."""
-        return tuple(
+        own = (
             f"{kind}s.{names[int(k)]}.{angle}"
             for kind, names, groups in (
                 ("force", self.force_names, self.forces),
@@ -127,6 +142,8 @@ class Model:
             for k in group.members
             for angle in group.type_info.layout.angles
         )
+        found = self.joint_angles.coordinates.tolist() if self.joint_angles else []
+        return (*own, *(joint_angle_name(self.joint_names[joint], k) for joint, k in found))
 
     def unknowns_of(self, joint: str) -> dict[str, int]:
         """Unknowns of a joint -> where they stand among the angles that are reported."""

@@ -57,7 +57,7 @@ COLUMNS = (
     Column("position_residual", "", "SI", "largest |C| of the constraint rows"),
     Column("velocity_residual", "", "SI", "largest |D v - nu| of the constraint rows"),
     Column("acceleration_residual", "", "SI", "largest |D v_dot - gamma| of the constraint rows"),
-    Column("angles", "angle", "rad", "angles of forces and joints that count whole turns"),
+    Column("angles", "angle", "rad", "angles of forces and joints, whole turns counted"),
     Column("states", "element_state", "SI", "states of their own of forces and joints"),
     Column("inputs", "input", "1", "inputs of the scene, as they acted at that instant"),
 )

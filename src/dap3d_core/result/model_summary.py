@@ -24,7 +24,8 @@ class ModelSummary:
         has_potential: True if every force has a potential (which a damper in it may not).
         is_isolated: True if momentum is conserved: no force, and no joint with ground or with a
             single body.
-        angle_count: number of angles of forces and joints with counted turns.
+        angle_count: number of angles with counted turns.
+        angle_names: of these, as in ``Model.angle_names``; none in files of older programs.
         state_names: (states,) of each number of the elements' states: forces.spring.z, or
             forces.spring.z.1 where there are several.
         input_names: of the inputs, in file order.
@@ -41,6 +42,7 @@ class ModelSummary:
     has_potential: bool
     is_isolated: bool
     angle_count: int = 0
+    angle_names: tuple[str, ...] = ()
     state_names: tuple[str, ...] = ()
     input_names: tuple[str, ...] = ()
 
@@ -104,6 +106,7 @@ def summary_of(model: Model) -> ModelSummary:
         is_isolated=not model.forces
         and all(len(slots) > 1 and 0 not in slots for slots in model.joint_slots),
         angle_count=model.angle_count,
+        angle_names=model.angle_names,
         state_names=tuple(name for state in model.element_states for name in state.labels),
         input_names=model.input_names,
     )

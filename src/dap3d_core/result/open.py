@@ -113,6 +113,8 @@ def _subject(dataset: Any, values: dict[str, Any]) -> ModelSummary:
         parts["state_names"] = tuple(map(str, dataset.variables["element_state"][:]))
     if "angle" in dataset.dimensions:
         parts["angle_count"] = len(dataset.dimensions["angle"])
+        if "angle" in dataset.variables:
+            parts["angle_names"] = tuple(map(str, dataset.variables["angle"][:]))
     for flag in ("has_potential", "is_isolated"):
         parts[flag] = bool(values[flag])
     return ModelSummary(**parts)

@@ -33,6 +33,12 @@ if TYPE_CHECKING:
     from dap3d_core.result.post.joint_coordinates import JointCoordinates
     from dap3d_core.scene.expressions.expression import Expression
 
+#: Said of a file without counted turns.
+NO_TURNS = (
+    "the file holds no turns of angles, for an older dap3d wrote it: they are counted from one "
+    "reported instant to the next, and wrong where a rate changes by more than half a turn per "
+    "reporting step between two; run the scene anew"
+)
 #: A model, and a function that returns an evaluator of it.
 Origin = tuple[Model, "Callable[[], Evaluator]"]
 #: Makes an origin from the text of a scene.
@@ -322,14 +328,17 @@ class Result:
             whole, index = self._whole
             self._coordinates[joint] = whole.coordinates(joint).at(index)
         elif joint not in self._coordinates:
-            from dap3d_core.result.post.joint_coordinates import coordinates_of
+            from dap3d_core.result.post.joint_coordinates import coordinates_of, counted_angles
 
             place = self.summary.joint_index[joint]
             motion = self._motions.of(place)
             if motion is None or not motion.size:
                 reason = self._motions.refused.get(place, "it leaves no freedom")
                 raise UnknownNameError(f"the joint {joint!r} has no coordinates: {reason}")
-            self._coordinates[joint] = coordinates_of(motion, self.t, self.u)
+            counted = counted_angles(self.summary, self.arrays, motion)
+            if counted is None:
+                self.note(NO_TURNS)
+            self._coordinates[joint] = coordinates_of(motion, self.t, self.u, counted)
         return self._coordinates[joint]
 
     @cached_property
@@ -337,7 +346,7 @@ class Result:
         """The motions of the joints."""
         from dap3d_core.assembly.motion.classify import classify
 
-        return classify(self.model)
+        return self.model.motions or classify(self.model)
 
     def _compute_reactions(self, names: Iterable[str]) -> None:
         index = self.summary.joint_index
@@ -388,14 +397,9 @@ class Result:
 
     def _angles(self) -> Floats | None:
         """(nt, k) angles with counted turns; None if an older file lacks them."""
-        if self.summary.angle_count == self.model.angle_count:
+        if self.summary.angle_count in (self.model.own_angle_count, self.model.angle_count):
             return self.arrays.angles
-        note = (
-            "the file holds no turns of angles, for an older dap3d wrote it: they are counted from "
-            "one reported instant to the next, and wrong where a body turns by more than half a "
-            "turn between two; run the scene anew"
-        )
-        self.note(note)
+        self.note(NO_TURNS)
         return None
 
     def _states(self) -> Floats | None:

@@ -185,6 +185,7 @@ class CompiledModel:
             evaluator = Evaluator(self.model, first, announce)
         except UnsuitableError as error:
             raise SimulationError(f"method {first} does not fit the scene: {error}") from error
+        self.model = evaluator.model  # with the motions of its joints
         evaluator.formulation = FORMULATIONS[method or self.method]
         settings = self.scene.simulation
         evaluator.set_penalty(settings.alpha, settings.Omega, settings.mu)

@@ -9,7 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import DOUBTFUL, UNSETTLED
+from dap3d_core.assembly.arrays import UNSETTLED
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED
 from dap3d_core.integrators.stepping.restore import check_alike, restored
@@ -360,10 +360,10 @@ def restore_system(run: RunState, stored: Mapping[str, Any]) -> None:
     new = restored("system.par", par, stored.get("system.par"), np.flatnonzero(~changes))
     counts: Any = stored.get("system.settings")
     check_alike("system.settings", counts, settings)
-    own = counts[[UNSETTLED, DOUBTFUL]]
-    if not (np.isfinite(new).all() and ((own >= 0.0) & (own <= MOST_COUNTED)).all()):
+    own = counts[UNSETTLED]
+    if not (np.isfinite(new).all() and 0.0 <= own <= MOST_COUNTED):
         raise ValueError("the numbers of its forces, turns or counts are not finite")
-    par[:], settings[[UNSETTLED, DOUBTFUL]] = new, own
+    par[:], settings[UNSETTLED] = new, own
 
 
 def check_position(run: RunState, rows: int) -> None:

@@ -154,7 +154,8 @@ def test_residuals_of_the_three_levels_are_reported(name, seed, machines):
     n, m = evaluator.model.body_count, evaluator.model.row_count
     rows, report = evaluator.rows(0.2, u), evaluator.report(0.2, u)
     D, v = rows.dense(), u[7 * n :]
-    assert len(report) == evaluator.report_size == 6 * n + m + 4
+    angles = evaluator.model.angle_count  # of the hinges
+    assert len(report) == evaluator.report_size == 6 * n + m + angles + 4
     position, velocity, acceleration = report[-3:]
     assert position == pytest.approx(np.max(np.abs(rows.C)), rel=1e-13)
     assert velocity == pytest.approx(np.max(np.abs(D @ v - rows.nu)), rel=1e-12)

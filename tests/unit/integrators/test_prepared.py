@@ -26,6 +26,7 @@ def problem(method):
     other[-4:-1] += 0.3
 
     def make(name, y, rows=3):
+        evaluator.start(0.0, evaluator.model.u0)  # turns are counted from there
         options = {"report_size": evaluator.report_size, "buffer_rows": rows, "project_on": True}
         return INTEGRATORS[name].make(evaluator, y, TIMES, **options, **SETTINGS[name])
 
@@ -47,6 +48,17 @@ def test_each_run_is_that_of_a_new_integration(method, name):
         ends.append(prepared.integration.y)
     assert np.array_equal(ends[0], ends[3])
     assert not np.array_equal(ends[0], ends[1])
+
+
+def test_turns_are_put_back_to_the_start():
+    """A wheel that turns more than once, on a spring that counts turns."""
+    evaluator = CompiledModel(wheel(), method="standard").evaluator
+    y = evaluator.integrated(evaluator.model.u0)
+    evaluator.start(0.0, evaluator.model.u0)
+    options = {"report_size": evaluator.report_size, "project_on": True}
+    prepared = PreparedRun(INTEGRATORS["dop853"].make(evaluator, y, [0.0, 1.0, 2.0], **options))
+    rows = [prepared.integration.rows() for _ in range(2) if prepared.run()]
+    assert np.array_equal(*rows)
 
 
 def test_a_run_that_fails_says_so_and_the_next_one_does_not():
@@ -71,7 +83,3 @@ def test_what_cannot_be_put_back_is_refused():
     stopped.tstops = [(0.05, False)]
     with pytest.raises(ValueError, match="break points"):
         PreparedRun(stopped)
-    turning = CompiledModel(wheel(), method="joint").evaluator
-    y = turning.coordinates.start(turning.model.u0)
-    with pytest.raises(ValueError, match="turns"):
-        PreparedRun(INTEGRATORS["dop853"].make(turning, y, TIMES))

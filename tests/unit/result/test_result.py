@@ -136,8 +136,8 @@ def test_jacobian_of_many_rows_is_sparse(monkeypatch):
 def thrown(request):
     """A shipped model at its start, its velocities thrown at random: no constraint level holds."""
     scene = load(request.param)
-    model = model_of(scene)
-    evaluator = Evaluator(model, "standard")
+    evaluator = Evaluator(model_of(scene), "standard")
+    model = evaluator.model  # with the angles of its joints
     rng = np.random.default_rng(11)
     u = np.tile(model.u0, (3, 1))
     u[:, 7 * model.body_count :] += rng.normal(size=(3, 6 * model.body_count))

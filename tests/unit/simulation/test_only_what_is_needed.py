@@ -47,7 +47,7 @@ def test_requirements_are_read_where_a_scene_has_them():
 
 def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     """Method standard brings in nothing of them."""
-    names = {"dap3d_core.formulations.joint", "dap3d_core.assembly.motion.classify"}
+    names = {"dap3d_core.formulations.joint"}
     assert not imported(PLAIN_RUN) & names
     found = imported(PLAIN_RUN.replace("dt=", "method='joint', dt="))
     assert names <= found

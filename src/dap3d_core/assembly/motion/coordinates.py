@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.assembly.motion.joint_motion import BALL, TRANSLATION, JointMotions
+from dap3d_core.assembly.motion.joint_motion import BALL, ROTATION, SCREW, TRANSLATION, JointMotions
 from dap3d_core.model.rigid_motion import (
     Pose,
     adjoint,
@@ -47,19 +47,22 @@ def coordinate_units(motion: JointMotions) -> tuple[str, ...]:
 
 
 def joint_coordinates(
-    motion: JointMotions, t: ArrayLike, r: Floats, p: Floats, v: Floats, w: Floats
-) -> tuple[Floats, Floats]:
+    motion: JointMotions, t: ArrayLike, r: Floats, p: Floats, v: Floats, w: Floats,
+    counted: Floats | None = None,
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Coordinates q and q_dot of m joints over a motion.
 
-    Turns of angles are counted from the first instant, where angles lie in (-pi, pi]; between two
-    instants an angle may change by less than half a turn more or less than its rates tell. The
-    rotation vector of a ball is the one of at most half a turn.
+    Turns of angles are those counted in the run. Without these they are counted from the first
+    instant, where angles lie in (-pi, pi]; between two instants an angle may change by less than
+    half a turn more or less than its rates tell. The rotation vector of a ball is the one of at
+    most half a turn.
 
     Args:
         motion: of the joints.
         t: (nt,) instants, s.
         r, p: (nt, n, 3) in m, (nt, n, 4), of all bodies without ground.
         v, w: (nt, n, 3) velocities in m/s and global angular velocities in rad/s.
+        counted: (nt, m, k) angles, rad, within half a turn.
 
     Returns:
         q (nt, m, d) in rad and m, q_dot (nt, m, d) in rad/s and m/s.
@@ -67,8 +70,18 @@ def joint_coordinates(
     pose, twist = relative_motion(motion, r, p, v, w)
     q = coordinates(motion, pose)
     q_dot = coordinate_rates(motion, q, twist)
-    count_turns(motion, np.asarray(t, dtype=float), q, q_dot)
+    if counted is None:
+        count_turns(motion, np.asarray(t, dtype=float), q, q_dot)
+    else:
+        angles = angle_columns(motion)
+        q[..., angles] += TURN * np.rint((counted - q[..., angles]) / TURN)
     return q, q_dot
+
+
+def angle_columns(motion: JointMotions) -> list[int]:
+    """Indices of the coordinates of a motion that are angles with whole turns."""
+    parts = zip(motion.columns, motion.parts, strict=True)
+    return [columns.start for columns, part in parts if part.kind in (ROTATION, SCREW)]
 
 
 def relative_motion(

@@ -88,6 +88,7 @@ class JointRows:
     def count_turns(self) -> None:
         """Count the turns of angles from the poses set last."""
         if self._has_angles:
+            self._out[1][0] = 1.0  # they are kept
             self._call(ANGLE)
 
     def residuals(self) -> Floats:

@@ -43,6 +43,7 @@ from dap3d_core.assembly.state_update import (
     size_of_positions,
     size_of_velocities,
 )
+from dap3d_core.assembly.turns import report_turns
 from dap3d_core.formulations.common.friction import solve_with_friction
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.linear.ldlt.factor import (
@@ -308,11 +309,11 @@ def project_velocities(
 
 
 @compiled
-def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
+def report_levels(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Angles, energy and residuals into the end of out.
 
     The last four are the potential energy and the largest residuals of position, velocity and
-    acceleration; before them stand the angles whose turns are counted.
+    acceleration; before them are the angles whose turns are counted, those of joints last.
     """
     value = system.settings[SCRATCH : SCRATCH + 1]
     last = out.shape[0] - 4
@@ -325,6 +326,7 @@ def report_levels(t: float, out: Floats, system: System, loops: Any) -> None:
     value[0] = 0.0
     angles = out[6 * (system.body.shape[0] - 1) + system.row.shape[0] :]
     call_kinds(TURNED, TURNED, t, system, loops, angles, value, value)
+    report_turns(t, y, out[last - system.turns.shape[0] :], system)
 
 
 @compiled

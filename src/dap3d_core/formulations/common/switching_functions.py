@@ -5,17 +5,64 @@
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import ANGLE, DOUBTFUL, KNOT, SCRATCH, SWITCH, Floats, System
-from dap3d_core.assembly.evaluate import call_kinds, place
-from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.assembly.arrays import (
+    ANGLE,
+    DOUBTFUL,
+    KNOT,
+    SCRATCH,
+    SWITCH,
+    Floats,
+    System,
+)
+from dap3d_core.assembly.evaluate import call_kinds, place, place_state
+from dap3d_core.assembly.turns import (
+    doubtful_angles,
+    has_measured,
+    keep_turns,
+    measure_all,
+    needs_places,
+)
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 
 @compiled
 def accepted(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """Count the turns of angles at an accepted state; ``out`` is left as it is."""
+    """Count turns up to the end of a step, or judge whether that can be done.
+
+    out[0]: on entry positive where the state y is accepted (integrators/stepping/step_control.py);
+    else the number of angles whose turns are not certain is returned there, nothing is counted.
+    """
+    has_own = counts_own_angles(system)
+    if has_own:
+        place(t, y, system, loops)
+        count(t, y, y[:0], out, system, loops)
+    elif needs_places(system):
+        if out[0] <= 0.0 or not has_measured(t, system):
+            place_state(y, system)
+        count(t, y, y[:0], out, system, loops)
+    else:
+        count(t, y, y, out, system, loops)
+
+
+@compiled
+def count(t: float, y: Floats, unplaced: Floats, out: Floats, system: System, loops: Any) -> None:
+    """As ``accepted``; unplaced: the state where bodies are not placed, else empty."""
     doubtful = system.settings[DOUBTFUL : DOUBTFUL + 1]
-    place(t, y, system, loops)
-    call_kinds(ANGLE, ANGLE, t, system, loops, doubtful, doubtful, doubtful)
+    doubtful[0] = 0.0
+    if counts_own_angles(system):
+        call_kinds(ANGLE, ANGLE, t, system, loops, doubtful, out, out)
+    if out[0] <= 0.0:
+        out[0] = doubtful[0] + doubtful_angles(t, unplaced, system, out[0] < 0.0)
+        return
+    if not has_measured(t, system):
+        measure_all(t, unplaced, system)
+    keep_turns(t, y, system, out[0] > 1.0)
+
+
+@compiled_into
+def counts_own_angles(system: System) -> bool:
+    """True if elements have angles of their own."""
+    return system.kinds[ANGLE + 1] > system.kinds[ANGLE]
 
 
 @compiled

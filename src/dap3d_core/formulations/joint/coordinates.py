@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 import attrs
 import numpy as np
 
+from dap3d_core.assembly import turns as turn_columns
 from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.joint_motion import ModelMotions
 from dap3d_core.assembly.tree_arrays import KeptRowArrays, TreeArrays
-from dap3d_core.formulations.joint.equations import TWO_TURNS, body_state
+from dap3d_core.formulations.joint.equations import body_state
 from dap3d_core.formulations.joint.node_layout import (
     CENTRE,
     CHILD,
@@ -54,8 +55,8 @@ if TYPE_CHECKING:
 
 #: A note says where right-hand sides take more than this time of method standard.
 COSTLY = 1.2
-#: Joints that words name.
-MOST_NAMES = 5
+#: Joints that words name; elementary motions of a joint at most.
+MOST_NAMES, MOST_PARTS = 5, 8
 #: Quantities of the segments of a state, as in tolerances.
 QUANTITIES = {
     "angles": "p", "lengths": "r", "rotations": "pppp", "poses": "rrrpppp",
@@ -217,10 +218,10 @@ class Coordinates:
         return prepared(body_state, y, out, self.evaluator.system)
 
     def continued(self, expected: Floats, y: Floats) -> Floats:
-        """The state y with angles that ``project`` has not brought back, near those expected."""
+        """The state y with angles that have not been brought back, near those expected."""
         angles, continued = self.nodes.layout["angles"], y.copy()
-        turns = np.rint((expected[angles] - y[angles]) / TWO_TURNS)
-        continued[angles] += TWO_TURNS * turns
+        turns = np.rint((expected[angles] - y[angles]) / turn_columns.TWO_TURNS)
+        continued[angles] += turn_columns.TWO_TURNS * turns
         return continued
 
     def with_jump(self, y: Floats, dv: Floats, states: Floats, work: float) -> Floats:
@@ -275,7 +276,7 @@ def cost_over_standard(model: Model, plan: Plan) -> float:
 
 def _tree_and_reasons(model: Model) -> tuple[ModelMotions, SpanningForest, dict[int, str]]:
     """Motions of joints, the joints of a tree, and why others keep their rows."""
-    motions = classify(model)
+    motions = model.motions or classify(model)
     ends: dict[int, tuple[int, int]] = {}
     reasons = dict(motions.refused)
     for group in motions.motions:
@@ -311,7 +312,26 @@ def _with_tree(
         slope=np.zeros(nodes.layout.size),
         kept=kept,
     )
-    return attrs.evolve(system, body=places[:bodies], tree=arrays)
+    turns = turns_of_coordinates(system.turns, model, nodes)
+    return attrs.evolve(system, body=places[:bodies], tree=arrays, turns=turns)
+
+
+def turns_of_coordinates(turns: Integers, model: Model, nodes: TreeNodes) -> Integers:
+    """``System.turns`` with the places of those angles that are coordinates of a tree."""
+    table, angles = turns.copy(), model.joint_angles
+    assert angles is not None
+    keys = angles.coordinates @ (MOST_PARTS, 1)
+    for group in nodes.groups:
+        joints = group.moves.joints if group.moves else np.zeros(0, dtype=np.int64)
+        for part in np.flatnonzero(np.equal(group.motions, REVOLUTE)).tolist():
+            first = np.searchsorted(keys, MOST_PARTS * joints)
+            is_reversed = angles.bodies[first, 0] != group.children
+            k = np.where(is_reversed, len(group.motions) - 1 - part, part)
+            rows = np.searchsorted(keys, MOST_PARTS * joints + k)
+            chain = nodes.table[group.nodes[:, part]]
+            table[rows, turn_columns.COORDINATE] = chain[:, COORDINATE]
+            table[rows, turn_columns.COORDINATE_RATE] = chain[:, RATE]
+    return table
 
 
 def _kept_rows(

@@ -16,8 +16,6 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import (
-    ANGLE,
-    DOUBTFUL,
     KNOT,
     SCRATCH,
     SWITCH,
@@ -35,28 +33,25 @@ from dap3d_core.assembly.evaluate import (
 )
 from dap3d_core.assembly.metric import in_body_axes
 from dap3d_core.assembly.offsets import coordinate_offset, states_offset, velocity_offset
+from dap3d_core.assembly.turns import has_measured
 from dap3d_core.formulations.common.constraints import (
     linearise,
     report_levels,
     report_multipliers,
 )
 from dap3d_core.formulations.common.friction import has_friction, solve_with_friction
+from dap3d_core.formulations.common.switching_functions import count, counts_own_angles
 from dap3d_core.formulations.joint.multipliers import joint_multipliers, scale_accelerations
 from dap3d_core.formulations.joint.node_layout import (
     COORDINATE,
     FREE,
     MOTION,
-    REVOLUTE,
     SPHERICAL,
 )
 from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.joint.reduce import reduce_tree
 from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
 from dap3d_core.kernels.runtime.cache import compiled
-
-#: Two turns, after which Euler parameters are the same again; angles are kept within them, so that
-#: the tolerance of an angle does not grow with its turns.
-TWO_TURNS = 12.566370614359172
 
 
 @compiled
@@ -140,21 +135,18 @@ def store_reactions(system: System) -> None:
 
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """Bring Euler parameters to unit length, and angles within two turns: there are no rows."""
+    """Bring Euler parameters to unit length: there are no rows."""
     out[0] = out[1] = out[2] = out[3] = 0.0
-    settle_coordinates(y, system)
+    normalise_rotations(y, system)
 
 
 @compiled
-def settle_coordinates(y: Floats, system: System) -> None:
-    """Bring Euler parameters to unit length, and angles within two turns."""
+def normalise_rotations(y: Floats, system: System) -> None:
+    """Bring Euler parameters to unit length."""
     nodes = system.tree.nodes
     for n in range(1, nodes.shape[0]):
         motion, i = nodes[n, MOTION], nodes[n, COORDINATE]
-        if motion == REVOLUTE:
-            if abs(y[i]) > TWO_TURNS:
-                y[i] -= TWO_TURNS * np.rint(y[i] / TWO_TURNS)
-        elif motion >= SPHERICAL:
+        if motion >= SPHERICAL:
             i += 3 if motion == FREE else 0
             e0, e1, e2, e3 = y[i], y[i + 1], y[i + 2], y[i + 3]
             h = 1.0 / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
@@ -169,16 +161,18 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     accelerate(t, system, loops)
     body_accelerations(system, out)
     report_multipliers(system, out)
-    report_levels(t, out, system, loops)
+    report_levels(t, y, out, system, loops)
 
 
 @compiled
 def accepted(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """Count the turns of angles at an accepted state; ``out`` is left as it is."""
-    doubtful = system.settings[DOUBTFUL : DOUBTFUL + 1]
-    place_tree(y, system)
-    call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
-    call_kinds(ANGLE, ANGLE, t, system, loops, doubtful, doubtful, doubtful)
+    """As in common/switching_functions.py; angles of the tree are brought within two turns."""
+    has_own = counts_own_angles(system)
+    if has_own or not has_measured(t, system):
+        place_tree(y, system)
+        if has_own:
+            call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
+    count(t, y, y[:0], out, system, loops)
 
 
 @compiled

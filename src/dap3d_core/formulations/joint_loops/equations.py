@@ -125,7 +125,7 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     accelerate(t, system, loops, True)
     body_accelerations(system, out)
     report_multipliers(system, out)
-    report_levels(t, out, system, loops)
+    report_levels(t, y, out, system, loops)
     if system.tree.kept.settings[PART_OF_ROW] > 0.0:
         for _ in range(2):
             for k in range(system.total.shape[0]):

@@ -26,7 +26,7 @@ from dap3d_core.formulations.common.constraints import (
     REDUNDANT_FAILURE_FACTOR,
     REFACTOR_RATIO,
 )
-from dap3d_core.formulations.joint.equations import settle_coordinates
+from dap3d_core.formulations.joint.equations import normalise_rotations
 from dap3d_core.formulations.joint.node_layout import (
     COORDINATE,
     FIXED,
@@ -96,7 +96,7 @@ def project_onto_kept(t: float, y: Floats, out: Floats, system: System, loops: A
     linear = out[0] == 1.0
     factored, stale = linear, False
     out[0] = out[1] = 0.0
-    settle_coordinates(y, system)
+    normalise_rotations(y, system)
     if not linear:
         place_tree(y, system)
         call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)

@@ -39,7 +39,6 @@ from dap3d_core.integrators.stepping.event_location import (
 from dap3d_core.integrators.stepping.integration_state import (
     NOT_FINITE,
     OTHER,
-    PROJECTED,
     RUNNING,
     SCRATCH,
     STEP_FLOOR,
@@ -51,10 +50,14 @@ from dap3d_core.integrators.stepping.output import may_step, project_state
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.step_control import (
     EPSILON,
+    FROM_END,
     LARGEST,
+    STEP_FOR_TURNS,
     STRETCH,
+    count_turns,
     first_step,
     step_floor,
+    turns_are_certain,
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_beyond, scaled_largest
 from dap3d_core.kernels.array_types import Floats
@@ -73,13 +76,14 @@ def advance_adams(
     """Integrate as ``runge_kutta.advance`` does; functions and budget as there."""
     rhs, project, report = functions[0], functions[1], functions[2]
     watch = functions[4] if work.switch_count != 0 else rhs
+    accepted = functions[3] if work.calls_accepted != 0 else rhs
     limit = work.rhs_count + budget
     while may_step(work, state_at, limit, project, report, system, loops):
         steps, rejected, h = work.step_count, work.rejected_count, work.h
-        step(work, rhs, project, watch, system, loops)
+        step(work, (rhs, project, accepted, watch), system, loops)
         update_rounding(work, work.differences[0], h, rejected, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
-            functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
+            count_turns(work, accepted, system, loops, FROM_END)
 
 
 @compiled
@@ -109,16 +113,14 @@ def begin(work: AdamsState, rhs: Function, system: Any, loops: Any) -> None:
 
 
 @compiled
-def step(
-    work: AdamsState, rhs: Function, project: Function, watch: Function, system: Any, loops: Any
-) -> None:
-    """Try one step: accept it, reject it, or stop the run."""
-    times = work.times
+def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
+    """Try one step: accept it, reject it, or stop the run; functions as ``advance`` has them."""
+    rhs, project, accepted, watch = functions
     if work.first_stage_valid == 0:
         begin(work, rhs, system, loops)
         if work.status != RUNNING:
             return
-    t, t_end, k = work.t, times[-1], work.next_order
+    t, t_end, k = work.t, work.times[-1], work.next_order
     h = min(work.h, work.longest_step)
     end = t_end if t + STRETCH * h >= t_end else t + h
     t1 = min(end, work.t_limit)
@@ -152,11 +154,13 @@ def step(
         for i in range(trial.size):
             trial[i] += g * change[i]
         failure = project_state(work, t1, trial, project, system, loops)
-        if failure == RUNNING:
-            if complete_step(work, t1, rhs, watch, system, loops):
-                accept(work, t1, k, here, below, lower)
-        else:
+        if failure != RUNNING:
             reject(work, t1, h, 1, 0.1, failure)
+        elif complete_step(work, t1, rhs, watch, system, loops):
+            if turns_are_certain(work, t1, accepted, system, loops):
+                accept(work, t1, k, here, below, lower)
+            else:
+                reject(work, t1, h, k, STEP_FOR_TURNS, STEP_FLOOR)
     elif error <= LARGEST:
         record_failure(work, error, h, work.failure_count != 0)
         work.failure_count += 1

@@ -180,7 +180,7 @@ class RadauIntegration(Integration):
         self.evaluator = evaluator
         super().__init__(
             evaluator.functions, evaluator.system, evaluator.loops, y0, times,
-            length_count=evaluator.length_count, watched=evaluator.counts_turns, **options,
+            length_count=evaluator.length_count, watched=evaluator.watched, **options,
         )  # fmt: skip
         work = self.work
         work.convergence_factor = work.accepted_error = 1.0

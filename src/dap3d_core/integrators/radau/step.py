@@ -27,7 +27,6 @@ from dap3d_core.integrators.stepping.event_location import (
 )
 from dap3d_core.integrators.stepping.integration_state import (
     NOT_FINITE,
-    PROJECTED,
     RUNNING,
     SCRATCH,
     STEP_FLOOR,
@@ -47,8 +46,10 @@ from dap3d_core.integrators.stepping.step_control import (
     STEP_AFTER_FAILURE,
     STEP_AFTER_SINGULAR_END,
     STEP_CUT,
+    count_turns,
     end_of_step,
     first_step,
+    judge_turns,
     lands_near_singularity,
     reject,
     step_floor,
@@ -84,6 +85,7 @@ def advance(
     """Integrate until more than ``budget`` stages are evaluated, the rows are full, or the end."""
     rhs, project, report = functions[0], functions[1], functions[2]
     watch = functions[4] if work.switch_count != 0 else rhs
+    accepted = functions[3] if work.calls_accepted != 0 else rhs
     limit = work.rhs_count + budget
     while may_step(work, dense_state, limit, project, report, system, loops):
         steps, rejected = work.step_count, work.rejected_count
@@ -91,13 +93,13 @@ def advance(
             tangent.fine[0] = 0.0
             start(work, rhs, project, system, loops)
         else:
-            step(work, parts, project, watch, system, loops, tangent, matrix)
+            step(work, parts, (project, accepted, watch), system, loops, tangent, matrix)
             h = work.factored_step
             if work.rounding_state != 0 and h > 0.0 and can_measure(work, rejected):
                 measure = parts[5]
                 measure(work.t, h, work, system, loops, tangent, matrix)
         if work.calls_accepted != 0 and work.step_count > steps:
-            functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
+            count_turns(work, accepted, system, loops)
 
 
 @compiled
@@ -128,20 +130,18 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
 def step(
     work: RadauState,
     parts: Sequence[Any],
-    project: Function,
-    watch: Function,
+    functions: Any,
     system: System,
     loops: Any,
     tangent: Tangent,
     matrix: StageMatrix,
 ) -> None:
-    """Try one step: accept it, reject it, or stop the run."""
-    estimate_error, find_slope = parts[3], parts[4]
-    state = work.state
-    adaptive, t = work.fixed_step == 0.0, work.t
+    """Try one step: accept it, reject it, or stop the run; functions: project, accepted, watch."""
+    (project, accepted, watch), estimate_error, find_slope = functions, parts[3], parts[4]
+    state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
     end = t1 = end_of_step(work)
     longest = h = t1 - t
-    if work.switch_count != 0 or work.t_limit < t1:
+    if work.switch_count != 0 or min(work.t_limit, t + work.step_limit_at_switch) < t1:
         h = next_length(work, t1, state[SLOPE], project, watch, system, loops)
         if h == 0.0:
             return
@@ -160,6 +160,8 @@ def step(
         if failure == RUNNING:
             find_slope(t, h, work, system, loops, tangent, matrix)
             failure = complete_step(work, t1, h, watch, system, loops)
+        if failure == RUNNING:
+            failure = judge_turns(work, t1, accepted, system, loops)
         if failure == STEP_CUT:
             return
         if failure == RUNNING and adaptive and lands_near_singularity(work, t1):

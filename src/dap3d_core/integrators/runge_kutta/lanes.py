@@ -24,7 +24,11 @@ from dap3d_core.integrators.stepping.integration_state import (
 )
 from dap3d_core.integrators.stepping.output import dense_state, may_step
 from dap3d_core.integrators.stepping.rounding import update_rounding
-from dap3d_core.integrators.stepping.step_control import end_of_step, first_step
+from dap3d_core.integrators.stepping.step_control import (
+    count_turns,
+    end_of_step,
+    first_step,
+)
 from dap3d_core.integrators.stepping.vector_ops import combine
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
@@ -167,10 +171,14 @@ def end_step(
 ) -> None:
     """Accept or reject the step of a lane whose stages are known."""
     rhs, project = functions[0], functions[1]
+    accepted = functions[3] if work.calls_accepted != 0 else rhs
     if lanes.does[k] == LOST:
         work.status = NOT_FINITE
         return
     t1, error, has_rates = lanes.end[k], lanes.error[k], lanes.does[k] == HAS_RATES
-    h = t1 - work.t
-    finish_step(work, t1, h, h, t1, False, error, has_rates, rhs, project, rhs, system, loops)
+    h, steps = t1 - work.t, work.step_count
+    of_step = rhs, project, accepted, rhs
+    finish_step(work, t1, h, h, t1, False, error, has_rates, of_step, system, loops)
     update_rounding(work, work.k[0], lanes.h[k], lanes.rejected[k], rhs, system, loops)
+    if work.calls_accepted != 0 and work.step_count > steps:
+        count_turns(work, accepted, system, loops)

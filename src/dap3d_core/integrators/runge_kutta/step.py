@@ -9,7 +9,8 @@ It knows a vector y and first-class functions ``f(t, y, out, system, loops)``:
              close to a singular one to continue; out[4:] = singularity measures, which go through
              zero at a singular state (stepping/singular_poses.py)
     report   out = what else is reported at (t, y): accelerations, multipliers, ...
-    accepted (only where something is watched) takes note of an accepted state
+    accepted (only where turns are counted) takes note of an accepted state, or judges the step to
+             one, by out[0] (step_control.py); out[0] = angles whose turns are not certain
     watch    (only where there are switches) gives their values (stepping/event_location.py)
 
 Everything that decides what comes next is in the arrays of ``RungeKuttaState``: however a run is
@@ -38,7 +39,6 @@ from dap3d_core.integrators.stepping.event_location import (
 from dap3d_core.integrators.stepping.integration_state import (
     NOT_FINITE,
     OTHER,
-    PROJECTED,
     RUNNING,
     SCRATCH,
     STEP_FLOOR,
@@ -72,10 +72,12 @@ from dap3d_core.integrators.stepping.step_control import (
     STEP_CUT,
     accept,
     combined_error,
+    count_turns,
     end_of_step,
     error_beyond_rounding,
     error_norm,
     first_step,
+    judge_turns,
     lands_near_singularity,
     reject,
     step_floor,
@@ -104,26 +106,21 @@ def advance(
     """
     rhs, project, report = functions[0], functions[1], functions[2]
     watch = functions[4] if work.switch_count != 0 else rhs
+    accepted = functions[3] if work.calls_accepted != 0 else rhs
     limit = work.rhs_count + budget
     while may_step(work, dense_state, limit, project, report, system, loops):
         steps, rejected = work.step_count, work.rejected_count
         h = work.h
-        step(work, rhs, project, watch, system, loops)
+        step(work, (rhs, project, accepted, watch), system, loops)
         update_rounding(work, work.k[0], h, rejected, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
-            functions[3](work.t, work.state[Y], work.real[PROJECTED:], system, loops)
+            count_turns(work, accepted, system, loops)
 
 
 @compiled
-def step(
-    work: RungeKuttaState,
-    rhs: Function,
-    project: Function,
-    watch: Function,
-    system: Any,
-    loops: Any,
-) -> None:
-    """Try one step: accept it, reject it, or stop the run."""
+def step(work: RungeKuttaState, functions: Any, system: Any, loops: Any) -> None:
+    """Try one step: accept it, reject it, or stop the run; functions as of ``finish_step``."""
+    rhs, project, _, watch = functions
     if work.first_stage_valid == 0 and not find_first_stage(work, rhs, system, loops):
         return
     adaptive = work.fixed_step == 0.0
@@ -132,7 +129,7 @@ def step(
     end = t1 = end_of_step(work)
     longest = t1 - work.t
     h = limit_step_at_singularity(work, longest) if adaptive else longest
-    if work.switch_count != 0 or work.t_limit < t1:
+    if work.switch_count != 0 or min(work.t_limit, work.t + work.step_limit_at_switch) < t1:
         h = min(h, next_length(work, t1, work.k[0], project, watch, system, loops))
         if h == 0.0:
             return
@@ -142,7 +139,7 @@ def step(
     if not take_stages(work, t1, h, near, rhs, project, watch, system, loops):
         return
     error = step_error(work, t1, h, near, project, system, loops)
-    finish_step(work, t1, h, longest, end, near, error, False, rhs, project, watch, system, loops)
+    finish_step(work, t1, h, longest, end, near, error, False, functions, system, loops)
 
 
 @compiled
@@ -177,9 +174,7 @@ def finish_step(
     near: bool,
     error: float,
     has_rates: bool,
-    rhs: Function,
-    project: Function,
-    watch: Function,
+    functions: Any,
     system: Any,
     loops: Any,
 ) -> None:
@@ -187,8 +182,11 @@ def finish_step(
 
     has_rates: f at t1 and the trial state is known already, in the stage behind those of the step.
     """
+    rhs, project, accepted, watch = functions
     if error <= 1.0:
         failure = complete_step(work, t1, near, has_rates, rhs, project, watch, system, loops)
+        if failure == RUNNING:
+            failure = judge_turns(work, t1, accepted, system, loops)
         if failure == STEP_CUT:
             return
         other = 0.0

@@ -98,6 +98,7 @@ def next_length(
             if work.end_status != 0:
                 return 0.0
         h = distance_to_crossing(work, h, short)
+    h = min(h, work.step_limit_at_switch)
     short *= 2.0 ** min(work.stalled_steps, MAX_STALLS)
     if h > short or h == end - work.t:
         return h
@@ -126,7 +127,6 @@ def distance_to_crossing(work: IntegrationState, h: float, short: float) -> floa
     short: the length up to which an Euler step is taken.
     """
     s, longest = work.switches, h
-    h = min(h, work.step_limit_at_switch)
     for k in range(s.shape[1]):
         side = s[SIDE, k]
         if side == 0.0:
@@ -243,6 +243,7 @@ def update_switches_after_step(
         work.h = max(work.h, longest)
     if work.fixed_step != 0.0 and work.t < end:
         work.segment_step -= 1
+    work.step_limit_at_switch = np.inf
     if work.switch_count == 0:
         return
     stalled = 0
@@ -255,7 +256,7 @@ def update_switches_after_step(
         if s[SIDE, k] == 0.0:
             s[SIDE, k] = np.sign(s[FOUND, k])
             s[VALUE, k] += s[SIDE, k] * s[BAND, k]
-    work.step_limit_at_switch, work.cut_attempts = np.inf, 0
+    work.cut_attempts = 0
     work.stalled_steps = work.stalled_steps + 1 if stalled else 0
 
 

@@ -68,7 +68,8 @@ class Integration(Restorable):
         Number of lengths that ``project`` gives, which vanish at singular states
         (stepping/singular_poses.py).
     watched
-        Whether the fourth function is called with each accepted state.
+        1: the fourth function is called with each accepted state; 2: with ends of steps as well,
+        which it may refuse (step_control.py).
     ends
         (2, q) for each switch that the fifth function gives, what it does: the run ENDS where it
         becomes negative; the integration BEGINS anew where it changes its sign
@@ -116,7 +117,7 @@ class Integration(Restorable):
         report_size: int = 0,
         buffer_rows: int = 256,
         length_count: int = 0,
-        watched: bool = False,
+        watched: int = 0,
         ends: ArrayLike = (),
         kinds: ArrayLike = (),
     ) -> None:

@@ -95,7 +95,7 @@ class IntegrationState(Arrays):
     t_stop = _real()  # of what stopped the run
     error_across_singularity = _real()  # of the last step that was to cross a singular state
     t_limit = _real()  # no step goes beyond
-    step_limit_at_switch = _real()  # since a step met the other side of a switch
+    step_limit_at_switch = _real()  # since a step met the other side, or was too long for turns
     t_stiff = _real()  # when the scene became stiff
     largest_work = _real()  # magnitude of the last component at an accepted state
     failed_error_rate = _real()  # error per length of the last step that failed
@@ -115,7 +115,7 @@ class IntegrationState(Arrays):
     error_uses_last_stage = _integer()
     has_dense_output = _integer()
     projects = _integer()
-    calls_accepted = _integer()
+    calls_accepted = _integer()  # 0, NOTES or JUDGES (step_control.py)
     # what changes
     status = _integer()
     next_report = _integer()  # index in times

@@ -10,7 +10,15 @@ their codes DOPRI5 and DOP853.
 import math
 from typing import Any
 
-from dap3d_core.integrators.stepping.integration_state import SCRATCH, TRIAL, Function, Y
+from dap3d_core.integrators.stepping.integration_state import (
+    PROJECTED,
+    RUNNING,
+    SCRATCH,
+    STEP_FLOOR,
+    TRIAL,
+    Function,
+    Y,
+)
 from dap3d_core.integrators.stepping.output import NEAR_SINGULAR
 from dap3d_core.integrators.stepping.vector_ops import combine, scaled_beyond, scaled_largest
 from dap3d_core.kernels.array_types import Floats
@@ -28,6 +36,12 @@ STEP_CUT = -1
 STEP_AFTER_SINGULAR_END, SINGULAR_END_ATTEMPTS = 0.6, 4
 #: A singular state this many such steps ahead is stepped across at once.
 SINGULAR_END_REACH = 5.0
+#: Values of ``calls_accepted``: the fourth function takes note of accepted states; it judges the
+#: ends of steps as well. Factor on a step in which turns cannot be counted.
+NOTES, JUDGES, STEP_FOR_TURNS = 1, 2, 0.5
+#: What an accepted state is announced with, and the end of a step to be judged: one that the error
+#: limits, or one of a given length.
+FROM_START, FROM_END, OF_ERROR, OF_LENGTH = 1.0, 2.0, 0.0, -1.0
 #: The last step is stretched by at most this factor, to end at t_end.
 STRETCH = 1.01
 
@@ -176,3 +190,46 @@ def lands_near_singularity(work: Any, t1: float) -> bool:
         and work.near_singular_landings < SINGULAR_END_ATTEMPTS
         and t1 < work.times[-1]
     )
+
+
+@compiled
+def turns_are_certain(work: Any, t1: float, accepted: Function, system: Any, loops: Any) -> bool:
+    """True if turns can be counted in a step to t1."""
+    if work.calls_accepted != JUDGES:
+        return True
+    moved = work.projection_moved
+    work.projection_moved = OF_ERROR if work.fixed_step == 0.0 else OF_LENGTH
+    accepted(t1, work.state[TRIAL], work.real[PROJECTED:], system, loops)
+    doubtful, work.projection_moved = work.projection_moved, moved
+    return bool(doubtful == 0.0)
+
+
+@compiled
+def count_turns(
+    work: Any, accepted: Function, system: Any, loops: Any, sense: float = FROM_START
+) -> None:
+    """Count turns up to the accepted state; sense: FROM_START or FROM_END.
+
+    It says from which end of the step dense output continues coordinates: an angle that is one may
+    be brought within two turns between them.
+    """
+    moved = work.projection_moved
+    work.projection_moved = sense
+    accepted(work.t, work.state[Y], work.real[PROJECTED:], system, loops)
+    work.projection_moved = moved
+
+
+@compiled
+def judge_turns(work: Any, t1: float, accepted: Function, system: Any, loops: Any) -> int:
+    """RUNNING, or STEP_CUT where a shorter step than that to t1 is tried, also a fixed one."""
+    if turns_are_certain(work, t1, accepted, system, loops):
+        return RUNNING
+    h = STEP_FOR_TURNS * (t1 - work.t)
+    if work.fixed_step == 0.0:
+        reject(work, t1, h, STEP_FLOOR)
+        return STEP_CUT
+    work.rejected_count += 1
+    work.step_limit_at_switch = h
+    if h < step_floor(work):
+        work.t_stop, work.status = t1, STEP_FLOOR
+    return STEP_CUT

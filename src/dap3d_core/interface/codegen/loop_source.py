@@ -26,7 +26,7 @@ LOOP_KINDS = {
     "friction": ("friction",),
     "switch": ("switch",),
     "impulse": ("J", "impulse"),
-    "angle": (),  # the angles of the type's fields, at an accepted step
+    "angle": (),  # the angles of the type's fields, at the end of a step
     "turned": (),  # the same angles, for reports
     "rate": ("rate",),
     "bound": (),  # as switches; of unknowns
@@ -86,15 +86,21 @@ def called_with(type_info: TypeInfo, kernel: str) -> str:
 
 def store_angle(name: str, offset: int) -> Iterable[str]:
     """Store an angle, its rate and the time; count in out1 where its turns are in doubt."""
-    change = f"x_{name}_dot - par[p1 + {offset + 1}]"
-    yield f"out1[0] += doubtful({change}, t - par[p1 + {offset + 2}])"
+    angle, before, time = (f"par[p1 + {offset + k}]" for k in range(3))
+    step = f"x_{name} - {angle}, {before}, x_{name}_dot, t - {time}"
+    yield f"out1[0] += doubtful({step}, out2[0])"
     yield from keep(offset, f"x_{name}", f"x_{name}_dot")
 
 
 def keep(offset: int, value: str, rate: str) -> Iterable[str]:
-    """Store a value, its rate and the time in the numbers of an instance."""
+    """Store a value, its rate and the time of an instance where a step is accepted."""
     for k, number in enumerate((value, rate, "t")):
-        yield f"par[p1 + {offset + k}] = {number}"
+        yield kept(f"par[p1 + {offset + k}]", number)
+
+
+def kept(place: str, value: str) -> str:
+    """Store a value where a step is accepted, and not only judged: out2[0] > 0."""
+    return f"{place} = where(out2[0] > 0.0, {value}, {place})"
 
 
 def append(values: Sequence[str]) -> Iterable[str]:

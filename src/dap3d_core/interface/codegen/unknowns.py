@@ -18,6 +18,7 @@ from dap3d_core.interface.codegen.loop_source import (
     called_with,
     gathering_lines,
     keep,
+    kept,
     store,
     store_angle,
 )
@@ -60,10 +61,10 @@ def write_with_unknowns(
     elif what == "angle":
         for name, at in layout.angles.items():
             is_unknown = name in unknowns
-            kept = keep(at, kept_value(type_info, name), f"x_{name}_dot")
-            lines += kept if is_unknown else store_angle(name, at)
+            found = keep(at, kept_value(type_info, name), f"x_{name}_dot")
+            lines += found if is_unknown else store_angle(name, at)
         lines.append("_, _, signs = eliminate(G, (), signs)")
-        lines += [f"par[p1 + {layout.angles[name] + ANGLE_WIDTH}] = signs[{k}]"
+        lines += [kept(f"par[p1 + {layout.angles[name] + ANGLE_WIDTH}]", f"signs[{k}]")
                   for k, name in enumerate(unknowns)]  # fmt: skip
     elif what == "turned":
         lines += append([kept_value(type_info, name) for name in layout.angles])

@@ -30,6 +30,7 @@ __all__ = [
     "unwound",
     "vector_at",
     "vector_in",
+    "where",
     "whole",
     "within",
 ]
@@ -65,9 +66,15 @@ def unwound(angle, last):
     return angle + TURN * np.rint((last - angle).real / TURN)
 
 
-def doubtful(change, elapsed):
-    """1 if a rate changed so much within a step that a turn may be miscounted, else 0."""
-    return where(abs(change) * elapsed > 0.5 * TURN, 1.0, 0.0)
+def doubtful(rise, before, rate, elapsed, sense):
+    """1 if an angle may be miscounted in a step, else 0.
+
+    Its rate changed by half a turn per step; its rise is not near the mean rate's; or it is more
+    than half a turn in a step whose length was given, and is not limited by its error: sense < 0.
+    """
+    is_far = where(sense < 0.0, where(abs(rise) > 0.5 * TURN, 1.0, 0.0), 0.0)
+    changes = where(abs(rate - before) * elapsed > 0.5 * TURN, 1.0, is_far)
+    return where(abs(rise - 0.5 * (before + rate) * elapsed) > 0.25 * TURN, 1.0, changes)
 
 
 def within(x, low, high):

@@ -42,6 +42,7 @@ NAMES = {
     "joint": "names of the joints",
     "point": "names of the points; animation points come last",
     "element_state": "names of the states of their own of forces and joints",
+    "angle": "names of the angles whose turns are counted",
     "input": "names of the inputs",
     "axis": "axes of a vector",
     "euler": "Euler parameters, body to global",
@@ -127,12 +128,14 @@ def define(
         **{kind: getattr(summary, f"{kind}_names") for kind in ("joint", "point", "input")},
         "element_state": summary.state_names,
     }
+    if summary.angle_names:  # files of older programs have none
+        entries["angle"] = summary.angle_names
     dataset.createDimension("time", nt or None)
     for name, values in entries.items():
         if len(values):
             dataset.createDimension(name, len(values))
     for name, meaning in NAMES.items():
-        if len(entries[name]):
+        if len(entries.get(name, ())) and not isinstance(entries[name], range):
             variable = dataset.createVariable(name, str, (name,))
             write_attributes(variable, about("1", meaning))
             variable[:] = np.array(entries[name], dtype=object)

@@ -87,6 +87,9 @@ def check_subject(summary: ModelSummary) -> None:
     for name in summary.state_names:
         if not name.isprintable() or name.count(".") not in (2, 3):
             raise ValueError(f"{name!r} is no name of a state")
+    for name in summary.angle_names:
+        if not name.isprintable() or name.count(".") != 2:
+            raise ValueError(f"{name!r} is no name of an angle")
     for constant in ("mass", "Jp", "point_local"):
         if not (np.abs(getattr(summary, constant)) <= MOST).all():
             raise ValueError(f"{constant} holds a number that no scene may have")

@@ -77,7 +77,7 @@ def force_output(
     minus_lambda = np.zeros_like(evaluator.system.multipliers)
     for k, time in place_at(evaluator, t, u, states, inputs):
         if angles is None:
-            loops.call("angle", time, force)
+            loops.call("angle", time, force, np.ones(1))  # which keeps what it finds
         else:
             loops.parameters.set_angles(angles[k])
         if actuation is not None:

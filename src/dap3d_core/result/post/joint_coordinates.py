@@ -5,11 +5,19 @@ from itertools import pairwise
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.motion.coordinates import aliases, coordinate_units, joint_coordinates
+from dap3d_core.assembly.motion.coordinates import (
+    aliases,
+    angle_columns,
+    coordinate_units,
+    joint_coordinates,
+)
 from dap3d_core.assembly.motion.joint_motion import JointMotions
 from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.joint_angles import joint_angle_name
 from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import split
+from dap3d_core.result.arrays import Arrays
+from dap3d_core.result.model_summary import ModelSummary
 
 
 @attrs.frozen(eq=False)
@@ -45,13 +53,27 @@ class JointCoordinates:
         return attrs.evolve(self, q=self.q[index], q_dot=self.q_dot[index])
 
 
-def coordinates_of(motion: JointMotions, t: Floats, u: Floats) -> JointCoordinates:
+def counted_angles(summary: ModelSummary, arrays: Arrays, motion: JointMotions) -> Floats | None:
+    """(nt, k) angles of a joint as a run counted them; None where a file of an older program has
+    none.
+    """
+    joint = summary.joint_names[int(motion.joints[0])]
+    names = [joint_angle_name(joint, k) for k in angle_columns(motion)]
+    if not set(names) <= set(summary.angle_names) or arrays.angles.shape[1] < summary.angle_count:
+        return None
+    return arrays.angles[:, [summary.angle_names.index(name) for name in names]]
+
+
+def coordinates_of(
+    motion: JointMotions, t: Floats, u: Floats, counted: Floats | None
+) -> JointCoordinates:
     """Coordinates of a single joint.
 
     Args:
         motion: of the joint.
         t: (nt,) s; where it does not rise another run begins, and turns are counted anew.
         u: (nt, 13 n) states.
+        counted: (nt, k) its angles; None to count turns from one instant to the next.
     """
     bodies = [body for body in (int(motion.body_i[0]), int(motion.body_j[0])) if body]
     place = {0: 0} | {body: k + 1 for k, body in enumerate(bodies)}
@@ -59,7 +81,12 @@ def coordinates_of(motion: JointMotions, t: Floats, u: Floats) -> JointCoordinat
     motion = attrs.evolve(motion, body_i=i, body_j=j)
     columns = np.array(bodies) - 1
     parts = [
-        joint_coordinates(motion, t[rows], *(part[:, columns] for part in split(u[rows])))
+        joint_coordinates(
+            motion,
+            t[rows],
+            *(part[:, columns] for part in split(u[rows])),
+            counted=None if counted is None else counted[rows, None],
+        )
         for rows in _runs(t)
     ]
     q, q_dot = (

@@ -2,6 +2,7 @@
 
 from contextlib import suppress
 
+from dap3d_core.model.joint_angles import JOINT_ANGLES
 from dap3d_core.result.errors import ResultError
 from dap3d_core.result.model_summary import ModelSummary
 from dap3d_core.result.quantities.catalogue import Quantity, QuantityOwner, QuantitySource
@@ -21,10 +22,16 @@ def states_of(summary: ModelSummary, owner: QuantityOwner) -> dict[str, dict[str
 
 def unknowns_of(source: QuantitySource, owner: QuantityOwner) -> dict[str, int]:
     """Columns of the unknowns of an owner; none where the model for them is not available."""
-    if owner.kind == "joint" and not owner.slot and source.summary.angle_count:
+    if owner.kind == "joint" and not owner.slot and _has_own_angles(source.summary):
         with suppress(ResultError):
             return source.model.unknowns_of(owner.name)
     return {}
+
+
+def _has_own_angles(summary: ModelSummary) -> bool:
+    """True if elements have angles or unknowns of their own, so far as that is known."""
+    names = summary.angle_names or [""] * summary.angle_count
+    return any(not name.startswith(JOINT_ANGLES) for name in names)
 
 
 def own_names(source: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:

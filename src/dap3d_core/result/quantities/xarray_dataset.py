@@ -58,6 +58,7 @@ def dataset_of(result: QuantitySource) -> "xarray.Dataset":
         "axis": AXES,
         "euler": EULER,
         **({"input": summary.input_names} if summary.input_names else {}),
+        **({"angle": summary.angle_names} if summary.angle_names else {}),
     }
     if summary.state_names:
         labels[STATES] = summary.state_names

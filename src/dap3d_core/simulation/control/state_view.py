@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Callable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from dap3d_core.assembly.motion.joint_motion import ROTATION, TRANSLATION
+from dap3d_core.assembly.turns import ANGLE, COORDINATE, OFFSET, STATE
 from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.stepping.hold import T, quick_view
@@ -25,7 +25,7 @@ OF_BODIES = {"r": (R, 3), "p": (P, 4), "rd": (V, 3), "w": (W, 3)}
 AXES = {"x": 0, "y": 1, "z": 2}
 TURN = 2.0 * math.pi
 #: Names of the coordinate of a joint that has one, and of its rate.
-COORDINATE = {
+NAMES = {
     ROTATION: (("angle", "q1"), ("angle_rate", "q1_dot")),
     TRANSLATION: (("length", "q1"), ("length_rate", "q1_dot")),
 }
@@ -36,32 +36,26 @@ class StateView:
 
     Positions and velocities of bodies (``r``, ``p``, ``rd``, ``w`` and their components) and the
     coordinate of a joint that has one are read from where they stand; other quantities evaluate the
-    scene, which takes some hundred microseconds. Turns of an angle are counted from one reading to
-    the next. Arrays are views: they change with the run, copy what is to be kept.
+    scene, which takes some hundred microseconds. Turns of an angle are those that the run has
+    counted. Arrays are views: they change with the run, copy what is to be kept.
     """
 
     def __init__(self, compiled: CompiledModel, evaluator: Evaluator) -> None:
         self._compiled, self._evaluator = compiled, evaluator
         self._getters: dict[str, Getter] = {}
-        self._angles: list[_Angle] = []
         self._is_placed = False
 
     def attach(self, integration: Integration) -> None:
         """Show the state of an integration from here on."""
         self._integration = integration
         self._real = quick_view(integration.work.real)
+        self._y = quick_view(integration.work.state[Y])
         self._place_bodies = self._evaluator.coordinates.placer(integration.work.state[Y])
         self.changed()
 
     def changed(self) -> None:
         """The state is another."""
         self._is_placed = False
-
-    def restarted(self) -> None:
-        """Another motion begins: turns are counted anew."""
-        for angle in self._angles:
-            angle.forget()
-        self.changed()
 
     @property
     def t(self) -> float:
@@ -146,11 +140,11 @@ class StateView:
 
     def _coordinate(self, joint: int, name: str) -> Getter | None:
         """The function that reads a coordinate, or its rate, of a joint with a single one."""
-        for group in self._motions.motions:
+        for group in self._evaluator.model.motions.motions:
             places = np.flatnonzero(group.joints == joint)
-            if not len(places) or len(group.parts) != 1 or group.parts[0].kind not in COORDINATE:
+            if not len(places) or len(group.parts) != 1 or group.parts[0].kind not in NAMES:
                 continue
-            names, rates = COORDINATE[group.parts[0].kind]
+            names, rates = NAMES[group.parts[0].kind]
             if name not in (*names, *rates):
                 return None
             motion = group.take(places)
@@ -158,15 +152,8 @@ class StateView:
                 length = _Length(self, motion)
                 return length.rate if name in rates else length.value
             angle = _Angle(self, motion)
-            self._angles.append(angle)
             return angle.rate if name in rates else angle.value
         return None
-
-    @cached_property
-    def _motions(self) -> Any:
-        from dap3d_core.assembly.motion.classify import classify
-
-        return classify(self._evaluator.model)
 
     @IGNORE_FLOAT_ERRORS
     def _quantity(self, name: str) -> Any:
@@ -225,15 +212,22 @@ class _Coordinate:
 
 
 class _Angle(_Coordinate):
-    """The angle of a joint with a single axis, turns counted from one reading to the next."""
+    """The angle of a joint with a single axis."""
 
     def __init__(self, view: StateView, motion: Any) -> None:
         super().__init__(view, motion)
-        self.forget()
+        system, model = view._evaluator.system, view._evaluator.model
+        joints = model.joint_angles.coordinates[:, 0]  # type: ignore[union-attr]
+        row = system.turns[int(np.flatnonzero(joints == motion.joints[0])[0])]
+        self._par = quick_view(system.par)
+        self._state, self._coordinate = int(row[STATE]), int(row[COORDINATE])
 
-    def forget(self) -> None:
-        """Begin to count turns anew."""
-        self._last: tuple[float, float, float] | None = None
+    @property
+    def _counted(self) -> float:
+        """The angle but for rounding, rad."""
+        if self._coordinate < 0:
+            return float(self._par[self._state + ANGLE])
+        return float(self._view._y[self._coordinate] + self._par[self._state + OFFSET])
 
     def value(self) -> float:
         """The angle, rad."""
@@ -245,14 +239,7 @@ class _Angle(_Coordinate):
         )  # fmt: skip
         a, b, c = self._axis
         q = 2.0 * math.atan2(gone[1] * a + gone[2] * b + gone[3] * c, gone[0])
-        rate, t = self.rate(), self._view.t
-        expected = 0.0
-        if self._last is not None:
-            before, q_before, rate_before = self._last
-            expected = q_before + 0.5 * (t - before) * (rate + rate_before)
-        q -= TURN * round((q - expected) / TURN)
-        self._last = t, q, rate
-        return q
+        return q - TURN * round((q - self._counted) / TURN)
 
     def rate(self) -> float:
         """Its rate, rad/s."""

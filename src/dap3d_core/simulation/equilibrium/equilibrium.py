@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.model import build_model
+from dap3d_core.model.joint_angles import JOINT_ANGLES
 from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import split
 from dap3d_core.result import INFORMATION
@@ -132,7 +133,7 @@ class Equilibrium:
                 f"and so may be their forces: {', '.join(changed)}"
             )
         wound = [name.rpartition(".")[0] for name, angle in self.state.angles.items()
-                 if abs(angle) > np.pi]  # fmt: skip
+                 if abs(angle) > np.pi and not name.startswith(JOINT_ANGLES)]  # fmt: skip
         if wound:
             scene.notes.append(
                 f"whole turns are no part of a scene, these begin without them: {', '.join(wound)}"

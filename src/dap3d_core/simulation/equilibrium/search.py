@@ -92,7 +92,7 @@ class _Search:
         self.path = np.zeros((model.body_count, 6))
         self.motion = np.zeros_like(self.path)
         self.leaves = 0
-        repeats = not model.angle_count and bool(np.all(model.position_row))
+        repeats = not model.own_angle_count and bool(np.all(model.position_row))
         self.most_turns = MOST_TURNS if repeats else MOST_COUNTED_TURNS
 
     def run(self) -> Search:

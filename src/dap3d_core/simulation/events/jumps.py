@@ -262,7 +262,7 @@ class Jumps:
         sides = np.where(at_once, np.sign(rates), jump.sides)
         work.switches[at.SIDE] = np.where(self._law.elements.is_jump, sides, 0.0)
         if work.calls_accepted:  # angles are extrapolated by their rates
-            functions[ACCEPTED](t, y, np.zeros(1), *arrays)
+            functions[ACCEPTED](t, y, np.ones(1), *arrays)
 
 
 def _rows_to(u: Floats, bodies: Mapping[int, Floats]) -> JumpRows:

@@ -10,6 +10,7 @@ import numpy as np
 from dap3d_core.interface import PluginError
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model, ModelError, build_model
+from dap3d_core.model.joint_angles import JOINT_ANGLES
 from dap3d_core.model.rotations import angular_velocities, euler_rates
 from dap3d_core.model.state_layout import join, split
 from dap3d_core.registry.suggestions import nearest, some
@@ -137,7 +138,10 @@ def _matched(named: NamedState, model: Model) -> StartState:
     r, p, v, w = split(named.u)
     u = join(r[index], p[index], v[index], w[index])
     names = model.angle_names
-    uncounted = sorted({n.rpartition(".")[0] for n in names if n not in named.angles})
+    uncounted = sorted({
+        n.rpartition(".")[0].replace(JOINT_ANGLES, "joints.") for n in names
+        if n not in named.angles
+    })  # fmt: skip
     if uncounted:
         listed = some(uncounted, MOST_NAMES)
         notes.append(f"turns are counted from zero, for the start has none: {listed}")
@@ -168,6 +172,7 @@ def _state_of_result(
              "at t = 0, and so do functions of time"]  # fmt: skip
     if before != after:
         _refuse_jumps(result, before, after)
+        _refuse_turns(result, before, after)
         notes.append(
             f"{INFORMATION}the start was interpolated between the reported instants "
             f"{result.t[before]:.9g} s and {result.t[after]:.9g} s of the result"
@@ -176,7 +181,7 @@ def _state_of_result(
     if with_angles and result.summary.angle_count:
         values = (1.0 - fraction) * result.arrays.angles[before]
         values = values + fraction * result.arrays.angles[after]
-        names = _angle_names_of(result, registry)
+        names = result.summary.angle_names or _angle_names_of(result, registry)
         angles = dict(zip(names, values.tolist(), strict=False))  # none where they are not known
     u = _state_at(result, before, after, fraction)
     states = _states_at(result, before, after, fraction)
@@ -208,6 +213,21 @@ def _refuse_jumps(result: Result, before: int, after: int) -> None:
                 f"velocities jumped at t = {jump.t:.9g} s, between the reported instants "
                 f"{first:.9g} s and {last:.9g} s; give one of these as the time of the start",
             )
+
+
+def _refuse_turns(result: Result, before: int, after: int) -> None:
+    """SceneError where a body turns by more than half a turn between two reported instants."""
+    first, last = float(result.t[before]), float(result.t[after])
+    speed = np.linalg.norm(result.w[[before, after]], axis=-1).max(axis=0)
+    fastest = int(np.argmax(speed))
+    if speed[fastest] * (last - first) > np.pi:
+        raise _mistake(
+            result.record.title or "the result",
+            f"{result.summary.body_names[fastest]} turns at {speed[fastest]:.3g} rad/s, by more "
+            f"than half a turn between the reported instants {first:.9g} s and {last:.9g} s: its "
+            "pose is not known there; give one of these as the time of the start, or report more "
+            "often",
+        )
 
 
 def _interval(result: Result, t: Any) -> tuple[int, int, float]:

@@ -194,7 +194,10 @@ def _forces(
                   np.zeros(count), np.zeros((count, model.angle_count)), np.zeros((count, 3)),
                   rank=len(actuators), idle=np.ones(len(actuators), dtype=bool))  # fmt: skip
     for k, (t, u, v_dot) in enumerate(zip(motion.t.tolist(), motion.u, motion.v_dot, strict=True)):
-        evaluator.count_turns(t, u)
+        if motion.angles is None:
+            evaluator.count_turns(t, u)
+        else:
+            evaluator.begin_turns(t, u, motion.angles[k])
         report = evaluator.report(t, u)
         out.angles[k] = report[layout["angles"]]
         needed = required_forces(evaluator, t, u, v_dot)

@@ -52,12 +52,14 @@ class Motion:
         u: (nt, 13 n) states on the constraints.
         v_dot: (nt, 6 n) accelerations.
         misfit: quantity -> largest distance of the data from the motion, in its unit.
+        angles: (nt, angles) that a run has counted, in the order of the model; None of data.
     """
 
     t: Floats
     u: Floats
     v_dot: Floats
     misfit: dict[str, float]
+    angles: Floats | None = None
 
 
 def read_motion(motion: Any) -> Result | MeasuredData:
@@ -108,9 +110,14 @@ def motion_on(
         SceneError: the data have columns that are no positions of the scene, or lack its bodies.
         SimulationError: the data leave freedoms of the scene open, or fit none of its poses.
     """
+    angles: Floats | None = None
     if isinstance(given, Result):
         t, u, v_dot = given.t, *_states_of(evaluator, given)
         misfit: dict[str, float] = {}
+        columns = [given.summary.angle_names.index(name) for name in evaluator.model.angle_names
+                   if name in given.summary.angle_names]  # fmt: skip
+        if len(columns) == evaluator.model.angle_count:
+            angles = given.arrays.angles[:, columns]
     else:
         t = given.t
         fit = _Fit(evaluator, given, chosen, scene_text)
@@ -123,7 +130,7 @@ def motion_on(
     u, v_dot = u.copy(), v_dot.copy()
     for k, time in enumerate(t):
         u[k], v_dot[k] = _on_rows(evaluator, float(time), u[k], v_dot[k], chosen)
-    return Motion(t, u, v_dot, misfit)
+    return Motion(t, u, v_dot, misfit, angles)
 
 
 def differentiated(t: Floats, u: Floats) -> tuple[Floats, Floats]:

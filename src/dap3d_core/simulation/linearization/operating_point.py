@@ -185,7 +185,11 @@ def _state(
         if k < 0 or abs(at.t[k] - t) > SAME_INSTANT * span:
             near = f"; the nearest is t = {at.t[k]:.9g} s" if k >= 0 else ""
             raise SimulationError(f"the result has no instant at t = {t:.9g} s{near}")
-        angles = at.arrays.angles[k] if at.summary.angle_count == model.angle_count else None
+        angles = np.zeros(model.angle_count)
+        known = at.arrays.angles[k]  # an older file has no angles of joints
+        if known.size not in (model.own_angle_count, model.angle_count):
+            known = known[:0]
+        angles[: known.size] = known
         states = at.arrays.states[k] if at.arrays.states.shape[1] == model.state_count else None
         if at.summary.input_names == model.input_names:
             compiled.evaluator.set_inputs(at.inputs[k])

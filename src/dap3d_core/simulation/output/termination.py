@@ -37,11 +37,6 @@ def doubts(evaluator: Evaluator) -> list[str]:
             "accelerations open there, and those reported, with their multipliers, are not "
             "determined"
         )
-    if count := evaluator.doubtful_turns:
-        notes.append(
-            f"turns of angles: the rate of turn changed so much within a step, {count} times, "
-            "that whole turns may be miscounted; give a tighter rtol, or a shorter step"
-        )
     return notes
 
 

@@ -147,7 +147,7 @@ class SteppedRun:
         self._hold.forget()
         if self._hold.integration is not self._integration:
             self._attach()
-        self.state.restarted()
+        self.state.changed()
         if u is not None:
             state = state_of(u, evaluator.model.body_names)
             evaluator.start(0.0, state)

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import DOUBTFUL, UNSETTLED, System
+from dap3d_core.assembly.arrays import UNSETTLED, System
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.stepping.integration_state import (
     FINISHED,
@@ -220,7 +220,7 @@ def store_run(
             store_row(points.rows[p * nt + k], work.rows[k], work, starting, system, loops)
     diagnostics[p, ENDED], diagnostics[p, ROWS] = work.status, work.row_count
     diagnostics[p, TAKEN], diagnostics[p, CALLS] = work.step_count, work.rhs_count
-    diagnostics[p, FRICTION_FAILURES] = system.settings[UNSETTLED] + system.settings[DOUBTFUL]
+    diagnostics[p, FRICTION_FAILURES] = system.settings[UNSETTLED]
 
 
 @compiled

@@ -25,6 +25,7 @@ from dap3d_core.assembly.arrays import (
 from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
 from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.assembly.state_update import apply_displacement, apply_velocity_change
+from dap3d_core.assembly.turns import begin_turns
 from dap3d_core.formulations.common.constraints import (
     PART,
     correct,
@@ -171,17 +172,18 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
 def store_start(t: float, y: Floats, system: System, loops: Any) -> None:
     """Place bodies, store functions' values at the start, count turns from here."""
     place(t, y, system, loops)
-    count_from_here(t, system, loops)
+    count_from_here(t, y, system, loops)
 
 
 @compiled_into
-def count_from_here(t: float, system: System, loops: Any) -> None:
+def count_from_here(t: float, y: Floats, system: System, loops: Any) -> None:
     """Store functions' values at the start and count turns, at bodies and functions as placed."""
-    unused, F = system.settings[SCRATCH : SCRATCH + 1], system.F
+    counts, F = system.settings[SCRATCH : SCRATCH + 1], system.F
     for k in range(F.shape[0]):
         F[k, 4] = F[k, 0]
-    system.settings[UNSETTLED] = system.settings[DOUBTFUL] = 0.0
-    call_kinds(ANGLE, ANGLE, t, system, loops, unused, unused, unused)
+    system.settings[UNSETTLED], counts[0] = 0.0, 1.0
+    call_kinds(ANGLE, ANGLE, t, system, loops, system.settings[DOUBTFUL:], counts, counts)
+    begin_turns(t, y, system)
 
 
 @compiled_into

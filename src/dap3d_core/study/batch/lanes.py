@@ -14,6 +14,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import STEPS, System
+from dap3d_core.assembly.turns import STATE, STATE_WIDTH
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.joint import lanes as tree_lanes
 from dap3d_core.integrators.runge_kutta.lanes import (
@@ -55,7 +56,7 @@ class LanePoints(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(("loaded", "point"), INTEGER_VECTOR),
-        **dict.fromkeys(("par", "body", "constants", "F"), MATRIX),
+        **dict.fromkeys(("par", "body", "constants", "F", "turns"), MATRIX),
     }
 
     loaded: Integers  # (1,) the point whose numbers the system of one scene has
@@ -64,6 +65,19 @@ class LanePoints(Arrays):
     body: Floats
     constants: Floats
     F: Floats
+    turns: Floats  # (L, numbers) states of angles (assembly/turns.py), which each run changes
+
+
+@compiled
+def exchange_turns(lane_points: LanePoints, k: int, system: System, to_lane: bool) -> None:
+    """Copy the states of angles from the system to a lane, or back."""
+    turns, par = lane_points.turns[k], system.par
+    for c in range(turns.shape[0]):
+        place = system.turns[0, STATE] + c
+        if to_lane:
+            turns[c] = par[place]
+        else:
+            par[place] = turns[c]
 
 
 @compiled
@@ -84,6 +98,7 @@ def set_lane(points: Points, p: int, lane_points: LanePoints, k: int, system: Sy
     for q in range(system.F.shape[0]):
         for c in range(FUNCTION_WIDTH):
             lane_points.F[FUNCTION_WIDTH * q + c, k] = system.F[q, c]
+    exchange_turns(lane_points, k, system, True)
 
 
 @compiled
@@ -96,6 +111,7 @@ def load(points: Points, lane_points: LanePoints, k: int, system: System) -> Non
         last = FUNCTION_WIDTH - 1
         for q in range(system.F.shape[0]):
             system.F[q, last] = lane_points.F[FUNCTION_WIDTH * q + last, k]
+    exchange_turns(lane_points, k, system, False)
 
 
 @compiled
@@ -160,6 +176,7 @@ def run_lanes(
             if lanes.does[k] != IDLE:
                 load(points, lane_points, k, system)
                 end_step(work, lanes, k, functions, system, loops)
+                exchange_turns(lane_points, k, system, True)
         spent += active * works[0][1].stage_count
     return active
 
@@ -205,6 +222,7 @@ class LaneBatch:
             point=np.full(self.count, NONE),
             **{name: self._system.matrix(getattr(system, name)) for name in ("par", "body", "F")},
             constants=self._system.matrix(system.tree.constants),
+            turns=np.zeros((self.count, STATE_WIDTH * len(system.turns))),
         )
         self._works = tuple(enumerate(make(self.count)))
         self._wide = (
@@ -273,8 +291,8 @@ def lane_batch(
         return "joints keep rows on the tree, or elements have states"
     if model.iterated_forces or evaluator.has_unknowns:
         return "forces depend on multipliers, or joints have unknowns of their own"
-    if evaluator.switches or evaluator.counts_turns or has_stops:
-        return "it has switches, angles whose turns are counted, or times that no step crosses"
+    if evaluator.switches or evaluator.watched > 1 or has_stops:
+        return "it has switches, angles that are no coordinates, or times that no step crosses"
     if model.body_count > MOST_BODIES:
         return f"it has more than {MOST_BODIES} bodies"
     try:

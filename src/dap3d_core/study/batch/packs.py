@@ -11,6 +11,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.assembly.turns import CONSTANT_WIDTH, CONSTANTS, STATE, STATE_WIDTH
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.model import Group, Model
@@ -80,6 +81,8 @@ def packed(model: Model, count: int) -> Model:
         point_body=model.point_body[:0],
         point_local=model.point_local[:0],
         notes=(),
+        motions=None,
+        joint_angles=None,
         **changed,
     )
 
@@ -125,13 +128,20 @@ class LaneLayout:
         self._n_states = one.model.state_count
         widths = [g.count * g.type_info.layout.state_width for g in one.model.acting]
         self._states = [width for width in widths if width]
-        self._angles = [g.count * len(g.type_info.layout.angles) for g in one.model.acting]
+        own = [g.count * len(g.type_info.layout.angles) for g in one.model.acting]
+        self._angles = [*own, one.model.joint_angle_count]
         self._par = np.full((count, one.system.par.size), -1, dtype=np.int64)
         for q, (_, group) in enumerate(one.loop_groups):
             first, first_of_many = (int(m.system.groups[q, 1]) for m in (one, many))
             size = group.numbers.size
             lanes = size * np.arange(count)[:, None]
             self._par[:, first : first + size] = first_of_many + np.arange(size) + lanes
+        for column, width in ((STATE, STATE_WIDTH), (CONSTANTS, CONSTANT_WIDTH)):
+            size = width * len(one.system.turns)
+            if size:
+                first, first_of_many = (int(m.system.turns[0, column]) for m in (one, many))
+                lanes = size * np.arange(count)[:, None]
+                self._par[:, first : first + size] = first_of_many + np.arange(size) + lanes
         self._sizes = (one.system.par.size, one.system.body.size)
         self._first = (many.system.par.size, many.system.par.size + many.system.body.size)
 

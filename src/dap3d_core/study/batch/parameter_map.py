@@ -13,6 +13,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.assembly.turns import IS_POINT
 from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.body_pose import BodyPose, pose
@@ -107,6 +108,9 @@ class ParameterMap:
             for p in self.parameters
         )
         self.moves = self.moves_start or any(p.table == "points" for p in parameters)
+        angles = evaluator.model.joint_angles
+        if self.moves and angles is not None and np.any(angles.constants[:, IS_POINT]):
+            raise NotCopiedError  # points of joints are among the constants of their angles
         bodies = {p.path[1] for p in parameters if p.path[0] == "bodies"
                   and p.path[2] in ("mass", "Jp")}  # fmt: skip
         self._bodies = np.array(sorted(checked.body_index[b] - 1 for b in bodies), dtype=np.int64)
@@ -242,6 +246,8 @@ class ParameterMap:
         spec = specs_of(type_).get(field)
         if spec is None or spec.kind not in ("number", "vec3"):
             raise NotCopiedError
+        if table == "joints" and self._has_angle(name):
+            raise NotCopiedError  # its axis may depend on the number
         if field.endswith(TOLERANCE) and field.removesuffix(TOLERANCE) in type_.state_lengths():
             raise NotCopiedError
         # with another value another variant may apply
@@ -253,6 +259,12 @@ class ParameterMap:
         targets = tuple(self._targets(instance, field, parameter.index))
         limits = spec if spec.kind == "number" else None
         return MappedParameter(parameter.path, parameter.index, targets, limits, table != "forces")
+
+    def _has_angle(self, joint: str) -> bool:
+        """True if an angle of a joint is counted."""
+        model = self._evaluator.model
+        assert model.joint_angles is not None
+        return model.joint_names.index(joint) in model.joint_angles.coordinates[:, 0]
 
     def _is_smooth_in_time(self, function: Instance) -> bool:
         """True for a function of time alone, without breaks at which a step has to end."""

@@ -67,7 +67,7 @@ class ModelRebuilder:
         checked = check(scene, self._compiled.checked.registry)
         model = build_model(checked)
         self._evaluator.load(model)
-        return checked, model
+        return checked, self._evaluator.model
 
     def prepare(self, point: Floats) -> RebuiltPoint | None:
         """A point as it starts; None where it cannot be run in a batch."""

@@ -18,7 +18,7 @@ def begin_tree(t: float, y: Floats, out: Floats, system: System, loops: Any) -> 
     """Begin a run; ``out`` is not used."""
     place_tree(y, system)
     call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
-    count_from_here(t, system, loops)
+    count_from_here(t, y, system, loops)
 
 
 @compiled

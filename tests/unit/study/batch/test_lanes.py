@@ -149,9 +149,9 @@ def with_friction(scene):
 
 #: What lanes do not take: what makes it, the reason.
 ALONE = {
-    "turns": (with_turns, "it has switches, angles whose turns are counted, or times"),
+    "turns": (with_turns, "it has switches, angles that are no coordinates, or times"),
     "a table": (with_table, "ptp(spline): wrench decides by a number that differs"),
-    "a bend in time": (with_bend, "it has switches, angles whose turns are counted, or times"),
+    "a bend in time": (with_bend, "it has switches, angles that are no coordinates, or times"),
     "friction": (with_friction, "forces depend on multipliers"),
 }
 
