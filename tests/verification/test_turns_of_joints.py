@@ -160,7 +160,8 @@ def driven(function="b", joint="drive-rot", **fields):
     scene.add_vector("down", "ground", (0.0, 0.0, -1.0))
     fields = fields or {"x_start": 0.0, "x_end": 3.0, "f_start": 0.0, "f_end": 100.0}
     scene.add_function(function, "course", **fields)
-    scene.add_joint(joint, "motor", body_i="wheel", a_j="down", function="course")
+    axis = "down" if joint == "rel-rot" else "ground.z"  # the former has the sign of the manual
+    scene.add_joint(joint, "motor", body_i="wheel", a_j=axis, function="course")
     scene.outputs["turns"] = "pin.angle / (2 * pi)"
     return scene
 

@@ -80,15 +80,11 @@ def coordinates_of(
     i, j = (np.array([place[int(body[0])]]) for body in (motion.body_i, motion.body_j))
     motion = attrs.evolve(motion, body_i=i, body_j=j)
     columns = np.array(bodies) - 1
-    parts = [
-        joint_coordinates(
-            motion,
-            t[rows],
-            *(part[:, columns] for part in split(u[rows])),
-            counted=None if counted is None else counted[rows, None],
-        )
-        for rows in _runs(t)
-    ]
+    parts = []
+    for rows in _runs(t):
+        r, p, v, w = (part[:, columns] for part in split(u[rows]))
+        own = None if counted is None else counted[rows, None]
+        parts.append(joint_coordinates(motion, t[rows], r, p, v, w, own))
     q, q_dot = (
         read_only(np.concatenate([part[k][:, 0] for part in parts]))
         if parts
