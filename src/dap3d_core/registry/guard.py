@@ -76,7 +76,7 @@ def guard(source: Source, notes: list[str]) -> Iterator[None]:
             f"{_title(source)}: wrong hook: {' '.join(str(error).split())}. {_remedy(source)}"
         ) from error
     except BaseException as error:  # SystemExit too: a plugin does not end the program
-        if is_out_of_memory(error):
+        if is_out_of_memory(error) and not isinstance(error, MemoryError):  # of a library's file
             raise MemoryError from error
         raise PluginError(f"{_title(source)}: {_reason(error)}. {_remedy(source)}") from error
 

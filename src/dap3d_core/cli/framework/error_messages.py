@@ -66,8 +66,10 @@ def _judge(error: BaseException) -> tuple[int, str]:
     """Exit code and text of an error."""
     from dap3d_core.interface.errors import PluginError, is_out_of_memory
 
-    if is_out_of_memory(error):
-        return exit_codes.FAILED, f"there is not enough memory for this{_memory_limit()}"
+    lack = exit_codes.FAILED, f"there is not enough memory for this{_memory_limit()}"
+    is_lack = is_out_of_memory(error)
+    if is_lack and (isinstance(error, MemoryError) or address_space() is not None):
+        return lack
     from dap3d_core.scene import SceneError
 
     if isinstance(error, KeyboardInterrupt):
@@ -77,6 +79,8 @@ def _judge(error: BaseException) -> tuple[int, str]:
         return exit_codes.FAILED, f"{error}; nothing was computed yet"
     if isinstance(error, (SceneError, PluginError, exit_codes.Refused)):
         return exit_codes.REFUSED, str(error)
+    if is_lack:
+        return lack
     if _is_unexpected(error):
         text = " ".join(str(error).split())
         return exit_codes.FAILED, f"unexpected {type(error).__name__}{text and f': {text}'}"
