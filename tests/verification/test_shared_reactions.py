@@ -89,7 +89,7 @@ def speed_after(t_end):
 )
 def test_friction_in_redundant_hinges_is_refused(scene, method):
     """No method has a motion to offer; the message names what to do."""
-    words = r'f0, f1.*not unique.*independent.*sph_sd.*shared = "least"'
+    words = r'f0, f1.*not unique.*independent.*bushing.*shared = "least"'
     with pytest.raises(dap.RedundantError, match=words):
         dap.simulate(scene, t_end=1.0, method=method)
 

@@ -104,8 +104,8 @@ def why_refused(laws: Sequence[SharedLaw]) -> str:
         "the law reads reactions that are not unique, of "
         f"joint{'s' if len(joints) > 1 else ''} {some(list(joints), MOST_NAMES)}: redundant rows "
         "can share their load in many ways, and each gives another motion. Make the rows "
-        "independent, by joints of fewer rows; or give each joint its share, by springs in place "
-        "of some (sph_sd and rot_sda, or a bushing), which carry what their stiffness says; or "
+        "independent, by joints of fewer rows; or give each joint its share, by a bushing in "
+        "its place (or sph_sd and rot_sda), which carries what its stiffness says; or "
         f"{own}: a note then says how much the outcome depends on it"
     )
 
