@@ -210,6 +210,7 @@ class RunState:
                 "rtol": self.settings.rtol,
                 "atol": self.settings.atol,
                 "length": self.evaluator.model.length,
+                "extent": self.evaluator.model.extent,
                 "most_work": max((run.largest_work for run in self.integrations), default=0.0),
                 **self._rate_noise(),
                 "step": self.settings.step,
