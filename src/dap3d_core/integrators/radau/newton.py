@@ -313,7 +313,8 @@ def find_stages(
         is not finite.
     """
     limit = newton_limit(work)
-    work.convergence_factor = max(work.convergence_factor, ROUNDING) ** 0.8
+    stale = abs(h - work.factored_step) / h  # factors of another step converge at this rate
+    work.convergence_factor = max(max(work.convergence_factor, ROUNDING) ** 0.8, stale)
     before = ratio = ratio_before = states = multipliers = 1.0
     was_found = False
     fixed = work.fixed_step != 0.0

@@ -157,7 +157,7 @@ def step(
     error = estimate_error(t, h, work, system, loops, tangent, matrix) if adaptive else 0.0
     if error < 1.0:
         find_work(t, h, work, system, loops, tangent, matrix)
-        failure = project_end(work, t1, h, project, system, loops)
+        failure = project_state(work, t1, state[TRIAL], project, system, loops)
         if failure == RUNNING:
             find_slope(t, h, work, system, loops, tangent, matrix)
             failure = complete_step(work, t1, h, watch, system, loops)
@@ -266,14 +266,6 @@ def safety_factor(work: RadauState) -> float:
     """Safety factor of the next step: smaller where the iteration took long (HW IV.8)."""
     most = 2.0 * MOST
     return min(SAFETY, SAFETY * (1.0 + most) / (work.last_iterations + most))
-
-
-@compiled
-def project_end(
-    work: RadauState, t1: float, h: float, project: Function, system: System, loops: Any
-) -> int:
-    """XXX"""
-    return project_state(work, t1, work.state[TRIAL], project, system, loops)
 
 
 @compiled
