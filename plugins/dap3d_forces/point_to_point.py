@@ -1,7 +1,7 @@
 """Point-to-point spring, damper and actuator."""
 
 from dap3d_core.interface import Force, Vector2, function, hookimpl, input_, number, vector2
-from dap3d_core.kernels import cross, dot, neg, scale, sqrt
+from dap3d_core.kernels import abs, add, cross, dot, neg, scale, sqrt, where
 
 interface_version = 1
 
@@ -18,12 +18,15 @@ class PointToPoint(Force):
     A function of l - l0 takes the place of k (l - l0): F = f(l - l0) + c l_dot + f_a, without an
     energy. A factor, a function of time, or an input multiplies f_a, which then counts as work.
     Where the two points coincide u is undefined: a scene that starts so is refused, and a
-    run that comes there stops and says so.
+    run that comes there stops and says so. With l0 = 0, without f_a and function, no direction is
+    needed: the spring is k d, and the damper acts along the motion, c d_dot.
     """
 
     keyword = "ptp"
     actuates = "f_a"
-    d: Vector2 = vector2(direction=True, doc="from the end on body i to the end on body j")
+    d: Vector2 = vector2(
+        direction=("l0", "f_a", "function"), doc="from the end on body i to the end on body j"
+    )
     k: float = number(default=0.0, unit="N/m", usual=(0.0, None), doc="stiffness")
     c: float = number(default=0.0, unit="N s/m", usual=(0.0, None), doc="damping coefficient")
     l0: float = number(default=0.0, unit="m", minimum=0.0, doc="undeformed length")
@@ -35,8 +38,10 @@ class PointToPoint(Force):
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a):
         length = sqrt(dot(d, d))
-        u = scale(1.0 / length, d)
-        return pull(k * (length - l0) + c * dot(u, d_dot) + f_a, u, s_P_i, s_P_j)
+        directed = length + abs(l0) + abs(f_a) > 0.0
+        u = scale(1.0 / where(directed, length, 1.0), d)
+        T = k * (length - l0) + c * dot(u, d_dot) + f_a
+        return pull_if(directed, T, u, add(scale(k, d), scale(c, d_dot)), s_P_i, s_P_j)
 
     def energy(d, k, l0, f_a):
         length = sqrt(dot(d, d))
@@ -50,8 +55,10 @@ class OfTime(PointToPoint, function=False, factor=True):
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, factor):
         length = sqrt(dot(d, d))
-        u = scale(1.0 / length, d)
-        return pull(k * (length - l0) + c * dot(u, d_dot) + factor * f_a, u, s_P_i, s_P_j)
+        directed = length + abs(l0) + abs(f_a) > 0.0
+        u = scale(1.0 / where(directed, length, 1.0), d)
+        T = k * (length - l0) + c * dot(u, d_dot) + factor * f_a
+        return pull_if(directed, T, u, add(scale(k, d), scale(c, d_dot)), s_P_i, s_P_j)
 
     def energy(d, k, l0):
         return spring_energy(d, k, l0)
@@ -64,8 +71,10 @@ class Actuated(PointToPoint, function=False, input=True):
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, input):
         length = sqrt(dot(d, d))
-        u = scale(1.0 / length, d)
-        return pull(k * (length - l0) + c * dot(u, d_dot) + input * f_a, u, s_P_i, s_P_j)
+        directed = length + abs(l0) + abs(f_a) > 0.0
+        u = scale(1.0 / where(directed, length, 1.0), d)
+        T = k * (length - l0) + c * dot(u, d_dot) + input * f_a
+        return pull_if(directed, T, u, add(scale(k, d), scale(c, d_dot)), s_P_i, s_P_j)
 
     def energy(d, k, l0):
         return spring_energy(d, k, l0)
@@ -112,7 +121,18 @@ def spring_energy(d, k, l0):
 
 def pull(T, u, s_i, s_j):
     """The tension T along u at the ends of the arms."""
-    F = scale(T, u)
+    return at_ends(scale(T, u), s_i, s_j)
+
+
+def pull_if(directed, T, u, other, s_i, s_j):
+    """The same, or another force where there is no direction."""
+    along = scale(T, u)
+    F = tuple(where(directed, x, y) for x, y in zip(along, other, strict=True))
+    return at_ends(F, s_i, s_j)
+
+
+def at_ends(F, s_i, s_j):
+    """The force F on body i, and its opposite on body j, at the ends of the arms."""
     return (F, cross(s_i, F)), (neg(F), neg(cross(s_j, F)))
 
 

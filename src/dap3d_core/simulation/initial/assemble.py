@@ -279,7 +279,7 @@ def _failure(
     if len(still_open) > MOST_JOINTS:
         lines.append(f"  and {len(still_open) - MOST_JOINTS} joints more")
     names = ", ".join(model.body_names[b - 1] for b in held)
-    why = ["bodies too short or too long to reach, and",
+    why = ["bodies that do not reach their joints, and",
            "contradictory joints cannot be assembled"]  # fmt: skip
     if is_far:
         why = ["the bodies were still on their way: give positions nearer to an assembled pose,",
