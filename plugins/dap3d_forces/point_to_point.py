@@ -1,9 +1,12 @@
 """Point-to-point spring, damper and actuator."""
 
 from dap3d_core.interface import Force, Vector2, function, hookimpl, input_, number, vector2
-from dap3d_core.kernels import abs, add, cross, dot, neg, scale, sqrt, where
+from dap3d_core.kernels import add, cross, dot, neg, scale, sqrt
 
 interface_version = 1
+
+#: m^2, N: less than the last digit of any square of a length.
+NEAR = 1e-140
 
 
 class PointToPoint(Force):
@@ -37,11 +40,9 @@ class PointToPoint(Force):
     function: str = function(argument="l - l0", doc="force, N, in place of k (l - l0)")
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a):
-        length = sqrt(dot(d, d))
-        directed = length + abs(l0) + abs(f_a) > 0.0
-        u = scale(1.0 / where(directed, length, 1.0), d)
+        length, u, at_zero = line(d, l0 * l0 + f_a * f_a)
         T = k * (length - l0) + c * dot(u, d_dot) + f_a
-        return pull_if(directed, T, u, add(scale(k, d), scale(c, d_dot)), s_P_i, s_P_j)
+        return pull_damped(T, u, scale(at_zero * c, d_dot), s_P_i, s_P_j)
 
     def energy(d, k, l0, f_a):
         length = sqrt(dot(d, d))
@@ -54,11 +55,9 @@ class OfTime(PointToPoint, function=False, factor=True):
     energy_where = "without f_a"
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, factor):
-        length = sqrt(dot(d, d))
-        directed = length + abs(l0) + abs(f_a) > 0.0
-        u = scale(1.0 / where(directed, length, 1.0), d)
+        length, u, at_zero = line(d, l0 * l0 + f_a * f_a)
         T = k * (length - l0) + c * dot(u, d_dot) + factor * f_a
-        return pull_if(directed, T, u, add(scale(k, d), scale(c, d_dot)), s_P_i, s_P_j)
+        return pull_damped(T, u, scale(at_zero * c, d_dot), s_P_i, s_P_j)
 
     def energy(d, k, l0):
         return spring_energy(d, k, l0)
@@ -70,11 +69,9 @@ class Actuated(PointToPoint, function=False, input=True):
     energy_where = "without f_a"
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, input):
-        length = sqrt(dot(d, d))
-        directed = length + abs(l0) + abs(f_a) > 0.0
-        u = scale(1.0 / where(directed, length, 1.0), d)
+        length, u, at_zero = line(d, l0 * l0 + f_a * f_a)
         T = k * (length - l0) + c * dot(u, d_dot) + input * f_a
-        return pull_if(directed, T, u, add(scale(k, d), scale(c, d_dot)), s_P_i, s_P_j)
+        return pull_damped(T, u, scale(at_zero * c, d_dot), s_P_i, s_P_j)
 
     def energy(d, k, l0):
         return spring_energy(d, k, l0)
@@ -119,16 +116,27 @@ def spring_energy(d, k, l0):
     return 0.5 * k * x * x
 
 
+def line(d, bound):
+    """Length of d, unit vector along it, and 0, or 1 at zero length.
+
+    Where there is no force at zero length (bound = 0) the unit vector is zero there, and T u has the
+    derivative T / length; else neither is a number.
+    """
+    part = NEAR / (NEAR + bound)
+    near = NEAR * (part * part)  # underflows with a bound
+    square = dot(d, d)
+    length = sqrt(square + near)
+    return length, scale(1.0 / length, d), 1.0 - square / (square + near)
+
+
 def pull(T, u, s_i, s_j):
     """The tension T along u at the ends of the arms."""
     return at_ends(scale(T, u), s_i, s_j)
 
 
-def pull_if(directed, T, u, other, s_i, s_j):
-    """The same, or another force where there is no direction."""
-    along = scale(T, u)
-    F = tuple(where(directed, x, y) for x, y in zip(along, other, strict=True))
-    return at_ends(F, s_i, s_j)
+def pull_damped(T, u, F, s_i, s_j):
+    """The same, and a force F."""
+    return at_ends(add(scale(T, u), F), s_i, s_j)
 
 
 def at_ends(F, s_i, s_j):
