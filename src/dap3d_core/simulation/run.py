@@ -292,6 +292,7 @@ class Run(RunState):
             notes += rounding_notes(self.integrations, self.evaluator)
         notes += recorder.pulling.notes()
         notes += [recorder.spread.note()] if recorder.spread is not None else []
+        notes += recorder.creep.notes(self.evaluator)
         notes += event_locator.notes() if event_locator else []
         notes += self.jumps.notes(self.present) if self.jumps is not None else []
         notes += event_notes(self.integrations, self.events())

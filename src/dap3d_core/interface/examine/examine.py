@@ -71,7 +71,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
-    _check_actuates(type_, layout)
+    _check_named_fields(type_, layout)
     _check_reset(type_, layout)
     if has_states:
         _check_state_names(type_, layout)
@@ -244,12 +244,18 @@ def _check_symbol(type_: type[TypeBase], layout: InstanceLayout) -> None:
         )
 
 
-def _check_actuates(type_: type[TypeBase], layout: InstanceLayout) -> None:
+def _check_named_fields(type_: type[TypeBase], layout: InstanceLayout) -> None:
     field = getattr(type_, "actuates", "")
     if field and layout.numbers.get(field, (0, None))[1] not in ((), (3,)):
         raise PluginError(
             f"{where_is(type_)}: actuates = {field!r} names no field of a number or of three; name "
             "the one that an actuator sets"
+        )
+    field = getattr(type_, "regularised", "")
+    if field and layout.numbers.get(field, (0, None))[1] != ():
+        raise PluginError(
+            f"{where_is(type_)}: regularised = {field!r} names no field of a number; name the speed "
+            "or rate below which friction fades"
         )
 
 
