@@ -236,8 +236,7 @@ def _check_symbol(type_: type[TypeBase], layout: InstanceLayout) -> None:
         raise PluginError(f"{who}: {symbol} is not one of {', '.join(SYMBOLS)}")
     stored = {name: s.kind for name, s in specs_of(type_).items() if name in layout.numbers}
     offered = {*layout.slots, *stored, *stored.values()}
-    lacking = [name for name in SYMBOLS[type_.symbol] if name not in offered]
-    if lacking:
+    if lacking := [name for name in SYMBOLS[type_.symbol] if name not in offered]:
         raise PluginError(
             f"{who}: {symbol} is drawn from {', '.join(lacking)}, which the type does not have; "
             'name another symbol, or leave "" to draw what it declares'
@@ -245,18 +244,13 @@ def _check_symbol(type_: type[TypeBase], layout: InstanceLayout) -> None:
 
 
 def _check_named_fields(type_: type[TypeBase], layout: InstanceLayout) -> None:
-    field = getattr(type_, "actuates", "")
-    if field and layout.numbers.get(field, (0, None))[1] not in ((), (3,)):
-        raise PluginError(
-            f"{where_is(type_)}: actuates = {field!r} names no field of a number or of three; name "
-            "the one that an actuator sets"
-        )
-    field = getattr(type_, "regularised", "")
-    if field and layout.numbers.get(field, (0, None))[1] != ():
-        raise PluginError(
-            f"{where_is(type_)}: regularised = {field!r} names no field of a number; name the speed "
-            "or rate below which friction fades"
-        )
+    for word, shapes, what in (
+        ("actuates", ((), (3,)), "of a number or of three; name the one that an actuator sets"),
+        ("regularised", ((),), "of a number; name the speed below which friction fades"),
+    ):
+        field = getattr(type_, word, "")
+        if field and layout.numbers.get(field, (0, 0))[1] not in shapes:
+            raise PluginError(f"{where_is(type_)}: {word} = {field!r} names no field {what}")
 
 
 def _constant(name: Any, value: Any, broken: Callable[[str], PluginError]) -> Any:
