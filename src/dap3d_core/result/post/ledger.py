@@ -191,13 +191,16 @@ def _energy_scale(summary: ModelSummary, course: LedgerSeries, record: RunMetada
     while a weight sinks has errors of its own size, not of that of the difference. Work is done
     between the reported instants, too: the record has the most at accepted steps.
 
-    A system at rest does no work; its scale is such that its rounding may be MOST of it.
+    A system at rest does no work; its scale is such that its rounding may be MOST of it. It is not
+    at rest where it moves with more than that: loads of a run that blew up are no measure.
     """
+    rounding = _rounding_at_rest(summary, course, record)
+    is_at_rest = _largest(course.kinetic) <= rounding
     work = max(_largest(course.work - course.work[0]), float(record.settings.get("most_work", 0.0)))
     exchanged = _largest(course.potential_energy - course.potential_energy[0])
     return max(
         float(course.kinetic[0]) + max(work, exchanged),
-        _rounding_at_rest(summary, course, record) / MOST,
+        rounding / MOST if is_at_rest else 0.0,
         SMALLEST,
     )
 

@@ -18,9 +18,9 @@ from dap3d_core.result.arrays import Arrays, joined
 
 #: Evaluations of all elements together, and instants at least and at most.
 WORK, FEWEST, MOST = 1000, 10, 100
-#: Friction between these parts of the whole is that of a contact within v_tol (tanh 1), and not of
-#: one at rest without load.
-LEAST, WITHIN = 1e-6, math.tanh(1.0)
+#: Friction between these parts of the whole is that of a contact within three times v_tol, and not
+#: of one at rest without load.
+LEAST, WITHIN = 1e-6, math.tanh(3.0)
 #: It creeps for long from this part of a run on, and this many instants.
 LONG, INSTANTS = 0.05, 3
 #: Part of v_tol at which friction is whole.
@@ -82,9 +82,10 @@ class CreepMonitor:
         fastest, length = float(np.max(speed[first:last])), unit.removesuffix("/s")
         return (
             f"forces.{self._model.force_names[int(group.members[k])]}: from t = {t[first]:.6g} to "
-            f"{t[last - 1]:.6g} s its contact is within {field} = {limit:g} {unit}, where "
-            f"regularised friction does not stick: it creeps, at up to {fastest:.3g} {unit}, by "
-            f"{far:.3g} {length}. It creeps less, in proportion, with a smaller {field}"
+            f"{t[last - 1]:.6g} s its contact is near {field} = {limit:g} {unit}, where "
+            "regularised friction does not stick: what should stay creeps, at up to "
+            f"{fastest:.3g} {unit}, by {far:.3g} {length}. It creeps less, in proportion, with a "
+            f"smaller {field}"
         )
 
 
