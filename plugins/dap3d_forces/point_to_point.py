@@ -119,8 +119,8 @@ def spring_energy(d, k, l0):
 def line(d, bound):
     """Length of d, unit vector along it, and 0, or 1 at zero length.
 
-    Where there is no force at zero length (bound = 0) the unit vector is zero there, and T u has the
-    derivative T / length; else neither is a number.
+    Where there is no force at zero length (bound = 0) the unit vector is zero there, and T u has
+    the derivative T / length; else neither is a number.
     """
     part = NEAR / (NEAR + bound)
     near = NEAR * (part * part)  # underflows with a bound

@@ -19,8 +19,8 @@ from dap3d_core.result.arrays import Arrays, joined
 #: Evaluations of all elements together, and instants at least and at most.
 WORK, FEWEST, MOST = 1000, 10, 100
 #: Friction between these parts of the whole is that of a contact within three times v_tol, and not
-#: of one at rest without load.
-LEAST, WITHIN = 1e-6, math.tanh(3.0)
+#: of one at rest without load, whose speed is an error of the steps.
+LEAST, WITHIN = 1e-3, math.tanh(3.0)
 #: It creeps for long from this part of a run on, and this many instants.
 LONG, INSTANTS = 0.05, 3
 #: Part of v_tol at which friction is whole.
