@@ -137,7 +137,8 @@ def step(
     matrix: StageMatrix,
 ) -> None:
     """Try one step: accept it, reject it, or stop the run; functions: project, accepted, watch."""
-    project, accepted, watch = functions
+    (project, accepted, watch), find_work = functions, parts[6]
+    estimate_error, find_slope = parts[3], parts[4]
     state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
     end = t1 = end_of_step(work)
     longest = h = t1 - t
