@@ -23,6 +23,7 @@ class RotationFriction(Force):
 
     keyword = "rot_friction"
     symbol = "ring"
+    regularised = "w_tol"
     body_i: Body = body(doc="body that turns")
     body_j: Body = body(doc="body against which it turns")
     axis: Vector = vector(doc="axis, on either body")
@@ -45,6 +46,7 @@ class TranslationFriction(Force):
     """
 
     keyword = "tran_friction"
+    regularised = "v_tol"
     P_i: Point = point(doc="where body i slides")
     a_j: Vector = vector(doc="axis it slides along, on body j")
     f_c: float = number(unit="N", minimum=0.0, doc="friction force")

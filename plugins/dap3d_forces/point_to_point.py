@@ -1,9 +1,12 @@
 """Point-to-point spring, damper and actuator."""
 
 from dap3d_core.interface import Force, Vector2, function, hookimpl, input_, number, vector2
-from dap3d_core.kernels import cross, dot, neg, scale, sqrt
+from dap3d_core.kernels import add, cross, dot, neg, scale, sqrt
 
 interface_version = 1
+
+#: m^2, N: less than the last digit of any square of a length.
+NEAR = 1e-140
 
 
 class PointToPoint(Force):
@@ -18,12 +21,15 @@ class PointToPoint(Force):
     A function of l - l0 takes the place of k (l - l0): F = f(l - l0) + c l_dot + f_a, without an
     energy. A factor, a function of time, or an input multiplies f_a, which then counts as work.
     Where the two points coincide u is undefined: a scene that starts so is refused, and a
-    run that comes there stops and says so.
+    run that comes there stops and says so. With l0 = 0, without f_a and function, no direction is
+    needed: the spring is k d, and the damper acts along the motion, c d_dot.
     """
 
     keyword = "ptp"
     actuates = "f_a"
-    d: Vector2 = vector2(direction=True, doc="from the end on body i to the end on body j")
+    d: Vector2 = vector2(
+        direction=("l0", "f_a", "function"), doc="from the end on body i to the end on body j"
+    )
     k: float = number(default=0.0, unit="N/m", usual=(0.0, None), doc="stiffness")
     c: float = number(default=0.0, unit="N s/m", usual=(0.0, None), doc="damping coefficient")
     l0: float = number(default=0.0, unit="m", minimum=0.0, doc="undeformed length")
@@ -34,9 +40,9 @@ class PointToPoint(Force):
     function: str = function(argument="l - l0", doc="force, N, in place of k (l - l0)")
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a):
-        length = sqrt(dot(d, d))
-        u = scale(1.0 / length, d)
-        return pull(k * (length - l0) + c * dot(u, d_dot) + f_a, u, s_P_i, s_P_j)
+        length, u, at_zero = line(d, l0 * l0 + f_a * f_a)
+        T = k * (length - l0) + c * dot(u, d_dot) + f_a
+        return pull_damped(T, u, scale(at_zero * c, d_dot), s_P_i, s_P_j)
 
     def energy(d, k, l0, f_a):
         length = sqrt(dot(d, d))
@@ -49,9 +55,9 @@ class OfTime(PointToPoint, function=False, factor=True):
     energy_where = "without f_a"
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, factor):
-        length = sqrt(dot(d, d))
-        u = scale(1.0 / length, d)
-        return pull(k * (length - l0) + c * dot(u, d_dot) + factor * f_a, u, s_P_i, s_P_j)
+        length, u, at_zero = line(d, l0 * l0 + f_a * f_a)
+        T = k * (length - l0) + c * dot(u, d_dot) + factor * f_a
+        return pull_damped(T, u, scale(at_zero * c, d_dot), s_P_i, s_P_j)
 
     def energy(d, k, l0):
         return spring_energy(d, k, l0)
@@ -63,9 +69,9 @@ class Actuated(PointToPoint, function=False, input=True):
     energy_where = "without f_a"
 
     def wrench(d, d_dot, s_P_i, s_P_j, k, c, l0, f_a, input):
-        length = sqrt(dot(d, d))
-        u = scale(1.0 / length, d)
-        return pull(k * (length - l0) + c * dot(u, d_dot) + input * f_a, u, s_P_i, s_P_j)
+        length, u, at_zero = line(d, l0 * l0 + f_a * f_a)
+        T = k * (length - l0) + c * dot(u, d_dot) + input * f_a
+        return pull_damped(T, u, scale(at_zero * c, d_dot), s_P_i, s_P_j)
 
     def energy(d, k, l0):
         return spring_energy(d, k, l0)
@@ -110,9 +116,31 @@ def spring_energy(d, k, l0):
     return 0.5 * k * x * x
 
 
+def line(d, bound):
+    """Length of d, unit vector along it, and 0, or 1 at zero length.
+
+    Where there is no force at zero length (bound = 0) the unit vector is zero there, and T u has
+    the derivative T / length; else neither is a number.
+    """
+    part = NEAR / (NEAR + bound)
+    near = NEAR * (part * part)  # underflows with a bound
+    square = dot(d, d)
+    length = sqrt(square + near)
+    return length, scale(1.0 / length, d), 1.0 - square / (square + near)
+
+
 def pull(T, u, s_i, s_j):
     """The tension T along u at the ends of the arms."""
-    F = scale(T, u)
+    return at_ends(scale(T, u), s_i, s_j)
+
+
+def pull_damped(T, u, F, s_i, s_j):
+    """The same, and a force F."""
+    return at_ends(add(scale(T, u), F), s_i, s_j)
+
+
+def at_ends(F, s_i, s_j):
+    """The force F on body i, and its opposite on body j, at the ends of the arms."""
     return (F, cross(s_i, F)), (neg(F), neg(cross(s_j, F)))
 
 

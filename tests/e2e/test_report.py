@@ -81,5 +81,12 @@ def test_the_error_of_a_run_is_estimated_shown_and_stored(dap3d):
     assert 0.0 < error.largest["r"] < 1e-6
     info = dap3d("info", "pen1.nc", "--json")
     assert json.loads(info.stdout)["error_estimate"]["r"] == error.largest["r"]
-    plain = dap3d("run", "pen1", "--t-end", "0.2", "--force", "--json", "--strict")
+    plain = dap3d("run", "pen1", "--t-end", "0.2", "--force", "--json", "--no-estimate", "--strict")
     assert json.loads(plain.stdout)["error_estimate"] is None
+
+
+def test_a_short_run_estimates_its_error_unasked(dap3d):
+    """A second run that takes less than a second; scripts do so on request alone."""
+    done = dap3d("run", "pen1", "--t-end", "0.2", "--json", "--strict")
+    assert 0.0 < json.loads(done.stdout)["error_estimate"]["r"] < 1e-6
+    assert dap.simulate("pen1", t_end=0.2).error is None

@@ -36,8 +36,9 @@ class FieldSpec:
         usual: least and greatest number (None: none) outside of which a scene gets a note.
         choices: allowed words of a choice (or False and True).
         aliases: other words for some of them.
-        direction: a vector between two points must not have zero length at the start of a run;
-            three numbers should have unit length (with a note otherwise).
+        direction: a vector between two points must not have zero length at the start of a run, or
+            only where one of these fields is given and not zero; three numbers should have unit
+            length (with a note otherwise).
         across: the field of a vector that this one must not be parallel to at the start of a run.
         unit_length: a vector is normalised (with a warning where its length is not 1).
         ground: a vector must be fixed in ground.
@@ -63,7 +64,7 @@ class FieldSpec:
     choices: tuple[Any, ...] = ()
     aliases: Mapping[str, str] = attrs.field(factory=dict)
     unit_length: bool = False
-    direction: bool = False
+    direction: bool | tuple[str, ...] = False
     across: str = ""
     ground: bool = False
     argument: str = ""
@@ -114,11 +115,14 @@ def vector(
     return _field(spec)
 
 
-def vector2(default: Any = REQUIRED, *, direction: bool = False, doc: str = "") -> Any:
+def vector2(
+    default: Any = REQUIRED, *, direction: bool | tuple[str, ...] = False, doc: str = ""
+) -> Any:
     """A vector between two points (type 2), by name; ``P_i`` and ``P_j`` may be given instead.
 
     With ``direction`` the element acts along it: a scene is refused where the two points coincide
-    at the start of a run.
+    at the start of a run. With names of fields (numbers, a function of an argument) only where one
+    of them is given and not zero.
     """
     return _field(FieldSpec("vector2", default, unit="m", doc=doc, direction=direction))
 

@@ -199,6 +199,8 @@ class Force(TypeBase):
             pull.
         restitution: field, the coefficient of restitution e of all rows: J v becomes -e J v. It is
             for ``dap3d check-plugin``; "" for no such field.
+        regularised: field, the speed or rate below which its friction fades as tanh(v / field)
+            does: a run in which it creeps instead of sticking says so; "" for no such field.
     """
 
     kind = "force"
@@ -209,6 +211,7 @@ class Force(TypeBase):
     each_body: ClassVar[bool] = False
     energy_where: ClassVar[str] = ""
     actuates: ClassVar[str] = ""
+    regularised: ClassVar[str] = ""
 
 
 class Function(TypeBase):

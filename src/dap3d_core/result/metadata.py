@@ -162,6 +162,11 @@ class RunMetadata:
         return float(self.settings.get("length", 1.0))
 
     @property
+    def extent(self) -> float:
+        """The length of the scene, m (Model.extent); that of its tolerances in older results."""
+        return float(self.settings.get("extent", self.length))
+
+    @property
     def projected(self) -> bool:
         """True if states were projected on the constraints."""
         return bool(self.settings.get("project", False))

@@ -4,6 +4,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+import attrs
 import numpy as np
 
 from dap3d_core.formulations.pivots import store_reference_pivots
@@ -19,7 +20,12 @@ from dap3d_core.simulation.handover import cannot_cross, crossing_notes, hand_ov
 from dap3d_core.simulation.initial.singular_start import SingularStart
 from dap3d_core.simulation.initial.tolerances import motion_notes, rounding_notes
 from dap3d_core.simulation.initial_state import InitialState, start_notes
-from dap3d_core.simulation.output.error_estimate import StepLimits, add_error
+from dap3d_core.simulation.output.error_estimate import (
+    QUICK,
+    StepLimits,
+    add_error,
+    ending_after,
+)
 from dap3d_core.simulation.output.termination import doubts, event_notes, why_stopped
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.redundancy.redundancy import Redundancy
@@ -110,7 +116,8 @@ class Run(RunState):
             raise SimulationError(message, result)
         assert result is not None
         if self.estimate_error:
-            add_error(result, self.settings, self._again, self.recorder.output)
+            quick = self.estimate_error == QUICK
+            add_error(result, self.settings, self._again, self.recorder.output, quick=quick)
         return result
 
     def _interrupt(self, error: BaseException) -> None:
@@ -128,10 +135,12 @@ class Run(RunState):
         elif self.checkpoint_writer is not None:
             self.checkpoint_writer.remove()
 
-    def _again(self, settings: Simulation, limits: StepLimits | None) -> Result:
+    def _again(self, settings: Simulation, limits: StepLimits | None, seconds: float) -> Result:
         """The result of a second run with other settings and limits of its steps, in memory."""
         events = self.event_locator.events if self.event_locator else ()
-        run = Run(self.compiled, settings, self.callbacks, events, limits=limits, start=self.start)
+        watch = ending_after(seconds, self.callbacks.watch)
+        callbacks = attrs.evolve(self.callbacks, watch=watch)
+        run = Run(self.compiled, settings, callbacks, events, limits=limits, start=self.start)
         return run.go()
 
     def _start(self) -> InitialState:
@@ -292,6 +301,7 @@ class Run(RunState):
             notes += rounding_notes(self.integrations, self.evaluator)
         notes += recorder.pulling.notes()
         notes += [recorder.spread.note()] if recorder.spread is not None else []
+        notes += recorder.creep.notes(self.evaluator)
         notes += event_locator.notes() if event_locator else []
         notes += self.jumps.notes(self.present) if self.jumps is not None else []
         notes += event_notes(self.integrations, self.events())

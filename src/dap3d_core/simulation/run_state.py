@@ -61,7 +61,8 @@ class RunState:
             the time at which radau takes over again, s.
         rank: of the constraints at the start.
         is_whole: the run is between two chunks, its rows taken.
-        estimate_error: a second run is to estimate the error of this one.
+        estimate_error: a second run is to estimate the error of this one; "quick" where that takes
+            less than a second.
         limits: of the steps of such a second run.
         start: a state in place of the scene's initial conditions; None for what the settings say.
         jumps: changes of velocities by elements; None where no type of the scene has any.
@@ -80,7 +81,7 @@ class RunState:
         output: str | os.PathLike[str] | None = None,
         force: bool = False,
         identity: str = "",
-        estimate_error: bool = False,
+        estimate_error: bool | str = False,
         limits: StepLimits | None = None,
         start: "StartState | None" = None,
         controllers: "Sequence[Controller]" = (),
@@ -210,6 +211,7 @@ class RunState:
                 "rtol": self.settings.rtol,
                 "atol": self.settings.atol,
                 "length": self.evaluator.model.length,
+                "extent": self.evaluator.model.extent,
                 "most_work": max((run.largest_work for run in self.integrations), default=0.0),
                 **self._rate_noise(),
                 "step": self.settings.step,

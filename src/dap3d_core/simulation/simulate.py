@@ -37,7 +37,7 @@ def simulate(
     force: bool = False,
     correct_metric: str | None = None,
     start: "Start | None" = None,
-    estimate_error: bool = False,
+    estimate_error: bool | str = False,
     checkpoint: float | None = None,
     events: Sequence[Event] = (),
     watch: Callable[[RunProgress], None] | None = None,
@@ -57,7 +57,7 @@ def simulate(
         progress, watch: called each 0.1 s or so, as progress(t, t_end), with a ``RunProgress``.
         events, controllers: see ``Event`` and ``Controller``.
         output, force: file to write, ``OUTPUT.part`` meanwhile; whether over an existing one.
-        estimate_error: estimate ``result.error`` by a second, finer run.
+        estimate_error: estimate ``result.error`` by a second, finer run; "quick": if within 1 s.
         checkpoint: seconds between checkpoints, for ``resume``; inf: one where the run is ended.
 
     Raises:

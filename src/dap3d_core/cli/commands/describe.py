@@ -191,6 +191,8 @@ def _allowed(spec: Any) -> str:
     words += [f"usually {' '.join(usual)}"] * bool(usual)
     if spec.direction:
         words.append("of unit length" if spec.kind == "vec3" else "not of zero length")
+        if isinstance(spec.direction, tuple):
+            words[-1] += f" at the start, unless without {', '.join(spec.direction)}"
     words += [f"not along {spec.across}"] * bool(spec.across)
     return ", ".join(words)
 

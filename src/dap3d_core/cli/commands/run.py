@@ -26,9 +26,10 @@ if TYPE_CHECKING:
     click.option("--from", "start_file", metavar="RESULT[@TIME]",
                  help="Start from the state of a result, at its end or at a time in s; bodies are "
                       "matched by their names."),
-    click.option("--error", "estimate_error", is_flag=True,
+    click.option("--error/--no-estimate", "estimate_error", default=None,
                  help="Estimate the error of all positions and velocities by a second run at "
-                      "tolerances ten times tighter, or half the step."),
+                      "tolerances ten times tighter, or half the step; by default where that takes "
+                      "less than a second."),
     click.option("--checkpoint", type=options.Seconds(), metavar="EVERY", default=math.inf,
                  help="Write RESULT.checkpoint so often: 90, 5min, 2h; dap3d resume continues "
                       "from it, also after the run was killed."),
@@ -69,6 +70,8 @@ def run(
     start, source = _start(ctx, start_file, given)
     target = writable(named_after(model, output), force=force, sources=(scene.path, source))
     options.check_settings(scene, given)
+    if given["estimate_error"] is None:
+        given["estimate_error"] = "quick"
     given["start"] = start
     names = options.SETTINGS | ({"start": "--from"} if start_file else {})
 

@@ -19,6 +19,7 @@ from dap3d_core.integrators.radau.newton import (
     factorise_both,
     find_stages,
     find_tangent,
+    find_work,
 )
 from dap3d_core.integrators.radau.rounding import measure_stage_noise
 from dap3d_core.integrators.radau.state import RadauState
@@ -228,7 +229,7 @@ class RadauIntegration(Integration):
         )  # fmt: skip
         parts = (
             find_tangent, factorise_both, find_stages, estimate_error, find_slope,
-            measure_stage_noise,
+            measure_stage_noise, find_work,
         )  # fmt: skip
         return table_of(signature, parts)
 

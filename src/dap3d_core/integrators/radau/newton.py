@@ -313,7 +313,8 @@ def find_stages(
         is not finite.
     """
     limit = newton_limit(work)
-    work.convergence_factor = max(work.convergence_factor, ROUNDING) ** 0.8
+    stale = abs(h - work.factored_step) / h  # factors of another step converge at this rate
+    work.convergence_factor = max(max(work.convergence_factor, ROUNDING) ** 0.8, stale)
     before = ratio = ratio_before = states = multipliers = 1.0
     was_found = False
     fixed = work.fixed_step != 0.0
@@ -399,3 +400,27 @@ def estimate_error(
         if not error >= 1.0:
             return error
     return error
+
+
+@compiled
+def find_work(
+    t: float,
+    h: float,
+    work: RadauState,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: StageMatrix,
+) -> float:
+    """Work done up to each stage, into Z, and up to the end of the step, into the trial state.
+
+    The iteration leaves the rates of stages at their last but one values. No error control sees the
+    work, so its powers are evaluated once more, at the stages as found.
+    """
+    evaluate_stages(t, h, work, system, loops, matrix)
+    last, A = work.state.shape[1] - 1, work.method.A
+    for i in range(3):
+        work.Z[i, last] = h * (A[i, 0] * work.F[0, last] + A[i, 1] * work.F[1, last]
+                               + A[i, 2] * work.F[2, last])  # fmt: skip
+    work.state[TRIAL, last] = work.state[Y, last] + work.Z[2, last]
+    return 0.0

@@ -137,7 +137,8 @@ def step(
     matrix: StageMatrix,
 ) -> None:
     """Try one step: accept it, reject it, or stop the run; functions: project, accepted, watch."""
-    (project, accepted, watch), estimate_error, find_slope = functions, parts[3], parts[4]
+    (project, accepted, watch), find_work = functions, parts[6]
+    estimate_error, find_slope = parts[3], parts[4]
     state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
     end = t1 = end_of_step(work)
     longest = h = t1 - t
@@ -156,7 +157,8 @@ def step(
         state[TRIAL, k] = state[Y, k] + work.Z[2, k]
     error = estimate_error(t, h, work, system, loops, tangent, matrix) if adaptive else 0.0
     if error < 1.0:
-        failure = project_end(work, t1, h, project, system, loops)
+        find_work(t, h, work, system, loops, tangent, matrix)
+        failure = project_state(work, t1, state[TRIAL], project, system, loops)
         if failure == RUNNING:
             find_slope(t, h, work, system, loops, tangent, matrix)
             failure = complete_step(work, t1, h, watch, system, loops)
@@ -265,20 +267,6 @@ def safety_factor(work: RadauState) -> float:
     """Safety factor of the next step: smaller where the iteration took long (HW IV.8)."""
     most = 2.0 * MOST
     return min(SAFETY, SAFETY * (1.0 + most) / (work.last_iterations + most))
-
-
-@compiled
-def project_end(
-    work: RadauState, t1: float, h: float, project: Function, system: System, loops: Any
-) -> int:
-    """Compute the work done and project the trial state; the failure, or RUNNING."""
-    n = work.state.shape[1]
-    A = work.method.A
-    for i in range(3):  # the work is a quadrature
-        work.Z[i, n - 1] = h * (A[i, 0] * work.F[0, n - 1] + A[i, 1] * work.F[1, n - 1]
-                                + A[i, 2] * work.F[2, n - 1])  # fmt: skip
-    work.state[TRIAL, n - 1] = work.state[Y, n - 1] + work.Z[2, n - 1]
-    return project_state(work, t1, work.state[TRIAL], project, system, loops)
 
 
 @compiled

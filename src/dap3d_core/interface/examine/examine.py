@@ -71,7 +71,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     rng = random.Random(seed)
     layout = layout_of(type_, _random_constants(type_, rng))
     _check_symbol(type_, layout)
-    _check_actuates(type_, layout)
+    _check_named_fields(type_, layout)
     _check_reset(type_, layout)
     if has_states:
         _check_state_names(type_, layout)
@@ -236,21 +236,21 @@ def _check_symbol(type_: type[TypeBase], layout: InstanceLayout) -> None:
         raise PluginError(f"{who}: {symbol} is not one of {', '.join(SYMBOLS)}")
     stored = {name: s.kind for name, s in specs_of(type_).items() if name in layout.numbers}
     offered = {*layout.slots, *stored, *stored.values()}
-    lacking = [name for name in SYMBOLS[type_.symbol] if name not in offered]
-    if lacking:
+    if lacking := [name for name in SYMBOLS[type_.symbol] if name not in offered]:
         raise PluginError(
             f"{who}: {symbol} is drawn from {', '.join(lacking)}, which the type does not have; "
             'name another symbol, or leave "" to draw what it declares'
         )
 
 
-def _check_actuates(type_: type[TypeBase], layout: InstanceLayout) -> None:
-    field = getattr(type_, "actuates", "")
-    if field and layout.numbers.get(field, (0, None))[1] not in ((), (3,)):
-        raise PluginError(
-            f"{where_is(type_)}: actuates = {field!r} names no field of a number or of three; name "
-            "the one that an actuator sets"
-        )
+def _check_named_fields(type_: type[TypeBase], layout: InstanceLayout) -> None:
+    for word, shapes, what in (
+        ("actuates", ((), (3,)), "of a number or of three; name the one that an actuator sets"),
+        ("regularised", ((),), "of a number; name the speed below which friction fades"),
+    ):
+        field = getattr(type_, word, "")
+        if field and layout.numbers.get(field, (0, 0))[1] not in shapes:
+            raise PluginError(f"{where_is(type_)}: {word} = {field!r} names no field {what}")
 
 
 def _constant(name: Any, value: Any, broken: Callable[[str], PluginError]) -> Any:

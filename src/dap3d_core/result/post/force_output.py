@@ -121,9 +121,11 @@ def _along(
     r, v = (motion_of(group.bodies[index], local, u, v_dot, level) for level in (0, 1))
     d, d_dot = r[:, 1] - r[:, 0], v[:, 1] - v[:, 0]
     length = np.linalg.norm(d, axis=1)
-    along = [np.einsum("tc,tc->t", d, a) for a in (d_dot, force)]
-    nonzero = np.where(length > 0.0, length, np.nan)
-    return length, along[0] / nonzero, along[1] / nonzero
+    d[length == 0.0] = d_dot[length == 0.0]  # the direction it has at once
+    size = np.linalg.norm(d, axis=1)
+    rate, tension = (np.einsum("tc,tc->t", d, a) for a in (d_dot, force))
+    nonzero = np.where(size > 0.0, size, 1.0)
+    return length, rate / nonzero, tension / nonzero
 
 
 class ForceLoops:

@@ -2,8 +2,11 @@
 
 Error control keeps the error of each step below ``atol + rtol |y|``. The errors of many steps add
 up; a run is called good while they come to no more than LOOSE times that. A run of fixed steps has
-no tolerance: it is called good while what should be conserved is so to FIXED. Drift is not
-accuracy: a small entry does not prove a right result, a large one proves a wrong one.
+no tolerance: it is called good while what should be conserved is so to FIXED. Whatever the
+tolerances, no limit is above MOST of a quantity's scale, and the scale is the scene's: its energy
+at the start and the work done, its extent, speeds that this energy allows. A run that blows up has
+larger ones. Drift is not accuracy: a small entry does not prove a right result, a large one proves
+a wrong one.
 """
 
 import attrs
@@ -20,6 +23,8 @@ from dap3d_core.result.post.point_motion import kinetic_energy, momentum
 LOOSE = 1e3
 #: What a run of fixed steps may be off by, as an estimate of its error may (global_error.py).
 FIXED = 1e-3
+#: The largest limit, as a part of a quantity's scale.
+MOST = 1e-2
 #: Relative rounding error of sums over a run.
 ROUNDING = 1e-12
 #: Residual, relative to 1 + largest magnitude, up to which a projection counts as converged
@@ -29,6 +34,8 @@ PROJECTED = 1e-10
 SOLVED = 1e-9
 #: Roundings in the reactions of a solution, as a part of them: its backward error.
 BACKWARD = 10.0 * float(np.finfo(float).eps)
+#: Scales are not zero.
+SMALLEST = float(np.finfo(float).tiny)
 #: Deviation of normalised Euler parameters from unit length.
 UNIT_LENGTH = 1e-12
 
@@ -73,6 +80,7 @@ class LedgerSeries:
         linear, angular: (nt, 3) momenta, kg m/s, kg m^2/s about the origin.
         sizes: largest magnitude of a coordinate, a velocity and an acceleration, those of angles
             times the length that tolerances refer to (m, m/s, m/s^2).
+        first_size: largest magnitude of a coordinate at the start, m.
 
     ``far``, ``orbit``, ``linear`` and ``angular`` only of an isolated system, else (0,).
     """
@@ -93,6 +101,7 @@ class LedgerSeries:
     linear: Floats = attrs.Factory(lambda: np.zeros(0))
     angular: Floats = attrs.Factory(lambda: np.zeros(0))
     sizes: list[float]
+    first_size: float
 
     @classmethod
     def of(cls, summary: ModelSummary, arrays: Arrays, length: float) -> "LedgerSeries":
@@ -104,7 +113,8 @@ class LedgerSeries:
             sized = (split(block.u)[0], arms * velocities_of(block.u), arms * block.v_dot)
             sizes = np.maximum(sizes, [_largest(a) for a in sized])
         series = {name: np.concatenate([b[name] for b in blocks]) for name in blocks[0]}
-        return cls(**series, sizes=sizes.tolist())
+        first_size = _largest(split(arrays.part(slice(1)).u)[0])
+        return cls(**series, sizes=sizes.tolist(), first_size=first_size)
 
 
 def _series(summary: ModelSummary, block: Arrays) -> dict[str, Floats]:
@@ -175,29 +185,37 @@ def _floors(record: RunMetadata) -> dict[str, float]:
 
 
 def _energy_scale(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> float:
-    """Scale for an imbalance of energy, J: the largest kinetic energy or work.
+    """Scale for an imbalance of energy, J: the kinetic energy at the start and the work done.
 
     Work of all forces together, and of those with a potential: what friction or a driver takes away
-    while a weight sinks has errors of its own size, not of that of the difference.
+    while a weight sinks has errors of its own size, not of that of the difference. Work is done
+    between the reported instants, too: the record has the most at accepted steps.
 
-    Below a speed of atol / rtol error control is absolute: an error atol of the speed v is one of
-    m v atol in the energy, to which m v (atol / rtol) is the scale, and without a speed it is one
-    of m atol^2. A system at rest has rounding errors of its potential for energy, and of what the
-    reactions do along what the constraints leave open; they are given the share that ROUNDING is of
-    the limit. The potential alone would not do: its zero is anybody's choice.
-
-    Work is done between the reported instants, too: the record has the most at accepted steps.
+    A system at rest does no work; its scale is such that its rounding may be MOST of it. It is not
+    at rest where it moves with more than that: loads of a run that blew up are no measure.
     """
-    floors, limit = _floors(record), _relative_limit(record)
-    kinetic = np.max(course.kinetic + floors["v"] * course.speed + floors["w"] * course.spin)
-    at_rest = ROUNDING * _largest(course.potential_energy)
-    at_rest += PROJECTED * (record.length + course.sizes[0]) * _largest(course.reaction)
-    if record.tolerances is not None:
-        atol = record.tolerances[1]
-        at_rest += atol["v"] ** 2 * summary.mass.sum() + atol["w"] ** 2 * _inertia(summary)
+    rounding = _rounding_at_rest(summary, course, record)
+    is_at_rest = _largest(course.kinetic) <= rounding
     work = max(_largest(course.work - course.work[0]), float(record.settings.get("most_work", 0.0)))
     exchanged = _largest(course.potential_energy - course.potential_energy[0])
-    return max(float(kinetic), work, exchanged, at_rest / limit, float(np.finfo(float).tiny))
+    return max(
+        float(course.kinetic[0]) + max(work, exchanged),
+        rounding / MOST if is_at_rest else 0.0,
+        SMALLEST,
+    )
+
+
+def _rounding_at_rest(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> float:
+    """Energy that a system at rest seems to gain, J.
+
+    That is rounding of its potential, and what the reactions do along what the constraints leave
+    open, and velocities. The potential alone would not do: its zero is anybody's choice.
+    """
+    open_ = PROJECTED * record.length
+    far = PROJECTED * course.first_size
+    work_of_reactions = (open_ + far) * _largest(course.reaction)
+    moving = open_**2 * float(summary.mass.sum()) + PROJECTED**2 * _inertia(summary)
+    return ROUNDING * _largest(course.potential_energy) + work_of_reactions + moving
 
 
 def _inertia(summary: ModelSummary) -> float:
@@ -208,15 +226,19 @@ def _inertia(summary: ModelSummary) -> float:
 def _energy(
     summary: ModelSummary, course: LedgerSeries, record: RunMetadata, change: Floats, what: str
 ) -> Entry:
-    """A change (nt,), J, that should be zero, relative to the energies of the run."""
+    """A change (nt,), J, that should be zero, relative to the energies of the scene."""
     worst, when = _worst(change, course.t)
     scale = _energy_scale(summary, course, record)
     text = f"{what}: {worst:.2g} J at t = {when:g} s, relative to {scale:.3g} J"
-    return _entry(worst / scale, _energy_limit(course, record, scale), "1", text)
+    floors = _floors(record)
+    absolute = float(np.max(floors["v"] * course.speed + floors["w"] * course.spin))
+    allowed = _relative_limit(record) * (scale + absolute) + _rounding_of_rates(course, record)
+    allowed += _rounding_at_rest(summary, course, record)
+    return _entry(worst / scale, min(allowed / scale, MOST), "1", text)
 
 
-def _energy_limit(course: LedgerSeries, record: RunMetadata, scale: float) -> float:
-    """The relative limit, and what rounding of the rates may make of the energy of a run.
+def _rounding_of_rates(course: LedgerSeries, record: RunMetadata) -> float:
+    """What rounding of the rates may make of the energy of a run, J.
 
     Where the last digits of positions change accelerations by more than the tolerances ask for, the
     run has that change, b (integrators/stepping/rounding.py). Velocities may be off by b T after a
@@ -224,8 +246,7 @@ def _energy_limit(course: LedgerSeries, record: RunMetadata, scale: float) -> fl
     """
     noise = record.settings.get("rate_noise", {"v": 0.0, "w": 0.0})
     power = noise["v"] * _largest(course.speed) + noise["w"] * _largest(course.spin)
-    drift = power * float(course.t[-1] - course.t[0])
-    return _relative_limit(record) + float(drift / scale)
+    return float(power * (course.t[-1] - course.t[0]))
 
 
 def _is_conservative(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> bool:
@@ -241,21 +262,35 @@ def _is_conservative(summary: ModelSummary, course: LedgerSeries, record: RunMet
 
 def _momentum(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> Entry:
     """Drift of linear and angular momentum, relative to the momenta of the bodies added up."""
-    floors = _floors(record)
-    far = floors["v"] * course.far + floors["r"] * course.speed
-    scales = (
-        np.max(course.speed) + floors["v"] * summary.mass.sum(),
-        np.max(course.orbit + far + course.spin) + floors["w"] * _inertia(summary),
-    )
-    drifts = []
-    for values, scale in zip((course.linear, course.angular), scales, strict=True):
+    floors, mass, inertia = _floors(record), float(summary.mass.sum()), _inertia(summary)
+    part = _allowed_speed(summary, course, record)
+    still = PROJECTED / MOST * record.length * mass  # rounding of a system at rest
+    turning = still * (record.length + course.first_size) + PROJECTED / MOST * inertia
+    far = _largest(floors["v"] * course.far + floors["r"] * course.speed)
+    found = []
+    for values, size, rest, absolute in (
+        (course.linear, course.speed, still, floors["v"] * mass),
+        (course.angular, course.orbit + course.spin, turning, far + floors["w"] * inertia),
+    ):
+        scale = max(part * _largest(size), rest)
         worst, _ = _worst(np.linalg.norm(values - values[0], axis=1), course.t)
-        drifts.append(worst / max(float(scale), float(np.finfo(float).tiny)))
+        limit = min(_relative_limit(record) * (scale + absolute) / scale, MOST)
+        found.append((worst / scale, limit))
     text = (
-        f"relative drift of linear momentum {drifts[0]:.2g}, of angular momentum about the origin "
-        f"{drifts[1]:.2g}"
+        f"relative drift of linear momentum {found[0][0]:.2g}, of angular momentum about the "
+        f"origin {found[1][0]:.2g}"
     )
-    return _entry(float(np.max(drifts)), _relative_limit(record), "1", text)
+    value, limit = max(found, key=lambda pair: np.nan_to_num(pair[0] / pair[1], nan=np.inf))
+    return _entry(value, limit, "1", text)
+
+
+def _allowed_speed(summary: ModelSummary, course: LedgerSeries, record: RunMetadata) -> float:
+    """Speeds that the energy of the scene allows, as a part of those of the run: 1 of a good run.
+
+    Of a run that gains energy from nowhere the largest speed is no measure of anything.
+    """
+    allowed = _energy_scale(summary, course, record) / max(_largest(course.kinetic), SMALLEST)
+    return float(min(1.0, allowed) ** 0.5)
 
 
 def _constraints(
@@ -265,12 +300,22 @@ def _constraints(
 
     Position and velocity: with projection as far as a projection may leave them, else what errors
     of steps come to. Acceleration: the equations solved for it, at any tolerance, and what rounding
-    of the reactions makes of it.
+    of the reactions makes of it. None above MOST of the scene's extent, or of the speeds and
+    accelerations that its energy allows; where nothing moves, of rounding.
     """
     sizes = [record.length + size for size in course.sizes]
-    limits: list[float | None] = [
+    part, rounding = _allowed_speed(summary, course, record), record.length / MOST
+    scales = (
+        record.extent,
+        max(part * course.sizes[1], PROJECTED * rounding),
+        max(part**2 * course.sizes[2], SOLVED * rounding),
+    )
+    allowed = (
         *(_state_limit(record, size, q) for size, q in zip(sizes[:2], "rv", strict=True)),
         SOLVED * sizes[2] + _rounding_of_accelerations(summary, course, record.length),
+    )
+    limits: list[float | None] = [
+        min(limit, MOST * scale) for limit, scale in zip(allowed, scales, strict=True)
     ]
     from dap3d_core.formulations import FORMULATIONS  # results are read without it
 
@@ -317,7 +362,7 @@ def _state_limit(record: RunMetadata, size: float, quantity: str) -> float:
 def _quaternion(course: LedgerSeries, record: RunMetadata) -> Entry:
     """Euler parameters are normalised by projection; without it their length drifts."""
     worst, when = _worst(course.off_unit, course.t)
-    limit = UNIT_LENGTH if record.projected else _state_limit(record, 1.0, "p")
+    limit = UNIT_LENGTH if record.projected else min(_state_limit(record, 1.0, "p"), MOST)
     text = f"largest deviation of Euler parameters from unit length, at t = {when:g} s"
     return _entry(worst, limit, "1", text)
 

@@ -136,7 +136,7 @@ def checkpoint_of(run: RunState) -> Checkpoint:
         "method": compiled.requested_method,
         "formulation": compiled.method,
         "settings": attrs.asdict(run.settings),
-        "estimate_error": run.estimate_error,
+        "estimate_error": run.estimate_error is True,
         "start_is_interpolated": run.start is not None and run.start.is_interpolated,
         "notes": run.notes,
         "wall_time_s": time.perf_counter() - run.started,

@@ -20,13 +20,8 @@ from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.linear.rank.rank import tolerance_of
 from dap3d_core.model.state_layout import join, split
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import (
-    displaced,
-    finite_rows,
-    fit_of,
-    sparse_least_change,
-    weights_of,
-)
+from dap3d_core.simulation.initial.assemble import fit_of, weights_of
+from dap3d_core.simulation.initial.least_change import displaced, finite_rows, sparse_least_change
 from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
 
 #: Displacements of bodies, rad or parts of the scene, that show how large forces are.

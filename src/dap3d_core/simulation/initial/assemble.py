@@ -12,19 +12,16 @@ from itertools import pairwise
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import System
-from dap3d_core.formulations.arrays import set_metric
-from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
+from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.linear.rank.rank import DENSE_ROWS, FEW_ROWS, factor_independent, has_loops
 from dap3d_core.model import Model
-from dap3d_core.model.rotations import euler_rates
-from dap3d_core.model.state_layout import join, split, state_layout, velocities_of
+from dap3d_core.model.state_layout import split, state_layout, velocities_of
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import Body, Scene
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.failure.diagnosis import find_offender
+from dap3d_core.simulation.initial.least_change import displaced, finite_rows, least_change
+from dap3d_core.simulation.initial.singular_assembly import is_farther, rotations, ways_out
 
 #: Position residuals above this are corrected; Newton stops below it.
 TOLERANCE = 1e-10
@@ -38,10 +35,10 @@ MOST_TURN, MOST_SHIFT = 0.5, 0.5
 ROUNDING = 1e-6
 #: A row of a shorter gradient, in its own units, is not changed by small changes.
 FLAT = 1e-6
+#: Singular poses that an assembly leaves.
+MOST_LEFT = 2
 #: Joints that the message of a failure lists.
 MOST_JOINTS = 10
-#: Singular values below this part of the largest are left out of the least-norm solution.
-RCOND = 1e-10
 
 
 @attrs.frozen(eq=False)
@@ -54,6 +51,7 @@ class Initial:
         residual: the same after the correction.
         passes: Newton passes at position level.
         moved, turned: largest displacement in m and rotation in rad of a body.
+        branch: the rotations by which it left a singular pose, in words; "" where there was none.
     """
 
     u: Floats
@@ -62,23 +60,7 @@ class Initial:
     passes: int
     moved: float
     turned: float
-
-
-def finite_rows(evaluator: Evaluator, t: float, u: Floats) -> ConstraintRows:
-    """All constraint rows at a state u (13 n,).
-
-    Raises:
-        AssemblyError: one of them is not finite there; the message names joint or function.
-    """
-    rows = evaluator.rows(t, u)
-    good = np.isfinite(rows.C) & np.isfinite(rows.nu) & np.isfinite(rows.gamma)
-    good[rows.row[~np.isfinite(rows.value)]] = False
-    if not np.all(good):
-        joint = evaluator.model.row_owner(int(np.argmin(good)))
-        culprit = find_offender(evaluator, t, evaluator.integrated(u), t)
-        culprit = culprit or f"joint {joint} is not finite"
-        raise AssemblyError(f"the initial positions cannot be assembled: {culprit}")
-    return rows
+    branch: str = ""
 
 
 def violation(evaluator: Evaluator, u: Floats, t: float = 0.0) -> tuple[float, float]:
@@ -126,7 +108,8 @@ def correct_initial(
         return Initial(u, before, before, 0, 0.0, 0.0)
     start = u
     held = np.array(sorted(hold), dtype=np.int64)
-    u, passes = correct_positions(evaluator, u, t, held, metric)
+    u, passes = correct_positions(evaluator, u, t, held, metric, leaves=MOST_LEFT)
+    branch = rotations(evaluator.model, start, u) if passes > MOST_PASSES else ""
     rows = finite_rows(evaluator, t, u)
     residual = rows.product(velocities_of(u)) - rows.nu
     if _largest(residual) > 0.0:
@@ -134,7 +117,8 @@ def correct_initial(
         velocities = velocities_of(u)
         velocities -= least_change(evaluator, rows, residual, t, None, metric)
     moved, turned = distance(start, u, evaluator.model.body_count)
-    return Initial(u, before, violation(evaluator, u, t), passes, float(moved), float(turned))
+    after = violation(evaluator, u, t)
+    return Initial(u, before, after, passes, float(moved), float(turned), branch)
 
 
 def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> list[str]:
@@ -151,6 +135,12 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
             f"{mark}initial positions corrected in {initial.passes} passes: "
             f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
             f"bodies moved by up to {initial.moved:.2g} m and {initial.turned:.2g} rad"
+        )
+    if initial.branch:
+        notes.append(
+            "the bodies were drawn at a singular pose, such as a straight line, from where two or "
+            f"more ways lead to an assembled one. Taken was: {initial.branch}. For another, draw "
+            "them a little off that pose"
         )
     if initial.residual[0] > tolerance:
         notes.append(
@@ -173,9 +163,12 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
 
 
 def correct_positions(
-    evaluator: Evaluator, u: Floats, t: float, held: Integers, metric: str = "unit"
+    evaluator: Evaluator, u: Floats, t: float, held: Integers, metric: str = "unit", leaves: int = 0
 ) -> tuple[Floats, int]:
     """The position stage of ``correct_initial``: the state with other r and p, and the passes.
+
+    leaves: how many singular poses it may leave, on one of several branches; passes are then more
+    than MOST_PASSES.
 
     Raises:
         AssemblyError: the residual does not vanish.
@@ -193,117 +186,45 @@ def correct_positions(
         if passes == MOST_PASSES:
             break
         change = least_change(evaluator, rows, rows.C, t, held, metric).reshape(-1, 6)
-        shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
-        turn = float(np.max(np.linalg.norm(change[:, 3:], axis=1)))
-        shift_limit = MOST_SHIFT * size / shift if shift else 1.0
-        turn_limit = MOST_TURN / turn if turn else 1.0
-        limit = min(1.0, shift_limit, turn_limit)
+        limit = _step_limit(change, size)
         u = displaced(u, -limit * change)
+    if leaves and not _without_gradient(evaluator, rows):
+        found = _leave(evaluator, u, rows, t, held, metric, leaves)
+        if found is not None:
+            return found[0], passes + found[1]
     raise _failure(evaluator, rows, passes, held, is_far=limit < 1.0)
 
 
-def least_change(
+def _leave(
     evaluator: Evaluator,
+    u: Floats,
     rows: ConstraintRows,
-    residual: Floats,
     t: float,
-    held: Integers | None = None,
-    metric: str = "unit",
-) -> Floats:
-    """The shortest x (6 n,) with D x = residual, on all rows.
-
-    With ``held`` (bodies, maybe none) on the position rows alone, and zero on these bodies.
-    """
-    count = evaluator.model.row_count
-    if count > DENSE_ROWS or (
-        count > FEW_ROWS
-        and (held is None or not len(held))
-        and not has_loops(evaluator.plan, evaluator.blocks(rows))
-    ):
-        return sparse_least_change(evaluator, residual, t, held, metric)
-    length = evaluator.model.length
-    if length != 1.0:  # rows of very different units
-        gradient = scaled_rows(rows, length)[1]
-        rows = attrs.evolve(rows, value=rows.value / gradient[rows.row])
-        residual = residual / gradient
-    D = rows.dense()
-    if held is None:
-        held = np.zeros(0, dtype=np.int64)
-    else:
-        keep = evaluator.model.position_row
-        D, residual = D[keep], residual[keep]
-    block = D.reshape(len(D), -1, 6)
-    block[:, held - 1] = 0.0
-    scale, frame = mass_scaling(evaluator)
-    if metric == "mass":
-        block[:, :, :3] *= scale
-        block[:, :, 3:] = np.einsum("mbr,brc->mbc", block[:, :, 3:], frame)
-    else:
-        block[:, :, :3] *= length
-    solution: Floats = np.asarray(np.linalg.lstsq(D, residual, rcond=RCOND)[0], dtype=np.float64)
-    change = solution.reshape(-1, 6)
-    change[held - 1] = 0.0  # rounding
-    if metric == "mass":
-        change[:] = unscaled(change, scale, frame)
-    else:
-        change[:, :3] *= length
-    return solution
+    held: Integers,
+    metric: str,
+    leaves: int,
+) -> tuple[Floats, int] | None:
+    """Assemble from a singular pose; None where that fails."""
+    found = None
+    for change in ways_out(evaluator, u, rows, t, held, metric):
+        away = displaced(u, _step_limit(change, evaluator.model.size) * change)
+        try:
+            closed, passes = correct_positions(evaluator, away, t, held, metric, leaves - 1)
+        except AssemblyError:
+            continue
+        if is_farther(evaluator, closed, rows, t):
+            return closed, passes + 1
+        found = found or (closed, passes + 1)
+    return found
 
 
-def mass_scaling(evaluator: Evaluator) -> tuple[Floats, Floats]:
-    """1/sqrt(m) (n, 1) and B (n, 3, 3) of the bodies as placed (linear/ldlt/factor.py)."""
-    metric = evaluator.system.metric[1:]
-    return metric[:, :1], metric[:, 7:16].reshape(-1, 3, 3)
-
-
-def unscaled(change: Floats, scale: Floats, frame: Floats) -> Floats:
-    """From the coordinates in which masses are one, (n, 6), to metres and rad in global axes."""
-    return np.hstack([scale * change[:, :3], np.einsum("brc,bc->br", frame, change[:, 3:])])
-
-
-def sparse_least_change(
-    evaluator: Evaluator,
-    residual: Floats,
-    t: float,
-    held: Integers | None = None,
-    metric: str = "unit",
-) -> Floats:
-    """The same by the block factorisation, for many rows; metric "unit" sets every mass to one."""
-    from dap3d_core.formulations.common.constraints import correct, linearise
-
-    system: System = evaluator.system
-    before = system.metric.copy()
-    n = evaluator.model.body_count
-    try:
-        if metric == "unit":
-            light = np.full(n, evaluator.model.length**-2)
-            set_metric(system.metric, light, np.tile(np.eye(3), (n, 1, 1)))
-            system.metric[1:, 7:16] = system.body[1:, 3:12]
-        if held is not None:
-            system.metric[held] = 0.0
-        linearise(t, system, evaluator.loops)
-        if held is not None:
-            row, _, place = evaluator.pattern
-            system.D[place[~evaluator.model.position_row[row]]] = 0.0
-        factor_independent(evaluator.plan, system.D, system.K)
-        system.residual[:] = 0.0
-        system.residual[system.row] = -residual
-        correct(system)
-        change = unscaled(system.change[6:].reshape(n, 6), *mass_scaling(evaluator))
-    finally:
-        system.metric[:] = before
-    return change.ravel()
-
-
-def displaced(u: Floats, change: Floats) -> Floats:
-    """The state with r + dr, and with p + 1/2 G^T dtheta of unit length (dtheta global, small).
-
-    change: (n, 6) or (6 n,) dr, dtheta of each body.
-    """
-    r, p, v, w = split(u)
-    change = change.reshape(-1, 6)
-    p = p + euler_rates(p, change[:, 3:])
-    return join(r + change[:, :3], p / np.linalg.norm(p, axis=1, keepdims=True), v, w)
+def _step_limit(change: Floats, size: float) -> float:
+    """The part of a change (n, 6) that a pass makes."""
+    shift = float(np.max(np.linalg.norm(change[:, :3], axis=1)))
+    turn = float(np.max(np.linalg.norm(change[:, 3:], axis=1)))
+    shift_limit = MOST_SHIFT * size / shift if shift else 1.0
+    turn_limit = MOST_TURN / turn if turn else 1.0
+    return min(1.0, shift_limit, turn_limit)
 
 
 def distance(u: Floats, other: Floats, n: int) -> tuple[Floats, Floats]:
@@ -358,7 +279,8 @@ def _failure(
     if len(still_open) > MOST_JOINTS:
         lines.append(f"  and {len(still_open) - MOST_JOINTS} joints more")
     names = ", ".join(model.body_names[b - 1] for b in held)
-    why = ["contradictory joints cannot be assembled"]
+    why = ["bodies that do not reach their joints, and",
+           "contradictory joints cannot be assembled"]  # fmt: skip
     if is_far:
         why = ["the bodies were still on their way: give positions nearer to an assembled pose,",
                "unless the joints contradict each other"]  # fmt: skip

@@ -24,12 +24,13 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS, Rank
 from dap3d_core.model.state_layout import split, velocities_of
-from dap3d_core.simulation.initial.assemble import (
+from dap3d_core.simulation.initial.assemble import extent
+from dap3d_core.simulation.initial.least_change import (
     displaced,
-    extent,
     finite_rows,
     least_change,
     mass_scaling,
+    quadratic_part,
     unscaled,
 )
 
@@ -122,21 +123,11 @@ def _loses_rank(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> bool:
     if np.linalg.norm(free) <= NONE * np.linalg.norm(wish):
         return False
     gradient = scaled_rows(rows, evaluator.model.length)[1]  # dependencies are those of scaled rows
-    quadratic = _quadratic(evaluator, still, free, t) / gradient
+    quadratic = quadratic_part(evaluator, still, free, t) / gradient
     gaps = [d.combinations @ quadratic[d.rows] for d in rank.dependencies]
     worst = max(float(np.max(np.abs(gap))) for gap in gaps)
     scaled = attrs.evolve(rows, value=rows.value / gradient[rows.row])
     return worst > FULFILLED * _size(evaluator, scaled, free)
-
-
-def _quadratic(evaluator: Evaluator, still: Floats, v: Floats, t: float) -> Floats:
-    """The part of gamma (rows,) that is quadratic in the velocities, at v (6 n,)."""
-    total = -2.0 * finite_rows(evaluator, t, still).gamma
-    for sign in (1.0, -1.0):
-        moving = still.copy()
-        velocities_of(moving)[:] = sign * v
-        total += finite_rows(evaluator, t, moving).gamma
-    return 0.5 * total
 
 
 def _size(evaluator: Evaluator, rows: ConstraintRows, v: Floats) -> float:
@@ -184,7 +175,7 @@ class _Cone:
         for i in range(f):
             for j in range(i + 1):
                 plus, minus = (
-                    _quadratic(evaluator, self.still, self.N[:, i] + sign * self.N[:, j], t)
+                    quadratic_part(evaluator, self.still, self.N[:, i] + sign * self.N[:, j], t)
                     for sign in (1.0, -1.0)
                 )
                 self.H[:, i, j] = self.H[:, j, i] = self.left @ (plus - minus) / 4.0

@@ -93,9 +93,24 @@ def _measured(
             _turned(group, end, numbers, A) + r[..., _bodies(group, end), :]
             for end in ("P_i", "P_j")
         )
-        return np.linalg.norm(end - start, axis=-1), COINCIDENT * max(size, 1.0)
+        distance = np.linalg.norm(end - start, axis=-1)
+        needed = _is_needed(group, spec, numbers)
+        return np.where(needed, distance, np.inf), COINCIDENT * max(size, 1.0)
     one, other = (_turned(group, vector, numbers, A) for vector in (name, spec.across))
     return np.linalg.norm(np.cross(one, other), axis=-1), PARALLEL
+
+
+def _is_needed(group: Group, spec: FieldSpec, numbers: Floats) -> NDArray[np.bool_]:
+    """(..., m) where the direction of a vector between points matters."""
+    layout = group.type_info.layout
+    fields = spec.direction if isinstance(spec.direction, tuple) else ()
+    functions = group.type_info.argument_functions if group.type_info.given else ()
+    always = not fields or any(name in functions for name in fields)
+    needed = np.full(numbers.shape[:-1], always)
+    for name in fields:
+        if name in layout.numbers:
+            needed |= numbers[..., layout.numbers[name][0]] != 0.0
+    return needed
 
 
 def _words(name: str, spec: FieldSpec, measure: float) -> tuple[str, str]:
@@ -104,13 +119,20 @@ def _words(name: str, spec: FieldSpec, measure: float) -> tuple[str, str]:
         return (
             f"its points P_i and P_j coincide at the start (distance {measure:.2g} m), "
             "so the direction it acts along is undefined",
-            "give one of the points, or of the bodies, another place",
+            "give one of the points, or of the bodies, another place" + _zeros(spec),
         )
     return (
         f"{name} and {spec.across} are parallel at the start, so the angle about "
         f"{spec.across} is undefined",
         f"take a vector across {spec.across} for {name}",
     )
+
+
+def _zeros(spec: FieldSpec) -> str:
+    """Remedy of an element that needs no direction without some of its fields."""
+    if not isinstance(spec.direction, tuple):
+        return ""
+    return f"; without {', '.join(spec.direction)} none is needed"
 
 
 def _turned(group: Group, name: str, numbers: Floats, A: Floats) -> Floats:

@@ -23,7 +23,8 @@ from dap3d_core.result.quantities.lookup import find
 from dap3d_core.result.quantities.measured_data import MeasuredData, read_measured
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.initial.assemble import displaced, extent
+from dap3d_core.simulation.initial.assemble import extent
+from dap3d_core.simulation.initial.least_change import displaced
 from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags
 from dap3d_core.simulation.redundancy.freedoms import motion_words
 

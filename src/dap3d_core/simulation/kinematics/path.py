@@ -21,7 +21,8 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import angular_velocities, euler_rates
 from dap3d_core.model.state_layout import join, split, velocities_of
-from dap3d_core.simulation.initial.assemble import displaced, extent, finite_rows
+from dap3d_core.simulation.initial.assemble import extent
+from dap3d_core.simulation.initial.least_change import displaced, finite_rows
 from dap3d_core.simulation.kinematics.pose_equations import LinearisedRows
 
 #: Newton stops behind a correction (rad, or parts of the model) whose product with the one behind

@@ -11,7 +11,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import to_body, to_global
 from dap3d_core.model.state_layout import split
-from dap3d_core.simulation.initial.assemble import finite_rows
+from dap3d_core.simulation.initial.least_change import finite_rows
 
 Flags = NDArray[np.bool_]
 

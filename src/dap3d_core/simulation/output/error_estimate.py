@@ -1,6 +1,7 @@
 """The error of a run, estimated by a second one: tolerances ten times tighter, or half the step."""
 
 import os
+import time
 from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any, NamedTuple
@@ -21,6 +22,13 @@ TIGHTER = 10.0
 #: that hardly depends on the tolerance, and lets it grow by a largest factor: two runs would begin
 #: with equal steps, and their equal errors would not show in the difference.
 FIRST_STEP = 0.01
+#: The value of ``estimate_error`` for an estimate where it takes less than QUICK_SECONDS, and the
+#: time of a second run as a multiple of that of the first, at most.
+QUICK, QUICK_SECONDS, SLOWER = "quick", 1.0, 2.0
+
+
+class OutOfTimeError(Exception):
+    """A second run takes longer than it may."""
 
 
 class StepLimits(NamedTuple):
@@ -34,8 +42,11 @@ class StepLimits(NamedTuple):
     longest: float
 
 
-#: Makes a run with other settings, and with limits on its steps where these are controlled.
-Again = Callable[[Simulation, StepLimits | None], Result]
+#: Makes a run with other settings, with limits on its steps where these are controlled, that takes
+#: so many seconds at most.
+Again = Callable[[Simulation, StepLimits | None, float], Result]
+#: A callback ``watch`` of a run.
+Watch = Callable[[Any], None]
 
 
 def finer(settings: Simulation) -> Simulation | None:
@@ -48,11 +59,28 @@ def finer(settings: Simulation) -> Simulation | None:
     return attrs.evolve(settings, rtol=rtol / TIGHTER, atol=tighter(settings.atol, TIGHTER))
 
 
+def ending_after(seconds: float, watch: Watch | None) -> Watch | None:
+    """A callback that ends a run by OutOfTimeError after so many seconds, and calls another one."""
+    if seconds == np.inf:
+        return watch
+    last = time.perf_counter() + seconds
+
+    def check(progress: Any) -> None:
+        if time.perf_counter() > last:
+            raise OutOfTimeError
+        if watch is not None:
+            watch(progress)
+
+    return check
+
+
 def add_error(
     result: Result,
     settings: Simulation,
     again: Again,
     output: str | os.PathLike[str] | None,
+    *,
+    quick: bool = False,
 ) -> None:
     """Estimate the error of a result by a second run, and write it into its file as well.
 
@@ -63,29 +91,38 @@ def add_error(
         settings: of that run.
         again: makes the second run.
         output: the file of the result, None where it has none.
+        quick: only where that takes less than QUICK_SECONDS; that there is no estimate, for which
+            nobody asked, is for information.
 
     Raises:
         BaseException: whatever ends the second run from outside (Ctrl-C, an exception of
             ``progress``); it carries the first result as ``.result``.
     """
+    none = f"{INFORMATION if quick else ''}its error was not estimated"
+    too_long = f"{none}: that takes longer than {QUICK_SECONDS:g} s"
     finer_settings = finer(settings)
     if finer_settings is None:
-        note = f"its error was not estimated: rtol {settings.rtol:g} cannot be made any tighter"
-        _amend(result, output, note)
+        _amend(result, output, f"{none}: rtol {settings.rtol:g} cannot be made any tighter")
+        return
+    if quick and SLOWER * result.stats.wall_time_s > QUICK_SECONDS:
+        _amend(result, output, too_long)
         return
     words = _words(finer_settings)
     try:
-        second = again(finer_settings, _limits(result, finer_settings))
+        limits = _limits(result, finer_settings)
+        second = again(finer_settings, limits, QUICK_SECONDS if quick else np.inf)
+    except OutOfTimeError:
+        _amend(result, output, too_long)
+        return
     except (SimulationError, SceneError) as error:
-        _amend(result, output, f"its error was not estimated: in a second run at {words}, {error}")
+        _amend(result, output, f"{none}: in a second run at {words}, {error}")
         return
     except BaseException as error:
         _amend(result, output, "the estimate of its error was ended early and left out")
         error.result = result  # type: ignore[attr-defined]
         raise
     if not _same_instants(result, second):
-        note = f"a second run at {words} ended elsewhere, by its events"
-        _amend(result, output, f"its error was not estimated: {note}")
+        _amend(result, output, f"{none}: a second run at {words} ended elsewhere, by its events")
         return
     steps = second.stats.steps
     result.arrays = result.arrays.with_error(estimated_error(result.u, second.u, steps))

@@ -18,6 +18,7 @@ from dap3d_core.result.arrays import LARGE, Arrays, arrays_of, joined
 from dap3d_core.result.file.atomic_write import check_utf8
 from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.open import arrays_in
+from dap3d_core.simulation.failure.creep import CreepMonitor
 from dap3d_core.simulation.failure.negative_reactions import Pulling
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class ResultRecorder:
         count: instants reported so far.
         pulling: multipliers that must not be negative, and were.
         spread: what depends on the share of loads that are not unique; None where nothing does.
+        creep: friction that should stick and creeps.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class ResultRecorder:
         self._parts: list[Arrays] = []
         self.pulling = Pulling(model)
         self.spread: ShareSpread | None = None
+        self.creep = CreepMonitor(model, most)
         self._bytes = 0
         self._writer: ResultWriter | None = None
         #: (13 n,) the least and the largest value of each component so far.
@@ -88,6 +91,7 @@ class ResultRecorder:
         self.pulling.look(arrays)
         if self.spread is not None:
             self.spread.look(arrays)
+        self.creep.look(arrays)
         self._bytes += 8 * len(arrays) * arrays.width
         large = self._bytes > LARGE
         if self._writer is None:

@@ -13,13 +13,8 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import (
-    FIT,
-    correct_positions,
-    displaced,
-    extent,
-    finite_rows,
-)
+from dap3d_core.simulation.initial.assemble import FIT, correct_positions, extent
+from dap3d_core.simulation.initial.least_change import displaced, finite_rows
 from dap3d_core.simulation.redundancy.near_redundant import HELD
 
 #: Rows beyond which nothing is looked for.

@@ -7,7 +7,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model import Model
-from dap3d_core.simulation.initial.assemble import finite_rows
+from dap3d_core.simulation.initial.least_change import finite_rows
 from dap3d_core.simulation.redundancy.redundancy import rank_of
 
 #: Parts of a motion smaller than this part of the largest are not named.

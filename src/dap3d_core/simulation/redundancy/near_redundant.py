@@ -18,7 +18,8 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import FIT, correct_positions, displaced, fit_of
+from dap3d_core.simulation.initial.assemble import FIT, correct_positions, fit_of
+from dap3d_core.simulation.initial.least_change import displaced
 
 #: From this part of the largest singular value on rows are held: the root of the regularisation of
 #: lsq, 1e-9 of a row's square.

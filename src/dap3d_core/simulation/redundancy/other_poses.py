@@ -13,12 +13,8 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import coordinates_of
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import (
-    correct_positions,
-    displaced,
-    finite_rows,
-    least_change,
-)
+from dap3d_core.simulation.initial.assemble import correct_positions
+from dap3d_core.simulation.initial.least_change import displaced, finite_rows, least_change
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, rank_of
 
 #: Poses that are tried up to this many rows; beyond, the last number.

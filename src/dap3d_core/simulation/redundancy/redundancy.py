@@ -19,7 +19,8 @@ from dap3d_core.linear.rank.rank import (
 )
 from dap3d_core.model import Model
 from dap3d_core.registry.suggestions import some
-from dap3d_core.simulation.initial.assemble import finite_rows, fit_of
+from dap3d_core.simulation.initial.assemble import fit_of
+from dap3d_core.simulation.initial.least_change import finite_rows
 from dap3d_core.simulation.initial.singular_start import SingularStart, singular_start
 from dap3d_core.simulation.redundancy.near_redundant import Binding, bindings
 

@@ -25,7 +25,7 @@ from dap3d_core.registry.suggestions import some
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.scene import ValidatedScene
 from dap3d_core.simulation.errors import AssemblyError, RedundantError
-from dap3d_core.simulation.initial.assemble import finite_rows
+from dap3d_core.simulation.initial.least_change import finite_rows
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, by_joint, rank_of
 

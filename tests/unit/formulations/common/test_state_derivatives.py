@@ -6,7 +6,7 @@ from support.state_types import REGISTRY, stated, steered
 
 import dap3d_core as dap
 from dap3d_core.formulations.common.state_derivatives import state_derivatives
-from dap3d_core.simulation.initial.assemble import displaced
+from dap3d_core.simulation.initial.least_change import displaced
 
 #: Step of central differences: truncation 1e-10, rounding 1e-10 of numbers of order one to 100.
 H = 1e-5

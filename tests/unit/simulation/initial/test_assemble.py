@@ -17,7 +17,7 @@ from dap3d_core.interface import Function, Joint, Vector2, number, vector2
 from dap3d_core.kernels import cross, dot, neg, row, scale, sqrt, where
 from dap3d_core.model.state_layout import split
 from dap3d_core.result import INFORMATION
-from dap3d_core.simulation.initial import assemble
+from dap3d_core.simulation.initial import assemble, least_change
 from dap3d_core.simulation.initial.assemble import correct_initial, violation
 from dap3d_core.simulation.redundancy import redundancy
 
@@ -31,7 +31,7 @@ def corrected(scene, **options):
 @pytest.fixture
 def many_rows(monkeypatch):
     """Every scene is treated as one of many rows."""
-    monkeypatch.setattr(assemble, "DENSE_ROWS", 0)
+    monkeypatch.setattr(least_change, "DENSE_ROWS", 0)
     monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
 
 
@@ -248,7 +248,7 @@ def test_the_metric_of_many_rows_is_that_of_few(metric, monkeypatch):
     """Bodies of different mass and inertia, turned: the block factorisation weighs as numpy."""
     scene = bent_chain(5)
     _, few = corrected(scene, metric=metric)
-    monkeypatch.setattr(assemble, "DENSE_ROWS", 0)
+    monkeypatch.setattr(least_change, "DENSE_ROWS", 0)
     monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
     _, many = corrected(scene, metric=metric)
     assert many.u == pytest.approx(few.u, abs=1e-10)
@@ -363,7 +363,7 @@ def test_the_correction_of_many_rows_is_that_of_few(scene, monkeypatch):
     """The block factorisation finds the least change that numpy finds, redundant rows or not: both
     end within 1e-10 of the constraints, after passes that agree to rounding times the condition."""
     _, few = corrected(scene)
-    monkeypatch.setattr(assemble, "DENSE_ROWS", 0)
+    monkeypatch.setattr(least_change, "DENSE_ROWS", 0)
     monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
     evaluator, many = corrected(scene)
     metric = evaluator.system.metric.copy()

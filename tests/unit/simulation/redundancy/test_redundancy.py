@@ -146,7 +146,7 @@ def test_what_is_redundant_at_one_pose_alone(rows, monkeypatch):
     """A02 with all links in line: rank 27 of 35 rows, 29 elsewhere (benchmarks A02). Two of the
     eight rows are redundant there alone, six everywhere."""
     if rows == "many":
-        monkeypatch.setattr("dap3d_core.simulation.initial.assemble.DENSE_ROWS", 0)
+        monkeypatch.setattr("dap3d_core.simulation.initial.least_change.DENSE_ROWS", 0)
         monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
     found, elsewhere = elsewhere_of(four_bar_row(2, np.pi / 2))
     assert (found.rank.rank, found.rank.redundant, found.rank.dof) == (27, 8, 3)

@@ -1,0 +1,121 @@
+"""Regularised friction that should stick and creeps: for how long, how fast, how far.
+
+Friction that fades below a speed, as tanh(v / v_tol) does, holds nothing at rest: what should stick
+creeps at a part of v_tol. Which part is seen by evaluating the law twice, as it is and with a
+v_tol that is far smaller, where its friction is whole: the ratio is tanh(v / v_tol).
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.interface.fields import specs_of
+from dap3d_core.model import Group, Model
+from dap3d_core.model.groups import Floats
+from dap3d_core.result.arrays import Arrays, joined
+
+#: Evaluations of all elements together, and instants at least and at most.
+WORK, FEWEST, MOST = 1000, 10, 100
+#: Friction between these parts of the whole is that of a contact within three times v_tol, and not
+#: of one at rest without load, whose speed is an error of the steps.
+LEAST, WITHIN = 1e-3, math.tanh(3.0)
+#: It creeps for long from this part of a run on, and this many instants.
+LONG, INSTANTS = 0.05, 3
+#: Part of v_tol at which friction is whole.
+WHOLE = 1e-9
+#: Field of the friction of joints (interface/codegen/kernel_arguments.py), and its unit.
+OF_JOINTS = ("v_tol", "m/s")
+
+
+class CreepMonitor:
+    """Looks through what is reported for friction that should stick."""
+
+    def __init__(self, model: Model, most: int) -> None:
+        """Args: model; most: how many instants are reported at most."""
+        self._model = model
+        self._elements = [(group, k) for group in model.friction for k in range(group.count)]
+        self._elements += [
+            (group, k)
+            for group in model.forces
+            if getattr(group.type_info.type, "regularised", "")
+            for k in range(group.count)
+        ]
+        kept = min(MOST, max(FEWEST, WORK // max(1, len(self._elements))))
+        self._stride, self._count = max(1, most // kept), 0
+        self._kept: list[Arrays] = []
+
+    def look(self, arrays: Arrays) -> None:
+        """Keep some of what was reported next."""
+        if self._elements:
+            first = -self._count % self._stride
+            self._count += len(arrays)
+            indices = np.arange(first, len(arrays), self._stride)
+            self._kept += [arrays.at(indices)] if len(indices) else []
+
+    @IGNORE_FLOAT_ERRORS
+    def notes(self, evaluator: Evaluator) -> list[str]:
+        """Note on each element that creeps for long."""
+        if not self._kept:
+            return []
+        arrays = joined(self._kept)
+        notes = (self._note(evaluator, arrays, *element) for element in self._elements)
+        return [note for note in notes if note]
+
+    def _note(self, evaluator: Evaluator, arrays: Arrays, group: Group, k: int) -> str:
+        type_: Any = group.type_info.type
+        field, unit = OF_JOINTS
+        if group.joints is None:
+            field = type_.regularised
+            unit = specs_of(type_)[field].unit
+        limit = float(group.numbers[k, group.type_info.layout.numbers[field][0]])
+        part = _parts_of_whole(evaluator, arrays, group, k, field, limit)
+        speed = limit * np.arctanh(np.minimum(part, WITHIN))
+        creeps = (part > LEAST) & (part < WITHIN)
+        t = arrays.t
+        first, last = _longest(creeps)
+        if last - first < INSTANTS or t[last - 1] - t[first] < LONG * (t[-1] - t[0]):
+            return ""
+        far = float(np.sum(0.5 * (speed[first + 1 : last] + speed[first : last - 1])
+                           * np.diff(t[first:last])))  # fmt: skip
+        fastest, length = float(np.max(speed[first:last])), unit.removesuffix("/s")
+        return (
+            f"forces.{self._model.force_names[int(group.members[k])]}: from t = {t[first]:.6g} to "
+            f"{t[last - 1]:.6g} s its contact is near {field} = {limit:g} {unit}, where "
+            "regularised friction does not stick: what should stay creeps, at up to "
+            f"{fastest:.3g} {unit}, by {far:.3g} {length}. It creeps less, in proportion, with a "
+            f"smaller {field}"
+        )
+
+
+def _parts_of_whole(
+    evaluator: Evaluator, arrays: Arrays, group: Group, k: int, field: str, limit: float
+) -> Floats:
+    """(nt,) the wrench as a part of that at a large speed; 0 without load."""
+    from dap3d_core.result.post.force_output import ForceLoops  # not without friction
+    from dap3d_core.result.post.reactions import place_at
+
+    loops, size = ForceLoops(evaluator, group, k), np.zeros((len(arrays), 2))
+    force = np.zeros_like(evaluator.system.force)
+    minus_lambda = np.zeros_like(evaluator.system.multipliers)
+    places = place_at(evaluator, arrays.t, arrays.u, arrays.states, arrays.inputs)
+    for n, time in places:
+        minus_lambda[evaluator.system.row] = -arrays.Lam[n]
+        for c, value in enumerate((limit, WHOLE * limit)):
+            loops.parameters.scale_field(group, field, value)
+            force[:] = 0.0
+            reads = loops.law == "friction"
+            loops.call(loops.law, time, force, minus_lambda if reads else None)
+            size[n, c] = np.max(np.abs(force))
+    part: Floats = size[:, 0] / np.where(size[:, 1] > 0.0, size[:, 1], 1.0)
+    return part
+
+
+def _longest(flags: Any) -> tuple[int, int]:
+    """First, and one behind the last, of the longest row of true ones."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    if not len(edges):
+        return 0, 0
+    k = 2 * int(np.argmax(edges[1::2] - edges[::2]))
+    return int(edges[k]), int(edges[k + 1])
