@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from dap3d_core.plot.curves import curve_picture
 from dap3d_core.plot.figure_file import check_suffix, save_figure
 from dap3d_core.plot.style import WIDTH, Picture
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, ResultError
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def picture_of(
     return fit_picture(result, names)
 
 
+@checked
 def plot(
     result: "Drawable",
     *quantities: str,

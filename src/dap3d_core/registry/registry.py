@@ -8,6 +8,7 @@ import attrs
 from dap3d_core.interface import PluginError
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.hooks import GROUPS
+from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.declared_types import not_yet_installed
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover, normal_name
 from dap3d_core.registry.guard import OverdueError
@@ -228,6 +229,7 @@ class Registry:
         return error
 
 
+@checked
 def load_registry(*, groups: Collection[str] | None = None) -> Registry:
     """Find the installed types by their entry points; imports no plugin.
 

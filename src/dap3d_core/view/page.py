@@ -12,6 +12,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import ResultError
 from dap3d_core.result.file.atomic_write import whole_file
 from dap3d_core.view.page_data import page_data
@@ -67,6 +68,7 @@ class View:
         )
 
 
+@checked
 def view(
     result: Any,
     *quantities: str,

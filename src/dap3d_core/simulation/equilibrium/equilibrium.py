@@ -9,6 +9,7 @@ import numpy as np
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import split
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import INFORMATION
 from dap3d_core.result.errors import unknown
 from dap3d_core.result.post.reactions import Reaction, reactions
@@ -84,6 +85,7 @@ class Equilibrium:
         return NamedState(str(self.compiled.scene.name) or "the equilibrium", model.body_names,
                           self.u, angles, (note,), states=states)  # fmt: skip
 
+    @checked
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
         """Reaction of a joint on each of its bodies, ground included: D^T lambda.
 
@@ -154,6 +156,7 @@ class Equilibrium:
         return changed
 
 
+@checked
 def equilibrium(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     *,
