@@ -93,10 +93,14 @@ def _is_a(kind: Any, value: Any) -> bool:
         return isinstance(value, Mapping) and all(
             _fits(arguments[0], k) and _fits(arguments[1], v) for k, v in value.items()
         )
-    if origin in (Sequence, Collection):
+    if origin is tuple and Ellipsis not in arguments:
+        return (
+            _is_list(value) and len(value) == len(arguments) and all(map(_fits, arguments, value))
+        )
+    if origin in (Sequence, Collection, tuple):
         is_list = _is_list(value) or (origin is Collection and isinstance(value, (set, frozenset)))
         return is_list and all(_fits(arguments[0], one) for one in value)
-    if not isinstance(origin, type) or origin is tuple:
+    if not isinstance(origin, type):
         return True
     try:
         return isinstance(value, origin)
@@ -144,8 +148,8 @@ def _noun(kind: Any) -> str:
         return noun
     if origin in (Sequence, Collection, tuple):
         plural = {str: "names", float: "numbers", int: "whole numbers"}
-        item = arguments[0]
-        return f"a list of {plural.get(item) or _noun(item)}"
+        count = f"{len(arguments)} " if origin is tuple else ""
+        return f"a list of {count}{plural.get(arguments[0]) or _noun(arguments[0])}"
     if origin is Mapping:
         return "a dictionary"
     name = getattr(origin, "__name__", str(origin))

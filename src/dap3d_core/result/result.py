@@ -439,7 +439,6 @@ class Result:
         """Errors of conserved and vanishing quantities (post/ledger.py): entries by name."""
         return ledger_of(self.summary, self.arrays, self.record)
 
-    @checked
     def quantity(self, name: str) -> Values:
         """A quantity by name, such as ``crank.r.z``, ``P3.v``, ``J1.force.norm``, ``energy.total``.
 
