@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 @command(
     "List the installed types.",
     click.option("--no-compile", is_flag=True, help="Do not check that kernels compile."),
-    click.option("--limit", type=click.FloatRange(min=0.0, min_open=True), metavar="SECONDS",
+    click.option("--limit", type=options.FiniteFloat(positive=True), metavar="SECONDS",
                  help="Time in which a plugin must load (60 by default)."),
     click.option("--test", is_flag=True, help="Check formulas, and run the tests of packages."),
     options.JSON,

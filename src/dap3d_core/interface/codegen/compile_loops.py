@@ -79,6 +79,8 @@ def compiled_loop(
         return None
     try:
         return build(loop, announce)
+    except OSError:  # of the surroundings: no fault of the type
+        raise
     except Exception as error:
         if is_out_of_memory(error):
             raise MemoryError from error
