@@ -42,8 +42,10 @@ def result():
 
 def good_arguments(function, result):
     """Arguments for the parameters that must be given; nothing is read or run with them."""
-    known = {"result": result, "path": "none.nc", "format": "csv", "parameters": {}, "vary": {},
-             "outputs": [], "measured": {}, "motion": result, "names": [], "folder": "none"}  # fmt: skip
+    known = {
+        "result": result, "motion": result, "path": "none.nc", "folder": "none", "format": "csv",
+        "parameters": {}, "vary": {}, "measured": {}, "outputs": [], "names": [],
+    }  # fmt: skip
     parameters = inspect.signature(function).parameters.values()
     needed = [p.name for p in parameters if p.default is p.empty and p.kind not in VARIADIC]
     return {name: known.get(name, "pen1") for name in needed}

@@ -169,10 +169,7 @@ def _animation(mistakes: MistakeList, content: Any) -> Animation:
 
 def _find(source: Any) -> tuple[Path, list[str]]:
     """The scene file of a name, folder or path, with notes on the choice."""
-    try:
-        text = os.fsdecode(source)
-    except TypeError:
-        raise file_error("", f"a scene is loaded by name or path, not {source!r}") from None
+    text = os.fsdecode(source)
     if not text.strip():
         raise file_error("", "the name of the model is empty; give a name, a folder or a file")
     if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", text):
