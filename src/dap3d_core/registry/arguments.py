@@ -33,7 +33,7 @@ _READERS = {"Result": "dap.open", "Scene": "dap.load", "CompiledModel": "dap.com
 def checked(function: Function) -> Function:
     """Decorator of a public function: refuses arguments of kinds that its annotations exclude.
 
-    Numbers of numpy count as Python's; text and truth values are no numbers, and text is no list.
+    Numbers of numpy become Python's; text and truth values are no numbers, and text is no list.
     ``SETTINGS`` are left to the function, and annotations that are known to type checkers alone.
     """
     signature = inspect.signature(function)
@@ -42,10 +42,12 @@ def checked(function: Function) -> Function:
     @wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
         try:
-            given = signature.bind(*args, **kwargs).arguments
+            bound = signature.bind(*args, **kwargs)
         except TypeError:
             return function(*args, **kwargs)  # Python's own message names the function
-        for name, value in given.items():
+        given = bound.arguments
+        for name in given:
+            value = given[name] = _python_number(given[name])
             parameter = signature.parameters[name]
             if value is parameter.default:
                 continue
@@ -53,7 +55,7 @@ def checked(function: Function) -> Function:
                 kinds[name] = _annotation(function, parameter)
             if not _fits(kinds[name], value):
                 raise TypeError(_fault(name, kinds[name], value))
-        return function(*args, **kwargs)
+        return function(*bound.args, **bound.kwargs)
 
     return call  # type: ignore[return-value]
 
@@ -114,12 +116,15 @@ def _is_list(value: Any) -> bool:
     return isinstance(value, (Sequence, Set)) or bool(getattr(value, "shape", ()))
 
 
-def _is_number(kind: type, value: Any) -> bool:
-    """True for Python's and numpy's numbers and truth values, arrays without dimensions as well."""
+def _python_number(value: Any) -> Any:
+    """A number or truth value of numpy, also as an array without dimensions, as Python's."""
     dtype = getattr(value, "dtype", None)
-    if dtype is not None and not isinstance(value, (Real, bool)):
-        letters = {bool: "b", int: "iu", float: "iuf"}[kind]
-        return not value.shape and dtype.kind in letters
+    is_number = getattr(dtype, "kind", "") in tuple("biuf") and value.shape == ()
+    return value.item() if is_number and not getattr(value, "mask", False) else value
+
+
+def _is_number(kind: type, value: Any) -> bool:
+    """True for a Python number; truth values are none but of their own kind."""
     if kind is bool or isinstance(value, bool):
         return kind is bool and isinstance(value, bool)
     return isinstance(value, Integral if kind is int else Real)
