@@ -41,6 +41,16 @@ def picture_of(
         from dap3d_core.plot.sweep.sweep_plot import sweep_picture
 
         return sweep_picture(cast("xarray.Dataset", result), names, x, at)
+    drawn = result.values() if isinstance(result, Mapping) else [result]
+    is_result = all(isinstance(one, Result) for one in drawn)
+    if (
+        not is_result
+        and not hasattr(result, "mode_eigenvalues")
+        and not hasattr(result, "measured")
+    ):
+        words = "a Result, a dictionary of these, a Fit, a Linearization or the data of a sweep"
+        reader = f"; dap.open({result!r}) reads one" if isinstance(result, (str, Path)) else ""
+        raise TypeError(f"the argument result should be {words}, not {result!r}{reader}")
     if at:
         raise ValueError("at chooses points of a sweep; this is none")
     if isinstance(result, (Result, Mapping)):

@@ -3,9 +3,11 @@
 import inspect
 import os
 import reprlib
+import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, Set, Sized
 from functools import wraps
 from numbers import Integral, Real
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, get_args, get_origin
 
@@ -20,6 +22,7 @@ _NOUNS: dict[Any, str] = {
     bytes: "bytes",
     NoneType: "None",
     os.PathLike: "a path",
+    Path: "a path",
     Callable: "a function",
 }
 #: Settings of a run, whose values are checked with those of the scene.
@@ -67,10 +70,20 @@ def _annotation(function: Callable[..., Any], parameter: inspect.Parameter) -> A
         return Any
     if isinstance(kind, str):
         try:
-            kind = eval(kind, function.__globals__)  # of our own sources
+            kind = eval(kind, function.__globals__, _PublicNames())  # of our own sources
         except (NameError, TypeError):
             return Any
     return Any if kind is parameter.empty else kind
+
+
+class _PublicNames(dict[str, Any]):
+    """Public names of dap3d, which some modules import for type checkers alone."""
+
+    def __missing__(self, name: str) -> Any:
+        package = sys.modules["dap3d_core"]
+        if name not in package.__all__:
+            raise KeyError(name)
+        return getattr(package, name)
 
 
 def _members(kind: Any) -> Iterator[Any]:
