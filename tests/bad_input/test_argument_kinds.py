@@ -89,6 +89,15 @@ MESSAGES = {
         lambda: dap.export("run.nc", "run.csv"),
         r"argument result should be a Result, not 'run.nc'; dap.open\('run.nc'\) makes one",
     ),
+    "text for a result that is shown": (
+        lambda: dap.view("run.nc"),
+        r"argument result should be a Result, not 'run.nc'; dap.open\('run.nc'\) makes one",
+    ),
+    "text for a result that is drawn": (
+        lambda: dap.plot("run.nc", "t"),
+        r"argument result should be a Result, .*, not 'run.nc'; dap.open\('run.nc'\) reads one",
+    ),
+    "a dictionary of no results": (lambda: dap.plot({"a": 3}, "t"), "should be a Result, a dict"),
     "a name for a list of names": (
         lambda: dap.linearize("pen1", outputs="cone.r.z"),
         r"outputs should be a list of names, not 'cone.r.z'; write \['cone.r.z'\] for a single one",

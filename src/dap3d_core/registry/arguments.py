@@ -63,6 +63,16 @@ def checked(function: Function) -> Function:
     return call  # type: ignore[return-value]
 
 
+def require(name: str, kind: Any, value: Any) -> None:
+    """Refuse an argument that is of no kind, where the annotation says less than is known.
+
+    Raises:
+        TypeError: as of ``checked``.
+    """
+    if not _fits(kind, value):
+        raise TypeError(_fault(name, kind, value))
+
+
 def _annotation(function: Callable[..., Any], parameter: inspect.Parameter) -> Any:
     """The kinds of a parameter; ``Any`` where they are unknown at run time."""
     kind = parameter.annotation
