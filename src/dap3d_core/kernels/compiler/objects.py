@@ -73,7 +73,7 @@ machine.emit_object(llvm.parse_assembly("define double @f(double %x) { ret doubl
 
 def _is_known(name: str) -> bool:
     """True if LLVM compiles for a processor; in a process of its own, which LLVM may abort."""
-    trial = [sys.executable, "-c", _TRIAL, name]
+    trial = [sys.executable, "-P", "-c", _TRIAL, name]  # -P: no package of the current folder
     done = subprocess.run(trial, stdin=subprocess.DEVNULL, capture_output=True, check=False)
     return done.returncode == 0 and not done.stderr
 
