@@ -26,8 +26,8 @@ CHECK_PYTHON := import sys, venv, ensurepip; sys.exit(sys.version_info < (3, 11)
 unexport PYTHONDONTWRITEBYTECODE
 
 .DELETE_ON_ERROR:
-.PHONY: help run install wheel test test-all verify verify-long unit-nojit coverage no-fma lint audit \
-    format docs bench bench-peers fuzz clean
+.PHONY: help run install wheel test test-all verify verify-long unit-nojit coverage no-fma lowest newest \
+    lint audit format docs bench bench-peers fuzz clean
 
 help:  ## show this list
 	@echo "make TARGET, where TARGET is one of"
@@ -69,6 +69,20 @@ no-fma: $(VENV)/.installed-test  ## tests of compiled bits as on a processor wit
 	@if [ "$$(uname -m)" != x86_64 ]; then echo "no-fma: only on x86-64"; exit 0; fi; \
 	$(NO_FMA) $(PYTHON) -m pytest -n auto -m "not slow" \
 	    tests/unit/kernels/compiler/test_core.py tests/unit/kernels/compiler/test_complex.py
+
+# What meets the dependencies: commands, files, pictures, the compiler, clusters, formats.
+SMOKE := tests/e2e/test_run.py tests/e2e/test_commands.py tests/unit/result/file tests/unit/plot \
+    tests/unit/kernels/compiler tests/unit/matlab tests/unit/formats tests/unit/study/sweep
+# Old packages use what newer ones have deprecated since.
+SMOKE_TEST = -m pytest -n auto -m "not slow" -W ignore::DeprecationWarning $(SMOKE)
+LOWEST_VENV := build/lowest-venv
+lowest: $(LOWEST_VENV)/.installed  ## part of the tests with the lowest versions that pyproject.toml allows
+	@$(LOWEST_VENV)/bin/python $(SMOKE_TEST)
+
+NEWEST_VENV := build/newest-venv
+newest: $(NEWEST_VENV)/.installed  ## the same part with the newest Python that is installed here
+	@if [ -x $(NEWEST_VENV)/bin/python ]; then $(NEWEST_VENV)/bin/python $(SMOKE_TEST); \
+	else cat $<; fi
 
 # All checks run, also after one has failed; the last line says which.
 lint: $(VENV)/.installed-dev  ## format, lint, types, floors, circles, sizes
@@ -128,6 +142,27 @@ $(PEERS_VENV)/.installed: pyproject.toml $(PYTHON)
 	            --only-binary=:all: "$$peer" || echo "$$peer cannot be installed: skipped"; \
 	    done; }
 	@touch $@
+
+# Environments of their own: what they need does not touch what is tested.
+SMOKE_INSTALL := install --quiet --only-binary=:all: --disable-pip-version-check
+$(LOWEST_VENV)/.installed: pyproject.toml tools/lowest.py $(PYTHON)
+	@echo "Installing dap3d with the lowest versions of its dependencies into $(LOWEST_VENV) ..."
+	@rm -rf $(LOWEST_VENV)
+	@$(PYTHON) -m venv $(LOWEST_VENV)
+	@$(PYTHON) tools/lowest.py > $(LOWEST_VENV)/lowest.txt
+	@$(LOWEST_VENV)/bin/python -m pip $(SMOKE_INSTALL) -c $(LOWEST_VENV)/lowest.txt -e ".[smoke,xacro]"
+	@$(LOWEST_VENV)/bin/python -m pip $(SMOKE_INSTALL) --no-deps -e plugins/dap3d-example
+	@touch $@
+
+$(NEWEST_VENV)/.installed: pyproject.toml tools/newest_python.py $(PYTHON)
+	@rm -rf $(NEWEST_VENV) && mkdir -p $(NEWEST_VENV)
+	@python=$$($(PYTHON) tools/newest_python.py) || { \
+	    echo "newest: skipped, no Python here is newer than that of .venv" > $@; exit 0; }; \
+	echo "Installing dap3d for $$python into $(NEWEST_VENV) ..."; \
+	"$$python" -m venv $(NEWEST_VENV) && \
+	$(NEWEST_VENV)/bin/python -m pip $(SMOKE_INSTALL) -e ".[smoke]" && \
+	$(NEWEST_VENV)/bin/python -m pip $(SMOKE_INSTALL) --no-deps -e plugins/dap3d-example && \
+	touch $@
 
 clean:  ## remove caches, builds and coverage (.venv and runs stay)
 	@rm -rf build dist htmlcov .coverage .coverage.*

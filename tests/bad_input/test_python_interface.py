@@ -122,9 +122,9 @@ def test_rates_that_are_not_finite_are_an_error_that_names_the_culprit(compiled)
     ("given", "error", "words"),
     [
         ({"events": dap.Event("t", above=0.2)}, TypeError, r"write \[event\] for a single one"),
-        ({"events": 3}, TypeError, "a list of dap.Event, not of 3"),
-        ({"events": ["t"]}, TypeError, "a list of dap.Event, not of 't'"),
-        ({"watch": 3}, TypeError, "watch is a function"),
+        ({"events": 3}, TypeError, "a list of dap.Event, not 3"),
+        ({"events": ["t"]}, TypeError, r"a list of dap.Event, not \['t'\]"),
+        ({"watch": 3}, TypeError, "watch should be a function"),
         ({"method": 3}, dap.SceneError, "should be text|should be one of"),
         ({"integrator": b"dop853"}, dap.SceneError, "should be one of"),
         ({"t_end": "1"}, dap.SceneError, "without quotes"),

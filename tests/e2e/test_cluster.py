@@ -8,6 +8,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from contextlib import contextmanager
 
@@ -205,6 +206,49 @@ def test_a_worker_that_is_killed_loses_nothing(alone):
         os.kill(victim, signal.SIGKILL)
         parts += list(found)
         same(alone, dict(sorted(collected(parts).items())))
+
+
+def test_a_worker_that_is_lost_while_it_reports_its_versions_has_no_say(client, alone):
+    """It hangs in the middle of the question and dies: the points are computed by the others."""
+    with another_worker(client) as address:
+        (pid,) = client.run(os.getpid, workers=[address]).values()
+        os.kill(pid, signal.SIGSTOP)
+        threading.Timer(1.0, os.kill, (pid, signal.SIGKILL)).start()
+        same(alone, collected(run_on(client, bob(), POINTS, PLACES)))
+
+
+class _Losing:
+    """A client all of whose workers are lost at the first questions."""
+
+    status = "running"
+
+    def __init__(self, *answers):
+        self.answers, self.asked = list(answers), 0
+
+    def wait_for_workers(self, count, timeout):
+        if not self.answers:
+            raise TimeoutError
+        self.asked += 1
+
+    def run(self, *question, on_error):
+        self.found = self.answers.pop(0)
+        return self.found
+
+    def nthreads(self):
+        return {worker: 1 for worker, answer in self.found.items() if answer == "fit"}
+
+    scheduler = None
+
+
+def test_where_all_workers_are_lost_others_are_waited_for():
+    from distributed import comm
+
+    gone, lost = {"a": comm.CommClosedError("removed")}, {"b": OSError("reset")}
+    losing = _Losing(gone, lost, {"b": OSError("reset"), "c": "fit"})
+    assert dask_cluster._answers(losing, b"") == {"c": "fit"}
+    assert losing.asked == 3
+    with pytest.raises(ClusterError, match="has no workers"):
+        dask_cluster._answers(_Losing(gone, lost), b"")
 
 
 def test_points_that_kill_their_workers_are_named():

@@ -77,29 +77,36 @@ def process(words, folder):
     )
 
 
+def readme_steps(text):
+    """The blocks of the README in their order: scene, commands, scripts, as (kind, content)."""
+    pattern = r"^```(toml|python)\n(.*?)^```|^    (?:\.venv/bin/)?dap3d ([^\n]*)$"
+    for found in re.finditer(pattern, text, flags=re.MULTILINE | re.DOTALL):
+        language, block, line = found.groups()
+        yield (language, block) if language else ("dap3d", shlex.split(line, comments=True))
+
+
 @pytest.mark.slow
-def test_the_readme(tmp_path):
-    """The scene, the commands and the script of the README, in this order, in an empty folder."""
-    text = (REPOSITORY / "README.md").read_text()
-    (scene,) = blocks(text, "toml")
-    (tmp_path / "cone.toml").write_text(scene)
-    found = commands(text, ".venv/bin/dap3d")
-    names = ["check", "run", "plot", "sweep", "plot", "equilibrium", "modes"]
-    assert [words[0] for words in found] == names
-    for words in found:
-        done = dap3d(words, tmp_path)
-        assert done.returncode == 0, done.stderr
+def test_the_readme_runs_in_sequence_and_once_more(tmp_path):
+    """Each block of the README as printed, one after another, in one folder that begins empty."""
+    sequence = list(readme_steps((REPOSITORY / "README.md").read_text()))
+    words = ["check", "run", "plot", "sweep", "plot", "equilibrium", "modes", "check-plugin"]
+    assert [content[0] for kind, content in sequence if kind == "dap3d"] == words
+    assert [kind for kind, _ in sequence if kind != "dap3d"] == ["toml", "python", "python"]
+    for kind, content in sequence * 2:
+        if kind == "toml":
+            (tmp_path / "cone.toml").write_text(content)
+        elif kind == "dap3d":
+            done = dap3d(content, tmp_path)
+            assert done.returncode == 0, (content, done.stderr)
+        elif "interface_version" in content:
+            (tmp_path / "plugin.py").write_text(content)
+        else:
+            done = subprocess.run(
+                [sys.executable, "-c", content], cwd=tmp_path, capture_output=True, text=True
+            )
+            assert done.returncode == 0, done.stderr
     assert (tmp_path / "cone.png").stat().st_size > 1000
     assert (tmp_path / "sweep.png").stat().st_size > 1000
-    (tmp_path / "cone.nc").unlink()
-    script, joint = blocks(text, "python")
-    (tmp_path / "plugin.py").write_text(joint)
-    done = dap3d(["check-plugin", "plugin.py", "--allow-code"], tmp_path)
-    assert done.returncode == 0, done.stdout
-    done = subprocess.run(
-        [sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
     assert (tmp_path / "cone.nc").exists()
 
 

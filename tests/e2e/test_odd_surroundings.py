@@ -214,3 +214,42 @@ def test_a_limit_on_files_is_named_before_the_run(scene_file):
     assert "dt of at least" in found.stderr
     found = in_shell("ulimit -f 2000; $DAP3D run fall.toml --t-end 1 --dt 0.5", folder)
     assert found.returncode == 0, found
+
+
+# ---------------------------------------------------------------- variables of the environment
+
+
+@pytest.mark.parametrize("name", ["nonsense", "../x", "x86-64-v2 ", "pentium4", "'"])
+def test_an_unknown_processor_is_one_sentence(scene_file, name):
+    """LLVM would end the process; the type whose kernels come first is not blamed."""
+    folder = scene_file().parent
+    found = in_shell("$DAP3D run fall.toml -q", folder, DAP3D_CPU=name)
+    assert found.returncode == 1
+    assert "the environment variable DAP3D_CPU is" in found.stderr
+    assert "unset it" in found.stderr
+    assert not any(words in found.stderr for words in ("LLVM ERROR", "kernels", "unexpected"))
+    assert not (folder / "fall.nc").exists()
+
+
+@pytest.mark.parametrize("command", ["plot fall.nc t -o a.png", "animate fall.nc -o a.gif"])
+def test_an_unknown_backend_of_matplotlib_is_one_sentence(scene_file, command):
+    folder = scene_file().parent
+    found = in_shell(f"$DAP3D run fall.toml -q && $DAP3D {command}", folder, MPLBACKEND="nonsense")
+    assert found.returncode == 1
+    assert "the environment variable MPLBACKEND is 'nonsense'" in found.stderr
+    assert "unexpected" not in found.stderr
+
+
+@pytest.mark.parametrize("option", ["--t inf", "--t=-inf", "--t nan", "--t 1e999", "--t x"])
+def test_a_time_that_is_not_finite_is_a_usage_error(scene_file, option):
+    found = in_shell(f"$DAP3D modes fall.toml {option}", scene_file().parent)
+    assert found.returncode == 2
+    assert "--t" in found.stderr
+    assert "unexpected" not in found.stderr
+
+
+@pytest.mark.parametrize("limit", ["nan", "inf", "0", "-1"])
+def test_a_limit_of_loading_is_a_positive_time(tmp_path, limit):
+    found = in_shell(f"$DAP3D plugins --no-compile --limit {limit}", tmp_path)
+    assert found.returncode == 2
+    assert "--limit" in found.stderr

@@ -163,6 +163,8 @@ ALLOWED = {
     ("testing/samples/random_element.py", "exec"): "loop modules",
     ("kernels/compiler/units.py", "eval"): "calls of compiled functions, by their types",
     ("kernels/compiler/background.py", "subprocess"): "Python itself, to compile beside",
+    ("kernels/compiler/objects.py", "subprocess"): "Python itself, to try a named processor",
+    ("registry/arguments.py", "eval"): "annotations of public functions",
     ("testing/packages.py", "subprocess"): "pytest, on the tests of packages, when it is asked for",
     ("plot/film/encoding.py", "subprocess"): "ffmpeg, without a shell",
     ("simulation/checkpoint/file.py", "allow_pickle"): "switched off",

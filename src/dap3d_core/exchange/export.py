@@ -6,6 +6,7 @@ from pathlib import Path
 
 import attrs
 
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, ResultError
 from dap3d_core.result.file.atomic_write import whole_file
 from dap3d_core.scene import Scene
@@ -36,6 +37,7 @@ class Export:
     notes: tuple[str, ...] = ()
 
 
+@checked
 def export(
     result: Result,
     path: str | os.PathLike[str],

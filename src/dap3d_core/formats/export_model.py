@@ -8,6 +8,7 @@ import attrs
 from dap3d_core.formats.export_scene.articulation import articulation_of
 from dap3d_core.interface.formats import Articulation, FormatError, Geometry, Remark, Remarks
 from dap3d_core.registry import Registry, load_registry
+from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.extensions import extensions
 from dap3d_core.scene import Scene, SceneError, check, load
 from dap3d_core.scene.errors import MISSING, Mistake
@@ -30,6 +31,7 @@ class ExportReport:
     left_out: tuple[Remark, ...]
 
 
+@checked
 def export_model(
     scene: Scene | str | os.PathLike[str],
     path: str | os.PathLike[str] | None = None,

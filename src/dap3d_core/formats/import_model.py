@@ -17,6 +17,7 @@ from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import Articulation, FormatError, Importer, Remark, Remarks
 from dap3d_core.interface.formats.articulation import KINDS
 from dap3d_core.registry import Registry, load_registry
+from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.extensions import extensions
 from dap3d_core.registry.suggestions import nearest, some
 from dap3d_core.scene import Scene, SceneError, check
@@ -63,6 +64,7 @@ class ImportReport:
         return scene.save(target)
 
 
+@checked
 def import_model(
     path: str | os.PathLike[str],
     *,

@@ -19,9 +19,10 @@ def integrator_named(name: Any) -> Integrator:
     Raises:
         PluginError: it is of another package, and cannot be used.
     """
+    name = str(name)
     if name == "auto":
         return EXPLICIT
-    return INTEGRATORS.get(name) or _of_package(str(name))
+    return INTEGRATORS.get(name) or _of_package(name)
 
 
 @lru_cache(maxsize=16)

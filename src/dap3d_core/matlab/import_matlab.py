@@ -14,6 +14,7 @@ from dap3d_core.matlab.translate.elements import add_forces, add_functions, add_
 from dap3d_core.matlab.translate.fields import NAMES, Fields, name_of
 from dap3d_core.matlab.translate.user_force import KEYWORD, add_user_forces
 from dap3d_core.registry import Registry, load_registry
+from dap3d_core.registry.arguments import checked
 from dap3d_core.scene import Mistake, Scene, SceneError, check
 from dap3d_core.scene.errors import file_error
 
@@ -21,6 +22,7 @@ from dap3d_core.scene.errors import file_error
 _LEFT_ALONE = "no joint and no force acts on it"
 
 
+@checked
 def import_matlab(
     folder: str | os.PathLike[str], registry: Registry | None = None
 ) -> tuple[Scene, ImportReport]:

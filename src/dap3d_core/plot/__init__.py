@@ -11,15 +11,28 @@ def _import_matplotlib() -> None:
 
     A ``matplotlibrc`` there may be that of a stranger's model, and may have names read as TeX.
     A script that has imported matplotlib before has decided for itself.
+
+    Raises:
+        OSError: ``MPLBACKEND`` names no backend.
     """
-    if "matplotlib" in sys.modules or not os.path.lexists("matplotlibrc"):
+    if "matplotlib" in sys.modules:
         return
-    here = os.getcwd()
-    os.chdir(os.path.abspath(os.sep))
+    here = os.getcwd() if os.path.lexists("matplotlibrc") else None
+    if here is not None:
+        os.chdir(os.path.abspath(os.sep))
     try:
         import matplotlib  # noqa: F401
+    except ValueError as error:
+        backend = os.environ.get("MPLBACKEND")
+        if not backend:
+            raise
+        raise OSError(
+            f"the environment variable MPLBACKEND is {backend!r}, which is no backend of "
+            "matplotlib; name one, such as Agg, or unset it"
+        ) from error
     finally:
-        os.chdir(here)
+        if here is not None:
+            os.chdir(here)
 
 
 _import_matplotlib()

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from dap3d_core.plot.curves import curve_picture
 from dap3d_core.plot.figure_file import check_suffix, save_figure
 from dap3d_core.plot.style import WIDTH, Picture
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, ResultError
 
 if TYPE_CHECKING:
@@ -40,6 +41,16 @@ def picture_of(
         from dap3d_core.plot.sweep.sweep_plot import sweep_picture
 
         return sweep_picture(cast("xarray.Dataset", result), names, x, at)
+    drawn = result.values() if isinstance(result, Mapping) else [result]
+    is_result = all(isinstance(one, Result) for one in drawn)
+    if (
+        not is_result
+        and not hasattr(result, "mode_eigenvalues")
+        and not hasattr(result, "measured")
+    ):
+        words = "a Result, a dictionary of these, a Fit, a Linearization or the data of a sweep"
+        reader = f"; dap.open({result!r}) reads one" if isinstance(result, (str, Path)) else ""
+        raise TypeError(f"the argument result should be {words}, not {result!r}{reader}")
     if at:
         raise ValueError("at chooses points of a sweep; this is none")
     if isinstance(result, (Result, Mapping)):
@@ -57,6 +68,7 @@ def picture_of(
     return fit_picture(result, names)
 
 
+@checked
 def plot(
     result: "Drawable",
     *quantities: str,

@@ -72,7 +72,7 @@ def _discover(
     known = (GROUPS | EXTENSIONS).items()
     kinds = {group: kind for kind, (group, _) in known if group in groups}
     sources = [source for one in _declaring(kinds) for source in _sources(one, kinds, blocked)]
-    order = {kind: k for k, kind in enumerate(GROUPS)}
+    order = {kind: k for k, kind in enumerate(GROUPS | EXTENSIONS)}
     sources.sort(key=lambda s: (order.get(s.kind, -1), s.keyword, s.distribution))
     return tuple(sources)
 

@@ -2,6 +2,7 @@
 
 import importlib
 import inspect
+from functools import partial
 from typing import Any
 
 import attrs
@@ -9,8 +10,9 @@ import attrs
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.hooks import EXTENSIONS
 from dap3d_core.registry.discovery import Source, discover
-from dap3d_core.registry.guard import guard
+from dap3d_core.registry.guard import guard, within
 from dap3d_core.registry.plugin_module import hooks_of
+from dap3d_core.registry.registry import LOAD_LIMIT, PluginInfo, collision, info_of
 from dap3d_core.registry.suggestions import nearest
 
 #: Module of each kind's hook and base class, and the name of the class.
@@ -50,8 +52,12 @@ class Extensions:
 
         return tuple(sorted(self.keywords, key=others))
 
-    def load(self, keyword: str) -> Any:
+    def load(self, keyword: str, limit_s: float | None = None) -> Any:
         """What the hook of a module returns with this keyword, checked: a class, or a method.
+
+        Args:
+            keyword: of the extension.
+            limit_s: time limit of the loading of its module; by default none.
 
         Raises:
             PluginError: there is none, two packages bring it, its module is broken, or it fails the
@@ -64,11 +70,8 @@ class Extensions:
             known = ", ".join(self.keywords) or "none"
             raise PluginError(f"there is no {self.kind} {keyword!r}{hint} (installed: {known})")
         if len(sources) > 1:
-            both = " and ".join(map(str, sources))
-            raise PluginError(
-                f"{self.kind} {keyword!r} is brought by {both}; uninstall one of them"
-            )
-        return _load(sources[0])
+            raise PluginError(collision(sources))
+        return _load(sources[0], limit_s)
 
 
 def extensions(kind: str) -> Extensions:
@@ -84,8 +87,22 @@ def extensions(kind: str) -> Extensions:
     return Extensions(kind, sources)
 
 
-def _load(source: Source) -> Any:
-    """What an entry point names.
+def extension_listing(limit_s: float | None = LOAD_LIMIT) -> list[PluginInfo]:
+    """Every extension with its state; loads each in its own guard and raises nothing.
+
+    Args:
+        limit_s: time limit of the loading of each; one that takes longer is broken.
+    """
+    same: dict[tuple[str, str], list[Source]] = {}
+    for source in discover([group for group, _ in EXTENSIONS.values()]):
+        if source.kind:  # entry points that cannot be read are in the listing of types
+            same.setdefault((source.kind, source.keyword), []).append(source)
+    load = partial(_load, limit_s=limit_s)
+    return [info_of(source, rivals, load) for rivals in same.values() for source in rivals]
+
+
+def _load(source: Source, limit_s: float | None = None) -> Any:
+    """What an entry point names, loaded within a time limit, s.
 
     Raises:
         PluginError: names distribution, module, reason and remedy.
@@ -94,7 +111,7 @@ def _load(source: Source) -> Any:
     module_name, base_name = _BASES[source.kind]
     specs = importlib.import_module(module_name)
     base = getattr(specs, base_name)
-    with guard(source, []):
+    with guard(source, []), within(limit_s):
         if source.fault:
             raise PluginError(source.fault)
         module = importlib.import_module(source.module)

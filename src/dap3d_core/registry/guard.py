@@ -15,6 +15,7 @@ from typing import Any
 import pluggy
 
 from dap3d_core.interface.errors import PluginError, is_out_of_memory
+from dap3d_core.interface.hooks import EXTENSIONS
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source
 
 #: Plugins are loaded one at a time: the guard changes state of the whole process.
@@ -118,7 +119,12 @@ def _restored(source: Source, folder: str, notes: list[str]) -> Iterator[None]:
 def _title(source: Source) -> str:
     if not source.distribution:
         return f"the model's own file {source.module}"
-    return f"{source.kind} type {source.keyword!r} of {source}"
+    return f"{noun_of(source.kind)} {source.keyword!r} of {source}"
+
+
+def noun_of(kind: str) -> str:
+    """A kind in messages: a joint type, an integrator."""
+    return kind if kind in EXTENSIONS else f"{kind} type"
 
 
 def _remedy(source: Source) -> str:
@@ -126,7 +132,7 @@ def _remedy(source: Source) -> str:
         return "Repair the file"
     name = source.distribution
     leaving = f"{BLOCK_VARIABLE}={name}:{source.keyword}"
-    return f"Repair, update or uninstall {name}, or leave this type out with {leaving}"
+    return f"Repair, update or uninstall {name}, or leave it out with {leaving}"
 
 
 def _reason(error: BaseException) -> str:

@@ -1,16 +1,17 @@
 """The registry of types; each is loaded and examined on first use."""
 
-from collections.abc import Collection
+from collections.abc import Callable, Collection
 from pathlib import Path
 
 import attrs
 
 from dap3d_core.interface import PluginError
 from dap3d_core.interface.codegen.type_info import TypeInfo
-from dap3d_core.interface.hooks import GROUPS
+from dap3d_core.interface.hooks import EXTENSIONS, GROUPS
+from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.declared_types import not_yet_installed
 from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover, normal_name
-from dap3d_core.registry.guard import OverdueError
+from dap3d_core.registry.guard import OverdueError, noun_of
 from dap3d_core.registry.loading import compile_kernels, load, load_file
 from dap3d_core.registry.suggestions import nearest
 
@@ -33,10 +34,11 @@ class UnknownTypeError(PluginError, LookupError):
 
 @attrs.frozen
 class PluginInfo:
-    """A type and its state, a line of ``dap3d plugins``.
+    """A type or an extension and its state, a line of ``dap3d plugins``.
 
     Attributes:
-        kind: joint, force or function; "" where a distribution's entry points cannot be read.
+        kind: joint, force or function, or one of ``EXTENSIONS``; "" where a distribution's entry
+            points cannot be read.
         keyword: the type's name in a scene.
         distribution, version: the installed package; "" for a model's own file.
         module: the module, or the path of a model's own file.
@@ -85,7 +87,7 @@ class Registry:
         if not sources:
             raise self._unknown(kind, keyword)
         if len(sources) > 1:
-            raise PluginError(_collision(sources))
+            raise PluginError(collision(sources))
         return self._load(sources[0], limit_s)
 
     def sources_of(self, kind: str, keyword: str) -> list[Source]:
@@ -128,7 +130,11 @@ class Registry:
             compiling: compile the kernels of types from other packages as well, which takes a
                 second a type the first time.
         """
-        infos = [(s, self._info(s, same, limit_s)) for same in self.sources.values() for s in same]
+        infos = [
+            (s, info_of(s, same, lambda source: self._load(source, limit_s)))
+            for same in self.sources.values()
+            for s in same
+        ]
         return [self._compiled(s, info) if compiling else info for s, info in infos]
 
     def with_file(self, path: str | Path) -> "Registry":
@@ -149,7 +155,7 @@ class Registry:
     def clash(self, kind: str, keyword: str, path: Path) -> str:
         """The fault of a model's own file with the keyword of an installed type."""
         sources = [s for s in self.sources[kind, keyword] if not s.blocked]
-        return _collision([*sources, Source(kind, keyword, str(path))])
+        return collision([*sources, Source(kind, keyword, str(path))])
 
     def _load(self, source: Source, limit_s: float | None = None) -> TypeInfo:
         loaded = self._loaded.get(source)
@@ -166,23 +172,6 @@ class Registry:
         if isinstance(loaded, str):
             raise PluginError(loaded)
         return loaded
-
-    def _info(self, source: Source, rivals: list[Source], limit_s: float | None) -> PluginInfo:
-        state, reason = "ok", ""
-        active = [s for s in rivals if not s.blocked]
-        if source.blocked:
-            state, reason = "blocked", f"{BLOCK_VARIABLE} names {source.blocked}"
-        elif not source.kind:
-            state, reason = "broken", source.fault
-        elif len(active) > 1:
-            state, reason = "duplicate", _collision(active)
-        else:
-            try:
-                self._load(source, limit_s)
-            except PluginError as error:
-                state, reason = "broken", str(error)
-        s = source
-        return PluginInfo(s.kind, s.keyword, s.distribution, s.version, s.module, state, reason)
 
     def _compiled(self, source: Source, info: PluginInfo) -> PluginInfo:
         """The info after compiling the kernels of a type; dap3d's own are compiled by its tests."""
@@ -228,6 +217,7 @@ class Registry:
         return error
 
 
+@checked
 def load_registry(*, groups: Collection[str] | None = None) -> Registry:
     """Find the installed types by their entry points; imports no plugin.
 
@@ -241,13 +231,39 @@ def load_registry(*, groups: Collection[str] | None = None) -> Registry:
     return Registry(sources)
 
 
+def info_of(source: Source, rivals: list[Source], load: Callable[[Source], object]) -> PluginInfo:
+    """A line of the listing: the state of a type or an extension, and the fault if there is one.
+
+    Args:
+        source: its origin.
+        rivals: all origins of its kind and keyword, itself as well.
+        load: loads it, or raises a PluginError.
+    """
+    state, reason = "ok", ""
+    active = [s for s in rivals if not s.blocked]
+    if source.blocked:
+        state, reason = "blocked", f"{BLOCK_VARIABLE} names {source.blocked}"
+    elif not source.kind:
+        state, reason = "broken", source.fault
+    elif len(active) > 1:
+        state, reason = "duplicate", collision(active)
+    else:
+        try:
+            load(source)
+        except PluginError as error:
+            state, reason = "broken", str(error)
+    s = source
+    return PluginInfo(s.kind, s.keyword, s.distribution, s.version, s.module, state, reason)
+
+
 def _check_kind(kind: str) -> None:
     if kind not in GROUPS:
         raise ValueError(f"a kind is one of {', '.join(GROUPS)}, not {kind!r}")
 
 
-def _collision(sources: list[Source]) -> str:
-    title = f"{sources[0].kind} type {sources[0].keyword!r}"
+def collision(sources: list[Source]) -> str:
+    """The fault of several types with one keyword, and the remedies."""
+    title = f"{noun_of(sources[0].kind)} {sources[0].keyword!r}"
     both = " and ".join(str(s) for s in sources)
     names = sorted({s.distribution for s in sources} - {""})
     leaving = " or ".join(f"{BLOCK_VARIABLE}={n}:{sources[0].keyword}" for n in names)
@@ -258,6 +274,10 @@ def _collision(sources: list[Source]) -> str:
         )
     if len(names) == 1:
         return f"{title} is declared twice, by {both}; update or uninstall {names[0]}"
+    if sources[0].kind in EXTENSIONS:
+        return (
+            f"{title} is brought by {both}; uninstall one of them, or leave one out with {leaving}"
+        )
     others = " or ".join(n for n in names if n != OWN)
     words = " or ".join(f'"{n}:{sources[0].keyword}"' for n in names)
     return (

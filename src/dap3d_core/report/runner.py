@@ -12,6 +12,7 @@ import attrs
 
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.integrators import INTEGRATORS
+from dap3d_core.registry.arguments import checked
 from dap3d_core.report.error_norms import PARTED, final_position_error, trajectory_error
 from dap3d_core.report.recommend import front
 from dap3d_core.report.reference import Reference, find_reference
@@ -46,6 +47,7 @@ _STEP_LEFT_OUT = (
 )
 
 
+@checked
 def report(
     scene: Scene | str | os.PathLike[str],
     *,

@@ -11,6 +11,7 @@ import numpy as np
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import read_only
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result.arrays import Arrays, arrays_of
 from dap3d_core.result.errors import ResultError, UnknownNameError, unknown
 from dap3d_core.result.event_record import EventRecord
@@ -24,6 +25,7 @@ from dap3d_core.result.post.reactions import Reaction, jacobians, reactions
 from dap3d_core.result.quantities.catalogue import MOTION, Quantity
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.scene import SceneError
+from dap3d_core.scene.coerce import canonical
 
 if TYPE_CHECKING:
     import xarray
@@ -280,6 +282,7 @@ class Result:
         """
         return jacobians(self.evaluator, self.t, self.u, self.inputs)
 
+    @checked
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
         """Reaction of a joint on each of its bodies, ground included: D^T lambda (spec 2).
 
@@ -298,6 +301,7 @@ class Result:
             UnknownNameError: there is no such joint; names the nearest.
             ResultError: as ``model``.
         """
+        joint = canonical(joint)
         if joint not in self.summary.joint_index:
             raise unknown("joint", joint, self.summary.joint_names)
         self._compute_reactions([joint])
@@ -308,6 +312,7 @@ class Result:
         self._compute_reactions(self.summary.joint_names)
         return {name: dict(self._reactions[name]) for name in self.summary.joint_names}
 
+    @checked
     def coordinates(self, joint: str) -> "JointCoordinates":
         """Coordinates of a joint and their rates.
 
@@ -322,6 +327,7 @@ class Result:
             UnknownNameError: there is no such joint; its motion has no coordinates, says why.
             ResultError: as ``model``.
         """
+        joint = canonical(joint)
         if joint not in self.summary.joint_index:
             raise unknown("joint", joint, self.summary.joint_names)
         if joint not in self._coordinates and self._whole is not None:
@@ -365,6 +371,7 @@ class Result:
         """Names of the force elements, in the order of the scene."""
         return self.record.force_names
 
+    @checked
     def force(self, name: str) -> ForceOutput:
         """Output of a force element, evaluated at the reported states (spec 6).
 
@@ -379,6 +386,7 @@ class Result:
             UnknownNameError: there is no such force; names the nearest.
             ResultError: as ``model``; or an event changed its parameters during the run.
         """
+        name = canonical(name)
         if name not in self.force_names:
             raise unknown("force", name, self.force_names)
         if any(name in event.changes for event in self.events):
@@ -451,6 +459,7 @@ class Result:
         quantity = find(self, name)
         return Values(quantity.values, quantity.label, quantity.unit)
 
+    @checked
     def save(self, path: str | os.PathLike[str], force: bool = False) -> None:
         """Writes a NetCDF-4 file, whole or not at all; ``open_result`` reads it.
 

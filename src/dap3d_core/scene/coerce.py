@@ -1,8 +1,28 @@
 """Conversion of values from scripts and files to plain Python."""
 
 from typing import Any
+from unicodedata import normalize
 
-_PLAIN = frozenset({float, int, str, bool, type(None)})
+_PLAIN = frozenset({float, int, bool, type(None)})
+
+
+def canonical(text: str) -> str:
+    """A text with composed characters (Unicode's form NFC), as scenes hold all names.
+
+    Letters that look alike remain different: the micro sign is no Greek mu.
+    """
+    return text if text.isascii() else normalize("NFC", text)
+
+
+def with_identifiers(fields: dict[str, Any]) -> dict[str, Any]:
+    """Fields of a type by the names that Python gives them in its class (Unicode's form NFKC).
+
+    Unchanged where two of them would be one: the check then refuses the one that is unknown.
+    """
+    if all(map(str.isascii, fields)):
+        return fields
+    found = {normalize("NFKC", name): value for name, value in fields.items()}
+    return found if len(found) == len(fields) else fields
 
 
 def plain(value: Any) -> Any:
@@ -13,6 +33,8 @@ def plain(value: Any) -> Any:
     kind = type(value)
     if kind in _PLAIN:
         return value
+    if kind is str:
+        return canonical(value)
     if kind is tuple:
         for v in value:
             if type(v) not in _PLAIN:
@@ -22,12 +44,12 @@ def plain(value: Any) -> Any:
     if kind is list or kind is tuple:
         return tuple([v if type(v) in _PLAIN else plain(v) for v in value])
     if kind is dict:
-        return {k: plain(v) for k, v in value.items()}
+        return {plain(k): plain(v) for k, v in value.items()}
     if hasattr(value, "tolist"):
         return _of_array(value)
     for base in (str, float, int):
         if isinstance(value, base):
-            return base.__str__(value) if base is str else base(value)
+            return canonical(base.__str__(value)) if base is str else base(value)
     return plain(list(value)) if isinstance(value, (list, tuple)) else value
 
 

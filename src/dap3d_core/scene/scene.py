@@ -9,7 +9,8 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.scene.coerce import plain
+from dap3d_core.registry.arguments import checked
+from dap3d_core.scene.coerce import plain, with_identifiers
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Key, Mistake, MistakeList, SceneError
 
@@ -105,7 +106,7 @@ class Input:
 class AnimationPoint:
     """A point that is only drawn: name of its body, its coordinates there (3 numbers, m)."""
 
-    body: Any = None
+    body: Any = attrs.field(default=None, converter=plain)
     sPp: Any = attrs.field(default=None, converter=plain)
 
 
@@ -337,6 +338,7 @@ class Scene(SceneDisplay):
         """
         return self._add_element("shapes", type, name, fields)
 
+    @checked
     def add_requirement(self, name: str, versions: str = "*") -> str:
         """Add a distribution that brings types of the scene, and return its name.
 
@@ -358,6 +360,7 @@ class Scene(SceneDisplay):
         Raises:
             SceneError: the name is taken or illegal.
         """
+        name = plain(name)
         self._check_name("parameters", self.parameters, name)
         self.parameters[name] = plain(value)
         return name
@@ -374,6 +377,7 @@ class Scene(SceneDisplay):
         Raises:
             SceneError: the name is taken or illegal.
         """
+        name = plain(name)
         self._check_name("outputs", self.outputs, name)
         value = plain(expression)
         self.outputs[name] = value if unit is None else {"value": value, "unit": plain(unit)}
@@ -393,6 +397,7 @@ class Scene(SceneDisplay):
 
         return to_toml(self)
 
+    @checked
     def save(self, path: str | Path) -> Path:
         """Write the scene to a file, or to ``scene.toml`` in a folder; returns the file.
 
@@ -405,6 +410,7 @@ class Scene(SceneDisplay):
 
     def _add(self, table: str, name: str, fields: dict[str, Any]) -> str:
         named, class_ = getattr(self, table), NAMED[table]
+        name, fields = plain(name), plain(fields)
         self._check_name(table, named, name)
         if not fields.keys() <= keys_of(class_):
             mistakes = MistakeList()
@@ -421,8 +427,9 @@ class Scene(SceneDisplay):
             raise SceneError([Mistake(f"{table}.{name or ''}".rstrip("."), type_, what)])
         if name is None:
             name = self._free_name(table, elements, type_)
+        name = plain(name)
         self._check_name(table, elements, name)
-        fields = {k: plain(v) for k, v in fields.items() if v is not None}
+        fields = {k: plain(v) for k, v in with_identifiers(fields).items() if v is not None}
         elements[name] = Element(name, type_, fields)
         return name
 

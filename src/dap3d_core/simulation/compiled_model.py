@@ -22,6 +22,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.registry import PluginError, Registry, load_registry
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import (
     Scene,
@@ -447,6 +448,7 @@ def _modelled(checked: ValidatedScene) -> Model:
         raise SceneError(sorted(found, key=lambda m: m.line or 0)) from error
 
 
+@checked
 def compile_scene(
     scene: Scene | str | os.PathLike[str],
     *,

@@ -8,6 +8,7 @@ import attrs
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface import PluginError
 from dap3d_core.model import Model
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import INFORMATION, Result, ResultError
 from dap3d_core.result import open_result as open_file
 from dap3d_core.scene import SceneError, load, parse
@@ -22,6 +23,7 @@ NOT_RECORDED = (
 )
 
 
+@checked
 def open_result(
     path: str | os.PathLike[str],
     *,

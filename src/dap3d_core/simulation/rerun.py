@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface import PluginError
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, ResultError, current_versions
 from dap3d_core.result.arrays import COLUMNS, Arrays
 from dap3d_core.result.model_summary import is_summary_of
@@ -52,6 +53,7 @@ class _EnoughError(Exception):
     """The repetition has come as far as the result."""
 
 
+@checked
 def rerun(
     result: Result | str | os.PathLike[str],
     *,

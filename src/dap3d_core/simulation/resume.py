@@ -16,6 +16,7 @@ from dap3d_core.integrators.stepping.restore import check_alike, restored
 from dap3d_core.interface import PluginError
 from dap3d_core.kernels.runtime.source_digest import driver_digest
 from dap3d_core.model.state_layout import u_from_y
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import INFORMATION, Result, current_versions
 from dap3d_core.result.file.validate import are_texts
 from dap3d_core.scene import SceneError, Simulation, check_simulation, load, parse
@@ -36,6 +37,7 @@ from dap3d_core.simulation.run_state import Callbacks, Progress, RunState
 from dap3d_core.simulation.settings import check_checkpoint, report_times
 
 
+@checked
 def resume(
     path: str | os.PathLike[str],
     *,

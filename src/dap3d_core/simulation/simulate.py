@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     from dap3d_core.simulation.initial.start_state import Start, StartState
 
 
+@checked
 def simulate(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     *,

@@ -10,6 +10,7 @@ import numpy as np
 from dap3d_core.model.groups import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import MISSING, Mistake, SceneError
+from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.validate.coerce_values import LARGEST
 
 DESIGNS = ("lhs", "random", "sobol", "halton")
@@ -181,6 +182,7 @@ def _pairs(vary: Any, mistakes: list[Mistake]) -> list[tuple[str, Any]]:
     if not pairs and not mistakes:
         what = "nothing varies: a study varies at least one number"
         mistakes.append(Mistake("vary", MISSING, what, remedy="bodies.crank.mass=1:5:9"))
+    pairs = [(plain(name), values) for name, values in pairs]
     names = [name for name, _ in pairs]
     twice = dict.fromkeys(n for n in names if names.count(n) > 1)
     mistakes += [Mistake("vary", name, "a number is varied only once") for name in twice]

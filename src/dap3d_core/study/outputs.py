@@ -12,6 +12,7 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result import Quantity, Result, ResultError, RunMetadata, UnknownNameError, find
 from dap3d_core.scene import MISSING, Mistake, SceneError
+from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import shown
 from dap3d_core.simulation import CompiledModel, SimulationError
 from dap3d_core.simulation.output.check_outputs import probe_of
@@ -110,6 +111,7 @@ def outputs_of(given: Any) -> tuple[Output, ...]:
         pairs = [(getattr(of, "__name__", "") if callable(of) else of, of) for of in given]
     else:
         raise SceneError([Mistake("outputs", given, FORM)])
+    pairs = [(plain(label), plain(of)) for label, of in pairs]
     if not pairs:
         raise SceneError([Mistake("outputs", MISSING, f"a study needs at least one; {FORM}")])
     read = [_output(label, of) for label, of in pairs]

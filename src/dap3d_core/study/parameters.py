@@ -11,6 +11,7 @@ import attrs
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Instance, Mistake, Scene, SceneError, Simulation, ValidatedScene
+from dap3d_core.scene.coerce import canonical
 from dap3d_core.scene.scene import NAMED, Element
 from dap3d_core.scene.validate.settings import OPEN
 
@@ -221,7 +222,7 @@ def _resolve(checked: ValidatedScene, name: Any) -> SceneParameter | Mistake:
     """The parameter of a name, or what is wrong with the name."""
     if not isinstance(name, str):
         return Mistake("vary", name, "the name of a number is text such as 'bodies.crank.mass'")
-    table, *rest = name.split(".")
+    table, *rest = canonical(name).split(".")
     if table not in TABLES:
         return _no_table(checked, name, table, rest)
     path: tuple[str, ...] = (table,)

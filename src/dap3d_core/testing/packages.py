@@ -11,10 +11,13 @@ from pathlib import Path
 import attrs
 
 from dap3d_core.interface import PluginError
+from dap3d_core.interface.hooks import EXTENSIONS
 from dap3d_core.registry import LOAD_LIMIT, Registry
 from dap3d_core.registry.declared_types import editable_folder
+from dap3d_core.registry.discovery import Source, discover
+from dap3d_core.registry.extensions import extensions
 from dap3d_core.registry.registry import OWN
-from dap3d_core.testing.checks.findings import CheckOutcome, Finding, Report
+from dap3d_core.testing.checks.findings import OK, CheckOutcome, Finding, Report
 from dap3d_core.testing.kit import POSES, SEED, check_type
 
 #: States of the tests of a package.
@@ -65,20 +68,40 @@ class PackageReport:
         return all(t.ok for t in self.types) and self.tests.state in (PASSED, NONE)
 
 
+def active_sources(registry: Registry) -> list[Source]:
+    """The origins of all installed types and extensions that are not blocked."""
+    types = (source for same in registry.sources.values() for source in same)
+    others = discover([group for group, _ in EXTENSIONS.values()])
+    extensions_ = (source for source in others if source.kind)
+    return [source for source in (*types, *extensions_) if not source.blocked]
+
+
 def check_named(
     registry: Registry, kind: str, keyword: str, *, poses: int = POSES, seed: int = SEED
 ) -> Report:
-    """The report on a type; it has a single finding if the type cannot be loaded."""
+    """The report on a type or an extension; a single finding if it cannot be loaded."""
     try:
+        if kind in EXTENSIONS:
+            extensions(kind).load(keyword, limit_s=LOAD_LIMIT)
+            words = "it can be loaded, and is what its kind declares"
+            return _loading_report(registry, kind, keyword, CheckOutcome("loading", "", OK, words))
         type_info = registry.get(kind, keyword, limit_s=LOAD_LIMIT)
         return check_type(type_info, poses=poses, seed=seed)
     except PluginError as error:
         finding = Finding("loading", "", "", 0, str(error))
-        outcome = CheckOutcome(
-            "loading", "", "failed", "it can be loaded", None, None, (), (finding,)
-        )
-        module = next((s.module for s in registry.sources_of(kind, keyword)), keyword)
-        return Report(kind, keyword, module, seed, poses, (outcome,))
+        outcome = CheckOutcome("loading", "", "failed", "it can be loaded", findings=(finding,))
+        return _loading_report(registry, kind, keyword, outcome)
+
+
+def _loading_report(registry: Registry, kind: str, keyword: str, outcome: CheckOutcome) -> Report:
+    """The report of one outcome, with the module that brings the type."""
+    sources = (
+        extensions(kind).sources.get(keyword, ())
+        if kind in EXTENSIONS
+        else registry.sources_of(kind, keyword)
+    )
+    module = next((source.module for source in sources), keyword)
+    return Report(kind, keyword, module, SEED, POSES, (outcome,))
 
 
 def check_packages(
@@ -93,7 +116,7 @@ def check_packages(
         progress: called with what is done next.
     """
     say = progress or (lambda words: None)
-    sources = [s for same in registry.sources.values() for s in same if not s.blocked]
+    sources = active_sources(registry)
     packages = {s.distribution: s.version for s in sources if s.distribution}
     for name in sorted(packages, key=lambda n: (n != OWN, n)):
         reports = []

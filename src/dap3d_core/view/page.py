@@ -12,7 +12,8 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.result import ResultError
+from dap3d_core.registry.arguments import checked, require
+from dap3d_core.result import Result, ResultError
 from dap3d_core.result.file.atomic_write import whole_file
 from dap3d_core.view.page_data import page_data
 from dap3d_core.view.scene3d.scene_data import scene_of
@@ -67,6 +68,7 @@ class View:
         )
 
 
+@checked
 def view(
     result: Any,
     *quantities: str,
@@ -103,6 +105,7 @@ def view(
 
         return View(sweep_data(result, quantities, fps, model=model, allow_code=allow_code,
                                progress=progress, announce=announce))  # fmt: skip
+    require("result", Result, result)
     return View(page_data(result, scene_of(result, model), quantities, fps))
 
 

@@ -56,7 +56,7 @@ def test_folders_that_hold_no_model(tmp_path):
         with pytest.raises(SceneError) as caught:
             dap.import_matlab(tmp_path / name)
         assert words in str(caught.value), name
-    with pytest.raises(SceneError, match="a MATLAB model is a folder, not 3"):
+    with pytest.raises(TypeError, match="folder should be text or a path, not 3"):
         dap.import_matlab(3)
 
 

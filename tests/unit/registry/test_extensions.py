@@ -7,7 +7,8 @@ import pytest
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.registry.extensions import extensions
+from dap3d_core.registry.extensions import extension_listing, extensions
+from dap3d_core.testing.packages import active_sources, check_named
 
 GOOD = '''
 from dap3d_core.interface.formats import Articulation, Importer, Inertial, Joint, Link, hookimpl
@@ -82,3 +83,118 @@ def test_a_blocked_format_is_left_out(install, monkeypatch):
     install("rods", GOOD, *ROD)
     monkeypatch.setenv("DAP3D_BLOCK", "rods:rod")
     assert "rod" not in extensions("importer").keywords
+
+
+MIDPOINT = """
+from dap3d_core.interface import hookimpl
+from dap3d_core.interface.integrators import RungeKuttaMethod
+
+interface_version = 1
+
+
+@hookimpl
+def dap3d_integrators():
+    return [RungeKuttaMethod(keyword="midpoint", order=2, a=[[0.5]], b=[0.0, 1.0])]
+"""
+SOLID = '''
+from dap3d_core.interface import hookimpl
+from dap3d_core.interface.shapes import ShapeKind
+
+interface_version = 1
+
+
+@hookimpl
+def dap3d_shapes():
+    class Point(ShapeKind):
+        """A triangle."""
+
+        keyword = "dot"
+
+        def mesh(self):
+            return [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]
+
+    return [Point]
+'''
+EXPORTER = '''
+from dap3d_core.interface.formats import Exporter, hookimpl
+
+interface_version = 1
+
+
+class Rod(Exporter):
+    """Writes a length."""
+
+    keyword, title, suffixes = "rod", "Rod", (".rod",)
+
+    def write(self, articulation, target):
+        return []
+
+
+@hookimpl
+def dap3d_exporters():
+    return [Rod]
+'''
+KINDS = {
+    "importer": (GOOD, "rod"),
+    "exporter": (EXPORTER, "rod"),
+    "integrator": (MIDPOINT, "midpoint"),
+    "shape": (SOLID, "dot"),
+}
+
+
+def listed(kind, limit_s=10.0):
+    return {i.keyword: i for i in extension_listing(limit_s) if i.kind == kind}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_listing_has_every_kind_with_its_state(install, kind):
+    text, keyword = KINDS[kind]
+    module = install("parts", text, keyword, f"dap3d.{kind}s")
+    info = listed(kind)[keyword]
+    assert (info.state, info.reason) == ("ok", "")
+    assert (info.distribution, info.version, info.module) == ("parts", "1.2", module)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: "x = = 1\n", "SyntaxError"),
+        (lambda text: text.replace("dap3d_core.interface", "none.interface"), "ModuleNotFound"),
+        (lambda text: text.replace("return [", "return 3 or ["), "'int' object is not iterable"),
+        (lambda text: text.replace("    return [", "    return 0 and ["), "none with the keyword"),
+        (lambda text: "raise SystemExit(3)\n", "SystemExit: 3"),
+        (lambda text: "while True: pass\n", "not loaded after 0.3 s"),
+    ],
+    ids=["syntax", "import", "number", "nothing", "exit", "endless"],
+)
+def test_the_listing_says_what_is_wrong_with_one_and_lists_all_others(install, kind, change, words):
+    text, keyword = KINDS[kind]
+    install("parts", change(text), keyword, f"dap3d.{kind}s")
+    found = listed(kind, 0.3)
+    assert found[keyword].state == "broken"
+    assert words in found[keyword].reason
+    assert f"{kind} '{keyword}' of distribution parts 1.2" in found[keyword].reason
+    others = [i for i in extension_listing() if i.distribution == "dap3d"]
+    assert len(others) == 5  # three importers, two exporters
+    assert {i.state for i in others} == {"ok"}
+
+
+def test_the_listing_has_what_is_blocked_and_what_two_packages_bring(install, monkeypatch):
+    install("parts", MIDPOINT, "midpoint", "dap3d.integrators")
+    install("others", MIDPOINT, "midpoint", "dap3d.integrators")
+    both = [i for i in extension_listing() if i.keyword == "midpoint"]
+    assert [i.state for i in both] == ["duplicate", "duplicate"]
+    assert "uninstall one of them" in both[0].reason
+    monkeypatch.setenv("DAP3D_BLOCK", "parts:midpoint")
+    states = {i.distribution: i.state for i in extension_listing() if i.keyword == "midpoint"}
+    assert states == {"parts": "blocked", "others": "ok"}
+
+
+@pytest.mark.parametrize(("text", "state"), [(MIDPOINT, "ok"), ("x = = 1\n", "failed")])
+def test_the_checks_of_a_package_load_its_extensions(install, text, state):
+    install("parts", text, "midpoint", "dap3d.integrators")
+    registry = dap.load_registry()
+    (source,) = [s for s in active_sources(registry) if s.distribution == "parts"]
+    report = check_named(registry, source.kind, source.keyword)
+    assert [outcome.state for outcome in report.outcomes] == [state]

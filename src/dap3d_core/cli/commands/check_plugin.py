@@ -45,6 +45,8 @@ def check_plugin(
 ) -> int:
     """Check the formulas of types of joints, forces and functions.
 
+    Of importers, exporters, integrators and shapes: that they can be loaded.
+
     NAME is the keyword of a type (PACKAGE:KEYWORD where two packages share one), a distribution or
     a module that brings types, or a Python file with types of its own (with --allow-code).
 
@@ -113,19 +115,20 @@ def _types_of(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:
     A keyword that several packages share is named with the package.
     """
     from dap3d_core.registry.discovery import normal_name
+    from dap3d_core.testing.packages import active_sources
 
     known: dict[str, None] = {}
     matched = False
-    for sources in registry.sources.values():
-        active = [s for s in sources if s.kind and not s.blocked]
-        for source in active:
-            names = (source.keyword, source.module, normal_name(source.distribution))
-            known |= dict.fromkeys(n for n in (*names[:2], source.distribution) if n)
-            package, _, word = name.rpartition(":")
-            is_one = word == source.keyword and normal_name(package) == names[2]
-            if not name or name in names or normal_name(name) == names[2] or is_one:
-                matched = True
-                yield source.kind, registry.word_of(source)
+    for source in active_sources(registry):
+        if not source.kind:
+            continue
+        names = (source.keyword, source.module, normal_name(source.distribution))
+        known |= dict.fromkeys(n for n in (*names[:2], source.distribution) if n)
+        package, _, word = name.rpartition(":")
+        is_one = word == source.keyword and normal_name(package) == names[2]
+        if not name or name in names or normal_name(name) == names[2] or is_one:
+            matched = True
+            yield source.kind, registry.word_of(source)
     if not matched:
         from dap3d_core.cli.framework.error_messages import type_hint
 
@@ -138,7 +141,8 @@ def _types_of(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:
 def _show(console: "Terminal", report: "Report", *, quiet: bool) -> None:
     from rich.text import Text
 
-    console.title(f"{report.keyword}, a {report.kind}")
+    article = "an" if report.kind[:1] in "aeiou" else "a"
+    console.title(f"{report.keyword}, {article} {report.kind}")
     if not quiet:
         console.say(report.title, indent=2, whole=True)
         rows: list[tuple[str | Text, ...]] = []

@@ -29,7 +29,7 @@ NAMED, LEAST_SHARE = 3, 0.05
     click.option("--from", "start", metavar="RESULT[@TIME]",
                  help="Linearise about a state of a result, at an instant in s or its last one; by "
                       "default about the start of the model."),
-    click.option("--t", "time", type=float, metavar="S",
+    click.option("--t", "time", type=options.FiniteFloat(), metavar="S",
                  help="Time of drivers and functions; 0 by default. Not with --from."),
     click.option("-n", "--number", type=click.IntRange(min=1), metavar="NUMBER",
                  help="Number of modes, the lowest ones; 20 are listed by default, 10 of a model "

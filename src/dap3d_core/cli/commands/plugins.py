@@ -15,13 +15,14 @@ if TYPE_CHECKING:
 @command(
     "List the installed types.",
     click.option("--no-compile", is_flag=True, help="Do not check that kernels compile."),
-    click.option("--limit", type=click.FloatRange(min=0.0, min_open=True), metavar="SECONDS",
+    click.option("--limit", type=options.FiniteFloat(positive=True), metavar="SECONDS",
                  help="Time in which a plugin must load (60 by default)."),
     click.option("--test", is_flag=True, help="Check formulas, and run the tests of packages."),
     options.JSON,
 )  # fmt: skip
 def plugins(*, no_compile: bool, limit: float | None, test: bool, as_json: bool) -> int:
-    """List the types of joints, forces and functions that are installed.
+    """List the types of joints, forces and functions that are installed, and what else packages
+    bring: importers, exporters, integrators and shapes.
 
     A type that cannot be loaded, or whose kernels cannot be compiled, is listed with the reason.
     For that the kernels of other packages are compiled: the first time about a second a type.
@@ -36,13 +37,16 @@ def plugins(*, no_compile: bool, limit: float | None, test: bool, as_json: bool)
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.registry import LOAD_LIMIT
+    from dap3d_core.registry.extensions import extension_listing
 
     if test:
         if no_compile or limit is not None:
             raise Refused("--no-compile and --limit are of the list; leave them out with --test")
         return _test(as_json=as_json)
     registry = dap.load_registry()
-    types = registry.listing(compiling=not no_compile, limit_s=limit or LOAD_LIMIT)
+    limit_s = limit or LOAD_LIMIT
+    types = registry.listing(compiling=not no_compile, limit_s=limit_s)
+    types += extension_listing(limit_s)
     if as_json:
         print_json({"types": [attrs.asdict(t) for t in types], "notes": registry.notes})
         return DONE

@@ -31,6 +31,28 @@ class Tolerance(click.ParamType):  # type: ignore[type-arg]
                       param, ctx)  # fmt: skip
 
 
+class FiniteFloat(click.types.FloatParamType):
+    """A finite number.
+
+    Attributes:
+        positive: True if it must be above 0.
+    """
+
+    def __init__(self, *, positive: bool = False) -> None:
+        self.positive = positive
+
+    def convert(self, value: Any, param: Any, ctx: Any) -> Any:
+        """Convert to a number; refuse inf and nan."""
+        import math
+
+        number = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number", param, ctx)
+        if self.positive and number <= 0.0:
+            self.fail(f"{value!r} is not above 0", param, ctx)
+        return number
+
+
 class Seconds(click.ParamType):  # type: ignore[type-arg]
     """A duration in s, written as 90, 90s, 5min or 2h."""
 

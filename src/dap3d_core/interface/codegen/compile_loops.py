@@ -82,6 +82,8 @@ def compiled_loop(
     except Exception as error:
         if is_out_of_memory(error):
             raise MemoryError from error
+        if isinstance(error, OSError):  # of the surroundings: no fault of the type
+            raise
         raise PluginError(
             f"{where_is(type_info.type)}: its kernels cannot be compiled ({loop.name}): {error}. "
             "A kernel is plain: tuples of numbers, the words of dap3d_core.kernels, where() for "

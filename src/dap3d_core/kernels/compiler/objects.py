@@ -8,6 +8,8 @@ import contextlib
 import hashlib
 import json
 import os
+import subprocess
+import sys
 import threading
 import time
 from functools import cache
@@ -41,11 +43,39 @@ class Processor(NamedTuple):
 
 @cache
 def processor() -> Processor:
-    """This processor, or the one that ``DAP3D_CPU`` names (for example ``x86-64-v2``)."""
+    """This processor, or the one that ``DAP3D_CPU`` names (for example ``x86-64-v2``).
+
+    Raises:
+        OSError: LLVM knows no such processor for this machine.
+    """
     llvm = _llvm()
     name = os.environ.get("DAP3D_CPU", "")
+    if name and not _is_known(name):
+        raise OSError(
+            f"the environment variable DAP3D_CPU is {name!r}, which is no processor of "
+            f"{llvm.get_process_triple()} that LLVM knows; name one, such as "
+            f"{llvm.get_host_cpu_name()}, or unset it for the processor of this machine"
+        )
     features = "" if name else llvm.get_host_cpu_features().flatten()
     return Processor(llvm.get_process_triple(), name or llvm.get_host_cpu_name(), features)
+
+
+#: Compiles a function for the processor that it is given.
+_TRIAL = """
+import sys
+import llvmlite.binding as llvm
+llvm.initialize_native_target()
+llvm.initialize_native_asmprinter()
+machine = llvm.Target.from_default_triple().create_target_machine(cpu=sys.argv[1])
+machine.emit_object(llvm.parse_assembly("define double @f(double %x) { ret double %x }"))
+"""
+
+
+def _is_known(name: str) -> bool:
+    """True if LLVM compiles for a processor; in a process of its own, which LLVM may abort."""
+    trial = [sys.executable, "-P", "-c", _TRIAL, name]  # -P: no package of the current folder
+    done = subprocess.run(trial, stdin=subprocess.DEVNULL, capture_output=True, check=False)
+    return done.returncode == 0 and not done.stderr
 
 
 @cache

@@ -22,6 +22,7 @@ from dap3d_core.plot.film.projection import (
     with_margin,
 )
 from dap3d_core.plot.film.stick_figure import pose_at, sticks_of
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result
 from dap3d_core.result.file.atomic_write import whole_file
 
@@ -72,6 +73,7 @@ class Film:
 
 
 @fixed_files()
+@checked
 def animate(
     result: Result,
     path: str | os.PathLike[str],

@@ -21,6 +21,7 @@ from dap3d_core.result.quantities.catalogue import (
     QuantitySource,
 )
 from dap3d_core.result.quantities.own_numbers import own_names, own_quantity, states_of
+from dap3d_core.scene.coerce import canonical
 
 NORM = "norm"
 #: Names of joint coordinates, of which a joint has some.
@@ -56,6 +57,7 @@ def find(result: QuantitySource, name: str) -> Quantity:
     """
     if not isinstance(name, str):
         raise TypeError(f"a quantity is named by text such as 'crank.r.z', not by {name!r}")
+    name = canonical(name)
     if name in SYSTEM:
         label, unit, values = SYSTEM[name]
         if name == "t":  # of kinematics over a coordinate, which takes the place of time

@@ -123,7 +123,7 @@ def _read_csv(path: Path, mistakes: list[Mistake]) -> dict[str, Any]:
         lines = io.StringIO(read_regular(path).decode("utf-8-sig"), newline="")
         rows = [(k, row) for k, row in enumerate(csv.reader(lines), start=1)
                 if any(row) and not row[0].startswith("#")]  # fmt: skip
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, ValueError, csv.Error) as error:
         why = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         mistakes.append(Mistake("measured", str(path), f"cannot be read as a CSV file: {why}"))
         return {}

@@ -19,6 +19,7 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.suggestions import nearest
+from dap3d_core.scene.coerce import canonical
 from dap3d_core.scene.expressions.units import (
     Carried,
     UnitError,
@@ -196,6 +197,7 @@ def parse_expression(text: str) -> Expression:
     """
     if not text.strip():
         raise ExpressionError("is empty", ALLOWED)
+    text = canonical(text)
     if len(text) > LONGEST:
         what = f"is too long: {len(text)} characters; at most {LONGEST} are read"
         raise ExpressionError(what, "divide it into several that name one another")
@@ -204,7 +206,10 @@ def parse_expression(text: str) -> Expression:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of Python's reader, such as for "1if"
-            body = ast.parse(f"({text}\n)", mode="eval").body
+            source = f"({text}\n)"
+            body = ast.parse(source, mode="eval").body
+        if not text.isascii():
+            _restore_names(body, source)
         root = _node(body, DEEPEST)
     except SyntaxError as error:
         reason = str(error.msg).partition(". ")[0]
@@ -216,6 +221,19 @@ def parse_expression(text: str) -> Expression:
     except ValueError:  # NUL, surrogates, integers of thousands of digits
         raise ExpressionError("is no expression", ALLOWED) from None
     return Expression(text, root, tuple(dict.fromkeys(_names(root))))
+
+
+def _restore_names(tree: ast.AST, source: str) -> None:
+    """Put names as written in the place of those that Python's parser has changed (to form NFKC).
+
+    It takes a micro sign for the Greek mu, and a ligature for its letters.
+    """
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Name):
+            node.id = ast.get_source_segment(source, node) or node.id
+        elif isinstance(node, ast.Attribute):
+            written = ast.get_source_segment(source, node) or node.attr
+            node.attr = written.rpartition(".")[2].split()[-1]
 
 
 def read_expression(value: Any) -> Expression | Fault:

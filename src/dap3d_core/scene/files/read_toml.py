@@ -6,8 +6,9 @@ import stat
 from pathlib import Path
 from typing import Any
 
+from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.scene.coerce import plain
+from dap3d_core.scene.coerce import canonical, plain, with_identifiers
 from dap3d_core.scene.errors import MISSING, Key, MistakeList, SceneError, dotted, file_error
 from dap3d_core.scene.files.text_file import read_text, unreadable
 from dap3d_core.scene.scene import (
@@ -37,7 +38,8 @@ _LONG_KEY = re.compile(
 DEEPEST = 50
 
 
-def load(source: str | os.PathLike[str]) -> Scene:
+@checked
+def load(source: str | bytes | os.PathLike[str]) -> Scene:
     """Read a scene; ``check`` validates its values.
 
     Args:
@@ -141,7 +143,8 @@ def _known(
 def _entry(mistakes: MistakeList, key: Key, content: Any, class_: type) -> Any:
     name = str(key[-1])
     if class_ is Element:
-        fields = {k: plain(v) for k, v in _table(mistakes, key, content).items()}
+        table = with_identifiers(_table(mistakes, key, content))
+        fields = {k: plain(v) for k, v in table.items()}
         return Element(name, fields.pop("type", None), fields)
     return class_(name, **_known(mistakes, key, content, keys_of(class_)))
 
@@ -166,10 +169,7 @@ def _animation(mistakes: MistakeList, content: Any) -> Animation:
 
 def _find(source: Any) -> tuple[Path, list[str]]:
     """The scene file of a name, folder or path, with notes on the choice."""
-    try:
-        text = os.fsdecode(source)
-    except TypeError:
-        raise file_error("", f"a scene is loaded by name or path, not {source!r}") from None
+    text = os.fsdecode(source)
     if not text.strip():
         raise file_error("", "the name of the model is empty; give a name, a folder or a file")
     if re.match(r"[A-Za-z][A-Za-z0-9+.-]+://", text):
@@ -219,7 +219,7 @@ def _parse(text: str, path: Path) -> dict[str, Any]:
         what = f"a key of more than {MOST_PARTS} parts; those of a scene have 4 at most"
         raise file_error(path, what, line=text.count("\n", 0, long.end()) + 1)
     try:
-        data = tomllib.loads(text)
+        data = tomllib.loads(canonical(text))
     except RecursionError:
         raise _too_deep(path) from None
     except ValueError as error:  # TOMLDecodeError, and integers of thousands of digits

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unicodedata import normalize
 
 import attrs
 
@@ -194,6 +195,9 @@ def mesh_file(folder: Path | None, name: str) -> Path | Fault:
     if folder is None:
         return path
     try:
+        if not path.exists():  # names of files are as the system gives them, decomposed on some
+            decomposed = folder / normalize("NFD", name)
+            path = decomposed if decomposed.exists() else path
         if not path.resolve().is_relative_to(folder.resolve()):
             return Fault("leads out of the folder of the scene", "copy the file there")
         if path.exists() and not path.is_file():

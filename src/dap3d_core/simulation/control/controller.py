@@ -6,6 +6,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.scene.coerce import plain
 from dap3d_core.simulation.control.state_view import StateView
 from dap3d_core.simulation.events.event import several
 
@@ -28,7 +29,7 @@ class Controller:
         TypeError: ``update`` is no function.
     """
 
-    every: float
+    every: float = attrs.field(converter=plain)
     update: Callable[[float, StateView], Mapping[str, float]]
     name: str = ""
 

@@ -8,6 +8,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.stepping.hold import quick_view
 from dap3d_core.registry.suggestions import nearest
+from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.validate.coerce_values import LARGEST
 
 
@@ -56,6 +57,8 @@ class HeldInputs:
             raise TypeError(f"inputs are given as {{input: value}}, not as {given!r}") from None
         for name, value in items:
             k = index.get(name)
+            if k is None:
+                k = index.get(plain(name))
             if k is None:
                 raise ValueError(self._unknown(name))
             if type(value) is not float:

@@ -10,6 +10,7 @@ from dap3d_core.model import build_model
 from dap3d_core.model.joint_angles import JOINT_ANGLES
 from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import split
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import INFORMATION
 from dap3d_core.result.errors import unknown
 from dap3d_core.result.post.reactions import Reaction, reactions
@@ -85,6 +86,7 @@ class Equilibrium:
         return NamedState(str(self.compiled.scene.name) or "the equilibrium", model.body_names,
                           self.u, angles, (note,), states=states)  # fmt: skip
 
+    @checked
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
         """Reaction of a joint on each of its bodies, ground included: D^T lambda.
 
@@ -155,6 +157,7 @@ class Equilibrium:
         return changed
 
 
+@checked
 def equilibrium(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     *,

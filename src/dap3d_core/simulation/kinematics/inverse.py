@@ -10,6 +10,7 @@ import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.model_summary import summary_of
@@ -45,6 +46,7 @@ RANK = 1e-9
 PRODUCED = 1e-8
 
 
+@checked
 def inverse(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     motion: Any,

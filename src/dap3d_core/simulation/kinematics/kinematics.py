@@ -10,6 +10,7 @@ import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import arrays_of
 from dap3d_core.result.file.atomic_write import check_target, check_utf8
@@ -42,6 +43,7 @@ SHARE = 0.01
 MOST_BRANCHES = 4
 
 
+@checked
 def kinematics(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     *,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -255,6 +256,7 @@ class Linearization:
         shares: Floats = energy / energy.sum(axis=1, keepdims=True)
         return shares
 
+    @checked
     def motion(self, mode: int = 0, size: float = 0.1, instants: int = 60) -> Result:
         """The motion of one mode, as a result of one period for ``view``, ``animate``, ``save``.
 
@@ -304,6 +306,7 @@ def _balance(space: StateSpace, scale: Floats) -> Floats:
     return found
 
 
+@checked
 def linearize(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     at: Any = None,

@@ -13,6 +13,7 @@ from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.stepping.hold import Hold
 from dap3d_core.integrators.stepping.integration_state import Y
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -229,6 +230,7 @@ class _OpenRun(Run):
         return []
 
 
+@checked
 def start(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     *,

@@ -9,6 +9,7 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.registry import load_registry
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result.quantities.measured_data import MeasuredData, read_measured
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, check, check_simulation, load
 from dap3d_core.simulation import SimulationError
@@ -52,6 +53,7 @@ UNEXPLAINED, DEVIATIONS = 0.5, 6.0
 AT_BOUND = 1e-3
 
 
+@checked
 def fit(
     scene: Scene | str | os.PathLike[str],
     parameters: Any,

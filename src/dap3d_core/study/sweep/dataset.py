@@ -16,6 +16,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import ResultError, current_versions
 from dap3d_core.result.arrays import LARGE
 from dap3d_core.result.file.checksum import check_checksums, check_signature
@@ -199,6 +200,7 @@ class InMemory:
         return Sweep(variables, coordinates, layout.attributes)
 
 
+@checked
 def open_sweep(path: str | os.PathLike[str]) -> "xarray.Dataset":
     """Read what ``sweep`` wrote.
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
+from dap3d_core.registry.arguments import checked
 from dap3d_core.result import ResultError
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
 from dap3d_core.simulation.output.free_space import check_room_of_points
@@ -28,6 +29,7 @@ LARGEST_PACK = 1024
 INVALID_NAME = "a name in a NetCDF file begins with a letter, a digit or _ and holds no slash"
 
 
+@checked
 def sweep(
     scene: Scene | str | os.PathLike[str],
     vary: Any,

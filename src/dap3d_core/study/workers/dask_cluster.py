@@ -129,16 +129,7 @@ def check_workers(client: Any, here: Environment, payload: bytes) -> None:
     Raises:
         ClusterError: there are no workers, or some cannot run the study; names them.
     """
-    with _requests(client):
-        try:
-            client.wait_for_workers(1, timeout=ARRIVAL)
-        except TimeoutError as error:
-            address = _address(client)
-            raise ClusterError(
-                f"the scheduler at {address} has no workers; start some with "
-                f"`dask worker {address}`"
-            ) from error
-        answers = client.run(environment_there, current_versions(), payload, on_error="return")
+    answers = _answers(client, payload)
     version = here["versions"]["dap3d"]
     remedy = f'pip install "dap3d[cluster]=={version}" in its environment'
     unfit = []
@@ -152,6 +143,41 @@ def check_workers(client: Any, here: Environment, payload: bytes) -> None:
         more = [f"... and {len(unfit) - MAX_NAMES} more"] if len(unfit) > MAX_NAMES else []
         title = f"{len(unfit)} of {len(answers)} workers cannot run this study:"
         raise ClusterError("\n".join([title, *unfit[:MAX_NAMES], *more]))
+
+
+def _answers(client: Any, payload: bytes) -> dict[str, Any]:
+    """The environment of each worker, or the exception that it raised, by address.
+
+    Workers that are lost meanwhile have no say; where all are, others are waited for.
+
+    Raises:
+        ClusterError: there are no workers.
+    """
+    while True:
+        with _requests(client):
+            try:
+                client.wait_for_workers(1, timeout=ARRIVAL)
+            except TimeoutError as error:
+                address = _address(client)
+                raise ClusterError(
+                    f"the scheduler at {address} has no workers; start some with "
+                    f"`dask worker {address}`"
+                ) from error
+            answers = client.run(environment_there, current_versions(), payload, on_error="return")
+            present = client.nthreads()
+        found = {
+            worker: answer
+            for worker, answer in answers.items()
+            if not _is_lost(answer, worker in present)
+        }
+        if found:
+            return found
+
+
+def _is_lost(answer: Any, is_present: bool) -> bool:
+    """True for the answer of a worker that ended before it could give one."""
+    closed = _distributed().comm.CommClosedError
+    return isinstance(answer, closed) or (isinstance(answer, OSError) and not is_present)
 
 
 def environment_there(versions: dict[str, str], payload: bytes) -> Environment:

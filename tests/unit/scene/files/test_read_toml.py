@@ -93,8 +93,6 @@ def test_a_missing_file_names_the_nearest_in_its_folder(tmp_path, monkeypatch):
         ("x" * 300, "too long"),
         ("a\0b", "there is no file"),
         ("no/such/file.toml", "there is no file"),
-        (3, "by name or path"),
-        (None, "by name or path"),
         ("/dev/null", "not a regular file"),
         ("/dev/zero", "not a regular file"),
     ],

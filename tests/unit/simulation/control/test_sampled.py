@@ -278,5 +278,5 @@ def test_lists_of_controllers_are_checked():
     one = dap.Controller(every=0.1, update=feedback)
     with pytest.raises(TypeError, match=r"write \[controller\]"):
         dap.simulate(pushed_block(), t_end=1.0, controllers=one)
-    with pytest.raises(TypeError, match=r"a list of dap\.Controller, not of"):
+    with pytest.raises(TypeError, match=r"a list of dap\.Controller, not "):
         dap.simulate(pushed_block(), t_end=1.0, controllers=[feedback])
