@@ -9,16 +9,38 @@ from dap3d_site.markdown import code, directive, page, table
 
 #: Makers of fields, in the order in which one meets them.
 MAKERS = ("body", "point", "vector", "vector2", "number", "numbers", "vec3", "matrix", "function",
-          "functions", "input_", "angle", "table", "choice", "joint")  # fmt: skip
+          "functions", "input_", "angle", "table", "square", "choice", "joint")  # fmt: skip
 #: Annotations of fields: the class of what a scene names there is not seen by the author.
 ANNOTATIONS = ("Body", "Point", "Vector", "Vector2")
 CLASSES = ("Joint", "Force", "Function")
 #: Words of kernels by subject.
 WORDS = {
     "Vectors": ("add", "sub", "neg", "scale", "dot", "cross", "norm2", "rotate"),
-    "Matrices and rows": ("skew", "eye", "row", "hstack"),
-    "Mathematics": ("sqrt", "sin", "cos", "tanh", "asin", "acos", "atan2", "exp", "log", "hypot"),
-    "Parts of numbers": ("abs", "floor", "minimum", "maximum"),
+    "Matrices and rows": ("skew", "eye", "row", "hstack", "matmul", "transpose"),
+    "Rotations": (
+        "rotation_vector",
+        "rotation_matrix",
+        "euler_parameters",
+        "quaternion_product",
+        "conjugate",
+    ),
+    "Mathematics": (
+        "sqrt",
+        "sin",
+        "cos",
+        "tan",
+        "asin",
+        "acos",
+        "atan",
+        "atan2",
+        "sinh",
+        "cosh",
+        "tanh",
+        "exp",
+        "log",
+        "hypot",
+    ),
+    "Parts of numbers": ("abs", "sign", "floor", "mod", "minimum", "maximum"),
     "Branches and tables": ("where", "lookup"),
     "For `prepare`": ("normals",),
 }
