@@ -11,6 +11,16 @@ from click.testing import CliRunner
 import dap3d_core as dap
 from dap3d_core.cli.app import dap3d
 from dap3d_core.scene import parse
+from dap3d_core.scene.expressions.expression import OPERATORS, WORDS
+from dap3d_core.scene.expressions.units import (
+    COMPARISONS,
+    PURE,
+    text_of,
+    unit_of,
+    unit_of_call,
+)
+
+ANGLES = ("asin", "acos", "atan", "atan2")
 
 PENDULUM = """\
 [scene]
@@ -110,6 +120,17 @@ def test_conversions_by_bare_numbers_have_no_known_unit(probe):
 
 def test_units_that_are_known(probe):
     assert dict(zip(KNOWN, probe(*KNOWN), strict=True)) == KNOWN
+
+
+def test_every_word_and_operator_has_a_rule_of_units():
+    """Of lengths alone: none falls through to the rule of products."""
+    ruled = {"*": "m^2", "/": "1", "**": "", "sqrt": "m^(1/2)", "dot": "m^2", "cross": "m^2"}
+    ruled |= dict.fromkeys(("sin", "cos", "tan"), "") | dict.fromkeys(ANGLES, "rad")
+    ruled |= dict.fromkeys((*PURE, *COMPARISONS), "1")
+    length = unit_of("m")
+    arities = {sign: 1 if sign in ("neg", "not") else 2 for sign, _ in OPERATORS.values()}
+    for word, arity in (arities | {name: word.arity for name, word in WORDS.items()}).items():
+        assert text_of(unit_of_call(word, *[length] * arity)) == ruled.get(word, "m"), word
 
 
 def test_constants_have_their_values():

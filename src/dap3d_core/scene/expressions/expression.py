@@ -69,10 +69,12 @@ def _dot(a: Floats, b: Floats) -> Floats:
 #: Functions by name: the words of kernels for numbers, and three of vectors.
 WORDS: Final[Mapping[str, Word]] = {
     **{name: Word(1, getattr(np, name)) for name in
-       ("sin", "cos", "tan", "exp", "log", "sqrt", "abs", "floor", "tanh")},
+       ("sin", "cos", "tan", "exp", "log", "sqrt", "abs", "sign", "floor", "sinh", "cosh", "tanh")},
     "asin": Word(1, np.arcsin),
     "acos": Word(1, np.arccos),
+    "atan": Word(1, np.arctan),
     "atan2": Word(2, np.arctan2),
+    "mod": Word(2, np.mod),
     "hypot": Word(2, np.hypot),
     "minimum": Word(2, np.minimum),
     "maximum": Word(2, np.maximum),

@@ -48,10 +48,10 @@ _SYMBOL = re.compile(r"([^\W\d_]\w*)(?:\^(-?\d+|\(-?\d+/\d+\)))?")
 
 #: Functions by their effect on units; those of ``ALIKE`` take terms of one unit.
 ANGULAR = {"sin", "cos", "tan"}
-PURE = {"exp", "log", "tanh", "and", "or", "not"}
+PURE = {"exp", "log", "sign", "sinh", "cosh", "tanh", "and", "or", "not"}
 COMPARISONS = {"<", "<=", ">", ">=", "==", "!="}
 SAME = {"neg", "abs", "floor", "norm"}
-ALIKE = {"+", "-", "%", "hypot", "minimum", "maximum", "where", "atan2"} | COMPARISONS
+ALIKE = {"+", "-", "%", "mod", "hypot", "minimum", "maximum", "where", "atan2"} | COMPARISONS
 
 
 class UnitError(ValueError):
@@ -137,7 +137,7 @@ def unit_of_call(word: str, *arguments: Carried) -> Carried:
     if word in ANGULAR:
         is_other = isinstance(first, Unit) and first.exact and set(first.known or {}) - {"rad"}
         return UNKNOWN if is_other else PLAIN
-    if word in ("asin", "acos"):
+    if word in ("asin", "acos", "atan"):
         return ANGLE
     if word == "sqrt":
         return _power(first, 0.5)

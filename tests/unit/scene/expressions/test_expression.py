@@ -39,6 +39,8 @@ CASES = [
     ("floor(10*t) + abs(-t) + tanh(t)", np.floor(10 * T) + T + np.tanh(T)),
     ("sin(t)*cos(t)*tan(t)*exp(t)*log(t)*sqrt(t)",
      np.sin(T) * np.cos(T) * np.tan(T) * np.exp(T) * np.log(T) * np.sqrt(T)),
+    ("sinh(t) + cosh(t) + atan(t)", np.sinh(T) + np.cosh(T) + np.arctan(T)),
+    ("sign(t - 0.5) + mod(-t, 0.7)", np.sign(T - 0.5) + np.mod(-T, 0.7)),
     ("2\n * t  # twice", 2 * T),
     ("pi", np.pi),
 ]  # fmt: skip
