@@ -33,6 +33,7 @@ class BallSpring(Force):
 
     keyword = "sph_sd"
     symbol = "ball"
+    jumps_where = "half a turn from p_i o p_c"
     body_i: Body = body(doc="body from which the turn is measured")
     body_j: Body = body(doc="body that turns")
     k: float = number(default=0.0, unit="N m/rad", usual=(0.0, None), doc="stiffness")

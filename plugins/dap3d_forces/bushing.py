@@ -46,6 +46,7 @@ class Bushing(Force):
 
     keyword = "bushing"
     symbol = "ball"
+    jumps_where = "half a turn from where it is at rest"
     P_i: Point = point(doc="where it is fastened, on body i")
     P_j: Point = point(doc="where it is fastened, on body j; at rest there, where P_i is")
     k: tuple = square(6, NONE, doc="stiffness, N/m and N m/rad (between them: N/rad)")

@@ -134,10 +134,19 @@ def compiled_type(value, parameter):
         return Table(value.signature)
     if callable(value) and not isinstance(value, Arrays):
         return Known(value)
+    if isinstance(value, tuple) and all(map(callable, value)):
+        return Tuple(tuple(map(Known, value)))
     if isinstance(value, complex):
         return COMPLEX
     type_ = type_of(value)
     return FLOAT if type_ == INT and parameter.annotation is float else type_
+
+
+def is_constant(type_):
+    """True for functions, and tuples of them, which are no arguments of machine code."""
+    if isinstance(type_, Tuple):
+        return all(map(is_constant, type_.items))
+    return isinstance(type_, Known)
 
 
 def wrapper_of(function, types):
@@ -185,7 +194,7 @@ def exported(program, function, before, index):
     types = [Array(COMPLEX, 1) if t == COMPLEX else t for t in types]  # C calls take no complex
     symbol = f"recorded_{index}"
     program.export(wrapper, (*types, Array(COMPLEX, 1)), symbol)
-    variable = [k for k, t in enumerate(types) if not isinstance(t, Known)]
+    variable = [k for k, t in enumerate(types) if not is_constant(t)]
     signature = Signature((*(types[k] for k in variable), Array(COMPLEX, 1)))
     return symbol, signature, variable
 

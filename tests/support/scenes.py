@@ -87,6 +87,8 @@ def _field(scene, name, spec, owner, rng, wanted):
         return rng.uniform(-1, 1, 3)
     if spec.kind == "numbers":
         return rng.uniform(-1, 1, spec.columns)
+    if spec.kind == "square":
+        return rng.uniform(0.5, 1.5, spec.columns)
     if spec.kind == "matrix":
         return rotation(rng.normal(size=4))
     if spec.by_rows:

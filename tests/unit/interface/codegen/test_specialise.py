@@ -266,7 +266,7 @@ def test_an_angle_is_unwound_by_the_last_accepted_one(owner):
 
     def keep():
         s = evaluator.system
-        call_kinds(ANGLE, ANGLE, 0.0, s, evaluator.loops, s.force, s.force, s.force)
+        call_kinds(ANGLE, ANGLE, 0.0, s, evaluator.loops, s.force, np.ones(1), s.force)
 
     for degrees in (170.0, 190.0, 350.0, 370.0, 530.0):
         assert turn_to(degrees) == pytest.approx(3.0 * math.radians(degrees))
