@@ -53,6 +53,24 @@ def test_compound_pendulum():
     assert lin.dof == 1
 
 
+def test_weights_that_springs_carry():
+    """Where loads balance but for rounding, at rest, it is an equilibrium: f alone is no scale.
+
+    A ball under two springs of 40 N/m and 1 m, drawn out by m g / k each: up and down
+    sqrt(k_sum / m), sideways sqrt(g / length) of the drawn length, as a pendulum.
+    """
+    scene = Scene(name="balance")
+    scene.add_body("ball", mass=2.0, Jp=[0.06] * 3, r=[0, 0, -1.0 - 2.0 * G / 80.0])
+    for name in ("one", "other"):
+        scene.add_force("ptp", name, P_i="ball.O", P_j="ground.O", k=40.0, l0=1.0)
+    scene.add_force("weight", "gravity")
+    found = dap.equilibrium(scene)
+    lin = dap.linearize(scene, at=found)
+    assert lin.is_steady
+    wanted = [(G / (1.0 + 2.0 * G / 80.0)) ** 0.5] * 4 + [40.0**0.5] * 2
+    np.testing.assert_allclose(magnitudes(lin, 6), wanted, rtol=1e-7)  # of the pose: 1e-8
+
+
 def test_inverted_pendulum():
     """Standing on its hinge the same rod falls at the same rate, and dap3d says that it does."""
     scene = Scene(name="inverted")

@@ -30,10 +30,13 @@ from dap3d_core.model.rotations import rotation, skew
 from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.linearization.tangent import TangentMatrices
 
-#: Accelerations beyond those of the steady motion, as a part of those that forces would give.
+#: Accelerations beyond those of the steady motion, as a part of those that forces would give, those
+#: of a displacement by the size of the bodies among them.
 STEADY = 1e-7
 #: Singular values below this part of the largest leave Omega undetermined.
 RCOND = 1e-9
+#: Entries of e~ J - J e~, J of norm 1, below which they are rounding: of a ball's they all are.
+ROUNDING_OF_INERTIA = 1e-14
 
 
 @attrs.frozen(eq=False)
@@ -78,6 +81,8 @@ def steady_frames(
     for k in range(3):
         e = skew(np.eye(3)[k])
         matrix[:, 6:, k] = (e @ J - J @ e).reshape(n, 9)
+    turning = matrix[:, 6:]
+    turning[np.abs(turning) <= ROUNDING_OF_INERTIA] = 0.0
     side[:, 6:] = np.einsum("nrk,nk->nr", matrix[:, 6:], w)
     matrix = np.concatenate([matrix, np.zeros((n, 15, 3))], axis=2)
     matrix[:, :3, 3:] = np.eye(3)  # a common acceleration
@@ -97,7 +102,9 @@ def steady_frames(
     mass = np.hstack([np.repeat(model.mass[:, None], 3, 1), np.linalg.norm(model.Jp, ord=-2,
                       axis=(1, 2))[:, None].repeat(3, 1)])  # fmt: skip
     loads = np.abs(tangent.f) + np.abs(tangent.D.T) @ np.abs(tangent.multipliers)
-    size = loads.reshape(n, 6) / mass / np.repeat([length, 1.0], 3)
+    unit = np.repeat([length, 1.0], 3)
+    loads = np.maximum(loads, np.abs(tangent.stiffness) @ np.tile(unit, n))  # f may balance
+    size = loads.reshape(n, 6) / mass / unit
     rate = max(_largest(w), _largest(v) / length, float(np.sqrt(_largest(size))))
     is_steady = (
         _largest(missed[:, :6]) <= STEADY * rate**2 and _largest(missed[:, 6:]) <= STEADY * rate
