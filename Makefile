@@ -34,10 +34,13 @@ help:  ## show this list
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  %-12s %s\n", $$1, $$2}' Makefile
 	@echo "make run MODEL=NAME takes another model (folders of models/), QUANTITY=NAME draws another curve."
 
-run: $(VENV)/.installed  ## simulate MODEL (fourbar3), write runs/MODEL.nc and a picture of it
+run: $(VENV)/.installed  ## simulate MODEL (fourbar3): result, picture, curve and page in runs/
 	@mkdir -p runs
 	@$(VENV)/bin/dap3d run "$(MODEL)" -o "$(RUN).nc" --force $(FLAGS)
-	@$(VENV)/bin/dap3d plot "$(RUN).nc" "$(QUANTITY)" -o "$(RUN).png" --force
+	@$(VENV)/bin/dap3d animate "$(RUN).nc" -o "$(RUN).png" --at 0 --model "$(MODEL)" --force
+	@$(VENV)/bin/dap3d plot "$(RUN).nc" "$(QUANTITY)" -o "$(RUN)-curve.png" --force
+	@$(VENV)/bin/dap3d view "$(RUN).nc" -o "$(RUN).html" --model "$(MODEL)" --force $(FLAGS)
+	@echo "Open $(RUN).html in a browser: the scene moves there, with its curves and its ledger."
 
 install: $(VENV)/.installed  ## put dap3d into .venv, editable (what run, test and lint do themselves)
 

@@ -89,7 +89,8 @@ def readme_steps(text):
 def test_the_readme_runs_in_sequence_and_once_more(tmp_path):
     """Each block of the README as printed, one after another, in one folder that begins empty."""
     sequence = list(readme_steps((REPOSITORY / "README.md").read_text()))
-    words = ["check", "run", "plot", "sweep", "plot", "equilibrium", "modes", "check-plugin"]
+    words = ["check", "run", "view", "plot", "sweep", "plot", "equilibrium", "modes"]
+    words += ["check-plugin"]
     assert [content[0] for kind, content in sequence if kind == "dap3d"] == words
     assert [kind for kind, _ in sequence if kind != "dap3d"] == ["toml", "python", "python"]
     for kind, content in sequence * 2:
