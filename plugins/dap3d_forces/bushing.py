@@ -45,6 +45,7 @@ class Bushing(Force):
     """
 
     keyword = "bushing"
+    synonyms = ("mount",)
     symbol = "ball"
     jumps_where = "half a turn from where it is at rest"
     P_i: Point = point(doc="where it is fastened, on body i")

@@ -14,6 +14,7 @@ class GlobalForce(Force):
     """
 
     keyword = "f"
+    synonyms = ("force",)
     actuates = "f"
     body_i: Body = body(default=None, doc="the body it acts on")
     P_i: Point = point(default=None, doc="where it acts; the mass centre when left out")

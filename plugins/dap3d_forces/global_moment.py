@@ -15,6 +15,7 @@ class GlobalMoment(Force):
     """
 
     keyword = "n"
+    synonyms = ("torque", "moment")
     actuates = "n"
     body_i: Body = body(doc="the body it acts on")
     n: tuple = vec3(unit="N m", doc="components in ground axes")

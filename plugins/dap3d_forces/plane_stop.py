@@ -18,6 +18,7 @@ class PlaneStop(Force):
     """
 
     keyword = "plane_stop"
+    synonyms = ("contact", "floor", "bumper")
     symbol = "plate"
     unilateral = (0,)
     restitution = "e"

@@ -26,6 +26,7 @@ class PointToPoint(Force):
     """
 
     keyword = "ptp"
+    synonyms = ("spring", "damper", "tsda", "spring-damper")
     actuates = "f_a"
     d: Vector2 = vector2(
         direction=("l0", "f_a", "function"), doc="from the end on body i to the end on body j"

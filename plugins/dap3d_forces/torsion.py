@@ -38,6 +38,7 @@ class Torsion(Force):
     """
 
     keyword = "rot_sda"
+    synonyms = ("rsda", "torsion", "torsional-spring")
     actuates = "n_a"
     symbol = "ring"
     energy_where = "where the bodies turn about the common axis, and without n_a"

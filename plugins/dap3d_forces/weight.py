@@ -17,6 +17,7 @@ class Weight(Force):
     """
 
     keyword, each_body = "weight", True
+    synonyms = ("gravity",)
     gravity: float = number(
         default=9.81, unit="m/s^2", usual=(0.0, None), doc="gravitational acceleration"
     )

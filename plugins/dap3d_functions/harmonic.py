@@ -10,6 +10,7 @@ class Harmonic(Function):
     """f = offset + amplitude sin(frequency x + phase); the frequency is an angular one."""
 
     keyword, smooth = "harmonic", True
+    synonyms = ("sine", "sin", "cosine")
     amplitude: float = number(default=1.0, doc="amplitude")
     frequency: float = number(unit="rad/s", doc="angular frequency")
     phase: float = number(default=0.0, unit="rad", doc="phase at x = 0")

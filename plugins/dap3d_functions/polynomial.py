@@ -9,6 +9,7 @@ class Polynomial(Function):
     """f = c1 + c2 x + c3 x^2, for every x (manual: type ``a``; spec 7)."""
 
     keyword, smooth = "a", True
+    synonyms = ("polynomial", "linear", "constant")
     coeff: tuple = vec3(doc="c1, c2, c3")
 
     def value(x, coeff):

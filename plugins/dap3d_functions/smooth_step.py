@@ -15,6 +15,7 @@ class SmoothStep(Function):
     """
 
     keyword = "b"
+    synonyms = ("smoothstep", "ramp")
     x_start: float = number(default=0.0, doc="where the transition begins")
     x_end: float = number(default=1.0, doc="where it ends")
     f_start: float = number(default=0.0, doc="value before")

@@ -27,6 +27,7 @@ class Spline(Function):
     """
 
     keyword = "spline"
+    synonyms = ("table", "interpolation")
     x: tuple = table(doc="arguments of the points, increasing")
     y: tuple = table(doc="values of the points, as many")
     periodic: bool = choice((False, True), False, doc="the curve repeats itself")

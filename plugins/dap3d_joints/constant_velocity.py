@@ -24,6 +24,7 @@ class ConstantVelocity(Joint):
     """
 
     keyword, rows = "cv", 4
+    synonyms = ("convel", "homokinetic")
     symbol = "ball"
     P_i: Point = point(doc="where the shafts meet, on body i")
     P_j: Point = point(doc="where the shafts meet, on body j")

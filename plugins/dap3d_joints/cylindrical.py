@@ -28,6 +28,7 @@ class Cylindrical(Joint):
     """
 
     keyword, rows = "cyl", 4
+    synonyms = ("cylindrical", "sleeve")
     symbol = "sleeve"
     a_i: Vector = vector(doc="axis on body i")
     a_j: Vector = vector(doc="axis on body j")

@@ -34,6 +34,7 @@ class Disk(Joint):
     """
 
     keyword, rows, holonomic = "disk", 3, (False, False, True)
+    synonyms = ("wheel", "rolling")
     symbol = "wheel"
     switch_words = (
         "the disk lies down (sine of the angle between disk and ground below its `lying`), "

@@ -28,6 +28,7 @@ class DrivenRotation(Joint):
     """
 
     keyword, rows = "drive-rot", 1
+    synonyms = ("motion", "rotational-motion", "driver")
     symbol = "ring"
     drives = True
     body_i: Body = body(doc="body that is turned")

@@ -32,6 +32,7 @@ class DrivenTranslation(Joint):
     """
 
     keyword, rows = "drive-tran", 1
+    synonyms = ("translational-motion",)
     drives = True
     body_i: Body = body(default=None, doc="body that is moved; that of P_i")
     body_j: Body = body(default=None, doc="body the motion is measured from; that of P_j and a_j")

@@ -19,6 +19,7 @@ class InLine(Joint):
     """
 
     keyword, rows = "inline", 2
+    synonyms = ("point-on-line", "pointonline", "bead")
     symbol = "ball"
     P_i: Point = point(doc="the point that slides, on body i")
     P_j: Point = point(doc="point of the line, on body j")

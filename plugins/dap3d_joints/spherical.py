@@ -23,6 +23,7 @@ class Spherical(Joint):
     """
 
     keyword, rows = "sph", 3
+    synonyms = ("spherical", "ball", "socket")
     symbol = "ball"
     P_i: Point = point(doc="point on body i")
     P_j: Point = point(doc="point on body j")

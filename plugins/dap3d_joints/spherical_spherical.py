@@ -21,6 +21,7 @@ class SphericalSpherical(Joint):
     """
 
     keyword, rows = "sph-sph", 1
+    synonyms = ("distance", "rod", "link")
     symbol = "link"
     d: Vector2 = vector2(direction=True, doc="from the link's end on body i to its end on body j")
     length: float = number(

@@ -20,6 +20,7 @@ class Universal(Joint):
     """
 
     keyword, rows = "univ", 4
+    synonyms = ("universal", "cardan", "hooke")
     symbol = "cross"
     P_i: Point = point(doc="centre of the cross, on body i")
     P_j: Point = point(doc="centre of the cross, on body j")

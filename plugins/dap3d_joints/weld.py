@@ -34,6 +34,7 @@ class Weld(Joint):
     """
 
     keyword, rows = "weld", 6
+    synonyms = ("fixed", "rigid", "lock")
     symbol = "block"
     body_i: Body = body(doc="one of the bodies")
     body_j: Body = body(doc="the other one; ground may be it")

@@ -45,6 +45,8 @@ class TypeBase:
     #: not be invariant to a common rigid motion of its bodies (docs/check-plugin.md).
     ground_axes: ClassVar[bool] = False
     symbol: ClassVar[str] = ""
+    #: Other names of the type, of other programs, say: messages suggest its keyword for them.
+    synonyms: ClassVar[tuple[str, ...]] = ()
     #: True for impulses that drive bodies: check-plugin lets them add kinetic energy.
     gives_energy: ClassVar[bool] = False
     #: States of its own: names, or name -> length (docs/concepts/kernels.md).

@@ -103,6 +103,21 @@ class Registry:
         name, same = normal_name(package), self.sources.get((kind, word.strip()), ())
         return [s for s in same if not s.blocked and normal_name(s.distribution) == name]
 
+    def keyword_of_synonym(self, kind: str, word: str) -> str:
+        """The keyword of dap3d's own type of a kind with this other name; "" where there is none.
+
+        Loads these types: for messages alone.
+        """
+        for (of_kind, keyword), sources in self.sources.items():
+            if of_kind == kind and any(s.distribution == OWN for s in sources):
+                try:
+                    type_ = self.get(kind, f"{OWN}:{keyword}").type
+                except PluginError:
+                    continue
+                if word.casefold() in type_.synonyms:
+                    return keyword
+        return ""
+
     def word_of(self, source: Source) -> str:
         """The keyword of a type, or ``package:keyword`` where several packages have this one."""
         is_shared = len(self.sources_of(source.kind, source.keyword)) > 1
@@ -189,7 +204,7 @@ class Registry:
         if package and (rivals := self.sources_of(kind, word)):
             return self._not_of_package(rivals, package)
         known = self.keywords(kind)
-        near = nearest(keyword, known)
+        near = self.keyword_of_synonym(kind, keyword) or nearest(keyword, known)
         words = f"there is no {kind} type {keyword!r}"
         blocked = self.sources.get((kind, keyword), [])
         others = [k for k in GROUPS if k != kind and (k, keyword) in self.sources]

@@ -465,3 +465,28 @@ def test_a_model_file_without_types_or_missing_is_refused(tmp_path):
         load_registry().with_file(write(tmp_path, "interface_version = 1\n"))
     with pytest.raises(PluginError, match="cannot be read"):
         load_registry().with_file(tmp_path / "nothing.py")
+
+
+@pytest.mark.parametrize(
+    ("kind", "word", "keyword"),
+    [
+        ("joint", "hinge", "rev"),  # and not bushing, which is spelt alike
+        ("joint", "Prismatic", "tran"),
+        ("joint", "ball", "sph"),
+        ("force", "gravity", "weight"),
+        ("force", "spring", "ptp"),
+        ("function", "sine", "harmonic"),
+    ],
+)
+def test_other_names_of_a_type_lead_to_its_keyword(kind, word, keyword):
+    with pytest.raises(UnknownTypeError, match=f"did you mean '{keyword}'") as caught:
+        load_registry().get(kind, word)
+    assert caught.value.nearest == keyword
+
+
+def test_no_two_types_of_a_kind_share_another_name():
+    registry = load_registry()
+    for kind in ("joint", "force", "function"):
+        own = [registry.get(kind, k).type for k in registry.keywords(kind)]
+        words = [word for type_ in own for word in (*type_.synonyms, type_.keyword)]
+        assert len(set(words)) == len(words), kind

@@ -74,7 +74,9 @@ def _kinds(registry: "Registry", keyword: str) -> list[str]:
     known = {kind: registry.keywords(kind) for kind in GROUPS}
     kinds = [kind for kind in known if registry.sources_of(kind, keyword)]
     if not kinds:
-        hint = type_hint(keyword, sorted({k for keywords in known.values() for k in keywords}))
+        same = [k for kind in known if (k := registry.keyword_of_synonym(kind, keyword))]
+        every = same or sorted({k for keywords in known.values() for k in keywords})
+        hint = f"; did you mean {same[0]!r}?" if same else type_hint(keyword, every)
         lists = "; ".join(f"{kind}s: {', '.join(all_) or 'none'}" for kind, all_ in known.items())
         raise Refused(f"there is no type {keyword!r}{hint} ({lists})")
     return kinds
