@@ -18,7 +18,7 @@ class InPlane(Joint):
     """
 
     keyword, rows = "inplane", 1
-    synonyms = ("point-on-plane", "pointonplane")
+    synonyms = ("pointonplane",)
     symbol = "plate"
     P_i: Point = point(doc="the point that slides, on body i")
     P_j: Point = point(doc="point of the plane, on body j")
