@@ -211,5 +211,8 @@ def test_what_is_no_such_number_is_refused(given):
 
 
 def test_unknown_and_missing_arguments_have_the_words_of_python():
-    with pytest.raises(TypeError, match=r"taking\(\) got an unexpected keyword argument 'y'"):
+    with pytest.raises(
+        TypeError, match=r"taking\(\) got an unexpected keyword argument 'y'"
+    ) as found:
         taking(y=1)
+    assert found.value.__context__ is None  # one traceback, not two

@@ -127,6 +127,9 @@ def _run_words(words: list[str], *, as_json: bool) -> int:
     except BrokenPipeError:  # the reader closed the pipe
         leave_stdout()
         return exit_codes.DONE
+    except MemoryError:  # too little even for the modules that report errors
+        print("there is not enough memory for this", file=sys.stderr)
+        return exit_codes.FAILED
     except OSError as error:
         leave_stdout()
         print(f"cannot write the output: {error.strerror or error}", file=sys.stderr)

@@ -14,12 +14,20 @@ SMALL = 1e-4
 def matmul(A, B):
     """The matrix product A B."""
     columns = transpose(B)
-    return tuple(tuple(dot(row, column) for column in columns) for row in A)
+    return tuple(tuple(_product(row, column) for column in columns) for row in A)
+
+
+def _product(row, column):
+    """The scalar product of a row and a column, of any length."""
+    first, *others = (a * b for a, b in zip(row, column, strict=True))
+    for product in others:
+        first = first + product
+    return first
 
 
 def transpose(A):
     """The transposed matrix A^T."""
-    return tuple((A[0][k], A[1][k], A[2][k]) for k in range(3))
+    return tuple(zip(*A, strict=True))
 
 
 def conjugate(p):

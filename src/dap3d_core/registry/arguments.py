@@ -5,6 +5,7 @@ import os
 import reprlib
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence, Set, Sized
+from contextlib import suppress
 from functools import wraps
 from numbers import Integral, Real
 from pathlib import Path
@@ -44,9 +45,10 @@ def checked(function: Function) -> Function:
 
     @wraps(function)
     def call(*args: Any, **kwargs: Any) -> Any:
-        try:
+        bound = None
+        with suppress(TypeError):
             bound = signature.bind(*args, **kwargs)
-        except TypeError:
+        if bound is None:
             return function(*args, **kwargs)  # Python's own message names the function
         given = bound.arguments
         for name in given:

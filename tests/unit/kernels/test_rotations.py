@@ -53,6 +53,16 @@ def test_products():
     np.testing.assert_allclose(one, (1.0, 0.0, 0.0, 0.0), atol=1e-15)
 
 
+def test_products_of_matrices_of_any_size():
+    """No row or column is left out; sizes that do not match are refused."""
+    A, B = RNG.normal(size=(2, 3)), RNG.normal(size=(3, 4))
+    given = tuple(map(tuple, A)), tuple(map(tuple, B))
+    np.testing.assert_allclose(kernels.matmul(*given), A @ B, atol=1e-15)
+    np.testing.assert_array_equal(kernels.transpose(given[0]), A.T)
+    with pytest.raises(ValueError, match="zip"):
+        kernels.matmul(given[0], given[0])
+
+
 @pytest.mark.parametrize("size", [0.0, 1e-8, 0.0199, 0.0201, 2.0])
 def test_their_derivatives_by_complex_steps(size):
     """At rest, on both sides of the limit of the series, and beyond, against differences."""

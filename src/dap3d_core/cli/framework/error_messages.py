@@ -8,7 +8,7 @@ from typing import Any
 
 from dap3d_core.cli.console.console import Terminal, plain, print_json, stderr
 from dap3d_core.cli.process import exit_codes
-from dap3d_core.cli.process.memory import address_space
+from dap3d_core.cli.process.memory import address_space, is_used_up
 from dap3d_core.cli.process.streams import leave_stderr
 
 
@@ -67,7 +67,7 @@ def _judge(error: BaseException) -> tuple[int, str]:
     from dap3d_core.interface.errors import PluginError, is_out_of_memory
 
     lack = exit_codes.FAILED, f"there is not enough memory for this{_memory_limit()}"
-    is_lack = is_out_of_memory(error)
+    is_lack = is_out_of_memory(error) or (isinstance(error, Exception) and is_used_up())
     if is_lack and (isinstance(error, MemoryError) or address_space() is not None):
         return lack
     from dap3d_core.scene import SceneError
@@ -117,7 +117,8 @@ def _is_unexpected(error: BaseException) -> bool:
     """True if the library does not raise such an error on purpose."""
     from dap3d_core.interface.errors import is_out_of_memory
 
-    if is_out_of_memory(error) or isinstance(error, (OSError, exit_codes.Terminated)):
+    is_lack = is_out_of_memory(error) or is_used_up()
+    if is_lack or isinstance(error, (OSError, exit_codes.Terminated)):
         return False
     # Looked up, not imported: the broken module may be of the library itself.
     module = sys.modules.get("dap3d_core.simulation.errors")

@@ -6,6 +6,8 @@ import os
 #: Address space, bytes, that numpy's import takes, and what each of its threads adds. With less
 #: its library ends the process with a message of its own, or interrupts it.
 NUMPY, THREAD = 160 * 2**20, 40 * 2**20
+#: With less left, libraries fail for a lack of memory in words of their own, such as "HDF error".
+LEAST = 16 * 2**20
 
 
 def address_space() -> int | None:
@@ -24,9 +26,21 @@ def check_memory() -> None:
     Raises:
         MemoryError: the limit on the address space leaves too little for it.
     """
+    if not _has_room(NUMPY + THREAD * (os.cpu_count() or 1)):
+        raise MemoryError
+
+
+def is_used_up() -> bool:
+    """True if the limit on the address space leaves so little that libraries fail."""
+    return not _has_room(LEAST)
+
+
+def _has_room(size: int) -> bool:
+    """True if the limit on the address space, if there is one, leaves a number of bytes."""
     if address_space() is None:
-        return
+        return True
     try:
-        mmap.mmap(-1, NUMPY + THREAD * (os.cpu_count() or 1)).close()
-    except OSError as error:
-        raise MemoryError from error
+        mmap.mmap(-1, size).close()
+    except OSError:
+        return False
+    return True

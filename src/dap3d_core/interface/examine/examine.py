@@ -161,7 +161,7 @@ def _output(
 ) -> tuple[str, ...]:
     """Expressions of a kernel's numbers; it may be undefined for some random inputs, not all."""
     who = f"{where_is(type_)}.{kernel_name}"
-    for _ in range(ATTEMPTS):
+    for attempt in range(ATTEMPTS):
         try:
             value = kernel(*(random_quantity(q, rng) for q in quantities))
             if kernel_name in ("rate", "reset"):
@@ -171,6 +171,9 @@ def _output(
         except ShapeError as error:
             raise PluginError(f"{who}: {error}") from None
         except Exception as error:
+            # Python refuses what IEEE numbers make infinite, also on a side that is not taken.
+            if isinstance(error, ArithmeticError) and attempt < ATTEMPTS - 1:
+                continue
             reason = f"{type(error).__name__}: {error}{line_of(error, kernel)}"
             raise PluginError(f"{who} failed on a random input: {reason}") from error
         scalars = [value_at(value, path) for path in paths]

@@ -22,7 +22,7 @@ from dap3d_core.testing.samples.sampled_type import UNDEFINED, Sample, SampledTy
 #: Kernels that make the motion jump where they do, by kind of type.
 LAWS = {"force": ("wrench", "rate"), "joint": ("C", "nu", "gamma", "rate"), "function": ()}
 #: Samples whose surroundings are searched, distance on both sides and places on the way.
-SAMPLES, REACH, PLACES = 2, 1.5, 25
+SAMPLES, REACH, PLACES = 2, 4.0, 65
 #: Halvings of an interval in which a condition changes; a jump is more than this part of the law.
 HALVINGS, JUMP = 60, 1e-6
 #: A switch changes its sign within this distance of the place.
@@ -38,11 +38,16 @@ class ComparedNumber(Stepped):
     __hash__ = complex.__hash__
     results: ClassVar[list[bool]] = []
 
+    @property
+    def real(self) -> "ComparedPart":
+        """The real part, which remembers as well."""
+        return ComparedPart(super().real)
 
-def _compared(name: str) -> Any:
-    compare = getattr(Stepped, name)
 
-    def method(self: ComparedNumber, other: Any) -> Any:
+def _compared(number: type, name: str) -> Any:
+    compare = getattr(number, name)
+
+    def method(self: Any, other: Any) -> Any:
         holds = compare(self, other)
         ComparedNumber.results.append(bool(holds))
         return holds
@@ -50,8 +55,16 @@ def _compared(name: str) -> Any:
     return method
 
 
+class ComparedPart(float):
+    """The real part of one, by which kernels such as ``sign`` compare it."""
+
+    __slots__ = ()
+    __hash__ = float.__hash__
+
+
 for _name in ("__lt__", "__le__", "__gt__", "__ge__"):
-    setattr(ComparedNumber, _name, _compared(_name))
+    setattr(ComparedNumber, _name, _compared(Stepped, _name))
+    setattr(ComparedPart, _name, _compared(float, _name))
 
 
 def switches(subject: SampledType) -> CheckOutcome:

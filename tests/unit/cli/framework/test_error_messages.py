@@ -6,6 +6,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
+from dap3d_core.cli.framework import error_messages
 from dap3d_core.cli.framework.error_messages import report_error
 from dap3d_core.cli.process.exit_codes import Refused, Terminated
 from dap3d_core.scene import Mistake, SceneError
@@ -65,3 +66,12 @@ def test_all_mistakes_of_a_scene_are_listed():
         "nearest": "ab", "remedy": "do",
     }  # fmt: skip
     assert err.splitlines()[:2] == ["2 mistakes:", "f.toml:3: a.b = nan: wrong; did you mean 'ab'?"]
+
+
+@pytest.mark.parametrize("error", [Refused("cannot write a.nc: HDF error"), KeyError()])
+def test_errors_of_libraries_without_memory_are_a_lack_of_it(monkeypatch, capsys, error):
+    """They fail in words of their own where the limit on memory leaves nothing."""
+    monkeypatch.setattr(error_messages, "is_used_up", lambda: True)
+    monkeypatch.setattr(error_messages, "address_space", lambda: 400_000 * 1024)
+    assert report_error(error, debug=False, as_json=False) == 1
+    assert capsys.readouterr().err.startswith("there is not enough memory for this")

@@ -21,7 +21,7 @@ from dap3d_core.interface import (
     vector,
     vector2,
 )
-from dap3d_core.kernels import neg, row, scale, sqrt, sub, where
+from dap3d_core.kernels import minimum, neg, row, scale, sqrt, sub, where
 
 ZERO = (0.0, 0.0, 0.0)
 X = (1.0, 0.0, 0.0)
@@ -249,6 +249,9 @@ def test_a_kernel_may_be_undefined_for_some_numbers():
     not finite where it happens."""
     assert "energy" in examine(force(energy=lambda t: sqrt(t - 1.0))).outputs
     assert "C" in examine(joint(C=lambda r_i: where(r_i[0] < 0.0, math.nan, 1.0))).outputs
+    # 1/0 on the side that is not taken, where Python raises and IEEE numbers do not
+    divided = force(energy=lambda t: where(t < 1.0, 1.0 / sqrt(1.0 - minimum(t, 1.0)), 0.0))
+    assert "energy" in examine(divided).outputs
 
 
 def test_velocity_level_kernels_may_name_velocities():

@@ -38,6 +38,7 @@ from dap3d_core.kernels import (
     neg,
     row,
     scale,
+    sign,
     skew,
     sqrt,
     sub,
@@ -282,6 +283,13 @@ class Branching(Spring):
         return pull(k, d, s_P_i, s_P_j)
 
 
+class Signed(Spring):
+    """Pulls as its points part, with one force."""
+
+    def wrench(d, v_P_i, v_P_j, k, s_P_i, s_P_j):
+        return pull(k * sign(dot(d, sub(v_P_j, v_P_i))), d, s_P_i, s_P_j)
+
+
 class Limited(Spring):
     def wrench(d, k, s_P_i, s_P_j):
         inside = (dot(d, d) < 1.0) & (k > 0.5)
@@ -346,8 +354,9 @@ PLANTED = [
     (Counting, {"purity"}, "row 1 of wrench gives other numbers when it is called again"),
     (ReadingTable, {"purity"}, "it reads LIMITS, a dict that anyone may change; make it a tuple"),
     (Printing, {"purity"}, r"prints? is not shown: 'the stiffness is .*it calls print\(\)"),
-    (Branching, {"plain"}, r"wrench branches on a number \[.*\]; branch by where\("),
+    (Branching, {"plain", "branches"}, r"wrench branches on a number \[.*\]; branch by where\("),
     (Limited, {"plain", "branches"}, r"wrench branches on a number \[.*min or max"),
+    (Signed, {"branches"}, "wrench jumps by .* no switch is defined"),
     (MathExp, {"plain"},
      r"wrench takes floats alone \(TypeError: .*\) \[.*take .*sqrt, .*not from math"),
     (Bessel, {"plain"}, r"wrench takes floats alone \(a function of numpy or scipy\) \["),
