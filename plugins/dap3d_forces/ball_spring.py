@@ -33,7 +33,6 @@ class BallSpring(Force):
 
     keyword = "sph_sd"
     symbol = "ball"
-    jumps_where = "half a turn from p_i o p_c"
     body_i: Body = body(doc="body from which the turn is measured")
     body_j: Body = body(doc="body that turns")
     k: float = number(default=0.0, unit="N m/rad", usual=(0.0, None), doc="stiffness")
@@ -56,10 +55,18 @@ class BallSpring(Force):
         phi = turn(p_i, p_j, p_c)
         return 0.5 * k * dot(phi, phi)
 
+    def switch(p_i, p_j, p_c):
+        return turned(p_i, p_j, p_c)[0]  # zero at half a turn, where phi jumps
+
 
 def turn(p_i, p_j, p_c):
     """phi, the rotation vector of the turn from p_i o p_c to p_j."""
-    return rotation_vector(quaternion_product(p_j, conjugate(quaternion_product(p_i, p_c))))
+    return rotation_vector(turned(p_i, p_j, p_c))
+
+
+def turned(p_i, p_j, p_c):
+    """The same turn as Euler parameters."""
+    return quaternion_product(p_j, conjugate(quaternion_product(p_i, p_c)))
 
 
 @hookimpl

@@ -47,7 +47,6 @@ class Bushing(Force):
     keyword = "bushing"
     synonyms = ("mount",)
     symbol = "ball"
-    jumps_where = "half a turn from where it is at rest"
     P_i: Point = point(doc="where it is fastened, on body i")
     P_j: Point = point(doc="where it is fastened, on body j; at rest there, where P_i is")
     k: tuple = square(6, NONE, doc="stiffness, N/m and N m/rad (between them: N/rad)")
@@ -81,6 +80,9 @@ class Bushing(Force):
         of_both = dot(x, rotate(K_tr, phi))
         return 0.5 * dot(x, rotate(K_t, x)) + of_both + 0.5 * dot(phi, rotate(K_r, phi))
 
+    def switch(p_i, p_j, home):
+        return turned(p_i, p_j, home)[0]  # zero at half a turn, where phi jumps
+
 
 def blocks(given):
     """The 3 x 3 blocks of translation, of both, and of rotation of a symmetric 6 x 6 matrix."""
@@ -92,8 +94,12 @@ def blocks(given):
 
 def turn(p_i, p_j, home):
     """phi, in the axes of body i, of the rotation that body j has made since it was at home."""
-    now = quaternion_product(conjugate(p_i), p_j)
-    return rotation_vector(quaternion_product(now, conjugate(home)))
+    return rotation_vector(turned(p_i, p_j, home))
+
+
+def turned(p_i, p_j, home):
+    """The same rotation as Euler parameters."""
+    return quaternion_product(quaternion_product(conjugate(p_i), p_j), conjugate(home))
 
 
 def gradient(phi, mu):

@@ -195,8 +195,6 @@ class Force(TypeBase):
             else drawn from the declared fields.
         energy_where: the condition, to follow "only", for the energy to be the potential of the
             wrench; "" for no condition.
-        jumps_where: where its law jumps without a switch, to follow "jumps": a place that is not
-            reached in use, as half a turn of a mount; "" for nowhere.
         actuates: field, a number or three, that an actuator sets: the wrench is linear in it. Of
             three numbers the direction stays. Inverse dynamics finds it; "" for no such field.
         unilateral: rows of ``J``, from 0, whose impulses are not negative: they push and do not
@@ -214,7 +212,6 @@ class Force(TypeBase):
     restitution: ClassVar[str] = ""
     each_body: ClassVar[bool] = False
     energy_where: ClassVar[str] = ""
-    jumps_where: ClassVar[str] = ""
     actuates: ClassVar[str] = ""
     regularised: ClassVar[str] = ""
 

@@ -7,6 +7,7 @@ damaged file is never loaded.
 import contextlib
 import hashlib
 import json
+import mmap
 import os
 import subprocess
 import sys
@@ -25,6 +26,8 @@ MAX_BYTES = 200_000_000
 STRAY_AGE = 3600.0
 #: A folder is cleaned at the first of so many objects that a process writes: it is read whole.
 CLEAN_EVERY = 50
+#: Bytes that loading takes besides the code.
+ROOM = 16 * 2**20
 #: Optimisation levels.
 UNOPTIMISED, OPTIMISED = 0, 3
 _lock = threading.RLock()
@@ -130,8 +133,16 @@ def compile_ir(text: str, level: int, target: Processor | None = None) -> bytes:
 
 
 def load(code: bytes, symbols: list[str]) -> list[int]:
-    """Load object code into memory; returns the addresses of its symbols."""
+    """Load object code into memory; returns the addresses of its symbols.
+
+    Raises:
+        MemoryError: there is too little left.
+    """
     llvm = _llvm()
+    try:  # without room LLVM ends the process
+        mmap.mmap(-1, len(code) + ROOM).close()
+    except OSError:
+        raise MemoryError from None
     with _lock:
         machine = _target_machine(UNOPTIMISED, processor())
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)

@@ -35,8 +35,8 @@ def check_room(
     needed, limit = 8 * rows * numbers * COPIES, file_size_limit()
     place, room = _room(output) if needed > ALWAYS else ("", None)
     if output is not None and limit is not None and needed > COPIES * (limit - DESCRIPTION):
-        place, room = "in files, by their limit (ulimit -f)", COPIES * limit
-        needed = max(needed, room + 1)
+        place, room = "in a file, by its limit (ulimit -f)", limit
+        needed = needed // COPIES + DESCRIPTION
     if room is None or needed <= room:
         return
     what = (
@@ -47,6 +47,8 @@ def check_room(
     remedy = f"report less often, with a dt {2.0 * needed / max(room, 1):.3g} times as long or more"
     if dt is not None:
         remedy = f"give dt of at least {2.0 * dt * needed / max(room, 1):.3g}"
+    if limit is not None and room == limit <= DESCRIPTION:
+        remedy = "a result with few instants is larger: raise the limit"
     if output is None:
         remedy += ", or name a file (output=, -o), which takes them as they come"
     raise SceneError([Mistake("dt", MISSING if dt is None else dt, what, remedy=remedy)])
