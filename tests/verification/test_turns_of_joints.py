@@ -339,7 +339,7 @@ def test_a_start_between_reports_that_are_far_apart_is_refused():
 
 
 def test_a_start_between_reports_at_rest_with_turns_between_them_is_refused():
-    """Turned by -40 rad from rest to rest between two reports: the angles tell, the speeds do not."""
+    """By -40 rad from rest to rest between two reports: angles tell, speeds do not."""
     scene = wheel(0.0, 0.0)
     scene.add_function("b", "turning", x_start=0.0, x_end=3.0, f_start=0.0, f_end=-40.0)
     scene.add_joint("drive-rot", "motor", body_i="wheel", a_j="ground.z", function="turning")
