@@ -12,12 +12,14 @@ ZERO = (0.0, 0.0, 0.0)
 class RotationStop(Force):
     """Limit of the angle theta of body j relative to body i about an axis u common to both.
 
-    theta is measured from v_i to v_j and counts whole turns; theta_dot = u . (w_j - w_i). The gap
-    is g = theta - theta_stop for side "min", g = theta_stop - theta for side "max". Where it closes
-    faster than w_rest an impulsive moment along u makes g_dot of it -e g_dot, the joints of the
-    bodies held (docs/jumps.md); slower contact is carried by a spring and damper, of stiffness k
-    and of the damping ratio zeta, that pushes and does not pull. zeta is that of the inertia
-    ``J_c``, by default of the two bodies alone. Without ``rebound`` all contact is carried.
+    theta falls where the angle that a rev or cyl about u of the same bodies i and j reports grows:
+    side "max" limits that angle from below. It is measured from v_i to v_j and counts whole turns;
+    theta_dot = u . (w_j - w_i). The gap is g = theta - theta_stop for side "min",
+    g = theta_stop - theta for side "max". Where it closes faster than w_rest an impulsive moment
+    along u makes g_dot of it -e g_dot, the joints of the bodies held (docs/jumps.md); slower
+    contact is carried by a spring and damper, of stiffness k and of the damping ratio zeta, that
+    pushes and does not pull. zeta is that of the inertia ``J_c``, by default of the two bodies
+    alone. Without ``rebound`` all contact is carried.
     """
 
     keyword = "rot_stop"

@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 import dap3d_core as dap
-from dap3d_core.simulation.events.sampling import Sampler
+from dap3d_core.simulation.events.sampling import FRACTIONS, Sampler, turning_points
 
 G = 9.81
 EPS = np.finfo(float).eps
@@ -111,6 +111,9 @@ def test_turning_points_of_a_pendulum(integrator, method):
         (lambda t: (t - 0.37) ** 4 - 1e-10, [0.37 - 10.0**-2.5, 0.37 + 10.0**-2.5]),
         (lambda t: (t - 0.2) * (t - 0.2001) * (t - 0.7) * (t - 0.70001),
          [0.2, 0.2001, 0.7, 0.70001]),
+        # three passages between two samples: its turning points are 4e-4 apart
+        (lambda t: (t - 0.5) * (t - 0.5003) * (t - 0.5007), [0.5, 0.5003, 0.5007]),
+        (lambda t: (t - 0.1) * (t - 0.6) * (t - 0.602) * (t - 0.6035), [0.1, 0.6, 0.602, 0.6035]),
         (lambda t: np.floor(10.0 * t) - 4.5, [0.5]),
         (lambda t: 1e300 * (t - 0.5), [0.5]),
         (lambda t: 1e-300 * (t - 0.5), [0.5]),
@@ -209,6 +212,17 @@ def test_windows_are_narrowed_to_what_cannot_hide_a_crossing():
 
             samples = Sampler(None).samples(dip, dip, 0.0, dip(0.0), 1.0)
             assert any(value <= 0.0 for _, value in samples), (place, width)
+
+
+@pytest.mark.parametrize("rise", [1.0, -1.0])
+def test_turning_points_close_to_each_other(rise):
+    """Of a quintic: its slope is rise * 5 (x - a)(x - a - d) (x^2 + 1)."""
+    for a in (*np.linspace(0.01, 0.98, 40), 0.5, 0.25):
+        for d in (1e-2, 1e-4, 1e-6):
+            slope = np.polynomial.Polynomial.fromroots([a, a + d, 1j, -1j]) * 5.0 * rise
+            found = turning_points(np.real(slope.integ()(FRACTIONS)))
+            # the slope there is d^2, of values to rounding: 1e-15 / (d 1) of a place, and a margin
+            assert [x for x, _ in found] == pytest.approx([a, a + d], abs=1e-2 * d + 1e-13 / d)
 
 
 # ------------------------------------------------------------------ switches of types

@@ -336,3 +336,13 @@ def test_a_start_between_reports_that_are_far_apart_is_refused():
     near = dap.simulate(wheel(), t_end=2.0, dt=0.01)
     begun = dap.simulate(wheel(), t_end=0.1, start=(near, 1.003)).quantity("pin.angle").values[0]
     assert begun == pytest.approx(float(decaying(1.003)), abs=1e-4)
+
+
+def test_a_start_between_reports_at_rest_with_turns_between_them_is_refused():
+    """By -40 rad from rest to rest between two reports: angles tell, speeds do not."""
+    scene = wheel(0.0, 0.0)
+    scene.add_function("b", "turning", x_start=0.0, x_end=3.0, f_start=0.0, f_end=-40.0)
+    scene.add_joint("drive-rot", "motor", body_i="wheel", a_j="ground.z", function="turning")
+    run = dap.simulate(scene, t_end=4.0, dt=4.0)
+    with pytest.raises(dap.SceneError, match="changes by 40 rad, by more than half a turn"):
+        dap.simulate(wheel(0.0, 0.0), t_end=0.1, start=(run, 2.0))

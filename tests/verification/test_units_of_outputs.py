@@ -274,10 +274,11 @@ def test_declared_units_survive_copies_and_files(tmp_path):
 @pytest.mark.parametrize(
     ("value", "unit"),
     [("h.angle", "deg"), ("rod.r.x", "mm"), ("h.angle_rate", "rpm"), ("h.angle", "m"),
+     ("h.angle_rate", "Hz"),
      ("norm(h.force)", "kN"), ("energy.kinetic", "N"), ("rod.rd.x", "km/h"), ("t", "min")],
 )  # fmt: skip
 def test_a_declared_unit_that_the_value_does_not_have_is_refused(value, unit):
-    """A number in rad that is called deg is wrong by 57."""
+    """A number in rad that is called deg is wrong by 57, one in rad/s called Hz by 2 pi."""
     scene = _parsed("")
     scene.add_output("wrong", value, unit=unit)
     with pytest.raises(dap.SceneError, match=rf"outputs\.wrong.*is declared in {unit}, and its"):

@@ -166,7 +166,9 @@ def contradiction(declared: str, unit: Carried) -> str:
     if isinstance(unit, float) or not unit.exact or unit.counted or not unit.known:
         return ""
     powers = _parsed(declared)
-    if set(_size(powers)[1]) - {"m", "s", "kg"} or _is_like(powers, unit.known):
+    counts_cycles = "rad" in unit.known and any(symbol.endswith("Hz") for symbol in powers)
+    is_strange = bool(set(_size(powers)[1]) - {"m", "s", "kg"})
+    if is_strange or (_is_like(powers, unit.known) and not counts_cycles):
         return ""
     return f"is declared in {declared}, and its value is in {_text(unit.known)}"
 

@@ -8,6 +8,8 @@ there, and the window is narrowed.
 """
 
 from collections.abc import Callable, Iterator
+from itertools import pairwise
+from math import comb
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,8 +36,8 @@ NARROWEST, MAX_LOST = 2.0**-12, 2
 NARROWEST_AT_KINK, MAX_KINK_WINDOWS = 2.0**-40, 128
 #: Windows that are tried in a step at most, but for those that ``every`` requires.
 MAX_WINDOWS = 2**13
-#: Instants at which the slope of the quintic is evaluated, to find its turning points.
-GRID = np.linspace(0.0, 1.0, 49)
+#: Of the slope of the quintic: coefficients below this part of the largest are rounding.
+NO_COEFFICIENT = 1e-15
 
 
 def _predictions() -> Floats:
@@ -56,28 +58,38 @@ def _predictions() -> Floats:
 
 
 MISFITS = _predictions()
-#: Coefficients of the quintic, lowest first, from the values; slopes on the grid from these.
+#: Coefficients of the quintic, lowest first, and of its slope, from the values.
 COEFFICIENTS = np.linalg.inv(np.vander(FRACTIONS, increasing=True))
-POWERS = np.arange(len(FRACTIONS))
-GRID_SLOPES = np.column_stack([np.zeros_like(GRID), np.vander(GRID, 5, increasing=True)]) * POWERS
+SLOPES = np.arange(1, len(FRACTIONS))[:, None] * COEFFICIENTS[1:]
+#: Bernstein coefficients of the slope from the values: it has no zero where all have one sign.
+BERNSTEIN = np.array([[comb(i, j) / comb(4, j) for j in range(5)] for i in range(5)]) @ SLOPES
 WIDEST_GAP = float(np.max(np.diff(FRACTIONS)))
 
 
 def turning_points(values: Floats) -> list[tuple[float, float]]:
-    """(fraction of the window, value) of the extrema of the quintic through the values."""
-    coefficients = COEFFICIENTS @ values
-    slopes = np.sign(GRID_SLOPES @ coefficients)
-    before = np.flatnonzero(slopes[:-1] * slopes[1:] < 0.0).tolist()
-    slope = np.polynomial.polynomial.polyder(coefficients).tolist() if before else []
+    """(fraction of the window, value) of the extrema of the quintic through the values.
+
+    They lie between the middles of the zeros of its slope, however close these are.
+    """
+    bernstein = BERNSTEIN @ values
+    if np.all(bernstein >= 0.0) or np.all(bernstein <= 0.0):
+        return []
+    slope = SLOPES @ values
+    slope[np.abs(slope) <= NO_COEFFICIENT * np.max(np.abs(slope))] = 0.0
+    zeros = np.sort(np.roots(slope[::-1]).real)
+    places = np.array([0.0, *zeros[(zeros > 0.0) & (zeros < 1.0)], 1.0])
+    middles = (0.5 * (places[:-1] + places[1:])).tolist()
+    coefficients, polynomial = slope.tolist(), (COEFFICIENTS @ values).tolist()
+    signs = [(x, y) for x in middles if (y := _polynomial(coefficients, x)) != 0.0]
     found = []
-    for k in before:
-        low, high = GRID[k : k + 2].tolist()
-        while low < (middle := 0.5 * (low + high)) < high:
-            if _polynomial(slope, middle) * slopes[k] > 0.0:
-                low = middle
-            else:
-                high = middle
-        found.append((middle, _polynomial(coefficients.tolist(), middle)))
+    for (low, side), (high, other) in pairwise(signs):
+        if (side > 0.0) != (other > 0.0):
+            while low < (middle := 0.5 * (low + high)) < high:
+                if (_polynomial(coefficients, middle) > 0.0) == (side > 0.0):
+                    low = middle
+                else:
+                    high = middle
+            found.append((middle, _polynomial(polynomial, middle)))
     return found
 
 

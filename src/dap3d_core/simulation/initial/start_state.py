@@ -216,18 +216,26 @@ def _refuse_jumps(result: Result, before: int, after: int) -> None:
 
 
 def _refuse_turns(result: Result, before: int, after: int) -> None:
-    """SceneError where a body turns by more than half a turn between two reported instants."""
+    """SceneError where a body turns by more than half a turn between two reported instants.
+
+    The counted angles say so where a body rests at both.
+    """
     first, last = float(result.t[before]), float(result.t[after])
     speed = np.linalg.norm(result.w[[before, after]], axis=-1).max(axis=0)
     fastest = int(np.argmax(speed))
+    turn = np.abs(result.arrays.angles[after] - result.arrays.angles[before])
     if speed[fastest] * (last - first) > np.pi:
-        raise _mistake(
-            result.record.title or "the result",
-            f"{result.summary.body_names[fastest]} turns at {speed[fastest]:.3g} rad/s, by more "
-            f"than half a turn between the reported instants {first:.9g} s and {last:.9g} s: its "
-            "pose is not known there; give one of these as the time of the start, or report more "
-            "often",
-        )
+        turns = f"{result.summary.body_names[fastest]} turns at {speed[fastest]:.3g} rad/s,"
+    elif turn.max(initial=0.0) > np.pi:
+        turns = f"an angle changes by {turn.max():.3g} rad,"
+    else:
+        return
+    raise _mistake(
+        result.record.title or "the result",
+        f"{turns} by more than half a turn between the reported instants {first:.9g} s and "
+        f"{last:.9g} s: the pose is not known there; give one of these as the time of the start, "
+        "or report more often",
+    )
 
 
 def _interval(result: Result, t: Any) -> tuple[int, int, float]:
