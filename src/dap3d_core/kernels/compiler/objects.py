@@ -26,8 +26,8 @@ MAX_BYTES = 200_000_000
 STRAY_AGE = 3600.0
 #: A folder is cleaned at the first of so many objects that a process writes: it is read whole.
 CLEAN_EVERY = 50
-#: Bytes that loading takes besides the code.
-ROOM = 16 * 2**20
+#: Bytes that LLVM takes besides the text or the code.
+ROOM = 32 * 2**20
 #: Optimisation levels.
 UNOPTIMISED, OPTIMISED = 0, 3
 _lock = threading.RLock()
@@ -119,7 +119,12 @@ def _target_machine(level: int, target: Processor) -> Any:
 
 
 def compile_ir(text: str, level: int, target: Processor | None = None) -> bytes:
-    """Object code of a module of LLVM IR."""
+    """Object code of a module of LLVM IR.
+
+    Raises:
+        MemoryError: there is too little left.
+    """
+    _check_room(4 * len(text))
     llvm, target = _llvm(), target or processor()
     machine, module = _target_machine(level, target), llvm.parse_assembly(text)
     module.triple, module.data_layout = target.triple, str(machine.target_data)
@@ -132,6 +137,18 @@ def compile_ir(text: str, level: int, target: Processor | None = None) -> bytes:
     return code
 
 
+def _check_room(size: int) -> None:
+    """Check that there is room for a number of bytes and what LLVM takes besides.
+
+    Raises:
+        MemoryError: there is not; LLVM would end the process.
+    """
+    try:
+        mmap.mmap(-1, size + ROOM).close()
+    except OSError:
+        raise MemoryError from None
+
+
 def load(code: bytes, symbols: list[str]) -> list[int]:
     """Load object code into memory; returns the addresses of its symbols.
 
@@ -139,10 +156,7 @@ def load(code: bytes, symbols: list[str]) -> list[int]:
         MemoryError: there is too little left.
     """
     llvm = _llvm()
-    try:  # without room LLVM ends the process
-        mmap.mmap(-1, len(code) + ROOM).close()
-    except OSError:
-        raise MemoryError from None
+    _check_room(len(code))
     with _lock:
         machine = _target_machine(UNOPTIMISED, processor())
         engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
