@@ -139,3 +139,13 @@ def test_radau_takes_multipliers_as_known_to_their_last_digits():
     assert heavy.stats.steps < 2.5 * light.stats.steps
     case = next(case for case in SCALES if case.name == "heavy on light")
     assert case.error(heavy) < 1e-5
+
+
+@pytest.mark.parametrize(("integrator", "rtol"), [("dop853", 1e-3), ("dopri5", 1e-2)])
+def test_what_a_projection_moves_is_no_rounding(integrator, rtol):
+    """A free wheel at a loose tolerance: projection moves its Euler parameters by as much, which
+    was taken for the rounding of their rates. Smaller tolerances do change its accuracy."""
+    scene = dap.Scene(name="wheel")
+    scene.add_body("b", mass=1.0, Jp=(0.01, 0.01, 0.02), w=(0.0, 0.0, 10.0))
+    result = dap.simulate(scene, t_end=50.0, dt=2.5, integrator=integrator, rtol=rtol, atol=rtol)
+    assert not [note for note in result.notes if "rounding" in note]

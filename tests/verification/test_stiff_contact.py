@@ -25,7 +25,7 @@ def run(scene, t_end, integrator, **settings):
 def ball(k, e, height=0.1, mass=1.0, floor=0.0, **fields):
     """A ball of no radius that falls on a plane."""
     scene = dap.Scene(name="ball")
-    scene.add_body("b", mass=mass, Jp=(1.0, 1.0, 1.0), r=(0.0, 0.0, floor + height))
+    scene.add_body("b", mass=mass, Jp=(mass, mass, mass), r=(0.0, 0.0, floor + height))
     scene.add_point("floor", "ground", (0.0, 0.0, floor))
     scene.add_force("weight")
     scene.add_force("plane_stop", "f", P_i="b.O", P_j="floor", e=e, k=k, **fields)
@@ -228,3 +228,15 @@ def test_a_run_that_stalls_says_why_and_keeps_what_it_has(integrator):
     assert 0.6 < kept.t[-1] < 0.7
     expected = 2.0 * kept.t - 1.5 * kept.t**2
     np.testing.assert_allclose(kept.r[:, 0, 0], expected, atol=1e-8)
+
+
+@pytest.mark.parametrize("e", [0.5, 0.9])
+@pytest.mark.parametrize("height", [0.1, 0.37, 0.5])
+@pytest.mark.parametrize(("mass", "k"), [(1e-3, 3e9), (1e-3, 5e10), (0.1, 1e12), (1.0, 1e13)])
+def test_a_light_ball_rebounds_every_time(mass, k, height, e):
+    """Stages of a step after an impact seemed found, by a first rate of 1e-7 that was that of the
+    stiff side of the bend alone: the ball stayed on the plane, its energy gone."""
+    result = dap.simulate(
+        ball(k, e, height=height, mass=mass), t_end=2.0, dt=0.01, integrator="radau"
+    )
+    check_ball(result, k, e, height=height, mass=mass)

@@ -13,6 +13,9 @@ OWNERS = {"i": "crank", "j": "rod", "k": "slider"}
 PLACES = {"crank": 0.0, "rod": 1.0, "slider": 2.0, "ground": 0.0}
 #: Common x of all points of an element, so that joints fit, and height of a disk of radius 1.
 MEETING, HEIGHT = 0.5, 1.0
+#: A number without a default. Of lengths it is no simple part of the distance of two bodies, which
+#: would put strokes at their ends.
+NUMBER = 0.6
 _LISTS = {
     "vec3": "[0.0, 0.0, 1.0]",
     "matrix": "[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]",
@@ -140,7 +143,7 @@ class _Example:
             yield (
                 name,
                 _LISTS.get("rows" if spec.by_rows else spec.kind)
-                or _toml(max(0.5, spec.minimum or 0.5)),
+                or _toml(max(NUMBER, spec.minimum or NUMBER)),
             )
         elif spec.default is not None:
             yield name, _toml(spec.default)

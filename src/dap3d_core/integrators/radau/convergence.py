@@ -6,8 +6,9 @@
 import math
 
 from dap3d_core.integrators.radau.state import RadauState
-from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, Y
-from dap3d_core.integrators.stepping.step_control import EPSILON, LARGEST
+from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, MOST, NOISE, Y
+from dap3d_core.integrators.stepping.step_control import EPSILON
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
 
@@ -26,21 +27,34 @@ STALLED, MOST_ROUNDINGS = 10.0, 1e6
 
 @compiled
 def newton_limit(work: RadauState) -> float:
-    """Norm of a change at which the iteration ends (HW IV.8), not below what rounding allows."""
-    y, rtol = work.state[Y], work.rtol
-    n = work.frames.shape[1] - 1
-    limit = min(0.03, math.sqrt(rtol))
-    first = 0
-    for count in (COORDINATES * n, VELOCITIES * n):  # states of elements have units of their own
-        top = 0.0
-        low = atol = LARGEST
-        for k in range(first, first + count):
-            top, low = max(top, abs(y[k])), min(low, abs(y[k]))
-            atol = min(atol, work.tolerance[ABSOLUTE, k])
-        if count > 0:
-            limit = max(limit, ROUNDINGS * EPSILON * top / (atol + rtol * low))
-        first += count
-    return min(limit, LOOSEST)
+    """Norm of a change at which the iteration ends (HW IV.8)."""
+    return min(0.03, math.sqrt(work.rtol))
+
+
+@compiled
+def size_of_change(change: Floats, h: float, work: RadauState) -> float:
+    """Norm of a change of the state, as ``scaled_largest``.
+
+    Where a tolerance asks for more than the rounding of the largest component lets an iteration
+    find, that takes its place: a change of ROUNDINGS of it is at the limit. The others are found
+    as exactly as they would be without.
+    """
+    y, rtol, tolerance = work.state[Y], work.rtol, work.tolerance
+    n, rounding = work.frames.shape[1] - 1, ROUNDINGS * EPSILON / newton_limit(work)
+    first, largest = 0, 0.0
+    for count in (COORDINATES * n, VELOCITIES * n, work.error_size):
+        last, least = min(first + count, work.error_size), 0.0
+        if first < (COORDINATES + VELOCITIES) * n:  # states of elements have units of their own
+            for k in range(first, last):
+                least = max(least, rounding * abs(y[k]))
+        for k in range(first, last):
+            scale = max(tolerance[ABSOLUTE, k] + rtol * abs(y[k]), least)
+            noise = min(h * tolerance[NOISE, k], tolerance[MOST, k])
+            ratio = (abs(change[k]) - noise) / max(noise, scale)
+            if not ratio <= largest:
+                largest = ratio
+        first = last
+    return largest
 
 
 @compiled

@@ -45,6 +45,7 @@ from dap3d_core.integrators.radau.convergence import (
     is_settling,
     is_stalled,
     newton_limit,
+    size_of_change,
 )
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, SCRATCH, TRIAL, Y
@@ -261,7 +262,7 @@ def size_of_multipliers(h: float, change: Floats, work: RadauState, system: Syst
     zero(moved)
     add_transposed(system.blocks, system.D, change[1], h, moved)
     add_velocity(system.metric, moved, out[velocity_offset(1, n) :])
-    return scaled_largest(out, y, y, work.error_size, work.rtol, work.tolerance, h)
+    return size_of_change(out, h, work)
 
 
 @compiled
@@ -274,7 +275,7 @@ def change_stages(h: float, work: RadauState, system: System) -> float:
     y = work.state[Y]
     work.state_change = work.multiplier_change = 0.0
     for i in range(3):
-        size = scaled_largest(work.R[i], y, y, work.error_size, work.rtol, work.tolerance, h)
+        size = size_of_change(work.R[i], h, work)
         other = size_of_multipliers(h, work.G[i], work, system)
         if not size <= work.state_change:
             work.state_change = size
@@ -355,7 +356,11 @@ def find_stages(
                 return 0.8 * excess ** (-1.0 / (3.0 + most - done))
         before = max(change, ROUNDING)
         states, multipliers = work.state_change, work.multiplier_change
-        found = work.convergence_factor * change <= limit and done >= least
+        factor = work.convergence_factor
+        if done > 1 and (work.has_last_step == 0 or least > 1):  # the first rate may be that of
+            last = 0.5 if done == 2 else ratio  # the stiff side of a bend alone
+            factor = max(factor, last / (1.0 - last) if last < 1.0 else LARGEST)
+        found = factor * change <= limit and done >= least
         if found and ((done == 1 and change <= 1.0) or is_power_known(h, ratio, work)):
             return 0.0
         was_found = found and done > 1

@@ -28,6 +28,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     RUNNING,
     SCRATCH,
     TOLERANCES,
+    TRIAL,
     Function,
     Y,
 )
@@ -36,8 +37,8 @@ from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: Least scale of an error: at atol = 0 a component that is exactly zero is not divided by zero.
 SMALLEST_ATOL = 1e-290
-#: A change of the last digit, and how often one is tried.
-DIGIT, SAMPLES = 2.220446049250313e-16, 3
+#: A change of the last digit, how often one is tried, how many digits a projection moves.
+DIGIT, SAMPLES, DIGITS_MOVED = 2.220446049250313e-16, 3, 100.0
 #: Rounding errors in the estimate of an error, in those of one right-hand side: a sum over stages
 #: whose weights add up to five or so in magnitude, each with several roundings.
 ROUNDINGS = 6.0
@@ -64,11 +65,12 @@ def tolerance_of(size: int, atol: ArrayLike, kinds: ArrayLike) -> Floats:
 
 @compiled_into
 def update_rounding(
-    work: Any, f: Floats, h: float, rejected: int, rhs: Function, system: Any, loops: Any
+    work: Any, first: Floats, h: float, rejected: int, rhs: Function, system: Any, loops: Any
 ) -> None:
     """Measure the rounding of the rates where the last step, of length h, gives a reason to.
 
-    f: dy/dt at the state. rejected: how many steps had failed before that one.
+    first: the rates that the next step starts with. rejected: how many steps had failed before
+    that one.
     """
     due = (
         work.step_count % PROBE == 0 and work.fixed_step == 0.0 and work.rejected_count == rejected
@@ -77,9 +79,8 @@ def update_rounding(
         return
     if not can_measure(work, rejected):
         return
-    argument, out = work.state[SCRATCH], work.state[OTHER]
-    work.rhs_count += SAMPLES + 1
-    measure_noise(work, f, h, argument, out, rhs, system, loops)
+    work.rhs_count += SAMPLES + 2
+    measure_noise(work, first, h, rhs, system, loops)
     judge_noise(work, h)
 
 
@@ -130,22 +131,19 @@ def change_digits(y: Floats, sample: int, argument: Floats) -> None:
 
 @compiled
 def measure_noise(
-    work: Any,
-    f: Floats,
-    h: float,
-    argument: Floats,
-    out: Floats,
-    rhs: Function,
-    system: Any,
-    loops: Any,
+    work: Any, first: Floats, h: float, rhs: Function, system: Any, loops: Any
 ) -> None:
-    """Uncertainty of dy/dt at the state, which is f, in an explicit step h, into ``tolerance``.
+    """Uncertainty of dy/dt at the state in an explicit step h, into ``tolerance``.
 
     By the last digits of y, and by what these make of y itself in the step. Where that would grow
     in the step the step is longer than the method is stable for: it counts as if it did not.
-    argument, out: scratch.
+
+    The rates that the next step starts with are those before the projection. They differ by what
+    that moves: by last digits, which is rounding as well, or by a tolerance, which is none.
     """
     y, tolerance, noise = work.state[Y], work.tolerance, work.tolerance[NOISE]
+    argument, out, f = work.state[SCRATCH], work.state[OTHER], work.state[TRIAL]
+    rhs(work.t, y, f, system, loops)
     for i in range(y.size):
         noise[i] = 0.0
     for sample in range(SAMPLES):
@@ -153,6 +151,10 @@ def measure_noise(
         rhs(work.t, argument, out, system, loops)
         for i in range(y.size):
             noise[i] = max(noise[i], ROUNDINGS * abs(out[i] - f[i]))
+    for i in range(y.size):
+        moved = ROUNDINGS * abs(first[i] - f[i])
+        if noise[i] < moved <= DIGITS_MOVED * noise[i]:
+            noise[i] = moved
     change_digits(y, SAMPLES, argument)
     for i in range(y.size):
         argument[i] += h * noise[i]
