@@ -21,11 +21,12 @@ from dap3d_core.formulations.stabilized_index2.stage_equations import (
 )
 from dap3d_core.integrators.radau.newton import solve_first
 from dap3d_core.integrators.radau.state import RadauState
-from dap3d_core.integrators.stepping.integration_state import NOISE, SCRATCH, Y
+from dap3d_core.integrators.stepping.integration_state import NOISE, SCRATCH, Function, Y
 from dap3d_core.integrators.stepping.rounding import (
     ROUNDINGS,
     SAMPLES,
     change_digits,
+    find_rate_noise,
     judge_noise,
 )
 from dap3d_core.kernels.runtime.cache import compiled
@@ -63,5 +64,18 @@ def measure_stage_noise(
         solve_first(h, work, system, matrix)
         for k in range(y.shape[0]):
             noise[k] = max(noise[k], size * abs(work.R[0, k]))
-    judge_noise(work, h)
     return 0.0
+
+
+@compiled
+def bound_stage_noise(h: float, work: RadauState, rhs: Function, system: Any, loops: Any) -> None:
+    """Bound what was measured by the rounding of the rates themselves, and judge it.
+
+    Near a singular pose the factors of a step make more of rounding than there is of it.
+    """
+    noise, own = work.tolerance[NOISE], work.R[0]
+    work.rhs_count += SAMPLES + 1
+    find_rate_noise(work, own, rhs, system, loops)
+    for k in range(noise.shape[0]):
+        noise[k] = min(noise[k], own[k])
+    judge_noise(work, h)

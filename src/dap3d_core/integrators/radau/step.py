@@ -18,6 +18,7 @@ from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatri
 from dap3d_core.integrators.radau.convergence import is_at_rounding, newton_limit
 from dap3d_core.integrators.radau.dense_output import prepare_dense
 from dap3d_core.integrators.radau.newton import MOST, SAME_STEP, predict
+from dap3d_core.integrators.radau.rounding import bound_stage_noise
 from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, RadauState
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
@@ -98,6 +99,7 @@ def advance(
             if work.rounding_state != 0 and h > 0.0 and can_measure(work, rejected):
                 measure = parts[5]
                 measure(work.t, h, work, system, loops, tangent, matrix)
+                bound_stage_noise(h, work, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
             count_turns(work, accepted, system, loops)
 

@@ -130,6 +130,20 @@ def change_digits(y: Floats, sample: int, argument: Floats) -> None:
 
 
 @compiled
+def find_rate_noise(work: Any, noise: Floats, rhs: Function, system: Any, loops: Any) -> None:
+    """Changes of dy/dt at the state by the last digits of y; dy/dt itself into TRIAL."""
+    y, argument, out, f = work.state[Y], work.state[SCRATCH], work.state[OTHER], work.state[TRIAL]
+    rhs(work.t, y, f, system, loops)
+    for i in range(y.size):
+        noise[i] = 0.0
+    for sample in range(SAMPLES):
+        change_digits(y, sample, argument)
+        rhs(work.t, argument, out, system, loops)
+        for i in range(y.size):
+            noise[i] = max(noise[i], ROUNDINGS * abs(out[i] - f[i]))
+
+
+@compiled
 def measure_noise(
     work: Any, first: Floats, h: float, rhs: Function, system: Any, loops: Any
 ) -> None:
@@ -143,14 +157,7 @@ def measure_noise(
     """
     y, tolerance, noise = work.state[Y], work.tolerance, work.tolerance[NOISE]
     argument, out, f = work.state[SCRATCH], work.state[OTHER], work.state[TRIAL]
-    rhs(work.t, y, f, system, loops)
-    for i in range(y.size):
-        noise[i] = 0.0
-    for sample in range(SAMPLES):
-        change_digits(y, sample, argument)
-        rhs(work.t, argument, out, system, loops)
-        for i in range(y.size):
-            noise[i] = max(noise[i], ROUNDINGS * abs(out[i] - f[i]))
+    find_rate_noise(work, noise, rhs, system, loops)
     for i in range(y.size):
         moved = ROUNDINGS * abs(first[i] - f[i])
         if noise[i] < moved <= DIGITS_MOVED * noise[i]:
