@@ -51,6 +51,11 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
         return f"{head}: {_chatter(evaluator, integration)}"
     t_stop = integration.t_stop if integration.t_stop is not None else t
     message = f"{head}: {REASONS[integration.status]}"
+    if integration.status is Status.STEP_FLOOR and (step := integration.work.fixed_step):
+        message = (
+            f"{head}: a step of {step:g} s, as given, cannot be taken there; give a shorter step, "
+            "or none, and rtol chooses the steps"
+        )
     if integration.status is not Status.NOT_FINITE:
         culprit = find_contradiction(evaluator, t, y, rank)
         if culprit:
