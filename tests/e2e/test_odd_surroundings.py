@@ -210,7 +210,7 @@ def test_a_limit_on_files_is_named_before_the_run(scene_file):
     folder = scene_file().parent
     found = in_shell("ulimit -f 200; $DAP3D run fall.toml --t-end 2000 --dt 0.01", folder)
     assert found.returncode == 2, found
-    assert "in files, by their limit (ulimit -f)" in found.stderr
+    assert "in a file, by its limit (ulimit -f)" in found.stderr
     assert "dt of at least" in found.stderr
     found = in_shell("ulimit -f 2000; $DAP3D run fall.toml --t-end 1 --dt 0.5", folder)
     assert found.returncode == 0, found

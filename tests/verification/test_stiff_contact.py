@@ -243,10 +243,10 @@ def test_a_light_ball_rebounds_every_time(mass, k, height, e):
 
 
 def test_a_given_step_that_is_too_long_for_a_contact_is_named():
-    """Newton's iteration finds no stages across the bend: the run stops, and says what to change."""
+    """No stages are found across the bend: the run stops, and says what to change."""
     scene = dap.Scene(name="drop")
     scene.add_body("b", mass=1.0, Jp=(1.0, 1.0, 1.0), r=(0.0, 0.0, 1.0))
     scene.add_force("weight")
     scene.add_force("plane_stop", "floor", P_i="b.O", e=0.0, k=1e5)
-    with pytest.raises(dap.SimulationError, match="a step of 0.01 s, as given, .* shorter step"):
+    with pytest.raises(dap.SimulationError, match=r"a step of 0\.01 s, as given, .* shorter step"):
         dap.simulate(scene, t_end=1.0, dt=0.1, integrator="radau", step=0.01)

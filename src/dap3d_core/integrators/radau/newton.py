@@ -66,8 +66,6 @@ UNSEEN_CHANGE, UNSEEN_RATE = 0.1, 2e-3
 #: A step whose stages were not found is halved.
 UNFOUND = 0.5
 LARGEST = 1.7976931348623157e308
-#: What the work of a step may be off by, as part of the tolerance.
-WORK_TOLERANCE = 0.1
 
 
 @compiled
@@ -233,16 +231,13 @@ def evaluate_stages(
 ) -> None:
     """Residuals of the three stages: F - A^-1 Z / h into R, those of the rows into G."""
     y, argument, c = work.state[Y], work.state[SCRATCH], work.method.c
-    stages, inverse, last = work.Z, work.method.inverse, y.shape[0] - 1
-    work.power_change = 0.0
+    stages, inverse = work.Z, work.method.inverse
     for i in range(3):
-        power = work.F[i, last]
         for k in range(y.shape[0]):
             argument[k] = y[k] + stages[i, k]
         evaluate_stage(t + c[i] * h, argument, work.multipliers[i], matrix.held, work.F[i],
                        work.G[i], system, loops)  # fmt: skip
         keep_frames(system.body, work.frames[i])
-        work.power_change = max(work.power_change, abs(work.F[i, last] - power))
         a0, a1, a2 = inverse[i, 0] / h, inverse[i, 1] / h, inverse[i, 2] / h
         for k in range(y.shape[0]):
             rate = a0 * stages[0, k] + a1 * stages[1, k] + a2 * stages[2, k]
@@ -292,17 +287,6 @@ def change_stages(h: float, work: RadauState, system: System) -> float:
 
 
 @compiled
-def is_power_known(h: float, ratio: float, work: RadauState) -> bool:
-    """True if the last change of the stages has changed the work of a step h by little.
-
-    The power was evaluated before it. ratio: of that change to the one before, 1 in the first
-    iteration, whose power is compared with that of the last step.
-    """
-    size = max(work.largest_work, h * abs(work.F[2, work.F.shape[1] - 1]))
-    return h * work.power_change * ratio <= WORK_TOLERANCE * work.rtol * size
-
-
-@compiled
 def find_stages(
     t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Tangent,
     matrix: StageMatrix,
@@ -317,7 +301,6 @@ def find_stages(
     stale = abs(h - work.factored_step) / h  # factors of another step converge at this rate
     work.convergence_factor = max(max(work.convergence_factor, ROUNDING) ** 0.8, stale)
     before = ratio = ratio_before = states = multipliers = 1.0
-    was_found = False
     fixed = work.fixed_step != 0.0
     most = MOST_FIXED if fixed else MOST
     least = 2 if tangent.fine[0] == BENT else 1  # rates of other steps say nothing across a bend
@@ -329,7 +312,7 @@ def find_stages(
         work.last_iterations = done
         if not change <= LARGEST:
             return math.nan
-        if was_found or is_exact(change, before if done == least > 1 else LARGEST, limit, work):
+        if is_exact(change, before if done == least > 1 else LARGEST, limit, work):
             return 0.0
         if done > 1:
             ratio = change / before
@@ -360,10 +343,8 @@ def find_stages(
         if done > 1 and (work.has_last_step == 0 or least > 1):  # the first rate may be that of
             last = 0.5 if done == 2 else ratio  # the stiff side of a bend alone
             factor = max(factor, last / (1.0 - last) if last < 1.0 else LARGEST)
-        found = factor * change <= limit and done >= least
-        if found and ((done == 1 and change <= 1.0) or is_power_known(h, ratio, work)):
+        if factor * change <= limit and done >= least and (done > 1 or change <= 1.0):
             return 0.0
-        was_found = found and done > 1
     return UNFOUND
 
 

@@ -58,7 +58,6 @@ class RadauState(IntegrationState):
     accepted_step = _own()  # length of the last accepted step
     factored_step = _own()  # length of the step that the factors belong to
     accepted_error = _own()  # of the last accepted step
-    power_change = _own()  # of the power at the stages, in the last iteration
     regularisation = _own()  # of the rows; 0: none
     state_change = _own()  # norms of the last change of the stages and of their multipliers
     multiplier_change = _own()

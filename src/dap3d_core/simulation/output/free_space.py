@@ -32,23 +32,25 @@ def check_room(
     Raises:
         SceneError: says how much there would be, how much room there is, and what to do.
     """
-    needed, limit = 8 * rows * numbers * COPIES, file_size_limit()
+    reports, limit = 8 * rows * numbers, file_size_limit()
+    needed, times = COPIES * reports, 0.0
     place, room = _room(output) if needed > ALWAYS else ("", None)
-    if output is not None and limit is not None and needed > COPIES * (limit - DESCRIPTION):
-        place, room = "in a file, by its limit (ulimit -f)", limit
-        needed = needed // COPIES + DESCRIPTION
+    if output is not None and limit is not None and reports > limit - DESCRIPTION:
+        place, room, needed = "in a file, by its limit (ulimit -f)", limit, reports + DESCRIPTION
+        times = 2.0 * reports / max(limit - DESCRIPTION, 1)
     if room is None or needed <= room:
         return
     what = (
         f"the run would report {rows:,} instants of {numbers:,} numbers, {_size(needed)}; "
         f"there is room for {_size(room)} {place}"
     )
-    # with half of the room for all else
-    remedy = f"report less often, with a dt {2.0 * needed / max(room, 1):.3g} times as long or more"
-    if dt is not None:
-        remedy = f"give dt of at least {2.0 * dt * needed / max(room, 1):.3g}"
-    if limit is not None and room == limit <= DESCRIPTION:
-        remedy = "a result with few instants is larger: raise the limit"
+    times = times or 2.0 * needed / max(room, 1)  # half of the room is for all else
+    if times >= rows:
+        remedy = "no run fits there: raise the limit"
+    elif dt is None:
+        remedy = f"report less often, with a dt {times:.3g} times as long or more"
+    else:
+        remedy = f"give dt of at least {times * dt:.3g}"
     if output is None:
         remedy += ", or name a file (output=, -o), which takes them as they come"
     raise SceneError([Mistake("dt", MISSING if dt is None else dt, what, remedy=remedy)])
