@@ -134,6 +134,7 @@ def test_functions_with_close_roots_kinks_and_jumps(flight, function, times):
     assert not any("too fast" in note for note in result.notes)
 
 
+@pytest.mark.slow
 def test_all_swings_of_a_fast_function(flight):
     """sin(1e4 t) has 3183 roots in a second of free flight, which is five steps."""
     event = dap.Event(lambda t, state: np.sin(1e4 * t))

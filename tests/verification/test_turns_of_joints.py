@@ -176,6 +176,7 @@ def test_a_driven_wheel_follows_its_driver(analysis, joint, dt):
     assert result.quantity("turns").values[-1] == pytest.approx(100.0 / (2.0 * np.pi), abs=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("dt", [0.05, 1.3])
 def test_kinematics_of_a_driver_that_turns_back(dt):
     scene = driven("harmonic", amplitude=40.0, frequency=3.0)

@@ -5,6 +5,7 @@ there: else steps go across the jump. A formula that is derived must have a valu
 it is derived from has a slope.
 """
 
+from collections import Counter
 from collections.abc import Iterator
 from typing import Any, ClassVar
 
@@ -25,6 +26,8 @@ LAWS = {"force": ("wrench", "rate"), "joint": ("C", "nu", "gamma", "rate"), "fun
 SAMPLES, REACH, PLACES = 2, 4.0, 65
 #: Halvings of an interval in which a condition changes; a jump is more than this part of the law.
 HALVINGS, JUMP = 60, 1e-6
+#: Changes of a condition that are looked at: where it changes its law jumps, or does not.
+TRIES = 8
 #: A switch changes its sign within this distance of the place.
 NEAR = 1e-6
 #: A slope is one where its error bound is less than this part of it.
@@ -88,9 +91,10 @@ def switches(subject: SampledType) -> CheckOutcome:
 
 def _unseen_jump(sample: Sample, name: str) -> str:
     """The first jump of a law along the directions of its bodies that no switch sees, in words."""
+    tried: Counter[int] = Counter()
     for words, along in _directions(sample):
         path = _Path(sample, name, along)
-        for place in path.changes():
+        for place in path.changes(tried):
             close = [x for x in map(path.value, path.bracket(place)) if x is not None]
             if len(close) < 2:
                 continue
@@ -140,8 +144,11 @@ class _Path:
         self._sample, self._name, self._along = sample, name, along
         self._width = 2.0 * REACH / (PLACES - 1)
 
-    def changes(self) -> Iterator[float]:
-        """Distances at which a condition of the kernel changes."""
+    def changes(self, tried: Counter[int]) -> Iterator[float]:
+        """Distances at which a condition of the kernel changes, a few of each condition.
+
+        tried: how often each condition was met, on other ways as well.
+        """
         places = np.linspace(-REACH, REACH, PLACES)
         results = [self._results(x) for x in places]
         if not any(results):
@@ -149,7 +156,9 @@ class _Path:
         for k in range(PLACES - 1):
             one, other = results[k], results[k + 1]
             for which in np.flatnonzero(np.array(one) != np.array(other)):
-                yield self._located(places[k], places[k + 1], int(which), one[which])
+                tried[int(which)] += 1
+                if tried[int(which)] <= TRIES:
+                    yield self._located(places[k], places[k + 1], int(which), one[which])
 
     def _located(self, a: float, b: float, which: int, first: bool) -> float:
         for _ in range(HALVINGS):
