@@ -194,7 +194,7 @@ def _allowed(spec: Any) -> str:
     if spec.direction:
         words.append("of unit length" if spec.kind == "vec3" else "not of zero length")
         if isinstance(spec.direction, tuple):
-            words[-1] += f" at the start, unless without {', '.join(spec.direction)}"
+            words[-1] += f" at the start, where one of {', '.join(spec.direction)} is given"
     words += [f"not along {spec.across}"] * bool(spec.across)
     return ", ".join(words)
 

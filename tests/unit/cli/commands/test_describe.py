@@ -115,7 +115,7 @@ def test_a_required_function_is_in_the_example():
     ("keyword", "field", "allowed"),
     [
         ("ptp", "k", "usually >= 0"),
-        ("ptp", "d", "not of zero length at the start, unless without l0, f_a, function"),
+        ("ptp", "d", "not of zero length at the start, where one of l0, f_a, function is given"),
         ("friction", "mu", ">= 0, usually <= 10"),
         ("rot_sda", "v_i", "not along axis"),
         ("weight", "wgt", "of unit length"),
