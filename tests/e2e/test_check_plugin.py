@@ -60,7 +60,8 @@ def test_a_file_of_ones_own(dap3d, refuse):
     (rubber,) = found["types"]
     states = {o["check"]: o["state"] for o in rubber["outcomes"]}
     assert states == {"energy": "failed", "frame": "ok", "action and reaction": "ok",
-                      "purity": "ok", "plain": "ok", "compiled": "ok"}  # fmt: skip
+                      "branches": "ok", "rest": "ok", "purity": "ok", "plain": "ok",
+                      "compiled": "ok"}  # fmt: skip
     (energy,) = (o for o in rubber["outcomes"] if o["check"] == "energy")
     assert energy["findings"][0]["pose"]["seed"] == 3
 

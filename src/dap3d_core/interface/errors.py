@@ -25,7 +25,9 @@ def is_out_of_memory(error: BaseException | None) -> bool:
 
     A library whose file does not fit into the address space is reported as one that is not found.
     """
-    while error is not None:
+    seen: set[int] = set()  # an exception that was raised from itself has no end
+    while error is not None and id(error) not in seen:
+        seen.add(id(error))
         text = str(error).lower()
         is_lack = isinstance(error, MemoryError) or getattr(error, "errno", None) == ENOMEM
         if is_lack or any(words in text for words in MEMORY_WORDS):

@@ -135,7 +135,9 @@ class SweepRuns:
         try:
             compiled = CompiledModel(self.scene, allow_code=allow_code, announce=announce)
         except SceneError as error:
-            raise error if model is not None else SceneError(map(_own, error.mistakes)) from error
+            if model is not None:
+                raise
+            raise SceneError(map(_own, error.mistakes)) from error
         _check_types(data, compiled)
         self._registry, self._between = compiled.checked.registry, between
         self._numbers: tuple[SceneParameter, ...] = parameters_named(compiled.checked, names)
