@@ -108,14 +108,16 @@ class Registry:
 
         Loads these types: for messages alone.
         """
-        for (of_kind, keyword), sources in self.sources.items():
-            if of_kind == kind and any(s.distribution == OWN for s in sources):
-                try:
-                    type_ = self.get(kind, f"{OWN}:{keyword}").type
-                except PluginError:
-                    continue
-                if word.casefold() in type_.synonyms:
-                    return keyword
+        every = (s for sources in self.sources.values() for s in sources)
+        for source in every:
+            if source.kind != kind or source.distribution != OWN or source.blocked:
+                continue
+            try:
+                synonyms = self._load(source).type.synonyms
+            except PluginError:
+                continue
+            if word.casefold() in synonyms:
+                return source.keyword
         return ""
 
     def word_of(self, source: Source) -> str:

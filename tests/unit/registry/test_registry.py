@@ -484,6 +484,13 @@ def test_other_names_of_a_type_lead_to_its_keyword(kind, word, keyword):
     assert caught.value.nearest == keyword
 
 
+def test_names_of_blocked_types_lead_nowhere(monkeypatch):
+    monkeypatch.setenv("DAP3D_BLOCK", "dap3d")
+    with pytest.raises(UnknownTypeError) as caught:
+        load_registry().get("joint", "hinge")
+    assert caught.value.nearest is None
+
+
 def test_no_two_types_of_a_kind_share_another_name():
     registry = load_registry()
     for kind in ("joint", "force", "function"):
