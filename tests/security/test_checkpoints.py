@@ -32,7 +32,7 @@ INTEGERS = RadauState.indices("integer") | AdamsState.indices("integer")
 COUNTS = {
     "step_count", "rejected_count", "rhs_count", "projection_count", "report_count",
     "near_singular_landings", "cut_attempts", "stiff_steps", "nonstiff_steps", "stalled_steps",
-    "equal_steps", "failure_count",
+    "equal_steps", "failure_count", "attempt_count", "stall_start",
     "iteration_count", "last_iterations", "jacobian_count", "factorisation_count",
 }  # fmt: skip
 
