@@ -103,7 +103,10 @@ NOT_CALLED = {
         "integrators.stepping.singular_poses": "predict_measures is_approaching "
         "least_time_to_singularity",
         "integrators.radau.step": "reject_iteration stage_is_across",
-        "integrators.radau.convergence": "is_settling is_stalled",
+        "integrators.stepping.rounding": "measure_noise",
+        "assembly.turns": "measure_all follow_poses",
+        "formulations.regularised": "least_multipliers take_seen",
+        "formulations.stabilized_index2.jacobian": "find_smooth_side",
         "integrators.stepping.output": "report_end",
         "integrators.runge_kutta.step": "is_rounding",
         "integrators.stepping.event_location": "cut_step",
@@ -112,7 +115,7 @@ NOT_CALLED = {
         "formulations.joint.lanes": "rhs",
         "integrators.runge_kutta.lanes": "plan_step take_stages put_stage put_argument take_rates "
         "judge_step end_step",
-        "study.batch.lanes": "set_lane load next_step run_lanes",
+        "study.batch.lanes": "set_lane load next_step run_lanes exchange_turns",
     }.items()
     for name in names.split()
 }
