@@ -79,7 +79,7 @@ def inverse(
     Returns:
         A result with the motion, the reactions, and for each actuator the quantity
         ``NAME.actuation``: the force or moment of a driver, positive where it drives its
-            coordinate on, the force f_a of a ``ptp``, N or N m.
+        coordinate on, the force f_a of a ``ptp``, N or N m.
 
     Raises:
         SceneError, PluginError, ResultError: as ``compile``; unusable motion, actuators or output.
