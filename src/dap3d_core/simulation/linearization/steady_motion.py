@@ -81,8 +81,7 @@ def steady_frames(
     for k in range(3):
         e = skew(np.eye(3)[k])
         matrix[:, 6:, k] = (e @ J - J @ e).reshape(n, 9)
-    turning = matrix[:, 6:]
-    turning[np.abs(turning) <= ROUNDING_OF_INERTIA] = 0.0
+    matrix[:, 6:][np.abs(matrix[:, 6:]) <= ROUNDING_OF_INERTIA] = 0.0
     side[:, 6:] = np.einsum("nrk,nk->nr", matrix[:, 6:], w)
     matrix = np.concatenate([matrix, np.zeros((n, 15, 3))], axis=2)
     matrix[:, :3, 3:] = np.eye(3)  # a common acceleration
@@ -106,9 +105,8 @@ def steady_frames(
     loads = np.maximum(loads, np.abs(tangent.stiffness) @ np.tile(unit, n))  # f may balance
     size = loads.reshape(n, 6) / mass / unit
     rate = max(_largest(w), _largest(v) / length, float(np.sqrt(_largest(size))))
-    is_steady = (
-        _largest(missed[:, :6]) <= STEADY * rate**2 and _largest(missed[:, 6:]) <= STEADY * rate
-    )
+    is_steady = _largest(missed[:, :6]) <= STEADY * rate**2
+    is_steady = is_steady and _largest(missed[:, 6:]) <= STEADY * rate
     Omega[np.abs(Omega) <= RCOND * rate] = 0.0
     if is_steady and (np.any(v) or np.any(w)):
         change = acceleration_rates(tangent, np.hstack([v, w]).ravel(), dependencies).reshape(n, 6)
