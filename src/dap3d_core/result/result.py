@@ -141,18 +141,11 @@ class Result:
         return cls(summary, arrays_of(rows, summary), record, lambda: (model, evaluator_of))
 
     def at(self, index: Integers) -> "Result":
-        """The result at some of its instants, (k,) rising indices; turns are those of the whole.
-
-        Raises:
-            ValueError: they are no rising indices of its instants.
-        """
+        """The result at some of its instants, (k,) rising indices; turns are those of the whole."""
         index = np.atleast_1d(np.asarray(index))
         rises = index.dtype.kind in "iu" and index.ndim == 1 and np.all(np.diff(index) > 0)
         if not rises or not 0 <= index[0] <= index[-1] < len(self.t):
-            raise ValueError(
-                f"index should be rising whole numbers from 0 to {len(self.t) - 1}: the places of "
-                f"reported instants in result.t, not {index!r}"
-            )
+            raise ValueError(f"index should be rising places in result.t, not {index!r}")
         part = Result(self.summary, self.arrays.at(index), self.record, lambda: self._origin)
         part._whole = self, index
         return part

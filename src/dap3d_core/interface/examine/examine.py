@@ -15,6 +15,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.body_pose import BodyPose
+from dap3d_core.interface.codegen import return_shapes
 from dap3d_core.interface.codegen.instance_layout import (
     InstanceLayout,
     body_slots,
@@ -32,13 +33,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     parameters,
 )
 from dap3d_core.interface.codegen.reactions import READING, reaction_names
-from dap3d_core.interface.codegen.return_shapes import (
-    ShapeError,
-    checked_shape,
-    entries,
-    state_entries,
-    value_at,
-)
+from dap3d_core.interface.codegen.return_shapes import ShapeError, checked_shape, value_at
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.element_unknowns import unknown_names
@@ -165,9 +160,11 @@ def _output(
         try:
             value = kernel(*(random_quantity(q, rng) for q in quantities))
             if kernel_name in ("rate", "reset"):
-                paths = state_entries(value, [s for _, s in state_places(type_).values()])
+                paths = return_shapes.state_entries(
+                    value, [s for _, s in state_places(type_).values()]
+                )
             else:
-                paths = entries(value, *_expected(type_, kernel_name, value, rows))
+                paths = return_shapes.entries(value, *_expected(type_, kernel_name, value, rows))
         except ShapeError as error:
             raise PluginError(f"{who}: {error}") from None
         except Exception as error:
