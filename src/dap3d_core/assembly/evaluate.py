@@ -14,6 +14,7 @@ from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unsc
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import where
 
 
 @compiled
@@ -193,8 +194,7 @@ def largest_weighted(values: Floats, weights: Floats) -> float:
     found = 0.0
     for k in range(values.shape[0]):
         size = abs(values[k]) * weights[k]
-        if not size <= found:
-            found = size
+        found = where((size > found) | (size != size), size, found)
     return found
 
 
@@ -204,6 +204,5 @@ def largest(values: Floats) -> float:
     found = 0.0
     for k in range(values.shape[0]):
         size = abs(values[k])
-        if not size <= found:
-            found = size
+        found = where((size > found) | (size != size), size, found)
     return found

@@ -82,6 +82,7 @@ def atan2(y, x):
     return _like(x + y, math.atan2(y, x))
 
 
+@intrinsic("where")
 def where(condition, a, b):
     """``a`` where the condition holds, else ``b``: a kernel's branch. Both are evaluated."""
     if hasattr(condition, "tracer"):

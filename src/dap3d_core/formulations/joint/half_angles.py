@@ -11,6 +11,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import where
 
 # pi/2 in three parts, the first two with trailing zeros, and 2/pi.
 P1, P2, P3 = 1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21
@@ -39,7 +40,7 @@ def largest_angle(q: Floats, count: int) -> float:
     """Largest magnitude of the first angles of q."""
     largest = 0.0
     for i in range(count):
-        largest = max(largest, abs(q[i]))
+        largest = where(abs(q[i]) > largest, abs(q[i]), largest)
     return largest
 
 

@@ -36,6 +36,7 @@ class AdamsIntegration(Integration):
 
     name = "adams"
     state_class = AdamsState
+    takes_programs = True
     keeps_step = False
 
     def __init__(self, *args: Any, step: float | None = None, **options: Any) -> None:

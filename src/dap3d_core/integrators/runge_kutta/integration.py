@@ -28,6 +28,7 @@ class RungeKutta(Integration):
     """
 
     state_class = RungeKuttaState
+    takes_programs = True
 
     def __init__(
         self, method: Tableau, *args: Any, stop_when_stiff: bool = False, **options: Any

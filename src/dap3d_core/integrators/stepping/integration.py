@@ -99,6 +99,8 @@ class Integration(Restorable):
     #: Whether its formulas are implicit; whether it goes on with its step where rates jump.
     implicit = False
     keeps_step = True
+    #: Whether its steps evaluate right-hand sides by address, so that programs may take their place.
+    takes_programs = False
 
     def __init__(
         self,
@@ -153,6 +155,11 @@ class Integration(Restorable):
         work.rtol, work.error_size = rtol, error_size
         work.projects, work.calls_accepted = project_on, watched
         work.t_limit = work.step_limit_at_switch = work.longest_step = np.inf
+
+    @property
+    def functions(self) -> Any:
+        """The table of functions that it was made with."""
+        return self._arguments[0]
 
     def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
         """Further arrays of ``work``, for ``size`` components."""

@@ -83,6 +83,10 @@ def _sign(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
     return sign
 
 
+def _where(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
+    return w.select(node, w.cast(node, values[0], t.BOOL), *values[1:])
+
+
 def _pointer(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
     first, *lengths = values[0].words
     return t.Value(t.Array(values[0].type.item, 1), (first, w.count_of(lengths)))
@@ -94,4 +98,5 @@ FORMS: dict[str, Form] = {
     "int": _conversion(t.INT), "float": _conversion(t.FLOAT), "bool": _conversion(t.BOOL),
     "complex": _complex, "integer ceil": _ceil, "abs": _abs, "sign": _sign,
     "min": _extreme(ast.Lt()), "max": _extreme(ast.Gt()), "pointer": _pointer,
+    "where": _where,
 }  # fmt: skip

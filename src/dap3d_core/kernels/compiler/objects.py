@@ -131,6 +131,7 @@ def compile_ir(text: str, level: int, target: Processor | None = None) -> bytes:
     module.verify()
     options = llvm.create_pipeline_tuning_options(speed_level=level)
     options.loop_vectorization, options.slp_vectorization = level > 0, False
+    options.loop_interleaving = False
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
     code: bytes = machine.emit_object(module)
@@ -164,6 +165,11 @@ def load(code: bytes, symbols: list[str]) -> list[int]:
         engine.finalize_object()
         _engines.append(engine)
         return [engine.get_function_address(symbol) for symbol in symbols]
+
+
+def name_address(symbol: str, address: int) -> None:
+    """Let code that is loaded from here on find an address by a symbol."""
+    _llvm().add_symbol(symbol, address)
 
 
 def encoded(results: Any, code: bytes) -> bytes:

@@ -38,6 +38,10 @@ class Tracer(Writer):
         """Raise a TraceError, with the remedy for kernels; its line is in the traceback."""
         raise TraceError(f"has {why}; {_REMEDY}")
 
+    def decide(self, condition: t.Value) -> bool:
+        """Refuse to branch on a number."""
+        raise TraceError("branches on a number; use where(condition, a, b)")
+
     def value(self, x: Any, like: t.Scalar = t.FLOAT) -> t.Value:
         """A number of a kernel: symbolic, or a constant, a float unless it is of the type given."""
         if isinstance(x, Symbol):
@@ -62,14 +66,18 @@ class Tracer(Writer):
         """A function of floats: sqrt, sin, ..."""
         if name not in (*EXACT, *LIBRARY):
             raise AttributeError(name)
-        return lambda *numbers: Symbol(self, self.call(name, *map(self.word, numbers)))
+        return lambda *numbers: self.symbol(self.call(name, *map(self.word, numbers)))
+
+    def symbol(self, value: t.Value) -> Any:
+        """A result as kernels see it."""
+        return Symbol(self, value)
 
     def where(self, condition: "Symbol", a: Any, b: Any) -> Any:
         """``a`` where the condition holds, else ``b``; tuples item by item."""
         if isinstance(a, tuple) and isinstance(b, tuple) and len(a) == len(b):
             return tuple(self.where(condition, x, y) for x, y in zip(a, b, strict=True))
         test = self.cast(None, condition.value, t.BOOL)
-        return Symbol(self, self.select(None, test, self.value(a), self.value(b)))
+        return self.symbol(self.select(None, test, self.value(a), self.value(b)))
 
     def integer(self, x: Any) -> "Symbol":
         """A float as an integer, an index or a count."""
@@ -89,11 +97,11 @@ class Tracer(Writer):
 def _operation(op: ast.operator) -> tuple[Any, Any]:
     def operate(self: "Symbol", other: Any) -> "Symbol":
         given = self.tracer.value(other, self.value.type)
-        return Symbol(self.tracer, self.tracer.operation(None, op, self.value, given))
+        return self.tracer.symbol(self.tracer.operation(None, op, self.value, given))
 
     def reflected(self: "Symbol", other: Any) -> "Symbol":
         given = self.tracer.value(other, self.value.type)
-        return Symbol(self.tracer, self.tracer.operation(None, op, given, self.value))
+        return self.tracer.symbol(self.tracer.operation(None, op, given, self.value))
 
     return operate, reflected
 
@@ -101,7 +109,7 @@ def _operation(op: ast.operator) -> tuple[Any, Any]:
 def _comparison(op: ast.cmpop) -> Any:
     def compare(self: "Symbol", other: Any) -> "Symbol":
         given = self.tracer.value(other)
-        return Symbol(self.tracer, self.tracer.comparison(None, op, self.value, given))
+        return self.tracer.symbol(self.tracer.comparison(None, op, self.value, given))
 
     return compare
 
@@ -134,7 +142,7 @@ class Symbol:
         return self ^ True
 
     def __neg__(self) -> "Symbol":
-        return Symbol(self.tracer, self.tracer.negative(None, self.value))
+        return self.tracer.symbol(self.tracer.negative(None, self.value))
 
     def __pos__(self) -> "Symbol":
         return self
@@ -161,6 +169,10 @@ class Symbol:
     def __rpow__(self, x: Any) -> "Symbol":
         return self.tracer.pow(x, self)
 
+    def sqrt(self) -> "Symbol":
+        """The square root, for ``numpy.sqrt``."""
+        return self.tracer.sqrt(self)
+
     def rint(self) -> "Symbol":
         """The nearest integer, for ``numpy.rint``."""
         return self.tracer.rint(self)
@@ -177,8 +189,8 @@ class Symbol:
     __round__ = __floor__ = __ceil__ = __trunc__ = _refuse
     __floordiv__ = __mod__ = __rfloordiv__ = __rmod__ = __divmod__ = _refuse
 
-    def __bool__(self) -> NoReturn:
-        raise TraceError("branches on a number; use where(condition, a, b)")
+    def __bool__(self) -> bool:
+        return self.tracer.decide(self.value)
 
     def __getattr__(self, name: str) -> NoReturn:
         raise _MissingError(f"reads {name} of a number; {_REMEDY}")

@@ -10,7 +10,7 @@ import os
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -26,6 +26,8 @@ _RESULTS = {type_.name: type_ for type_ in (NOTHING, BOOL, INT, FLOAT)}
 _units: dict[str, Unit] = {}
 #: Held while a unit is made, as several threads may need it at once.
 _making = threading.RLock()
+#: The thread in which the functions of the core run with symbols (compiler/straight_line.py).
+_symbolic_thread: int | None = None
 
 
 def jit_is_on() -> bool:
@@ -98,6 +100,18 @@ def prepared(function: Callable[..., Any], *arguments: Any) -> Callable[..., Any
     return functools.partial(function, *arguments)
 
 
+@contextmanager
+def run_with_symbols() -> Iterator[None]:
+    """Run functions of the core in this thread as plain Python, with symbols for numbers."""
+    global _symbolic_thread
+    with _making:
+        _symbolic_thread = threading.get_ident()
+        try:
+            yield
+        finally:
+            _symbolic_thread = None
+
+
 class Compiled:
     """A function of the core, compiled for the types that it is called with.
 
@@ -113,7 +127,9 @@ class Compiled:
         self._quick: dict[Any, Entry] = {}
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the code for the types of these arguments."""
+        """Call the code for the types of these arguments; where symbols run, the Python function."""
+        if _symbolic_thread is not None and _symbolic_thread == threading.get_ident():
+            return self.__wrapped__(*arguments)
         for parameter in self._parameters[len(arguments) :]:
             arguments += (parameter.default,)
         key = tuple([kind_of(a) for a in arguments])

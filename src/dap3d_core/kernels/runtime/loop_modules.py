@@ -88,6 +88,13 @@ def _support_sources() -> list[str | bytes]:
     return sources(*_SUPPORT)
 
 
+def python_loop(loop: Loop) -> Callable[..., None]:
+    """The loop as a Python function."""
+    text = source_of(loop)
+    made: Callable[..., None] = _module(loop, text, unit_names(loop, text)[1])["loop"]
+    return made
+
+
 def build_wide(loop: Loop, count: int) -> Entry:
     """The loop for ``count`` scenes of one structure at once (lanes.py).
 

@@ -1,0 +1,190 @@
+"""Straight-line programs: functions of the core run once with symbols, for one scene.
+
+Integers, topology and most numbers of the scene are constants of the program: loops unroll, zeros
+and ones fold, equal expressions are computed once, and what is written into arrays on the way stays
+in registers. A number that is read before it was written is loaded. A branch on a number takes the
+way of the state at which the program is written, and becomes a guard: where one fails, the program
+has stored nothing, and calls the function that it stands for. Results have the bits of that.
+"""
+
+import ast
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.kernels.compiler import types as t
+from dap3d_core.kernels.compiler.trace import Symbol, TraceError, Tracer
+from dap3d_core.kernels.compiler.writer import COMPARISONS, OPERATORS
+
+_ZERO = (0.0, -0.0)
+
+
+class StraightLine(Tracer):
+    """Records a program; knows the number of each symbol at the state where it is written.
+
+    Attributes:
+        guards: conditions, by their names, and whether each one holds.
+    """
+
+    def __init__(self, most: int) -> None:
+        """Args:
+        most: instructions at most.
+        """
+        super().__init__()
+        self.guards: dict[str, bool] = {}
+        self._most = most
+        self._known: dict[str, str] = {}
+        self._numbers: dict[str, Any] = {}
+
+    def new(self, text: str) -> str:
+        """As of ``Writer``; the same instruction once."""
+        name = self._known.get(text)
+        if name is None:
+            if len(self._known) > self._most:
+                raise TraceError(f"takes more than {self._most} instructions")
+            name = self._known[text] = super().new(text)
+        return name
+
+    def guard(self) -> str:
+        """The condition that all guards are as they were."""
+        word = "true"
+        for name, truth in self.guards.items():
+            as_before = name if truth else self.new(f"xor i1 {name}, true")
+            word = as_before if word == "true" else self.new(f"and i1 {word}, {as_before}")
+        return word
+
+    def store(self, base: str, k: int, x: Any) -> None:
+        """Store a number at an index of an array."""
+        word, at = self.word(x), self.new(f"getelementptr inbounds double, ptr {base}, i64 {k}")
+        self.line(f"store double {word}, ptr {at}, align 8")
+
+    def number(self, value: t.Value) -> Any:
+        """The number of a value at the state where the program is written."""
+        return self._numbers[value.word] if value.constant is None else value.constant
+
+    def at(self, value: t.Value, number: Any) -> t.Value:
+        """A value, with its number noted."""
+        self._numbers[value.word] = number
+        return value
+
+    def symbol(self, value: t.Value) -> Any:
+        """A constant as itself."""
+        return Symbol(self, value) if value.constant is None else value.constant
+
+    def decide(self, condition: t.Value) -> bool:
+        """The truth of a condition, which becomes a guard."""
+        truth = bool(self.number(condition))
+        import os, traceback
+        if os.environ.get("GUARDS"): print("GUARD", truth, [f"{f.name}:{f.lineno}" for f in traceback.extract_stack()[-5:-2]])
+        self.guards[self.cast(None, condition, t.BOOL).word] = truth
+        return truth
+
+    def operation(self, node: Any, op: ast.operator, a: t.Value, b: t.Value) -> t.Value:
+        """As of ``Writer``, but for zeros and ones."""
+        folded = _folded(op, a, b)
+        if folded is not None:
+            return self.negative(node, b) if folded is NEGATIVE else folded
+        result = super().operation(node, op, a, b)
+        if result.constant is None:
+            number = OPERATORS[type(op)][0]
+            with np.errstate(all="ignore"):
+                self.at(result, number(np.float64(self.number(a)), self.number(b))
+                        if result.type == t.FLOAT else number(self.number(a), self.number(b)))  # fmt: skip
+        return result
+
+    def negative(self, node: Any, value: t.Value) -> t.Value:
+        """As of ``Writer``."""
+        result = super().negative(node, value)
+        return result if result.constant is not None else self.at(result, -self.number(value))
+
+    def comparison(self, node: Any, op: ast.cmpop, a: t.Value, b: t.Value) -> t.Value:
+        """As of ``Writer``."""
+        result = super().comparison(node, op, a, b)
+        if result.constant is None:
+            self.at(result, bool(COMPARISONS[type(op)][0](self.number(a), self.number(b))))
+        return result
+
+    def select(self, node: Any, condition: t.Value, a: t.Value, b: t.Value) -> t.Value:
+        """As of ``Writer``."""
+        if condition.constant is not None or a.words == b.words:
+            return a if condition.constant in (None, True) else b
+        result = super().select(node, condition, a, b)
+        return self.at(result, self.number(a if self.number(condition) else b))
+
+    def cast(self, node: Any, value: t.Value, type_: Any) -> t.Value:
+        """As of ``Writer``."""
+        result = super().cast(node, value, type_)
+        if result is not value and result.constant is None:
+            number = {t.BOOL: bool, t.INT: int, t.FLOAT: float}[type_](self.number(value))
+            self.at(result, number)
+        return result
+
+    def __getattr__(self, name: str) -> Callable[..., Any]:
+        """A function of floats."""
+        written = super().__getattr__(name)
+        python = NUMBERS.get(name) or getattr(math, name)
+
+        def call(*given: Any) -> Any:
+            values = [self.number(self.value(x)) for x in given]
+            try:
+                number = python(*values)
+            except (ValueError, OverflowError):
+                number = math.nan
+            if all(self.value(x).constant is not None for x in given):
+                return number
+            result = written(*given)
+            self.at(result.value, number)
+            return result
+
+        return call
+
+
+NUMBERS: dict[str, Callable[..., float]] = {
+    "fabs": abs, "rint": lambda x: float(np.rint(x)), "floor": lambda x: float(math.floor(x)),
+    "ceil": lambda x: float(math.ceil(x)),
+}  # fmt: skip
+NEGATIVE = t.Value(t.NOTHING)
+
+
+def _folded(op: ast.operator, a: t.Value, b: t.Value) -> t.Value | None:
+    """The result where one operand is zero or one; NEGATIVE: -b; None: it is none of these."""
+    if (a.constant is None) == (b.constant is None):
+        return None
+    if isinstance(op, ast.Add):
+        return b if a.constant in _ZERO else a if b.constant in _ZERO else None
+    if isinstance(op, ast.Sub):
+        if b.constant is not None:
+            return a if b.constant in _ZERO else None
+        return NEGATIVE if a.constant in _ZERO else None
+    if isinstance(op, ast.Mult):
+        for x, y in ((a, b), (b, a)):
+            if x.constant in _ZERO and x.constant is not None:
+                return t.constant(0.0)
+            if x.constant == 1.0 and y.type == t.FLOAT:
+                return y
+        return None
+    if isinstance(op, ast.Div):
+        if a.constant is not None and a.constant in _ZERO:
+            return t.constant(0.0)
+        return a if b.constant == 1.0 and a.type == t.FLOAT else None
+    return None
+
+
+class Item(Symbol):
+    """A number of an array, loaded where it is read before the program writes it."""
+
+    __slots__ = ("_loaded", "_number", "_where")
+
+    def __init__(self, tracer: StraightLine, where: Any, number: float) -> None:
+        self.tracer, self._where, self._number, self._loaded = tracer, where, number, None
+
+    @property
+    def value(self) -> t.Value:
+        if self._loaded is None:
+            base, k = self._where
+            at = self.tracer.new(f"getelementptr inbounds double, ptr {base()}, i64 {k}")
+            word = self.tracer.new(f"load double, ptr {at}, align 8")
+            self._loaded = self.tracer.at(t.Value(t.FLOAT, (word,)), self._number)
+        return self._loaded
