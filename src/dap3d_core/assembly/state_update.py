@@ -6,6 +6,7 @@ from dap3d_core.assembly.arrays import Floats
 from dap3d_core.assembly.metric import unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.scalar_math import where
 
 
 @compiled
@@ -68,7 +69,7 @@ def size_of_positions(y: Floats, n: int, length: float) -> float:
     for b in range(1, n + 1):
         first = coordinate_offset(b)
         for c in range(first, first + 3):
-            found = max(found, abs(y[c]))
+            found = where(abs(y[c]) > found, abs(y[c]), found)
     return length + found
 
 
@@ -79,5 +80,7 @@ def size_of_velocities(y: Floats, n: int, length: float) -> float:
     for b in range(1, n + 1):
         f = velocity_offset(b, n)
         for c in range(3):
-            found = max(found, abs(y[f + c]), length * abs(y[f + 3 + c]))
+            v, w = abs(y[f + c]), length * abs(y[f + 3 + c])
+            found = where(v > found, v, found)
+            found = where(w > found, w, found)
     return length + found

@@ -37,8 +37,8 @@ from dap3d_core.assembly.turns import (
 )
 from dap3d_core.formulations import FORMULATIONS, REPORT, RHS
 from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers
-from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
+from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.formulations.switches import Switch, switches_of
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.interface.element_unknowns import START

@@ -4,17 +4,36 @@ A table is given to a kernel as (array, place, rows, sample of a row): its rows 
 array from that place on; the first number of each row increases.
 """
 
+from dap3d_core.kernels.scalar_math import where
+
+#: Rows of a table at most among which a straight-line program chooses.
+MOST_CHOSEN = 32
+
 
 def lookup(table, x):
     """The last row of a table with a first number not above x, or the first row; a tuple."""
     array, place, rows, sample = table
     if hasattr(array, "tracer"):  # in a trace
         at = array.tracer.row_of(_row, array, place, rows, len(sample), x)
+    elif hasattr(x, "tracer"):  # of a table whose numbers are known
+        return _chosen(array, int(place), int(rows), len(sample), x)
     elif hasattr(x, "free_symbols"):
         raise TypeError("a table has no symbolic rows")
     else:
         at = _row(array, int(place), int(rows), len(sample), getattr(x, "real", x))
     return tuple(array[at + k] for k in range(len(sample)))
+
+
+def _chosen(array, place, rows, width, x):
+    """The row itself, chosen among all of them without a branch."""
+    if rows > MOST_CHOSEN:
+        raise TypeError(f"a table of {rows} rows is searched, which branches on a number")
+    found = tuple(array[place + k] for k in range(width))
+    for row in range(1, rows):
+        first = place + row * width
+        here = array[first] <= x
+        found = tuple(where(here, array[first + k], found[k]) for k in range(width))
+    return found
 
 
 def _row(array, place, rows, width, x):

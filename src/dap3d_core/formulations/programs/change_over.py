@@ -7,52 +7,46 @@ alone, and only where the numbers that are its constants are those of the scene.
 
 import threading
 import time
-from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
 from dap3d_core.formulations import PROJECT, RHS
+from dap3d_core.kernels.compiler import objects
+from dap3d_core.kernels.compiler.background import optimiser
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
+    from dap3d_core.formulations.programs.scene_program import Program
     from dap3d_core.integrators.stepping.integration import Integration
     from dap3d_core.kernels.array_types import Floats
 
 #: Seconds in general code from which on a program is looked for in the cache folder, and made.
 LOAD_AFTER, MAKE_AFTER = 0.02, 0.25
+#: Whether another process compiles programs where it can, so that the run goes on.
+BESIDE = True
 #: Bodies of a scene at most: the program of a larger one would be too long.
 MOST_BODIES = 64
-#: A program whose guards fail in more than this part of its evaluations is given up.
-MOST_FAILURES = 0.05
-
-
-@attrs.frozen
-class Program:
-    """A loaded program.
-
-    Attributes:
-        addresses: of right-hand side and projection.
-        failures: evaluations at which a guard failed, so far.
-    """
-
-    addresses: tuple[int, int]
-    failures: Callable[[], int]
+#: Programs of right-hand sides and projections whose guards fail more often are given up.
+MOST_FAILURES = (0.05, 0.3)
 
 
 @attrs.define
 class Record:
-    """What is known of the scenes of one program.
+    """What is known of the scenes of one name.
 
     Attributes:
-        program: the program, once there is one.
-        reason: why there is none and will be none; "" while there may be.
+        programs: of right-hand side and projection, as ``scene_program.make`` returns them; empty
+            as long as there are none.
+        reason: why there are none and will be none; "" while there may be.
+        is_requested: True if they are being compiled by another process.
     """
 
-    program: Program | None = None
+    programs: "list[Program]" = attrs.field(factory=list)
     reason: str = ""
+    is_requested: bool = False
 
 
 #: Seconds that general code has taken, by a rough description of the scene; records by identity.
@@ -63,73 +57,83 @@ _making = threading.Lock()
 
 
 class ChangeOver:
-    """The program of an evaluator, for its integrations.
-
-    Attributes:
-        record: what is known of it; None until general code has taken a while.
-    """
+    """The programs of an evaluator, for its integrations."""
 
     def __init__(self, evaluator: "Evaluator") -> None:
         """Args: the evaluator."""
         model = evaluator.model
-        self.record: Record | None = None
-        self._evaluator, self._numbers = evaluator, np.zeros(0)
+        self._evaluator = evaluator
+        self._name: str | None = None
+        self._numbers: Floats = np.zeros(0)
         self._key = evaluator.method, model.body_count, model.row_count, len(evaluator.loop_groups)
         self._is_open = jit_is_on() and 0 < model.body_count <= MOST_BODIES
 
     def advance(self, integration: "Integration", budget: int) -> None:
-        """``integration.advance``, by the program where there is one."""
-        program = self._program(integration) if self._is_open else None
-        if program is None:
+        """``integration.advance``, by programs where there are some."""
+        record = self._record_of(integration) if self._is_open else None
+        if record is None:
             clock = time.perf_counter()
             integration.advance(budget)
             _spent[self._key] = _spent.get(self._key, 0.0) + time.perf_counter() - clock
             return
-        addresses = integration.functions.addresses
-        general, failures = addresses[[RHS, PROJECT]].copy(), program.failures()
-        count = integration.statistics.rhs
-        addresses[[RHS, PROJECT]] = program.addresses
+        programs, addresses = record.programs[: PROJECT + 1], integration.functions.addresses
+        general = addresses[: len(programs)].copy()
+        before = [program.failures() for program in programs]
+        addresses[: len(programs)] = [program.address for program in programs]
+        done = integration.statistics
         try:
             integration.advance(budget)
         finally:
-            addresses[[RHS, PROJECT]] = general
-        failed, count = program.failures() - failures, integration.statistics.rhs - count
-        if self.record is not None and failed > 1 + MOST_FAILURES * count:
-            self.record.program = None
-            self.record.reason = f"{failed} of {count} evaluations took another branch"
+            addresses[: len(programs)] = general
+        now = integration.statistics
+        counts = now.rhs - done.rhs, now.projections - done.projections
+        for k in reversed(range(len(programs))):
+            if programs[k].failures() - before[k] > 1 + MOST_FAILURES[k] * counts[k]:
+                _give_up(record, k)
 
-    def _program(self, integration: "Integration") -> Program | None:
-        """The program, where this call may run it."""
-        spent = _spent.get(self._key, 0.0)
-        if spent < LOAD_AFTER or not integration.takes_programs:
+    def _record_of(self, integration: "Integration") -> Record | None:
+        """The record, where this call may run its programs."""
+        if _spent.get(self._key, 0.0) < LOAD_AFTER or not integration.takes_programs:
             return None
         from dap3d_core.formulations.programs import scene_program
 
-        if self.record is None:
+        numbers = scene_program.constant_numbers(self._evaluator)
+        if self._name is None:
             if not scene_program.is_optimised(self._evaluator):
                 return None
-            self._numbers = scene_program.constant_numbers(self._evaluator)
-            self._name = scene_program.name_of(self._evaluator, integration.y.size, self._numbers)
-            self.record = _records.setdefault(self._name, Record())
-        record = self.record
-        if record.reason or not np.array_equal(
-            self._numbers, scene_program.constant_numbers(self._evaluator)
-        ):
+            self._numbers = numbers
+            self._name = scene_program.name_of(self._evaluator, integration.y.size, numbers)
+        if not np.array_equal(self._numbers, numbers):
             return None
         with _making:
-            if record.program is None and not record.reason:
-                is_kept = scene_program.is_kept(self._name)
-                if is_kept or spent >= MAKE_AFTER:
-                    _make(record, self._name, self._evaluator, integration)
-        return record.program
+            record = _records.setdefault(self._name, Record())
+            if not (record.programs or record.reason):
+                try:
+                    self._make(record, self._name, integration)
+                except (TypeError, ValueError, ArithmeticError) as error:
+                    record.reason = str(error)
+        return record if record.programs else None
+
+    def _make(self, record: Record, name: str, integration: "Integration") -> None:
+        """Load programs that the cache folder has, or let them be compiled."""
+        from dap3d_core.formulations.programs import scene_program
+
+        evaluator, path = self._evaluator, scene_program.path_of(name)
+        stored = None if path is None else objects.read_object(path)
+        if stored is None:
+            if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
+                return
+            text = scene_program.write_programs(evaluator, name, integration.t, integration.y)
+            if BESIDE and path is not None and optimiser.request(text, [], path):
+                record.is_requested = True
+                return
+            stored = [], objects.optimised(text, [], path)
+        record.programs = scene_program.load_programs(evaluator, name, stored[1])
 
 
-def _make(record: Record, name: str, evaluator: "Evaluator", integration: "Integration") -> None:
-    from dap3d_core.formulations.programs import scene_program
-
-    try:
-        addresses, failures = scene_program.made(name, evaluator, integration.t, integration.y)
-    except (TypeError, ValueError, ArithmeticError) as error:
-        record.reason = str(error)
-        return
-    record.program = Program(addresses, failures)
+def _give_up(record: Record, k: int) -> None:
+    """Take other code from here on where guards of a program fail too often."""
+    if k == RHS:
+        record.programs, record.reason = [], "guards fail: branches depend on the motion"
+    else:
+        del record.programs[k]  # the general projection behind a right-hand side moves up

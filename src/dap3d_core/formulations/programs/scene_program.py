@@ -1,15 +1,17 @@
-"""The right-hand side of one scene as a straight-line program.
+"""Right-hand side and projection of one scene as straight-line programs.
 
 The functions of a formulation are run once with symbols for numbers: what is left is the arithmetic
-of this scene. The program takes the place of the right-hand side in a table of functions, with a
-projection that first evaluates the general right-hand side where it would read what that leaves.
-Bits stay those of the general code.
+of this scene (kernels/compiler/straight_line.py). A program leaves nothing in the arrays of the
+system but what outlives an evaluation, so the projection, which may read what the right-hand side
+of its state left, computes that itself.
 """
 
+import ctypes
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib import import_module
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,129 +22,160 @@ from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, con
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler import types as t
-from dap3d_core.kernels.compiler.straight_line import Item, StraightLine, Symbol
-from dap3d_core.kernels.compiler.types import INT, Signature
-from dap3d_core.kernels.compiler.units import Entry, Unit
+from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
+from dap3d_core.kernels.compiler.trace import Symbol
+from dap3d_core.kernels.compiler.units import Entry
 from dap3d_core.kernels.runtime.cache import cache_folder, names_of, run_with_symbols
 from dap3d_core.kernels.runtime.loop_modules import python_loop
 from dap3d_core.kernels.runtime.source_digest import origin
+from dap3d_core.model import Group
 
 #: Instructions of a program at most: larger scenes gain less, and take long to compile.
 MOST_INSTRUCTIONS = 20_000
-#: Arguments of a formulation's functions in LLVM IR.
+#: Part of the largest number by which a state whose projection is traced is off its constraints:
+#: one pass brings it back, as most ends of steps.
+OFF = 1e-10
+#: What a projection gives besides lengths (integrators/runge_kutta/step.py).
+OUTCOMES = 4
 ARGUMENTS = "double %t, ptr %y, i64 %y.1, ptr %out, i64 %out.1, ptr %system, ptr %loops"
 
-_TEXT = """{needs}
-declare void @{rhs}({arguments})
-declare void @{project}({arguments})
-@failures = internal global i64 0
+_PROGRAM = """
+@{counter}.failures = internal global i64 0
 
-define void @{symbols[0]}({arguments}) nounwind {{
+define void @{name}({arguments}) nounwind {{
 entry:
+{head}
+program:
 {body}
   br i1 {guard}, label %stores, label %general, !prof !1
 stores:
 {stores}
   ret void
 general:
-  %count = load i64, ptr @failures
+  %count = load i64, ptr @{counter}.failures
   %next = add i64 %count, 1
-  store i64 %next, ptr @failures
-  call void @{rhs}({arguments})
+  store i64 %next, ptr @{counter}.failures
+  call void @{general}({arguments})
   ret void
 }}
 
-define void @{symbols[1]}({arguments}) nounwind {{
-entry:
-  %first = load double, ptr %out, align 8
+define i64 @{counter}() nounwind {{
+  %count = load i64, ptr @{counter}.failures
+  ret i64 %count
+}}
+"""
+_HEAD = "  br label %program"
+#: Of a projection at a state whose right-hand side was not the last one evaluated.
+_PROJECTION_HEAD = """  %first = load double, ptr %out, align 8
   %valid = fcmp oeq double %first, 1.0
-  br i1 %valid, label %evaluate, label %project
-evaluate:
+  br i1 %valid, label %program, label %alone
+alone:
+  call void @{project}({arguments})
+  ret void"""
+#: The general projection behind a general right-hand side, whose program left nothing.
+_BEHIND = """
+define void @{name}({arguments}) nounwind {{
+entry:
+{head}
+program:
   %rates = alloca [{size} x double], align 8
   call void @{rhs}(double %t, ptr %y, i64 %y.1, ptr %rates, i64 {size}, ptr %system, ptr %loops)
-  br label %project
-project:
   call void @{project}({arguments})
   ret void
 }}
-
-define i64 @{symbols[2]}() nounwind {{
-  %count = load i64, ptr @failures
-  ret i64 %count
-}}
-!0 = !{{}}
-!1 = !{{!"branch_weights", i32 1000, i32 1}}
 """
+_WEIGHTS = '!0 = !{}\n!1 = !{!"branch_weights", i32 1000, i32 1}\n'
+
+
+class Program(NamedTuple):
+    """A loaded program in place of a function: its address, and how often a guard failed so far."""
+
+    address: int
+    failures: Callable[[], int]
 
 
 def formulation_module(evaluator: Evaluator) -> Any:
     """The module that has the functions of an evaluator's formulation."""
-    formulation = evaluator.formulation
-    own = formulation.has_own_coordinates
-    name = evaluator.coordinates.equations if own else formulation.name
+    own = evaluator.formulation.has_own_coordinates
+    name = evaluator.coordinates.equations if own else evaluator.formulation.name
     return import_module(f"dap3d_core.formulations.{name}")
+
+
+def reads_rates(evaluator: Evaluator) -> bool:
+    """True if a projection reads what the right-hand side leaves: where there are rows."""
+    return evaluator.formulation.needs_joints and evaluator.length_count > 0
 
 
 @IGNORE_FLOAT_ERRORS
 def write_program(
-    evaluator: Evaluator, time: float, state: Floats, symbols: Sequence[str], general: Sequence[str]
-) -> str:
-    """LLVM IR of right-hand side, projection, and the count of guards that failed.
+    evaluator: Evaluator, time: float, state: Floats, names: dict[str, str], head: str = ""
+) -> tuple[str, dict[str, str]]:
+    """LLVM IR of one program, and the declarations that it needs.
 
     Args:
         evaluator: of the scene, as a run begins.
         time, state: where branches on numbers are decided.
-        symbols: of the three functions.
-        general: those of right-hand side and projection of any scene.
+        names: of the program, its ``counter``, and the ``general`` function.
+        head: of a projection, which is then behind the right-hand side.
 
     Raises:
         TraceError: the program would be too long.
     """
     tracer = StraightLine(MOST_INSTRUCTIONS)
     system = SymbolicSystem(evaluator, tracer)
-    y = np.array([Item(tracer, (lambda: "%y", k), x) for k, x in enumerate(state.tolist())], object)
-    out = np.zeros(state.size, dtype=object)
-    loops = [python_loop(write(group.type_info, kind)) for kind, group in evaluator.loop_groups]
+    y = _items(tracer, "%y", state)
+    out = rates = np.zeros(state.size, dtype=object)
+    loops = [_python_loop(kind, group) for kind, group in evaluator.loop_groups]
     t_now = Symbol(tracer, tracer.at(t.Value(t.FLOAT, ("%t",)), time))
+    module = formulation_module(evaluator)
     with run_with_symbols():
-        formulation_module(evaluator).rhs(t_now, y, out, system.struct, loops)
-    guard = tracer.guard()
-    stores = [(lambda: "%out", k, x) for k, x in enumerate(out)]
-    body = "\n".join(tracer.lines)
-    del tracer.lines[:]
-    for pointer, k, x in (*stores, *system.stores()):
+        module.rhs(t_now, y, rates, system.struct, loops)
+        if head:
+            first = np.zeros(OUTCOMES + evaluator.length_count)
+            first[0] = 1.0
+            out = _items(tracer, "%out", first)
+            module.project(t_now, y, out, system.struct, loops)
+    guard, body = tracer.guard(), tracer.taken_lines()
+    for base, numbers in (("%out", out), ("%y", y if head else ())):
+        for k, x in enumerate(numbers):
+            tracer.store(base, k, x)
+    for pointer, k, x in system.stores():
         tracer.store(pointer(), k, x)
-    return _TEXT.format(
-        needs="\n".join(tracer.needs.values()),
-        rhs=general[0],
-        project=general[1],
-        arguments=ARGUMENTS,
-        symbols=symbols,
-        body=body,
-        guard=guard,
-        stores="\n".join(tracer.lines),
-        size=state.size,
+    text = _PROGRAM.format(head=head or _HEAD, arguments=ARGUMENTS, body=body, guard=guard,
+                           stores=tracer.taken_lines(), **names)  # fmt: skip
+    return text, tracer.needs
+
+
+def _python_loop(kind: str, group: Group) -> Callable[..., None]:
+    loop = write(group.type_info, kind)
+    assert loop is not None  # it has been compiled
+    return python_loop(loop)
+
+
+def _items(tracer: StraightLine, base: str, numbers: Floats) -> Any:
+    return np.array(
+        [Item(tracer, (lambda: base, k), x) for k, x in enumerate(numbers.tolist())], object
     )
 
 
 def name_of(evaluator: Evaluator, size: int, numbers: Floats) -> str:
-    """Name of the program of an evaluator: a digest of all that decides it.
+    """Name of the programs of an evaluator: a digest of all that decides them.
 
     Args:
         evaluator: of the scene.
         size: of the state.
-        numbers: constants of the program.
+        numbers: constants of the programs.
     """
     parts: list[str | bytes] = [f"{size} {evaluator.model.input_rows}", numbers.tobytes()]
     parts += [entry.unit.name for entry in _entries(evaluator)]
     for name, array in evaluator.system.walk():
         parts += [f"{name} {array.shape}", b"" if array.dtype == float else array.tobytes()]
     plain = inspect.unwrap(formulation_module(evaluator).rhs)
-    return names_of("program", [plain], *parts, *origin([write_program]))[1]
+    return names_of("program", [plain], *parts, *origin([write_program, constants]))[1]
 
 
 def constant_numbers(evaluator: Evaluator) -> Floats:
-    """The numbers of the scene that are constants of its program."""
+    """The numbers of the scene that are constants of its programs."""
     arrays = dict(evaluator.system.walk())
     found: Floats = np.concatenate(
         [arrays[name].reshape(-1)[places] for name, places in constants(evaluator)]
@@ -159,35 +192,63 @@ def _entries(evaluator: Evaluator) -> list[Entry]:
     return [*evaluator.functions.entries, *evaluator.loops.entries]
 
 
-def is_kept(name: str) -> bool:
-    """True if the cache folder has a program."""
+def path_of(name: str) -> Path | None:
+    """The object file of programs; None where there is no cache folder."""
     folder = cache_folder()
-    return folder is not None and (folder / f"{name}.o").exists()
+    return None if folder is None else folder / f"{name}.o"
 
 
-def made(
-    name: str, evaluator: Evaluator, time: float, state: Floats
-) -> tuple[tuple[int, int], Callable[[], int]]:
-    """Addresses of a program's right-hand side and projection, and a count of its failed guards.
+def write_programs(evaluator: Evaluator, name: str, time: float, state: Floats) -> str:
+    """LLVM IR of programs of right-hand side and, where it reads what that leaves, projection.
 
-    From the cache folder, or compiled now.
+    Then the general projection behind a right-hand side of its own, for where guards of that
+    program fail.
 
     Args:
-        name: of the program.
-        evaluator: of the scene.
+        evaluator: of the scene, as a run begins.
+        name: of the programs.
         time, state: where branches are decided.
 
     Raises:
         TypeError, ValueError, ArithmeticError: the scene has none; says why.
     """
-    general = []
+    rhs, project = (_named(entry) for entry in evaluator.functions.entries[: PROJECT + 1])
+    symbols, size = symbols_of(evaluator, name), state.size
+    noise = np.random.default_rng(0).standard_normal(size)
+    state = state + OFF * float(np.max(np.abs(state))) * noise
+    names = {"name": symbols[0], "counter": symbols[1], "general": rhs}
+    text, needs = write_program(evaluator, time, state, names)
+    if len(symbols) > 2:
+        head = _PROJECTION_HEAD.format(project=project, arguments=ARGUMENTS)
+        names = {"name": symbols[2], "counter": symbols[3], "general": symbols[4]}
+        other, needed = write_program(evaluator, time, state, names, head)
+        text, needs = text + other, needs | needed
+        text += _BEHIND.format(name=symbols[4], head=head, rhs=rhs, project=project,
+                               arguments=ARGUMENTS, size=size)  # fmt: skip
+    declared = [f"declare void @{symbol}({ARGUMENTS})" for symbol in (rhs, project)]
+    return "\n".join([*needs.values(), *declared, text, _WEIGHTS])
+
+
+def load_programs(evaluator: Evaluator, name: str, code: bytes) -> list[Program]:
+    """Programs from their object code, in the order in which they were written."""
     for entry in evaluator.functions.entries[: PROJECT + 1]:
-        general.append(entry.unit.symbols[entry.k])
-        objects.name_address(general[-1], entry.unit.addresses[entry.k])
+        _named(entry)
+    symbols = symbols_of(evaluator, name)
+    addresses = objects.load(code, symbols)
+    programs = [
+        Program(addresses[k], ctypes.CFUNCTYPE(ctypes.c_int64)(addresses[k + 1]))
+        for k in range(0, len(symbols) - 1, 2)
+    ]
+    return [*programs, *(Program(address, int) for address in addresses[4:])]
 
-    def text(symbols: list[str]) -> tuple[str, list[Any]]:
-        return write_program(evaluator, time, state, symbols, general), []
 
-    unit = Unit(name, 3, text, cache_folder(), optimise=True)
-    rates, project, _ = unit.addresses
-    return (rates, project), Entry(unit, 2, Signature((), INT))
+def symbols_of(evaluator: Evaluator, name: str) -> list[str]:
+    """Symbols of programs and their counters, and of the projection behind a right-hand side."""
+    return [f"{name.replace('-', '_')}_{k}" for k in range(5 if reads_rates(evaluator) else 2)]
+
+
+def _named(entry: Entry) -> str:
+    """The symbol of a function, which programs find."""
+    symbol = entry.unit.symbols[entry.k]
+    objects.name_address(symbol, entry.unit.addresses[entry.k])
+    return symbol

@@ -99,7 +99,7 @@ class Integration(Restorable):
     #: Whether its formulas are implicit; whether it goes on with its step where rates jump.
     implicit = False
     keeps_step = True
-    #: Whether its steps evaluate right-hand sides by address, so that programs may take their place.
+    #: Whether programs of a scene's own may take the place of its functions.
     takes_programs = False
 
     def __init__(

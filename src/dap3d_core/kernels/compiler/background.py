@@ -41,14 +41,22 @@ class Optimiser:
         """Request optimised code for a unit, from the second process where there can be one."""
         with self._lock:
             self.units.append(unit)
-        if unit.path is None or core_count() < 2 or self._has_ended():
-            return
-        path = unit.path.with_name(f"{unit.name}.{os.getpid()}.ll")
-        write_file(path, objects.encoded(unit.results, unit.text.encode()))
+        if unit.path is not None:
+            self.request(unit.text, unit.results, unit.path)
+
+    def request(self, text: str, results: list[Any], path: Path) -> bool:
+        """Let the second process write optimised code of LLVM IR; False where there is none."""
+        if core_count() < 2 or self._has_ended():
+            return False
+        source = path.with_name(f"{path.stem}.{os.getpid()}.ll")
+        if not write_file(source, objects.encoded(results, text.encode())):
+            return False
         with contextlib.suppress(OSError, ValueError):
             self._start()
-            self._process.stdin.write(f"{path}\t{unit.path}\n".encode())
+            self._process.stdin.write(f"{source}\t{path}\n".encode())
             self._process.stdin.flush()
+            return True
+        return False
 
     def _has_ended(self) -> bool:
         return self._process is not None and self._process.poll() is not None

@@ -55,6 +55,11 @@ class StraightLine(Tracer):
             word = as_before if word == "true" else self.new(f"and i1 {word}, {as_before}")
         return word
 
+    def taken_lines(self) -> str:
+        """The instructions so far, which are left out of those to come."""
+        lines, self.lines = "\n".join(self.lines), []
+        return lines
+
     def store(self, base: str, k: int, x: Any) -> None:
         """Store a number at an index of an array."""
         word, at = self.word(x), self.new(f"getelementptr inbounds double, ptr {base}, i64 {k}")
@@ -76,8 +81,6 @@ class StraightLine(Tracer):
     def decide(self, condition: t.Value) -> bool:
         """The truth of a condition, which becomes a guard."""
         truth = bool(self.number(condition))
-        import os, traceback
-        if os.environ.get("GUARDS"): print("GUARD", truth, [f"{f.name}:{f.lineno}" for f in traceback.extract_stack()[-5:-2]])
         self.guards[self.cast(None, condition, t.BOOL).word] = truth
         return truth
 
@@ -89,9 +92,8 @@ class StraightLine(Tracer):
         result = super().operation(node, op, a, b)
         if result.constant is None:
             number = OPERATORS[type(op)][0]
-            with np.errstate(all="ignore"):
-                self.at(result, number(np.float64(self.number(a)), self.number(b))
-                        if result.type == t.FLOAT else number(self.number(a), self.number(b)))  # fmt: skip
+            x, y = self.number(a), self.number(b)
+            self.at(result, number(np.float64(x) if result.type == t.FLOAT else x, y))
         return result
 
     def negative(self, node: Any, value: t.Value) -> t.Value:
@@ -181,7 +183,8 @@ class Item(Symbol):
         self.tracer, self._where, self._number, self._loaded = tracer, where, number, None
 
     @property
-    def value(self) -> t.Value:
+    def value(self) -> t.Value:  # type: ignore[override]
+        """The number, which is loaded here if it was not before."""
         if self._loaded is None:
             base, k = self._where
             at = self.tracer.new(f"getelementptr inbounds double, ptr {base()}, i64 {k}")

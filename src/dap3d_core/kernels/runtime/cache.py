@@ -127,7 +127,7 @@ class Compiled:
         self._quick: dict[Any, Entry] = {}
 
     def __call__(self, *arguments: Any) -> Any:
-        """Call the code for the types of these arguments; where symbols run, the Python function."""
+        """Call the code for the types of these arguments; the Python function with symbols."""
         if _symbolic_thread is not None and _symbolic_thread == threading.get_ident():
             return self.__wrapped__(*arguments)
         for parameter in self._parameters[len(arguments) :]:

@@ -1,0 +1,109 @@
+"""Runs by a program of the scene's own: the same bits, and general code where it does not fit."""
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.formulations.programs import change_over, scene_program
+from dap3d_core.integrators import EXPLICIT
+from dap3d_core.kernels.runtime.cache import jit_is_on
+
+pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
+SETTINGS = {"t_end": 0.3, "rtol": 1e-9, "atol": 1e-11}
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """Programs are made at the first call, in this process, for scenes that nobody knows yet."""
+    monkeypatch.setattr(change_over, "LOAD_AFTER", 0.0)
+    monkeypatch.setattr(change_over, "MAKE_AFTER", 0.0)
+    monkeypatch.setattr(change_over, "BESIDE", False)
+    monkeypatch.setattr(change_over, "_records", {})
+    monkeypatch.setattr(change_over, "_spent", {})
+    monkeypatch.setattr(scene_program, "is_optimised", lambda evaluator: True)
+    return change_over._records
+
+
+def general(scene, **settings):
+    """A run by general code."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(change_over, "LOAD_AFTER", np.inf)
+        return dap.simulate(scene, **SETTINGS, **settings)
+
+
+def assert_same(one, other):
+    """All numbers of two results are equal."""
+    for name in ("r", "p", "rd", "w", "rdd", "Lam"):
+        assert np.array_equal(getattr(one, name), getattr(other, name), equal_nan=True), name
+
+
+def programs(records):
+    """The programs of the only scene."""
+    [record] = records.values()
+    return record.programs
+
+
+@pytest.mark.parametrize(("model", "method"), [("pen1", "standard"), ("pen1", "joint"),
+                         ("fourbar2", "lsq"), ("bodies2", "unconstrained")])  # fmt: skip
+def test_bits_are_those_of_general_code(model, method, at_once):
+    """And guards hold."""
+    result = dap.simulate(model, method=method, **SETTINGS)
+    assert_same(result, general(model, method=method))
+    rhs, *project = programs(at_once)
+    assert rhs.failures() == 0 and len(project) in (0, 1, 2)
+
+
+def test_another_mass_is_another_program(at_once):
+    """Numbers of the scene are constants of its program."""
+    scene = dap.load("pen1")
+    scene.bodies["cone"].mass = 2.0
+    assert_same(dap.simulate(scene, **SETTINGS), general(scene))
+    assert_same(dap.simulate("pen1", **SETTINGS), general("pen1"))
+    assert len(at_once) == 2
+
+
+def test_numbers_that_change_in_a_run_stop_the_program(at_once):
+    """A call after an event has set a number is one of general code."""
+    evaluator, seen = dap.compile("pen1").evaluator, []
+    y0 = evaluator.coordinates.start(evaluator.model.u0)
+    integration = EXPLICIT.make(
+        evaluator, y0, np.array([0.0, 1.0]), report_size=evaluator.report_size
+    )
+    addresses = integration.functions.addresses
+    before, advance = addresses.copy(), integration.advance
+
+    def advanced(budget):
+        seen.append(np.array_equal(addresses, before))
+        return advance(budget)
+
+    integration.advance = advanced
+    evaluator.programs.advance(integration, 1)
+    assert np.array_equal(addresses, before)
+    evaluator.system.par[0] += 1e-3
+    evaluator.programs.advance(integration, 1)
+    assert seen == [False, True]
+
+
+def test_a_program_whose_guards_fail_is_given_up(at_once, monkeypatch):
+    """General code runs from there on, with the same bits."""
+    monkeypatch.setattr(change_over, "MOST_FAILURES", (-2.0, -2.0))
+    assert_same(dap.simulate("pen1", **SETTINGS), general("pen1"))
+    [record] = at_once.values()
+    assert "guards" in record.reason and not record.programs
+
+
+def test_a_scene_without_program_runs(at_once, monkeypatch):
+    """Where it would be too long, say; the reason is kept."""
+    monkeypatch.setattr(scene_program, "MOST_INSTRUCTIONS", 10)
+    monkeypatch.setattr(scene_program, "path_of", lambda name: None)
+    assert_same(dap.simulate("pen1", **SETTINGS), general("pen1"))
+    [record] = at_once.values()
+    assert "more than 10 instructions" in record.reason
+
+
+def test_short_runs_make_none(monkeypatch):
+    """Nothing is even looked for before general code has taken a while."""
+    monkeypatch.setattr(change_over, "_records", {})
+    monkeypatch.setattr(change_over, "_spent", {})
+    dap.simulate("pen1", t_end=0.1)
+    assert change_over._records == {}

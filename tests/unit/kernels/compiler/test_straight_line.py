@@ -1,0 +1,79 @@
+"""Straight-line programs: what is folded, what is guarded, and that the bits are those of Python."""
+
+import ctypes
+import math
+
+import numpy as np
+import pytest
+
+from dap3d_core.kernels import atan2, cos, exp, sqrt, tanh, where
+from dap3d_core.kernels.compiler import objects
+from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
+from dap3d_core.kernels.compiler.trace import Symbol, TraceError
+
+START = [0.3, -1.7, 2.5, 0.0]
+
+
+def traced(function, start=START, most=1000):
+    """Tracer and results of a function of numbers that are loaded from an array."""
+    tracer = StraightLine(most)
+    items = [Item(tracer, (lambda: "%x", k), x) for k, x in enumerate(start)]
+    return tracer, function(*items)
+
+
+def compiled(function, start=START):
+    """A function of an array by its program: its results, and whether all guards hold."""
+    tracer, results = traced(function, start)
+    guard = tracer.guard()
+    for k, x in enumerate(results):
+        tracer.store("%out", k, x)
+    text = "\n".join([*tracer.needs.values(), "define i1 @f(ptr %x, ptr %out) {", "entry:",
+                      tracer.taken_lines(), f"  ret i1 {guard}", "}"])  # fmt: skip
+    [address] = objects.load(objects.compile_ir(text, 3), ["f"])
+    call = ctypes.CFUNCTYPE(ctypes.c_bool, ctypes.c_void_p, ctypes.c_void_p)(address)
+
+    def run(*numbers):
+        x, out = np.array(numbers), np.zeros(len(results))
+        return call(x.ctypes.data, out.ctypes.data), out
+
+    return run
+
+
+def mixed(a, b, c, d):
+    """Each kind of operation."""
+    e = (a + b) * c - d / (1.0 + a * a)
+    f = sqrt(abs(e)) + cos(e) * exp(-abs(c)) + atan2(a, b) + tanh(e)
+    g = where((e > f) | (b < 0.25), e, -f)
+    return e, f, g, g**2, np.sqrt(a * a), np.rint(4.0 * b), 2.0**a
+
+
+def test_bits_are_those_of_python():
+    """Whatever the numbers, also those that are not where the program was written."""
+    run, rng = compiled(mixed), np.random.default_rng(1)
+    for numbers in rng.normal(scale=2.0, size=(50, 4)).tolist():
+        holds, out = run(*numbers)
+        assert holds  # there is no branch
+        assert out.tolist() == [float(x) for x in mixed(*map(np.float64, numbers))]
+
+
+def test_zeros_and_ones_fold_and_equal_expressions_are_one():
+    """What a scene does not need is not computed."""
+    tracer, (x, y) = traced(lambda a, b, c, d: (0.0 * a + 1.0 * b + 0.0 / c, (b + c) * (b + c)))
+    lines = tracer.taken_lines()
+    assert lines.count("fadd") == 1 and lines.count("fmul") == 1 and "fdiv" not in lines
+    assert isinstance(x, Symbol) and isinstance(y, Symbol)
+    assert traced(lambda a, b, c, d: (a * 0.0, 3.0 - 3.0))[1] == (0.0, 0.0)
+
+
+def test_a_branch_becomes_a_guard():
+    """The way of the start is taken; elsewhere the guard says that it is the wrong one."""
+    run = compiled(lambda a, b, c, d: (a + b,) if a > 0.0 and not b > 0.0 else (a - b,))
+    assert run(1.0, -2.0, 0.0, 0.0) == (True, -1.0)
+    for numbers in ((-1.0, -2.0), (1.0, 2.0), (math.nan, -1.0), (1.0, math.nan)):
+        assert run(*numbers, 0.0, 0.0)[0] is (not (numbers[1] > 0.0) and numbers[0] > 0.0)
+
+
+def test_too_long_a_program_is_refused():
+    """Where the instructions are too many."""
+    with pytest.raises(TraceError, match="more than 5 instructions"):
+        traced(mixed, most=5)
