@@ -29,6 +29,7 @@ import lanes
 import llvmlite
 import numpy
 import points
+import programs
 import projection
 import right_hand_side
 import scale
@@ -107,6 +108,7 @@ def main():
         "study": study.measure,
         "points": points.measure,
         "lanes": lanes.measure,
+        "programs": programs.measure,
         "joint_motions": joint_motions.measure,
         "hard_cases": hard.measure,
         "long_time": hard.long_time.measure,

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
     from dap3d_core.formulations.programs.scene_program import Program
     from dap3d_core.integrators.stepping.integration import Integration
-    from dap3d_core.kernels.array_types import Floats
+    from dap3d_core.kernels.array_types import Floats, Integers
 
 #: Seconds in general code from which on a program is looked for in the cache folder, and made.
 LOAD_AFTER, MAKE_AFTER = 0.02, 0.25
@@ -64,6 +64,8 @@ class ChangeOver:
         model = evaluator.model
         self._evaluator = evaluator
         self._name: str | None = None
+        #: Constants of the programs: where they stand, and their numbers.
+        self._parts: list[tuple[Floats, Integers]] = []
         self._numbers: Floats = np.zeros(0)
         self._key = evaluator.method, model.body_count, model.row_count, len(evaluator.loop_groups)
         self._is_open = jit_is_on() and 0 < model.body_count <= MOST_BODIES
@@ -97,21 +99,22 @@ class ChangeOver:
             return None
         from dap3d_core.formulations.programs import scene_program
 
-        numbers = scene_program.constant_numbers(self._evaluator)
         if self._name is None:
             if not scene_program.is_optimised(self._evaluator):
                 return None
-            self._numbers = numbers
-            self._name = scene_program.name_of(self._evaluator, integration.y.size, numbers)
-        if not np.array_equal(self._numbers, numbers):
+            self._parts = scene_program.constant_parts(self._evaluator)
+            self._numbers = scene_program.constant_numbers(self._parts)
+            size = integration.y.size
+            self._name = scene_program.name_of(self._evaluator, size, self._numbers)
+        if not np.array_equal(self._numbers, scene_program.constant_numbers(self._parts)):
             return None
         with _making:
             record = _records.setdefault(self._name, Record())
             if not (record.programs or record.reason):
                 try:
                     self._make(record, self._name, integration)
-                except (TypeError, ValueError, ArithmeticError) as error:
-                    record.reason = str(error)
+                except Exception as error:  # the general code runs on, whatever it was
+                    record.reason = f"{type(error).__name__}: {error}"
         return record if record.programs else None
 
     def _make(self, record: Record, name: str, integration: "Integration") -> None:

@@ -9,13 +9,14 @@ of its state left, computes that itself.
 import ctypes
 import inspect
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import Floats
+from dap3d_core.assembly.arrays import Floats, Integers
 from dap3d_core.formulations import PROJECT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, constants
@@ -23,7 +24,7 @@ from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
-from dap3d_core.kernels.compiler.trace import Symbol
+from dap3d_core.kernels.compiler.trace import Symbol, TraceError
 from dap3d_core.kernels.compiler.units import Entry
 from dap3d_core.kernels.runtime.cache import cache_folder, names_of, run_with_symbols
 from dap3d_core.kernels.runtime.loop_modules import python_loop
@@ -84,6 +85,7 @@ program:
   ret void
 }}
 """
+_NONE = "define i64 @{counter}() nounwind {{\n  ret i64 0\n}}\n"
 _WEIGHTS = '!0 = !{}\n!1 = !{!"branch_weights", i32 1000, i32 1}\n'
 
 
@@ -174,12 +176,15 @@ def name_of(evaluator: Evaluator, size: int, numbers: Floats) -> str:
     return names_of("program", [plain], *parts, *origin([write_program, constants]))[1]
 
 
-def constant_numbers(evaluator: Evaluator) -> Floats:
-    """The numbers of the scene that are constants of its programs."""
+def constant_parts(evaluator: Evaluator) -> list[tuple[Floats, Integers]]:
+    """Arrays of a system, flat, and the places there of constants of its programs."""
     arrays = dict(evaluator.system.walk())
-    found: Floats = np.concatenate(
-        [arrays[name].reshape(-1)[places] for name, places in constants(evaluator)]
-    )
+    return [(arrays[name].reshape(-1), places) for name, places in constants(evaluator)]
+
+
+def constant_numbers(parts: list[tuple[Floats, Integers]]) -> Floats:
+    """The numbers that are constants of programs, as they are now."""
+    found: Floats = np.concatenate([array[places] for array, places in parts])
     return found
 
 
@@ -221,10 +226,13 @@ def write_programs(evaluator: Evaluator, name: str, time: float, state: Floats) 
     if len(symbols) > 2:
         head = _PROJECTION_HEAD.format(project=project, arguments=ARGUMENTS)
         names = {"name": symbols[2], "counter": symbols[3], "general": symbols[4]}
-        other, needed = write_program(evaluator, time, state, names, head)
-        text, needs = text + other, needs | needed
-        text += _BEHIND.format(name=symbols[4], head=head, rhs=rhs, project=project,
-                               arguments=ARGUMENTS, size=size)  # fmt: skip
+        behind = partial(_BEHIND.format, head=head, rhs=rhs, project=project,
+                         arguments=ARGUMENTS, size=size)  # fmt: skip
+        try:
+            other, needed = write_program(evaluator, time, state, names, head)
+        except TraceError:  # too long: the right-hand side alone has a program
+            other, needed = behind(name=symbols[2]) + _NONE.format(counter=symbols[3]), {}
+        text, needs = text + other + behind(name=symbols[4]), needs | needed
     declared = [f"declare void @{symbol}({ARGUMENTS})" for symbol in (rhs, project)]
     return "\n".join([*needs.values(), *declared, text, _WEIGHTS])
 

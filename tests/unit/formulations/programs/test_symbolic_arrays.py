@@ -20,10 +20,12 @@ def test_counted_turns_are_no_constants(evaluator):
     """Nor is what a run counts; masses are."""
     places = dict(constants(evaluator))
     counted = [k for s in evaluator.turn_places() for k in range(*s.indices(10**6))]
-    assert counted and not set(counted) & set(places["par"].tolist())
+    assert counted
+    assert not set(counted) & set(places["par"].tolist())
     body = set(places["body"].tolist())
     width = evaluator.system.body.shape[1]
-    assert width + MASS in body and width not in body
+    assert width + MASS in body
+    assert width not in body
 
 
 def test_arrays_that_share_memory_share_symbols(evaluator):
@@ -31,7 +33,8 @@ def test_arrays_that_share_memory_share_symbols(evaluator):
     struct = SymbolicSystem(evaluator, StraightLine(1000)).struct
     struct.body[1, 0] = 5.0
     assert struct.tree.places[1, 0] == 5.0
-    assert isinstance(struct.body[1, 1], Item) and isinstance(struct.body[1, MASS], float)
+    assert isinstance(struct.body[1, 1], Item)
+    assert isinstance(struct.body[1, MASS], float)
     assert struct.nodes is evaluator.system.nodes
 
 
@@ -43,5 +46,7 @@ def test_only_what_outlives_an_evaluation_is_stored(evaluator):
     assert system.stores() == []
     system.struct.settings[3] += 1.0
     [(pointer, k, x)] = system.stores()
-    assert k == 3 and isinstance(x, Symbol) and pointer() in "\n".join(tracer.lines)
+    assert k == 3
+    assert isinstance(x, Symbol)
+    assert pointer() in "\n".join(tracer.lines)
     assert np.array_equal(evaluator.system.settings[3], 0.0)

@@ -1,4 +1,4 @@
-"""Straight-line programs: what is folded, what is guarded, and that the bits are those of Python."""
+"""Straight-line programs: what is folded, what is guarded, bits that are those of Python."""
 
 import ctypes
 import math
@@ -60,8 +60,11 @@ def test_zeros_and_ones_fold_and_equal_expressions_are_one():
     """What a scene does not need is not computed."""
     tracer, (x, y) = traced(lambda a, b, c, d: (0.0 * a + 1.0 * b + 0.0 / c, (b + c) * (b + c)))
     lines = tracer.taken_lines()
-    assert lines.count("fadd") == 1 and lines.count("fmul") == 1 and "fdiv" not in lines
-    assert isinstance(x, Symbol) and isinstance(y, Symbol)
+    assert lines.count("fadd") == 1
+    assert lines.count("fmul") == 1
+    assert "fdiv" not in lines
+    assert isinstance(x, Symbol)
+    assert isinstance(y, Symbol)
     assert traced(lambda a, b, c, d: (a * 0.0, 3.0 - 3.0))[1] == (0.0, 0.0)
 
 
