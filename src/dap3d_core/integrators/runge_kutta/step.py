@@ -86,6 +86,7 @@ from dap3d_core.integrators.stepping.step_control import (
 from dap3d_core.integrators.stepping.vector_ops import all_finite, combine, copy, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.scalar_math import where
 
 #: Near a singular state nothing is known better than to this part of the largest component.
 POSITION_NOISE = 1e-11
@@ -322,8 +323,7 @@ def projection_jump(work: RungeKuttaState, before: Floats, after: Floats) -> flo
     for i in range(work.error_size):
         largest = MAX_PROJECTION * (1.0 + max(abs(y[i]), abs(after[i])))
         ratio = abs(after[i] - before[i]) / largest
-        if not ratio <= jump:
-            jump = ratio
+        jump = where((ratio > jump) | (ratio != ratio), ratio, jump)
     return jump
 
 

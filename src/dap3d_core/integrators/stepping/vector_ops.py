@@ -7,6 +7,7 @@ and writes its result a few times only; the terms come from ``tableau.combinatio
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, MOST, NOISE
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.scalar_math import where
 
 #: Terms of a linear combination of stages that are added in one pass over the components.
 GROUP = 4
@@ -79,8 +80,7 @@ def scaled_largest(
         scale = (atol if atol > least else least) + rtol * (a if a > b else b)
         noise = min(h * tolerance[NOISE, i], tolerance[MOST, i])
         ratio = (abs(x[i]) - noise) / (noise if noise > scale else scale)
-        if not ratio <= largest:
-            largest = ratio
+        largest = where((ratio > largest) | (ratio != ratio), ratio, largest)
     return largest
 
 
@@ -102,8 +102,7 @@ def scaled_beyond(
         doubt = dt * max(abs(f0[i]), abs(f1[i]))
         scale = tolerance[ABSOLUTE, i] + rtol * max(abs(y0[i]), abs(y1[i]))
         ratio = abs(x[i]) / (scale + doubt)
-        if not ratio <= largest:
-            largest = ratio
+        largest = where((ratio > largest) | (ratio != ratio), ratio, largest)
     return largest
 
 
