@@ -1,6 +1,15 @@
 """Rotation driver at position level: prescribes the angle of one body against another."""
 
-from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, vector
+from dap3d_core.interface import (
+    Body,
+    Joint,
+    Vector,
+    body,
+    function,
+    hookimpl,
+    joint_fields,
+    vector,
+)
 from dap3d_core.kernels import atan2, cos, dot, neg, normals, row, sin, sub
 from dap3d_joints.relative_rows import turning, turning_rate
 
@@ -31,6 +40,7 @@ class DrivenRotation(Joint):
     synonyms = ("motion", "rotational-motion", "driver")
     symbol = "ring"
     drives = True
+    joint: str = joint_fields("body_i", "body_j", "a_j", doc="the joint whose coordinate it drives, in place of bodies and axis")
     body_i: Body = body(doc="body that is turned")
     body_j: Body = body(default="ground", doc="body that the rotation is measured from")
     a_j: Vector = vector(doc="axis, on body j")

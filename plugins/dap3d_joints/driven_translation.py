@@ -8,6 +8,7 @@ from dap3d_core.interface import (
     body,
     function,
     hookimpl,
+    joint_fields,
     number,
     point,
     vector,
@@ -34,6 +35,7 @@ class DrivenTranslation(Joint):
     keyword, rows = "drive-tran", 1
     synonyms = ("translational-motion",)
     drives = True
+    joint: str = joint_fields("P_i", "P_j", "a_j", doc="the joint whose coordinate it drives")
     body_i: Body = body(default=None, doc="body that is moved; that of P_i")
     body_j: Body = body(default=None, doc="body the motion is measured from; that of P_j and a_j")
     P_i: Point = point(default=None, doc="on body i; the mass centre when left out")

@@ -1,6 +1,16 @@
 """Relative rotation driver: prescribes how fast one body turns against another about an axis."""
 
-from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, input_, vector
+from dap3d_core.interface import (
+    Body,
+    Joint,
+    Vector,
+    body,
+    function,
+    hookimpl,
+    input_,
+    joint_fields,
+    vector,
+)
 from dap3d_core.kernels import cross, dot, neg, row
 
 interface_version = 1
@@ -25,6 +35,7 @@ class RelativeRotation(Joint):
     keyword, rows, holonomic = "rel-rot", 1, False
     symbol = "ring"
     drives = True
+    joint: str = joint_fields("body_i", "body_j", "a_j", doc="the joint whose coordinate it drives, in place of bodies and axis")
     body_i: Body = body(doc="body whose rotation the driver is measured from")
     body_j: Body = body(default="ground", doc="body that is turned")
     a_j: Vector = vector(doc="axis, on body j")

@@ -1,6 +1,16 @@
 """Relative translation driver: prescribes how fast a mass centre moves against another."""
 
-from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, input_, vector
+from dap3d_core.interface import (
+    Body,
+    Joint,
+    Vector,
+    body,
+    function,
+    hookimpl,
+    input_,
+    joint_fields,
+    vector,
+)
 from dap3d_core.kernels import dot, neg, row, sub
 
 interface_version = 1
@@ -27,6 +37,7 @@ class RelativeTranslation(Joint):
 
     keyword, rows, holonomic = "rel-tran", 1, False
     drives = True
+    joint: str = joint_fields("body_i", "body_j", "a_j", doc="the joint whose coordinate it drives, in place of bodies and axis")
     body_i: Body = body(doc="body that the motion is measured from")
     body_j: Body = body(default="ground", doc="body that is moved")
     a_j: Vector = vector(doc="direction, on body j")

@@ -27,7 +27,7 @@ class FieldSpec:
 
     Attributes:
         kind: body, point, vector, vector2, number, numbers, vec3, matrix, square, table, function,
-            functions, input, choice, joint or angle.
+            functions, input, choice, joint, joint_fields or angle.
         default: value where the scene gives none; REQUIRED where it must.
         unit: SI unit of a number, "" for none.
         doc: its meaning, one short sentence.
@@ -50,6 +50,7 @@ class FieldSpec:
         axes: the fields an angle is measured between: two vectors, and the axis.
         rows: number of rows that a joint must have; None for any.
         instead_of: field that an input takes the place of; "" for none.
+        gives: fields that a joint gives -> its own, as of ``joint_fields``.
     """
 
     kind: str
@@ -75,6 +76,7 @@ class FieldSpec:
     axes: tuple[str, str, str] = ("", "", "")
     rows: int | None = None
     instead_of: str = ""
+    gives: Mapping[str, str] = attrs.field(factory=dict)
 
     @property
     def for_prepare(self) -> bool:
@@ -243,6 +245,18 @@ def joint(*, rows: int | None = None, doc: str = "") -> Any:
     kernel ``friction`` of its one joint.
     """
     return _field(FieldSpec("joint", REQUIRED, doc=doc, rows=rows))
+
+
+def joint_fields(*same: str, doc: str = "", **others: str) -> Any:
+    """A joint by name, from which an element takes fields that it then leaves out.
+
+    ``joint_fields("body_i", "body_j", "a_j")`` takes fields of the same names: what acts in the
+    coordinate of a joint names the joint. ``joint_fields(P_j="P", a_j="a")`` takes the point and
+    the axis that the joint has on the body that moves: body i, or body j where body i is ground.
+    The scene gives the joint or the fields.
+    """
+    gives = {name: name for name in same} | others
+    return _field(FieldSpec("joint_fields", None, doc=doc, gives=gives))
 
 
 def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:

@@ -5,6 +5,7 @@ import re
 from collections.abc import Callable, Collection, Mapping
 from typing import Any, NamedTuple
 
+from dap3d_core.interface.fields import FieldSpec
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.coerce import plain
 
@@ -17,6 +18,8 @@ UNIT_TOLERANCE = 1e-6
 ROUNDING = 1e-9
 #: A shorter vector has no direction.
 SHORTEST = 1e-12
+#: An angle beyond a full turn is probably given in degrees.
+TURN = 6.283185307179586
 
 
 class Fault(NamedTuple):
@@ -232,3 +235,22 @@ def _kind(value: Any) -> str:
         return name
     dtype = getattr(value, "dtype", None)
     return f"an array of {dtype}" if dtype is not None else f"a {type(value).__name__}"
+
+
+def oddity(spec: FieldSpec, value: Any) -> str:
+    """The note on an unusual value of a field, to follow it in a message; "" for no note."""
+    if spec.kind == "number":
+        low, high = spec.usual
+        if low is not None and value < low:
+            return f"is less than {low:g}, which is unusual; it is used as it is"
+        if high is not None and value > high:
+            return f"is more than {high:g}, which is unusual; it is used as it is"
+        if spec.unit == "rad" and abs(value) > TURN:
+            return "is more than a full turn; angles are in rad"
+    elif spec.direction and spec.kind == "vec3":
+        length = sum(x * x for x in value) ** 0.5
+        if length == 0.0:
+            return "is a direction of zero length: it has no effect"
+        if abs(length - 1.0) > ROUNDING:
+            return f"is a direction of length {length:.9g}, not 1; it is used as it is"
+    return ""

@@ -17,6 +17,7 @@ from dap3d_core.scene.validate.coerce_values import (
     matrix_of,
     number_of,
     numbers_of,
+    oddity,
     rows_of,
     square_of,
     word_of,
@@ -31,9 +32,9 @@ from dap3d_core.scene.validate.geometry import (
     two_ends,
     vector_of,
 )
+from dap3d_core.scene.validate.joint_fields import with_joint_fields
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance
-from dap3d_core.scene.validate.warnings import oddity
 
 #: The two points that may be given in place of a vector of type 2.
 ENDS = ("P_i", "P_j")
@@ -113,6 +114,7 @@ class Reader:
         self.fields = [self._field(name, spec) for name, spec in specs.items()]
         self.kinds = {name: spec.kind for name, spec in specs.items()}
         self.known = dict.fromkeys([*specs, *self.ends])
+        self.of_joints = {name: spec.gives for name, spec in specs.items() if spec.gives}
         # Bodies and points that may be left out follow from the other fields of their slot.
         self.late = [
             f for f in self.fields if f.spec.kind in ("body", "point") and f.spec.default is None
@@ -126,6 +128,11 @@ class Reader:
 
     def read(self, element: Element) -> Instance | None:
         """The instance of an element; None where a mistake was reported."""
+        if self.of_joints and not self.of_joints.keys().isdisjoint(element.fields):
+            whole = with_joint_fields(self.report, self.geometry, self.table, element, self.of_joints)
+            if whole is None:
+                return None
+            element = whole
         reading = _Reading(self, element)
         if not element.fields.keys() <= self.known.keys():
             reading.report.add_unknown_keys(

@@ -1,0 +1,76 @@
+"""Fields that an element takes from a joint which it names: its bodies, points and axes."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import attrs
+
+from dap3d_core.interface.fields import slot_of
+from dap3d_core.scene.scene import GROUND, Element
+from dap3d_core.scene.validate.geometry import Geometry, missing_words
+from dap3d_core.scene.validate.mistake_collector import Collector
+
+
+def with_joint_fields(
+    report: Collector,
+    geometry: Geometry,
+    table: str,
+    element: Element,
+    references: Mapping[str, Mapping[str, str]],
+) -> Element | None:
+    """The element with the fields of the joints that it names; None where a mistake is reported.
+
+    Args:
+        report: takes mistakes; its scene has the joints.
+        geometry: resolves points and vectors to bodies.
+        table: of the element.
+        element: as written.
+        references: fields that name joints -> what each gives, as of ``joint_fields``.
+    """
+    fields, good = dict(element.fields), True
+
+    def refuse(field: str, what: str, nearest: str = "", remedy: str = "") -> None:
+        nonlocal good
+        report.add((table, element.name, field), element.fields[field], what, nearest, remedy)
+        good = False
+
+    for field, gives in references.items():
+        name = element.fields.get(field)
+        if name is None:
+            continue
+        joint = report.scene.joints.get(name) if isinstance(name, str) else None
+        if joint is None or joint is element:
+            refuse(field, *missing_words(report, "joint", name, report.scene.joints))
+            continue
+        for own, other in gives.items():
+            other = other if slot_of(other) else f"{other}_{_moving(geometry, joint)}"
+            value = _field(geometry, joint, other)
+            if own in element.fields:
+                refuse(own, f"give {field} or {own}, not both")
+            elif value is None:
+                what = f"is of type {joint.type}, which has no {other} to be taken for {own}"
+                refuse(field, what, remedy=f"leave {field} out, and give {', '.join(gives)}")
+                break
+            else:
+                fields[own] = value
+    return attrs.evolve(element, fields=fields) if good else None
+
+
+def _moving(geometry: Geometry, joint: Element) -> str:
+    """Slot of the body of a joint that moves: j where body i is ground."""
+    return "j" if _field(geometry, joint, "body_i") == GROUND else "i"
+
+
+def _field(geometry: Geometry, joint: Element, name: str) -> Any:
+    """A field of a joint as written; a body also by a point or vector that is fixed in it."""
+    value = joint.fields.get(name)
+    if value is not None or not name.startswith("body_"):
+        return value
+    slot, names = name[-1], (GROUND, *geometry.bodies.body_names)
+    for located in (
+        geometry.point(joint.fields.get(f"P_{slot}")),
+        geometry.vector(joint.fields.get(f"a_{slot}")),
+    ):
+        if located is not None:
+            return names[located[0]]
+    return None
