@@ -7,7 +7,6 @@ from dap3d_example.clutch import Clutch
 from dap3d_example.cycloid import Cycloid
 from dap3d_example.cylinder import Cylinder
 from dap3d_example.engine import Engine
-from dap3d_example.gear import Gear
 from dap3d_example.motor import Motor
 from dap3d_example.point_on_plane import PointOnPlane
 from dap3d_example.point_on_surface import PointOnSurface
@@ -16,7 +15,7 @@ from dap3d_example.stage import Stage
 from dap3d_example.tyre import Tyre
 
 TYPES = (
-    Gear, PointOnPlane, PointOnSurface, Motor, Cylinder, Servo, Tyre, Clutch, Stage, Engine, Cycloid
+    PointOnPlane, PointOnSurface, Motor, Cylinder, Servo, Tyre, Clutch, Stage, Engine, Cycloid
 )  # fmt: skip
 CHECKS = [(type_, check) for type_ in TYPES for check in checks_for(type_)]
 

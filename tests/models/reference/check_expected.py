@@ -31,13 +31,16 @@ BENCHMARKS = {
     "A05": "governor",
     "N1": "rolling_disk",
 }
-ALL = (*NAMES, *BENCHMARKS)
+#: Mechanisms of engineers.
+ENGINEERING = ("planetary",)
+ALL = (*NAMES, *BENCHMARKS, *ENGINEERING)
 PRINTED = ("specification", "benchmarks")  # sources that are no script of this folder
 
 
 def folder_of(model: str) -> Path:
     """Return the folder of a model."""
-    return MODELS / "benchmarks" / model if model in BENCHMARKS else MODELS / model
+    group = "benchmarks" if model in BENCHMARKS else "engineering" if model in ENGINEERING else ""
+    return MODELS / group / model
 
 
 def reference(model: str) -> Any:

@@ -6,11 +6,13 @@ import ball1
 import bodies2
 import numpy as np
 import pytest
-from check_expected import ALL, folder_of, reference
+from check_expected import BENCHMARKS, NAMES, folder_of, reference
 from rigid import rotation
 
 import dap3d_core as dap
 
+#: Models that are a system of the generic simulator, too.
+ALL = (*NAMES, *BENCHMARKS)
 SYSTEMS = [name for name in ALL if name not in ("bodies2", "ball1")]
 SLOTS = {
     **dict.fromkeys(("P_i", "P_j"), "points"),

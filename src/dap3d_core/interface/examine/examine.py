@@ -11,6 +11,7 @@ from difflib import get_close_matches
 from keyword import iskeyword
 from types import FunctionType
 from typing import Any
+from warnings import catch_warnings
 
 import attrs
 
@@ -192,7 +193,8 @@ def _random_constants(type_: type[TypeBase], rng: random.Random) -> dict[str, An
         instance = type_(**(fields | conditions))
         set_ends(instance, lambda: numbers(rng, 3))
         try:
-            return prepared(instance, bodies)
+            with catch_warnings(action="ignore"):  # of values that mean nothing
+                return prepared(instance, bodies)
         except ValueError as error:
             refusal = error
     raise PluginError(

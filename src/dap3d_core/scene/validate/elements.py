@@ -129,7 +129,9 @@ class Reader:
     def read(self, element: Element) -> Instance | None:
         """The instance of an element; None where a mistake was reported."""
         if self.of_joints and not self.of_joints.keys().isdisjoint(element.fields):
-            whole = with_joint_fields(self.report, self.geometry, self.table, element, self.of_joints)
+            whole = with_joint_fields(
+                self.report, self.geometry, self.table, element, self.of_joints
+            )
             if whole is None:
                 return None
             element = whole

@@ -43,8 +43,8 @@ def with_joint_fields(
             refuse(field, *missing_words(report, "joint", name, report.scene.joints))
             continue
         for own, other in gives.items():
-            other = other if slot_of(other) else f"{other}_{_moving(geometry, joint)}"
-            value = _field(geometry, joint, other)
+            other = other if slot_of(other) else f"{other}_{_moving(report, geometry, joint)}"
+            value = _field(report, geometry, joint, other)
             if own in element.fields:
                 refuse(own, f"give {field} or {own}, not both")
             elif value is None:
@@ -56,19 +56,22 @@ def with_joint_fields(
     return attrs.evolve(element, fields=fields) if good else None
 
 
-def _moving(geometry: Geometry, joint: Element) -> str:
+def _moving(report: Collector, geometry: Geometry, joint: Element) -> str:
     """Slot of the body of a joint that moves: j where body i is ground."""
-    return "j" if _field(geometry, joint, "body_i") == GROUND else "i"
+    return "j" if _field(report, geometry, joint, "body_i") == GROUND else "i"
 
 
-def _field(geometry: Geometry, joint: Element, name: str) -> Any:
+def _field(report: Collector, geometry: Geometry, joint: Element, name: str) -> Any:
     """A field of a joint as written; a body also by a point or vector that is fixed in it."""
     value = joint.fields.get(name)
+    if value is None and name in ("P_i", "P_j"):
+        named = (report.scene.vectors2.get(v) for v in joint.fields.values() if isinstance(v, str))
+        value = next((getattr(vector2, name) for vector2 in named if vector2), None)
     if value is not None or not name.startswith("body_"):
         return value
     slot, names = name[-1], (GROUND, *geometry.bodies.body_names)
     for located in (
-        geometry.point(joint.fields.get(f"P_{slot}")),
+        geometry.point(_field(report, geometry, joint, f"P_{slot}")),
         geometry.vector(joint.fields.get(f"a_{slot}")),
     ):
         if located is not None:

@@ -76,7 +76,7 @@ REFUSED = {
     "rising": (BETWEEN, ON_TIME),
     "rel-rot": ({"body_i": "body", "body_j": "base", "a_j": "a_j"},
                 "it has rows of the velocity level"),
-    "gear": ({"a_i": "a_i", "a_j": "a_j", "teeth_i": 10, "teeth_j": 20}, "it joins three bodies"),
+    "couple": ({"a_i": "a_i", "a_j": "a_j", "teeth_i": 10, "teeth_j": 20}, "it joins three bodies"),
 }  # fmt: skip
 
 

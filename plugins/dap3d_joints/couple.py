@@ -1,12 +1,12 @@
-"""Gear pair: two wheels with teeth, and the carrier that their bearings are fixed to."""
+"""Coupled rotations: two wheels turn in a fixed ratio against a third body."""
 
 from dap3d_core.interface import Body, Joint, Vector, body, choice, hookimpl, number, vector
-from dap3d_example.turning import references, turned_by, wrapped
+from dap3d_joints.turning import references, turned_by, wrapped
 
 interface_version = 1
 
 
-class Gear(Joint):
+class Couple(Joint):
     """Gears i and j, which turn against the carrier k about their axes, stay in mesh.
 
     It transmits moments alone, about a_i and a_j, and the carrier takes their sum: motion and power
@@ -27,7 +27,8 @@ class Gear(Joint):
     of the axes s = 1 is right.
     """
 
-    keyword, rows = "gear", 1
+    keyword, rows = "couple", 1
+    synonyms = ("coupler", "ratio", "transmission")
     a_i: Vector = vector(doc="axis of gear i, on that gear")
     a_j: Vector = vector(doc="axis of gear j, on that gear, or on ground for a fixed ring")
     body_k: Body = body(default="ground", doc="carrier, which holds the bearings of both")
@@ -49,4 +50,4 @@ class Gear(Joint):
 @hookimpl
 def dap3d_joints():
     """The joint types of this module."""
-    return [Gear]
+    return [Couple]

@@ -1,0 +1,168 @@
+"""Gear pair: two toothed wheels in mesh, with the tooth force at the pitch point."""
+
+from fractions import Fraction
+from warnings import warn
+
+from dap3d_core.interface import (
+    Joint,
+    Point,
+    Vector,
+    choice,
+    hookimpl,
+    joint_fields,
+    number,
+    point,
+    vector,
+)
+from dap3d_core.kernels import atan2, cross, dot, norm2, scale, sqrt, sub, tan
+from dap3d_joints.turning import wrapped
+
+interface_version = 1
+
+#: Numbers of teeth at most that stand for a ratio of radii.
+MOST_TEETH = 1000
+#: Radii may miss the distance of the axes, and axes be askew, by this part.
+MISFIT = 1e-6
+
+
+class Gear(Joint):
+    """Wheels i and j stay in mesh; the reaction is a force at the pitch point of both.
+
+    The bearings are joints of their own, and carry the tooth force; wherever they are, on ground or
+    on a carrier that turns itself, the axes stay at their distance. With g = r_Pj - r_Pi from one
+    axis to the other, and phi_i, phi_j the angles from g to marks on the wheels about a_i and a_j,
+    zero in the poses as given, the pitch circles roll on one another:
+
+        C = r_i / z_i wrapped(z_i phi_i + s z_j phi_j) + tan(helix) (a_i . g - x_0)
+
+    with radii r, numbers of teeth z, and s = 1 for teeth outside on both wheels, s = -1 where one
+    is a ring with teeth inside; the opposite where a_i and a_j point against each other. Whole
+    turns are whole numbers of teeth, so what is wrapped into (-pi, pi] is the error alone. The
+    gradient of C is a unit force along the tangent in the pitch point. With a ``helix`` it has a
+    part along the axis; it is the angle of the teeth of wheel i, positive for a right-handed one.
+
+    With ``bevel`` the axes meet: P_i and P_j are that point on each wheel, both axes point from
+    there to the wheels, and phi is measured from the other axis. r_i / r_j is z_i / z_j, and the
+    radius a length of one's choice: the larger end's, as the tooth force is the torque over it.
+
+    Radii follow from the numbers of teeth and the distance of the axes, or are given in their
+    place. The radial force of a pressure angle always presses the wheels apart, whichever flank is
+    in touch; a multiplier has both signs, so it is no part of the row: the force ``gear`` has it,
+    an elastic mesh. J and gamma are derived from C.
+    """
+
+    keyword, rows = "gear", 1
+    synonyms = ("gears", "gearpair", "spur", "bevel")
+    symbol = "link"
+    joint_i: str = joint_fields(P_i="P", a_i="a", doc="hinge of wheel i")
+    joint_j: str = joint_fields(P_j="P", a_j="a", doc="hinge of wheel j")
+    P_i: Point = point(default=None, doc="on the axis of wheel i; its mass centre when left out")
+    P_j: Point = point(default=None, doc="on the axis of wheel j; its mass centre when left out")
+    a_i: Vector = vector(doc="axis of wheel i, on the wheel")
+    a_j: Vector = vector(doc="axis of wheel j, on the wheel, or on ground for a fixed ring")
+    teeth_i: float = number(default=None, minimum=1.0, whole=True, doc="teeth of wheel i")
+    teeth_j: float = number(default=None, minimum=1.0, whole=True, doc="teeth of wheel j")
+    radius_i: float = number(default=None, unit="m", positive=True, doc="pitch radius of wheel i")
+    radius_j: float = number(default=None, unit="m", positive=True, doc="pitch radius of wheel j")
+    helix: float = number(0.0, unit="rad", usual=(-0.8, 0.8), doc="helix angle of wheel i")
+    internal: bool = choice((False, True), False, doc="one wheel is a ring with teeth inside")
+    bevel: bool = choice((False, True), False, doc="the axes meet")
+
+    def prepare(self, bodies):
+        i, j = bodies["i"], bodies["j"]
+        a, b = i.to_global(self.a_i), j.to_global(self.a_j)
+        g = sub(j.place(self.P_j), i.place(self.P_i))
+        sizes = sizes_of(self, length(across(g, a)))
+        if self.bevel:
+            if length(g) > MISFIT * sizes["radius_i"]:
+                warn(
+                    "P_i and P_j are apart; of bevel gears both are the point where the axes meet",
+                    stacklevel=2,
+                )
+            if self.helix:
+                warn("helix is not used by bevel gears", stacklevel=2)
+            sizes |= marks(a, b, i, "i") | marks(b, a, j, "j")
+            return sizes | {"x_0": 0.0, "lever": 1.0 / length(cross(a, b))}
+        if length(cross(a, b)) > MISFIT:
+            warn("a_i and a_j are not parallel; where the axes meet write bevel = true, and name "
+                 "the point where they do", stacklevel=2)  # fmt: skip
+        sizes["sense"] *= 1.0 if dot(a, b) > 0.0 else -1.0
+        sizes |= marks(a, g, i, "i") | marks(b, g, j, "j")
+        return sizes | {"x_0": dot(a, g), "lever": 0.0}
+
+    def C(
+        r_P_i, r_P_j, a_i, u_i, m_i, u_j, m_j, teeth_i, teeth_j, radius_i, sense, helix, x_0
+    ):  # fmt: skip
+        g = sub(r_P_j, r_P_i)
+        phi_i, phi_j = atan2(-dot(m_i, g), dot(u_i, g)), atan2(-dot(m_j, g), dot(u_j, g))
+        roll = wrapped(teeth_i * phi_i + sense * teeth_j * phi_j)
+        return radius_i / teeth_i * roll + tan(helix) * (dot(a_i, g) - x_0)
+
+
+class BevelGear(Gear, bevel=True):
+    """The axes meet."""
+
+    def C(
+        r_P_i, r_P_j, a_i, a_j, u_i, m_i, u_j, m_j, teeth_i, teeth_j, radius_i, sense, lever
+    ):  # fmt: skip
+        phi_i, phi_j = atan2(-dot(m_i, a_j), dot(u_i, a_j)), atan2(-dot(m_j, a_i), dot(u_j, a_i))
+        roll = wrapped(teeth_i * phi_i + sense * teeth_j * phi_j)
+        return radius_i / teeth_i * roll - lever * dot(cross(a_i, a_j), sub(r_P_j, r_P_i))
+
+
+def length(a):
+    """The length of a vector."""
+    return sqrt(norm2(a))
+
+
+def across(g, a):
+    """The part of g normal to the unit vector a."""
+    return sub(g, scale(dot(a, g), a))
+
+
+def marks(a, g, pose, slot):
+    """U and m on a wheel, by which the angle of g about its axis a is measured: zero now."""
+    u = across(g, a)
+    u = scale(1.0 / length(u), u)
+    return {f"u_{slot}": pose.to_local(u), f"m_{slot}": pose.to_local(cross(a, u))}
+
+
+def sizes_of(gear, distance):
+    """Numbers of teeth, pitch radii and sense of a pair whose axes have a distance."""
+    sense = -1.0 if gear.internal else 1.0
+    z_i, z_j, r_i, r_j = gear.teeth_i, gear.teeth_j, gear.radius_i, gear.radius_j
+    if (
+        (z_i is None) != (z_j is None)
+        or (r_i is None) != (r_j is None)
+        or (z_i is None and r_i is None)
+    ):
+        raise ValueError("how large are the wheels? Give teeth_i and teeth_j, or radius_i and "
+                         "radius_j, or all")  # fmt: skip
+    if z_i is None:
+        ratio = Fraction(r_j / r_i).limit_denominator(MOST_TEETH)
+        z_i, z_j = float(ratio.denominator), float(ratio.numerator)
+    if gear.internal and z_i == z_j:
+        raise ValueError("a ring and the wheel in it are not of the same size")
+    if r_i is None and gear.bevel:
+        raise ValueError("of bevel gears give radius_i and radius_j, too: the tooth force is the "
+                         "torque over them")  # fmt: skip
+    if not (gear.bevel or distance > 0.0):
+        raise ValueError("the axes are one; wheels in mesh have axes at a distance")
+    if r_i is None:
+        r_i, r_j = (distance * z / abs(z_i + sense * z_j) for z in (z_i, z_j))
+    elif abs(r_i * z_j - r_j * z_i) > MISFIT * r_i * z_j:
+        warn(
+            f"the radii are as {r_i:g} to {r_j:g}, the teeth as {z_i:g} to {z_j:g}; these hold",
+            stacklevel=2,
+        )
+    apart = abs(r_i + sense * r_j)
+    if not gear.bevel and abs(apart - distance) > MISFIT * distance:
+        warn(f"the axes are {distance:.9g} m apart, and wheels of these radii {apart:.9g} m: the "
+             "reaction is no force in one point", stacklevel=2)  # fmt: skip
+    return {"teeth_i": z_i, "teeth_j": z_j, "radius_i": r_i, "radius_j": r_j, "sense": sense}
+
+
+@hookimpl
+def dap3d_joints():
+    """The joint types of this module."""
+    return [Gear]

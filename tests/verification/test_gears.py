@@ -1,0 +1,226 @@
+"""Gears, racks and couples against closed forms: motion, tooth forces, loads of bearings."""
+
+import math
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+
+#: Of constraints that hold to rounding, and a motion that a run follows to its tolerance.
+TIGHT = {"rtol": 1e-10, "atol": 1e-12}
+#: Reactions of scenes at rest are solutions of linear equations of numbers near one.
+ROUNDING = 1e-11
+J = 0.02
+
+
+def wheels(**places):
+    """Wheels of 1 kg, and J about z, on hinges in ground at x, y."""
+    scene = dap.Scene(name="wheels")
+    for name, (x, y) in places.items():
+        scene.add_body(name, mass=1.0, Jp=(0.01, 0.01, J), r=(x, y, 0.0))
+        hinge(scene, name, "ground", (x, y, 0.0))
+    return scene
+
+
+def hinge(scene, name, on, at, axis="z"):
+    """A hinge of a wheel at its centre, on another body."""
+    scene.add_point(f"at_{name}", on, at)
+    scene.add_joint("rev", f"hinge_{name}", P_i=f"{name}.O", P_j=f"at_{name}",
+                    a_i=f"{name}.{axis}", a_j=f"{on}.{axis}")  # fmt: skip
+
+
+def pair(scene, one, other, name="mesh", type_="gear", **fields):
+    """A joint between two wheels by their hinges."""
+    scene.add_joint(type_, name, joint_i=f"hinge_{one}", joint_j=f"hinge_{other}", **fields)
+
+
+def torque(scene, body, value, axis=2):
+    """A constant torque about an axis of ground."""
+    n = [0.0, 0.0, 0.0]
+    n[axis] = value
+    scene.add_force("n", f"on_{body}", body_i=body, n=n)
+
+
+def turned(result, body, axis=2):
+    """The speed of a body at the end."""
+    return result.w[-1, result.summary.body_index[body], axis]
+
+
+def load(result, joint):
+    """The force on body i of a joint at the end."""
+    return result.reaction(joint)["i"].force[-1]
+
+
+@pytest.mark.parametrize("method", ["standard", "lsq", "joint"])
+def test_an_idler_bears_twice_the_tooth_force(method):
+    """3 N m on a wheel of 0.1 m, and on the last one so that nothing moves: 2 T / r."""
+    scene = wheels(a=(0.0, 0.0), idler=(0.3, 0.0), c=(0.6, 0.0))
+    pair(scene, "a", "idler", "ab", teeth_i=20, teeth_j=40)
+    pair(scene, "idler", "c", "bc", radius_i=0.2, radius_j=0.1)
+    torque(scene, "a", 3.0)
+    torque(scene, "c", -3.0)
+    result = dap.simulate(scene, t_end=0.1, dt=0.1, method=method)
+    assert load(result, "hinge_a") == pytest.approx([0.0, 30.0, 0.0], abs=30.0 * ROUNDING)
+    assert load(result, "hinge_idler") == pytest.approx([0.0, -60.0, 0.0], abs=60.0 * ROUNDING)
+    assert abs(result.Lam[-1]).max() >= 30.0 - 1e-9
+
+
+def planetary(type_="gear", **fields):
+    """A sun of 20 teeth, a planet of 40 on a carrier, a ring of 100 in ground."""
+    scene = wheels(sun=(0.0, 0.0), carrier=(0.0, 0.0))
+    scene.add_body("planet", mass=0.4, Jp=(3e-4, 3e-4, 5e-4), r=(0.06, 0.0, 0.0))
+    hinge(scene, "planet", "carrier", (0.06, 0.0, 0.0))
+    pair(scene, "sun", "planet", "inner", type_, teeth_i=20, teeth_j=40, **fields)
+    scene.add_joint(type_, "outer", joint_i="hinge_planet", P_j="ground.O", a_j="ground.z",
+                    teeth_i=40, teeth_j=100, internal=True, **fields)  # fmt: skip
+    torque(scene, "sun", 0.3)
+    return scene
+
+
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_a_planetary_gear_obeys_willis_and_adds_up_inertia(method):
+    """The carrier turns by z_s / (z_s + z_r) of the sun, over many turns."""
+    result = dap.simulate(planetary(), t_end=10.0, dt=0.05, method=method, **TIGHT)
+    sun, carrier, planet = (turned(result, b) for b in ("sun", "carrier", "planet"))
+    assert carrier == pytest.approx(sun / 6.0, rel=1e-9)
+    assert planet - carrier == pytest.approx(-(sun - carrier) / 2.0, rel=1e-9)
+    inertia = J + (J + 0.4 * 0.06**2) / 36.0 + 5e-4 * (planet / sun) ** 2
+    assert sun == pytest.approx(0.3 * 10.0 / inertia, rel=1e-8)
+    angle = [result.coordinates(f"hinge_{b}").q[:, 0] for b in ("sun", "carrier")]
+    assert np.abs(angle[1] - angle[0] / 6.0).max() < 1e-9 * angle[0].max()
+
+
+def test_the_pin_of_a_planet_carries_both_tooth_forces():
+    """Of a planet that turns no faster: both are tangential, and their sum moves the carrier."""
+    scene = planetary()
+    for body in ("sun", "planet"):  # nothing of the torque is spent on them
+        scene.bodies[body].Jp = (1e-12, 1e-12, 2e-12)
+    scene.bodies["planet"].mass = 1e-9
+    result = dap.simulate(scene, t_end=1e-3, dt=1e-3, method="standard", **TIGHT)
+    assert abs(load(result, "hinge_planet")[1]) == pytest.approx(2.0 * 0.3 / 0.02, rel=1e-6)
+
+
+def test_bevel_gears_turn_by_the_ratio_and_bear_the_tooth_force():
+    """A wheel about x drives one about z, 15 to 30 teeth, 0.05 to 0.1 m; T / r on the bearings."""
+    scene = dap.Scene(name="bevel")
+    for name, axis, r in (("a", "x", (0.1, 0.0, 0.0)), ("b", "z", (0.0, 0.0, 0.05))):
+        scene.add_body(name, mass=1.0, Jp=(J, J, J), r=r)
+        hinge(scene, name, "ground", r, axis)
+        scene.add_point(f"apex_{name}", name, [-x for x in r])
+    scene.add_joint("gear", "mesh", P_i="apex_a", P_j="apex_b", a_i="a.x", a_j="b.z", teeth_i=15,
+                    teeth_j=30, radius_i=0.05, radius_j=0.1, bevel=True)  # fmt: skip
+    torque(scene, "a", 2.0, axis=0)
+    result = dap.simulate(scene, t_end=2.0, dt=0.02, **TIGHT)
+    faster, slower = turned(result, "a", 0), turned(result, "b")
+    assert slower == pytest.approx(-faster / 2.0, rel=1e-9)
+    assert faster == pytest.approx(2.0 * 2.0 / (J + J / 4.0), rel=1e-8)
+    tooth = J * (2.0 / (J + J / 4.0)) / 2.0 / 0.1  # what accelerates the driven wheel
+    for joint in ("hinge_a", "hinge_b"):
+        assert np.linalg.norm(load(result, joint)) == pytest.approx(tooth, rel=1e-8)
+    # the force acts where the pitch cones touch, at x = 0.1, z = 0.05
+    moment = result.reaction("mesh")["j"].moment[-1]
+    force = result.reaction("mesh")["j"].force[-1]
+    assert moment == pytest.approx(np.cross([0.1, 0.0, 0.0], force), abs=1e-9)
+
+
+def test_helical_teeth_push_along_the_axis():
+    """By tan(helix) of the tangential force, on both wheels."""
+    scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
+    pair(scene, "a", "b", teeth_i=20, teeth_j=40, helix=0.4)
+    torque(scene, "a", 3.0)
+    torque(scene, "b", 6.0)
+    result = dap.simulate(scene, t_end=0.1, dt=0.1)
+    x, y, z = load(result, "hinge_a")
+    assert [abs(v) for v in (x, y, z)] == pytest.approx([0.0, 30.0, 30.0 * math.tan(0.4)], abs=1e-9)
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_a_pinion_drives_a_rack(side, method):
+    """(m + J / r^2) a = T / r; the rack on either side; the bearing carries what moves it."""
+    scene, r, m = wheels(pinion=(0.0, 0.0)), 0.05, 3.0
+    scene.add_body("rack", mass=m, Jp=(0.1, 0.1, 0.1), r=(0.2, -side * r, 0.0))
+    scene.add_point("rail", "ground", (0.0, -side * r, 0.0))
+    scene.add_joint("tran", "slide", P_i="rack.O", P_j="rail", a_j="ground.x")
+    scene.add_joint("rack", "teeth", joint_i="hinge_pinion", P_j="rack.O", a_j="rack.x", radius=r)
+    torque(scene, "pinion", 1.5)
+    result = dap.simulate(scene, t_end=2.0, dt=0.01, method=method, **TIGHT)
+    a = 1.5 / r / (m + J / r**2)
+    index = result.summary.body_index["rack"]
+    assert result.rd[-1, index, 0] == pytest.approx(side * a * 2.0, rel=1e-9)
+    assert result.r[-1, index, 0] == pytest.approx(0.2 + side * a * 2.0, rel=1e-9)
+    assert load(result, "hinge_pinion") == pytest.approx([side * m * a, 0.0, 0.0], abs=1e-8)
+    assert turned(result, "pinion") == pytest.approx(a * 2.0 / r, rel=1e-9)
+
+
+def test_couples_turn_by_the_same_ratio_without_a_tooth_force():
+    """The idler bears nothing of 2 T / r."""
+    scene = wheels(a=(0.0, 0.0), idler=(0.3, 0.0), c=(0.6, 0.0))
+    scene.add_joint("couple", "ab", a_i="a.z", a_j="idler.z", teeth_i=20, teeth_j=40)
+    scene.add_joint("couple", "bc", a_i="idler.z", a_j="c.z", teeth_i=40, teeth_j=20)
+    torque(scene, "a", 3.0)
+    result = dap.simulate(scene, t_end=1.0, dt=0.1, **TIGHT)
+    assert turned(result, "c") == pytest.approx(turned(result, "a"), rel=1e-9)
+    assert turned(result, "idler") == pytest.approx(-turned(result, "a") / 2.0, rel=1e-9)
+    assert np.abs(load(result, "hinge_idler")).max() < 1e-9
+
+
+@pytest.mark.parametrize("internal", [False, True])
+def test_an_elastic_mesh_rests_where_the_torque_is_held(internal):
+    """T / r^2 / k of a turn, all parts of the tooth force on the bearing; damped to rest."""
+    place = (0.1, 0.0) if internal else (0.3, 0.0)
+    scene = wheels(a=(0.0, 0.0))
+    fields = {"P_j": "centre", "a_j": "ground.z", "teeth_j": 40}
+    scene.add_point("centre", "ground", (*place, 0.0))
+    scene.add_force("gear", "mesh", joint_i="hinge_a", teeth_i=20, k=1e5, c=200.0, helix=0.3,
+                    internal=internal, **fields)  # fmt: skip
+    torque(scene, "a", 3.0)
+    result = dap.simulate(scene, t_end=2.0, dt=0.1, **TIGHT)
+    r, tangent = 0.1, 30.0
+    assert result.coordinates("hinge_a").q[-1, 0] == pytest.approx(3.0 / r**2 / 1e5, rel=1e-7)
+    radial = tangent * math.tan(math.radians(20.0)) / math.cos(0.3)
+    x, y, z = load(result, "hinge_a")
+    assert abs(y) == pytest.approx(tangent, rel=1e-7)
+    assert x == pytest.approx(-radial if internal else radial, rel=1e-7)
+    assert abs(z) == pytest.approx(tangent * math.tan(0.3), rel=1e-7)
+
+
+def test_backlash_is_crossed_freely():
+    """A wheel set free in the middle of its play touches after sqrt(b J / (T r)) seconds."""
+    scene = wheels(a=(0.0, 0.0))
+    scene.add_point("centre", "ground", (0.3, 0.0, 0.0))
+    scene.add_force("gear", "mesh", joint_i="hinge_a", P_j="centre", a_j="ground.z", teeth_i=20,
+                    teeth_j=40, k=1e6, backlash=2e-3)  # fmt: skip
+    torque(scene, "a", 3.0)
+    result = dap.simulate(scene, t_end=0.2, dt=1e-3, **TIGHT)
+    touch = math.sqrt(2e-3 * J / (3.0 * 0.1))
+    w, t = result.w[:, 0, 2], result.t
+    free = t < touch
+    assert np.abs(w[free] - 3.0 / J * t[free]).max() < 1e-9
+    assert np.abs(w[~free][3:] - 3.0 / J * t[~free][3:]).min() > 1e-2
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({}, "how large are the wheels"),
+        ({"teeth_i": 20}, "how large are the wheels"),
+        ({"teeth_i": 20, "teeth_j": 20, "internal": True}, "not of the same size"),
+        ({"radius_i": 0.1, "radius_j": 0.1, "bevel": True, "teeth_i": 3}, "how large"),
+    ],
+)
+def test_a_pair_of_no_size_is_refused(fields, words):
+    """With what to give."""
+    scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
+    pair(scene, "a", "b", **fields)
+    with pytest.raises(dap.SceneError, match=words):
+        dap.simulate(scene, t_end=0.1)
+
+
+def test_wheels_that_do_not_meet_are_noted():
+    """Radii of 0.1 m each, axes 0.3 m apart."""
+    scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
+    pair(scene, "a", "b", radius_i=0.1, radius_j=0.1)
+    notes = dap.simulate(scene, t_end=0.02).notes
+    assert any("0.3 m apart" in note for note in notes)
