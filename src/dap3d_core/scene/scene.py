@@ -42,7 +42,9 @@ class Body:
         mass: kg; None where the scene gives none (1.0 is then used, with a note).
         Jp: inertia matrix in body axes, 3 numbers (its diagonal) or 3x3, kg m^2; None as for mass.
         r: position, 3 numbers, m.
-        p: Euler parameters e0, e1, e2, e3, unit length.
+        p: orientation as Euler parameters e0, e1, e2, e3, of unit length; or in their place
+        rpy: roll, pitch, yaw: turns about ground's x, then y, then z, rad or such as "30 deg"; or
+        axis_angle: an axis, 3 numbers of any length, and the angle about it.
         r_dot: velocity, 3 numbers, m/s.
         w: angular velocity in global axes, 3 numbers, rad/s.
         color: for drawings, "" for the next of the colour cycle.
@@ -53,6 +55,8 @@ class Body:
     Jp: Any = attrs.field(default=None, converter=plain)
     r: Any = attrs.field(default=ZERO, converter=plain)
     p: Any = attrs.field(default=NO_TURN, converter=plain)
+    rpy: Any = attrs.field(default=None, converter=plain)
+    axis_angle: Any = attrs.field(default=None, converter=plain)
     r_dot: Any = attrs.field(default=ZERO, converter=plain)
     w: Any = attrs.field(default=ZERO, converter=plain)
     color: Any = ""

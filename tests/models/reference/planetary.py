@@ -1,8 +1,8 @@
 """Reference for the model `planetary`: closed form, by Willis and Newton.
 
 All wheels turn in fixed ratios, so the torque on the sun accelerates one inertia: the sum of
-J ratio^2, and of m (d ratio)^2 for the planet, which the carrier takes along. The tooth force of the
-ring is what accelerates the planet about its centre, beside that of the sun.
+J ratio^2, and of m (d ratio)^2 for the planet, which the carrier takes along. The tooth force of
+the ring is what accelerates the planet about its centre, beside that of the sun.
 """
 
 import numpy as np

@@ -7,12 +7,14 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import MISSING
-from dap3d_core.scene.scene import Body
+from dap3d_core.scene.scene import NO_TURN, Body
 from dap3d_core.scene.validate.coerce_columns import Keys, numbers, vectors
 from dap3d_core.scene.validate.coerce_values import (
     ROUNDING,
     UNIT_TOLERANCE,
     Fault,
+    from_axis_angle,
+    from_rpy,
     matrix_of,
     not_unit,
     numbers_of,
@@ -92,7 +94,12 @@ def _masses(report: Collector, names: tuple[str, ...], bodies: list[Body]) -> Fl
 
 def _quaternions(report: Collector, names: tuple[str, ...], bodies: list[Body]) -> Floats:
     keys = Keys("bodies", names, "p")
-    p = vectors(report, keys, [b.p for b in bodies], 4)
+    p = vectors(
+        report,
+        keys,
+        [_orientation(report, name, b) for name, b in zip(names, bodies, strict=True)],
+        4,
+    )
     length = np.sqrt(np.einsum("nk,nk->n", p, p))
     deviation = np.abs(length - 1.0)
     for k in np.flatnonzero(deviation > ROUNDING):
@@ -109,6 +116,23 @@ def _quaternions(report: Collector, names: tuple[str, ...], bodies: list[Body]) 
             report.note(text, "Euler parameters normalised")
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(p / length[:, None])
+
+
+def _orientation(report: Collector, name: str, body: Body) -> Any:
+    """Euler parameters of a body as written, or of what stands in their place."""
+    given = {k: v for k, v in (("rpy", body.rpy), ("axis_angle", body.axis_angle)) if v is not None}
+    if not given:
+        return body.p
+    if body.p != NO_TURN:
+        given["p"] = body.p
+    if len(given) > 1:
+        what = f"give one of {' and '.join(given)}"
+        report.add(("bodies", name, next(iter(given))), next(iter(given.values())), what)
+        return NO_TURN
+    [(field, value)] = given.items()
+    reader = from_rpy if field == "rpy" else from_axis_angle
+    p = report.read(("bodies", name, field), value, reader)
+    return NO_TURN if isinstance(p, Fault) else p
 
 
 def _inertias(report: Collector, names: tuple[str, ...], bodies: list[Body]) -> Floats:

@@ -13,6 +13,12 @@ from dap3d_core.scene.coerce import plain
 LARGEST = 1e100
 #: A number in quotes, and the length up to which it is recognised.
 _NUMBER, LONGEST_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?"), 60
+#: A number and the name of its unit; units of angles and of their rates, in rad and rad/s.
+_ANGLE = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([A-Za-z][A-Za-z/ ]*)")
+ANGLE_UNITS: dict[str, dict[str, float]] = {
+    "rad": {"deg": math.pi / 180.0, "rad": 1.0},
+    "rad/s": {"deg/s": math.pi / 180.0, "rpm": math.pi / 30.0, "rad/s": 1.0},
+}
 #: Euler parameters farther from unit length are refused; those farther than ROUNDING are noted.
 UNIT_TOLERANCE = 1e-6
 ROUNDING = 1e-9
@@ -61,6 +67,22 @@ def _number_fault(value: Any) -> float | Fault:
     return Fault(f"{should}, not {_kind(value)}")
 
 
+def angle_of(value: Any, unit: str = "rad") -> float | Fault:
+    """A number in a unit of angles, rad or rad/s; or a text with its own unit, such as "30 deg"."""
+    if type(value) is not str:
+        return number_of(value)
+    found = _ANGLE.fullmatch(value.strip())
+    if found is None:
+        return _number_fault(value)
+    number, given = float(found[1]), found[2].replace(" ", "")
+    known = ANGLE_UNITS[unit]
+    if given not in known:
+        close = nearest(given, known) or next(iter(known))
+        words = ", ".join(f'"{found[1]} {name}"' for name in known)
+        return Fault(f"should be in one of {', '.join(known)}", f"write {words}", close)
+    return number_of(number * known[given])
+
+
 def numbers_of(value: Any, count: int) -> Any:
     """Exactly ``count`` finite numbers as a tuple."""
     if type(value) is tuple and len(value) == count:
@@ -105,6 +127,44 @@ def quaternion_of(value: Any) -> Any:
         return p
     length = sum(x * x for x in p) ** 0.5
     return Fault(not_unit(length)) if abs(length - 1.0) > UNIT_TOLERANCE else p
+
+
+def from_rpy(value: Any) -> Any:
+    """Euler parameters of roll, pitch and yaw."""
+    angles = _angles(value, 3, "roll, pitch and yaw")
+    if isinstance(angles, Fault):
+        return angles
+    (s0, c0), (s1, c1), (s2, c2) = ((math.sin(0.5 * x), math.cos(0.5 * x)) for x in angles)
+    return (
+        c2 * c1 * c0 + s2 * s1 * s0,
+        c2 * c1 * s0 - s2 * s1 * c0,
+        c2 * s1 * c0 + s2 * c1 * s0,
+        s2 * c1 * c0 - c2 * s1 * s0,
+    )
+
+
+def from_axis_angle(value: Any) -> Any:
+    """Euler parameters of a turn: three components of its axis, and the angle."""
+    numbers = _angles(value, 4, "an axis, 3 numbers, and an angle")
+    if isinstance(numbers, Fault):
+        return numbers
+    *axis, angle = numbers
+    length = math.hypot(*axis)
+    if length < SHORTEST:
+        return Fault("has an axis of zero length", "write [0.0, 0.0, 1.0, angle] for one about z")
+    part = math.sin(0.5 * angle) / length
+    return (math.cos(0.5 * angle), *(part * x for x in axis))
+
+
+def _angles(value: Any, count: int, what: str) -> Any:
+    """Numbers, of which the last, or all of three, are angles."""
+    value, should = plain(value), f"should be {count} numbers: {what}"
+    if type(value) is not tuple or len(value) != count:
+        return Fault(should)
+    read = [angle_of if count == 3 or k == count - 1 else number_of for k in range(count)]
+    numbers = tuple(reader(x) for reader, x in zip(read, value, strict=True))
+    faults = [x for x in numbers if isinstance(x, Fault)]
+    return Fault(f"{should}; {faults[0].what}", faults[0].remedy) if faults else numbers
 
 
 def not_unit(length: float) -> str:

@@ -11,7 +11,9 @@ from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
 from dap3d_core.scene.scene import GROUND, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
+    ANGLE_UNITS,
     Fault,
+    angle_of,
     bounded,
     list_of,
     matrix_of,
@@ -46,7 +48,7 @@ _UNKNOWN = -2
 #: Readers of the kinds of fields that hold values and no references.
 READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
     "number": lambda spec, value: bounded(
-        number_of(value),
+        angle_of(value, spec.unit) if spec.unit in ANGLE_UNITS else number_of(value),
         positive=spec.positive,
         minimum=spec.minimum,
         maximum=spec.maximum,

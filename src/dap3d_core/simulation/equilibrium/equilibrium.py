@@ -122,6 +122,7 @@ class Equilibrium:
         scene = self.compiled.scene.copy()
         for body, r, p in zip(scene.bodies.values(), self.r.tolist(), self.p.tolist(), strict=True):
             body.r, body.p = tuple(r), tuple(p)
+            body.rpy = body.axis_angle = None
             body.r_dot = body.w = (0.0, 0.0, 0.0)
         for state in self.compiled.model.element_states:
             values = self.states[state.first : state.first + state.length].tolist()

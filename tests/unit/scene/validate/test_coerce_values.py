@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from unit.scene.base import BASE
 
+from dap3d_core.registry import load_registry
 from dap3d_core.scene import Scene, SceneError, check
 
 
@@ -87,3 +89,61 @@ def test_the_triangle_inequality_has_room_for_rounding(registry):
     scene.add_body("plate", mass=1.0, Jp=[0.1, 0.2, 0.1 + 0.2])
     scene.add_body("disc", mass=1.0, Jp=[0.01, 0.02, 0.01])
     check(scene, registry)
+
+
+TURNED = [
+    ({"rpy": (0.3, -0.7, 2.0)}, Rotation.from_euler("xyz", (0.3, -0.7, 2.0))),
+    (
+        {"rpy": ("30 deg", 0.1, "-1.5e1deg")},
+        Rotation.from_euler("xyz", (30, 5.729577951, -15), True),
+    ),
+    (
+        {"axis_angle": (1, 2, 2, "90 deg")},
+        Rotation.from_rotvec(np.array([1, 2, 2]) / 3 * np.pi / 2),
+    ),
+]
+
+
+@pytest.mark.parametrize(("given", "wanted"), TURNED)
+def test_orientations_are_those_of_scipy(given, wanted):
+    """Roll, pitch, yaw are turns about fixed axes; an axis may have any length."""
+    scene = Scene(name="turned")
+    scene.add_body("b", mass=1.0, Jp=(1.0, 1.0, 1.0), **given)
+    x, y, z, e0 = wanted.as_quat()
+    found = check(scene, load_registry()).p[0]
+    assert abs(found @ (e0, x, y, z)) == pytest.approx(1.0, abs=1e-10)
+    assert np.linalg.norm(found) == pytest.approx(1.0, abs=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"rpy": (1, 2)}, "3 numbers: roll, pitch and yaw"),
+        ({"rpy": ("30 degs", 0, 0)}, "one of deg, rad"),
+        ({"rpy": "30 deg"}, "3 numbers: roll, pitch and yaw"),
+        ({"axis_angle": (0, 0, 0, 1)}, "an axis of zero length"),
+        ({"axis_angle": (0, 1, "30 deg")}, "an axis, 3 numbers, and an angle"),
+        ({"rpy": (0, 0, 1), "p": (0, 1, 0, 0)}, "give one of rpy and p"),
+        ({"rpy": (0, 0, 1), "axis_angle": (0, 1, 0, 0)}, "give one of rpy and axis_angle"),
+    ],
+)
+def test_orientations_that_mean_nothing_are_refused(given, words):
+    """With what is allowed."""
+    scene = Scene(name="turned")
+    scene.add_body("b", mass=1.0, Jp=(1.0, 1.0, 1.0), **given)
+    with pytest.raises(SceneError, match=words):
+        check(scene, load_registry())
+
+
+def test_angles_of_types_may_be_given_in_degrees_and_rates_in_turns():
+    """Numbers whose unit is rad or rad/s; no others."""
+    scene = Scene(name="turned")
+    for name in ("a", "b"):
+        scene.add_body(name, mass=1.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_force("rot_sda", "coil", v_i="a.x", v_j="b.x", axis="b.z", k=1.0, theta_0="90 deg")
+    assert check(scene, load_registry()).forces[0].values["theta_0"] == pytest.approx(
+        np.pi / 2, rel=1e-15
+    )
+    scene.forces["coil"].fields["k"] = "3 deg"
+    with pytest.raises(SceneError, match='k = "3 deg": should be a number'):
+        check(scene, load_registry())
