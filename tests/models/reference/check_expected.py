@@ -32,7 +32,15 @@ BENCHMARKS = {
     "N1": "rolling_disk",
 }
 #: Mechanisms of engineers.
-ENGINEERING = ("planetary",)
+ENGINEERING = (
+    "engine",
+    "excavator",
+    "motion_platform",
+    "planetary",
+    "rotor",
+    "two_link_arm",
+    "wiper",
+)
 ALL = (*NAMES, *BENCHMARKS, *ENGINEERING)
 PRINTED = ("specification", "benchmarks")  # sources that are no script of this folder
 
