@@ -2,8 +2,8 @@
 
     python tools/gallery_pictures.py [FOLDER]
 
-Writes MODEL.png for each model of models/engineering into FOLDER, docs/how-to/engineering-gallery by
-default.
+Writes MODEL.png for each model of models/engineering into FOLDER, by default
+docs/how-to/engineering-gallery.
 """
 
 import sys
