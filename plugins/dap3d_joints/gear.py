@@ -56,8 +56,14 @@ class Gear(Joint):
     keyword, rows = "gear", 1
     synonyms = ("gears", "gearpair", "spur", "bevel")
     symbol = "link"
-    example: ClassVar[Mapping[str, str]] = {"P_i": '"crank.O"', "P_j": '"rod.O"', "a_i": '"crank.y"', "a_j": '"rod.y"',
-               "teeth_i": "20", "teeth_j": "40"}  # fmt: skip
+    example: ClassVar[Mapping[str, str]] = {
+        "P_i": '"crank.O"',
+        "P_j": '"rod.O"',
+        "a_i": '"crank.y"',
+        "a_j": '"rod.y"',
+        "teeth_i": "20",
+        "teeth_j": "40",
+    }
     joint_i: str = joint_fields(P_i="P", a_i="a", doc="hinge of wheel i")
     joint_j: str = joint_fields(P_j="P", a_j="a", doc="hinge of wheel j")
     P_i: Point = point(default=None, doc="on the axis of wheel i; its mass centre when left out")
