@@ -150,9 +150,10 @@ class _Path:
         tried: how often each condition was met, on other ways as well.
         """
         places = np.linspace(-REACH, REACH, PLACES)
-        results = [self._results(x) for x in places]
-        if not any(results):
+        first = self._results(places[0])
+        if not first:  # both sides of a where are evaluated: it compares everywhere, or nowhere
             return
+        results = [first, *map(self._results, places[1:])]
         for k in range(PLACES - 1):
             one, other = results[k], results[k + 1]
             for which in np.flatnonzero(np.array(one) != np.array(other)):
