@@ -164,6 +164,8 @@ class _Path:
     def _located(self, a: float, b: float, which: int, first: bool) -> float:
         for _ in range(HALVINGS):
             middle = 0.5 * (a + b)
+            if middle in (a, b):  # neighbouring numbers
+                break
             a, b = (middle, b) if self._results(middle)[which] == first else (a, middle)
         return float(b)
 
