@@ -1,6 +1,8 @@
 """Elastic mesh of two toothed wheels: stiffness, damping, backlash, pressure angle and helix."""
 
+from collections.abc import Mapping
 from math import cos, tan
+from typing import ClassVar
 
 from dap3d_core.interface import (
     Force,
@@ -55,6 +57,14 @@ class GearMesh(Force):
 
     keyword = "gear"
     synonyms = ("mesh", "gearmesh")
+    example: ClassVar[Mapping[str, str]] = {
+        "P_i": '"crank.O"',
+        "P_j": '"rod.O"',
+        "a_i": '"crank.y"',
+        "a_j": '"rod.y"',
+        "teeth_i": "20",
+        "teeth_j": "40",
+    }
     joint_i: str = joint_fields(P_i="P", a_i="a", doc="hinge of wheel i")
     joint_j: str = joint_fields(P_j="P", a_j="a", doc="hinge of wheel j")
     P_i: Point = point(default=None, doc="on the axis of wheel i; its mass centre when left out")

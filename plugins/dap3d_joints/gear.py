@@ -1,6 +1,8 @@
 """Gear pair: two toothed wheels in mesh, with the tooth force at the pitch point."""
 
+from collections.abc import Mapping
 from fractions import Fraction
+from typing import ClassVar
 from warnings import warn
 
 from dap3d_core.interface import (
@@ -54,6 +56,14 @@ class Gear(Joint):
     keyword, rows = "gear", 1
     synonyms = ("gears", "gearpair", "spur", "bevel")
     symbol = "link"
+    example: ClassVar[Mapping[str, str]] = {
+        "P_i": '"crank.O"',
+        "P_j": '"rod.O"',
+        "a_i": '"crank.y"',
+        "a_j": '"rod.y"',
+        "teeth_i": "20",
+        "teeth_j": "40",
+    }
     joint_i: str = joint_fields(P_i="P", a_i="a", doc="hinge of wheel i")
     joint_j: str = joint_fields(P_j="P", a_j="a", doc="hinge of wheel j")
     P_i: Point = point(default=None, doc="on the axis of wheel i; its mass centre when left out")
@@ -131,13 +141,12 @@ def sizes_of(gear, distance):
     """Numbers of teeth, pitch radii and sense of a pair whose axes have a distance."""
     sense = -1.0 if gear.internal else 1.0
     z_i, z_j, r_i, r_j = gear.teeth_i, gear.teeth_j, gear.radius_i, gear.radius_j
-    if (
-        (z_i is None) != (z_j is None)
-        or (r_i is None) != (r_j is None)
-        or (z_i is None and r_i is None)
-    ):
-        raise ValueError("how large are the wheels? Give teeth_i and teeth_j, or radius_i and "
-                         "radius_j, or all")  # fmt: skip
+    if (z_i is None) != (z_j is None) or (r_i is None) != (r_j is None):
+        raise ValueError("one wheel has a size, the other none: give teeth_i and teeth_j, or "
+                         "radius_i and radius_j, or all")  # fmt: skip
+    if z_i is None and r_i is None:
+        warn("the wheels are taken to be of one size; give teeth_i and teeth_j", stacklevel=2)
+        z_i = z_j = 1.0
     if z_i is None:
         ratio = Fraction(r_j / r_i).limit_denominator(MOST_TEETH)
         z_i, z_j = float(ratio.denominator), float(ratio.numerator)

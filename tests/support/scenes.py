@@ -67,7 +67,7 @@ def scene_for(type_info, rng, *, ground=None, values=None):
 
 
 def _field(scene, name, spec, owner, rng, wanted):
-    if not spec.given:
+    if not spec.given or spec.kind == "joint_fields":
         return None
     body = owner.get(slot_of(name) or "", "b1")
     if spec.kind == "point":

@@ -204,10 +204,9 @@ def test_backlash_is_crossed_freely():
 @pytest.mark.parametrize(
     ("fields", "words"),
     [
-        ({}, "how large are the wheels"),
-        ({"teeth_i": 20}, "how large are the wheels"),
+        ({"teeth_i": 20}, "one wheel has a size, the other none"),
         ({"teeth_i": 20, "teeth_j": 20, "internal": True}, "not of the same size"),
-        ({"radius_i": 0.1, "radius_j": 0.1, "bevel": True, "teeth_i": 3}, "how large"),
+        ({"radius_i": 0.1, "radius_j": 0.1, "bevel": True, "teeth_i": 3}, "one wheel has"),
     ],
 )
 def test_a_pair_of_no_size_is_refused(fields, words):
@@ -224,3 +223,6 @@ def test_wheels_that_do_not_meet_are_noted():
     pair(scene, "a", "b", radius_i=0.1, radius_j=0.1)
     notes = dap.simulate(scene, t_end=0.02).notes
     assert any("0.3 m apart" in note for note in notes)
+    del scene.joints["mesh"].fields["radius_i"], scene.joints["mesh"].fields["radius_j"]
+    notes = dap.simulate(scene, t_end=0.02).notes
+    assert any("taken to be of one size" in note for note in notes)

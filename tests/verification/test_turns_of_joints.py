@@ -166,7 +166,9 @@ def driven(function="b", joint="drive-rot", **fields):
     return scene
 
 
-@pytest.mark.parametrize("dt", [0.1, 2.0, 10.0])
+@pytest.mark.parametrize(
+    "dt", [*(pytest.param(x, marks=pytest.mark.slow) for x in (0.1, 2.0)), 10.0]
+)
 @pytest.mark.parametrize("joint", ["drive-rot", "rel-rot"])
 @pytest.mark.parametrize("analysis", [dap.simulate, dap.kinematics])
 def test_a_driven_wheel_follows_its_driver(analysis, joint, dt):
@@ -255,7 +257,7 @@ def test_a_run_from_a_result_goes_on_with_its_turns(methods, tmp_path):
 
 
 @pytest.mark.parametrize("method", ["standard", "joint"])
-@pytest.mark.parametrize("integrator", ["dop853", "adams"])
+@pytest.mark.parametrize("integrator", ["dop853", pytest.param("adams", marks=pytest.mark.slow)])
 def test_an_event_at_an_angle(method, integrator):
     """The wheel passes 77.5 rad once, within steps of several turns in joint coordinates."""
     events = [dap.Event("pin.angle", at=77.5)]

@@ -45,6 +45,8 @@ class TypeBase:
     #: not be invariant to a common rigid motion of its bodies (docs/check-plugin.md).
     ground_axes: ClassVar[bool] = False
     symbol: ClassVar[str] = ""
+    #: Of the example of ``describe``: fields -> what is written there, where no value is usual.
+    example: ClassVar[Mapping[str, str]] = {}
     #: Other names of the type, of other programs, say: messages suggest its keyword for them.
     synonyms: ClassVar[tuple[str, ...]] = ()
     #: True for impulses that drive bodies: check-plugin lets them add kinetic energy.

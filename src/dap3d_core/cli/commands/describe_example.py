@@ -98,7 +98,12 @@ class _Example:
                 owners[field.rpartition("_")[2]] = spec.default
         lines = [f"[{type_.kind}s.{name}]", f'type = "{type_.keyword}"']
         for field, spec in specs.items():
-            for key, value in self._values(field, spec, owners, motor):
+            own = type_.example.get(field)
+            for body in PLACES if own else ():
+                if own.startswith(f'"{body}.'):
+                    self._body_named(body)
+            values = self._values(field, spec, owners, motor) if own is None else [(field, own)]
+            for key, value in values:
                 line = f"{key} = {value}"
                 remarks = (spec.unit if spec.kind == "number" else "",
                            "" if spec.required else "may be left out")  # fmt: skip

@@ -75,7 +75,7 @@ def modes(
     if mode is not None and output is None:
         raise Refused("--mode chooses the motion that -o writes: name its file, -o FILE.nc")
     scene = dap.load(model)
-    at, t = _state_of(start, allow_code) if start else (None, time or 0.0)
+    at, t = state_of(start, allow_code) if start else (None, time or 0.0)
     with refusing(dap.SimulationError):
         found = dap.linearize(scene, at=at, t=t, modes=number, allow_code=allow_code)
         data = _data(scene.name, found, number or LISTED)
@@ -114,7 +114,7 @@ def _targets(plot: str | None, output: str | None, force: bool) -> list[Path]:
     return targets
 
 
-def _state_of(start: str, allow_code: bool) -> tuple["Result", float]:
+def state_of(start: str, allow_code: bool) -> tuple["Result", float]:
     """The result that --from names, and the instant.
 
     Raises:

@@ -14,6 +14,7 @@ from dap3d_core.result import INFORMATION, Result
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, eigenvalues_of
+from dap3d_core.simulation.linearization.frequency_response import response
 from dap3d_core.simulation.linearization.inputs import inputs_of
 from dap3d_core.simulation.linearization.mode_motion import mode_motion
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint, operating_point
@@ -113,6 +114,40 @@ class Linearization:
     def D(self) -> Floats:
         """(outputs, inputs) feedthrough matrix."""
         return self._outputs.D if self.outputs else np.zeros((0, len(self.inputs)))
+
+    @checked
+    def frequency_response(
+        self,
+        frequencies: float | Sequence[float] | Floats,
+        inputs: Sequence[str] | str | None = None,
+        outputs: Sequence[str] | str | None = None,
+    ) -> Complex:
+        """Response to inputs that oscillate: complex amplitudes of outputs for unit amplitudes.
+
+        ``abs`` is the gain, ``numpy.angle`` by how much the output leads. Of an undamped resonance
+        it is infinite. The linearisation is about its state: an oscillation about no equilibrium
+        and no steady motion has none.
+
+        Args:
+            frequencies: (f,) Hz, as ``frequencies`` of the modes; 0 for a constant input.
+            inputs, outputs: as of ``linearize``; by default those of this linearisation.
+
+        Returns:
+            (f, outputs, inputs), in units of the outputs over those of the inputs.
+
+        Raises:
+            UnknownNameError: an input or output that there is not; names the nearest.
+            ValueError: a frequency is negative or not finite, or there are no inputs or outputs.
+        """
+        of = self
+        if inputs is not None or outputs is not None:
+            names = (self.inputs if inputs is None else _names(inputs),
+                     self.outputs if outputs is None else _names(outputs))  # fmt: skip
+            of = Linearization(self._point, *names, self._mode_count)
+        for word, there in (("inputs", of.inputs), ("outputs", of.outputs)):
+            if not there:
+                raise ValueError(f"a response needs {word}: name them here, or to linearize")
+        return response(of, frequencies)
 
     @property
     def state_count(self) -> int:

@@ -150,9 +150,10 @@ class _Path:
         tried: how often each condition was met, on other ways as well.
         """
         places = np.linspace(-REACH, REACH, PLACES)
-        results = [self._results(x) for x in places]
-        if not any(results):
+        first = self._results(places[0])
+        if not first:  # both sides of a where are evaluated: it compares everywhere, or nowhere
             return
+        results = [first, *map(self._results, places[1:])]
         for k in range(PLACES - 1):
             one, other = results[k], results[k + 1]
             for which in np.flatnonzero(np.array(one) != np.array(other)):
@@ -163,6 +164,8 @@ class _Path:
     def _located(self, a: float, b: float, which: int, first: bool) -> float:
         for _ in range(HALVINGS):
             middle = 0.5 * (a + b)
+            if middle in (a, b):  # neighbouring numbers
+                break
             a, b = (middle, b) if self._results(middle)[which] == first else (a, middle)
         return float(b)
 

@@ -101,7 +101,8 @@ class Kernels:
     ) -> NDArray[Any]:
         """The same of numbers of a class, which is called with each."""
         to_numbers = np.frompyfunc(number, 1, 1)
-        arrays = (to_numbers(x) for x in (state.body(), state.table(), state.own.astype(object)))
+        body = state.body()[: len(self.type_info.layout.slots) + 1]  # no other row is read
+        arrays = (to_numbers(x) for x in (body, state.table(), state.own.astype(object)))
         return self._run(name, element, number(state.t), *arrays)
 
     def state_rate(self, element: RandomElement, state: State, along: Any) -> Floats:

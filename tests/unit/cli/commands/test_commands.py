@@ -96,6 +96,7 @@ REFUSED = [
     (("kinematics", "pne1"), "did you mean 'pen1'"),
     (("inverse", "pne1"), "Missing argument 'MOTION'"),
     (("modes", "fall.toml", "-n", "0"), "is not in the range x>=1"),
+    (("response", "fall.toml", "--input", "a"), "Missing option '--output'"),
     # sweeps
     (("sweep",), "Missing argument 'MODEL'"),
     (("sweep", "pne1", *VARY, *KEEP), "did you mean 'pen1'"),

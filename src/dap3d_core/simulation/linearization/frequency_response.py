@@ -1,0 +1,74 @@
+"""Response of a linearisation to inputs that oscillate, and its peaks."""
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from dap3d_core.kernels.array_types import Floats
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.linearization.linearization import Linearization
+
+Complex = NDArray[np.complex128]
+#: Range of frequencies by default: below the lowest mode and above the highest, and without modes.
+BELOW, ABOVE, WITHOUT = 0.1, 10.0, (0.1, 100.0)
+#: Modes slower than this part of the fastest are drifts, and say nothing about a range.
+DRIFTS = 1e-6
+
+
+class Peak(NamedTuple):
+    """A frequency, Hz, at which a gain is largest among its neighbours; phase in rad."""
+
+    frequency: float
+    gain: float
+    phase: float
+
+
+def response(lin: "Linearization", frequencies: ArrayLike) -> Complex:
+    """(f, outputs, inputs) C (i omega - A)^-1 B + D; infinite at an undamped resonance.
+
+    Raises:
+        ValueError: a frequency is negative or not finite.
+    """
+    given = np.atleast_1d(np.asarray(frequencies, dtype=float))
+    if given.ndim != 1 or not np.all(np.isfinite(given)) or np.any(given < 0.0):
+        raise ValueError(f"frequencies are finite numbers of 0 Hz and more, not {frequencies!r}")
+    A, B, C, D = lin.A, lin.B, lin.C, lin.D
+    found = np.empty((len(given), len(lin.outputs), len(lin.inputs)), dtype=complex)
+    for k, f in enumerate(given):
+        try:
+            found[k] = C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) + D
+        except np.linalg.LinAlgError:
+            found[k] = np.inf
+    return found
+
+
+def usual_range(lin: "Linearization") -> tuple[float, float]:
+    """Frequencies, Hz, between which a response is of interest: around those of the modes."""
+    known = lin.frequencies[np.isfinite(lin.frequencies)]
+    known = known[known > DRIFTS * np.max(known, initial=0.0)]
+    if not len(known):
+        return WITHOUT
+    return BELOW * float(known.min()), ABOVE * float(known.max())
+
+
+def samples(lin: "Linearization", first: float, last: float, count: int) -> Floats:
+    """(f,) frequencies, Hz, evenly spaced by their logarithms, and closely about each mode."""
+    even = np.geomspace(first, last, count)
+    width = np.maximum(np.abs(lin.damping), 1e-3)
+    near = lin.frequencies[:, None] * (1.0 + width[:, None] * np.linspace(-3.0, 3.0, 61))
+    inside = near[(near >= first) & (near <= last)]
+    found: Floats = np.unique(np.concatenate([even, inside]))
+    return found
+
+
+def peaks(frequencies: Floats, values: Complex) -> list[Peak]:
+    """Peaks of one response (f,), in the order of their frequencies."""
+    gain = np.abs(values)
+    inner = (gain[1:-1] >= gain[:-2]) & (gain[1:-1] > gain[2:])
+    phase = np.unwrap(np.angle(np.where(np.isfinite(values), values, 0.0)))
+    return [
+        Peak(float(frequencies[k]), float(gain[k]), float(phase[k]))
+        for k in 1 + np.flatnonzero(inner)
+    ]

@@ -1,0 +1,56 @@
+"""``dap3d response``: its table, its JSON, its picture, and what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+from unit.simulation.linearization.test_frequency_response import exact, masses
+
+from dap3d_core.cli import main
+
+
+@pytest.fixture
+def model(tmp_path, monkeypatch):
+    """Two masses in the current folder."""
+    monkeypatch.chdir(tmp_path)
+    masses().save("masses.toml")
+    return ["response", "masses.toml", "--input", "push", "--output", "b.r.x"]
+
+
+def test_json(model, capsys):
+    """The response at every frequency, and its peaks, which the modes are near."""
+    assert main([*model, "--from", "0.5", "--to", "5", "-n", "20", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    [one] = data["responses"]
+    f, G = np.array(data["frequencies"]), np.array(one["real"]) + 1j * np.array(one["imag"])
+    assert f[0] == pytest.approx(0.5)
+    assert f[-1] == pytest.approx(5.0)
+    np.testing.assert_allclose(G, exact(f)[:, 1], rtol=1e-9)
+    assert [p["frequency"] for p in one["peaks"]] == pytest.approx([1.125, 2.259], rel=1e-3)
+
+
+def test_table_fits_sixty_columns(model, capsys, monkeypatch):
+    """The gain at the lowest frequency, and each peak."""
+    monkeypatch.setenv("COLUMNS", "60")
+    assert main([*model, "--output", "a.r.x", "-o", "bode.png"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 60
+    assert any("b.r.x over push" in line for line in lines)
+    assert any(line.split()[:2] == ["1.1254", "0.37723"] for line in lines)
+    assert main([*model, "-o", "bode.png"]) == 2  # it exists
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--from", "3", "--to", "1"), "give --from below --to"),
+        (("--output", "b.r.q"), "b.r has x, y, z"),
+        (("--input", "pus"), "did you mean 'push'"),
+        (("-o", "bode.docx"), ".png"),
+        (("-n", "1"), "is not in the range"),
+    ],
+)
+def test_what_is_refused(model, words, said, capsys):
+    """One message, exit status 2."""
+    assert main([*model, *words]) == 2
+    assert said in capsys.readouterr().err
