@@ -2,6 +2,7 @@
 
     states = ("z",)          one number
     states = {"z": 3, "q": 1}  by their lengths
+    states = {"z": "n"}        as many as a list of the type has entries
 
 The state ``z`` has the fields ``z_0``, its initial value, and ``z_atol``, its absolute tolerance,
 unless the type declares these itself. Its kernel ``rate`` returns the derivatives.
@@ -58,11 +59,15 @@ def add_state_fields(class_: type) -> None:
 
 
 def _is_length(length: Any) -> bool:
+    if isinstance(length, str):  # the name of a size
+        return length.isidentifier()
     return isinstance(length, int) and not isinstance(length, bool) and length > 0
 
 
-def _initial(name: str, length: int) -> Any:
+def _initial(name: str, length: int | str) -> Any:
     words = f"initial value of {name}"
+    if isinstance(length, str):
+        return numbers(length, 0.0, doc=words)
     if length == 1:
         return number(0.0, doc=words)
     zeros = (0.0,) * length

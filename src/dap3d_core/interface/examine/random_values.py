@@ -82,4 +82,4 @@ def random_field(spec: FieldSpec, rng: random.Random) -> Any:
         return spec.choices[0]
     if spec.kind == "functions":
         return ("f", "g", "h")
-    return None if spec.kind in ("function", "input") else spec.kind
+    return None if spec.kind in ("function", "input") or spec.size else spec.kind

@@ -26,6 +26,7 @@ from dap3d_core.scene.validate.geometry import (
     Geometry,
     Located,
     body_of,
+    entry_of,
     missing_words,
     point_of,
     two_ends,
@@ -51,7 +52,7 @@ READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
         maximum=spec.maximum,
         whole=spec.whole,
     ),
-    "numbers": lambda spec, value: numbers_of(value, spec.columns),
+    "numbers": lambda spec, x: list_of(x) if spec.size else numbers_of(x, spec.columns),
     "vec3": lambda spec, value: numbers_of(value, 3),
     "matrix": lambda spec, value: matrix_of(value),
     "square": lambda spec, value: square_of(value, spec.columns),
@@ -112,6 +113,7 @@ class Reader:
         self.ends = ENDS if takes_ends else ()
         self.fields = [self._field(name, spec) for name, spec in specs.items()]
         self.kinds = {name: spec.kind for name, spec in specs.items()}
+        self.lists = {name: spec for name, spec in specs.items() if spec.size}
         self.known = dict.fromkeys([*specs, *self.ends])
         # Bodies and points that may be left out follow from the other fields of their slot.
         self.late = [
@@ -141,6 +143,7 @@ class Reader:
                 value = field.spec.default
             field.read(reading, field, value)
         reading.check_slots()
+        shape = reading.shape() if self.lists and reading.good else None
         if not reading.good:
             return None
         values, bodies = reading.values, tuple(reading.bodies)
@@ -149,6 +152,10 @@ class Reader:
                 is_point = field.spec.kind == "point"
                 values[field.name] = ZERO if is_point else self.body_names[bodies[field.slot]]
         type_info = self.type_info.chosen(values) if self.type_info.variants else self.type_info
+        if shape is not None:
+            from dap3d_core.interface.examine.sized_types import sized
+
+            type_info, bodies = sized(type_info, shape), tuple(reading.bodies)
         functions = tuple(
             [self.rows[self.kinds[n]].get(values[n], 0) for n in type_info.layout.functions]
         )
@@ -159,8 +166,8 @@ class Reader:
 class _Reading:
     """One element: values of its fields, the body of each slot and the field that gave it."""
 
-    __slots__ = ("bodies", "element", "given_by", "good", "key", "others", "reader", "report",
-                 "values")  # fmt: skip
+    __slots__ = ("bodies", "element", "given_by", "good", "key", "others", "places", "reader",
+                 "report", "values")  # fmt: skip
 
     def __init__(self, reader: Reader, element: Element) -> None:
         count = len(reader.slots)
@@ -169,6 +176,7 @@ class _Reading:
         self.values: dict[str, Any] = {}
         self.bodies, self.given_by = [_UNKNOWN] * count, [""] * count
         self.others: dict[str, int] = {}  # bodies of vectors of no slot
+        self.places: dict[str, Sequence[Located]] = {}  # of the entries of lists
         self.good = True
 
     def refuse(self, name: str, what: str, nearest: str = "", remedy: str = "") -> None:
@@ -289,8 +297,8 @@ class _Reading:
     def value(self, field: _Field, value: Any) -> None:
         """A number, a list of numbers, a matrix or a word."""
         spec = field.spec
-        if value is None and spec.default is None:
-            self.values[field.name] = None
+        if value is None and spec.default is None or (spec.size and value is spec.default):
+            self.values[field.name] = value
             return
         key = (*self.key, field.name)
         result = self.report.read(key, value, field.value_of)
@@ -299,6 +307,48 @@ class _Reading:
             self.good = False
         elif odd := oddity(spec, result):
             self.report.note(f"{dotted(key)} = {shown(value)} {odd}")
+
+    # ---------------------------------------------------------------- lists
+
+    def list(self, field: _Field, value: Any) -> None:
+        """A list of points, vectors or bodies by name."""
+        self.values[field.name] = value
+        kind, least = field.spec.kind, field.spec.least
+        if type(value) is not tuple or len(value) < least:
+            self.refuse(field.name, f"should be a list of {least} or more {kind}, by name")
+            return
+        key, geometry = (*self.key, field.name), self.reader.geometry
+        places = [entry_of(self.report, geometry, key, kind, name) for name in value]
+        self.good &= None not in places
+        self.places[field.name] = places
+
+    def shape(self) -> Any:
+        """The lengths of the lists and the slots of their entries, whose values become fields."""
+        from dap3d_core.interface.examine.sized_types import Shape, entry_fields, shared_slots
+
+        sizes: dict[str, tuple[int, str]] = {}
+        given = {n: v for n in self.reader.lists if isinstance(v := self.values[n], tuple)}
+        for name, value in given.items():
+            count, first = sizes.setdefault(self.reader.lists[name].size, (len(value), name))
+            if count != len(value):
+                what = f"has {len(value)} entries, and {first} has {count}: they go together"
+                self.refuse(name, what)
+        for name in self.reader.lists.keys() - given.keys():  # a default, one number
+            spec = self.reader.lists[name]
+            self.values[name] = (float(spec.default),) * sizes[spec.size][0]
+        on = {name: [body for body, _ in places] for name, places in self.places.items()}
+        try:
+            self.bodies, slots = shared_slots(self.bodies, on)
+        except ValueError as error:
+            self.refuse("", str(error))
+            return None
+        if on and len(self.bodies) < 2:
+            name = self.reader.body_names[self.bodies[0]]
+            self.refuse(next(iter(on)), f"all are on {name}; an element acts between bodies")
+        for name, letters in slots.items():
+            for entry, (_, local) in zip(entry_fields(name, letters), self.places[name], strict=True):
+                self.values[entry] = local
+        return Shape(tuple((n, k) for n, (k, _) in sizes.items()), tuple(slots.items()))
 
     # ---------------------------------------------------------------- bodies of slots
 
@@ -364,6 +414,9 @@ _FIELD_READERS = {
     "functions": _Reading.functions,
     "input": _Reading.input,
     "joint": _Reading.joint,
+    "points": _Reading.list,
+    "vectors": _Reading.list,
+    "bodies": _Reading.list,
 }
 
 
