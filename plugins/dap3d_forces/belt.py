@@ -24,12 +24,12 @@ class Belt(Force):
     runs from pulley k to the next. With rho_k the radii, d between the centres, normal to the axis,
     l its length, u = d / l and m = axis x u, it touches both pulleys in the direction n:
 
-        sin b = (rho_k - rho_(k+1)) / l,  n = sin b u - cos b m,  e = cos b u + sin b m
-        P_k = r_k + rho_k n,  P_(k+1) = r_(k+1) + rho_(k+1) n
-        x_dot = e . (v_P(k+1) - v_Pk),  T = max(0, pretension + k x + c x_dot)
+        sin b = (rho_k - rho_(k+1)) / l,  n = sin b u - cos b m
+        P_k = r_k + rho_k n,  P_(k+1) = r_(k+1) + rho_(k+1) n,  e along P_(k+1) - P_k
+        x_dot = e . (v_P(k+1) - v_P_k),  T = max(0, pretension + k x + c x_dot)
         force T e at P_k on pulley k, -T e at P_(k+1) on the next
 
-    v_P is the velocity of the point of the pulley there. The elongations x of the spans since the
+    v_P_k is the velocity of the point of the pulley there. The elongations x of the spans since the
     start are states. The forces load the bearings: with the axis fixed, the moment on a pulley is
     rho (T_out - T_in), where T_out is the tension of the span that begins there. With ``crossed``
     the belt of two pulleys crosses itself, as with a negative second radius.
@@ -37,7 +37,7 @@ class Belt(Force):
 
     keyword = "belt"
     synonyms = ("pulley", "timing-belt", "chain")
-    states = {"x": "n"}  # noqa: RUF012
+    states = {"x": "n"}
     points: tuple = points("n", least=2, doc="centres of the pulleys, in order along the belt")
     radii: tuple = numbers("n", unit="m", doc="radii; negative of a pulley on the belt's back")
     axis: Vector = vector(doc="direction of the axes of all pulleys")
@@ -98,8 +98,10 @@ def runs(r, rho, axis):
         m = cross(axis, u)
         s = (rho[a] - rho[b]) / l
         z = sqrt(1.0 - s * s)
-        n, e = sub(scale(s, u), scale(z, m)), add(scale(z, u), scale(s, m))
-        spans.append((a, b, e, scale(rho[a], n), scale(rho[b], n)))
+        n = sub(scale(s, u), scale(z, m))
+        arm_a, arm_b = scale(rho[a], n), scale(rho[b], n)
+        e = sub(add(r[b], arm_b), add(r[a], arm_a))
+        spans.append((a, b, scale(1.0 / sqrt(norm2(e)), e), arm_a, arm_b))
     return spans
 
 

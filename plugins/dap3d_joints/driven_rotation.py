@@ -1,6 +1,6 @@
 """Rotation driver at position level: prescribes the angle of one body against another."""
 
-from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, vector
+from dap3d_core.interface import Body, Joint, Vector, body, function, hookimpl, input_, vector
 from dap3d_core.kernels import atan2, cos, dot, neg, normals, row, sin, sub
 from dap3d_joints.relative_rows import turning, turning_rate
 
@@ -24,7 +24,8 @@ class DrivenRotation(Joint):
         gamma = f_ddot - h_dot . (w_i - w_j)
 
     h = a_j where a revolute or cylindrical joint holds a_j along the same axis of body i. Turns
-    are not counted, nor need they be.
+    are not counted, nor need they be. An input is the rate, held between settings: the row is then
+    one of the velocity level alone, and velocities jump where it is set.
     """
 
     keyword, rows = "drive-rot", 1
@@ -35,6 +36,7 @@ class DrivenRotation(Joint):
     body_j: Body = body(default="ground", doc="body that the rotation is measured from")
     a_j: Vector = vector(doc="axis, on body j")
     function: str = function(doc="angle, rad, as a function of time; counted from f(0)")
+    input: str = input_(instead_of="function", unit="rad/s", doc="rate of rotation")
 
     def prepare(self, bodies):
         n, m = normals(self.a_j)
@@ -56,6 +58,19 @@ class DrivenRotation(Joint):
     def gamma(a_j, u_i, a_j_dot, u_i_dot, w_i, w_j, f_ddot):
         h_dot = turning_rate(a_j, u_i, a_j_dot, u_i_dot)
         return f_ddot - dot(h_dot, sub(w_i, w_j))
+
+
+class Held(DrivenRotation, input=True):
+    """The rate is an input."""
+
+    holonomic = False
+    C = None
+
+    def nu(input):
+        return input
+
+    def gamma(a_j, u_i, a_j_dot, u_i_dot, w_i, w_j):
+        return -dot(turning_rate(a_j, u_i, a_j_dot, u_i_dot), sub(w_i, w_j))
 
 
 @hookimpl
