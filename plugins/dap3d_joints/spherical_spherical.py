@@ -63,10 +63,11 @@ class Leg(SphericalSpherical, function=True):
         C     = (d . d - l |l|) / 2,  nu = |l| f_dot
         gamma = d . (w_i x s_i_dot - w_j x s_j_dot) - d_dot . d_dot + |l| f_ddot + sign(l) f_dot^2
 
-    A leg is not turned round: where l would be negative there is no position.
+    A leg is not turned round: a run ends where l becomes negative.
     """
 
     drives = True
+    switch_words = "the length of a driven leg has become zero; give it a greater length or stroke"
 
     def prepare(self, bodies):
         constants = super().prepare(bodies)
@@ -86,6 +87,9 @@ class Leg(SphericalSpherical, function=True):
         arms = dot(d, sub(cross(w_i, s_P_i_dot), cross(w_j, s_P_j_dot)))
         driven = abs(l) * f_ddot + where(l < 0.0, -1.0, 1.0) * f_dot * f_dot
         return arms - dot(d_dot, d_dot) + driven
+
+    def switch(length, counted, f, f_0):
+        return length + f - counted * f_0
 
 
 class Paced(SphericalSpherical, input=True):

@@ -8,6 +8,7 @@ import attrs
 
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
+from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
 from dap3d_core.scene.scene import GROUND, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
@@ -99,7 +100,7 @@ class Reader:
         self.type_info, self.table = type_info, table
         self.geometry, self.report, self.arguments = geometry, report, arguments
         self.body_names = (GROUND, *geometry.bodies.body_names)
-        self.slots = () if getattr(type_info.type, "each_body", False) else type_info.layout.slots
+        self.slots = () if acts_on_all(type_info.type) else type_info.layout.slots
         self.function_index = {name: k for k, name in enumerate(report.scene.functions, 1)}
         #: Rows of F: those of functions, then those of inputs.
         self.rows = {

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import attrs
 
+from dap3d_core.interface.types import acts_on_all
 from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import dotted
 from dap3d_core.scene.scene import NAMED, Scene, fault_of_name
@@ -125,7 +126,7 @@ def _check_shapes_and_outputs(report: Collector, bodies: "Bodies") -> None:
 
 def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Instance]) -> None:
     """Note bodies without joints and forces."""
-    if any(getattr(e.type_info.type, "each_body", False) for e in elements):
+    if any(acts_on_all(e.type_info.type) for e in elements):
         return
     used = {body for e in elements for body in e.bodies}
     for k, name in enumerate(bodies.body_names, 1):
