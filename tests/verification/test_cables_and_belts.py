@@ -27,12 +27,12 @@ def test_two_blocks_over_a_movable_pulley():
     m_1, m_2 = 3.0, 2.0
     result = dap.simulate(blocks(m_1, m_2, "joint"), t_end=0.2, dt=0.1)
     T = 3.0 * m_1 * m_2 * G / (4.0 * m_1 + m_2)
-    np.testing.assert_allclose(result["rope.lambda"].ravel(), T, rtol=1e-10)
+    np.testing.assert_allclose(result.quantity("rope.lambda").values.ravel(), T, rtol=1e-10)
     np.testing.assert_allclose(result.rdd[:, 0, 2], T / m_1 - G, rtol=1e-9)
     np.testing.assert_allclose(result.rdd[:, 1, 2], 2.0 * T / m_2 - G, rtol=1e-9)
     length = -result.r[:, 0, 2] + 2.0 - 2.0 * result.r[:, 1, 2]
     np.testing.assert_allclose(length, length[0], rtol=1e-12)
-    energy = result["energy.total"]
+    energy = result.quantity("energy.total").values
     np.testing.assert_allclose(energy, energy[0], atol=1e-8)
 
 
@@ -73,7 +73,9 @@ def test_a_winch_with_a_function_and_an_input():
         scene.add_force("weight", "g", gravity=G)
         result = dap.simulate(scene, t_end=0.5, dt=0.25)
         np.testing.assert_allclose(result.r[:, 0, 2], -1.0 - 0.1 * result.t, atol=1e-9)
-        np.testing.assert_allclose(result["rope.lambda"].ravel(), 2.0 * G, rtol=1e-9)
+        np.testing.assert_allclose(
+            result.quantity("rope.lambda").values.ravel(), 2.0 * G, rtol=1e-9
+        )
 
 
 def belt(crossed):

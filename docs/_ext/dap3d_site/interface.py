@@ -126,6 +126,12 @@ def _words() -> Iterator[str]:
         "imported from `dap3d_core.kernels`: then the same lines run compiled, in plain Python, "
         "with complex numbers and with symbols."
     )
+    rows = [
+        (subject, code(name), (getattr(kernels, name).__doc__ or "").partition("\n")[0])
+        for subject, names in WORDS.items()
+        for name in names
+    ]
+    yield table(("subject", "word", "what it is"), rows)
     for subject, names in WORDS.items():
         yield f"## {subject}"
         for name in names:

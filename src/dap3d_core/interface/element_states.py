@@ -44,8 +44,9 @@ def add_state_fields(class_: type) -> None:
     if "states" not in vars(class_):
         return
     fields: dict[str, Any] = {}
+    sizes = _sizes(class_)
     for name, length in state_lengths(class_).items():
-        if isinstance(name, str) and name.isidentifier() and _is_length(length):
+        if isinstance(name, str) and name.isidentifier() and _is_length(length, sizes):
             fields[f"{name}{INITIAL}"] = _initial(name, length)
             words = f"absolute tolerance of {name}; 0: that of the run"
             fields[f"{name}{TOLERANCE}"] = number(0.0, minimum=0.0, doc=words)
@@ -58,9 +59,16 @@ def add_state_fields(class_: type) -> None:
     class_.__annotations__ = own
 
 
-def _is_length(length: Any) -> bool:
-    if isinstance(length, str):  # the name of a size
-        return length.isidentifier()
+def _sizes(class_: type) -> set[str]:
+    """Names of the sizes of the lists that a class declares, before attrs has made its fields."""
+    declared = [*vars(class_).values(), *getattr(class_, "__attrs_attrs__", ())]
+    specs = (getattr(field, "metadata", {}).get("dap3d") for field in declared)
+    return {spec.size for spec in specs if spec is not None}
+
+
+def _is_length(length: Any, sizes: set[str]) -> bool:
+    if isinstance(length, str):
+        return length in sizes
     return isinstance(length, int) and not isinstance(length, bool) and length > 0
 
 

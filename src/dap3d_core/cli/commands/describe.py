@@ -137,7 +137,11 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         ],
         "example": example_of(type_info, registry),
         **({"motions": _motions(type_info)} if kind == "joint" else {}),
-        **({"each_body": bool(type_.each_body), "each_pair": bool(type_.each_pair)} if kind == "force" else {}),
+        **(
+            {"each_body": bool(type_.each_body), "each_pair": bool(type_.each_pair)}
+            if kind == "force"
+            else {}
+        ),
         **({"arguments": type_.arguments} if kind == "function" else {}),
     }
 

@@ -187,5 +187,3 @@ def _described(sample: TypeInfo) -> dict[str, KernelArgument]:
         velocity = first is not None and first.velocity
         described[name] = KernelArgument(name, (len(entries), *own), velocity, "", doc=doc)
     return described
-
-

@@ -347,7 +347,9 @@ class _Reading:
             name = self.reader.body_names[self.bodies[0]]
             self.refuse(next(iter(on)), f"all are on {name}; an element acts between bodies")
         for name, letters in slots.items():
-            for entry, (_, local) in zip(entry_fields(name, letters), self.places[name], strict=True):
+            for entry, (_, local) in zip(
+                entry_fields(name, letters), self.places[name], strict=True
+            ):
                 self.values[entry] = local
         return Shape(tuple((n, k) for n, (k, _) in sizes.items()), tuple(slots.items()))
 
