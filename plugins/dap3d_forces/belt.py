@@ -1,5 +1,7 @@
 """Elastic belt over two or more pulleys."""
 
+from typing import ClassVar
+
 from dap3d_core.interface import (
     Force,
     Vector,
@@ -37,7 +39,7 @@ class Belt(Force):
 
     keyword = "belt"
     synonyms = ("pulley", "timing-belt", "chain")
-    states = {"x": "n"}
+    states: ClassVar = {"x": "n"}
     points: tuple = points("n", least=2, doc="centres of the pulleys, in order along the belt")
     radii: tuple = numbers("n", unit="m", doc="radii; negative of a pulley on the belt's back")
     axis: Vector = vector(doc="direction of the axes of all pulleys")

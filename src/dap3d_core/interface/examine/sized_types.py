@@ -76,7 +76,7 @@ def examine_sized(type_: Any, examine: Callable[..., TypeInfo], seed: int) -> Ty
     sample = [examine(class_, seed) for class_ in sample_classes(type_)][0]
     slots = body_slots(type_)
     layout = attrs.evolve(sample.layout, slots=slots)
-    names = {**sample.names, **_described(sample)}
+    names = {**sample.names, **described(sample)}
     return attrs.evolve(sample, type=type_, layout=layout, names=names, variants=variants, given="")
 
 
@@ -176,7 +176,7 @@ def _prepare(type_: Any, on: Mapping[str, Sequence[str]]) -> Callable[..., Any]:
     return prepare
 
 
-def _described(sample: TypeInfo) -> dict[str, KernelArgument]:
+def described(sample: TypeInfo) -> dict[str, KernelArgument]:
     """What lists offer, for descriptions of a type."""
     shape: Shape = sample.type.shape_of_lists  # type: ignore[attr-defined]
     described = {}

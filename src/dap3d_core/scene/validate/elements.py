@@ -298,7 +298,7 @@ class _Reading:
     def value(self, field: _Field, value: Any) -> None:
         """A number, a list of numbers, a matrix or a word."""
         spec = field.spec
-        if value is None and spec.default is None or (spec.size and value is spec.default):
+        if (value is None and spec.default is None) or (spec.size and value is spec.default):
             self.values[field.name] = value
             return
         key = (*self.key, field.name)
@@ -308,8 +308,6 @@ class _Reading:
             self.good = False
         elif odd := oddity(spec, result):
             self.report.note(f"{dotted(key)} = {shown(value)} {odd}")
-
-    # ---------------------------------------------------------------- lists
 
     def list(self, field: _Field, value: Any) -> None:
         """A list of points, vectors or bodies by name."""

@@ -1,5 +1,7 @@
 """Types with lists of a length that the scene gives."""
 
+from typing import ClassVar
+
 import numpy as np
 import pytest
 
@@ -17,10 +19,10 @@ from dap3d_core.testing import check_type
 
 
 class Anchors(Force):
-    """Each point is pulled towards the first by a spring of its own, with a memory of its length."""
+    """Each point is pulled towards the first by a spring of its own, with a memory."""
 
     keyword = "anchors"
-    states = {"q": "n"}
+    states: ClassVar = {"q": "n"}
     points: tuple = points("n", least=2)
     stiffness: tuple = numbers("n", 2.0)
     tau: float = number(1.0, positive=True)
@@ -97,9 +99,9 @@ def test_a_wrong_list_is_refused(fields, words):
 
 
 def test_points_that_coincide_are_refused():
+    scene = cable(points=["a.O", "P", "ground.O"])
+    scene.add_point("P", body="ground", sPp=[0.0, 0.0, -1.0])
     with pytest.raises(dap.SceneError, match="points 1 and 2 of the cable coincide"):
-        scene = cable(points=["a.O", "P", "ground.O"])
-        scene.add_point("P", body="ground", sPp=[0.0, 0.0, -1.0])
         dap.compile(scene)
 
 
