@@ -83,7 +83,7 @@ def length_at_start(points, poses):
         ValueError: a point coincides with the next.
     """
     places = [pose.place(point) for point, pose in zip(points, poses, strict=True)]
-    squares = [norm2(sub(b, a)) for a, b in zip(places, places[1:], strict=False)]
+    squares = [norm2(d) for d in steps(places)]
     if 0.0 in squares:
         k = squares.index(0.0) + 1
         raise ValueError(
@@ -93,9 +93,14 @@ def length_at_start(points, poses):
     return sum(square**0.5 for square in squares)
 
 
+def steps(r):
+    """From each vector to the next."""
+    return [sub(r[k + 1], r[k]) for k in range(len(r) - 1)]
+
+
 def spans(r):
     """Lengths of the spans between points, and unit vectors along them."""
-    between = [sub(b, a) for a, b in zip(r, r[1:], strict=False)]
+    between = steps(r)
     lengths = [sqrt(norm2(d)) for d in between]
     return lengths, [scale(1.0 / l, d) for l, d in zip(lengths, between, strict=True)]
 
@@ -103,8 +108,7 @@ def spans(r):
 def pulls(r):
     """The force on each point of a cable with the tension 1."""
     u = spans(r)[1]
-    inner = [sub(b, a) for a, b in zip(u, u[1:], strict=False)]
-    return [u[0], *inner, scale(-1.0, u[-1])]
+    return [u[0], *steps(u), scale(-1.0, u[-1])]
 
 
 def length_rate(r, v):

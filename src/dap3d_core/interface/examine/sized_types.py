@@ -73,7 +73,7 @@ def examine_sized(type_: Any, examine: Callable[..., TypeInfo], seed: int) -> Ty
     """Check a type by samples; the result describes it, and ``sized`` completes it."""
     own_variants = type_.variants if "variants" in vars(type_) else ()
     variants = tuple((conditions, examine(class_, seed)) for conditions, class_ in own_variants)
-    sample = [examine(class_, seed) for class_ in sample_classes(type_)][0]
+    sample = examine(sample_classes(type_)[0], seed)
     slots = body_slots(type_)
     layout = attrs.evolve(sample.layout, slots=slots)
     names = {**sample.names, **described(sample)}
@@ -99,7 +99,8 @@ def sample_classes(type_: Any) -> list[Any]:
 
 def sized(type_info: TypeInfo, shape: Shape) -> TypeInfo:
     """The type for one shape of its lists."""
-    return _examined(type_info.type, shape)
+    type_: Any = type_info.type
+    return _examined(type_, shape)
 
 
 @cache
