@@ -7,6 +7,7 @@ from dap3d_core.interface import (
     body,
     function,
     hookimpl,
+    input_,
     joint_fields,
     vector,
 )
@@ -33,7 +34,8 @@ class DrivenRotation(Joint):
         gamma = f_ddot - h_dot . (w_i - w_j)
 
     h = a_j where a revolute or cylindrical joint holds a_j along the same axis of body i. Turns
-    are not counted, nor need they be.
+    are not counted, nor need they be. An input is the rate, held between settings: the row is then
+    one of the velocity level alone, and velocities jump where it is set.
     """
 
     keyword, rows = "drive-rot", 1
@@ -50,6 +52,7 @@ class DrivenRotation(Joint):
     body_j: Body = body(default="ground", doc="body that the rotation is measured from")
     a_j: Vector = vector(doc="axis, on body j")
     function: str = function(doc="angle, rad, as a function of time; counted from f(0)")
+    input: str = input_(instead_of="function", unit="rad/s", doc="rate of rotation")
 
     def prepare(self, bodies):
         n, m = normals(self.a_j)
@@ -71,6 +74,19 @@ class DrivenRotation(Joint):
     def gamma(a_j, u_i, a_j_dot, u_i_dot, w_i, w_j, f_ddot):
         h_dot = turning_rate(a_j, u_i, a_j_dot, u_i_dot)
         return f_ddot - dot(h_dot, sub(w_i, w_j))
+
+
+class Held(DrivenRotation, input=True):
+    """The rate is an input."""
+
+    holonomic = False
+    C = None
+
+    def nu(input):
+        return input
+
+    def gamma(a_j, u_i, a_j_dot, u_i_dot, w_i, w_j):
+        return -dot(turning_rate(a_j, u_i, a_j_dot, u_i_dot), sub(w_i, w_j))
 
 
 @hookimpl

@@ -8,6 +8,7 @@ from dap3d_core.interface import (
     body,
     function,
     hookimpl,
+    input_,
     joint_fields,
     number,
     point,
@@ -30,6 +31,9 @@ class DrivenTranslation(Joint):
         C     = a_j . (d(0) - d) - (f - f_0)         length left out: C = 0 in the poses as given
         J_i   = [a_j^T, (s_i x a_j)^T],  J_j = [-a_j^T, ((d - s_j) x a_j)^T],  nu = f_dot
         gamma = f_ddot - (w_i x s_i_dot) . a_j - (w_j x d + s_j_dot - 2 d_dot) . a_j_dot
+
+    An input is the speed, held between settings: the row is then one of the velocity level alone,
+    and velocities jump where it is set.
     """
 
     keyword, rows = "drive-tran", 1
@@ -42,6 +46,7 @@ class DrivenTranslation(Joint):
     P_j: Point = point(default=None, doc="on body j; the mass centre when left out")
     a_j: Vector = vector(doc="direction, on body j")
     function: str = function(doc="distance, m, as a function of time")
+    input: str = input_(instead_of="function", unit="m/s", doc="speed of P_i along a_j")
     length: float = number(
         default=None, unit="m", doc="distance where f = 0; left out, f is counted from the start"
     )
@@ -66,6 +71,21 @@ class DrivenTranslation(Joint):
         d, d_dot = sub(r_P_j, r_P_i), sub(v_P_j, v_P_i)
         slide = sub(add(cross(w_j, d), s_P_j_dot), scale(2.0, d_dot))
         return f_ddot - dot(cross(w_i, s_P_i_dot), a_j) - dot(slide, a_j_dot)
+
+
+class Held(DrivenTranslation, input=True):
+    """The speed is an input."""
+
+    holonomic = False
+    C = None
+
+    def nu(input):
+        return input
+
+    def gamma(a_j, a_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j):
+        d, d_dot = sub(r_P_j, r_P_i), sub(v_P_j, v_P_i)
+        slide = sub(add(cross(w_j, d), s_P_j_dot), scale(2.0, d_dot))
+        return -dot(cross(w_i, s_P_i_dot), a_j) - dot(slide, a_j_dot)
 
 
 @hookimpl

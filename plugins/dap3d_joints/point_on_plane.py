@@ -8,6 +8,7 @@ from dap3d_core.interface import (
     body,
     function,
     hookimpl,
+    input_,
     number,
     point,
     vector,
@@ -28,7 +29,9 @@ class PointOnPlane(Joint):
         J_i   = [a_j^T, (s_i x a_j)^T],  nu = f_dot
         gamma = -a_j . (w_i x s_i_dot) + f_ddot
 
-    The manual's gamma lacks the dot on s_i.
+    The manual's gamma lacks the dot on s_i. An input is the speed along a_j, held between settings:
+    the row is then one of the velocity level alone, without ``length``, and velocities jump where
+    it is set.
     """
 
     keyword, rows = "rP", 1
@@ -38,6 +41,7 @@ class PointOnPlane(Joint):
     a_j: Vector = vector(ground=True, doc="normal of the plane, on ground")
     length: float = number(unit="m", doc="coordinate along a_j where f = 0; of either sign")
     function: str = function(doc="how far the plane moves along a_j, m, as a function of time")
+    input: str = input_(instead_of="function", unit="m/s", doc="speed of the plane along a_j")
 
     def C(a_j, r_P_i, length, f):
         return dot(a_j, r_P_i) - length - f
@@ -50,6 +54,19 @@ class PointOnPlane(Joint):
 
     def gamma(a_j, w_i, s_P_i_dot, f_ddot):
         return f_ddot - dot(a_j, cross(w_i, s_P_i_dot))
+
+
+class Held(PointOnPlane, input=True):
+    """The speed is an input."""
+
+    holonomic = False
+    C = None
+
+    def nu(input):
+        return input
+
+    def gamma(a_j, w_i, s_P_i_dot):
+        return -dot(a_j, cross(w_i, s_P_i_dot))
 
 
 @hookimpl

@@ -1,7 +1,7 @@
 """Spherical-spherical joint: a massless link of given length between two points."""
 
-from dap3d_core.interface import Joint, Vector2, function, hookimpl, number, vector2
-from dap3d_core.kernels import abs, cross, dot, neg, norm2, row, sub, where
+from dap3d_core.interface import Joint, Vector2, function, hookimpl, input_, number, vector2
+from dap3d_core.kernels import abs, cross, dot, neg, norm2, row, sqrt, sub, where
 
 interface_version = 1
 
@@ -17,7 +17,9 @@ class SphericalSpherical(Joint):
         J_i   = [-d^T, -(s_i x d)^T],  J_j = [d^T, (s_j x d)^T]
         gamma = d . (w_i x s_i_dot - w_j x s_j_dot) - d_dot . d_dot
 
-    lambda |d| is the force in the link, negative in tension, also with a function.
+    lambda |d| is the force in the link, negative in tension, also with a function. An input
+    is the speed at which the leg becomes longer, held between settings (``Paced``): the row is then
+    one of the velocity level alone, and velocities jump where it is set.
     """
 
     keyword, rows = "sph-sph", 1
@@ -28,6 +30,9 @@ class SphericalSpherical(Joint):
         default=None, unit="m", positive=True, doc="length of the link; left out, as at the start"
     )
     function: str = function(doc="m, by which a driven leg is longer, as a function of time")
+    input: str = input_(
+        instead_of="function", unit="m/s", doc="speed at which a driven leg becomes longer"
+    )
 
     def prepare(self, bodies):
         if self.length is not None:
@@ -58,10 +63,11 @@ class Leg(SphericalSpherical, function=True):
         C     = (d . d - l |l|) / 2,  nu = |l| f_dot
         gamma = d . (w_i x s_i_dot - w_j x s_j_dot) - d_dot . d_dot + |l| f_ddot + sign(l) f_dot^2
 
-    A leg is not turned round: where l would be negative there is no position.
+    A leg is not turned round: a run ends where l becomes negative.
     """
 
     drives = True
+    switch_words = "the length of a driven leg has become zero; give it a greater length or stroke"
 
     def prepare(self, bodies):
         constants = super().prepare(bodies)
@@ -81,6 +87,23 @@ class Leg(SphericalSpherical, function=True):
         arms = dot(d, sub(cross(w_i, s_P_i_dot), cross(w_j, s_P_j_dot)))
         driven = abs(l) * f_ddot + where(l < 0.0, -1.0, 1.0) * f_dot * f_dot
         return arms - dot(d_dot, d_dot) + driven
+
+    def switch(length, counted, f, f_0):
+        return length + f - counted * f_0
+
+
+class Paced(SphericalSpherical, input=True):
+    """A leg whose speed is an input v: nu = |d| v, gamma as for the link, and v d . d_dot / |d|."""
+
+    drives, holonomic = True, False
+    C = None
+
+    def nu(d, input):
+        return sqrt(norm2(d)) * input
+
+    def gamma(d, d_dot, w_i, w_j, s_P_i_dot, s_P_j_dot, input):
+        arms = dot(d, sub(cross(w_i, s_P_i_dot), cross(w_j, s_P_j_dot)))
+        return arms - dot(d_dot, d_dot) + input * dot(d, d_dot) / sqrt(norm2(d))
 
 
 @hookimpl

@@ -9,7 +9,8 @@ from dap3d_site.markdown import code, directive, page, table
 
 #: Makers of fields, in the order in which one meets them.
 MAKERS = ("body", "point", "vector", "vector2", "number", "numbers", "vec3", "matrix", "function",
-          "functions", "input_", "angle", "table", "square", "choice", "joint", "joint_fields")  # fmt: skip
+          "functions", "input_", "angle", "table", "square", "choice", "joint", "joint_fields",
+          "points", "vectors", "bodies")  # fmt: skip
 #: Annotations of fields: the class of what a scene names there is not seen by the author.
 ANNOTATIONS = ("Body", "Point", "Vector", "Vector2")
 CLASSES = ("Joint", "Force", "Function")
@@ -41,7 +42,7 @@ WORDS = {
         "hypot",
     ),
     "Parts of numbers": ("abs", "sign", "floor", "mod", "minimum", "maximum"),
-    "Branches and tables": ("where", "lookup"),
+    "Branches, tables, lists": ("where", "lookup", "item", "by_body"),
     "For `prepare`": ("normals",),
 }
 
@@ -125,6 +126,12 @@ def _words() -> Iterator[str]:
         "imported from `dap3d_core.kernels`: then the same lines run compiled, in plain Python, "
         "with complex numbers and with symbols."
     )
+    rows = [
+        (subject, code(name), (getattr(kernels, name).__doc__ or "").partition("\n")[0])
+        for subject, names in WORDS.items()
+        for name in names
+    ]
+    yield table(("subject", "word", "what it is"), rows)
     for subject, names in WORDS.items():
         yield f"## {subject}"
         for name in names:

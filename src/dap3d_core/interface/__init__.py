@@ -9,6 +9,7 @@ from dap3d_core.interface.fields import (
     Vector,
     Vector2,
     angle,
+    bodies,
     body,
     choice,
     function,
@@ -20,11 +21,13 @@ from dap3d_core.interface.fields import (
     number,
     numbers,
     point,
+    points,
     square,
     table,
     vec3,
     vector,
     vector2,
+    vectors,
 )
 from dap3d_core.interface.hooks import hookimpl
 from dap3d_core.interface.types import INTERFACE_VERSION, Force, Function, Joint
@@ -41,6 +44,7 @@ __all__ = [
     "Vector",
     "Vector2",
     "angle",
+    "bodies",
     "body",
     "choice",
     "examine",
@@ -54,9 +58,11 @@ __all__ = [
     "number",
     "numbers",
     "point",
+    "points",
     "square",
     "table",
     "vec3",
     "vector",
     "vector2",
+    "vectors",
 ]

@@ -2,6 +2,7 @@
 
     states = ("z",)          one number
     states = {"z": 3, "q": 1}  by their lengths
+    states = {"z": "n"}        as many as a list of the type has entries
 
 The state ``z`` has the fields ``z_0``, its initial value, and ``z_atol``, its absolute tolerance,
 unless the type declares these itself. Its kernel ``rate`` returns the derivatives.
@@ -43,8 +44,9 @@ def add_state_fields(class_: type) -> None:
     if "states" not in vars(class_):
         return
     fields: dict[str, Any] = {}
+    sizes = _sizes(class_)
     for name, length in state_lengths(class_).items():
-        if isinstance(name, str) and name.isidentifier() and _is_length(length):
+        if isinstance(name, str) and name.isidentifier() and _is_length(length, sizes):
             fields[f"{name}{INITIAL}"] = _initial(name, length)
             words = f"absolute tolerance of {name}; 0: that of the run"
             fields[f"{name}{TOLERANCE}"] = number(0.0, minimum=0.0, doc=words)
@@ -57,12 +59,23 @@ def add_state_fields(class_: type) -> None:
     class_.__annotations__ = own
 
 
-def _is_length(length: Any) -> bool:
+def _sizes(class_: type) -> set[str]:
+    """Names of the sizes of the lists that a class declares, before attrs has made its fields."""
+    declared = [*vars(class_).values(), *getattr(class_, "__attrs_attrs__", ())]
+    specs = (getattr(field, "metadata", {}).get("dap3d") for field in declared)
+    return {spec.size for spec in specs if spec is not None}
+
+
+def _is_length(length: Any, sizes: set[str]) -> bool:
+    if isinstance(length, str):
+        return length in sizes
     return isinstance(length, int) and not isinstance(length, bool) and length > 0
 
 
-def _initial(name: str, length: int) -> Any:
+def _initial(name: str, length: int | str) -> Any:
     words = f"initial value of {name}"
+    if isinstance(length, str):
+        return numbers(length, 0.0, doc=words)
     if length == 1:
         return number(0.0, doc=words)
     zeros = (0.0,) * length

@@ -27,7 +27,8 @@ class FieldSpec:
 
     Attributes:
         kind: body, point, vector, vector2, number, numbers, vec3, matrix, square, table, function,
-            functions, input, choice, joint, joint_fields or angle.
+            functions, input, choice, joint, joint_fields or angle; bodies, points or vectors of a
+            list.
         default: value where the scene gives none; REQUIRED where it must.
         unit: SI unit of a number, "" for none.
         doc: its meaning, one short sentence.
@@ -51,6 +52,9 @@ class FieldSpec:
         rows: number of rows that a joint must have; None for any.
         instead_of: field that an input takes the place of; "" for none.
         gives: fields that a joint gives -> its own, as of ``joint_fields``.
+        size: name of the number of entries of a list, which the scene gives by its length; "" of
+            all else.
+        least: smallest number of entries of a list.
     """
 
     kind: str
@@ -77,6 +81,8 @@ class FieldSpec:
     rows: int | None = None
     instead_of: str = ""
     gives: Mapping[str, str] = attrs.field(factory=dict)
+    size: str = ""
+    least: int = 1
 
     @property
     def for_prepare(self) -> bool:
@@ -89,18 +95,19 @@ class FieldSpec:
         return self.default is REQUIRED
 
 
-def _field(spec: FieldSpec) -> Any:
+def field_of(spec: FieldSpec) -> Any:
+    """The attribute of a class that declares a field."""
     return attrs.field(default=None if spec.required else spec.default, metadata={"dap3d": spec})
 
 
 def body(default: Any = REQUIRED, *, doc: str = "") -> Any:
     """A body by name; the last letter of the field is its slot (``body_i``)."""
-    return _field(FieldSpec("body", default, doc=doc))
+    return field_of(FieldSpec("body", default, doc=doc))
 
 
 def point(default: Any = REQUIRED, *, doc: str = "") -> Any:
     """A point on a body, by name; ``P_i`` lies on the body of slot i."""
-    return _field(FieldSpec("point", default, unit="m", doc=doc))
+    return field_of(FieldSpec("point", default, unit="m", doc=doc))
 
 
 def vector(
@@ -114,7 +121,7 @@ def vector(
     where the two are parallel at the start of a run.
     """
     spec = FieldSpec("vector", default, doc=doc, unit_length=True, ground=ground, across=across)
-    return _field(spec)
+    return field_of(spec)
 
 
 def vector2(
@@ -126,7 +133,7 @@ def vector2(
     at the start of a run. With names of fields (numbers, a function of an argument) only where one
     of them is given and not zero.
     """
-    return _field(FieldSpec("vector2", default, unit="m", doc=doc, direction=direction))
+    return field_of(FieldSpec("vector2", default, unit="m", doc=doc, direction=direction))
 
 
 def number(
@@ -146,27 +153,61 @@ def number(
     (least, greatest) with None for no limit, it is allowed, and noted.
     """
     spec = FieldSpec("number", default, unit, doc, positive, minimum, maximum, whole, usual)
-    return _field(spec)
+    return field_of(spec)
 
 
 def vec3(default: Any = REQUIRED, *, unit: str = "", direction: bool = False, doc: str = "") -> Any:
     """Three finite numbers; with ``direction`` a length other than 1 is noted."""
-    return _field(FieldSpec("vec3", default, unit, doc, direction=direction))
+    return field_of(FieldSpec("vec3", default, unit, doc, direction=direction))
 
 
-def numbers(count: int, default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
-    """As many finite numbers as ``count``."""
-    return _field(FieldSpec("numbers", default, unit, doc, columns=count))
+def numbers(count: int | str, default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
+    """As many finite numbers as ``count``.
+
+    With the name of a size, ``numbers("n")``, the length of the list in the scene is that size, and
+    a default is one number, of all entries (docs/what-a-type-can-say.md, Sizes).
+    """
+    if isinstance(count, str):
+        return field_of(FieldSpec("numbers", default, unit, doc, size=count))
+    return field_of(FieldSpec("numbers", default, unit, doc, columns=count))
+
+
+def points(size: str = "n", *, least: int = 1, doc: str = "") -> Any:
+    """A list of points on any bodies, by name; its length is the size of this name.
+
+    Several may lie on one body. A field ``points`` offers tuples ``r_points``, ``s_points``,
+    ``v_points``, ``s_points_dot``, and ``w_points`` of the bodies that they lie on; ``on_points``
+    are the indices of these bodies, for ``by_body``; the size and ``body_count`` are whole numbers.
+    """
+    return field_of(FieldSpec("points", REQUIRED, "m", doc, size=size, least=least))
+
+
+def vectors(size: str = "n", *, least: int = 1, doc: str = "") -> Any:
+    """A list of unit vectors fixed in any bodies, by name, as ``points``.
+
+    A field ``axes`` offers tuples ``axes``, ``axes_dot`` and ``w_axes``, and ``on_axes``.
+    """
+    spec = FieldSpec("vectors", REQUIRED, "", doc, unit_length=True, size=size, least=least)
+    return field_of(spec)
+
+
+def bodies(size: str = "n", *, least: int = 1, doc: str = "") -> Any:
+    """A list of bodies by name, as ``points``.
+
+    A field ``wheels`` offers tuples ``r_wheels``, ``A_wheels``, ``p_wheels``, ``v_wheels``,
+    ``w_wheels``, ``mass_wheels`` and ``Jp_wheels``, and ``on_wheels``.
+    """
+    return field_of(FieldSpec("bodies", REQUIRED, "", doc, size=size, least=least))
 
 
 def matrix(default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
     """A 3x3 matrix of finite numbers, by rows."""
-    return _field(FieldSpec("matrix", default, unit, doc))
+    return field_of(FieldSpec("matrix", default, unit, doc))
 
 
 def square(size: int, default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
     """A symmetric matrix, or its diagonal alone as ``size`` numbers; ``prepare`` alone reads it."""
-    return _field(FieldSpec("square", default, unit, doc, columns=size))
+    return field_of(FieldSpec("square", default, unit, doc, columns=size))
 
 
 def table(
@@ -186,7 +227,7 @@ def table(
     """
     default = REQUIRED if given else None
     spec = FieldSpec("table", default, unit, doc, columns=columns, given=given, by_rows=by_rows)
-    return _field(spec)
+    return field_of(spec)
 
 
 def function(default: Any = None, *, argument: str | tuple[str, str] = "", doc: str = "") -> Any:
@@ -202,7 +243,7 @@ def function(default: Any = None, *, argument: str | tuple[str, str] = "", doc: 
     """
     names = (argument,) if isinstance(argument, str) else argument
     words, count = " and ".join(names), len(names)
-    return _field(FieldSpec("function", default, doc=doc, argument=words, arguments=count))
+    return field_of(FieldSpec("function", default, doc=doc, argument=words, arguments=count))
 
 
 def functions(*, doc: str = "") -> Any:
@@ -211,7 +252,7 @@ def functions(*, doc: str = "") -> Any:
     The field offers its kernel a tuple of functions of one argument, each of which returns
     (f, f', f'', f''') there. A function that names itself, directly or through others, is refused.
     """
-    return _field(FieldSpec("functions", REQUIRED, doc=doc))
+    return field_of(FieldSpec("functions", REQUIRED, doc=doc))
 
 
 def input_(default: Any = None, *, instead_of: str = "", unit: str = "", doc: str = "") -> Any:
@@ -221,7 +262,7 @@ def input_(default: Any = None, *, instead_of: str = "", unit: str = "", doc: st
     belong to a variant of the type for ``input=True`` (the name of the field). A scene gives it or
     the field ``instead_of``, not both.
     """
-    return _field(FieldSpec("input", default, unit, doc, instead_of=instead_of))
+    return field_of(FieldSpec("input", default, unit, doc, instead_of=instead_of))
 
 
 def choice(
@@ -233,7 +274,7 @@ def choice(
 ) -> Any:
     """One of several words, or of False and True; ``aliases`` are other names of some of them."""
     spec = FieldSpec("choice", default, doc=doc, choices=tuple(choices), aliases=aliases or {})
-    return _field(spec)
+    return field_of(spec)
 
 
 def joint(*, rows: int | None = None, doc: str = "") -> Any:
@@ -244,7 +285,7 @@ def joint(*, rows: int | None = None, doc: str = "") -> Any:
     force and moment about the mass centre, global axes. A force without a ``wrench`` acts by the
     kernel ``friction`` of its one joint.
     """
-    return _field(FieldSpec("joint", REQUIRED, doc=doc, rows=rows))
+    return field_of(FieldSpec("joint", REQUIRED, doc=doc, rows=rows))
 
 
 def joint_fields(*same: str, doc: str = "", **others: str) -> Any:
@@ -256,7 +297,7 @@ def joint_fields(*same: str, doc: str = "", **others: str) -> Any:
     The scene gives the joint or the fields.
     """
     gives = {name: name for name in same} | others
-    return _field(FieldSpec("joint_fields", None, doc=doc, gives=gives))
+    return field_of(FieldSpec("joint_fields", None, doc=doc, gives=gives))
 
 
 def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:
@@ -266,7 +307,7 @@ def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:
     unwound (turns are counted at accepted steps), and its rate k . (w_j - w_i).
     """
     spec = FieldSpec("angle", None, "rad", doc, given=False, axes=(first, second, about))
-    return _field(spec)
+    return field_of(spec)
 
 
 def specs_of(type_: type) -> dict[str, FieldSpec]:
@@ -278,3 +319,8 @@ def slot_of(name: str) -> str | None:
     """The body slot of a name, its last letter (``P_i`` -> i), or None."""
     head, _, tail = name.rpartition("_")
     return tail if head and tail in SLOTS else None
+
+
+def sized_fields(type_: type) -> dict[str, FieldSpec]:
+    """The fields of a type that are lists of a length given by the scene."""
+    return {name: spec for name, spec in specs_of(type_).items() if spec.size}

@@ -6,6 +6,7 @@ these names.
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
 from typing import Any, ClassVar
 
 import attrs
@@ -193,6 +194,8 @@ class Force(TypeBase):
     Attributes:
         keyword: the name of the type in a scene.
         each_body: True if the element acts on every body of the scene (slot i in turn).
+        each_pair: True if it acts between every two bodies of the scene, without ground (slots i
+            and j in turn, each pair once).
         symbol: symbol in pictures, one of SYMBOLS; "": a spring between two ends, if it has them,
             else drawn from the declared fields.
         energy_where: the condition, to follow "only", for the energy to be the potential of the
@@ -213,6 +216,7 @@ class Force(TypeBase):
     unilateral: ClassVar[tuple[int, ...]] = ()
     restitution: ClassVar[str] = ""
     each_body: ClassVar[bool] = False
+    each_pair: ClassVar[bool] = False
     energy_where: ClassVar[str] = ""
     actuates: ClassVar[str] = ""
     regularised: ClassVar[str] = ""
@@ -244,6 +248,16 @@ class Function(TypeBase):
     def breaks(self) -> Sequence[float]:
         """Arguments at which this instance changes its form: both ends of a transition."""
         return ()
+
+
+def acts_on_all(type_: type[TypeBase]) -> int:
+    """Bodies that a type acts on in turn: 1 of ``each_body``, 2 of ``each_pair``; else 0."""
+    return 2 if getattr(type_, "each_pair", False) else int(getattr(type_, "each_body", False))
+
+
+def turns_of(type_: type[TypeBase], body_count: int) -> list[tuple[int, ...]]:
+    """The bodies, or pairs of bodies, that such a type acts on in turn, by their indices."""
+    return list(combinations(range(1, body_count + 1), acts_on_all(type_)))
 
 
 KINDS: dict[str, type[TypeBase]] = {"joint": Joint, "force": Force, "function": Function}

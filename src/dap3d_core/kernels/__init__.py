@@ -35,9 +35,10 @@ from dap3d_core.kernels.scalar_math import (
     tanh,
     where,
 )
-from dap3d_core.kernels.table_lookup import lookup
+from dap3d_core.kernels.table_lookup import item, lookup
 from dap3d_core.kernels.vectors import (
     add,
+    by_body,
     cross,
     dot,
     eye,
@@ -59,6 +60,7 @@ __all__ = [
     "asin",
     "atan",
     "atan2",
+    "by_body",
     "conjugate",
     "cos",
     "cosh",
@@ -70,6 +72,7 @@ __all__ = [
     "floor",
     "hstack",
     "hypot",
+    "item",
     "log",
     "lookup",
     "matmul",

@@ -67,6 +67,30 @@ def norm2(a):
     return a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
 
 
+def by_body(on, parts, count):
+    """Sums of the parts on each of ``count`` bodies, as ``wrench`` and ``J`` return them.
+
+    Args:
+        on: for each part the index of its body, such as ``on_points``.
+        parts: numbers, or nested tuples of one form: (force, moment), or rows of six.
+        count: number of bodies, ``body_count``.
+    """
+    sums = [zeros(parts[0])] * count
+    for body, part in zip(on, parts, strict=True):
+        sums[body] = added(sums[body], part)
+    return tuple(sums)
+
+
+def zeros(a):
+    """Zeros of the form of nested tuples."""
+    return tuple(zeros(x) for x in a) if isinstance(a, tuple) else 0.0
+
+
+def added(a, b):
+    """Sum of nested tuples of one form."""
+    return tuple(added(x, y) for x, y in zip(a, b, strict=True)) if isinstance(a, tuple) else a + b
+
+
 def normals(a):
     """Two unit vectors n, m that complete an axis a to a triad: a x n = m, n x m = a (spec 3).
 

@@ -14,7 +14,7 @@ from dap3d_core.interface.codegen.specialise import bind_friction, bind_function
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.types import TypeBase
+from dap3d_core.interface.types import TypeBase, acts_on_all, turns_of
 from dap3d_core.kernels.array_types import Floats as Floats
 from dap3d_core.kernels.array_types import Integers as Integers
 from dap3d_core.model.knots import knots_of
@@ -186,12 +186,13 @@ class Grouping:
 
     def _group(self, instances: list[Instance], members: list[int]) -> Group:
         type_info = instances[0].type_info
-        on_each = bool(getattr(type_info.type, "each_body", False))
-        n = self.body_count
+        on_each = bool(acts_on_all(type_info.type))
+        turns = turns_of(type_info.type, self.body_count) if on_each else []
+        n = len(turns)
         if on_each and _prepares(type_info.type):  # its constants may differ from body to body
             on_each = False
             members = [m for m in members for _ in range(n)]
-            instances = [attrs.evolve(i, bodies=(b,)) for i in instances for b in range(1, n + 1)]
+            instances = [attrs.evolve(i, bodies=turn) for i in instances for turn in turns]
         count = len(instances)
         if instances[0].terms:
             type_info, numbers, tables = self._combined(instances, members)
@@ -209,7 +210,7 @@ class Grouping:
         integers = np.array(others, dtype=np.int64).reshape(count, -1)
         places = np.array(members, dtype=np.int64)
         if on_each:
-            bodies = np.tile(np.arange(1, n + 1), count)[:, None]
+            bodies = np.tile(np.array(turns, dtype=np.int64), (count, 1))
             numbers = np.repeat(numbers, n, axis=0)
             integers = np.repeat(integers, n, axis=0)
             places = np.repeat(places, n)

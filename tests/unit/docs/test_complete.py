@@ -8,7 +8,7 @@ import tomllib
 from functools import cached_property
 from html import unescape
 from importlib import import_module
-from types import FunctionType
+from types import FunctionType, SimpleNamespace
 
 import attrs
 import click
@@ -145,11 +145,19 @@ def names_of(line="", constants=()):
     """The names of the position and of the velocity level with one more field, or constants."""
     from dap3d_core.interface.codegen.instance_layout import layout_of
     from dap3d_core.interface.codegen.kernel_arguments import namespace
+    from dap3d_core.interface.fields import sized_fields
 
     members = {"__module__": __name__}
     exec(line, vars(interface) | {}, members)
     type_ = type("Added", (Three,), members)
-    found = namespace(type_, layout_of(type_, dict(constants))).values()
+    if sized_fields(type_):
+        from dap3d_core.interface.examine.sized_types import described, sample_classes
+
+        type_ = sample_classes(type_)[0]
+    found = namespace(type_, layout_of(type_, dict(constants)))
+    if hasattr(type_, "shape_of_lists"):
+        found |= described(SimpleNamespace(type=type_, names=found))
+    found = [q for q in found.values() if not re.search(r"_\d_[i-p]", q.name)]
     return [{q.name for q in found if q.velocity == level} for level in (False, True)]
 
 

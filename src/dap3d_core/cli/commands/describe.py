@@ -137,7 +137,11 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         ],
         "example": example_of(type_info, registry),
         **({"motions": _motions(type_info)} if kind == "joint" else {}),
-        **({"each_body": bool(type_.each_body)} if kind == "force" else {}),
+        **(
+            {"each_body": bool(type_.each_body), "each_pair": bool(type_.each_pair)}
+            if kind == "force"
+            else {}
+        ),
         **({"arguments": type_.arguments} if kind == "function" else {}),
     }
 
@@ -267,6 +271,8 @@ def bodies_text(data: dict[str, Any]) -> str:
         return "its argument x, time where a force or joint does not say otherwise"
     if data.get("each_body"):
         return "every body of the scene"
+    if data.get("each_pair"):
+        return "every two bodies of the scene"
     if not data["bodies"]:
         return "the bodies of its joint"
     return f"{', '.join(data['bodies'])}; the last letter of a field is the body's"

@@ -11,7 +11,7 @@ import attrs
 from dap3d_core.interface.element_states import state_shape
 from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.fields import SLOTS, slot_of, specs_of
-from dap3d_core.interface.types import TypeBase
+from dap3d_core.interface.types import TypeBase, acts_on_all
 
 #: Numbers of an angle: itself, its rate and the time, at the last accepted step.
 ANGLE_WIDTH = 3
@@ -76,7 +76,7 @@ def body_slots(type_: type[TypeBase]) -> tuple[str, ...]:
     One after k counts only where all from k on are there: a vector ``a_n`` of a type of two bodies
     has no slot.
     """
-    slots = {"i"} if getattr(type_, "each_body", False) else set()
+    slots = set(SLOTS[: acts_on_all(type_)])
     for name, spec in specs_of(type_).items():
         if spec.kind == "vector2":
             slots |= {"i", "j"}

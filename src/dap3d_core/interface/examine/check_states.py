@@ -9,7 +9,7 @@ from dap3d_core.interface.codegen.instance_layout import InstanceLayout
 from dap3d_core.interface.element_states import INITIAL, RESERVED, state_lengths, state_shape
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.interface.types import TypeBase
+from dap3d_core.interface.types import TypeBase, acts_on_all
 
 #: Coordinates of joints and their rates, which are quantities as well.
 _COORDINATE = re.compile(r"q[1-9]\d?(_dot)?")
@@ -29,7 +29,7 @@ def check_states(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
         return
     if type_.kind == "function":
         raise PluginError(f"{who}: a function has no states; declare them in a force or a joint")
-    if getattr(type_, "each_body", False):
+    if acts_on_all(type_):
         raise PluginError(
             f"{who} acts on each body, and declares states: whose they are is open; "
             "declare body_i, and one element for each body"

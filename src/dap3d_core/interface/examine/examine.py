@@ -45,7 +45,7 @@ from dap3d_core.interface.examine.random_values import (
     random_pose,
     random_quantity,
 )
-from dap3d_core.interface.fields import SLOTS, slot_of, specs_of
+from dap3d_core.interface.fields import SLOTS, sized_fields, slot_of, specs_of
 from dap3d_core.interface.types import SYMBOLS, Force, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
@@ -58,6 +58,10 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     Raises:
         PluginError: with file, type, function and remedy.
     """
+    if sized_fields(type_) and not hasattr(type_, "shape_of_lists"):
+        from dap3d_core.interface.examine.sized_types import examine_sized
+
+        return examine_sized(type_, examine, seed)
     own_variants = type_.variants if "variants" in vars(type_) else ()
     for conditions, class_ in own_variants:
         _check_conditions(type_, conditions, class_)
@@ -98,16 +102,9 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     outputs |= _bounds(type_)
     _check_jumps(type_, outputs, len(layout.slots))
     functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
+    friction = _joint_of_friction(type_)
     return TypeInfo(
-        type_,
-        layout,
-        names,
-        outputs,
-        kernels,
-        variants,
-        functions,
-        friction_joint=_joint_of_friction(type_),
-        derived=derived,
+        type_, layout, names, outputs, kernels, variants, functions, friction, derived=derived
     )
 
 

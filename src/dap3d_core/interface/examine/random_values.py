@@ -82,4 +82,5 @@ def random_field(spec: FieldSpec, rng: random.Random) -> Any:
         return spec.choices[0]
     if spec.kind == "functions":
         return ("f", "g", "h")
-    return None if spec.kind in ("function", "input", "joint_fields") else spec.kind
+    named = spec.kind in ("function", "input", "joint_fields")
+    return None if named or spec.size else spec.kind

@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.interface.types import acts_on_all
 from dap3d_core.model.groups import Floats, Group
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.post.point_motion import motion_of
@@ -101,7 +102,7 @@ def group_of(evaluator: "Evaluator", name: str, element: int) -> tuple[Group, in
     """The group of a force element and its index there."""
     for group in evaluator.model.forces:
         indices = np.flatnonzero(group.members == element)
-        if len(indices) and not getattr(group.type_info.type, "each_body", False):
+        if len(indices) and not acts_on_all(group.type_info.type):
             return group, int(indices[0])
     raise UnknownNameError(
         f"the force {name!r} has no quantities: it acts on every body or in a joint, not on bodies "

@@ -8,6 +8,7 @@ import attrs
 
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
+from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
 from dap3d_core.scene.scene import GROUND, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
@@ -29,6 +30,7 @@ from dap3d_core.scene.validate.geometry import (
     Geometry,
     Located,
     body_of,
+    entry_of,
     missing_words,
     point_of,
     two_ends,
@@ -54,7 +56,7 @@ READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
         maximum=spec.maximum,
         whole=spec.whole,
     ),
-    "numbers": lambda spec, value: numbers_of(value, spec.columns),
+    "numbers": lambda spec, x: list_of(x) if spec.size else numbers_of(x, spec.columns),
     "vec3": lambda spec, value: numbers_of(value, 3),
     "matrix": lambda spec, value: matrix_of(value),
     "square": lambda spec, value: square_of(value, spec.columns),
@@ -101,7 +103,7 @@ class Reader:
         self.type_info, self.table = type_info, table
         self.geometry, self.report, self.arguments = geometry, report, arguments
         self.body_names = (GROUND, *geometry.bodies.body_names)
-        self.slots = () if getattr(type_info.type, "each_body", False) else type_info.layout.slots
+        self.slots = () if acts_on_all(type_info.type) else type_info.layout.slots
         self.function_index = {name: k for k, name in enumerate(report.scene.functions, 1)}
         #: Rows of F: those of functions, then those of inputs.
         self.rows = {
@@ -115,6 +117,7 @@ class Reader:
         self.ends = ENDS if takes_ends else ()
         self.fields = [self._field(name, spec) for name, spec in specs.items()]
         self.kinds = {name: spec.kind for name, spec in specs.items()}
+        self.lists = {name: spec for name, spec in specs.items() if spec.size}
         self.known = dict.fromkeys([*specs, *self.ends])
         self.of_joints = {name: spec.gives for name, spec in specs.items() if spec.gives}
         # Bodies and points that may be left out follow from the other fields of their slot.
@@ -152,6 +155,7 @@ class Reader:
                 value = field.spec.default
             field.read(reading, field, value)
         reading.check_slots()
+        shape = reading.shape() if self.lists and reading.good else None
         if not reading.good:
             return None
         values, bodies = reading.values, tuple(reading.bodies)
@@ -160,6 +164,10 @@ class Reader:
                 is_point = field.spec.kind == "point"
                 values[field.name] = ZERO if is_point else self.body_names[bodies[field.slot]]
         type_info = self.type_info.chosen(values) if self.type_info.variants else self.type_info
+        if shape is not None:
+            from dap3d_core.interface.examine.sized_types import sized
+
+            type_info, bodies = sized(type_info, shape), tuple(reading.bodies)
         functions = tuple(
             [self.rows[self.kinds[n]].get(values[n], 0) for n in type_info.layout.functions]
         )
@@ -170,8 +178,8 @@ class Reader:
 class _Reading:
     """One element: values of its fields, the body of each slot and the field that gave it."""
 
-    __slots__ = ("bodies", "element", "given_by", "good", "key", "others", "reader", "report",
-                 "values")  # fmt: skip
+    __slots__ = ("bodies", "element", "given_by", "good", "key", "others", "places", "reader",
+                 "report", "values")  # fmt: skip
 
     def __init__(self, reader: Reader, element: Element) -> None:
         count = len(reader.slots)
@@ -180,6 +188,7 @@ class _Reading:
         self.values: dict[str, Any] = {}
         self.bodies, self.given_by = [_UNKNOWN] * count, [""] * count
         self.others: dict[str, int] = {}  # bodies of vectors of no slot
+        self.places: dict[str, Sequence[Located]] = {}  # of the entries of lists
         self.good = True
 
     def refuse(self, name: str, what: str, nearest: str = "", remedy: str = "") -> None:
@@ -300,8 +309,8 @@ class _Reading:
     def value(self, field: _Field, value: Any) -> None:
         """A number, a list of numbers, a matrix or a word."""
         spec = field.spec
-        if value is None and spec.default is None:
-            self.values[field.name] = None
+        if (value is None and spec.default is None) or (spec.size and value is spec.default):
+            self.values[field.name] = value
             return
         key = (*self.key, field.name)
         result = self.report.read(key, value, field.value_of)
@@ -310,6 +319,48 @@ class _Reading:
             self.good = False
         elif odd := oddity(spec, result):
             self.report.note(f"{dotted(key)} = {shown(value)} {odd}")
+
+    def list(self, field: _Field, value: Any) -> None:
+        """A list of points, vectors or bodies by name."""
+        self.values[field.name] = value
+        kind, least = field.spec.kind, field.spec.least
+        if type(value) is not tuple or len(value) < least:
+            self.refuse(field.name, f"should be a list of {least} or more {kind}, by name")
+            return
+        key, geometry = (*self.key, field.name), self.reader.geometry
+        places = [entry_of(self.report, geometry, key, kind, name) for name in value]
+        self.good &= None not in places
+        self.places[field.name] = places
+
+    def shape(self) -> Any:
+        """The lengths of the lists and the slots of their entries, whose values become fields."""
+        from dap3d_core.interface.examine.sized_types import Shape, entry_fields, shared_slots
+
+        sizes: dict[str, tuple[int, str]] = {}
+        given = {n: v for n in self.reader.lists if isinstance(v := self.values[n], tuple)}
+        for name, value in given.items():
+            count, first = sizes.setdefault(self.reader.lists[name].size, (len(value), name))
+            if count != len(value):
+                what = f"has {len(value)} entries, and {first} has {count}: they go together"
+                self.refuse(name, what)
+        for name in self.reader.lists.keys() - given.keys():  # a default, one number
+            spec = self.reader.lists[name]
+            self.values[name] = (float(spec.default),) * sizes[spec.size][0]
+        on = {name: [body for body, _ in places] for name, places in self.places.items()}
+        try:
+            self.bodies, slots = shared_slots(self.bodies, on)
+        except ValueError as error:
+            self.refuse("", str(error))
+            return None
+        if on and len(self.bodies) < 2:
+            name = self.reader.body_names[self.bodies[0]]
+            self.refuse(next(iter(on)), f"all are on {name}; an element acts between bodies")
+        for name, letters in slots.items():
+            for entry, (_, local) in zip(
+                entry_fields(name, letters), self.places[name], strict=True
+            ):
+                self.values[entry] = local
+        return Shape(tuple((n, k) for n, (k, _) in sizes.items()), tuple(slots.items()))
 
     # ---------------------------------------------------------------- bodies of slots
 
@@ -375,6 +426,9 @@ _FIELD_READERS = {
     "functions": _Reading.functions,
     "input": _Reading.input,
     "joint": _Reading.joint,
+    "points": _Reading.list,
+    "vectors": _Reading.list,
+    "bodies": _Reading.list,
 }
 
 
@@ -434,23 +488,3 @@ def read_elements(
         if instance is not None:
             instances.append(instance)
     return instances
-
-
-def report_twins(report: Collector, table: str, instances: Iterable[Instance]) -> None:
-    """Equal joints are mistakes; equal forces, or joints with other numbers, are noted."""
-    seen: dict[Any, Instance] = {}
-    for instance in instances:
-        references = tuple(
-            v for v in instance.values.values() if not isinstance(v, (float, type(None)))
-        )
-        key = (id(instance.type_info), instance.bodies, references)
-        twin = seen.setdefault(key, instance)
-        if twin is instance:
-            continue
-        same = twin.values == instance.values
-        if table == "joints" and same:
-            what = f"is the same as {twin.name}: same type, same bodies, points and vectors"
-            report.add((table, instance.name), MISSING, what, "", "take one of the two out")
-        elif table == "joints" or same:
-            words = "is the same as" if same else "differs only in its numbers from"
-            report.note(f"{table}.{instance.name} {words} {table}.{twin.name}")

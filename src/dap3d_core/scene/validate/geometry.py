@@ -145,6 +145,16 @@ def body_of(report: Collector, bodies: Bodies, key: Key, name: Any) -> int:
     return body_index_of(report, bodies.body_index, key, name)
 
 
+def entry_of(report: Collector, geometry: Geometry, key: Key, kind: str, name: Any) -> Any:
+    """An entry of a list of points, vectors or bodies, with its body; None where it is wrong."""
+    if kind == "points":
+        return point_of(report, geometry, key, name)
+    if kind == "vectors":
+        return vector_of(report, geometry, key, name, unit=True)
+    body = body_of(report, geometry.bodies, key, name)
+    return None if body == BAD else (body, name)
+
+
 def body_index_of(report: Collector, index: Mapping[str, int], key: Key, name: Any) -> int:
     """Index of the body of a reference; BAD where a mistake is reported."""
     body = index.get(name, BAD) if isinstance(name, str) else BAD

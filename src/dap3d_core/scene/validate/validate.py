@@ -1,11 +1,13 @@
 """Check of a whole scene: all mistakes are reported at once, with file and line."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import attrs
 
+from dap3d_core.interface.types import acts_on_all
 from dap3d_core.registry import Registry
-from dap3d_core.scene.errors import dotted
+from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.scene import NAMED, Scene, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene
@@ -31,7 +33,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     """
     # numpy is imported here: a command that checks nothing does not wait for it.
     from dap3d_core.scene.validate.bodies import read_bodies
-    from dap3d_core.scene.validate.elements import read_elements, report_twins
+    from dap3d_core.scene.validate.elements import read_elements
     from dap3d_core.scene.validate.geometry import read_geometry
     from dap3d_core.scene.validate.settings import check_header, check_settings, notes_of
     from dap3d_core.scene.validate.types import Types
@@ -45,8 +47,8 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     inputs, functions = _read_signals(report, geometry, types)
     joints = read_elements(report, geometry, "joints", types.of("joints"), functions)
     forces = read_elements(report, geometry, "forces", types.of("forces"), functions)
-    report_twins(report, "joints", joints)
-    report_twins(report, "forces", forces)
+    _report_twins(report, "joints", joints)
+    _report_twins(report, "forces", forces)
     _check_shapes_and_outputs(report, bodies)
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
@@ -125,7 +127,7 @@ def _check_shapes_and_outputs(report: Collector, bodies: "Bodies") -> None:
 
 def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Instance]) -> None:
     """Note bodies without joints and forces."""
-    if any(getattr(e.type_info.type, "each_body", False) for e in elements):
+    if any(acts_on_all(e.type_info.type) for e in elements):
         return
     used = {body for e in elements for body in e.bodies}
     for k, name in enumerate(bodies.body_names, 1):
@@ -147,3 +149,23 @@ def _note_unused_signals(
         from dap3d_core.scene.signals.inputs import note_unread_inputs
 
         note_unread_inputs(report, elements)
+
+
+def _report_twins(report: Collector, table: str, instances: Iterable[Instance]) -> None:
+    """Equal joints are mistakes; equal forces, or joints with other numbers, are noted."""
+    seen: dict[Any, Instance] = {}
+    for instance in instances:
+        references = tuple(
+            v for v in instance.values.values() if not isinstance(v, (float, type(None)))
+        )
+        key = (id(instance.type_info), instance.bodies, references)
+        twin = seen.setdefault(key, instance)
+        if twin is instance:
+            continue
+        same = twin.values == instance.values
+        if table == "joints" and same:
+            what = f"is the same as {twin.name}: same type, same bodies, points and vectors"
+            report.add((table, instance.name), MISSING, what, "", "take one of the two out")
+        elif table == "joints" or same:
+            words = "is the same as" if same else "differs only in its numbers from"
+            report.note(f"{table}.{instance.name} {words} {table}.{twin.name}")

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from dap3d_core.interface.body_pose import BodyPose
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.interface.types import TypeBase
+from dap3d_core.interface.types import TypeBase, acts_on_all, turns_of
 from dap3d_core.scene import Instance
 
 
@@ -42,8 +42,8 @@ def dependence_of(instance: Instance, poses: Mapping[int, BodyPose], body_count:
     constants: set[str] = set()
     if type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__()):
         slots = instance.type_info.layout.slots
-        each = bool(getattr(type_, "each_body", False))
-        for bodies in [(b,) for b in range(1, body_count + 1)] if each else [instance.bodies]:
+        each = acts_on_all(type_)
+        for bodies in turns_of(type_, body_count) if each else [instance.bodies]:
             recorded = {
                 slot: _RecordedPose(poses[body], body, read)
                 for slot, body in zip(slots, bodies, strict=True)

@@ -17,7 +17,7 @@ from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
 from dap3d_core.interface.examine.random_values import numbers
-from dap3d_core.interface.fields import specs_of
+from dap3d_core.interface.fields import sized_fields, specs_of
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.testing.samples.cubic import Cubic, CubicOfTwo
 from dap3d_core.testing.samples.random_element import Kernels, RandomElement, RefusalError, draw
@@ -251,9 +251,19 @@ def sampled_types(type_info: TypeInfo, seed: int, poses: int) -> list[SampledTyp
         variants.append((own, type_info))
     variants += [(dict(conditions), e) for conditions, e in type_info.variants]
     return [
-        SampledType(_alone(with_functions(e, values)), values, seed, poses)
+        SampledType(_alone(with_functions(sample, values)), values, seed, poses)
         for values, e in variants
+        for sample in _samples(e)
     ]
+
+
+def _samples(type_info: TypeInfo) -> list[TypeInfo]:
+    """The type for some lengths of its lists; itself where it has none."""
+    if not sized_fields(type_info.type):
+        return [type_info]
+    from dap3d_core.interface.examine.sized_types import sample_classes
+
+    return [examine(class_) for class_ in sample_classes(type_info.type)]
 
 
 def _alone(type_info: TypeInfo) -> TypeInfo:

@@ -6,6 +6,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.fields import slot_of, specs_of
+from dap3d_core.interface.types import acts_on_all
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Group
 from dap3d_core.result import Result, ResultError
@@ -68,7 +69,7 @@ def joints_of(model: Model) -> list[ElementGeometry]:
 
 def forces_of(model: Model) -> list[ElementGeometry]:
     """The forces of a model that act on bodies of their own, in file order."""
-    groups = [g for g in model.forces if not getattr(g.type_info.type, "each_body", False)]
+    groups = [g for g in model.forces if not acts_on_all(g.type_info.type)]
     return _in_order(groups, model.force_names)
 
 

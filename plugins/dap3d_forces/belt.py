@@ -1,0 +1,119 @@
+"""Elastic belt over two or more pulleys."""
+
+from typing import ClassVar
+
+from dap3d_core.interface import (
+    Force,
+    Vector,
+    choice,
+    hookimpl,
+    number,
+    numbers,
+    points,
+    vector,
+)
+from dap3d_core.kernels import add, by_body, cross, dot, maximum, neg, norm2, scale, sqrt, sub
+
+interface_version = 1
+
+
+class Belt(Force):
+    """A massless, elastic belt over pulleys, without slip: a tension of its own in each span.
+
+    The ``points`` are the centres of the pulleys, in the order in which the belt runs around them
+    counterclockwise, seen against ``axis``, and closes on the first. A negative radius is that of a
+    pulley outside of the loop, on the back of the belt, which turns in the other direction. Span k
+    runs from pulley k to the next. With rho_k the radii, d between the centres, normal to the axis,
+    l its length, u = d / l and m = axis x u, it touches both pulleys in the direction n:
+
+        sin b = (rho_k - rho_(k+1)) / l,  n = sin b u - cos b m
+        P_k = r_k + rho_k n,  P_(k+1) = r_(k+1) + rho_(k+1) n,  e along P_(k+1) - P_k
+        x_dot = e . (v_P(k+1) - v_P_k),  T = max(0, pretension + k x + c x_dot)
+        force T e at P_k on pulley k, -T e at P_(k+1) on the next
+
+    v_P_k is the velocity of the point of the pulley there. The elongations x of the spans since the
+    start are states. The forces load the bearings: with the axis fixed, the moment on a pulley is
+    rho (T_out - T_in), where T_out is the tension of the span that begins there. With ``crossed``
+    the belt of two pulleys crosses itself, as with a negative second radius.
+    """
+
+    keyword = "belt"
+    synonyms = ("pulley", "timing-belt", "chain")
+    states: ClassVar = {"x": "n"}
+    points: tuple = points("n", least=2, doc="centres of the pulleys, in order along the belt")
+    radii: tuple = numbers("n", unit="m", doc="radii; negative of a pulley on the belt's back")
+    axis: Vector = vector(doc="direction of the axes of all pulleys")
+    k: float = number(unit="N/m", minimum=0.0, doc="stiffness of each span")
+    c: float = number(default=0.0, unit="N s/m", minimum=0.0, doc="damping of each span")
+    pretension: float = number(default=0.0, unit="N", minimum=0.0, doc="tension where x = 0")
+    crossed: bool = choice((False, True), False, doc="the belt of two pulleys crosses itself")
+
+    def prepare(self, bodies):
+        rho = list(self.radii)
+        if self.crossed and len(rho) > 2:
+            raise ValueError("crossed is for two pulleys; of more, give some a negative radius")
+        if self.crossed:
+            rho[1] = -rho[1]
+        places = [pose.place(P) for P, pose in zip(self.points, bodies["points"], strict=True)]
+        for k, place in enumerate(places):
+            after = (k + 1) % len(places)
+            if norm2(sub(places[after], place)) <= (rho[k] - rho[after]) ** 2:
+                raise ValueError(
+                    f"pulleys {k + 1} and {after + 1} are too near for a belt between them; "
+                    "give smaller radii or other points"
+                )
+        return {"rho": tuple(rho)}
+
+    def wrench(r_points, s_points, v_points, w_points, on_points, body_count, rho, axis, k, c,
+               pretension, x):  # fmt: skip
+        parts, on = [], []
+        for a, b, e, arm_a, arm_b in runs(r_points, rho, axis):
+            rate = speed(e, arm_a, arm_b, v_points, w_points, a, b)
+            F = scale(maximum(pretension + k * x[a] + c * rate, 0.0), e)
+            parts.append((F, cross(add(s_points[a], arm_a), F)))
+            parts.append((neg(F), neg(cross(add(s_points[b], arm_b), F))))
+            on += [on_points[a], on_points[b]]
+        return by_body(on, parts, body_count)
+
+    def rate(r_points, v_points, w_points, rho, axis):
+        return (tuple(
+            speed(e, arm_a, arm_b, v_points, w_points, a, b)
+            for a, b, e, arm_a, arm_b in runs(r_points, rho, axis)
+        ),)  # fmt: skip
+
+    def switch(r_points, v_points, w_points, rho, axis, k, c, pretension, x):
+        return tuple(
+            pretension + k * x[a] + c * speed(e, arm_a, arm_b, v_points, w_points, a, b)
+            for a, b, e, arm_a, arm_b in runs(r_points, rho, axis)
+        )
+
+
+def runs(r, rho, axis):
+    """Of each span: its pulleys, its direction, the arms from their centres to where it ends."""
+    spans = []
+    for a in range(len(r)):
+        b = (a + 1) % len(r)
+        d = sub(r[b], r[a])
+        d = sub(d, scale(dot(d, axis), axis))
+        l = sqrt(norm2(d))
+        u = scale(1.0 / l, d)
+        m = cross(axis, u)
+        s = (rho[a] - rho[b]) / l
+        z = sqrt(1.0 - s * s)
+        n = sub(scale(s, u), scale(z, m))
+        arm_a, arm_b = scale(rho[a], n), scale(rho[b], n)
+        e = sub(add(r[b], arm_b), add(r[a], arm_a))
+        spans.append((a, b, scale(1.0 / sqrt(norm2(e)), e), arm_a, arm_b))
+    return spans
+
+
+def speed(e, arm_a, arm_b, v, w, a, b):
+    """The rate at which a span becomes longer, m/s."""
+    v_a, v_b = add(v[a], cross(w[a], arm_a)), add(v[b], cross(w[b], arm_b))
+    return dot(e, sub(v_b, v_a))
+
+
+@hookimpl
+def dap3d_forces():
+    """The force types of this module."""
+    return [Belt]

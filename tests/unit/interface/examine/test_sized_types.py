@@ -1,0 +1,178 @@
+"""Types with lists of a length that the scene gives."""
+
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.interface import Force, Joint, examine, number, numbers, points, vectors
+from dap3d_core.interface.examine.sized_types import (
+    Shape,
+    entry_fields,
+    sample_classes,
+    shared_slots,
+    sized,
+)
+from dap3d_core.kernels import by_body, cross, dot, neg, scale, sub
+from dap3d_core.testing import check_type
+
+
+class Anchors(Force):
+    """Each point is pulled towards the first by a spring of its own, with a memory."""
+
+    keyword = "anchors"
+    states: ClassVar = {"q": "n"}
+    points: tuple = points("n", least=2)
+    stiffness: tuple = numbers("n", 2.0)
+    tau: float = number(1.0, positive=True)
+
+    def wrench(r_points, s_points, on_points, stiffness, q, n, body_count):
+        parts, on = [], []
+        for k in range(1, n):
+            F = scale(stiffness[k] + q[k], sub(r_points[0], r_points[k]))
+            parts += [(F, cross(s_points[k], F)), (neg(F), neg(cross(s_points[0], F)))]
+            on += [on_points[k], on_points[0]]
+        return by_body(on, parts, body_count)
+
+    def rate(q, n, tau):
+        return (tuple(-q[k] / tau for k in range(n)),)
+
+
+class Aligned(Joint):
+    """The axes have a constant sum of cosines with the first; its rows are derived."""
+
+    keyword, rows = "aligned", 1
+    axes: tuple = vectors("m", least=2)
+
+    def prepare(self, bodies):
+        a = [pose.to_global(v) for v, pose in zip(self.axes, bodies["axes"], strict=True)]
+        return {"total": sum(dot(a[0], b) for b in a[1:])}
+
+    def C(axes, total):
+        return sum(dot(axes[0], a) for a in axes[1:]) - total
+
+
+def test_the_formulas_of_all_samples_are_checked():
+    report = check_type(examine(Anchors), poses=2)
+    assert report.ok, report
+    report = check_type(examine(Aligned), poses=2)
+    assert report.ok, report
+    assert [len(c.shape_of_lists.on[0][1]) for c in sample_classes(Aligned)] == [3, 4]
+
+
+def test_a_shape_has_one_type():
+    """Equal lists share a compiled loop."""
+    shape = Shape((("m", 2),), (("axes", ("i", "j")),))
+    base = examine(Aligned)
+    assert sized(base, shape) is sized(base, shape)
+    assert sized(base, shape).layout.slots == ("i", "j")
+    assert entry_fields("axes", ("i", "j")) == ["axes_0_i", "axes_1_j"]
+
+
+def test_bodies_share_slots_in_the_order_of_the_list():
+    assert shared_slots([3], {"points": [5, 3, 5]}) == ([3, 5], {"points": ("j", "i", "j")})
+    with pytest.raises(ValueError, match="acts on 9 bodies; an element acts on 8 at most"):
+        shared_slots([], {"points": list(range(9))})
+
+
+def cable(**fields):
+    scene = dap.Scene(name="cable")
+    scene.add_body("a", mass=1.0, Jp=[0.1, 0.1, 0.1], r=[0.0, 0.0, -1.0])
+    scene.add_joint("cable", "rope", **fields)
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"points": "a.O"}, "should be a list of 2 or more points, by name"),
+        ({"points": ["a.O"]}, "should be a list of 2 or more points, by name"),
+        ({"points": ["a.O", "b.O"]}, "b"),
+        ({"points": ["a.O", "a.O"]}, "all are on a; an element acts between bodies"),
+        ({}, "is required"),
+    ],
+)
+def test_a_wrong_list_is_refused(fields, words):
+    with pytest.raises(dap.SceneError, match=words):
+        dap.compile(cable(**fields))
+
+
+def test_points_that_coincide_are_refused():
+    scene = cable(points=["a.O", "P", "ground.O"])
+    scene.add_point("P", body="ground", sPp=[0.0, 0.0, -1.0])
+    with pytest.raises(dap.SceneError, match="points 1 and 2 of the cable coincide"):
+        dap.compile(scene)
+
+
+def test_lists_of_one_size_go_together():
+    scene = dap.Scene(name="belt")
+    scene.add_body("a", mass=1.0, Jp=[0.1, 0.1, 0.1], r=[1.0, 0.0, 0.0])
+    scene.add_force("belt", "b", points=["a.O", "ground.O"], radii=[0.1], axis="ground.z", k=1.0)
+    with pytest.raises(dap.SceneError, match="has 1 entries, and points has 2: they go together"):
+        dap.compile(scene)
+
+
+def test_gravitation_of_all_pairs(tmp_path):
+    """``each_pair``: the accelerations of three bodies are Newton's, to rounding."""
+    (tmp_path / "plugin.py").write_text(GRAVITATION)
+    (tmp_path / "scene.toml").write_text(THREE)
+    scene = dap.load(tmp_path / "scene.toml")
+    result = dap.simulate(scene, allow_code=True, t_end=1.0, dt=0.5, rtol=1e-10, atol=1e-12)
+    m, r = np.array([5.0, 2.0, 1.0]), result.r[-1]
+    want = [
+        sum(m[j] * (r[j] - r[i]) / np.linalg.norm(r[j] - r[i]) ** 3 for j in range(3) if j != i)
+        for i in range(3)
+    ]
+    np.testing.assert_allclose(result.rdd[-1], want, rtol=1e-12)
+    energy = result.quantity("energy.total").values
+    np.testing.assert_allclose(energy, energy[0], rtol=1e-9)
+
+
+GRAVITATION = '''
+from dap3d_core.interface import Force, hookimpl, number
+from dap3d_core.kernels import neg, norm2, scale, sqrt, sub
+
+interface_version = 1
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Gravitation(Force):
+    """Every two bodies attract each other."""
+
+    keyword, each_pair = "gravitation", True
+    G: float = number(1.0)
+
+    def wrench(r_i, r_j, mass_i, mass_j, G):
+        d = sub(r_j, r_i)
+        F = scale(G * mass_i * mass_j / (norm2(d) * sqrt(norm2(d))), d)
+        return (F, ZERO), (neg(F), ZERO)
+
+    def energy(r_i, r_j, mass_i, mass_j, G):
+        return -G * mass_i * mass_j / sqrt(norm2(sub(r_j, r_i)))
+
+
+@hookimpl
+def dap3d_forces():
+    return [Gravitation]
+'''
+THREE = """
+[bodies.a]
+mass = 5.0
+Jp = [0.1, 0.1, 0.1]
+[bodies.b]
+mass = 2.0
+Jp = [0.1, 0.1, 0.1]
+r = [3.0, 0.0, 0.5]
+r_dot = [0.0, 1.0, 0.0]
+[bodies.c]
+mass = 1.0
+Jp = [0.1, 0.1, 0.1]
+r = [0.0, -4.0, 0.0]
+r_dot = [1.0, 0.0, 0.2]
+[forces.g]
+type = "gravitation"
+[simulation]
+t_end = 1.0
+dt = 0.5
+"""

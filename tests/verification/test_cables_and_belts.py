@@ -1,0 +1,130 @@
+"""Cables and belts against closed forms, drivers with inputs."""
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+
+G = 9.81
+JP = [0.1, 0.1, 0.1]
+
+
+def blocks(m_1, m_2, kind, **fields):
+    """A block on one end of a cable, and one under a movable pulley, between vertical spans."""
+    scene = dap.Scene(name="blocks")
+    scene.add_body("one", mass=m_1, Jp=JP, r=[0.0, 0.0, -1.0])
+    scene.add_body("two", mass=m_2, Jp=JP, r=[2.0, 0.0, -1.5])
+    for name, x in (("A", 0.0), ("B", 2.0)):
+        scene.add_point(name, body="ground", sPp=[x, 0.0, 0.0])
+    add = scene.add_joint if kind == "joint" else scene.add_force
+    add("cable", "rope", points=["one.O", "A", "B", "two.O", "B"], **fields)
+    scene.add_force("weight", "g", gravity=G)
+    return scene
+
+
+def test_two_blocks_over_a_movable_pulley():
+    """Closed form: T = 3 m1 m2 g / (4 m1 + m2), up a1 = T/m1 - g, a2 = 2 T/m2 - g; rounding."""
+    m_1, m_2 = 3.0, 2.0
+    result = dap.simulate(blocks(m_1, m_2, "joint"), t_end=0.2, dt=0.1)
+    T = 3.0 * m_1 * m_2 * G / (4.0 * m_1 + m_2)
+    np.testing.assert_allclose(result.quantity("rope.lambda").values.ravel(), T, rtol=1e-10)
+    np.testing.assert_allclose(result.rdd[:, 0, 2], T / m_1 - G, rtol=1e-9)
+    np.testing.assert_allclose(result.rdd[:, 1, 2], 2.0 * T / m_2 - G, rtol=1e-9)
+    length = -result.r[:, 0, 2] + 2.0 - 2.0 * result.r[:, 1, 2]
+    np.testing.assert_allclose(length, length[0], rtol=1e-12)
+    energy = result.quantity("energy.total").values
+    np.testing.assert_allclose(energy, energy[0], atol=1e-8)
+
+
+def test_an_elastic_cable_swings_about_its_stretch():
+    """One block on a vertical cable: z = z0 - (m g / k)(1 - cos(w t)); steps leave 1e-8."""
+    scene = dap.Scene(name="swing")
+    scene.add_body("one", mass=2.0, Jp=JP, r=[0.0, 0.0, -1.0])
+    scene.add_point("A", body="ground", sPp=[0.0, 0.0, 0.0])
+    scene.add_point("B", body="ground", sPp=[1.0, 0.0, 0.0])
+    scene.add_force("cable", "rope", points=["one.O", "A", "B"], k=800.0, slack=True)
+    scene.add_force("weight", "g", gravity=G)
+    result = dap.simulate(scene, t_end=1.0, dt=0.05, rtol=1e-9, atol=1e-11)
+    sink = 2.0 * G / 800.0 * (1.0 - np.cos(20.0 * result.t))
+    np.testing.assert_allclose(result.r[:, 0, 2], -1.0 - sink, atol=1e-7)
+
+
+def test_a_slack_cable_does_not_push():
+    """Thrown up on a slack cable a block moves freely until it is taut."""
+    scene = dap.Scene(name="thrown")
+    scene.add_body("one", mass=2.0, Jp=JP, r=[0.0, 0.0, -1.0], r_dot=[0.0, 0.0, 2.0])
+    scene.add_force("cable", "rope", points=["one.O", "ground.O"], k=800.0, c=5.0, slack=True)
+    scene.add_force("weight", "g", gravity=G)
+    result = dap.simulate(scene, t_end=0.3, dt=0.1)
+    z = -1.0 + 2.0 * result.t - 0.5 * G * result.t**2
+    np.testing.assert_allclose(result.r[:, 0, 2], z, atol=1e-9)
+
+
+def test_a_winch_with_a_function_and_an_input():
+    """Both lower the block at 0.1 m/s, with the tension of its weight."""
+    for fields in ({"function": "f"}, {"input": "winch"}):
+        scene = dap.Scene(name="winch")
+        scene.add_body("one", mass=2.0, Jp=JP, r=[0.0, 0.0, -1.0], r_dot=[0.0, 0.0, -0.1])
+        if "input" in fields:
+            scene.add_input("winch", value=0.1)
+        else:
+            scene.add_function("a", "f", coeff=[0.0, 0.1, 0.0])
+        scene.add_joint("cable", "rope", points=["one.O", "ground.O"], **fields)
+        scene.add_force("weight", "g", gravity=G)
+        result = dap.simulate(scene, t_end=0.5, dt=0.25)
+        np.testing.assert_allclose(result.r[:, 0, 2], -1.0 - 0.1 * result.t, atol=1e-9)
+        np.testing.assert_allclose(
+            result.quantity("rope.lambda").values.ravel(), 2.0 * G, rtol=1e-9
+        )
+
+
+def belt(crossed):
+    scene = dap.Scene(name="belt")
+    for name, x, J in (("a", 0.0, 0.02), ("b", 1.0, 0.05)):
+        scene.add_body(name, mass=1.0, Jp=[0.1, 0.1, J], r=[x, 0.0, 0.0])
+        scene.add_point(f"{name}_pin", body="ground", sPp=[x, 0.0, 0.0])
+        pins = {"P_i": f"{name}.O", "P_j": f"{name}_pin"}
+        scene.add_joint("rev", f"{name}_axis", **pins, a_i=f"{name}.z", a_j="ground.z")
+    pulleys = {"points": ["a.O", "b.O"], "radii": [0.1, 0.25], "axis": "ground.z"}
+    springs = {"k": 1e5, "c": 800.0, "pretension": 300.0}
+    scene.add_force("belt", "belt", **pulleys, **springs, crossed=crossed)
+    scene.add_force("np", "motor", body_i="a", np=[0.0, 0.0, 2.0])
+    return scene
+
+
+@pytest.mark.parametrize("crossed", [False, True])
+def test_a_belt_carries_a_moment(crossed):
+    """Steady acceleration: the rigid ratio, T_tight - T_slack = moment / r, and bearing loads.
+
+    The vibration of the belt decays with c/m of some 1e5 1/s; 1e-6 is far above what is left.
+    """
+    r_a, r_b, J_a, J_b, M, T_0 = 0.1, 0.25, 0.02, 0.05, 2.0, 300.0
+    result = dap.simulate(belt(crossed), t_end=0.5, dt=0.25, integrator="radau")
+    ratio = (-1.0 if crossed else 1.0) * r_a / r_b
+    alpha = M / (J_a + J_b * ratio**2)
+    np.testing.assert_allclose(result.wd[-1, 0, 2], alpha, rtol=1e-6)
+    np.testing.assert_allclose(result.wd[-1, 1, 2], ratio * alpha, rtol=1e-6)
+    difference = (M - J_a * alpha) / r_a
+    sine = (r_a - (-r_b if crossed else r_b)) / 1.0
+    along = 2.0 * T_0 * np.sqrt(1.0 - sine**2)  # the mean of both spans is the pretension
+    load = result.reaction("a_axis")["i"].force[-1]
+    np.testing.assert_allclose(-load[0], along, rtol=1e-5)
+    np.testing.assert_allclose(abs(load[1]), difference * abs(sine), rtol=1e-5)
+
+
+@pytest.mark.parametrize("kind", ["rP", "drive-tran", "sph-sph", "drive-rot"])
+def test_an_input_is_the_speed_of_a_driver(kind):
+    """A body is moved at the input, 0.5, from the start on, by which its velocity is corrected."""
+    scene = dap.Scene(name="driver")
+    scene.add_body("one", mass=2.0, Jp=JP, r=[1.0, 0.0, 0.0])
+    scene.add_input("speed", value=0.5)
+    fields = {
+        "rP": {"body_i": "one", "a_j": "ground.x", "length": 1.0},
+        "drive-tran": {"body_i": "one", "body_j": "ground", "a_j": "ground.x"},
+        "sph-sph": {"P_i": "ground.O", "P_j": "one.O"},
+        "drive-rot": {"body_i": "one", "a_j": "ground.z"},
+    }[kind]
+    scene.add_joint(kind, "driver", **fields, input="speed")
+    result = dap.simulate(scene, t_end=1.0, dt=0.5)
+    moved = result.w[:, 0, 2] * result.t if kind == "drive-rot" else result.r[:, 0, 0] - 1.0
+    np.testing.assert_allclose(moved, 0.5 * result.t, atol=1e-9)
