@@ -117,7 +117,10 @@ class _Example:
         """Keys and values in TOML that a scene may write for a field."""
         head, _, slot = name.rpartition("_")
         owner = owners.get(slot, "crank")
-        if spec.kind == "vector2":
+        if spec.size:
+            if spec.required:
+                yield name, self._list(spec)
+        elif spec.kind == "vector2":
             for end in ("i", "j"):
                 yield f"P_{end}", f'"{self._body_named(owners[end])}.O"'
         elif spec.kind == "point":
@@ -152,6 +155,14 @@ class _Example:
             )
         elif spec.default is not None:
             yield name, _toml(spec.default)
+
+    def _list(self, spec: Any) -> str:
+        """A list of as many entries as it must have, two or more, on the first bodies."""
+        names = [self._body_named(b) for b in list(OWNERS.values())[: max(spec.least, 2)]]
+        ends = {"points": ".O", "vectors": ".y", "bodies": ""}
+        if spec.kind in ends:
+            return _toml([name + ends[spec.kind] for name in names])
+        return _toml([NUMBER] * len(names))
 
     def _body_named(self, body: str) -> str:
         if body != "ground":

@@ -1,12 +1,23 @@
 """Types with lists of a length that the scene gives."""
 
+from math import nan
 from typing import ClassVar
 
 import numpy as np
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.interface import Force, Joint, examine, number, numbers, points, vectors
+from dap3d_core.interface import (
+    Force,
+    Function,
+    Joint,
+    examine,
+    number,
+    numbers,
+    points,
+    table,
+    vectors,
+)
 from dap3d_core.interface.examine.sized_types import (
     Shape,
     entry_fields,
@@ -14,7 +25,7 @@ from dap3d_core.interface.examine.sized_types import (
     shared_slots,
     sized,
 )
-from dap3d_core.kernels import by_body, cross, dot, neg, scale, sub
+from dap3d_core.kernels import by_body, cross, dot, item, neg, scale, sub
 from dap3d_core.testing import check_type
 
 
@@ -59,6 +70,31 @@ def test_the_formulas_of_all_samples_are_checked():
     report = check_type(examine(Aligned), poses=2)
     assert report.ok, report
     assert [len(c.shape_of_lists.on[0][1]) for c in sample_classes(Aligned)] == [3, 4]
+
+
+class Cam(Function):
+    """Steps of a table, by the index of its rows."""
+
+    keyword, smooth = "cam", True
+    heights: tuple = table()
+
+    def value(x, heights):
+        return item(heights, 3.0 * x)[0], 0.0, 0.0, 0.0
+
+
+def test_a_row_is_read_by_its_index():
+    """The whole index below; outside of the table its first and its last row; also compiled."""
+    heights = [5.0, 6.0, 7.0, 8.0], 1, 3, (0.0,)
+    for k, want in ((-4, 6.0), (0, 6.0), (1, 7.0), (1.9, 7.0), (2, 8.0), (9, 8.0), (nan, 6.0)):
+        assert item(heights, k) == (want,)
+    (compiled,) = [o for o in check_type(examine(Cam), poses=4).outcomes if o.check == "compiled"]
+    assert compiled.ok, compiled
+
+
+def test_parts_are_summed_for_each_body():
+    parts = [((1.0, 2.0), 3.0), ((10.0, 20.0), 30.0), ((100.0, 200.0), 300.0)]
+    sums = by_body((1, 0, 1), parts, 3)
+    assert sums == (parts[1], ((101.0, 202.0), 303.0), ((0.0, 0.0), 0.0))
 
 
 def test_a_shape_has_one_type():

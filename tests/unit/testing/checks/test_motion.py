@@ -36,11 +36,11 @@ INSTALLED = {
     "fix": ["none: the bodies move as one"],
     "weld": ["none: the bodies move as one"],
     "screw": ["1 screw about a_j, constant in body j"],
-    "sph-sph": [ONE_ROW, ON_TIME],  # a link, a driven leg
-    "rP": [ONE_ROW],
+    "sph-sph": [ONE_ROW, ON_TIME, ON_VELOCITY],  # a link, a driven leg, one with an input
+    "rP": [ONE_ROW, ON_VELOCITY],
     "disk": [ON_VELOCITY, ONE_ROW, ON_VELOCITY, ON_VELOCITY],
-    "drive-rot": [ON_TIME],
-    "drive-tran": [ON_TIME],
+    "drive-rot": [ON_TIME, ON_VELOCITY],
+    "drive-tran": [ON_TIME, ON_VELOCITY],
     "rel-rot": [ON_VELOCITY, ON_VELOCITY],
     "rel-tran": [ON_VELOCITY, ON_VELOCITY],
     "planar": ["2 translations along n_j and m_j and 1 rotation about a_j, constant in body j"],
@@ -51,6 +51,7 @@ INSTALLED = {
     "couple": ["refused: it joins three bodies"],
     "gear": [ONE_ROW] * 2,
     "rack": [ONE_ROW],
+    "cable": ["refused: it joins three bodies"] * 4 + [ON_TIME] * 2,  # two lists each
     "follow": ["refused: it joins three bodies"] * 2,
     "point-on-plane": [ONE_ROW],
     "point-on-surface": [ONE_ROW],
