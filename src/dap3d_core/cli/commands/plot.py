@@ -57,6 +57,7 @@ def plot(
 
     \b
     BODY.r .p .rd .w .wp .rdd .wd .wpd  of a body
+    BODY.roll .pitch .yaw               its orientation as in rpy, rad
     POINT.r .v .a                       of a point
     JOINT.force .moment .lambda         reactions on body i
     JOINT.j.force                       on the body of slot j
