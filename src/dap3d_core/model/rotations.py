@@ -44,6 +44,23 @@ def _apply(A: Floats, vector: ArrayLike) -> Floats:
     return turned
 
 
+def roll_pitch_yaw(p: ArrayLike) -> Floats:
+    """Roll, pitch and yaw (..., 3), rad, of Euler parameters (..., 4) of any length.
+
+    A = Rz(yaw) Ry(pitch) Rx(roll): turns about the global x, then y, then z. With c, s of half the
+    pitch, e0 + e2 and e3 - e1 are c + s times the cosine and sine of (yaw - roll) / 2; e0 - e2 and
+    e3 + e1 are c - s times those of (yaw + roll) / 2. So at a pitch of a quarter turn, where one
+    of the two is not defined, the other is as exact as anywhere, and the angles give p again. Roll
+    and yaw are in [-pi, pi], pitch in [-pi/2, pi/2].
+    """
+    e0, e1, e2, e3 = np.moveaxis(np.asarray(p, dtype=float), -1, 0)
+    half_difference, half_sum = np.arctan2(e3 - e1, e0 + e2), np.arctan2(e3 + e1, e0 - e2)
+    quarter = np.arctan2(np.hypot(e0 - e2, e3 + e1), np.hypot(e0 + e2, e3 - e1))
+    roll, yaw = half_sum - half_difference, half_sum + half_difference
+    turns = 2.0 * np.pi * np.round(np.array([roll, 0.0 * roll, yaw]) / (2.0 * np.pi))
+    return np.moveaxis(np.array([roll, 0.5 * np.pi - 2.0 * quarter, yaw]) - turns, 0, -1)
+
+
 def euler_rates(p: Floats, w: Floats) -> Floats:
     """p_dot (..., 4) of p (..., 4) and global angular velocities (..., 3): half (0, w) times p."""
     scalar = -np.sum(w * p[..., 1:], axis=-1, keepdims=True)

@@ -1,7 +1,9 @@
 """``dap3d check-plugin``: compares the formulas of types with derivatives and with each other."""
 
+import importlib.util
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -48,7 +50,8 @@ def check_plugin(
     Of importers, exporters, integrators and shapes: that they can be loaded.
 
     NAME is the keyword of a type (PACKAGE:KEYWORD where two packages share one), a distribution or
-    a module that brings types, or a Python file with types of its own (with --allow-code).
+    a module that brings types; or a Python file, of an installed package as it is, any other with
+    --allow-code.
 
     J, nu and gamma are compared with time derivatives, by complex step and by differences, at
     random poses on and off the constraints; energies with wrenches; and much else
@@ -95,9 +98,8 @@ def _named_types(
     registry: "Registry", names: tuple[str, ...], *, allow_code: bool
 ) -> tuple["Registry", list[tuple[str, str]]]:
     """The (kind, keyword) of all named types, without duplicates, and their registry."""
+    names = tuple(_module_of(registry, name) if name.endswith(".py") else name for name in names)
     for name in (n for n in names if n.endswith(".py")):
-        if not Path(name).is_file():
-            raise Refused(f"there is no file {name}")
         if not allow_code:
             raise Refused(
                 f"{name} is not run unless it is allowed; if you trust it, give --allow-code"
@@ -107,6 +109,27 @@ def _named_types(
     for name in names or ("",):
         types |= dict.fromkeys(_types_of(registry, name))
     return registry, list(types)
+
+
+def _module_of(registry: "Registry", name: str) -> str:
+    """The module of an installed package that a file is, such as one of an editable install.
+
+    The name of the file where it is none: it then stands alone.
+    """
+    from dap3d_core.testing.packages import active_sources
+
+    path = Path(name)
+    if not path.is_file():
+        raise Refused(f"there is no file {name}")
+    path = path.resolve()
+    stem = path.parent.name if path.stem == "__init__" else path.stem
+    for module in dict.fromkeys(source.module for source in active_sources(registry)):
+        if module.rpartition(".")[2] == stem:
+            with suppress(Exception):  # of a broken package; loading it reports the fault
+                found = importlib.util.find_spec(module)
+                if found and found.origin and Path(found.origin).resolve() == path:
+                    return module
+    return name
 
 
 def _types_of(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:

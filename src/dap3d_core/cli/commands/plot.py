@@ -56,7 +56,7 @@ def plot(
     """Draw quantities of a RESULT, or outputs of a sweep: by default energies or all outputs.
 
     \b
-    BODY.r .p .rd .w .wp .rdd .wd .wpd  of a body
+    BODY.r .p .rd .w .wp .rdd .wd .wpd  of a body; .roll .pitch .yaw as in rpy
     POINT.r .v .a                       of a point
     JOINT.force .moment .lambda         reactions on body i
     JOINT.j.force                       on the body of slot j

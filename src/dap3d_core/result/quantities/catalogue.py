@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.rotations import to_body
+from dap3d_core.model.rotations import roll_pitch_yaw, to_body
 from dap3d_core.model.state_layout import split
 from dap3d_core.result.arrays import AXES, COLUMNS, EULER, Arrays
 from dap3d_core.result.errors import UnknownNameError
@@ -188,6 +188,16 @@ def _in_body_axes(vectors: MotionFunction) -> MotionFunction:
     return lambda source, bodies: to_body(_state(1)(source, bodies), vectors(source, bodies))
 
 
+def _angle(place: int) -> QuantityFunction:
+    """Roll, pitch or yaw, without steps of a turn from one reported instant to the next."""
+
+    def values(source: QuantitySource, owner: QuantityOwner) -> Floats:
+        angles = roll_pitch_yaw(_state(1)(source, slice(owner.place, owner.place + 1)))
+        return np.asarray(np.unwrap(angles[:, 0, place]))
+
+    return values
+
+
 def _points(level: int) -> MotionFunction:
     return lambda source, points: point_motion(
         source.summary, source.arrays.u, source.arrays.v_dot, points, level
@@ -268,6 +278,8 @@ def _multipliers(source: QuantitySource, owner: QuantityOwner) -> Floats:
     return source.arrays.Lam[:, start[owner.place] : start[owner.place + 1]]
 
 
+#: Angles of a body, as ``rpy`` of a scene.
+ANGLES = ("roll", "pitch", "yaw")
 #: Parts of a ``Reaction``: label and unit.
 ACTIONS = {
     "force": ("force", "N"),
@@ -278,10 +290,11 @@ ACTIONS = {
 }
 #: Quantities by kind of their owner and by name.
 QUANTITIES: dict[str, dict[str, QuantityType]] = {
-    **{
-        kind: {m.quantity: m.quantity_type() for m in MOTION if m.owner == kind}
-        for kind in ("body", "point")
+    "body": {
+        **{m.quantity: m.quantity_type() for m in MOTION if m.owner == "body"},
+        **{name: QuantityType(name, "rad", (), _angle(k)) for k, name in enumerate(ANGLES)},
     },
+    "point": {m.quantity: m.quantity_type() for m in MOTION if m.owner == "point"},
     "joint": {
         **{n: QuantityType(f"reaction {a}", u, AXES, _action(n)) for n, (a, u) in ACTIONS.items()},
         "lambda": QuantityType("Lagrange multipliers", "SI", (), _multipliers),

@@ -41,13 +41,13 @@ def find(result: QuantitySource, name: str) -> Quantity:
 
     Args:
         result: what the quantity is computed from.
-        name: ``BODY.`` r p rd w wp rdd wd wpd; ``POINT.`` r v a (also rP rPd rPdd); ``JOINT.`` or
-            ``JOINT.SLOT.`` force moment force_body moment_body moment_at_point, without a slot on
-            the body of the first; ``JOINT.lambda`` (rows from 1); ``JOINT.`` q1 q1_dot q2 q2_dot
-            ... angle length angle_rate length_rate; ``JOINT.`` and ``FORCE.`` states of their own,
-            their numbers from 1; ``FORCE.`` or ``FORCE.SLOT.`` the actions as of
-            a joint; ``FORCE.`` length length_rate tension energy; energy.kinetic .potential .total;
-            work; ``NAME.actuation`` of actuators of inverse dynamics; constraint.position
+        name: ``BODY.`` r p rd w wp rdd wd wpd roll pitch yaw; ``POINT.`` r v a (also rP rPd rPdd);
+            ``JOINT.`` or ``JOINT.SLOT.`` force moment force_body moment_body moment_at_point,
+            without a slot on the body of the first; ``JOINT.lambda`` (rows from 1); ``JOINT.`` q1
+            q1_dot q2 q2_dot ... angle length angle_rate length_rate; ``JOINT.`` and ``FORCE.``
+            states of their own, their numbers from 1; ``FORCE.`` or ``FORCE.SLOT.`` the actions as
+            of a joint; ``FORCE.`` length length_rate tension energy; energy.kinetic .potential
+            .total; work; ``NAME.actuation`` of actuators of inverse dynamics; constraint.position
             .velocity .acceleration; t; inputs and outputs of the scene.
 
     Raises:

@@ -140,13 +140,28 @@ def check_every(events: Sequence[Event], t_end: float) -> None:
             )
 
 
-def checked_events(events: Any) -> tuple[Event, ...]:
+def checked_events(events: Any, bodies: Collection[str]) -> tuple[Event, ...]:
     """The events of a run.
+
+    Args:
+        events: as given.
+        bodies: names of the bodies, whose roll and yaw at one instant lack whole turns: where they
+            step from pi to -pi they would pass every level.
 
     Raises:
         TypeError: they are not several ``Event``.
+        ValueError: one watches roll or yaw.
     """
-    return several(events, Event, "events")
+    found = several(events, Event, "events")
+    for event in found:
+        body, _, angle = event.of.rpartition(".") if isinstance(event.of, str) else ("", "", "")
+        if angle in ("roll", "yaw") and body in bodies:
+            raise ValueError(
+                f"event {event.title}: {event.of} steps by a turn at pi, past every level; "
+                "watch the angle of a joint, which counts turns, or a function such as "
+                f'lambda t, s: math.sin(s["{event.of}"] - level)'
+            )
+    return found
 
 
 def several(given: Any, kind: type[Kind], argument: str) -> tuple[Kind, ...]:

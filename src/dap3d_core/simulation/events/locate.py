@@ -62,7 +62,8 @@ class EventLocator:
     horizon = np.inf
 
     def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
-        self.compiled, self.events = compiled, checked_events(events)
+        self.compiled = compiled
+        self.events = checked_events(events, compiled.model.body_names)
         self.numbers = Numbers(compiled)
         self.jumps: Jumps | None = None
         self.take_rows: Callable[[], None] = lambda: None

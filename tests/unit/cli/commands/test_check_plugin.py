@@ -5,6 +5,7 @@ import json
 from click.testing import CliRunner
 
 from dap3d_core.cli.app import dap3d
+from dap3d_joints import gear
 
 SLEEVE = '''
 from dap3d_core.interface import Joint, Point, Vector, hookimpl, point, vector
@@ -66,3 +67,19 @@ def test_the_motion_of_a_type_of_ones_own(tmp_path):
             {"kind": "rotation", "constant_in": "i", "name": "a_i"},
         ],
     }
+
+
+def test_the_file_of_an_installed_package_is_its_module():
+    """Also one that imports from its package; what is installed needs no permission to run."""
+    path = gear.__file__
+    output = checked(path, "--json", "--poses", "1")
+    assert json.loads(output) == json.loads(checked(gear.__name__, "--json", "--poses", "1"))
+
+
+def test_a_file_of_the_same_name_elsewhere_is_no_part_of_the_package(tmp_path):
+    path = tmp_path / "gear.py"
+    path.write_text(SLEEVE)
+    done = CliRunner().invoke(dap3d, ["check-plugin", str(path)])
+    assert done.exit_code == 2
+    assert "is not run unless it is allowed" in done.output
+    checked(str(path), "--allow-code", "--poses", "1")

@@ -13,6 +13,8 @@ import dap3d_core as dap
 from dap3d_core.cli.app import dap3d
 from dap3d_core.result import UnknownNameError, find, names_of
 
+MOTION = ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd")
+
 
 @pytest.fixture(scope="module")
 def result():
@@ -42,7 +44,7 @@ def folder(result, tmp_path_factory):
         ("J1.q2", ["J1.q2_dot"]),
         ("til", ["tilt"]),
         ("energy.", ["energy.kinetic", "energy.potential", "energy.total"]),
-        ("cone", [f"cone.{a}" for a in ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd")]),
+        ("cone", [f"cone.{a}" for a in (*MOTION, "roll", "pitch", "yaw")]),
         ("nothing", []),
         ("cone.none.", []),
     ],

@@ -34,6 +34,18 @@ def test_components_and_length(result):
         np.testing.assert_array_equal(result.quantity(f"bob.p.e{k}").values, result.p[:, 0, k])
 
 
+def test_roll_pitch_and_yaw_count_turns_from_one_reported_instant_to_the_next(result):
+    """The bob goes round about z by RATE t, past half a turn; it neither rolls nor pitches."""
+    turned = RATE * result.t
+    assert turned[-1] > np.pi
+    for name, expected in {"roll": 0.0, "pitch": 0.0, "yaw": turned}.items():
+        values, label, unit = result.quantity(f"bob.{name}")
+        np.testing.assert_allclose(values, np.broadcast_to(expected, turned.shape), atol=1e-14)
+        assert (label, unit) == (f"{name} of bob", "rad")
+    with pytest.raises(UnknownNameError, match=r"bob\.yaw has no components"):
+        result.quantity("bob.yaw.x")
+
+
 def test_points(result):
     P = result.summary.point_index["P"]
     for name, array in {"r": result.rP, "v": result.rPd, "a": result.rPdd}.items():
@@ -127,8 +139,11 @@ def test_the_nearest_right_name(result, wrong, right):
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ("bob", "which quantity of the body 'bob': r, p, rd, w, wp, rdd, wd, wpd"),
-        ("bob.q", "the body 'bob' has r, p, rd, w, wp, rdd, wd, wpd, not 'q'"),
+        (
+            "bob",
+            "which quantity of the body 'bob': r, p, rd, w, wp, rdd, wd, wpd, roll, pitch, yaw",
+        ),
+        ("bob.q", "the body 'bob' has r, p, rd, w, wp, rdd, wd, wpd, roll, pitch, yaw, not 'q'"),
         ("bob.r.x.y", "bob.r has x, y, z, norm, not 'x.y'"),
         ("bob.p.norm", "bob.p has e0, e1, e2, e3, not 'norm'"),
         ("P.w", "the point 'P' has r, v, a, not 'w'"),

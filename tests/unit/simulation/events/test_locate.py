@@ -192,3 +192,12 @@ def test_the_error_of_a_run_with_events_is_estimated_where_both_runs_report_alik
     stop = dap.Event("stone.r.z", below=0.5, action="stop")
     result = dap.simulate(compiled, t_end=1.0, events=[stop], estimate_error=True)
     assert result.error.largest["r"] < 1e-9
+
+
+@pytest.mark.parametrize("angle", ["roll", "yaw"])
+def test_angles_that_step_by_a_turn_are_refused(compiled, angle):
+    """They would pass every level at pi; pitch, which does not step, is found."""
+    with pytest.raises(ValueError, match=rf"stone\.{angle} steps by a turn at pi"):
+        dap.simulate(compiled, t_end=0.1, dt=0.1, events=[dap.Event(f"stone.{angle}", at=1.0)])
+    watched = [dap.Event("stone.pitch", at=1.0)]
+    assert not dap.simulate(compiled, t_end=0.1, dt=0.1, events=watched).events

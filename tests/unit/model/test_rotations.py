@@ -1,0 +1,27 @@
+"""Roll, pitch and yaw of Euler parameters: what a scene makes of them gives them back."""
+
+import numpy as np
+import pytest
+
+from dap3d_core.model.rotations import roll_pitch_yaw
+from dap3d_core.scene.validate.coerce_values import from_rpy
+
+
+def test_they_are_those_that_a_scene_is_given():
+    """Within some roundings of half angles, divided by c - s, which is at least 0.05."""
+    rng = np.random.default_rng(4)
+    angles = rng.uniform(-1.0, 1.0, size=(50, 3)) * [np.pi, 1.5, np.pi]
+    p = np.array([from_rpy(tuple(map(float, three))) for three in angles])
+    np.testing.assert_allclose(roll_pitch_yaw(p), angles, atol=1e-13)
+    np.testing.assert_allclose(roll_pitch_yaw(-3.0 * p), angles, atol=1e-13)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_upright_only_a_sum_or_a_difference_is_defined(sign):
+    """At a pitch of a quarter turn: yaw - roll upwards, yaw + roll downwards. Some roundings."""
+    p = np.array(from_rpy((0.3, sign * np.pi / 2, 0.7)))
+    roll, pitch, yaw = map(float, roll_pitch_yaw(p))
+    assert pitch == pytest.approx(sign * np.pi / 2, abs=1e-14)
+    assert yaw - sign * roll == pytest.approx(0.7 - sign * 0.3, abs=1e-14)
+    again = np.array(from_rpy((roll, pitch, yaw)))
+    assert abs(again @ p) == pytest.approx(1.0, abs=1e-14)
