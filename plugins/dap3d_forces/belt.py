@@ -21,10 +21,10 @@ class Belt(Force):
     """A massless, elastic belt over pulleys, without slip: a tension of its own in each span.
 
     The ``points`` are the centres of the pulleys, in the order in which the belt runs around them
-    counterclockwise, seen against ``axis``, and closes on the first. A negative radius is that of a
-    pulley outside of the loop, on the back of the belt, which turns in the other direction. Span k
-    runs from pulley k to the next. With rho_k the radii, d between the centres, normal to the axis,
-    l its length, u = d / l and m = axis x u, it touches both pulleys in the direction n:
+    counterclockwise, seen against ``axis_i``, and closes on the first. A negative radius is that of
+    a pulley outside of the loop, on the back of the belt, which turns in the other direction. Span
+    k runs from pulley k to the next. With rho_k the radii, d between the centres, normal to the
+    axis, l its length, u = d / l and m = axis x u, it touches both pulleys in the direction n:
 
         sin b = (rho_k - rho_(k+1)) / l,  n = sin b u - cos b m
         P_k = r_k + rho_k n,  P_(k+1) = r_(k+1) + rho_(k+1) n,  e along P_(k+1) - P_k
@@ -42,7 +42,7 @@ class Belt(Force):
     states: ClassVar = {"x": "n"}
     points: tuple = points("n", least=2, doc="centres of the pulleys, in order along the belt")
     radii: tuple = numbers("n", unit="m", doc="radii; negative of a pulley on the belt's back")
-    axis: Vector = vector(doc="direction of the axes of all pulleys")
+    axis_i: Vector = vector(doc="direction of the axes of all pulleys, on any body")
     k: float = number(unit="N/m", minimum=0.0, doc="stiffness of each span")
     c: float = number(default=0.0, unit="N s/m", minimum=0.0, doc="damping of each span")
     pretension: float = number(default=0.0, unit="N", minimum=0.0, doc="tension where x = 0")
@@ -55,19 +55,20 @@ class Belt(Force):
         if self.crossed:
             rho[1] = -rho[1]
         places = [pose.place(P) for P, pose in zip(self.points, bodies["points"], strict=True)]
+        axis = bodies["i"].to_global(self.axis_i)
         for k, place in enumerate(places):
             after = (k + 1) % len(places)
-            if norm2(sub(places[after], place)) <= (rho[k] - rho[after]) ** 2:
+            if norm2(across(sub(places[after], place), axis)) <= (rho[k] - rho[after]) ** 2:
                 raise ValueError(
                     f"pulleys {k + 1} and {after + 1} are too near for a belt between them; "
                     "give smaller radii or other points"
                 )
         return {"rho": tuple(rho)}
 
-    def wrench(r_points, s_points, v_points, w_points, on_points, body_count, rho, axis, k, c,
+    def wrench(r_points, s_points, v_points, w_points, on_points, body_count, rho, axis_i, k, c,
                pretension, x):  # fmt: skip
         parts, on = [], []
-        for a, b, e, arm_a, arm_b in runs(r_points, rho, axis):
+        for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i):
             rate = speed(e, arm_a, arm_b, v_points, w_points, a, b)
             F = scale(maximum(pretension + k * x[a] + c * rate, 0.0), e)
             parts.append((F, cross(add(s_points[a], arm_a), F)))
@@ -75,17 +76,22 @@ class Belt(Force):
             on += [on_points[a], on_points[b]]
         return by_body(on, parts, body_count)
 
-    def rate(r_points, v_points, w_points, rho, axis):
+    def rate(r_points, v_points, w_points, rho, axis_i):
         return (tuple(
             speed(e, arm_a, arm_b, v_points, w_points, a, b)
-            for a, b, e, arm_a, arm_b in runs(r_points, rho, axis)
+            for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i)
         ),)  # fmt: skip
 
-    def switch(r_points, v_points, w_points, rho, axis, k, c, pretension, x):
+    def switch(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x):
         return tuple(
             pretension + k * x[a] + c * speed(e, arm_a, arm_b, v_points, w_points, a, b)
-            for a, b, e, arm_a, arm_b in runs(r_points, rho, axis)
+            for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i)
         )
+
+
+def across(d, axis):
+    """The part of a vector that is normal to the axis."""
+    return sub(d, scale(dot(d, axis), axis))
 
 
 def runs(r, rho, axis):
@@ -93,8 +99,7 @@ def runs(r, rho, axis):
     spans = []
     for a in range(len(r)):
         b = (a + 1) % len(r)
-        d = sub(r[b], r[a])
-        d = sub(d, scale(dot(d, axis), axis))
+        d = across(sub(r[b], r[a]), axis)
         l = sqrt(norm2(d))
         u = scale(1.0 / l, d)
         m = cross(axis, u)

@@ -8,6 +8,7 @@ from support.scenes import case_names, cases, scene_for
 from dap3d_core.assembly.arrays import FRICTION
 from dap3d_core.assembly.evaluate import call_kinds
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.interface.fields import specs_of
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation
 from dap3d_core.model.state_layout import join, split
@@ -121,13 +122,15 @@ def test_force(case):
     compare(scene_for(REGISTRY.get("force", keyword), np.random.default_rng(0), values=values))
 
 
-WITH_FRICTION = [
-    (keyword, values)
-    for keyword, values in JOINTS
-    if "friction" in REGISTRY.get("joint", keyword).chosen(values).kernels
-    or any("friction" in v.kernels for c, v in REGISTRY.get("joint", keyword).variants
-           if c == values)
-]  # fmt: skip
+def has_friction(keyword, values):
+    """True if the type of a case, or its variant of just these values, has friction."""
+    type_info = REGISTRY.get("joint", keyword)
+    fields = dict.fromkeys(specs_of(type_info.type)) | values
+    alone = [v for c, v in type_info.variants if c == values]
+    return any("friction" in e.kernels for e in [type_info.chosen(fields), *alone])
+
+
+WITH_FRICTION = [(keyword, values) for keyword, values in JOINTS if has_friction(keyword, values)]
 
 
 @pytest.mark.parametrize("case", WITH_FRICTION, ids=case_names(WITH_FRICTION))

@@ -66,9 +66,23 @@ def scene_for(type_info, rng, *, ground=None, values=None):
     return scene
 
 
+def _list(scene, name, spec, owner, rng):
+    """Three entries on different bodies; small numbers, such as radii."""
+    on = list(owner.values())
+    if spec.kind == "points":
+        return [scene.add_point(f"{name}_{b}", b, rng.uniform(-1, 1, 3)) for b in on]
+    if spec.kind == "vectors":
+        return [scene.add_vector(f"{name}_{b}", b, rng.normal(size=3)) for b in on]
+    if spec.kind == "bodies":
+        return on
+    return rng.uniform(0.05, 0.1, len(on)) if spec.required else None
+
+
 def _field(scene, name, spec, owner, rng, wanted):
     if not spec.given or spec.kind == "joint_fields":
         return None
+    if spec.size:
+        return _list(scene, name, spec, owner, rng)
     body = owner.get(slot_of(name) or "", "b1")
     if spec.kind == "point":
         return scene.add_point(name, body, rng.uniform(-1, 1, 3))

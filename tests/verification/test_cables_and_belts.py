@@ -85,7 +85,7 @@ def belt(crossed):
         scene.add_point(f"{name}_pin", body="ground", sPp=[x, 0.0, 0.0])
         pins = {"P_i": f"{name}.O", "P_j": f"{name}_pin"}
         scene.add_joint("rev", f"{name}_axis", **pins, a_i=f"{name}.z", a_j="ground.z")
-    pulleys = {"points": ["a.O", "b.O"], "radii": [0.1, 0.25], "axis": "ground.z"}
+    pulleys = {"points": ["a.O", "b.O"], "radii": [0.1, 0.25], "axis_i": "ground.z"}
     springs = {"k": 1e5, "c": 800.0, "pretension": 300.0}
     scene.add_force("belt", "belt", **pulleys, **springs, crossed=crossed)
     scene.add_force("np", "motor", body_i="a", np=[0.0, 0.0, 2.0])

@@ -387,7 +387,7 @@ class _Reading:
             letter = slots[bodies.index(_UNKNOWN)]
             fields = [f.name for f in self.reader.fields if slot_of(f.name) == letter]
             self.refuse("", f"which body is {letter}? Give {' or '.join(fields)}")
-        if bodies == [0]:
+        if bodies == [0] and not self.reader.lists:
             what = "the only body of this element is ground, which is fixed"
             self.refuse(self.given_by[0], what)
         for n, body in enumerate(bodies):

@@ -144,7 +144,7 @@ def test_points_that_coincide_are_refused():
 def test_lists_of_one_size_go_together():
     scene = dap.Scene(name="belt")
     scene.add_body("a", mass=1.0, Jp=[0.1, 0.1, 0.1], r=[1.0, 0.0, 0.0])
-    scene.add_force("belt", "b", points=["a.O", "ground.O"], radii=[0.1], axis="ground.z", k=1.0)
+    scene.add_force("belt", "b", points=["a.O", "ground.O"], radii=[0.1], axis_i="ground.z", k=1.0)
     with pytest.raises(dap.SceneError, match="has 1 entries, and points has 2: they go together"):
         dap.compile(scene)
 

@@ -53,6 +53,7 @@ def test_instances_hold_what_types_need(scene_of, registry):
         "P_j": (0.0, 4.0, 0.0),
         "length": 8.0,
         "function": None,
+        "input": None,
     }
     g, spring = checked.forces
     assert g.bodies == ()
