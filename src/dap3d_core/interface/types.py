@@ -53,7 +53,7 @@ class TypeBase:
     #: True for impulses that drive bodies: check-plugin lets them add kinetic energy.
     gives_energy: ClassVar[bool] = False
     #: States of its own: names, or name -> length (docs/concepts/kernels.md).
-    states: ClassVar[tuple[str, ...] | Mapping[str, int]] = ()
+    states: ClassVar[tuple[str, ...] | Mapping[str, int | str]] = ()
 
     def __init_subclass__(cls, **conditions: Any) -> None:
         super().__init_subclass__()

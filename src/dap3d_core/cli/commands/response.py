@@ -108,11 +108,11 @@ def _frequencies(
     """
     from dap3d_core.simulation.linearization.frequency_response import samples, usual_range
 
-    low, high = usual_range(lin)
+    low, high = usual_range(lin.frequencies)
     low, high = low if first is None else first, high if last is None else last
     if not low < high:
         raise Refused(f"the frequencies run from {low:g} to {high:g} Hz: give --from below --to")
-    return samples(lin, low, high, number)
+    return samples(lin.frequencies, lin.damping, low, high, number)
 
 
 def _data(

@@ -18,9 +18,6 @@ from dap3d_core.kernels.compiler.background import optimiser
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
 if TYPE_CHECKING:
-    from dap3d_core.formulations.evaluator import Evaluator
-    from dap3d_core.formulations.programs.scene_program import Program
-    from dap3d_core.integrators.stepping.integration import Integration
     from dap3d_core.kernels.array_types import Floats, Integers
 
 #: Seconds in general code from which on a program is looked for in the cache folder, and made.
@@ -44,7 +41,7 @@ class Record:
         is_requested: True if they are being compiled by another process.
     """
 
-    programs: "list[Program]" = attrs.field(factory=list)
+    programs: list[Any] = attrs.field(factory=list)
     reason: str = ""
     is_requested: bool = False
 
@@ -59,7 +56,7 @@ _making = threading.Lock()
 class ChangeOver:
     """The programs of an evaluator, for its integrations."""
 
-    def __init__(self, evaluator: "Evaluator") -> None:
+    def __init__(self, evaluator: Any) -> None:
         """Args: the evaluator."""
         model = evaluator.model
         self._evaluator = evaluator
@@ -70,7 +67,7 @@ class ChangeOver:
         self._key = evaluator.method, model.body_count, model.row_count, len(evaluator.loop_groups)
         self._is_open = jit_is_on() and 0 < model.body_count <= MOST_BODIES
 
-    def advance(self, integration: "Integration", budget: int) -> None:
+    def advance(self, integration: Any, budget: int) -> None:
         """``integration.advance``, by programs where there are some."""
         record = self._record_of(integration) if self._is_open else None
         if record is None:
@@ -93,7 +90,7 @@ class ChangeOver:
             if programs[k].failures() - before[k] > 1 + MOST_FAILURES[k] * counts[k]:
                 _give_up(record, k)
 
-    def _record_of(self, integration: "Integration") -> Record | None:
+    def _record_of(self, integration: Any) -> Record | None:
         """The record, where this call may run its programs."""
         if _spent.get(self._key, 0.0) < LOAD_AFTER or not integration.takes_programs:
             return None
@@ -117,7 +114,7 @@ class ChangeOver:
                     record.reason = f"{type(error).__name__}: {error}"
         return record if record.programs else None
 
-    def _make(self, record: Record, name: str, integration: "Integration") -> None:
+    def _make(self, record: Record, name: str, integration: Any) -> None:
         """Load programs that the cache folder has, or let them be compiled."""
         from dap3d_core.formulations.programs import scene_program
 

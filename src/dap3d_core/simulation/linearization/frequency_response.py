@@ -1,14 +1,11 @@
 """Response of a linearisation to inputs that oscillate, and its peaks."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from dap3d_core.kernels.array_types import Floats
-
-if TYPE_CHECKING:
-    from dap3d_core.simulation.linearization.linearization import Linearization
 
 Complex = NDArray[np.complex128]
 #: Range of frequencies by default: below the lowest mode and above the highest, and without modes.
@@ -25,8 +22,10 @@ class Peak(NamedTuple):
     phase: float
 
 
-def response(lin: "Linearization", frequencies: ArrayLike) -> Complex:
+def response(A: Floats, B: Floats, C: Floats, D: Floats, frequencies: ArrayLike) -> Complex:
     """(f, outputs, inputs) C (i omega - A)^-1 B + D; infinite at an undamped resonance.
+
+    frequencies: (f,) Hz.
 
     Raises:
         ValueError: a frequency is negative or not finite.
@@ -34,8 +33,7 @@ def response(lin: "Linearization", frequencies: ArrayLike) -> Complex:
     given = np.atleast_1d(np.asarray(frequencies, dtype=float))
     if given.ndim != 1 or not np.all(np.isfinite(given)) or np.any(given < 0.0):
         raise ValueError(f"frequencies are finite numbers of 0 Hz and more, not {frequencies!r}")
-    A, B, C, D = lin.A, lin.B, lin.C, lin.D
-    found = np.empty((len(given), len(lin.outputs), len(lin.inputs)), dtype=complex)
+    found = np.empty((len(given), *D.shape), dtype=complex)
     for k, f in enumerate(given):
         try:
             found[k] = C @ np.linalg.solve(2j * np.pi * f * np.eye(len(A)) - A, B) + D
@@ -44,20 +42,20 @@ def response(lin: "Linearization", frequencies: ArrayLike) -> Complex:
     return found
 
 
-def usual_range(lin: "Linearization") -> tuple[float, float]:
+def usual_range(modes: Floats) -> tuple[float, float]:
     """Frequencies, Hz, between which a response is of interest: around those of the modes."""
-    known = lin.frequencies[np.isfinite(lin.frequencies)]
+    known = modes[np.isfinite(modes)]
     known = known[known > DRIFTS * np.max(known, initial=0.0)]
     if not len(known):
         return WITHOUT
     return BELOW * float(known.min()), ABOVE * float(known.max())
 
 
-def samples(lin: "Linearization", first: float, last: float, count: int) -> Floats:
+def samples(modes: Floats, damping: Floats, first: float, last: float, count: int) -> Floats:
     """(f,) frequencies, Hz, evenly spaced by their logarithms, and closely about each mode."""
     even = np.geomspace(first, last, count)
-    width = np.maximum(np.abs(lin.damping), 1e-3)
-    near = lin.frequencies[:, None] * (1.0 + width[:, None] * np.linspace(-3.0, 3.0, 61))
+    width = np.maximum(np.abs(damping), 1e-3)
+    near = modes[:, None] * (1.0 + width[:, None] * np.linspace(-3.0, 3.0, 61))
     inside = near[(near >= first) & (near <= last)]
     found: Floats = np.unique(np.concatenate([even, inside]))
     return found

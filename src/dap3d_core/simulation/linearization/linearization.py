@@ -147,7 +147,7 @@ class Linearization:
         for word, there in (("inputs", of.inputs), ("outputs", of.outputs)):
             if not there:
                 raise ValueError(f"a response needs {word}: name them here, or to linearize")
-        return response(of, frequencies)
+        return response(of.A, of.B, of.C, of.D, frequencies)
 
     @property
     def state_count(self) -> int:
