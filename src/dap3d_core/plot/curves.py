@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dap3d_core.model.groups import Floats
+from dap3d_core.plot.energies import drift_of, span_of
 from dap3d_core.plot.style import (
     DASHES,
     HEIGHT,
@@ -62,12 +63,17 @@ def rate_of(result: Result, quantity: Quantity) -> Floats | None:
 
 
 class Curve(NamedTuple):
-    """One line: its name in the legend, its points, the quantity, the number of its run."""
+    """One line: its name in the legend, its points, the quantity, the number of its run.
+
+    ``drift`` are words on the drift of a conserved energy; the axis spans ``span`` or more.
+    """
 
     name: str
     points: tuple[Floats, Floats]
     quantity: Quantity
     run: int
+    drift: str = ""
+    span: float = 0.0
 
 
 @attrs.frozen(eq=False)
@@ -95,7 +101,7 @@ class CurvePicture(Picture):
         for ax, (unit, curves) in zip(axes, self.panels.items(), strict=True):
             self._draw_panel(ax, unit, curves, height)
             if len(curves) > 1:
-                legend_above(ax, [curve.name for curve in curves], width)
+                legend_above(ax, [curve.name + curve.drift for curve in curves], width)
             style_axes(ax)
         label = with_unit(self.x.label, self.x.unit)
         axes[-1].set_xlabel(folded(label, 17 * width), fontsize=LETTERS)
@@ -139,20 +145,19 @@ class CurvePicture(Picture):
                 markersize=4.5,
                 markerfacecolor="none",
                 linewidth=1.4,
-                label=shown_text(curve.name),
+                label=shown_text(curve.name + (curve.drift if len(curves) > 1 else "")),
             )
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_formatter(PlainOffset())
-        show_rounding_flat(ax)
+        show_rounding_flat(ax, max(curve.span for curve in curves))
         ax.set_ylabel(folded(_y_label(unit, curves), 15 * height), fontsize=LETTERS)
 
 
 def _y_label(unit: str, curves: Sequence[Curve]) -> str:
     labels = list(dict.fromkeys(c.quantity.label for c in curves))
     kinds = list(dict.fromkeys(c.quantity.kind for c in curves))
-    return with_unit(
-        labels[0] if len(labels) == 1 else ", ".join(kinds) if len(kinds) < 3 else "", unit
-    )
+    words = labels[0] if len(labels) == 1 else ", ".join(kinds) if len(kinds) < 3 else ""
+    return with_unit(words + (curves[0].drift if len(curves) == 1 else ""), unit)
 
 
 def curve_picture(
@@ -216,7 +221,8 @@ def _curves(
     ]
     for name, *points in zip(names, *of_parts, strict=True):
         label = run if alone and run else ", ".join(part for part in (name, run) if part)
-        yield Curve(label, _interrupted(points), quantity, number)
+        drift, span = drift_of(result, quantity), span_of(result, quantity)
+        yield Curve(label, _interrupted(points), quantity, number, drift, span)
 
 
 def _points(result: Result, over: Quantity, quantity: Quantity) -> list[tuple[Floats, Floats]]:

@@ -59,13 +59,18 @@ class PlainOffset(ScalarFormatter):
         return " ".join(words)
 
 
-def show_rounding_flat(ax: Axes) -> None:
-    """Choose limits in which curves that differ by rounding alone are level."""
+def show_rounding_flat(ax: Axes, span: float = 0.0) -> None:
+    """Choose limits in which curves that differ by rounding alone are level.
+
+    The axis spans ``span`` or more.
+    """
     low, high = ax.dataLim.intervaly
     size = max(abs(low), abs(high))
     if 0.0 < high - low < ROUNDING * size:
+        span = max(span, 0.2 * size)
+    if high - low < span:
         middle = 0.5 * (low + high)
-        ax.set_ylim(middle - 0.1 * size, middle + 0.1 * size)
+        ax.set_ylim(middle - 0.55 * span, middle + 0.55 * span)
 
 
 def style_axes(ax: Axes, *, grid: bool = True) -> None:

@@ -13,6 +13,7 @@ from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import read_only
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result.arrays import Arrays, arrays_of
+from dap3d_core.result.display import ResultDisplay
 from dap3d_core.result.errors import ResultError, UnknownNameError, unknown
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.metadata import RunMetadata, RunStatistics
@@ -67,7 +68,7 @@ def _motion(array: str) -> cached_property[Floats]:
     return cached_property(values)
 
 
-class Result:
+class Result(ResultDisplay):
     """Result of a run: n bodies, m constraint rows, nP points at nt instants.
 
     Stored are t, u, v_dot, Lam, work and the potential energy; the other arrays of the manual's
@@ -154,13 +155,6 @@ class Result:
         """For other processes: everything but the model and the evaluator."""
         arrays = (*self.arrays.columns(), self.arrays.u_error)
         return _received, (self.summary, arrays, self.record)
-
-    def __repr__(self) -> str:
-        times = f", t = {self.t[0]:g} ... {self.t[-1]:g} s" if len(self.t) else ""
-        return (
-            f"<Result {self.record.title!r}: {self.status}, {self.summary.body_count} bodies, "
-            f"{self.summary.row_count} rows, {len(self.t)} instants{times}>"
-        )
 
     # ------------------------------------------------------------------ stored
 

@@ -48,7 +48,7 @@ def test_units_share_a_figure_in_panels_below_one_another(result):
     axes = first.figure.axes
     assert [sorted(lines(ax)) for ax in axes] == [
         ["P.r.z", "bob.r.x", "bob.r.y", "bob.r.z"],
-        ["energy.total", "work"],
+        ["energy.total (drift 0)", "work"],
         ["bob.p.e0"],
     ]
     assert [ax.get_ylabel().replace("\n", " ") for ax in axes] == [
