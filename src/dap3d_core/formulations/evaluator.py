@@ -38,7 +38,6 @@ from dap3d_core.assembly.turns import (
 from dap3d_core.formulations import FORMULATIONS, REPORT, RHS
 from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
-from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.formulations.switches import Switch, switches_of
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.interface.element_unknowns import START
@@ -152,7 +151,6 @@ class Evaluator:
         if self.formulation.has_own_coordinates:
             self.coordinates = self.formulation.coordinates(self)
             self.__dict__.pop("functions", None)  # other joints may be in the tree
-        self.__dict__.pop("programs", None)
 
     @IGNORE_FLOAT_ERRORS
     def start(
@@ -298,11 +296,6 @@ class Evaluator:
         turns, switches = self.counts_turns, bool(self.switches)
         equations = self.coordinates.equations if self.formulation.has_own_coordinates else ""
         return self.formulation.functions(turns=turns, switches=switches, equations=equations)
-
-    @cached_property
-    def programs(self) -> ChangeOver:
-        """The program of the scene's own, for its integrations."""
-        return ChangeOver(self)
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y of a state u (13 n,) and ``states``, in coordinates of bodies."""

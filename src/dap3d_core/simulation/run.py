@@ -251,7 +251,7 @@ class Run(RunState):
             elif self.event_locator:
                 self.event_locator.advance(integration, budget)
             else:
-                self.evaluator.programs.advance(integration, budget)
+                self.programs.advance(integration, budget)
             if self.jumps is not None:
                 self._let_jump(self.jumps, integration)
             self._take_rows()

@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import Integration, StepCounts
 from dap3d_core.result import INFORMATION, EventRecord, RunMetadata, RunStatistics
 from dap3d_core.scene import Mistake, SceneError, Simulation
@@ -54,6 +55,7 @@ class RunState:
 
     Attributes:
         compiled, evaluator, settings: the model, its evaluator, the settings with atol as a number.
+        programs: of the scene's own, which take the place of general code in longer runs.
         times: (nt,) reporting times, s.
         options: what every integration of the run is made with.
         integrations: the present one last; "auto" and radau may take a second one.
@@ -117,7 +119,7 @@ class RunState:
         self.event_locator = EventLocator(compiled, events) if events else None
         if self.event_locator is not None:
             check_every(self.event_locator.events, self.t_end)
-        self.jumps = jumps_of(self.evaluator)
+        self.jumps, self.programs = jumps_of(self.evaluator), ChangeOver(self.evaluator)
         if self.event_locator is not None:
             self.event_locator.jumps = self.jumps
         self.control: SampledControl | None = None

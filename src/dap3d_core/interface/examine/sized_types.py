@@ -97,16 +97,14 @@ def sample_classes(type_: Any) -> list[Any]:
     return classes
 
 
-def sized(type_info: TypeInfo, shape: Shape) -> TypeInfo:
-    """The type for one shape of its lists."""
+def sized(type_info: TypeInfo, shape: Shape, examine: Callable[..., TypeInfo]) -> TypeInfo:
+    """The type for one shape of its lists; examine: of examine.py, which makes use of this file."""
     type_: Any = type_info.type
-    return _examined(type_, shape)
+    return _examined(type_, shape, examine)
 
 
 @cache
-def _examined(type_: Any, shape: Shape) -> TypeInfo:
-    from dap3d_core.interface.examine.examine import examine
-
+def _examined(type_: Any, shape: Shape, examine: Callable[..., TypeInfo]) -> TypeInfo:
     return attrs.evolve(examine(sized_class(type_, shape)), given=str(shape))
 
 

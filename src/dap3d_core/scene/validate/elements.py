@@ -165,9 +165,10 @@ class Reader:
                 values[field.name] = ZERO if is_point else self.body_names[bodies[field.slot]]
         type_info = self.type_info.chosen(values) if self.type_info.variants else self.type_info
         if shape is not None:
+            from dap3d_core.interface.examine.examine import examine
             from dap3d_core.interface.examine.sized_types import sized
 
-            type_info, bodies = sized(type_info, shape), tuple(reading.bodies)
+            type_info, bodies = sized(type_info, shape, examine), tuple(reading.bodies)
         functions = tuple(
             [self.rows[self.kinds[n]].get(values[n], 0) for n in type_info.layout.functions]
         )

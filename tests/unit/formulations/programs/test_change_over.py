@@ -5,6 +5,7 @@ import pytest
 
 import dap3d_core as dap
 from dap3d_core.formulations.programs import change_over, scene_program
+from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import EXPLICIT
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
@@ -78,10 +79,11 @@ def test_numbers_that_change_in_a_run_stop_the_program(at_once):
         return advance(budget)
 
     integration.advance = advanced
-    evaluator.programs.advance(integration, 1)
+    programs = ChangeOver(evaluator)
+    programs.advance(integration, 1)
     assert np.array_equal(addresses, before)
     evaluator.system.par[0] += 1e-3
-    evaluator.programs.advance(integration, 1)
+    programs.advance(integration, 1)
     assert seen == [False, True]
 
 

@@ -101,8 +101,8 @@ def test_a_shape_has_one_type():
     """Equal lists share a compiled loop."""
     shape = Shape((("m", 2),), (("axes", ("i", "j")),))
     base = examine(Aligned)
-    assert sized(base, shape) is sized(base, shape)
-    assert sized(base, shape).layout.slots == ("i", "j")
+    assert sized(base, shape, examine) is sized(base, shape, examine)
+    assert sized(base, shape, examine).layout.slots == ("i", "j")
     assert entry_fields("axes", ("i", "j")) == ["axes_0_i", "axes_1_j"]
 
 
