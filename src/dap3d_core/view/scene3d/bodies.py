@@ -1,4 +1,4 @@
-"""Bodies without shapes: links from the origin to points, or the ellipsoid of inertia."""
+"""Bodies without shapes: links from the origin to points, or axes and the ellipsoid of inertia."""
 
 from collections.abc import Iterable
 
@@ -71,3 +71,14 @@ def inertia_ellipsoid(body: int, mass: float, Jp: Floats, most: float, color: st
     semi *= min(1.0, most / semi.max())
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     return Mark("inertia", "sphere", body, ORIGIN, plain(semi), quaternion(axes), color, name)
+
+
+def bare_body(body: int, mass: float, Jp: Floats, most: float, color: str, name: str) -> list[Mark]:
+    """A body without points: its ellipsoid of inertia, and its axes, which show that it turns.
+
+    Arguments as ``inertia_ellipsoid``.
+    """
+    ellipsoid = inertia_ellipsoid(body, mass, Jp, most, color, name)
+    reach = max(ellipsoid.size)
+    arms = [plain(axis) for axis in 1.5 * reach * np.eye(3)]
+    return [ellipsoid, *links(body, arms, 0.06 * reach, color, name)]

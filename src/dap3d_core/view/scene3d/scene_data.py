@@ -10,7 +10,7 @@ import numpy as np
 from dap3d_core.result import Result
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.scene.scene import Scene
-from dap3d_core.view.scene3d.bodies import attachment_points, inertia_ellipsoid, links, unit_of
+from dap3d_core.view.scene3d.bodies import attachment_points, bare_body, links, unit_of
 from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import colors
 from dap3d_core.view.scene3d.elements import ORIGIN, ElementGeometry, Elements
@@ -21,6 +21,8 @@ from dap3d_core.view.scene3d.symbols import Drawer
 
 #: The colour of what belongs to ground.
 GROUND = "#9aa3ad"
+#: The longest semi-axis of a body without points, as a part of the scene's size: nothing is hidden.
+MODEST = 0.03
 
 
 def scene_of(result: Result, model: str | os.PathLike[str] | None = None) -> Scene:
@@ -73,14 +75,14 @@ def scene_geometry(result: Result, scene: Scene, elements: Elements) -> SceneGeo
     size = float(np.linalg.norm(high - low))
     unit = unit_of(points, size or 1.0)
     marks = _bodies(result, points, shapes.bodies, unit, hues, elements.joints)
-    ellipsoids = _bare_bodies(result, bare, elements.joints, size, hues)
-    reach = max((max(m.size) for m in ellipsoids), default=0.0)
+    symbols = _bare_bodies(result, bare, elements.joints, size, hues)
+    reach = max((max(m.size) for m in symbols), default=0.0)
     reach = max([reach, *(j.numbers.get("radius", 0.0) for j in elements.joints)])
     extent = motion.extent(bounds, reach + 2.0 * unit)
     drawer = Drawer(motion, unit, elements.joints)
     pieces = [piece for j in elements.joints for piece in drawer.joint(j)]
     pieces += [piece for f in elements.forces for piece in drawer.force(f)]
-    marks += [*ellipsoids, *shapes.marks, *(p for p in pieces if isinstance(p, Mark))]
+    marks += [*symbols, *shapes.marks, *(p for p in pieces if isinstance(p, Mark))]
     spans = [p for p in pieces if isinstance(p, Span)]
     return SceneGeometry(summary.body_names, hues, marks, spans, shapes, extent, unit)
 
@@ -145,18 +147,13 @@ def _bare_bodies(
     """Bodies without points; a wheel is drawn by its joint."""
     summary = result.summary
     wheels = {j.bodies["i"] for j in joints if j.symbol == "wheel"}
-    most = 0.2 * size if size > 0.0 else np.inf
+    most = MODEST * size if size > 0.0 else np.inf
+    columns = zip(summary.mass, summary.Jp, hues, summary.body_names, strict=True)
     return [
-        inertia_ellipsoid(
-            k,
-            summary.mass[k - 1],
-            summary.Jp[k - 1],
-            most,
-            hues[k - 1],
-            summary.body_names[k - 1],
-        )
-        for k in bare
-        if k not in wheels
+        mark
+        for k, (mass, Jp, hue, name) in enumerate(columns, 1)
+        if k in bare and k not in wheels
+        for mark in bare_body(k, mass, Jp, most, hue, name)
     ]
 
 

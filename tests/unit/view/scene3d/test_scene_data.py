@@ -11,6 +11,7 @@ from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import CYCLE, chains_of, colors
 from dap3d_core.view.scene3d.primitives import turned_to
 from dap3d_core.view.scene3d.sampled_motion import Extent, instants_to_show
+from dap3d_core.view.scene3d.scene_data import MODEST
 
 
 @pytest.fixture(scope="module")
@@ -77,6 +78,17 @@ def test_a_bare_body_is_the_ellipsoid_of_its_inertia():
     axis = to_global(mark.q, np.eye(3)[int(np.argmax(mark.size))])
     assert abs(axis @ A[:, 0]) == pytest.approx(1.0)
     assert max(inertia_ellipsoid(1, mass, J, 0.06, "red", "b").size) == pytest.approx(0.06)
+
+
+def test_a_bare_body_hides_nothing_and_shows_that_it_turns():
+    scene = dap.Scene(name="thrown")
+    scene.add_body("b", Jp=(9.0, 9.0, 9.0), r_dot=(2.0, 0.0, 0.0), w=(0.0, 0.0, 1.0))
+    marks = dap.view(dap.simulate(scene, t_end=1.0, dt=0.5)).data["marks"]
+    (ellipsoid,) = (m for m in marks if m[0] == "inertia")
+    assert max(ellipsoid[4]) == pytest.approx(MODEST * 2.0, rel=1e-6)  # it flies 2 m
+    arms = [m for m in marks if m[1] == "cylinder"]
+    assert [m[4][2] for m in arms] == pytest.approx([0.09] * 3, rel=1e-6)
+    assert {m[7] for m in marks} == {"b"}
 
 
 @pytest.mark.parametrize("axis", [(0, 0, 1), (0, 0, -2), (1, 0, 0), (0.3, -4.0, 0.5)])
