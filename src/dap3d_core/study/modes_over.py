@@ -44,6 +44,8 @@ class ModesOver:
         values: (n,) values of the parameter.
         eigenvalues: (n, modes) eigenvalue of each mode, 1/s; of a conjugate pair that with Im > 0.
         stable: (n,) whether no motion grows, as ``Linearization.stable``.
+        steady: (n,) whether the start is an equilibrium or a steady motion; stability means
+            nothing elsewhere.
         notes: of the linearisations, each once.
     """
 
@@ -52,6 +54,7 @@ class ModesOver:
     values: Floats
     eigenvalues: Complex
     stable: NDArray[np.bool_]
+    steady: NDArray[np.bool_]
     notes: tuple[str, ...]
 
     @property
@@ -115,13 +118,15 @@ def modes_over(
     varied, numbers = _read(scene, parameter, values, allow_code)
     follower = _Follower()
     stable: list[bool] = []
+    steady: list[bool] = []
     notes: dict[str, None] = {}
     for point in _linearised(scene, varied, numbers, t, modes, allow_code):
         follower.add(point)
         stable.append(point.stable)
+        steady.append(point.is_steady)
         notes |= dict.fromkeys(point.notes)
     return ModesOver(varied.name, varied.unit, numbers, follower.eigenvalues()[:, :modes],
-                     np.array(stable), tuple(notes))  # fmt: skip
+                     np.array(stable), np.array(steady), tuple(notes))  # fmt: skip
 
 
 def _read(scene: Scene, name: str, values: Any, allow_code: bool) -> tuple[SceneParameter, Floats]:

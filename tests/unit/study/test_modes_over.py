@@ -27,6 +27,7 @@ def test_modes_that_cross_stay_themselves(values):
     np.testing.assert_allclose(2.0 * np.pi * found.frequencies, exact, rtol=1e-12)
     np.testing.assert_allclose(found.damping, 0.0, atol=1e-12)
     assert found.stable.all()
+    assert found.steady.all()
     assert not found.grows.any()
     assert found.unit == "N/m"
 

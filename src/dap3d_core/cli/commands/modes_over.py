@@ -51,18 +51,23 @@ def data_of(name: str, found: "ModesOver") -> dict[str, Any]:
         "imag": found.eigenvalues.imag,
         "grows": found.grows,
         "stable": found.stable,
+        "steady": found.steady,
         "notes": found.notes,
     }
 
 
 def show(console: "Terminal", name: str, found: "ModesOver") -> None:
     """Print the frequency and damping of each mode at the first and the last value."""
+    import numpy as np
+
     from dap3d_core.cli.console.console import scene_name
 
     console.title(scene_name(name))
     x, stable = found.values, found.stable
     where = "stable at all values"
-    if not stable.all():
+    if not found.steady.all():
+        where = f"no equilibrium, no steady motion at {np.sum(~found.steady)} of {len(x)} values"
+    elif not stable.all():
         unstable = x[~stable]
         where = f"unstable at {len(unstable)} of {len(x)} values, "
         where += f"{unstable.min():g} to {unstable.max():g}"
