@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from dap3d_core.study.fit.fit import fit
     from dap3d_core.study.fit.fit_parameters import Parameter
     from dap3d_core.study.fit.fit_result import Fit
+    from dap3d_core.study.modes_over import ModesOver, modes_over
     from dap3d_core.study.sweep.dataset import open_sweep
     from dap3d_core.study.sweep.sweep import sweep
     from dap3d_core.view import view
@@ -53,6 +54,7 @@ _HOMES = {
     "Event": ("simulation", "Event"),
     "Fit": ("study.fit.fit_result", "Fit"),
     "Linearization": ("simulation.linearization.linearization", "Linearization"),
+    "ModesOver": ("study.modes_over", "ModesOver"),
     "Parameter": ("study.fit.fit_parameters", "Parameter"),
     "PluginError": ("interface", "PluginError"),
     "RedundantError": ("simulation", "RedundantError"),
@@ -73,6 +75,7 @@ _HOMES = {
     "linearize": ("simulation.linearization.linearization", "linearize"),
     "load": ("scene", "load"),
     "load_registry": ("registry", "load_registry"),
+    "modes_over": ("study.modes_over", "modes_over"),
     "open": ("simulation", "open_result"),
     "open_sweep": ("study.sweep.dataset", "open_sweep"),
     "plot": ("plot", "plot"),
@@ -93,6 +96,7 @@ __all__ = [
     "Event",
     "Fit",
     "Linearization",
+    "ModesOver",
     "Parameter",
     "PluginError",
     "RedundantError",
@@ -113,6 +117,7 @@ __all__ = [
     "linearize",
     "load",
     "load_registry",
+    "modes_over",
     "open",
     "open_sweep",
     "plot",

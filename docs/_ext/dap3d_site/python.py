@@ -19,7 +19,8 @@ SECTIONS = {
          "simulation.stepwise.stepped_run.SteppedRun"),
     ),
     "Analyses": (
-        ("equilibrium", "kinematics", "inverse", "linearize", "Equilibrium", "Linearization"),
+        ("equilibrium", "kinematics", "inverse", "linearize", "modes_over", "Equilibrium",
+         "Linearization", "ModesOver"),
         (),
     ),
     "Results": (

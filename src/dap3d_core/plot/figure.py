@@ -19,8 +19,9 @@ if TYPE_CHECKING:
 
     from dap3d_core.simulation.linearization.linearization import Linearization
     from dap3d_core.study.fit.fit_result import Fit
+    from dap3d_core.study.modes_over import ModesOver
 
-    Drawable = Result | Mapping[str, Result] | Fit | Linearization | xarray.Dataset
+    Drawable = Result | Mapping[str, Result] | Fit | Linearization | ModesOver | xarray.Dataset
 
 #: Backends that matplotlib falls back on where it cannot open windows.
 FILE_BACKENDS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
@@ -41,6 +42,12 @@ def picture_of(
         from dap3d_core.plot.sweep.sweep_plot import sweep_picture
 
         return sweep_picture(cast("xarray.Dataset", result), names, x, at)
+    if hasattr(result, "grows"):
+        if names or x is not None or at:
+            raise ValueError("of modes over a parameter the frequencies are drawn: name no more")
+        from dap3d_core.plot.modes_over import ModesOverPicture
+
+        return ModesOverPicture(cast("ModesOver", result))
     drawn = result.values() if isinstance(result, Mapping) else [result]
     is_result = all(isinstance(one, Result) for one in drawn)
     if (
@@ -48,7 +55,10 @@ def picture_of(
         and not hasattr(result, "mode_eigenvalues")
         and not hasattr(result, "measured")
     ):
-        words = "a Result, a dictionary of these, a Fit, a Linearization or the data of a sweep"
+        words = (
+            "a Result, a dictionary of these, a Fit, a Linearization, a ModesOver or the data of "
+            "a sweep"
+        )
         reader = f"; dap.open({result!r}) reads one" if isinstance(result, (str, Path)) else ""
         raise TypeError(f"the argument result should be {words}, not {result!r}{reader}")
     if at:
@@ -80,8 +90,8 @@ def plot(
 
     Args:
         result: a ``Result``; several as names and results, {"rtol 1e-6": result, ...}; a ``Fit``:
-            its data, its curves and its residuals; a ``Linearization``: its eigenvalues; or the
-            data set of a sweep.
+            its data, its curves and its residuals; a ``Linearization``: its eigenvalues; a
+            ``ModesOver``: its frequencies; or the data set of a sweep.
         quantities: names such as ``crank.r.z``, ``crank.w`` (all components), ``energy.total``;
             each unit has a panel of its own. Of a fit its outputs, by default all. Of a sweep as
             well: lines over one number, a map over two, parallel coordinates over more, curves

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.framework import options
+from dap3d_core.cli.framework import completion, options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
     from dap3d_core.result import Result
+    from dap3d_core.scene import Scene
     from dap3d_core.simulation.linearization.linearization import Linearization
 
 #: Modes listed by default.
@@ -31,11 +32,15 @@ NAMED, LEAST_SHARE = 3, 0.05
                       "default about the start of the model."),
     click.option("--t", "time", type=options.FiniteFloat(), metavar="S",
                  help="Time of drivers and functions; 0 by default. Not with --from."),
+    click.option("--over", metavar="PARAMETER=FROM:TO:N", shell_complete=completion.parameters,
+                 help="Follow the modes over the values of a parameter, also FROM:TO:N:log or a "
+                      "list. Not with --from, --mode, -o."),
     click.option("-n", "--number", type=click.IntRange(min=1), metavar="NUMBER",
                  help="Number of modes, the lowest ones; 20 are listed by default, 10 of a model "
                       "of more than 150 bodies."),
     click.option("--plot", type=click.Path(), metavar="FILE",
-                 help="Draw the eigenvalues into a .png, .svg or .pdf file."),
+                 help="Draw the eigenvalues, with --over the frequencies over the parameter, into "
+                      "a .png, .svg or .pdf file."),
     click.option("--mode", type=click.IntRange(min=1), metavar="NUMBER",
                  help="With -o: the mode whose motion is written; the first by default."),
     options.output("Write the motion of a mode as a result, for `dap3d view` and `animate`."),
@@ -46,6 +51,7 @@ def modes(
     *,
     start: str | None,
     time: float | None,
+    over: str | None,
     number: int | None,
     plot: str | None,
     mode: int | None,
@@ -64,6 +70,7 @@ def modes(
     dap3d modes pen1
     dap3d modes pen1 --from pen1.nc@1.5
     dap3d modes pen1 --plot modes.png
+    dap3d modes pen1 --over bodies.cone.mass=1:5:9 --plot campbell.png
     dap3d modes pen1 --mode 1 -o mode.nc     then: dap3d view mode.nc
     """
     import dap3d_core as dap
@@ -72,9 +79,13 @@ def modes(
     targets = _targets(plot, output, force)
     if start is not None and time is not None:
         raise Refused("--t does not go with --from: the time is that of the result, RESULT@TIME")
+    if over is not None and not (start is None and mode is None and output is None):
+        raise Refused("--over does not go with --from, --mode and -o: it is about many starts")
     if mode is not None and output is None:
         raise Refused("--mode chooses the motion that -o writes: name its file, -o FILE.nc")
     scene = dap.load(model)
+    if over is not None:
+        return _over(scene, over, time, number, plot, force, allow_code, as_json)
     at, t = state_of(start, allow_code) if start else (None, time or 0.0)
     with refusing(dap.SimulationError):
         found = dap.linearize(scene, at=at, t=t, modes=number, allow_code=allow_code)
@@ -93,6 +104,29 @@ def modes(
         _show(stdout(), data, len(found.mode_eigenvalues))
         for target in targets:
             stdout().say(f"{target} written", whole=True)
+    return DONE
+
+
+def _over(
+    scene: "Scene", over: str, time: float | None, number: int | None, plot: str | None,
+    force: bool, allow_code: bool, as_json: bool,
+) -> int:  # fmt: skip
+    """Follow the modes over a parameter, and report them."""
+    from dap3d_core.cli.commands.modes_over import data_of, find_modes_over, show
+    from dap3d_core.cli.console.console import print_json, stdout
+
+    found = find_modes_over(scene, over, time, number or LISTED, allow_code=allow_code)
+    if plot is not None:
+        from dap3d_core.plot import save_plot
+
+        with refusing(ValueError):
+            save_plot(found, [], plot, force=force)
+    if as_json:
+        print_json(data_of(scene.name, found))
+    else:
+        show(stdout(), scene.name, found)
+        if plot is not None:
+            stdout().say(f"{plot} written", whole=True)
     return DONE
 
 

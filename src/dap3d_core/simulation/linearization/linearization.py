@@ -282,11 +282,16 @@ class Linearization:
         peak: Complex = weighted[largest, np.arange(shapes.shape[1])]
         return shapes / peak
 
+    @property
+    def M(self) -> Any:
+        """(6 n, 6 n) masses and inertias of the bodies, global axes: the metric of mode shapes."""
+        return self._point.tangent.M
+
     @cached_property
     def participation(self) -> Floats:
         """(modes, n) share of each body in the kinetic energy of each mode; each row sums to 1."""
         x = self.modes
-        energy = np.real(np.conj(x) * (self._point.tangent.M @ x)).T
+        energy = np.real(np.conj(x) * (self.M @ x)).T
         energy = energy.reshape(len(energy), len(self.body_names), 6).sum(axis=2)
         shares: Floats = energy / energy.sum(axis=1, keepdims=True)
         return shares

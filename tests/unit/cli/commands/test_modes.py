@@ -97,3 +97,26 @@ def test_refusals(model, capsys, words, message):
     error = capsys.readouterr().err
     assert message in " ".join(error.split())
     assert "Traceback" not in error
+
+
+def test_over_a_parameter(model, capsys, monkeypatch):
+    """--over follows the mode: sqrt(g l m / J) of a rod whose mass and inertia vary."""
+    monkeypatch.setenv("COLUMNS", "60")
+    words = ["modes", model, "--over", "bodies.rod.mass=1:3:3"]
+    assert main([*words, "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    m = np.array([1.0, 2.0, 3.0])
+    exact = np.sqrt(9.81 * 0.5 * m / (1 / 12 + 0.25 * m)) / (2.0 * np.pi)
+    np.testing.assert_allclose(np.array(data["frequencies"])[:, 0], exact, rtol=1e-12)
+    assert main([*words, "--plot", "campbell.png"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert max(map(len, lines)) <= 60
+    assert any(line.split() == ["1", "0.61052", "0.66879", "0", "0"] for line in lines)
+    for wrong, said in (
+        (["--over", "bodies.rod.mass"], "write PARAMETER=FROM:TO:N"),
+        (["--over", "bodies.rod.mas=1:2:3"], "did you mean 'bodies.rod.mass'"),
+        (["--over", "bodies.rod.mass=1:x:3"], "'x' is no finite number"),
+        (["--over", "bodies.rod.mass=1:2:3", "-o", "m.nc"], "--over does not go with"),
+    ):
+        assert main(["modes", model, *wrong]) == 2
+        assert said in " ".join(capsys.readouterr().err.split())
