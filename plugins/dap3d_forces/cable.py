@@ -24,7 +24,7 @@ class ElasticCable(Force):
     """
 
     keyword = "cable"
-    synonyms = ("rope", "pulley", "winch", "hoist", "belt")
+    synonyms = ("rope", "winch", "hoist")
     points: tuple = points("n", least=2, doc="ends and pulleys, in order along the cable")
     length: float = number(
         default=None, unit="m", positive=True, doc="length without tension; as at the start"

@@ -20,6 +20,7 @@ from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, is_out_of_memory, where_is
+from dap3d_core.interface.fields import sized_fields
 from dap3d_core.kernels.runtime.loop_modules import Loop, build
 
 
@@ -94,13 +95,13 @@ def compiled_loop(
 def compile_all(type_info: TypeInfo) -> None:
     """Compile all loops of a type and of its variants.
 
-    Except kernels that call a function of an argument: they are compiled with the function of a
-    scene.
+    Except kernels that call a function of an argument, and those of types with lists: they are
+    compiled with the function and the lengths of a scene.
 
     Raises:
         PluginError: one of them cannot be compiled.
     """
-    if not _calls_functions(type_info):
+    if not _calls_functions(type_info) and not sized_fields(type_info.type):
         for what in LOOP_KINDS:
             if what != "friction":
                 compiled_loop(with_sample_reactions(type_info), what)

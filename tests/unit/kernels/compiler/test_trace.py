@@ -7,6 +7,9 @@ from support.at_all_levels import made_of, same_bits, targets
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
 from dap3d_core.interface.codegen.specialise import bind_friction
+from dap3d_core.interface.examine.examine import examine
+from dap3d_core.interface.examine.sized_types import sample_classes
+from dap3d_core.interface.fields import sized_fields
 from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.runtime import generated_modules
 from dap3d_core.kernels.runtime.cache import jit_is_on
@@ -22,6 +25,12 @@ BODIES, INSTANCES, TRIALS = 8, 3, 6
 
 def loops_of(type_info):
     """Each loop of a type and of its variants, with cubics for the functions that they call."""
+    if sized_fields(type_info.type) and not hasattr(type_info.type, "shape_of_lists"):
+        for sample in sample_classes(type_info.type):
+            yield from loops_of(examine(sample))
+        for _, variant in type_info.variants:
+            yield from loops_of(variant)
+        return
     type_info = with_functions(type_info, {})
     for what in LOOP_KINDS:
         if what != "friction" and (loop := write(type_info, what)) is not None:
