@@ -7,6 +7,7 @@ from dap3d_core.interface import (
     Vector,
     choice,
     hookimpl,
+    joint_fields,
     number,
     numbers,
     points,
@@ -40,6 +41,7 @@ class Belt(Force):
     keyword = "belt"
     synonyms = ("pulley", "timing-belt", "chain")
     states: ClassVar = {"x": "n"}
+    joints: tuple = joint_fields(points="P", axis_i="a", doc="hinges of the pulleys, in order")
     points: tuple = points("n", least=2, doc="centres of the pulleys, in order along the belt")
     radii: tuple = numbers("n", unit="m", doc="radii; negative of a pulley on the belt's back")
     axis_i: Vector = vector(doc="direction of the axes of all pulleys, on any body")

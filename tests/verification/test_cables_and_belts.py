@@ -78,7 +78,7 @@ def test_a_winch_with_a_function_and_an_input():
         )
 
 
-def belt(crossed):
+def belt(crossed, by_joints=False):
     scene = dap.Scene(name="belt")
     for name, x, J in (("a", 0.0, 0.02), ("b", 1.0, 0.05)):
         scene.add_body(name, mass=1.0, Jp=[0.1, 0.1, J], r=[x, 0.0, 0.0])
@@ -86,20 +86,22 @@ def belt(crossed):
         pins = {"P_i": f"{name}.O", "P_j": f"{name}_pin"}
         scene.add_joint("rev", f"{name}_axis", **pins, a_i=f"{name}.z", a_j="ground.z")
     pulleys = {"points": ["a.O", "b.O"], "radii": [0.1, 0.25], "axis_i": "ground.z"}
+    if by_joints:
+        pulleys = {"joints": ["a_axis", "b_axis"], "radii": [0.1, 0.25]}
     springs = {"k": 1e5, "c": 800.0, "pretension": 300.0}
     scene.add_force("belt", "belt", **pulleys, **springs, crossed=crossed)
     scene.add_force("np", "motor", body_i="a", np=[0.0, 0.0, 2.0])
     return scene
 
 
-@pytest.mark.parametrize("crossed", [False, True])
-def test_a_belt_carries_a_moment(crossed):
+@pytest.mark.parametrize(("crossed", "by_joints"), [(False, False), (True, False), (False, True)])
+def test_a_belt_carries_a_moment(crossed, by_joints):
     """Steady acceleration: the rigid ratio, T_tight - T_slack = moment / r, and bearing loads.
 
     The vibration of the belt decays with c/m of some 1e5 1/s; 1e-6 is far above what is left.
     """
     r_a, r_b, J_a, J_b, M, T_0 = 0.1, 0.25, 0.02, 0.05, 2.0, 300.0
-    result = dap.simulate(belt(crossed), t_end=0.5, dt=0.25, integrator="radau")
+    result = dap.simulate(belt(crossed, by_joints), t_end=0.5, dt=0.25, integrator="radau")
     ratio = (-1.0 if crossed else 1.0) * r_a / r_b
     alpha = M / (J_a + J_b * ratio**2)
     np.testing.assert_allclose(result.wd[-1, 0, 2], alpha, rtol=1e-6)

@@ -294,7 +294,7 @@ def joint_fields(*same: str, doc: str = "", **others: str) -> Any:
     ``joint_fields("body_i", "body_j", "a_j")`` takes fields of the same names: what acts in the
     coordinate of a joint names the joint. ``joint_fields(P_j="P", a_j="a")`` takes the point and
     the axis that the joint has on the body that moves: body i, or body j where body i is ground.
-    The scene gives the joint or the fields.
+    The scene gives the joint or the fields. A list field takes something of each of several joints.
     """
     gives = {name: name for name in same} | others
     return field_of(FieldSpec("joint_fields", None, doc=doc, gives=gives))

@@ -135,7 +135,7 @@ class Reader:
         """The instance of an element; None where a mistake was reported."""
         if self.of_joints and not self.of_joints.keys().isdisjoint(element.fields):
             whole = with_joint_fields(
-                self.report, self.geometry, self.table, element, self.of_joints
+                self.report, self.geometry, self.table, element, self.of_joints, self.lists
             )
             if whole is None:
                 return None

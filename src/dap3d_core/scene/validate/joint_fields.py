@@ -1,6 +1,6 @@
 """Fields that an element takes from a joint which it names: its bodies, points and axes."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import attrs
@@ -17,6 +17,7 @@ def with_joint_fields(
     table: str,
     element: Element,
     references: Mapping[str, Mapping[str, str]],
+    lists: Collection[str] = (),
 ) -> Element | None:
     """The element with the fields of the joints that it names; None where a mistake is reported.
 
@@ -26,6 +27,7 @@ def with_joint_fields(
         table: of the element.
         element: as written.
         references: fields that name joints -> what each gives, as of ``joint_fields``.
+        lists: fields of the element that take something of each of several joints.
     """
     fields, good = dict(element.fields), True
 
@@ -35,25 +37,34 @@ def with_joint_fields(
         good = False
 
     for field, gives in references.items():
-        name = element.fields.get(field)
-        if name is None:
-            continue
-        joint = report.scene.joints.get(name) if isinstance(name, str) else None
-        if joint is None or joint is element:
-            refuse(field, *missing_words(report, "joint", name, report.scene.joints))
-            continue
-        for own, other in gives.items():
-            other = other if slot_of(other) else f"{other}_{_moving(report, geometry, joint)}"
-            value = _field(report, geometry, joint, other)
+        given = element.fields.get(field)
+        names = given if isinstance(given, tuple) else () if given is None else (given,)
+        found = []
+        for name in names:
+            joint = report.scene.joints.get(name) if isinstance(name, str) else None
+            if joint is None or joint is element:
+                refuse(field, *missing_words(report, "joint", name, report.scene.joints))
+            else:
+                found.append(joint)
+        for own, other in gives.items() if found else ():
+            values = [_of_moving(report, geometry, joint, other) for joint in found]
             if own in element.fields:
                 refuse(own, f"give {field} or {own}, not both")
-            elif value is None:
+            elif None in values:
+                joint = found[values.index(None)]
                 what = f"is of type {joint.type}, which has no {other} to be taken for {own}"
                 refuse(field, what, remedy=f"leave {field} out, and give {', '.join(gives)}")
                 break
             else:
-                fields[own] = value
+                fields[own] = tuple(values) if own in lists else values[0]
     return attrs.evolve(element, fields=fields) if good else None
+
+
+def _of_moving(report: Collector, geometry: Geometry, joint: Element, name: str) -> Any:
+    """A field of a joint; of a name without slot that of the body that moves."""
+    if not slot_of(name):
+        name = f"{name}_{_moving(report, geometry, joint)}"
+    return _field(report, geometry, joint, name)
 
 
 def _moving(report: Collector, geometry: Geometry, joint: Element) -> str:
