@@ -30,7 +30,7 @@ from dap3d_core.kernels import (
     where,
 )
 from dap3d_joints.gear import marks, sizes_of
-from dap3d_joints.turning import wrapped
+from dap3d_joints.turning import line_rates, wrapped
 
 interface_version = 1
 
@@ -104,7 +104,7 @@ class GearMesh(Force):
         g, g_dot = sub(r_P_j, r_P_i), sub(v_P_j, v_P_i)
         phi_i, phi_j = atan2(-dot(m_i, g), dot(u_i, g)), atan2(-dot(m_j, g), dot(u_j, g))
         delta = radius_i / teeth_i * wrapped(teeth_i * phi_i + sense * teeth_j * phi_j)
-        (k_i, e_i), (k_j, e_j) = turning(g, a_i), turning(g, a_j)
+        (k_i, e_i), (k_j, e_j) = line_rates(g, a_i), line_rates(g, a_j)
         t = add(scale(radius_i, k_i), scale(sense * radius_j, k_j))
         e_i, e_j = scale(radius_i, e_i), scale(sense * radius_j, e_j)
         rate = dot(e_i, w_i) + dot(e_j, w_j) - dot(t, g_dot)
@@ -126,13 +126,6 @@ class GearMesh(Force):
         delta = radius_i / teeth_i * wrapped(teeth_i * phi_i + sense * teeth_j * phi_j)
         plays = backlash > 0.0
         return where(plays, delta - 0.5 * backlash, 1.0), where(plays, delta + 0.5 * backlash, 1.0)
-
-
-def turning(g, a):
-    """K and e, by which an angle from g to a mark changes: -k . g_dot + e . w of the wheel."""
-    across = cross(a, g)
-    k = scale(1.0 / dot(across, across), across)
-    return k, cross(g, k)
 
 
 @hookimpl

@@ -1,9 +1,12 @@
 """Coupled rotations: two wheels turn in a fixed ratio against a third body."""
 
 from dap3d_core.interface import Body, Joint, Vector, body, choice, hookimpl, number, vector
-from dap3d_joints.turning import references, turned_by, wrapped
+from dap3d_core.kernels import add, dot, neg, row, scale, sub
+from dap3d_joints.turning import line_accelerations, line_rates, references, turned_by, wrapped
 
 interface_version = 1
+
+ZERO = (0.0, 0.0, 0.0)
 
 
 class Couple(Joint):
@@ -21,7 +24,8 @@ class Couple(Joint):
 
     with s = 1 for teeth outside on both gears, s = -1 where one gear is a ring with its teeth
     inside. Whole turns of a gear are whole numbers of teeth, so no turns need be counted: what is
-    wrapped into (-pi, pi], half a tooth, is the error alone. J and gamma are derived from C.
+    wrapped into (-pi, pi], half a tooth, is the error alone. The rate of
+    theta_i is e_i . (w_i - w_k), with e_i = u_k x (a_i x u_k) / |a_i x u_k|^2, u_k a mark on k.
 
     With bevel gears a_i and a_j differ in direction; with both pointing away from the meeting point
     of the axes s = 1 is right.
@@ -40,11 +44,25 @@ class Couple(Joint):
         e, f, u = references(self.a_i, bodies["i"], bodies["k"])
         n, m, v = references(self.a_j, bodies["j"], bodies["k"])
         sense = 1.0 if self.mesh == "external" else -1.0
-        return {"e_i": e, "f_i": f, "u_k": u, "n_j": n, "m_j": m, "v_k": v, "sense": sense}
+        return {"e_i": e, "f_i": f, "u_k": u, "n_j": n, "m_j": m, "b_k": v, "sense": sense}
 
-    def C(e_i, f_i, u_k, n_j, m_j, v_k, teeth_i, teeth_j, sense):
-        theta_i, theta_j = turned_by(e_i, f_i, u_k), turned_by(n_j, m_j, v_k)
+    def C(e_i, f_i, u_k, n_j, m_j, b_k, teeth_i, teeth_j, sense):
+        theta_i, theta_j = turned_by(e_i, f_i, u_k), turned_by(n_j, m_j, b_k)
         return wrapped(teeth_i * theta_i + sense * teeth_j * theta_j) / teeth_i
+
+    def J(a_i, a_j, u_k, b_k, teeth_i, teeth_j, sense):
+        e_i = line_rates(u_k, a_i)[1]
+        e_j = scale(sense * teeth_j / teeth_i, line_rates(b_k, a_j)[1])
+        return row(ZERO, e_i), row(ZERO, e_j), row(ZERO, neg(add(e_i, e_j)))
+
+    def gamma(
+        a_i, a_j, u_k, b_k, a_i_dot, a_j_dot, u_k_dot, b_k_dot, w_i, w_j, w_k, teeth_i, teeth_j,
+        sense,
+    ):  # fmt: skip
+        e_i = line_accelerations(u_k, a_i, u_k_dot, a_i_dot)[1]
+        e_j = line_accelerations(b_k, a_j, b_k_dot, a_j_dot)[1]
+        ratio = sense * teeth_j / teeth_i
+        return -dot(e_i, sub(w_i, w_k)) - ratio * dot(e_j, sub(w_j, w_k))
 
 
 @hookimpl

@@ -16,8 +16,20 @@ from dap3d_core.interface import (
     point,
     vector,
 )
-from dap3d_core.kernels import atan2, cross, dot, norm2, scale, sqrt, sub, tan
-from dap3d_joints.turning import wrapped
+from dap3d_core.kernels import (
+    add,
+    atan2,
+    cross,
+    dot,
+    neg,
+    norm2,
+    row,
+    scale,
+    sqrt,
+    sub,
+    tan,
+)
+from dap3d_joints.turning import line_accelerations, line_rates, wrapped
 
 interface_version = 1
 
@@ -50,7 +62,10 @@ class Gear(Joint):
     Radii follow from the numbers of teeth and the distance of the axes, or are given in their
     place. The radial force of a pressure angle always presses the wheels apart, whichever flank is
     in touch; a multiplier has both signs, so it is no part of the row: the force ``gear`` has it,
-    an elastic mesh. J and gamma are derived from C.
+    an elastic mesh.
+
+    phi_i changes at the rate -k_i . g_dot + e_i . w_i, with k_i = a_i x g / |a_i x g|^2 and
+    e_i = g x k_i, which give J and gamma (turning.py).
     """
 
     keyword, rows = "gear", 1
@@ -108,6 +123,32 @@ class Gear(Joint):
         roll = wrapped(teeth_i * phi_i + sense * teeth_j * phi_j)
         return radius_i / teeth_i * roll + tan(helix) * (dot(a_i, g) - x_0)
 
+    def J(
+        r_P_i, r_P_j, s_P_i, s_P_j, a_i, a_j, teeth_i, teeth_j, radius_i, sense, helix
+    ):  # fmt: skip
+        g, r_j = sub(r_P_j, r_P_i), sense * radius_i * teeth_j / teeth_i
+        (k_i, e_i), (k_j, e_j) = line_rates(g, a_i), line_rates(g, a_j)
+        axial = tan(helix)
+        F = sub(add(scale(radius_i, k_i), scale(r_j, k_j)), scale(axial, a_i))
+        n_i = add(scale(radius_i, e_i), scale(axial, cross(a_i, g)))
+        return row(F, add(cross(s_P_i, F), n_i)), row(neg(F), sub(scale(r_j, e_j), cross(s_P_j, F)))
+
+    def gamma(
+        r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, a_i, a_j, a_i_dot, a_j_dot, w_i, w_j,
+        teeth_i, teeth_j, radius_i, sense, helix,
+    ):  # fmt: skip
+        g, g_dot = sub(r_P_j, r_P_i), sub(v_P_j, v_P_i)
+        r_j, axial = sense * radius_i * teeth_j / teeth_i, tan(helix)
+        k_i, k_j = line_rates(g, a_i)[0], line_rates(g, a_j)[0]
+        k_i_dot, e_i_dot = line_accelerations(g, a_i, g_dot, a_i_dot)
+        k_j_dot, e_j_dot = line_accelerations(g, a_j, g_dot, a_j_dot)
+        F = sub(add(scale(radius_i, k_i), scale(r_j, k_j)), scale(axial, a_i))
+        F_dot = sub(add(scale(radius_i, k_i_dot), scale(r_j, k_j_dot)), scale(axial, a_i_dot))
+        bend = sub(cross(w_j, s_P_j_dot), cross(w_i, s_P_i_dot))
+        turn = add(cross(a_i_dot, g), cross(a_i, g_dot))
+        rolls = radius_i * dot(e_i_dot, w_i) + r_j * dot(e_j_dot, w_j)
+        return dot(F_dot, g_dot) + dot(F, bend) - rolls - axial * dot(turn, w_i)
+
 
 class BevelGear(Gear, bevel=True):
     """The axes meet."""
@@ -118,6 +159,42 @@ class BevelGear(Gear, bevel=True):
         phi_i, phi_j = atan2(-dot(m_i, a_j), dot(u_i, a_j)), atan2(-dot(m_j, a_i), dot(u_j, a_i))
         roll = wrapped(teeth_i * phi_i + sense * teeth_j * phi_j)
         return radius_i / teeth_i * roll - lever * dot(cross(a_i, a_j), sub(r_P_j, r_P_i))
+
+    def J(
+        r_P_i, r_P_j, s_P_i, s_P_j, a_i, a_j, teeth_i, teeth_j, radius_i, sense, lever
+    ):  # fmt: skip
+        g, e = sub(r_P_j, r_P_i), turn_of(a_i, a_j, radius_i, sense * radius_i * teeth_j / teeth_i)
+        F = scale(lever, cross(a_i, a_j))
+        n_i = sub(e, scale(lever, cross(a_i, cross(a_j, g))))
+        n_j = add(e, scale(lever, cross(a_j, cross(g, a_i))))
+        return row(F, add(cross(s_P_i, F), n_i)), row(neg(F), neg(add(cross(s_P_j, F), n_j)))
+
+    def gamma(
+        r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, a_i, a_j, a_i_dot, a_j_dot, w_i, w_j,
+        teeth_i, teeth_j, radius_i, sense, lever,
+    ):  # fmt: skip
+        g, g_dot = sub(r_P_j, r_P_i), sub(v_P_j, v_P_i)
+        r_j = sense * radius_i * teeth_j / teeth_i
+        e_i_dot = line_accelerations(a_j, a_i, a_j_dot, a_i_dot)[1]
+        e_j_dot = line_accelerations(a_i, a_j, a_i_dot, a_j_dot)[1]
+        e_dot = sub(scale(radius_i, e_i_dot), scale(r_j, e_j_dot))
+        t, t_dot = cross(a_i, a_j), add(cross(a_i_dot, a_j), cross(a_i, a_j_dot))
+        bend = sub(cross(w_j, s_P_j_dot), cross(w_i, s_P_i_dot))
+        n_i = add(
+            cross(a_i_dot, cross(a_j, g)),
+            cross(a_i, add(cross(a_j_dot, g), cross(a_j, g_dot))),
+        )
+        n_j = add(
+            cross(a_j_dot, cross(g, a_i)),
+            cross(a_j, add(cross(g_dot, a_i), cross(g, a_i_dot))),
+        )
+        apex = dot(t_dot, g_dot) + dot(t, bend) + dot(n_i, w_i) + dot(n_j, w_j)
+        return lever * apex - dot(e_dot, sub(w_i, w_j))
+
+
+def turn_of(a_i, a_j, r_i, r_j):
+    """What of the roll of bevel gears is e . (w_i - w_j)."""
+    return sub(scale(r_i, line_rates(a_j, a_i)[1]), scale(r_j, line_rates(a_i, a_j)[1]))
 
 
 def length(a):

@@ -3,8 +3,9 @@
 from warnings import warn
 
 from dap3d_core.interface import Joint, Point, Vector, hookimpl, joint_fields, number, point, vector
-from dap3d_core.kernels import atan2, cross, dot, sub
-from dap3d_joints.turning import wrapped
+from dap3d_core.kernels import add, atan2, cross, dot, row, scale, sqrt, sub
+from dap3d_joints.relative_rows import offset_gamma, offset_rows
+from dap3d_joints.turning import line_accelerations, line_rates, wrapped
 
 interface_version = 1
 
@@ -23,7 +24,8 @@ class Rack(Joint):
 
     with s = 1 where P_j lies from P_i towards a_i x a_j, s = -1 where it lies on the other side. x
     itself says how often the pinion has turned, so what is wrapped into (-pi, pi] is the error
-    alone. The reaction is a force along a_j in the pitch point. J and gamma are derived from C.
+    alone. The reaction is a force along a_j in the pitch point. The rate of
+    phi is e . (w_i - w_j), with e = u_i x (b_j x u_i) / |b_j x u_i|^2, b_j the axis on the rack.
     """
 
     keyword, rows = "rack", 1
@@ -47,9 +49,12 @@ class Rack(Joint):
             )
         d = sub(pinion.place(self.P_i), rack.place(self.P_j))
         sense = 1.0 if dot(d, cross(a, b)) <= 0.0 else -1.0
+        n = cross(a, b)
+        n = scale(1.0 / sqrt(dot(n, n)), n)
         return {
             "u_i": pinion.to_local(b),
-            "n_j": rack.to_local(cross(a, b)),
+            "n_j": rack.to_local(n),
+            "b_j": rack.to_local(cross(b, n)),
             "x_0": dot(b, d),
             "sense": sense,
         }
@@ -58,6 +63,20 @@ class Rack(Joint):
         phi = atan2(dot(n_j, u_i), dot(a_j, u_i))
         x = dot(a_j, sub(r_P_i, r_P_j)) - x_0
         return radius * wrapped(x / radius - sense * phi)
+
+    def J(r_P_i, r_j, s_P_i, u_i, a_j, b_j, radius, sense):
+        x_i, x_j = offset_rows(a_j, s_P_i, r_P_i, r_j)
+        e = scale(sense * radius, line_rates(u_i, b_j)[1])
+        return row(x_i[:3], sub(x_i[3:], e)), row(x_j[:3], add(x_j[3:], e))
+
+    def gamma(
+        r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, u_i, u_i_dot, a_j, a_j_dot, b_j, b_j_dot,
+        w_i, w_j, radius, sense,
+    ):  # fmt: skip
+        d, d_dot = sub(r_P_i, r_P_j), sub(v_P_i, v_P_j)
+        along = offset_gamma(a_j, a_j_dot, d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j)
+        e_dot = line_accelerations(u_i, b_j, u_i_dot, b_j_dot)[1]
+        return along + sense * radius * dot(e_dot, sub(w_i, w_j))
 
 
 @hookimpl

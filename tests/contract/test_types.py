@@ -42,6 +42,15 @@ def test_every_kind_of_check_is_there():
     }  # fmt: skip
 
 
+def test_standard_types_derive_nothing():
+    """They run where sympy, which the extra ``derive`` installs, is not there."""
+    for kind in ("joint", "force", "function"):
+        for listing in REGISTRY.listing():
+            if listing.kind == kind and listing.distribution == "dap3d":
+                type_info = REGISTRY.get(kind, listing.keyword)
+                assert not any(t.derived for t in (type_info, *(v for _, v in type_info.variants)))
+
+
 @pytest.mark.parametrize("case", JOINTS, ids=case_names(JOINTS))
 @pytest.mark.parametrize("ground", [None, "j"], ids=["body-body", "body-ground"])
 def test_rows_of_a_scene(case, ground):
