@@ -21,10 +21,9 @@ from dap3d_core.kernels import (
     atan2,
     cross,
     dot,
-    maximum,
-    minimum,
     neg,
     scale,
+    sign,
     sqrt,
     sub,
     where,
@@ -108,8 +107,9 @@ class GearMesh(Force):
         t = add(scale(radius_i, k_i), scale(sense * radius_j, k_j))
         e_i, e_j = scale(radius_i, e_i), scale(sense * radius_j, e_j)
         rate = dot(e_i, w_i) + dot(e_j, w_j) - dot(t, g_dot)
-        x = minimum(delta + 0.5 * backlash, maximum(delta - 0.5 * backlash, 0.0))
-        F = k * x + where(magnitude(delta) >= 0.5 * backlash, c * rate, 0.0)
+        play = 0.5 * backlash
+        pressed = k * (delta - play * sign(delta)) + c * rate
+        F = where(magnitude(delta) < play, 0.0 * rate, pressed)
         across = sub(g, scale(dot(a_i, g), a_i))
         lift = magnitude(F) * apart / sqrt(dot(across, across))
         f, other = scale(-F, t), add(scale(-lift, across), scale(-F * along, a_i))
