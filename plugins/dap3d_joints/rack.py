@@ -1,5 +1,7 @@
 """Rack and pinion, with the tooth force at the pitch point."""
 
+from collections.abc import Mapping
+from typing import ClassVar
 from warnings import warn
 
 from dap3d_core.interface import Joint, Point, Vector, hookimpl, joint_fields, number, point, vector
@@ -31,6 +33,7 @@ class Rack(Joint):
     keyword, rows = "rack", 1
     synonyms = ("pinion", "rackandpinion", "rackpin")
     symbol = "link"
+    example: ClassVar[Mapping[str, str]] = {"a_i": '"crank.y"', "a_j": '"rod.x"'}
     joint_i: str = joint_fields(P_i="P", a_i="a", doc="hinge of the pinion")
     joint_j: str = joint_fields(P_j="P", a_j="a", doc="slider of the rack")
     P_i: Point = point(default=None, doc="on the axis of the pinion; its mass centre by default")
@@ -50,6 +53,8 @@ class Rack(Joint):
         d = sub(pinion.place(self.P_i), rack.place(self.P_j))
         sense = 1.0 if dot(d, cross(a, b)) <= 0.0 else -1.0
         n = cross(a, b)
+        if not dot(n, n) > MISFIT**2:
+            raise ValueError("the axis a_i of the pinion lies along a_j; it is normal to the rack")
         n = scale(1.0 / sqrt(dot(n, n)), n)
         return {
             "u_i": pinion.to_local(b),
