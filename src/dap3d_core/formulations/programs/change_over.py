@@ -35,7 +35,7 @@ class Record:
     """What is known of the scenes of one name.
 
     Attributes:
-        programs: of right-hand side and projection, as ``scene_program.make`` returns them; empty
+        programs: of right-hand side and projection, as ``load_programs`` returns them; empty
             as long as there are none.
         reason: why there are none and will be none; "" while there may be.
         is_requested: True if they are being compiled by another process.
@@ -88,7 +88,7 @@ class ChangeOver:
         counts = now.rhs - done.rhs, now.projections - done.projections
         for k in reversed(range(len(programs))):
             if programs[k].failures() - before[k] > 1 + MOST_FAILURES[k] * counts[k]:
-                _give_up(record, k)
+                _give_up(record, programs[k], k)
 
     def _record_of(self, integration: Any) -> Record | None:
         """The record, where this call may run its programs."""
@@ -131,9 +131,16 @@ class ChangeOver:
         record.programs = scene_program.load_programs(evaluator, name, stored[1])
 
 
-def _give_up(record: Record, k: int) -> None:
-    """Take other code from here on where guards of a program fail too often."""
-    if k == RHS:
-        record.programs, record.reason = [], "guards fail: branches depend on the motion"
-    else:
-        del record.programs[k]  # the general projection behind a right-hand side moves up
+def _give_up(record: Record, program: Any, k: int) -> None:
+    """Take other code from here on where guards of a program fail too often.
+
+    Of a projection that is the general one behind a right-hand side of its own, which moves up: one
+    alone would read what programs of right-hand sides do not leave.
+    """
+    with _making:
+        if program not in record.programs:  # another thread was faster
+            return
+        if k == RHS:
+            record.programs, record.reason = [], "guards fail: branches depend on the motion"
+        else:
+            record.programs = [one for one in record.programs if one is not program]

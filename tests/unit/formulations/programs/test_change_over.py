@@ -96,6 +96,15 @@ def test_a_program_whose_guards_fail_is_given_up(at_once, monkeypatch):
     assert not record.programs
 
 
+def test_two_threads_give_up_one_projection_once():
+    """What reads the right-hand side's factors never stands behind a program of that."""
+    rhs, project, behind = ("rhs",), ("project",), ("behind",)
+    record = change_over.Record([rhs, project, behind])
+    for _ in range(2):
+        change_over._give_up(record, project, 1)
+    assert record.programs == [rhs, behind]
+
+
 def test_a_scene_without_program_runs(at_once, monkeypatch):
     """Where it would be too long, say; the reason is kept."""
     monkeypatch.setattr(scene_program, "MOST_INSTRUCTIONS", 10)
