@@ -61,6 +61,19 @@ def roll_pitch_yaw(p: ArrayLike) -> Floats:
     return np.moveaxis(np.array([roll, 0.5 * np.pi - 2.0 * quarter, yaw]) - turns, 0, -1)
 
 
+def roll_pitch_yaw_rates(angles: Floats, w: Floats) -> Floats:
+    """Rates (..., 3) of roll, pitch and yaw (..., 3) at global angular velocities w (..., 3).
+
+    Of w = yaw' z + pitch' Rz y + roll' Rz Ry x; those of roll and yaw grow without bound towards a
+    pitch of a quarter turn.
+    """
+    pitch, yaw = angles[..., 1], angles[..., 2]
+    along = np.cos(yaw) * w[..., 0] + np.sin(yaw) * w[..., 1]
+    across = np.cos(yaw) * w[..., 1] - np.sin(yaw) * w[..., 0]
+    roll = along / np.cos(pitch)
+    return np.stack([roll, across, w[..., 2] + np.sin(pitch) * roll], axis=-1)
+
+
 def euler_rates(p: Floats, w: Floats) -> Floats:
     """p_dot (..., 4) of p (..., 4) and global angular velocities (..., 3): half (0, w) times p."""
     scalar = -np.sum(w * p[..., 1:], axis=-1, keepdims=True)

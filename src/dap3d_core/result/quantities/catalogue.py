@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.model.rotations import roll_pitch_yaw, to_body
+from dap3d_core.model.rotations import roll_pitch_yaw, roll_pitch_yaw_rates, to_body
 from dap3d_core.model.state_layout import split
 from dap3d_core.result.arrays import AXES, COLUMNS, EULER, Arrays
 from dap3d_core.result.errors import UnknownNameError
@@ -189,11 +189,23 @@ def _in_body_axes(vectors: MotionFunction) -> MotionFunction:
 
 
 def _angle(place: int) -> QuantityFunction:
-    """Roll, pitch or yaw, without steps of a turn from one reported instant to the next."""
+    """Roll, pitch or yaw; roll and yaw with whole turns.
+
+    Between two instants an angle changes by what its rates at both make of the interval, to the
+    nearest turn; by less than half a turn where the rates differ too much to say, as they do near
+    a pitch of a quarter turn.
+    """
 
     def values(source: QuantitySource, owner: QuantityOwner) -> Floats:
-        angles = roll_pitch_yaw(_state(1)(source, slice(owner.place, owner.place + 1)))
-        return np.asarray(np.unwrap(angles[:, 0, place]))
+        body = slice(owner.place, owner.place + 1)
+        angles = roll_pitch_yaw(_state(1)(source, body))[:, 0]
+        rates = roll_pitch_yaw_rates(angles, _state(3)(source, body)[:, 0])[:, place]
+        half = 0.5 * np.diff(source.arrays.t)
+        agree = half * np.abs(rates[1:] - rates[:-1]) < np.pi
+        changes = np.where(agree, half * (rates[1:] + rates[:-1]), 0.0)
+        missing = (changes - np.diff(angles[:, place])) / (2.0 * np.pi)
+        turns = np.concatenate([[0.0], np.cumsum(np.rint(missing))])
+        return np.asarray(angles[:, place] + 2.0 * np.pi * turns)
 
     return values
 

@@ -26,7 +26,7 @@ from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import extent
 from dap3d_core.simulation.initial.least_change import displaced
 from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags
-from dap3d_core.simulation.redundancy.freedoms import motion_words
+from dap3d_core.simulation.redundancy.freedoms import coordinates_of
 
 #: Degree of the splines; the fewest instants, which a spline of degree 3 goes through.
 DEGREE, FEWEST = 5, 4
@@ -214,7 +214,7 @@ class _Fit:
             change = -rows.least(rows.rows.C)
             error = (self._gap(target, values) - slopes @ change)[measured]
             seen = slopes[measured] @ rows.free
-            self._check_seen(rows, seen, t)
+            self._check_seen(rows, seen, t, u)
             change = change + rows.free @ np.linalg.lstsq(seen, error, rcond=None)[0]
             size = extent(self.evaluator, change)
             if not np.isfinite(size):
@@ -282,7 +282,7 @@ class _Fit:
                 )
                 raise SceneError([Mistake(f"motion.{label}", MISSING, words)])
 
-    def _check_seen(self, rows: ChosenRows, seen: Floats, t: float) -> None:
+    def _check_seen(self, rows: ChosenRows, seen: Floats, t: float, u: Floats) -> None:
         """Refuse data that leave a freedom open."""
         freedoms = rows.free.shape[1]
         if not freedoms:
@@ -290,12 +290,12 @@ class _Fit:
         _, values, right = np.linalg.svd(seen) if len(seen) else (0, np.zeros(0), np.eye(freedoms))
         rank = int(np.sum(values > SEEN * max(1.0, np.max(values, initial=0.0))))
         if rank < freedoms:
-            model = self.evaluator.model
             motions = rows.free @ right[rank:].T
-            names = "; ".join(motion_words(model, m) for m in motions.T[:3])
+            names = ", ".join(coordinates_of(self.evaluator.model, u, motions))
             raise SimulationError(
                 f"at t = {t:.6g} s the motion leaves {freedoms - rank} of {freedoms} degrees of "
-                f"freedom open: {names}. Give more quantities: {freedoms} at least"
+                f"freedom open: give {names} as well, or other positions that move with the same "
+                "bodies"
             )
 
 

@@ -7,6 +7,8 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model import Model
+from dap3d_core.model.rotations import euler_rates
+from dap3d_core.model.state_layout import split
 from dap3d_core.simulation.initial.least_change import finite_rows
 from dap3d_core.simulation.redundancy.redundancy import rank_of
 
@@ -38,6 +40,23 @@ def free_motions(evaluator: Evaluator, t: float, u: Floats) -> Floats:
     chosen = qr(free.T, pivoting=True, mode="r")[1][: free.shape[1]]
     apart = free @ np.linalg.inv(free[chosen])
     return np.asarray(apart * np.tile(np.repeat([model.size, 1.0], 3), model.body_count)[:, None])
+
+
+def coordinates_of(model: Model, u: Floats, motions: Floats) -> list[str]:
+    """Positions that tell motions (6 n, k) in m and rad apart at a state u (13 n,), k names.
+
+    The Euler parameters stand with twice their changes, which is 1 for a turn of 1 rad.
+    """
+    from scipy.linalg import qr
+
+    r, p, _, _ = split(u)
+    moves = motions.reshape(len(p), 6, -1)
+    turns = euler_rates(p[:, None], np.swapaxes(moves[:, 3:], 1, 2))
+    changes = np.concatenate([moves[:, :3] / model.size, 2.0 * np.swapaxes(turns, 1, 2)], axis=1)
+    names = [f"{body}.{name}" for body in model.body_names
+             for name in ("r.x", "r.y", "r.z", "p.e0", "p.e1", "p.e2", "p.e3")]  # fmt: skip
+    order = qr(changes.reshape(len(names), -1).T, pivoting=True, mode="r")[1]
+    return [names[k] for k in order[: motions.shape[1]]]
 
 
 def motion_words(model: Model, motion: Floats) -> str:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from support.results import ARM, MASS, RATE, circling, model_of, result_of
 
+import dap3d_core as dap
 from dap3d_core.result import UnknownNameError, find
 from dap3d_core.scene import AnimationPoint, Scene
 
@@ -44,6 +45,15 @@ def test_roll_pitch_and_yaw_count_turns_from_one_reported_instant_to_the_next(re
         assert (label, unit) == (f"{name} of bob", "rad")
     with pytest.raises(UnknownNameError, match=r"bob\.yaw has no components"):
         result.quantity("bob.yaw.x")
+
+
+def test_roll_and_yaw_count_turns_between_reports_far_apart():
+    """A free body at 40 rad/s, reported ten times a second: 4 rad from one report to the next."""
+    scene = Scene(name="spun")
+    scene.add_body("rotor", mass=1.0, Jp=[1.0, 1.0, 1.0], w=[0.0, 0.0, -40.0])
+    result = dap.simulate(scene, t_end=3.0, dt=0.1)
+    np.testing.assert_allclose(result.quantity("rotor.yaw").values, -40.0 * result.t, atol=1e-9)
+    np.testing.assert_allclose(result.quantity("rotor.roll").values, 0.0, atol=1e-12)
 
 
 def test_points(result):

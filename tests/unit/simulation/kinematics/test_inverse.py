@@ -1,9 +1,12 @@
 """Inverse dynamics: motions as data, actuators, and what is refused."""
 
+import re
+
 import numpy as np
 import pytest
 from support import one_freedom
 from support.plain import long_in_plain_python
+from support.trees import mixed_chain
 
 import dap3d_core as dap
 from dap3d_core.result.quantities.lookup import find
@@ -176,8 +179,8 @@ def test_wrong_requests_are_refused(scene, motion, columns, actuators, words):
 
 
 def test_a_motion_that_leaves_a_freedom_open_is_refused(scene, motion):
-    """The slider does not tell which way the crank turns at a dead centre; the motion is named."""
-    with pytest.raises(dap.SimulationError, match=r"leaves 1 of 1 degrees.*crank turns about"):
+    """The slider does not tell which way the crank turns at a dead centre."""
+    with pytest.raises(dap.SimulationError, match=r"leaves 1 of 1 degrees.*give crank\.p\.e"):
         dap.inverse(scene, {"t": motion.t, "crank.r.y": motion.t}, "motor")
     with pytest.raises(dap.SceneError, match="no body 'follower'"):
         dap.inverse("fourbar2", motion)
@@ -185,3 +188,18 @@ def test_a_motion_that_leaves_a_freedom_open_is_refused(scene, motion):
         dap.inverse(scene, {"crank.r.x": motion.t})
     with pytest.raises(dap.SceneError, match="4 instants or more"):
         dap.inverse(scene, {n: v[:3] for n, v in crank_places(motion).items()})
+
+
+def test_what_is_to_be_given_is_named_once():
+    """Two rods below a first one that is given, on a ball joint and a hinge: four positions."""
+    scene = mixed_chain(3)
+    scene.add_force("np", "torque", body_i="b0", np=[0.0, 1.0, 0.0])
+    motion = dap.simulate(scene, t_end=0.1, dt=0.01)
+    columns = {"t": motion.t, "b0.r.x": motion.r[:, 0, 0], "b0.r.z": motion.r[:, 0, 2]}
+    with pytest.raises(dap.SimulationError, match="leaves 4 of 5 degrees") as caught:
+        dap.inverse(scene, columns, "torque")
+    names = re.search("give (.*) as well", str(caught.value))[1].split(", ")
+    assert len(set(names)) == 4
+    assert {name[:3] for name in names} <= {"b1.", "b2."}
+    found = dap.inverse(scene, columns | {n: motion.quantity(n).values for n in names}, "torque")
+    np.testing.assert_allclose(found.p, motion.p, atol=1e-8)
