@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from dap3d_core.report import report
     from dap3d_core.result import Result
     from dap3d_core.scene import Scene, SceneError, load, shipped_models
+    from dap3d_core.scene.include import include
     from dap3d_core.simulation import (
         AssemblyError,
         Event,
@@ -70,6 +71,7 @@ _HOMES = {
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("matlab", "import_matlab"),
     "import_model": ("formats.import_model", "import_model"),
+    "include": ("scene.include", "include"),
     "inverse": ("simulation.kinematics.inverse", "inverse"),
     "kinematics": ("simulation.kinematics.kinematics", "kinematics"),
     "linearize": ("simulation.linearization.linearization", "linearize"),
@@ -112,6 +114,7 @@ __all__ = [
     "fit",
     "import_matlab",
     "import_model",
+    "include",
     "inverse",
     "kinematics",
     "linearize",

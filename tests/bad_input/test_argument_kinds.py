@@ -48,8 +48,9 @@ def good_arguments(function, result):
         "parameters": {}, "vary": {}, "measured": {}, "outputs": [], "names": [],
     }  # fmt: skip
     parameters = inspect.signature(function).parameters.values()
-    needed = [p.name for p in parameters if p.default is p.empty and p.kind not in VARIADIC]
-    return {name: known.get(name, "pen1") for name in needed}
+    needed = [p for p in parameters if p.default is p.empty and p.kind not in VARIADIC]
+    scenes = {p.name: dap.Scene() for p in needed if p.annotation is dap.Scene}
+    return {p.name: known.get(p.name, "pen1") for p in needed} | scenes
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

@@ -7,7 +7,8 @@ from dap3d_site.markdown import code, directive, page
 #: Sections of the page: title, public names of ``dap3d_core``, and classes that they hand out.
 SECTIONS = {
     "Scenes": (
-        ("load", "shipped_models", "Scene", "import_matlab", "import_model", "export_model"),
+        ("load", "shipped_models", "Scene", "include", "import_matlab", "import_model",
+         "export_model"),
         ("scene.Simulation", "scene.Body", "scene.Animation", "scene.Mistake",
          "matlab.ImportReport", "formats.import_model.ImportReport",
          "formats.export_model.ExportReport"),

@@ -177,7 +177,16 @@ NAMED: dict[str, type] = {
     "inputs": Input,
     "shapes": Element,
 }
-TABLES = ("scene", "requires", "parameters", *NAMED, "outputs", "animation", "simulation")
+TABLES = (
+    "scene",
+    "include",
+    "requires",
+    "parameters",
+    *NAMED,
+    "outputs",
+    "animation",
+    "simulation",
+)
 
 
 @attrs.define(repr=False)
@@ -196,6 +205,7 @@ class Scene(SceneDisplay):
         path: the file this was read from, or None.
         faults: mistakes found in reading (unknown keys, wrong tables); ``check`` reports them.
         notes: information about the choice of the file.
+        included: the files of its sub-assemblies, by their names.
     """
 
     name: Any = ""
@@ -218,6 +228,7 @@ class Scene(SceneDisplay):
     path: Path | None = attrs.field(default=None, eq=False)
     faults: list[tuple[Key, Mistake]] = attrs.field(factory=list, eq=False)
     notes: list[str] = attrs.field(factory=list, eq=False)
+    included: dict[str, Path] = attrs.field(factory=dict, eq=False)
     _counts: dict[str, int] = attrs.field(factory=dict, eq=False, init=False)
 
     @property
@@ -241,6 +252,7 @@ class Scene(SceneDisplay):
             outputs={name: plain(output) for name, output in self.outputs.items()},
             faults=list(self.faults),
             notes=list(self.notes),
+            included=dict(self.included),
             **named,
         )
         scene._counts = dict(self._counts)

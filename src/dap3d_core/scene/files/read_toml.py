@@ -25,6 +25,8 @@ from dap3d_core.scene.scene import (
     keys_of,
 )
 
+#: Keys of a table [include.NAME].
+INCLUDE_KEYS = frozenset({"file", "at", "parameters"})
 #: Larger files are refused before they are read.
 LARGEST_FILE = 64 * 2**20
 #: Keys of more parts are refused unread: parsing takes time and memory quadratic in their number.
@@ -49,10 +51,14 @@ def load(source: str | bytes | os.PathLike[str]) -> Scene:
     Raises:
         SceneError: there is no such file, or it is not TOML; says where and what to do.
     """
+    return _load(source, ())
+
+
+def _load(source: str | bytes | os.PathLike[str], within: tuple[Path, ...]) -> Scene:
+    """A scene that the scenes of other files include, the outermost first."""
     path, notes = _find(source)
     data = _parse(read_text(path, LARGEST_FILE), path)
-    scene = scene_of(data)
-    scene.path = path
+    scene = scene_of(data, path, within)
     scene.notes += notes
     return scene
 
@@ -90,15 +96,23 @@ def group_of(folder: Path) -> str:
     return folder.parent.name if folder.parent != _models_folder() else ""
 
 
-def scene_of(data: dict[str, Any]) -> Scene:
-    """A scene from the tables of a scene file; ``Scene.faults`` holds their mistakes."""
+def scene_of(
+    data: dict[str, Any], path: Path | None = None, within: tuple[Path, ...] = ()
+) -> Scene:
+    """A scene from the tables of a scene file; ``Scene.faults`` holds their mistakes.
+
+    Args:
+        data: the tables.
+        path: the file; None of a text, which includes no others.
+        within: the files that include this one, the outermost first.
+    """
     mistakes = MistakeList()
     for name, content in data.items():
         if name not in TABLES:
             value = MISSING if isinstance(content, (dict, list)) else plain(content)
             what = f"unknown table; a scene has {', '.join(TABLES)}"
             mistakes.add((name,), value, what, mistakes.nearest(name, TABLES))
-    scene = Scene(faults=mistakes.mistakes)
+    scene = Scene(faults=mistakes.mistakes, path=path)
     header = _known(mistakes, ("scene",), data.get("scene", {}), HEADER_KEYS)
     scene.name = header.get("name", "")
     scene.description = header.get("description", "")
@@ -115,7 +129,41 @@ def scene_of(data: dict[str, Any]) -> Scene:
     scene.simulation = Simulation(
         **_known(mistakes, ("simulation",), settings, keys_of(Simulation))
     )
+    for name, content in _table(mistakes, ("include",), data.get("include", {})).items():
+        _include(mistakes, scene, name, content, within)
     return scene
+
+
+def _include(
+    mistakes: MistakeList, scene: Scene, name: str, content: Any, within: tuple[Path, ...]
+) -> None:
+    """Add a sub-assembly to a scene."""
+    key = ("include", name)
+    entry = _known(mistakes, key, content, INCLUDE_KEYS)
+    file, path = plain(entry.get("file", MISSING)), scene.path
+    if type(file) is not str or file == MISSING:
+        mistakes.add((*key, "file"), file, 'is required: the scene file, such as "axle.toml"')
+        return
+    if path is None:
+        mistakes.add(key, MISSING, "a text has no folder in which to find files to include")
+        return
+    found, within = path.parent / file, (*within, path.resolve())
+    if found.resolve() in within:
+        chain = " -> ".join(f.name for f in (*within, found))
+        mistakes.add((*key, "file"), file, f"files include one another in a circle: {chain}")
+        return
+    try:
+        part = _load(file if file in shipped_models() else found, within)
+    except SceneError as error:
+        for mistake in error.mistakes:
+            mistakes.add((*key, "file"), file, str(mistake))
+        return
+    from dap3d_core.scene.include import included
+
+    parameters = plain(entry.get("parameters", {}))
+    added = included(mistakes, key, part, plain(entry.get("at", {})), parameters)
+    if added is not None:
+        added.add_to(scene, mistakes)
 
 
 def _table(mistakes: MistakeList, key: Key, content: Any) -> dict[str, Any]:

@@ -1,6 +1,7 @@
 """Collects mistakes and notes of the check of a scene, and locates them in its file."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import attrs
@@ -63,16 +64,23 @@ class Collector(MistakeList):
 
 def located(scene: Scene, mistakes: list[tuple[Key, Mistake]]) -> list[Mistake]:
     """Mistakes with the file and the line of their keys, sorted by line."""
-    lines = _lines(scene)
-    file = str(scene.path) if scene.path else ""
+    files = {"": scene.path} | scene.included
+    lines = {name: _lines(path) for name, path in files.items()}
 
-    def line_of(key: Key) -> int | None:
-        """Line of a key; of a missing key that of its table; None in a table made by a script."""
-        shortest = min(len(key), 2 if key[:1] and key[0] in NAMED else 1)
+    def place_of(key: Key) -> tuple[str, int | None]:
+        """File and line of a key; of a missing key that of its table; None in a script's table."""
+        shortest, name = min(len(key), 2 if key[:1] and key[0] in NAMED else 1), ""
+        if shortest == 2 and "/" in str(key[1]):
+            head, _, tail = str(key[1]).rpartition("/")
+            name, key = (head, (key[0], tail, *key[2:])) if head in files else ("", key)
         parts = (key[:n] for n in range(len(key), shortest - 1, -1))
-        return next((lines[part] for part in parts if part in lines), None)
+        line = next((lines[name][part] for part in parts if part in lines[name]), None)
+        return str(files[name] or ""), line
 
-    result = [attrs.evolve(m, file=file, line=line_of(key)) for key, m in mistakes]
+    result = []
+    for key, mistake in mistakes:
+        file, line = place_of(key)
+        result.append(attrs.evolve(mistake, file=file, line=line))
     return sorted(result, key=lambda m: (m.line is None, m.line or 0))
 
 
@@ -81,14 +89,14 @@ def mistake_at(scene: Scene, key: Key, what: str, remedy: str = "") -> Mistake:
     return located(scene, [(key, Mistake(dotted(key), MISSING, what, remedy=remedy))])[0]
 
 
-def _lines(scene: Scene) -> dict[Key, int]:
-    """Lines of the keys in the file that a scene was read from, in its present state."""
+def _lines(path: Path | None) -> dict[Key, int]:
+    """Lines of the keys in a scene file, in its present state."""
     from dap3d_core.scene.files.line_numbers import lines_of
 
-    if scene.path is None:
+    if path is None:
         return {}
     try:
-        text = scene.path.read_bytes().decode("utf-8-sig")
+        text = path.read_bytes().decode("utf-8-sig")
     except (OSError, UnicodeDecodeError):  # deleted since: mistakes are reported without lines
         return {}
     return lines_of(text)

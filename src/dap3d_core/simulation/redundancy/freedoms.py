@@ -49,7 +49,7 @@ def coordinates_of(model: Model, u: Floats, motions: Floats) -> list[str]:
     """
     from scipy.linalg import qr
 
-    r, p, _, _ = split(u)
+    p = split(u)[1]
     moves = motions.reshape(len(p), 6, -1)
     turns = euler_rates(p[:, None], np.swapaxes(moves[:, 3:], 1, 2))
     changes = np.concatenate([moves[:, :3] / model.size, 2.0 * np.swapaxes(turns, 1, 2)], axis=1)

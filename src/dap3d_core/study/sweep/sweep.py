@@ -155,8 +155,11 @@ def _check_names(ensemble: Ensemble, plan: Design, *, in_file: bool) -> None:
             what = "this is a whole number; list whole values"
             mistakes.append(Mistake(f"vary {parameter.name}", varied.spec, what))
     if in_file:
-        label = 'give it a label: {"label": quantity}'
-        for key, given, remedy in (("vary", names, "rename it"), ("outputs", labels, label)):
+        label = 'give it a label, {"label": quantity}, or name it in [outputs] of the scene'
+        for key, given, remedy in (
+            ("vary", names, "rename it, or make it one of the [parameters]"),
+            ("outputs", labels, label),
+        ):
             invalid = [name for name in given if not _fits_file(name)]
             mistakes += [Mistake(key, name, INVALID_NAME, remedy=remedy) for name in invalid]
     if mistakes:
