@@ -18,6 +18,9 @@ from dap3d_core.kernels.compiler.background import optimiser
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from dap3d_core.formulations.programs.symbolic_arrays import Varied
     from dap3d_core.kernels.array_types import Floats, Integers
 
 #: Seconds in general code from which on a program is looked for in the cache folder, and made.
@@ -56,10 +59,10 @@ _making = threading.Lock()
 class ChangeOver:
     """The programs of an evaluator, for its integrations."""
 
-    def __init__(self, evaluator: Any) -> None:
-        """Args: the evaluator."""
+    def __init__(self, evaluator: Any, varied: "Varied" = None) -> None:
+        """Args: the evaluator; numbers that differ from run to run (symbolic_arrays.py)."""
         model = evaluator.model
-        self._evaluator = evaluator
+        self._evaluator, self._varied = evaluator, varied
         self._name: str | None = None
         #: Constants of the programs: where they stand, and their numbers.
         self._parts: list[tuple[Floats, Integers]] = []
@@ -69,52 +72,79 @@ class ChangeOver:
 
     def advance(self, integration: Any, budget: int) -> None:
         """``integration.advance``, by programs where there are some."""
-        record = self._record_of(integration) if self._is_open else None
+
+        def counts() -> tuple[int, int]:
+            now = integration.statistics
+            return now.rhs, now.projections
+
+        def run() -> None:
+            integration.advance(budget)
+
+        if integration.takes_programs:
+            start = integration.t, integration.y
+            self.call(run, integration.functions.addresses, start, counts)
+        else:
+            run()
+
+    def call(
+        self,
+        run: "Callable[[], None]",
+        addresses: "Integers",
+        start: "tuple[float, Floats]",
+        counts: "Callable[[], tuple[int, int]]",
+    ) -> None:
+        """Make a call that evaluates the scene, by programs where there are some.
+
+        Args:
+            run: the call.
+            addresses: of the functions that it calls.
+            start: time and state at which it begins.
+            counts: right-hand sides and projections so far.
+        """
+        record = self._record_of(start) if self._is_open else None
         if record is None:
             clock = time.perf_counter()
-            integration.advance(budget)
+            run()
             _spent[self._key] = _spent.get(self._key, 0.0) + time.perf_counter() - clock
             return
-        programs, addresses = record.programs[: PROJECT + 1], integration.functions.addresses
+        programs = record.programs[: PROJECT + 1]
         general = addresses[: len(programs)].copy()
-        before = [program.failures() for program in programs]
+        failures, done = [program.failures() for program in programs], counts()
         addresses[: len(programs)] = [program.address for program in programs]
-        done = integration.statistics
         try:
-            integration.advance(budget)
+            run()
         finally:
             addresses[: len(programs)] = general
-        now = integration.statistics
-        counts = now.rhs - done.rhs, now.projections - done.projections
+        now = counts()
         for k in reversed(range(len(programs))):
-            if programs[k].failures() - before[k] > 1 + MOST_FAILURES[k] * counts[k]:
+            if programs[k].failures() - failures[k] > 1 + MOST_FAILURES[k] * (now[k] - done[k]):
                 _give_up(record, programs[k], k)
 
-    def _record_of(self, integration: Any) -> Record | None:
+    def _record_of(self, start: "tuple[float, Floats]") -> Record | None:
         """The record, where this call may run its programs."""
-        if _spent.get(self._key, 0.0) < LOAD_AFTER or not integration.takes_programs:
+        if _spent.get(self._key, 0.0) < LOAD_AFTER:
             return None
         from dap3d_core.formulations.programs import scene_program
 
         if self._name is None:
             if not scene_program.is_optimised(self._evaluator):
                 return None
-            self._parts = scene_program.constant_parts(self._evaluator)
+            self._parts = scene_program.constant_parts(self._evaluator, self._varied)
             self._numbers = scene_program.constant_numbers(self._parts)
-            size = integration.y.size
-            self._name = scene_program.name_of(self._evaluator, size, self._numbers)
+            size = start[1].size
+            self._name = scene_program.name_of(self._evaluator, size, self._numbers, self._varied)
         if not np.array_equal(self._numbers, scene_program.constant_numbers(self._parts)):
             return None
         with _making:
             record = _records.setdefault(self._name, Record())
             if not (record.programs or record.reason):
                 try:
-                    self._make(record, self._name, integration)
+                    self._make(record, self._name, start)
                 except Exception as error:  # the general code runs on, whatever it was
                     record.reason = f"{type(error).__name__}: {error}"
         return record if record.programs else None
 
-    def _make(self, record: Record, name: str, integration: Any) -> None:
+    def _make(self, record: Record, name: str, start: "tuple[float, Floats]") -> None:
         """Load programs that the cache folder has, or let them be compiled."""
         from dap3d_core.formulations.programs import scene_program
 
@@ -123,7 +153,7 @@ class ChangeOver:
         if stored is None:
             if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
                 return
-            text = scene_program.write_programs(evaluator, name, integration.t, integration.y)
+            text = scene_program.write_programs(evaluator, name, *start, self._varied)
             if BESIDE and path is not None and optimiser.request(text, [], path):
                 record.is_requested = True
                 return

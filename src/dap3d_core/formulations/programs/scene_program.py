@@ -19,7 +19,7 @@ import numpy as np
 from dap3d_core.assembly.arrays import Floats, Integers
 from dap3d_core.formulations import PROJECT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, constants
+from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, Varied, constants
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler import types as t
@@ -110,7 +110,12 @@ def reads_rates(evaluator: Evaluator) -> bool:
 
 @IGNORE_FLOAT_ERRORS
 def write_program(
-    evaluator: Evaluator, time: float, state: Floats, names: dict[str, str], head: str = ""
+    evaluator: Evaluator,
+    time: float,
+    state: Floats,
+    names: dict[str, str],
+    head: str = "",
+    varied: Varied = None,
 ) -> tuple[str, dict[str, str]]:
     """LLVM IR of one program, and the declarations that it needs.
 
@@ -119,12 +124,13 @@ def write_program(
         time, state: where branches on numbers are decided.
         names: of the program, its ``counter``, and the ``general`` function.
         head: of a projection, which is then behind the right-hand side.
+        varied: as of ``constants``.
 
     Raises:
         TraceError: the program would be too long.
     """
     tracer = StraightLine(MOST_INSTRUCTIONS)
-    system = SymbolicSystem(evaluator, tracer)
+    system = SymbolicSystem(evaluator, tracer, varied)
     y = _items(tracer, "%y", state)
     out = rates = np.zeros(state.size, dtype=object)
     loops = [_python_loop(kind, group) for kind, group in evaluator.loop_groups]
@@ -160,26 +166,28 @@ def _items(tracer: StraightLine, base: str, numbers: Floats) -> Any:
     )
 
 
-def name_of(evaluator: Evaluator, size: int, numbers: Floats) -> str:
+def name_of(evaluator: Evaluator, size: int, numbers: Floats, varied: Varied = None) -> str:
     """Name of the programs of an evaluator: a digest of all that decides them.
 
     Args:
         evaluator: of the scene.
         size: of the state.
         numbers: constants of the programs.
+        varied: as of ``constants``.
     """
     parts: list[str | bytes] = [f"{size} {evaluator.model.input_rows}", numbers.tobytes()]
     parts += [entry.unit.name for entry in _entries(evaluator)]
     for name, array in evaluator.system.walk():
         parts += [f"{name} {array.shape}", b"" if array.dtype == float else array.tobytes()]
+    parts += [f"{name} {places.tolist()}" for name, places in (varied or {}).items()]
     plain = inspect.unwrap(formulation_module(evaluator).rhs)
     return names_of("program", [plain], *parts, *origin([write_program, constants]))[1]
 
 
-def constant_parts(evaluator: Evaluator) -> list[tuple[Floats, Integers]]:
+def constant_parts(evaluator: Evaluator, varied: Varied = None) -> list[tuple[Floats, Integers]]:
     """Arrays of a system, flat, and the places there of constants of its programs."""
     arrays = dict(evaluator.system.walk())
-    return [(arrays[name].reshape(-1), places) for name, places in constants(evaluator)]
+    return [(arrays[name].reshape(-1), places) for name, places in constants(evaluator, varied)]
 
 
 def constant_numbers(parts: list[tuple[Floats, Integers]]) -> Floats:
@@ -203,7 +211,9 @@ def path_of(name: str) -> Path | None:
     return None if folder is None else folder / f"{name}.o"
 
 
-def write_programs(evaluator: Evaluator, name: str, time: float, state: Floats) -> str:
+def write_programs(
+    evaluator: Evaluator, name: str, time: float, state: Floats, varied: Varied = None
+) -> str:
     """LLVM IR of programs of right-hand side and, where it reads what that leaves, projection.
 
     Then the general projection behind a right-hand side of its own, for where guards of that
@@ -213,28 +223,34 @@ def write_programs(evaluator: Evaluator, name: str, time: float, state: Floats) 
         evaluator: of the scene, as a run begins.
         name: of the programs.
         time, state: where branches are decided.
+        varied: as of ``constants``.
 
     Raises:
         TypeError, ValueError, ArithmeticError: the scene has none; says why.
     """
     rhs, project = (_named(entry) for entry in evaluator.functions.entries[: PROJECT + 1])
     symbols, size = symbols_of(evaluator, name), state.size
-    noise = np.random.default_rng(0).standard_normal(size)
-    state = state + OFF * float(np.max(np.abs(state))) * noise
+    state = _off_constraints(state)
     names = {"name": symbols[0], "counter": symbols[1], "general": rhs}
-    text, needs = write_program(evaluator, time, state, names)
+    text, needs = write_program(evaluator, time, state, names, varied=varied)
     if len(symbols) > 2:
         head = _PROJECTION_HEAD.format(project=project, arguments=ARGUMENTS)
         names = {"name": symbols[2], "counter": symbols[3], "general": symbols[4]}
         behind = partial(_BEHIND.format, head=head, rhs=rhs, project=project,
                          arguments=ARGUMENTS, size=size)  # fmt: skip
         try:
-            other, needed = write_program(evaluator, time, state, names, head)
+            other, needed = write_program(evaluator, time, state, names, head, varied)
         except TraceError:  # too long: the right-hand side alone has a program
             other, needed = behind(name=symbols[2]) + _NONE.format(counter=symbols[3]), {}
         text, needs = text + other + behind(name=symbols[4]), needs | needed
     declared = [f"declare void @{symbol}({ARGUMENTS})" for symbol in (rhs, project)]
     return "\n".join([*needs.values(), *declared, text, _WEIGHTS])
+
+
+def _off_constraints(state: Floats) -> Floats:
+    noise = np.random.default_rng(0).standard_normal(state.size)
+    off: Floats = state + OFF * float(np.max(np.abs(state))) * noise
+    return off
 
 
 def load_programs(evaluator: Evaluator, name: str, code: bytes) -> list[Program]:

@@ -1,6 +1,6 @@
 """The arrays of a system as symbols: what a program of the scene reads and writes."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -25,13 +25,22 @@ from dap3d_core.kernels.runtime.loop_support import MASS
 COUNTED = (SCRATCH, UNSETTLED, SINGULAR, DOUBTFUL)
 #: Columns of ``metric`` that follow from masses and inertias.
 METRIC_CONSTANTS = 7
+#: Members of a system -> flat indices of numbers that differ from run to run; None: all runs are
+#: of one model.
+Varied = Mapping[str, Integers] | None
 
 
-def constants(evaluator: Evaluator) -> Iterator[tuple[str, Integers]]:
+def constants(evaluator: Evaluator, varied: Varied = None) -> Iterator[tuple[str, Integers]]:
     """Name of a member, and flat indices of its numbers that no evaluation changes.
 
-    What these are at the start of a run they are at its end, unless an event sets them.
+    What these are at the start of a run they are at its end, unless an event sets them. With
+    ``varied``, what follows from its numbers at the start of a run is not among them either.
     """
+    for name, places in _constants(evaluator, varied is None):
+        yield name, np.setdiff1d(places, varied[name]) if varied and name in varied else places
+
+
+def _constants(evaluator: Evaluator, of_start: bool) -> Iterator[tuple[str, Integers]]:
     system = evaluator.system
     par = np.ones(system.par.size, dtype=bool)
     for places in evaluator.turn_places():
@@ -41,15 +50,16 @@ def constants(evaluator: Evaluator) -> Iterator[tuple[str, Integers]]:
     settings[list(COUNTED)] = False
     yield "settings", np.flatnonzero(settings)
     yield "weight", np.arange(system.weight.size)
-    yield "smallest", np.arange(system.smallest.size)
-    for name, columns in (("metric", slice(METRIC_CONSTANTS)), ("F", slice(4, 5))):
-        yield name, _of_rows(getattr(system, name), columns)
+    yield "metric", _of_rows(system.metric, slice(METRIC_CONSTANTS))
     yield "body", _of_rows(system.body, slice(MASS, None))
+    if of_start:
+        yield "smallest", np.arange(system.smallest.size)
+        yield "F", _of_rows(system.F, slice(4, 5))
     if system.tree is not None:
         yield "tree.places", _of_rows(system.tree.places, slice(MASS, None))
         yield "tree.constants", np.arange(system.tree.constants.size)
         if system.tree.kept is not None:
-            for name in ("compliance", "smallest", "settings"):
+            for name in ("compliance", "settings", *(("smallest",) if of_start else ())):
                 yield f"tree.kept.{name}", np.arange(getattr(system.tree.kept, name).size)
 
 
@@ -81,23 +91,24 @@ class SymbolicSystem:
         struct: what the functions of the core take for a system.
     """
 
-    def __init__(self, evaluator: Evaluator, tracer: StraightLine) -> None:
+    def __init__(self, evaluator: Evaluator, tracer: StraightLine, varied: Varied = None) -> None:
         self._tracer = tracer
         #: Of each piece of memory: its first item's address, and its items as symbols.
         self._memory: dict[int, Any] = {}
         #: Of members that are kept from one evaluation to another: symbols, pointer, as they were.
         self._kept: list[tuple[Any, Callable[[], str], Any]] = []
-        self._constants = dict(constants(evaluator))
-        self.struct = self._symbolic(evaluator.system, lambda: "%system", "")
+        self._constants = dict(constants(evaluator, varied))
+        self.struct = self.symbolic(evaluator.system, lambda: "%system", "")
 
-    def _symbolic(self, arrays: Arrays, base: Callable[[], str], before: str) -> SymbolicStruct:
+    def symbolic(self, arrays: Arrays, base: Callable[[], str], before: str) -> SymbolicStruct:
+        """The arrays of a struct; ``base`` gives its address, ``before`` begins names."""
         struct, word = SymbolicStruct(self._tracer, type(arrays).scalars), 0
         for name, type_ in arrays.type_of().members:
             member = getattr(arrays, name)
             pointer = self._pointer(base, word)
             word += len(type_.words)
             if isinstance(type_, Struct) and member is not None:
-                member = self._symbolic(member, pointer, f"{before}{name}.")
+                member = self.symbolic(member, pointer, f"{before}{name}.")
             elif isinstance(type_, Array) and type_.item is FLOAT:
                 member = self._numbers(member, pointer, before + name)
             setattr(struct, name, member)

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from dap3d_core.assembly.arrays import STEPS, System, step_functions
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.step import advance
-from dap3d_core.integrators.stepping.integration_state import Status
-from dap3d_core.kernels.runtime.cache import table_of
+from dap3d_core.integrators.stepping.integration_state import Status, Y
+from dap3d_core.kernels.runtime.cache import jit_is_on, table_of
 from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, procedure_signature
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.scene import Simulation
@@ -110,6 +111,7 @@ class CompiledBatch:
             "first_lengths": work.lengths.copy(),
         }
         self._begin, self.takes_lanes = _begin_functions(evaluator.formulation), True
+        self._programs: tuple[Any, ChangeOver] | None = None
         self._lanes: tuple[System, LaneBatch | str] | None = None
         self._calls, self._point_calls = 0.0, USUAL_CALLS
         self.run(np.zeros((0, 0)), np.zeros(0, dtype=np.int64), y0[None][:0])  # to compile it
@@ -125,6 +127,14 @@ class CompiledBatch:
             lanes = lane_batch(self.evaluator, self._lane_works, self._begin, len(self._stops) > 0)
             self._lanes = self.evaluator.system, lanes
         return self._lanes[1]
+
+    def _programs_for(self, places: Integers) -> ChangeOver:
+        """Programs of the scene in which the numbers at these places are not constants."""
+        key = id(self.evaluator.system), places.tobytes()
+        if self._programs is None or self._programs[0] != key:
+            varied = varied_at(self.evaluator.system, places)
+            self._programs = key, ChangeOver(self.evaluator, varied)
+        return self._programs[1]
 
     def _is_long(self, count: int) -> bool:
         """True if so many points are worth lanes."""
@@ -179,9 +189,22 @@ class CompiledBatch:
             lanes = self.lanes
             if not isinstance(lanes, str) and lanes.is_ready:
                 lanes.run(points, CALL)
-        while True:
+        programs = self._programs_for(points.places)
+
+        def call() -> None:
             with np.errstate(all="ignore"):  # as compiled code does
                 driver.run_points(points, work, *problem, system, loops, CALL)
+
+        def counts() -> tuple[int, int]:
+            ended = diagnostics[:, [driver.CALLS, driver.TAKEN]].sum(axis=0)
+            return int(ended[0]) + work.rhs_count, int(ended[1]) + work.step_count
+
+        addresses = self.evaluator.functions.addresses if jit_is_on() else None
+        while True:
+            if addresses is None or not count:
+                call()
+            else:
+                programs.call(call, addresses, (work.t, work.state[Y]), counts)
             if points.at[driver.POINT] == count:
                 break
         if count:
@@ -198,6 +221,17 @@ def numbers_of(evaluator: Evaluator) -> Floats:
     s = evaluator.system
     tree = () if s.tree is None else (s.tree.constants,)
     return np.concatenate([s.par, s.body.ravel(), s.metric.ravel(), *tree])
+
+
+def varied_at(system: System, places: Integers) -> dict[str, Integers]:
+    """Members of a system that numbers at some places (``numbers_of``) stand in, and where there."""
+    found, first = {}, 0
+    for name in ("par", "body", "metric", "tree.constants"):
+        array = getattr(system.tree, "constants", None) if "." in name else getattr(system, name)
+        if array is not None:
+            here = (first <= places) & (places < first + array.size)
+            found[name], first = places[here] - first, first + array.size
+    return found
 
 
 @cache
