@@ -1,4 +1,4 @@
-"""A point of a study: what it costs beside its integration, and what packs of points gain.
+"""A point of a study: what it costs beside its integration.
 
 Time of this thread, the least of several rounds in turn: what else runs on the machine does not
 count. The integration alone is the same one, started again and again by its own compiled call.
@@ -13,7 +13,7 @@ import dap3d_core as dap
 from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.study import Ensemble, Study, outputs_of
 
-ROUNDS, POINTS, PACKS = 9, 320, (4, 8, 16)
+ROUNDS, POINTS = 9, 320
 
 
 def pendulum():
@@ -83,23 +83,17 @@ def _row(case, make, name, low, high, output):
     points = np.linspace(low, high, POINTS)[:, None]
     least = {}
 
-    def study(pack=1):
-        return Study(scene, (name,), outputs_of([output]), pack=pack)
-
-    ways = {pack: Ensemble(study(pack)) for pack in (1, *PACKS)}
-    for of in ways.values():
-        of.run(points[:32])
+    of = Ensemble(Study(scene, (name,), outputs_of([output])))
+    of.run(points[:32])
     for _ in range(ROUNDS):
-        for pack, of in ways.items():
-            _keep(least, pack, _seconds(lambda of=of: of.run(points)) / POINTS)
-        _keep(least, "simulate", _seconds(lambda: ways[1].result(points[0])))
+        _keep(least, "point", _seconds(lambda: of.run(points)) / POINTS)
+        _keep(least, "simulate", _seconds(lambda: of.result(points[0])))
     short = _overhead(scene, name, points, output)
     return {
         "case": case,
-        "point_us": 1e6 * least[1],
+        "point_us": 1e6 * least["point"],
         "overhead_us": 1e6 * short,
-        "compile_and_simulate": least["simulate"] / least[1],
-        **{f"packs_of_{pack}": least[1] / least[pack] for pack in PACKS},
+        "compile_and_simulate": least["simulate"] / least["point"],
     }
 
 

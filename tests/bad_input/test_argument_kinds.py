@@ -190,10 +190,8 @@ def test_controllers_and_studies_take_numbers_of_numpy():
     assert type(controller.every) is float
     varied, n = {"bodies.cone.mass": [1.0, 2.0]}, np.int64(1)
     common = {"outputs": ["cone.r.z:max"], "t_end": np.float32(0.125)}
-    found = dap.sweep("pen1", varied, threads=n, pack=n, seed=n, **common)
-    alone = dap.sweep(
-        "pen1", varied, threads=1, pack=1, seed=1, outputs=["cone.r.z:max"], t_end=0.125
-    )
+    found = dap.sweep("pen1", varied, threads=n, seed=n, **common)
+    alone = dap.sweep("pen1", varied, threads=1, seed=1, outputs=["cone.r.z:max"], t_end=0.125)
     assert np.array_equal(found["cone.r.z:max"], alone["cone.r.z:max"])
 
 

@@ -115,21 +115,16 @@ def test_equilibrium_is_found_with_inputs_held():
 
 
 def test_inputs_vary_in_sweeps():
-    """As all that a scene holds: each point has its own, in batches and packs as well."""
+    """As all that a scene holds: each point has its own, in batches as well."""
     scene = dap.Scene(name="pushed")
     scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
     scene.add_input("push", 0.5)
     scene.add_force("f", "force", body_i="block", f=(1.0, 0.0, 0.0), input="push")
     values, masses = np.linspace(0.0, 1.0, 30), np.linspace(1.0, 2.0, 30)
     outputs = ["block.r.x", "push"]
-    for pack in (1, 4):
-        data = dap.sweep(
-            scene, {"inputs.push.value": values}, outputs=outputs, t_end=1.0, pack=pack
-        )
-        assert data["block.r.x"].values == pytest.approx(0.25 * values, abs=1e-14)
-        assert data["push"].values.tolist() == values.tolist()
-        data = dap.sweep(
-            scene, {"bodies.block.mass": masses}, outputs=outputs, t_end=1.0, pack=pack
-        )
-        assert data["block.r.x"].values == pytest.approx(0.25 / masses, abs=1e-14)
-        assert data["push"].values.tolist() == [0.5] * 30
+    data = dap.sweep(scene, {"inputs.push.value": values}, outputs=outputs, t_end=1.0)
+    assert data["block.r.x"].values == pytest.approx(0.25 * values, abs=1e-14)
+    assert data["push"].values.tolist() == values.tolist()
+    data = dap.sweep(scene, {"bodies.block.mass": masses}, outputs=outputs, t_end=1.0)
+    assert data["block.r.x"].values == pytest.approx(0.25 / masses, abs=1e-14)
+    assert data["push"].values.tolist() == [0.5] * 30

@@ -73,15 +73,12 @@ def test_a_resumed_run_keeps_its_turns(tmp_path):
     check(dap.resume(tmp_path / "run.nc.checkpoint"))
 
 
-@pytest.mark.parametrize("pack", [1, 4])
-def test_the_points_of_a_sweep_keep_their_turns(pack):
+def test_the_points_of_a_sweep_keep_their_turns():
     def moment(result):
         return float(result.force("spring").on["i"].moment[-1, 2])
 
     stiffness = np.array([0.5, 1.0, 1.5, 2.0])
-    found = dap.sweep(
-        winding(), {"forces.spring.k": stiffness}, outputs={"last": moment}, pack=pack
-    )
+    found = dap.sweep(winding(), {"forces.spring.k": stiffness}, outputs={"last": moment})
     w = np.sqrt(stiffness)
     np.testing.assert_allclose(found["last"], -SPEED * w * np.sin(3.0 * w), atol=1e-3)
 

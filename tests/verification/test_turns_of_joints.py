@@ -188,15 +188,14 @@ def test_kinematics_of_a_driver_that_turns_back(dt):
 
 
 @pytest.mark.parametrize("method", ["standard", "joint"])
-@pytest.mark.parametrize("pack", [1, 4])
-def test_sweeps_keep_turns_whatever_else_they_keep(method, pack):
+def test_sweeps_keep_turns_whatever_else_they_keep(method):
     points = {"bodies.wheel.w.z": np.array([-90.0, 20.0, 100.0, 333.0])}
     outputs = {"last": "pin.angle:end", "fastest": "pin.angle_rate:max"}
     wanted = points["bodies.wheel.w.z"] / SPEED * decaying(6.0)
     for kept in (outputs, {"last": outputs["last"]}, {"last": lambda r: r["pin.angle"][-1]}):
         if callable(kept["last"]):
             kept = {"last": lambda r: float(r.quantity("pin.angle").values[-1])}
-        found = dap.sweep(wheel(), points, outputs=kept, t_end=6.0, method=method, pack=pack)
+        found = dap.sweep(wheel(), points, outputs=kept, t_end=6.0, method=method)
         np.testing.assert_allclose(found["last"], wanted, atol=1e-3)
 
 

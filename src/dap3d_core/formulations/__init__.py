@@ -13,6 +13,8 @@ from dap3d_core.assembly.arrays import step_functions
 
 #: Indices of a formulation's functions in the list that an integrator takes.
 RHS, PROJECT, REPORT, ACCEPTED, WATCH = range(5)
+#: What a projection gives besides lengths (integrators/runge_kutta/step.py).
+OUTCOMES = 4
 
 #: Kinds of group loops that every formulation calls, and those of joints.
 _ALL = ("value", "wrench", "energy", "angle", "turned", "switch", "bound", "knot", "rate",

@@ -83,6 +83,8 @@ class Ensemble:
         if runner is None:
             return ("each point is run alone",)
         lanes = runner.compiled_batch.lanes
+        if lanes is None:
+            return ("points are run one by one: they are few",)
         if isinstance(lanes, str):
             return (f"points are run one by one: {lanes}",)
         return (f"points are run in {lanes.count} lanes of a vector",)
@@ -116,7 +118,7 @@ class Ensemble:
             if self._takes_batches:
                 from dap3d_core.study.batch.batch import batch_runner
 
-                self._of_thread.runner = batch_runner(self.reduction, self.times, self.study.pack)
+                self._of_thread.runner = batch_runner(self.reduction, self.times)
         runner: BatchRunner | None = self._of_thread.runner
         return runner
 

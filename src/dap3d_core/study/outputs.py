@@ -218,20 +218,6 @@ class Reduction:
             values_of[output.name] = REDUCTIONS[output.reduction](values, times)
         return values_of
 
-    @property
-    def is_of_single_copies(self) -> bool:
-        """True if no output needs what all copies of a pack share, which is NaN in their rows."""
-        if not all(self.of_rows.values()):
-            return False
-        layout = self.compiled.model.row_layout
-        rows = np.random.default_rng(0).random((3, layout["inputs"].start))
-        for name in ("work", "potential_energy", "residuals"):
-            rows[..., layout[name]] = np.nan
-        probe = self.result(self.compiled.model, rows)
-        quantities = (find(probe, str(output.of)) for output in self.outputs)
-        sources = (source for one in quantities for source in _sources(probe, one))
-        return all(bool(np.all(np.isfinite(source.values))) for source in sources)
-
     def result(self, model: Model, rows: Floats, evaluator: Evaluator | None = None) -> Result:
         """A result in memory, of rows of a model that an evaluator evaluates."""
         record = RunMetadata(scene_text=self.compiled.scene_text)

@@ -32,15 +32,12 @@ class Study:
         names: dotted names of the parameters that vary.
         outputs: computed from each run.
         allow_code: whether the model's own types may be loaded.
-        pack: number of points that take their steps together, where the scene allows it: faster,
-            and equal to single runs within the tolerances only.
     """
 
     scene: Scene
     names: tuple[str, ...]
     outputs: tuple[Output, ...]
     allow_code: bool = False
-    pack: int = 1
 
 
 @attrs.frozen(eq=False)

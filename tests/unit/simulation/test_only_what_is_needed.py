@@ -55,8 +55,8 @@ def test_joint_coordinates_are_imported_where_a_scene_takes_them():
 
 
 @pytest.mark.slow
-def test_lanes_are_imported_by_long_studies_in_joint_coordinates():
-    """Other studies, and short ones, bring in nothing of them."""
+def test_lanes_are_imported_by_long_studies():
+    """Short ones bring in nothing of them."""
     names = {f"dap3d_core.{part}.lanes" for part in ("kernels.compiler", "study.batch")}
     script = (
         "import sys, numpy as np, dap3d_core as dap\n"
@@ -67,10 +67,10 @@ def test_lanes_are_imported_by_long_studies_in_joint_coordinates():
     )
     script += (
         "sweep('joint')\n"
-        "compiled_batch.BEFORE_LANES = 1\n"
         "sweep('standard')\n"
         f"assert not {names} & set(sys.modules)\n"
-        "sweep('joint')\n"
+        "compiled_batch.BEFORE_LANES = 1\n"
+        "sweep('standard')\n"
     )
     assert names <= imported(script)
 

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 #: Arguments of ``dap.sweep`` with the options that give them.
 OPTIONS = {"vary": "--vary", "outputs": "--keep"} | {
-    name: f"--{name}" for name in ("sample", "design", "seed", "threads", "pack")
+    name: f"--{name}" for name in ("sample", "design", "seed", "threads")
 }
 
 
@@ -43,9 +43,6 @@ OPTIONS = {"vary": "--vary", "outputs": "--keep"} | {
     *options.SETTING_OPTIONS.values(),
     click.option("--threads", type=int, metavar="N",
                  help="Points that run at once; by default one for each core."),
-    click.option("--pack", type=int, metavar="N", default=1,
-                 help="N points take their steps together: small scenes gain about 2 times; equal "
-                      "to single runs within the tolerances only."),
     click.option("--scheduler", metavar="ADDRESS",
                  help="Run the points on the dask cluster of this scheduler: tcp://node7:8786."),
     click.option("--resume", is_flag=True,

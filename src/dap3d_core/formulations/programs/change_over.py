@@ -80,7 +80,7 @@ class ChangeOver:
         def run() -> None:
             integration.advance(budget)
 
-        if integration.takes_programs:
+        if self._is_open and integration.takes_programs:
             start = integration.t, integration.y
             self.call(run, integration.functions.addresses, start, counts)
         else:
@@ -95,13 +95,15 @@ class ChangeOver:
     ) -> None:
         """Make a call that evaluates the scene, by programs where there are some.
 
+        Kernels are compiled here.
+
         Args:
             run: the call.
             addresses: of the functions that it calls.
             start: time and state at which it begins.
             counts: right-hand sides and projections so far.
         """
-        record = self._record_of(start) if self._is_open else None
+        record = self._record_of(start)
         if record is None:
             clock = time.perf_counter()
             run()
@@ -119,6 +121,10 @@ class ChangeOver:
         for k in reversed(range(len(programs))):
             if programs[k].failures() - failures[k] > 1 + MOST_FAILURES[k] * (now[k] - done[k]):
                 _give_up(record, programs[k], k)
+
+    def has_programs(self, start: "tuple[float, Floats]") -> bool:
+        """True if a call that begins there would run programs."""
+        return self._is_open and self._record_of(start) is not None
 
     def _record_of(self, start: "tuple[float, Floats]") -> Record | None:
         """The record, where this call may run its programs."""

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.formulations import PROJECT
+from dap3d_core.formulations import OUTCOMES, PROJECT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, Varied, constants
 from dap3d_core.interface.codegen.compile_loops import write
@@ -29,15 +29,12 @@ from dap3d_core.kernels.compiler.units import Entry
 from dap3d_core.kernels.runtime.cache import cache_folder, names_of, run_with_symbols
 from dap3d_core.kernels.runtime.loop_modules import python_loop
 from dap3d_core.kernels.runtime.source_digest import origin
-from dap3d_core.model import Group
 
 #: Instructions of a program at most: larger scenes gain less, and take long to compile.
 MOST_INSTRUCTIONS = 20_000
 #: Part of the largest number by which a state whose projection is traced is off its constraints:
 #: one pass brings it back, as most ends of steps.
 OFF = 1e-10
-#: What a projection gives besides lengths (integrators/runge_kutta/step.py).
-OUTCOMES = 4
 ARGUMENTS = "double %t, ptr %y, i64 %y.1, ptr %out, i64 %out.1, ptr %system, ptr %loops"
 
 _PROGRAM = """
@@ -133,7 +130,7 @@ def write_program(
     system = SymbolicSystem(evaluator, tracer, varied)
     y = _items(tracer, "%y", state)
     out = rates = np.zeros(state.size, dtype=object)
-    loops = [_python_loop(kind, group) for kind, group in evaluator.loop_groups]
+    loops = python_loops(evaluator)
     t_now = Symbol(tracer, tracer.at(t.Value(t.FLOAT, ("%t",)), time))
     module = formulation_module(evaluator)
     with run_with_symbols():
@@ -154,10 +151,10 @@ def write_program(
     return text, tracer.needs
 
 
-def _python_loop(kind: str, group: Group) -> Callable[..., None]:
-    loop = write(group.type_info, kind)
-    assert loop is not None  # it has been compiled
-    return python_loop(loop)
+def python_loops(evaluator: Evaluator) -> list[Callable[..., None]]:
+    """The group loops of an evaluator in plain Python."""
+    loops = [write(group.type_info, kind) for kind, group in evaluator.loop_groups]
+    return [python_loop(loop) for loop in loops if loop is not None]  # all have been compiled
 
 
 def _items(tracer: StraightLine, base: str, numbers: Floats) -> Any:
@@ -230,7 +227,7 @@ def write_programs(
     """
     rhs, project = (_named(entry) for entry in evaluator.functions.entries[: PROJECT + 1])
     symbols, size = symbols_of(evaluator, name), state.size
-    state = _off_constraints(state)
+    state = off_constraints(state)
     names = {"name": symbols[0], "counter": symbols[1], "general": rhs}
     text, needs = write_program(evaluator, time, state, names, varied=varied)
     if len(symbols) > 2:
@@ -247,7 +244,8 @@ def write_programs(
     return "\n".join([*needs.values(), *declared, text, _WEIGHTS])
 
 
-def _off_constraints(state: Floats) -> Floats:
+def off_constraints(state: Floats) -> Floats:
+    """A state a little off its constraints, where a projection does as at most ends of steps."""
     noise = np.random.default_rng(0).standard_normal(state.size)
     off: Floats = state + OFF * float(np.max(np.abs(state))) * noise
     return off

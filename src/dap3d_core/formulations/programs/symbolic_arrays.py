@@ -56,7 +56,8 @@ def _constants(evaluator: Evaluator, of_start: bool) -> Iterator[tuple[str, Inte
         yield "smallest", np.arange(system.smallest.size)
         yield "F", _of_rows(system.F, slice(4, 5))
     if system.tree is not None:
-        yield "tree.places", _of_rows(system.tree.places, slice(MASS, None))
+        masses = slice(MASS, None) if of_start else slice(0)
+        yield "tree.places", _of_rows(system.tree.places, masses)
         yield "tree.constants", np.arange(system.tree.constants.size)
         if system.tree.kept is not None:
             for name in ("compliance", "settings", *(("smallest",) if of_start else ())):
@@ -105,7 +106,7 @@ class SymbolicSystem:
         struct, word = SymbolicStruct(self._tracer, type(arrays).scalars), 0
         for name, type_ in arrays.type_of().members:
             member = getattr(arrays, name)
-            pointer = self._pointer(base, word)
+            pointer = self.pointer(base, word)
             word += len(type_.words)
             if isinstance(type_, Struct) and member is not None:
                 member = self.symbolic(member, pointer, f"{before}{name}.")
@@ -114,7 +115,8 @@ class SymbolicSystem:
             setattr(struct, name, member)
         return struct
 
-    def _pointer(self, base: Callable[[], str], word: int) -> Callable[[], str]:
+    def pointer(self, base: Callable[[], str], word: int) -> Callable[[], str]:
+        """What gives the address of an array, which stands at some word of a struct."""
         new = self._tracer.new
         return lambda: new(
             f"load ptr, ptr {new(f'getelementptr inbounds i64, ptr {base()}, i64 {word}')}, align 8"

@@ -2,7 +2,7 @@
 
 Each run has its own state, time, step, error control and output, as alone, and calls of the
 right-hand side beside those of stages are its own (step.py): its numbers are the same bit for bit.
-Runs have no switches and no singular poses, as trees in joint coordinates have none.
+A step near a singular pose is taken as that of a run alone.
 """
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
@@ -13,10 +13,17 @@ from typing import Any, ClassVar
 import attrs
 
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
-from dap3d_core.integrators.runge_kutta.step import find_first_stage, finish_step, step_error
+from dap3d_core.integrators.runge_kutta.step import (
+    find_first_stage,
+    finish_step,
+    step,
+    step_error,
+)
 from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA
+from dap3d_core.integrators.stepping.event_location import is_sample_across, next_length
 from dap3d_core.integrators.stepping.integration_state import (
-    NOT_FINITE,
+    GIVEN,
+    PROJECTED,
     SCRATCH,
     TRIAL,
     Function,
@@ -24,6 +31,10 @@ from dap3d_core.integrators.stepping.integration_state import (
 )
 from dap3d_core.integrators.stepping.output import dense_state, may_step
 from dap3d_core.integrators.stepping.rounding import update_rounding
+from dap3d_core.integrators.stepping.singular_poses import (
+    is_near_singularity,
+    limit_step_at_singularity,
+)
 from dap3d_core.integrators.stepping.step_control import (
     count_turns,
     end_of_step,
@@ -35,9 +46,9 @@ from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
 from dap3d_core.kernels.runtime.cache import compiled
 
-#: What a lane does: nothing; it takes a step; the rates of its trial state are known; rates that it
-#: was given are not those of its run alone, and end it.
-IDLE, TAKES_STEP, HAS_RATES, LOST = 0, 1, 2, -1
+#: What a lane does: nothing; it takes a step; the rates of its trial state are known; its step is
+#: cut, as a stage lies across a switch.
+IDLE, TAKES_STEP, HAS_RATES, CUT = 0, 1, 2, -1
 #: Right-hand sides after which a run is left: never within its steps.
 ALL = 10**15
 
@@ -48,88 +59,96 @@ class Lanes(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(("does", "rejected"), INTEGER_VECTOR),
-        **dict.fromkeys(("y", "out"), MATRIX),
+        **dict.fromkeys(("y", "out", "outcome"), MATRIX),
     }
 
     does: Integers
     rejected: Integers  # steps of the run that had failed before this one
     h: Floats  # the run's next step, as it was chosen before this one
     end: Floats  # of the step
+    length: Floats  # of the step
+    goal: Floats  # where it would end without switches
     error: Floats
-    t: Floats  # arguments and results of the right-hand side of all lanes (formulations/joint)
+    t: Floats  # arguments and results of functions of all lanes (formulations/wide_rates.py)
     bound: Floats
     y: Floats  # (n, L)
     out: Floats  # (n, L)
+    outcome: Floats  # (m, L)
 
 
 @compiled
 def plan_step(
     work: RungeKuttaState, lanes: Lanes, k: int, functions: Any, system: Any, loops: Any
 ) -> bool:
-    """Report what a run has reached and choose its next step; False where it has ended."""
+    """Report what a run has reached and choose its next step; False at its end or its limit."""
     rhs, project, report = functions[0], functions[1], functions[2]
+    watch = functions[4] if work.switch_count != 0 else rhs
     while may_step(work, dense_state, ALL, project, report, system, loops):
         lanes.h[k], lanes.rejected[k] = work.h, work.rejected_count
-        if work.first_stage_valid != 0 or find_first_stage(work, rhs, system, loops):
-            if work.fixed_step == 0.0 and work.h == 0.0:
-                work.h = first_step(work, work.k, rhs, system, loops)
-            lanes.end[k] = end_of_step(work)
-            return True
+        if work.first_stage_valid == 0 and not find_first_stage(work, rhs, system, loops):
+            continue
+        adaptive = work.fixed_step == 0.0
+        if adaptive and work.h == 0.0:
+            work.h = first_step(work, work.k, rhs, system, loops)
+        steps, end = work.step_count, end_of_step(work)
+        h = longest = end - work.t
+        near = work.projects != 0 and is_near_singularity(work, h)
+        if near or (adaptive and limit_step_at_singularity(work, h) < h):
+            accepted = functions[3] if work.calls_accepted != 0 else rhs
+            step(work, (rhs, project, accepted, watch), system, loops)
+        else:
+            limit = min(work.t_limit, work.t + work.step_limit_at_switch)
+            if work.switch_count != 0 or limit < end:
+                h = min(h, next_length(work, end, work.k[0], project, watch, system, loops))
+            if h != 0.0:
+                lanes.length[k], lanes.goal[k] = h, end
+                lanes.end[k] = work.t + h if h < longest else end
+                return True
+        after_step(work, lanes, k, steps, functions, system, loops)
     return False
 
 
 @compiled
-def take_stages(
-    works: Any,
+def after_step(
+    work: RungeKuttaState,
     lanes: Lanes,
-    wide: Any,
+    k: int,
+    steps: int,
     functions: Any,
     system: Any,
     loops: Any,
 ) -> None:
-    """Stages and errors of the steps of all lanes; rates of the trial states that are good.
-
-    Args:
-        works: (lane, state of its run) of each.
-        lanes: of them.
-        wide: the right-hand side of all lanes, in a table, and its arguments.
-        functions, system, loops: of one run.
-    """
-    table, rates, wide_system, wide_loops = wide
-    rhs, project = table[0], functions[1]
-    stages = works[0][1].stage_count
-    for i in range(1, stages + 1):
-        asked = 0
-        for k, work in works:
-            if lanes.does[k] > IDLE:
-                asked += put_stage(work, lanes, k, i)
-        if asked > 0:
-            rhs(rates, wide_system, wide_loops)
-            for k, work in works:
-                if lanes.does[k] > IDLE:
-                    take_rates(work, lanes, k, i)
-    asked = 0
-    for k, work in works:
-        if lanes.does[k] > IDLE:
-            asked += judge_step(work, lanes, k, project, system, loops)
-    if asked > 0:
-        rhs(rates, wide_system, wide_loops)
-        for k, work in works:
-            if lanes.does[k] == HAS_RATES:
-                take_rates(work, lanes, k, stages)
+    """What ``advance`` does behind a step of a lane that had taken so many."""
+    rhs = functions[0]
+    update_rounding(work, work.k[0], lanes.h[k], lanes.rejected[k], rhs, system, loops)
+    if work.calls_accepted != 0 and work.step_count > steps:
+        count_turns(work, functions[3], system, loops)
 
 
 @compiled
-def put_stage(work: RungeKuttaState, lanes: Lanes, k: int, i: int) -> int:
+def put_stage(
+    work: RungeKuttaState,
+    lanes: Lanes,
+    k: int,
+    i: int,
+    functions: Any,
+    system: Any,
+    loops: Any,
+) -> int:
     """State of a stage, and as the argument of the right-hand side; 1 where that is wanted."""
     t1, table, stages = lanes.end[k], work.table, work.stage_count
-    h, c = t1 - work.t, table[i, ABSCISSA]
+    h, c = lanes.length[k], table[i, ABSCISSA]
     x = work.state[TRIAL] if i == stages else work.state[SCRATCH]
     combine(x, 1.0, work.state[Y], h, table, i, work.k)
     if i == stages and work.error_uses_last_stage == 0:
         return 0
+    t = t1 if c == 1.0 else work.t + c * h
+    watch = functions[4] if work.switch_count != 0 else functions[0]
+    if is_sample_across(work, t, x, watch, system, loops):
+        lanes.does[k] = CUT
+        return 0
     work.rhs_count += 1
-    put_argument(lanes, k, t1 if c == 1.0 else work.t + c * h, x)
+    put_argument(lanes, k, t, x)
     return 1
 
 
@@ -142,22 +161,12 @@ def put_argument(lanes: Lanes, k: int, t: float, x: Floats) -> None:
 
 
 @compiled
-def take_rates(work: RungeKuttaState, lanes: Lanes, k: int, i: int) -> None:
-    """Rates of a lane into stage i."""
-    stage = work.k[i]
-    if not lanes.bound[k] < 1.0:
-        lanes.does[k] = LOST
-    for j in range(stage.shape[0]):
-        stage[j] = lanes.out[j, k]
-
-
-@compiled
 def judge_step(
     work: RungeKuttaState, lanes: Lanes, k: int, project: Function, system: Any, loops: Any
 ) -> int:
     """Error of a step; 1 where the next one begins with the rates of its trial state."""
     t1 = lanes.end[k]
-    lanes.error[k] = step_error(work, t1, t1 - work.t, False, project, system, loops)
+    lanes.error[k] = step_error(work, t1, lanes.length[k], False, project, system, loops)
     if work.fixed_step != 0.0 or work.error_uses_last_stage != 0 or not lanes.error[k] <= 1.0:
         return 0
     lanes.does[k] = HAS_RATES
@@ -166,19 +175,31 @@ def judge_step(
 
 
 @compiled
+def take_projection(work: RungeKuttaState, lanes: Lanes, k: int) -> None:
+    """The projected trial state of a lane, where it is that of its run alone."""
+    if lanes.bound[k] < 1.0:
+        work.is_projected = 1
+        given, outcome = work.state[GIVEN], work.real[PROJECTED:]
+        for j in range(given.shape[0]):
+            given[j] = lanes.y[j, k]
+        for j in range(outcome.shape[0]):
+            outcome[j] = lanes.outcome[j, k]
+
+
+@compiled
 def end_step(
     work: RungeKuttaState, lanes: Lanes, k: int, functions: Any, system: Any, loops: Any
 ) -> None:
     """Accept or reject the step of a lane whose stages are known."""
     rhs, project = functions[0], functions[1]
-    accepted = functions[3] if work.calls_accepted != 0 else rhs
-    if lanes.does[k] == LOST:
-        work.status = NOT_FINITE
+    if lanes.does[k] == CUT:
+        after_step(work, lanes, k, work.step_count, functions, system, loops)
         return
+    accepted = functions[3] if work.calls_accepted != 0 else rhs
     t1, error, has_rates = lanes.end[k], lanes.error[k], lanes.does[k] == HAS_RATES
-    h, steps = t1 - work.t, work.step_count
-    of_step = rhs, project, accepted, rhs
-    finish_step(work, t1, h, h, t1, False, error, has_rates, of_step, system, loops)
-    update_rounding(work, work.k[0], lanes.h[k], lanes.rejected[k], rhs, system, loops)
-    if work.calls_accepted != 0 and work.step_count > steps:
-        count_turns(work, accepted, system, loops)
+    watch = functions[4] if work.switch_count != 0 else rhs
+    h, steps, end = lanes.length[k], work.step_count, lanes.goal[k]
+    of_step, longest = (rhs, project, accepted, watch), end - work.t
+    finish_step(work, t1, h, longest, end, False, error, has_rates, of_step, system, loops)
+    work.is_projected = 0
+    after_step(work, lanes, k, steps, functions, system, loops)

@@ -38,8 +38,9 @@ PROJECTION_FAILED, SWITCHED = int(Status.PROJECTION_FAILED), int(Status.SWITCHED
 CHATTERED, STIFF, JUMPED = int(Status.CHATTERED), int(Status.STIFF), int(Status.JUMPED)
 STALLED = int(Status.STALLED)
 
-# Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch.
-Y, TRIAL, SCRATCH, OTHER, STATES = range(5)
+# Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch;
+# the projected trial state, where it is known before (runge_kutta/lanes.py).
+Y, TRIAL, SCRATCH, OTHER, GIVEN, STATES = range(6)
 # Rows of ``tolerance``: absolute tolerance; change of dy/dt by the rounding of y, most that a step
 # may be off by for that, first of the components that are of the same kind (rounding.py).
 ABSOLUTE, NOISE, MOST, KIND, TOLERANCES = range(5)
@@ -145,6 +146,7 @@ class IntegrationState(Arrays):
     stall_start = _integer()  # rhs_count where steps became too short for the run to end
     rounding_state = _integer()  # of errors: 1 to be measured, 2 dominant (rounding.py)
     sampled_switch_count = _integer()  # a setting: switches that stages must not cross
+    is_projected = _integer()  # the row GIVEN, and its outcome, are of the trial state
     follows_steps = _integer()  # a setting: dense output of each step, not of reports alone
 
     real: Floats  # (MEASURES + m,) scalars; m singularity measures that project gives

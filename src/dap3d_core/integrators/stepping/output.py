@@ -8,6 +8,7 @@ from typing import Any
 
 from dap3d_core.integrators.stepping.integration_state import (
     FINISHED,
+    GIVEN,
     NOT_FINITE,
     PROJECTED,
     PROJECTION_FAILED,
@@ -18,7 +19,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Function,
     Y,
 )
-from dap3d_core.integrators.stepping.vector_ops import all_finite, interpolate
+from dap3d_core.integrators.stepping.vector_ops import all_finite, copy, interpolate
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
@@ -41,7 +42,8 @@ def project_state(
 ) -> int:
     """Project y where that is on; the failure, or RUNNING.
 
-    here: whether rhs was the last function called, at this very t and y.
+    here: whether rhs was the last function called, at this very t and y; the projected state and
+    what comes with it may be known then.
     """
     work.projection_moved = 0.0
     if not all_finite(y):
@@ -49,9 +51,12 @@ def project_state(
     if work.projects == 0:
         return RUNNING
     outcome = work.real[PROJECTED:]
-    outcome[0], outcome[1] = 1.0 if here else 0.0, 0.0
     work.projection_count += 1
-    project(t, y, outcome, system, loops)
+    if here and work.is_projected != 0:
+        copy(y, work.state[GIVEN])
+    else:
+        outcome[0], outcome[1] = 1.0 if here else 0.0, 0.0
+        project(t, y, outcome, system, loops)
     if outcome[1] == FAILED or not all_finite(y):
         return PROJECTION_FAILED
     return RUNNING

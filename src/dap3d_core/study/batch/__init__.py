@@ -1,1 +1,1 @@
-"""Batches of points: compiled runs, parameter maps, rebuilt models, packs."""
+"""Batches of points: compiled runs, parameter maps, rebuilt models, lanes."""

@@ -15,7 +15,6 @@ from dap3d_core.simulation.initial.assemble import ROUNDING, Initial, correction
 from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.study.batch import driver, initial_state
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
-from dap3d_core.study.batch.packs import PackedBatch
 from dap3d_core.study.batch.parameter_map import NotCopiedError, ParameterMap
 from dap3d_core.study.batch.rebuild import ModelRebuilder
 from dap3d_core.study.outputs import Reduction
@@ -25,7 +24,7 @@ if TYPE_CHECKING:
     from dap3d_core.study.batch.tree_points import TreePoints
 
 
-def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner | None":
+def batch_runner(reduction: Reduction, times: Floats) -> "BatchRunner | None":
     """A batch runner for this thread; None where the scene as given cannot start, or is to start at
     rest.
 
@@ -52,7 +51,7 @@ def batch_runner(reduction: Reduction, times: Floats, pack: int) -> "BatchRunner
         return None
     if redundancy.rank.redundant and compiled.model.iterated_forces:
         return None  # a run judges whether they read what is not unique
-    return BatchRunner(start, reduction, times, pack)
+    return BatchRunner(start, reduction, times)
 
 
 class BatchRunner:
@@ -61,12 +60,11 @@ class BatchRunner:
     Attributes:
         parameter_map: puts values of parameters into the arrays of the model; None where each point
             needs a model of its own.
-        compiled_batch: runs points one by one.
-        packed: runs them in packs; None where they are not packed.
+        compiled_batch: runs points.
     """
 
-    def __init__(self, start: InitialState, reduction: Reduction, times: Floats, pack: int) -> None:
-        """Args: the start of the scene as given; reduction, times and pack of the ensemble."""
+    def __init__(self, start: InitialState, reduction: Reduction, times: Floats) -> None:
+        """Args: the start of the scene as given; reduction and times of the ensemble."""
         self._start, self._reduction, self._times = start, reduction, times
         compiled = self._compiled = reduction.compiled
         parameters = reduction.parameters
@@ -78,18 +76,12 @@ class BatchRunner:
         self._runs = self._point_runs(start)
         self._pulling = Pulling(compiled.model)
         self.parameter_map: ParameterMap | None = None
-        self.packed: PackedBatch | None = None
         with contextlib.suppress(NotCopiedError):
             parameter_map = ParameterMap(compiled.checked, evaluator, parameters)
             is_of_bodies = not evaluator.formulation.has_own_coordinates
             has_start = is_of_bodies or parameter_map.keeps_poses
             if has_start and (not parameter_map.moves_start or self._has_compiled_correction()):
                 self.parameter_map = parameter_map
-                # Switches of one copy would interrupt all, friction is iterated for all.
-                shared = evaluator.formulation.accepts_redundant or bool(evaluator.switches)
-                shared = shared or bool(compiled.model.iterated_forces) or not is_of_bodies
-                if pack > 1 and not shared and reduction.is_of_single_copies:
-                    self.packed = PackedBatch(compiled, evaluator, times, pack)
 
     def _point_runs(self, start: InitialState) -> "CompiledBatch | TreePoints":
         """What runs mapped points one by one, from states in coordinates of bodies."""
@@ -139,28 +131,10 @@ class BatchRunner:
         parameter_map.set_states(y0, values[which])
         table, places = table[which], parameter_map.places
         start = driver.CORRECT if moves_start and model.row_count else driver.UNCORRECTED
-        rows = self._run_packed(table, places, y0, start)
+        rows = self._runs.run(table, places, y0, start)
         if parameter_map.moves:
             rows.done[parameter_map.are_undefined(table, rows.y0)] = False
         return which, rows
-
-    def _run_packed(self, table: Floats, places: Integers, y0: Floats, start: int) -> BatchRows:
-        """Run points in packs where they are packed, and one by one what packs do not finish."""
-        if self.packed is None:
-            return self._runs.run(table, places, y0, start)
-        first = None
-        if start == driver.CORRECT:
-            first = self.compiled_batch.run(table, places, y0, driver.CORRECT_ONLY)
-            y0 = np.where(first.done[:, None], first.y0, y0)
-        rows = self.packed.run(table, places, y0)
-        if first is not None:
-            rows = rows._replace(given=first.given, diagnostics=first.diagnostics)
-            rows.done[:] &= first.done
-        rest = np.flatnonzero(~rows.done)
-        singly = self.compiled_batch.run(table[rest], places, rows.given[rest], start)
-        for of_all, of_rest in zip(rows, singly, strict=True):
-            of_all[rest] = of_rest
-        return rows
 
     def _run_rebuilt(
         self, values: Floats, notes: list[str], first: int

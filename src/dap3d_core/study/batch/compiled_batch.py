@@ -1,5 +1,6 @@
 """Sets up the compiled loop over points (driver.py) and calls it."""
 
+from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -112,21 +113,38 @@ class CompiledBatch:
         }
         self._begin, self.takes_lanes = _begin_functions(evaluator.formulation), True
         self._programs: tuple[Any, ChangeOver] | None = None
-        self._lanes: tuple[System, LaneBatch | str] | None = None
+        self._lanes: tuple[Any, LaneBatch | str] | None = None
         self._calls, self._point_calls = 0.0, USUAL_CALLS
         self.run(np.zeros((0, 0)), np.zeros(0, dtype=np.int64), y0[None][:0])  # to compile it
 
     @property
-    def lanes(self) -> "LaneBatch | str":
-        """What runs many points in the lanes of vectors; in words why they are run one by one."""
-        if not self.evaluator.formulation.has_own_coordinates:
-            return "the scene is not run by method joint"
-        if self._lanes is None or self._lanes[0] is not self.evaluator.system:
-            from dap3d_core.study.batch.lanes import lane_batch
+    def lanes(self) -> "LaneBatch | str | None":
+        """What ran points in lanes of vectors; in words why none; None where none was needed."""
+        return None if self._lanes is None else self._lanes[1]
 
-            lanes = lane_batch(self.evaluator, self._lane_works, self._begin, len(self._stops) > 0)
-            self._lanes = self.evaluator.system, lanes
+    def _lanes_for(self, places: Integers) -> "LaneBatch | str":
+        """What runs many points in lanes; in words why they are run one by one."""
+        from dap3d_core.study.batch.lanes import LaneBatch, reason_against, wide_rates
+
+        key = id(self.evaluator.system), places.tobytes()
+        if self._lanes is None or self._lanes[0] != key:
+            found: LaneBatch | str = reason_against(self.evaluator, self._place[1].size)
+            if not found:
+                varied = varied_at(self.evaluator.system, places)
+                wide = wide_rates(self.evaluator, *self._place, varied)
+                found = (
+                    wide
+                    if isinstance(wide, str)
+                    else LaneBatch(self.evaluator, wide, self._lane_works, _drives(), self._begin)
+                )
+            self._lanes = key, found
         return self._lanes[1]
+
+    @property
+    def _place(self) -> tuple[float, Floats]:
+        """Time and state where branches of programs are decided."""
+        work = self.integration.work
+        return work.t, work.state[Y]
 
     def _programs_for(self, places: Integers) -> ChangeOver:
         """Programs of the scene in which the numbers at these places are not constants."""
@@ -148,11 +166,6 @@ class CompiledBatch:
         for work in works:
             work.tolerance[:] = self.integration.work.tolerance
         return works
-
-    @property
-    def _stops(self) -> Floats:
-        stops: Floats = self.constants["stops"]
-        return stops
 
     @property
     def number_count(self) -> int:
@@ -185,26 +198,29 @@ class CompiledBatch:
         )
         problem = (self.evaluator.functions, _drives(), self._begin)
         system, loops = self.evaluator.system, self.evaluator.loops
-        if start == driver.UNCORRECTED and self.takes_lanes and self._is_long(count):
-            lanes = self.lanes
-            if not isinstance(lanes, str) and lanes.is_ready:
-                lanes.run(points, CALL)
         programs = self._programs_for(points.places)
 
-        def call() -> None:
+        def run(call: Callable[[], Any]) -> None:
             with np.errstate(all="ignore"):  # as compiled code does
-                driver.run_points(points, work, *problem, system, loops, CALL)
+                if jit_is_on() and count:
+                    addresses = self.evaluator.functions.addresses
+                    programs.call(call, addresses, self._place, counts)
+                else:
+                    call()
 
         def counts() -> tuple[int, int]:
             ended = diagnostics[:, [driver.CALLS, driver.TAKEN]].sum(axis=0)
             return int(ended[0]) + work.rhs_count, int(ended[1]) + work.step_count
 
-        addresses = self.evaluator.functions.addresses if jit_is_on() else None
+        if start != driver.CORRECT_ONLY and self.takes_lanes and self._is_long(count):
+            from dap3d_core.formulations.programs.scene_program import reads_rates
+
+            lanes = self._lanes_for(points.places)
+            alone = not reads_rates(self.evaluator) or programs.has_programs(self._place)
+            if not isinstance(lanes, str) and lanes.is_ready and alone:
+                run(lambda: lanes.run(points, CALL))
         while True:
-            if addresses is None or not count:
-                call()
-            else:
-                programs.call(call, addresses, (work.t, work.state[Y]), counts)
+            run(lambda: driver.run_points(points, work, *problem, system, loops, CALL))
             if points.at[driver.POINT] == count:
                 break
         if count:
@@ -224,7 +240,7 @@ def numbers_of(evaluator: Evaluator) -> Floats:
 
 
 def varied_at(system: System, places: Integers) -> dict[str, Integers]:
-    """Members of a system that numbers at some places (``numbers_of``) stand in, and where there."""
+    """Members of a system in which numbers at some places (``numbers_of``) stand, and where."""
     found, first = {}, 0
     for name in ("par", "body", "metric", "tree.constants"):
         array = getattr(system.tree, "constants", None) if "." in name else getattr(system, name)

@@ -1,53 +1,64 @@
-"""Runs points of a tree in joint coordinates several at a time, one in each lane of a vector.
+"""Runs points several at a time, one in each lane of a vector.
 
-Each point has its own steps and the bits of its run alone. A lane whose run has ended takes the
-next point.
+The lanes take the stages of their steps together; all else each does by itself, with its own steps
+and the bits of its run alone. A lane whose run has ended takes the next point.
 """
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import STEPS, System
-from dap3d_core.assembly.turns import STATE, STATE_WIDTH
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.formulations.joint import lanes as tree_lanes
+from dap3d_core.formulations.programs.change_over import MOST_BODIES as MOST_BODIES_OF_PROGRAM
+from dap3d_core.formulations.wide_rates import SIGNATURE, WideRates
 from dap3d_core.integrators.runge_kutta.lanes import (
+    HAS_RATES,
     IDLE,
     TAKES_STEP,
     Lanes,
     end_step,
+    judge_step,
     plan_step,
-    take_stages,
+    put_stage,
+    take_projection,
 )
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
-from dap3d_core.integrators.stepping.integration_state import Function
-from dap3d_core.interface.codegen.compile_loops import write
-from dap3d_core.kernels.compiler.types import INT, CompileError, Signature, Table, Tuple
-from dap3d_core.kernels.compiler.units import Entry, Functions
+from dap3d_core.integrators.stepping.integration_state import OTHER, RUNNING, Function
+from dap3d_core.kernels.compiler.trace import TraceError
+from dap3d_core.kernels.compiler.types import INT, CompileError, Table, Tuple
+from dap3d_core.kernels.compiler.units import Entry
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
 from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
-from dap3d_core.kernels.runtime.function_lists import LOOP, LOOP_LIST
-from dap3d_core.kernels.runtime.lanes import WideArrays, lane_count, wide_function
-from dap3d_core.kernels.runtime.loop_modules import build_wide
+from dap3d_core.kernels.runtime.function_lists import LOOP_LIST
+from dap3d_core.kernels.runtime.lanes import lane_count
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.study.batch.driver import POINT, Points, set_numbers, start, store_run
+from dap3d_core.study.batch.driver import (
+    ENDED,
+    NO_START,
+    POINT,
+    Points,
+    next_stop,
+    set_numbers,
+    start,
+    store_run,
+)
 
 #: Bodies at most: the arrays of lanes, some 12 kB a body, are to fit into the processor's caches.
 MOST_BODIES = 2000
+#: Components of a state at least: stages of fewer take less time than to bring them into lanes.
+LEAST_COMPONENTS = 6
 #: No point.
 NONE = -1
 #: Numbers of a function in F, of which the last is that at the start of the run.
 FUNCTION_WIDTH = 5
 MakeWorks = Callable[[int], Sequence[RungeKuttaState]]
-#: Signature of the right-hand side of all lanes.
-_RATES = Signature((tree_lanes.Rates.type_of(), System.type_of(), LOOP_LIST))
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -55,29 +66,43 @@ class LanePoints(Arrays):
     """Points in L lanes, and the numbers of a system that lanes have each for itself."""
 
     types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("loaded", "point"), INTEGER_VECTOR),
-        **dict.fromkeys(("par", "body", "constants", "F", "turns"), MATRIX),
+        **dict.fromkeys(("loaded", "point", "projects", "places"), INTEGER_VECTOR),
+        **dict.fromkeys(("par", "body", "metric", "constants", "F", "smallest", "kept"), MATRIX),
     }
 
     loaded: Integers  # (1,) the point whose numbers the system of one scene has
     point: Integers  # (L,) of each lane
+    projects: Integers  # (1,) whether states are projected in all lanes at once
     par: Floats  # (numbers, L) each: parts of a system that differ from point to point
     body: Floats
+    metric: Floats
     constants: Floats
     F: Floats
-    turns: Floats  # (L, numbers) states of angles (assembly/turns.py), which each run changes
+    smallest: Floats
+    places: Integers  # (k,) in par, of what each run changes: states of angles
+    kept: Floats  # (L, k + settings) these, and settings
 
 
 @compiled
-def exchange_turns(lane_points: LanePoints, k: int, system: System, to_lane: bool) -> None:
-    """Copy the states of angles from the system to a lane, or back."""
-    turns, par = lane_points.turns[k], system.par
-    for c in range(turns.shape[0]):
-        place = system.turns[0, STATE] + c
+def exchange_kept(lane_points: LanePoints, k: int, system: System, to_lane: bool) -> None:
+    """Copy what a run keeps from one evaluation to another from the system to a lane, or back."""
+    kept, places, par, settings = (
+        lane_points.kept[k],
+        lane_points.places,
+        system.par,
+        system.settings,
+    )
+    count = places.shape[0]
+    for c in range(count + settings.shape[0]):
         if to_lane:
-            turns[c] = par[place]
+            kept[c] = par[places[c]] if c < count else settings[c - count]
+        elif c < count:
+            par[places[c]] = kept[c]
         else:
-            par[place] = turns[c]
+            settings[c - count] = kept[c]
+    if to_lane:
+        for c in range(count):
+            lane_points.par[places[c], k] = kept[c]
 
 
 @compiled
@@ -93,12 +118,16 @@ def set_lane(points: Points, p: int, lane_points: LanePoints, k: int, system: Sy
             par[place, k] = value
         elif place < first_metric:
             body[place - first_body, k] = value
-        elif place >= first_of_tree:
+        elif place < first_of_tree:
+            lane_points.metric[place - first_metric, k] = value
+        else:
             constants[place - first_of_tree, k] = value
     for q in range(system.F.shape[0]):
         for c in range(FUNCTION_WIDTH):
             lane_points.F[FUNCTION_WIDTH * q + c, k] = system.F[q, c]
-    exchange_turns(lane_points, k, system, True)
+    for i in range(system.smallest.shape[0]):
+        lane_points.smallest[i, k] = system.smallest[i]
+    exchange_kept(lane_points, k, system, True)
 
 
 @compiled
@@ -111,7 +140,9 @@ def load(points: Points, lane_points: LanePoints, k: int, system: System) -> Non
         last = FUNCTION_WIDTH - 1
         for q in range(system.F.shape[0]):
             system.F[q, last] = lane_points.F[FUNCTION_WIDTH * q + last, k]
-    exchange_turns(lane_points, k, system, False)
+        for i in range(system.smallest.shape[0]):
+            system.smallest[i] = lane_points.smallest[i, k]
+    exchange_kept(lane_points, k, system, False)
 
 
 @compiled
@@ -122,6 +153,7 @@ def next_step(
     work: RungeKuttaState,
     lanes: Lanes,
     functions: Any,
+    drives: Any,
     starting: Sequence[Function],
     system: System,
     loops: Any,
@@ -134,15 +166,95 @@ def next_step(
             if p == points.diagnostics.shape[0]:
                 return 0
             at[POINT] = p + 1
-            start(points, p, work, starting, system, loops)
+            if not start(points, p, work, starting, system, loops):
+                points.diagnostics[p, ENDED] = NO_START
+                continue
             set_lane(points, p, lane_points, k, system)
             lane_points.point[k] = lane_points.loaded[0] = p
         load(points, lane_points, k, system)
-        if plan_step(work, lanes, k, functions, system, loops):
-            lanes.does[k] = TAKES_STEP
-            return 1
+        while work.status == RUNNING:
+            if points.stops.shape[0] != 0:
+                work.t_limit = next_stop(points.stops, work, functions, drives[0], system, loops)
+            if plan_step(work, lanes, k, functions, system, loops):
+                lanes.does[k] = TAKES_STEP
+                return 1
+        work.t_limit = np.inf
         store_run(points, lane_points.point[k], work, starting, system, loops)
         lane_points.point[k] = NONE
+
+
+@compiled
+def take_stages(
+    points: Points,
+    lane_points: LanePoints,
+    works: Any,
+    lanes: Lanes,
+    wide: Any,
+    functions: Any,
+    system: System,
+    loops: Any,
+) -> None:
+    """Stages and errors of the steps of all lanes; rates of the trial states that are good.
+
+    Arguments as of ``run_lanes``.
+    """
+    table, rates, wide_system, wide_loops = wide
+    rhs, project = table[0], functions[1]
+    stages = works[0][1].stage_count
+    for i in range(1, stages + 1):
+        asked = 0
+        for k, work in works:
+            if lanes.does[k] > IDLE:
+                if work.sampled_switch_count != 0:
+                    load(points, lane_points, k, system)
+                asked += put_stage(work, lanes, k, i, functions, system, loops)
+        if asked > 0:
+            rhs(rates, wide_system, wide_loops)
+            for k, work in works:
+                if lanes.does[k] > IDLE:
+                    take_rates(
+                        points, lane_points, work, lanes, k, work.k[i], functions, system, loops
+                    )
+    asked = 0
+    for k, work in works:
+        if lanes.does[k] > IDLE:
+            asked += judge_step(work, lanes, k, project, system, loops)
+    if asked > 0:
+        rhs(rates, wide_system, wide_loops)
+        for k, work in works:
+            if lanes.does[k] == HAS_RATES:
+                stage = work.k[stages]
+                take_rates(points, lane_points, work, lanes, k, stage, functions, system, loops)
+        if lane_points.projects[0] != 0:
+            table[1](rates, wide_system, wide_loops)
+            for k, work in works:
+                if lanes.does[k] == HAS_RATES and work.projects != 0:
+                    take_projection(work, lanes, k)
+
+
+@compiled
+def take_rates(
+    points: Points,
+    lane_points: LanePoints,
+    work: RungeKuttaState,
+    lanes: Lanes,
+    k: int,
+    stage: Floats,
+    functions: Any,
+    system: System,
+    loops: Any,
+) -> None:
+    """Rates of a lane into a stage; evaluated for it alone where those of all are not valid."""
+    if lanes.bound[k] < 1.0:
+        for j in range(stage.shape[0]):
+            stage[j] = lanes.out[j, k]
+        return
+    load(points, lane_points, k, system)
+    argument = work.state[OTHER]
+    for j in range(stage.shape[0]):
+        argument[j] = lanes.y[j, k]
+    functions[0](lanes.t[k], argument, stage, system, loops)
+    exchange_kept(lane_points, k, system, True)
 
 
 @compiled
@@ -153,6 +265,7 @@ def run_lanes(
     lanes: Lanes,
     wide: Any,
     functions: Any,
+    drives: Any,
     starting: Any,
     system: System,
     loops: Any,
@@ -160,23 +273,24 @@ def run_lanes(
 ) -> int:
     """Run points until none is left or more than ``budget`` right-hand sides are spent.
 
-    Returns the number of lanes that have not ended. Arguments as of ``run_points`` (driver.py) and
-    ``take_stages`` (integrators/runge_kutta/lanes.py).
+    Returns the number of lanes that have not ended. Arguments as of ``run_points`` (driver.py), and
+    of lanes (integrators/runge_kutta/lanes.py); wide: functions of all lanes, in a table, and their
+    arguments (formulations/wide_rates.py).
     """
     spent, active = 0, 1
     while active > 0 and spent <= budget:
         active = 0
         for k, work in works:
             active += next_step(
-                points, lane_points, k, work, lanes, functions, starting, system, loops
+                points, lane_points, k, work, lanes, functions, drives, starting, system, loops
             )
         if active > 0:
-            take_stages(works, lanes, wide, functions, system, loops)
+            take_stages(points, lane_points, works, lanes, wide, functions, system, loops)
         for k, work in works:
             if lanes.does[k] != IDLE:
                 load(points, lane_points, k, system)
                 end_step(work, lanes, k, functions, system, loops)
-                exchange_turns(lane_points, k, system, True)
+                exchange_kept(lane_points, k, system, True)
         spent += active * works[0][1].stage_count
     return active
 
@@ -188,114 +302,105 @@ class LaneBatch:
         count: lanes.
     """
 
-    def __init__(self, evaluator: Evaluator, make: MakeWorks, starting: Any) -> None:
+    def __init__(
+        self, evaluator: Evaluator, wide: WideRates, make: MakeWorks, drives: Any, starting: Any
+    ) -> None:
         """Args:
-        evaluator: evaluates the model, in joint coordinates; its arrays stay what they are.
+        evaluator: evaluates the model; its arrays stay what they are.
+        wide: the right-hand side of all lanes.
         make: makes the states of so many integrations.
-        starting: as of ``run_points``.
-
-        Raises:
-            CompileError: kernels of the scene decide by a number.
+        drives, starting: as of ``run_points``.
         """
-        self.count = lane_count()
-        system, size = evaluator.system, evaluator.coordinates.size + 1
-        rates = tree_lanes.Rates(
-            t=np.zeros(1), y=np.zeros(size), out=np.zeros(size), bound=np.zeros(1)
-        )
-        self._rates = WideArrays(rates, self.count, ("t", "y", "out", "bound"))
-        self._system = WideArrays(system, self.count, tree_lanes.ARRAYS)
-        rhs = wide_function(tree_lanes.rhs, _RATES.arguments, self.count)
-        of_rates = {name: self._rates.matrix(array) for name, array in rates.walk()}
+        count = self.count = wide.lanes["bound"].shape[1]
+        system = evaluator.system
+        self._wide = wide
         self._lanes = Lanes(
-            does=np.zeros(self.count, dtype=np.int64),
-            rejected=np.zeros(self.count, dtype=np.int64),
-            h=np.zeros(self.count),
-            end=np.zeros(self.count),
-            error=np.zeros(self.count),
-            t=of_rates["t"][0],
-            bound=of_rates["bound"][0],
-            y=of_rates["y"],
-            out=of_rates["out"],
+            does=np.zeros(count, dtype=np.int64),
+            rejected=np.zeros(count, dtype=np.int64),
+            **{name: np.zeros(count) for name in ("h", "end", "length", "goal", "error")},
+            **{name: wide.lanes[name][0] for name in ("t", "bound")},
+            **{name: wide.lanes[name] for name in ("y", "out", "outcome")},
         )
+        places = [np.arange(system.par.size)[k] for k in evaluator.turn_places()]
+        kept = np.concatenate([np.zeros(0, dtype=np.int64), *places])
+        tree = np.zeros((0, count)) if system.tree is None else wide.matrix(system.tree.constants)
+        parts = ("par", "body", "metric", "F", "smallest")
         self._points = LanePoints(
             loaded=np.full(1, NONE),
-            point=np.full(self.count, NONE),
-            **{name: self._system.matrix(getattr(system, name)) for name in ("par", "body", "F")},
-            constants=self._system.matrix(system.tree.constants),
-            turns=np.zeros((self.count, STATE_WIDTH * len(system.turns))),
+            point=np.full(count, NONE),
+            projects=np.full(1, int(wide.has_projection)),
+            **{name: wide.matrix(getattr(system, name)) for name in parts},
+            constants=tree,
+            places=kept,
+            kept=np.zeros((count, kept.size + system.settings.size)),
         )
-        self._works = tuple(enumerate(make(self.count)))
-        self._wide = (
-            Functions(_RATES, [rhs]), self._rates, self._system,
-            Functions(LOOP, _wide_loops(evaluator, self.count)),
-        )  # fmt: skip
-        self._arguments = evaluator.functions, starting, system, evaluator.loops
+        self._works = tuple(enumerate(make(count)))
+        self._arguments = evaluator.functions, drives, starting, system, evaluator.loops
         work = RungeKuttaState.type_of()
         self._run: Entry = run_lanes.compile(
             [
-                Points.type_of(), LanePoints.type_of(), Tuple((Tuple((INT, work)),) * self.count),
+                Points.type_of(), LanePoints.type_of(), Tuple((Tuple((INT, work)),) * count),
                 Lanes.type_of(),
-                Tuple((Table(_RATES), self._rates.type, self._system.type, LOOP_LIST)),
-                STEPS, STEPS, System.type_of(), LOOP_LIST, INT,
+                Tuple((Table(SIGNATURE), *SIGNATURE.arguments)),
+                STEPS, Table(drives.signature), STEPS, System.type_of(), LOOP_LIST, INT,
             ]
         )  # fmt: skip
-        self._units = rhs.unit, self._run.unit
 
     @property
     def is_ready(self) -> bool:
         """True once its code is optimised: before that points run faster one by one."""
-        return all(unit.is_optimised for unit in self._units)
+        units = [*self._wide.units, self._run.unit]
+        return all(unit.is_optimised for unit in units)
 
     def run(self, points: Points, budget: int) -> None:
-        """Run points from states as given; Ctrl-C is answered after some right-hand sides."""
-        self._system.spread()
+        """Run points; Ctrl-C is answered after some right-hand sides.
+
+        A projection that reads what the right-hand side left must be a program, or behind one of
+        its own (formulations/programs): lanes share the arrays of one scene.
+        """
+        self._wide.spread()
         self._points.loaded[0] = NONE
         self._points.point[:] = NONE
-        while self._run(
-            points, self._points, self._works, self._lanes, self._wide, *self._arguments, budget
-        ):
+        own, wide = (points, self._points, self._works, self._lanes), self._wide.call
+        while self._run(*own, wide, *self._arguments, budget):
             pass
 
 
-def _wide_loops(evaluator: Evaluator, count: int) -> list[Entry]:
-    """The group loops that a right-hand side calls; of others those of one scene.
-
-    Raises:
-        CompileError: one of them decides by a number; names it.
-    """
-    loops = list(evaluator.loops.entries)
-    for q, (kind, group) in enumerate(evaluator.loop_groups):
-        loop = write(group.type_info, kind) if kind in tree_lanes.LOOPS else None
-        if loop is not None:
-            try:
-                loops[q] = build_wide(loop, count)
-            except CompileError as error:
-                raise CompileError(f"{loop.name} {error}") from error
-    return loops
+def reason_against(evaluator: Evaluator, size: int) -> str:
+    """Why points of a scene, with states of some size, are not run in lanes; "" where they are."""
+    if not jit_is_on():
+        return "kernels run as plain Python"
+    if evaluator.model.iterated_forces or evaluator.has_unknowns:
+        return "forces depend on multipliers, or joints have unknowns of their own"
+    if size < LEAST_COMPONENTS:
+        return f"its state has less than {LEAST_COMPONENTS} components"
+    return ""
 
 
-def lane_batch(
-    evaluator: Evaluator, make: MakeWorks, starting: Any, has_stops: bool
-) -> LaneBatch | str:
-    """What runs points in lanes; in words why they are run one by one.
+def wide_rates(
+    evaluator: Evaluator, time: float, state: Floats, varied: Mapping[str, Integers]
+) -> WideRates | str:
+    """The right-hand side of all lanes; in words why there is none.
 
     Args:
         evaluator: evaluates the model.
-        make, starting: as of ``LaneBatch``.
-        has_stops: there are times that no step crosses.
+        time, state: of a run.
+        varied: numbers that differ from point to point (formulations/programs/symbolic_arrays.py).
     """
-    model, coordinates = evaluator.model, evaluator.coordinates
-    if not jit_is_on():
-        return "kernels run as plain Python"
-    if coordinates.kept or model.state_count:
-        return "joints keep rows on the tree, or elements have states"
-    if model.iterated_forces or evaluator.has_unknowns:
-        return "forces depend on multipliers, or joints have unknowns of their own"
-    if evaluator.switches or evaluator.watched > 1 or has_stops:
-        return "it has switches, angles that are no coordinates, or times that no step crosses"
-    if model.body_count > MOST_BODIES:
-        return f"it has more than {MOST_BODIES} bodies"
     try:
-        return LaneBatch(evaluator, make, starting)
+        if evaluator.model.body_count <= MOST_BODIES_OF_PROGRAM:
+            from dap3d_core.formulations.programs.wide_program import program_rates
+
+            return program_rates(evaluator, lane_count(), time, state, varied)
+        reason = f"it has more than {MOST_BODIES_OF_PROGRAM} bodies"
+    except (CompileError, TraceError) as error:
+        reason = str(error)
+    is_tree = evaluator.formulation.has_own_coordinates and not evaluator.coordinates.kept
+    if not is_tree or evaluator.model.state_count or evaluator.model.body_count > MOST_BODIES:
+        return reason
+    from dap3d_core.formulations.joint.lanes import tree_rates
+
+    try:
+        return tree_rates(evaluator, lane_count())
     except CompileError as error:
         return str(error)

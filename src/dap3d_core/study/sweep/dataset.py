@@ -155,8 +155,6 @@ def _attributes(ensemble: Ensemble, design: Design) -> dict[str, Any]:
         "types": to_json(digests_of(ensemble.compiled.checked)),
         "versions": to_json(current_versions()),
     }
-    if ensemble.study.pack > 1:
-        found["pack"] = np.int64(ensemble.study.pack)
     return found if design.seed is None else found | {"seed": np.int64(design.seed)}
 
 

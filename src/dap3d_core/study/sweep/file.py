@@ -33,7 +33,6 @@ IDENTITY = {
     "outputs": "other outputs",
     "design": "another design",
     "seed": "another seed",
-    "pack": "packs of another size",
     "types": "other formulas: the file of a type has changed since",
     "versions": "other versions of dap3d, numpy, llvmlite or python",
 }

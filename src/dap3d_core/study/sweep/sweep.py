@@ -24,8 +24,6 @@ from dap3d_core.study.workers.threads import RunPoints, run_here
 if TYPE_CHECKING:
     import xarray
 
-#: Larger packs gain nothing, and a hard point would delay more of the others.
-LARGEST_PACK = 1024
 INVALID_NAME = "a name in a NetCDF file begins with a letter, a digit or _ and holds no slash"
 
 
@@ -52,7 +50,6 @@ def sweep(
     allow_code: bool = False,
     threads: int | None = None,
     client: Any = None,
-    pack: int = 1,
     output: str | os.PathLike[str] | None = None,
     force: bool = False,
     resume: bool = False,
@@ -72,7 +69,6 @@ def sweep(
         t_end, dt, method, integrator, rtol, atol, step: as of ``simulate``; likewise correct,
             project, correct_metric, start (a word), allow_code; announce as of ``compile``.
         threads, client: points at once; a ``distributed.Client`` whose workers run them.
-        pack: points that take their steps together, for speed: equal within the tolerances only.
         output, force, resume: file to write; overwrite it; continue with ``OUTPUT.part``.
         progress: called as progress(done, total).
 
@@ -86,7 +82,7 @@ def sweep(
     settings = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
                     step=step, start=start, correct=correct, project=project,
                     correct_metric=correct_metric)  # fmt: skip
-    study, plan = _read(scene, vary, outputs, (sample, design, seed), settings, allow_code, pack)
+    study, plan = _read(scene, vary, outputs, (sample, design, seed), settings, allow_code)
     runner = _Runner(threads, client, progress, announce, force=force, resume=resume)
     return runner.run(study, plan, output)
 
@@ -98,13 +94,9 @@ def _read(
     sampling: tuple[Any, ...],
     settings: dict[str, Any],
     allow_code: bool,
-    pack: Any,
 ) -> tuple[Study, Design]:
     """The study and its points, as far as they can be checked before the scene is compiled."""
     mistakes: list[Mistake] = []
-    if not (isinstance(pack, int) and not isinstance(pack, bool) and 1 <= pack <= LARGEST_PACK):
-        what = f"the points of a pack are a whole number from 1 to {LARGEST_PACK}"
-        mistakes.append(Mistake("pack", pack, what))
     changed = scene.copy() if isinstance(scene, Scene) else load(scene)
     given = {k: v for k, v in settings.items() if v is not None}
     changed.simulation = attrs.evolve(changed.simulation, **given)
@@ -124,7 +116,7 @@ def _read(
         mistakes += error.mistakes
     if mistakes:
         raise SceneError(mistakes)
-    return Study(changed, tuple(v.name for v in plan.varied), computed, allow_code, pack), plan
+    return Study(changed, tuple(v.name for v in plan.varied), computed, allow_code), plan
 
 
 def _ensemble(study: Study, announce: Callable[[str], None] | None) -> Ensemble:

@@ -41,18 +41,18 @@ RUNS = [
     ("ball1", {"t_end": 0.5, "dt": 0.1, "allow_code": True}),
     ("tri", SHORT),
 ]
-#: Friction, singular poses, packs of points, dense supernodes, radau with elements of many kinds.
+#: Friction, singular poses, points, dense supernodes, radau with elements of many kinds.
 MORE = """
 from support.problems import everything
 from support.on_axles import wheel
 from support import loops, redundant, singular, trees
 from unit.study.batch.test_batch import ensemble, pendulum
-from unit.study.batch.test_packs import CASES, in_packs
+from unit.study.batch.test_lanes import CASES
 
-def pack(make, vary, output, t_end=0.02, **settings):
+def points(make, vary, output, t_end=0.02, **settings):
     study = ensemble(make(), vary, [output], t_end=t_end, dt=0.01, **settings)
     low, high = np.array(list(vary.values())).T
-    in_packs(study, 3).run(low + np.random.default_rng(1).random((4, len(vary))) * (high - low))
+    study.run(low + np.random.default_rng(1).random((4, len(vary))) * (high - low))
 
 for integrator in ("dop853", "adams", "radau"):
     recorder.record(dap.simulate, wheel(), t_end=0.2, dt=0.1, integrator=integrator)
@@ -67,9 +67,9 @@ for scene in (rubbing, "bicycle", "A04", "fourbar3"):
 for scene, end in ((singular.flat_parallelogram(), 0.5), (redundant.dead_centre(), 1.2)):
     recorder.record(dap.simulate, scene, t_end=end, dt=end, rtol=1e-6)
 for case in CASES.values():
-    recorder.record(pack, *case)
-recorder.record(pack, *CASES["functions and their breaks"], t_end=0.6)
-recorder.record(pack, pendulum, {"bodies.bob.mass": (1.0, 3.0)}, "bob.w", method="penalty")
+    recorder.record(points, *case)
+recorder.record(points, *CASES["functions and their breaks"], t_end=0.6)
+recorder.record(points, pendulum, {"bodies.bob.mass": (1.0, 3.0)}, "bob.w", method="penalty")
 in_joint_coordinates = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.w"], method="joint")
 recorder.record(in_joint_coordinates.run, [[1.0], [3.0]])
 recorder.record(dap.simulate, "pen1", t_end=0.1, dt=0.1, rtol=1e-13, atol=1e-15)
@@ -113,9 +113,10 @@ NOT_CALLED = {
         "linear.rank.null_space": "solve_each",
         # compiled alone: study/batch/test_lanes.py compares their bits with those of single runs
         "formulations.joint.lanes": "rhs",
-        "integrators.runge_kutta.lanes": "plan_step take_stages put_stage put_argument take_rates "
-        "judge_step end_step",
-        "study.batch.lanes": "set_lane load next_step run_lanes exchange_turns",
+        "integrators.runge_kutta.lanes": "plan_step after_step put_stage put_argument judge_step "
+        "take_projection end_step",
+        "study.batch.lanes": "set_lane load next_step run_lanes exchange_kept take_stages "
+        "take_rates",
     }.items()
     for name in names.split()
 }

@@ -3,13 +3,17 @@
 import numpy as np
 import pytest
 from support import trees
+from support.on_axles import driven, stone, wheel
+from support.state_types import stated
 from unit.study.batch.test_batch import DONE, ensemble, path_of, singly
+from unit.study.batch.test_batch import pendulum as ball_pendulum
 
 import dap3d_core as dap
-from dap3d_core.integrators.stepping.integration_state import NOT_FINITE
+from dap3d_core.formulations.programs import change_over, scene_program
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.study import Ensemble
 from dap3d_core.study.batch import compiled_batch
+from dap3d_core.study.batch import lanes as study_lanes
 from dap3d_core.study.batch.lanes import LaneBatch
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="plain Python has no vectors")
@@ -28,7 +32,12 @@ def at_once(monkeypatch):
         run(lanes, points, budget)
 
     RUN.clear()
+    monkeypatch.setattr(change_over, "BESIDE", False)
+    for name in ("LOAD_AFTER", "MAKE_AFTER"):
+        monkeypatch.setattr(change_over, name, 0.0)
+    monkeypatch.setattr(scene_program, "is_optimised", lambda evaluator: True)
     monkeypatch.setattr(compiled_batch, "BEFORE_LANES", 1)
+    monkeypatch.setattr(study_lanes, "LEAST_COMPONENTS", 1)
     monkeypatch.setattr(LaneBatch, "is_ready", True)
     monkeypatch.setattr(LaneBatch, "run", counted)
 
@@ -70,7 +79,8 @@ def check(make, points):
     assert batch.status.tolist() == [DONE] * len(points)
     for name, values in alone.values.items():
         assert np.array_equal(batch.values[name], values)
-    assert max(np.ptp(values, axis=0).max() for values in alone.values.values()) > 1e-3
+    # else it would not matter whose numbers a point was given
+    assert any(np.ptp(v, axis=0).max() > 1e-3 * np.max(np.abs(v)) for v in alone.values.values())
     return of, batch
 
 
@@ -116,7 +126,7 @@ def test_points_that_have_a_model_each():
     assert path_of(of) == "rebuilt"
 
 
-def test_a_run_whose_angles_leave_the_range_of_lanes_is_run_alone():
+def test_rates_whose_angles_leave_the_range_of_lanes_are_evaluated_alone(monkeypatch):
     """Beyond 2e5 rad half angles are reduced in another way: steps of 0.1 s at 1e7 rad/s."""
     scene = pendulum()
     del scene.forces["spring"]
@@ -124,8 +134,58 @@ def test_a_run_whose_angles_leave_the_range_of_lanes_is_run_alone():
     scene.bodies["bob"].r_dot = (0.0, 0.0, -5e6)
     settings = {"method": "joint", "t_end": 0.3, "dt": 0.1, "integrator": "rk4", "step": 0.1}
     of = ensemble(scene, ("forces.gravity.gravity",), ("bob.r:series",), **settings)
-    of, _ = check(lambda: Ensemble(of.requested), np.linspace(1.0, 1e6, 5)[:, None])
-    assert lanes_of(of)._works[0][1].status == NOT_FINITE
+    points = np.linspace(1.0, 1e6, 5)[:, None]
+    check(lambda: Ensemble(of.requested), points)
+    RUN.clear()
+    monkeypatch.setattr(study_lanes, "MOST_BODIES_OF_PROGRAM", 0)  # as larger trees are run
+    check(lambda: Ensemble(of.requested), points)
+
+
+def turning():
+    """The wheel without what rubs."""
+    scene = wheel()
+    del scene.forces["rubbing"]
+    return scene
+
+
+def four_bar():
+    return dap.load("fourbar3")
+
+
+def tricycle():
+    return dap.load("tri")
+
+
+#: Scene, varied numbers with their ranges, outputs.
+CASES = {
+    "masses": (
+        ball_pendulum,
+        {"bodies.bob.mass": (1.0, 3.0), "bodies.bob.Jp.x": (0.1, 0.3)},
+        "bob.w",
+    ),
+    "gravity, each its own": (ball_pendulum, {"forces.gravity.gravity": (1.0, 20.0)}, "bob.r:max"),
+    "starts that are corrected": (ball_pendulum, {"points.A.sPp.y": (0.9, 1.1)}, "bob.r:series"),
+    "springs in free flight": (stone, {"forces.spring.k": (1.0, 9.0)}, "stone.r"),
+    "multipliers": (ball_pendulum, {"forces.gravity.gravity": (1.0, 20.0)}, "pivot.lambda"),
+    "turns": (turning, {"forces.spring.k": (1.0, 3.0)}, "wheel.w.z:series"),
+    "states of elements": (
+        stated,
+        {"forces.spring.z_0": (0.0, 0.3), "forces.loop.beta": (1.0, 3.0)},
+        "loop.z:series",
+    ),
+    "functions and their breaks": (driven, {"bodies.crank.Jp.z": (0.5, 1.5)}, "motor.lambda:max"),
+    "a closed chain": (four_bar, {"bodies.coupler.mass": (0.5, 1.0)}, "J1.lambda:max"),
+    "switches that no stage may cross": (tricycle, {"bodies.frame.mass": (9.0, 20.0)}, "frame.r"),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_points_of_all_kinds_have_the_bits_of_points_alone(case):
+    make, vary, output = CASES[case]
+    of = ensemble(make(), vary, [output], t_end=1.0, dt=0.1)
+    fractions = np.random.default_rng(1).random((11, len(vary)))
+    low, high = np.array(list(vary.values())).T
+    check(lambda: Ensemble(of.requested), low + fractions * (high - low))
 
 
 def with_table(scene):
@@ -147,33 +207,38 @@ def with_friction(scene):
     scene.add_force("friction", "rubbing", joint="hinge", mu=0.1, radius=0.05, v_tol=0.1)
 
 
-#: What lanes do not take: what makes it, the reason.
-ALONE = {
-    "turns": (with_turns, "it has switches, angles that are no coordinates, or times"),
-    "a table": (with_table, "ptp(spline): wrench decides by a number that differs"),
-    "a bend in time": (with_bend, "it has switches, angles that are no coordinates, or times"),
-    "friction": (with_friction, "forces depend on multipliers"),
-}
-
-
-@pytest.mark.parametrize("case", ALONE)
-def test_what_lanes_do_not_take_runs_point_by_point(case):
-    change, reason = ALONE[case]
+@pytest.mark.parametrize("change", [with_table, with_bend, with_turns])
+def test_trees_with_more_have_the_bits_of_points_alone(change):
+    """What decides by a number is a guard; where it fails, rates are evaluated alone."""
     scene = pendulum()
     change(scene)
+    settings = {"method": "joint", "t_end": 0.4, "dt": 0.1}
+    of = ensemble(scene, ("bodies.bob.mass",), ("bob.r:series",), **settings)
+    check(lambda: Ensemble(of.requested), np.linspace(0.5, 2.0, 11)[:, None])
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"), [(with_friction, "forces depend on multipliers"), (None, "less than")]
+)
+def test_what_lanes_do_not_take_runs_point_by_point(change, reason, monkeypatch):
+    scene = pendulum()
+    if change:
+        change(scene)
+    else:
+        monkeypatch.setattr(study_lanes, "LEAST_COMPONENTS", 6)
     settings = {"method": "joint", "t_end": 0.2, "dt": 0.1}
     of = ensemble(scene, ("bodies.bob.mass",), ("bob.r:series",), **settings)
+    assert of.notes == ("points are run one by one: they are few",)
+    assert of.run([[1.0], [2.0], [3.0], [4.0]]).status.tolist() == [DONE] * 4
     [note] = of.notes
     assert note.startswith("points are run one by one: ")
     assert reason in note
-    assert of.run([[1.0], [2.0]]).status.tolist() == [DONE, DONE]
 
 
 def test_notes_say_how_points_are_run():
-    of = swinging("bodies.bob.mass")
-    assert of.notes == (f"points are run in {lanes_of(of).count} lanes of a vector",)
     of = swinging("bodies.bob.mass", method="standard")
-    assert of.notes == ("points are run one by one: the scene is not run by method joint",)
+    of.run(np.linspace(1.0, 2.0, 5)[:, None])
+    assert of.notes == (f"points are run in {lanes_of(of).count} lanes of a vector",)
 
 
 def test_lanes_made_between_points_leave_the_numbers_of_the_scene():
@@ -185,5 +250,5 @@ def test_lanes_made_between_points_leave_the_numbers_of_the_scene():
     u[2] += 0.1
     evaluator.coordinates.start(u)
     before = evaluator.system.tree.constants.copy()
-    assert isinstance(lanes_of(of), LaneBatch)
+    assert isinstance(runner.compiled_batch._lanes_for(np.zeros(0, dtype=int)), LaneBatch)
     assert np.array_equal(evaluator.system.tree.constants, before)
