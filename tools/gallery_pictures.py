@@ -14,10 +14,12 @@ import dap3d_core as dap
 ROOT = Path(__file__).resolve().parents[1]
 #: The instant that is drawn, s.
 AT = {
+    "crane": 1.5,
     "engine": 0.004,
     "excavator": 2.5,
     "motion_platform": 0.7,
     "planetary": 0.5,
+    "quarter_car": 0.3,
     "rotor": 3.5,
     "two_link_arm": 0.3,
     "wiper": 0.5,
