@@ -24,6 +24,8 @@ AT = {
     "two_link_arm": 0.3,
     "wiper": 0.5,
 }
+#: Of plane mechanisms with shapes, the direction from which they are drawn.
+VIEW = {"crane": "x", "quarter_car": "x"}
 
 
 def main(folder: Path) -> None:
@@ -31,7 +33,8 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, t in AT.items():
         picture = folder / f"{name}.png"
-        dap.animate(dap.simulate(name), picture, at=t, size=(400, 0), force=True)
+        view = VIEW.get(name)
+        dap.animate(dap.simulate(name), picture, at=t, size=(400, 0), view=view, force=True)
         print(f"{picture} written")
 
 

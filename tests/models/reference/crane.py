@@ -35,8 +35,8 @@ def _step(t: float, start: float) -> Array:
 
 def _given(t: float) -> tuple[Array, Array]:
     """Return place of the trolley and length of the rope, both with derivatives."""
-    rope = LOWERED * _step(t, 6.0)
-    return 0.5 * WAY * (_step(t, 0.0) + _step(t, DELAY)), rope + [ROPE, 0.0, 0.0]
+    rope = LOWERED * _step(t, 6.0) + np.array([ROPE, 0.0, 0.0])
+    return 0.5 * WAY * (_step(t, 0.0) + _step(t, DELAY)), rope
 
 
 def _hanging(q: Array) -> tuple[complex, complex]:
