@@ -23,8 +23,8 @@ ELSEWHERE = {
 #: The README is for who opens the repository; the site has pages of its own for what it says.
 NOT_COPIED = ("README.md",)
 LINK = re.compile(r"(?<!!)\[([^\]]*)\]\((?![a-z]+:|#)([^)#\s]+)(#[^)]*)?\)")
-#: Copied beside the pages that show them.
-PICTURES = (".png", ".svg")
+#: Copied beside the pages that show them, or offer them.
+COPIED = (".png", ".svg", ".ipynb")
 
 
 def fill(source: Path, repository: Path) -> None:
@@ -47,7 +47,7 @@ def everything(repository: Path) -> dict[str, bytes]:
     found |= {path: text.encode() for path, text in gallery.pages(repository)}
     places = places_of(repository)
     for file, place in places.items():
-        if place.endswith(PICTURES):
+        if place.endswith(COPIED):
             found[place] = (repository / file).read_bytes()
         elif file not in NOT_COPIED:
             text = (repository / file).read_text(encoding="utf-8")
@@ -60,11 +60,11 @@ def everything(repository: Path) -> dict[str, bytes]:
 
 
 def places_of(repository: Path) -> dict[str, str]:
-    """Files of the repository that are pages or pictures of the site, and where they are there."""
+    """Files of the repository that are pages of the site or copied, and where they are there."""
     places = dict(ELSEWHERE)
     for file in sorted((repository / "docs").rglob("*")):
         within = file.relative_to(repository / "docs")
-        if within.parts[0].startswith("_") or file.suffix not in (".md", *PICTURES):
+        if within.parts[0].startswith("_") or file.suffix not in (".md", *COPIED):
             continue
         place = within.with_name("index.md") if within.name == "README.md" else within
         places[f"docs/{within.as_posix()}"] = place.as_posix()

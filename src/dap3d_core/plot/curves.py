@@ -1,7 +1,8 @@
 """Curves over time, or over one another, of one run or several: one panel for each unit."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
+from itertools import accumulate, pairwise
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -31,28 +32,56 @@ from dap3d_core.result.post.smooth_parts import cubic, smooth_parts
 
 #: A curve of fewer instants is drawn through about so many points.
 POINTS = 600
+#: So many instants, or fewer, have a marker each.
+FEW = 50
 
 
-def _refined(t: Floats, x: Floats, x_dot: Floats) -> Floats:
-    """A curve x (nt,) with derivative x_dot, at its instants and at equal fractions between.
+def _shaped(t: Floats, x: Floats, cuts: Sequence[float]) -> Floats:
+    """Slopes (2, nt - 1) at both ends of each interval that keep the shape of x (nt,).
 
-    A derivative that is NaN is taken for that of the straight line between two instants.
+    Between two instants a cubic of them rises or falls throughout, and stays between the values
+    (Fritsch and Carlson 1980). It is NaN where an interval has a cut, and beside NaN.
     """
-    if not 1 < len(t) < POINTS:
+    from scipy.interpolate import PchipInterpolator
+
+    slopes = np.full((2, len(t) - 1), np.nan)
+    broken = np.isnan(x[:-1]) | np.isnan(x[1:])
+    broken[[k - 1 for k in np.searchsorted(t, cuts) if 0 < k < len(t)]] = True
+    ends = [-1, *np.flatnonzero(broken), len(t) - 1]
+    for first, last in pairwise(ends):
+        if last > first + 1:
+            part = slice(first + 1, last + 1)
+            of_part = PchipInterpolator(t[part], x[part])(t[part], 1)
+            slopes[:, first + 1 : last] = of_part[:-1], of_part[1:]
+    return slopes
+
+
+def _refined(t: Floats, x: Floats, x_dot: Floats | None, cuts: Sequence[float]) -> Floats:
+    """A curve x (nt,), at its instants and at equal fractions between.
+
+    Between them it is a cubic of the derivative x_dot, or of slopes that keep the shape where this
+    is None; a straight line where neither is known, which is NaN, as in an interval with a cut.
+    """
+    between = _between(len(t))
+    if between == 1:
         return x
-    between = -(-POINTS // len(t))
-    h, ends, rates = np.diff(t), np.stack([x[:-1], x[1:]]), np.stack([x_dot[:-1], x_dot[1:]])
+    h, ends = np.diff(t), np.stack([x[:-1], x[1:]])
+    rates = _shaped(t, x, cuts) if x_dot is None else np.stack([x_dot[:-1], x_dot[1:]])
     rates = np.where(np.isnan(rates), np.diff(x) / h, rates)
     pieces = [cubic(k / between, h, ends, rates) for k in range(between)]
     return np.append(np.stack(pieces, axis=1).reshape(-1), x[-1])
 
 
-def smooth(t: Floats, x: Floats, y: Floats, x_dot: Floats | None, y_dot: Floats | None
+def _between(count: int) -> int:
+    """Points of a curve for each of its instants."""
+    return -(-POINTS // count) if 1 < count < POINTS else 1
+
+
+def smooth(result: Result, x: Floats, y: Floats, x_dot: Floats | None, y_dot: Floats | None
            ) -> tuple[Floats, Floats]:  # fmt: skip
-    """A curve (x, y), between instants t by cubics where both derivatives are known."""
-    if x_dot is None or y_dot is None:
-        return x, y
-    return _refined(t, x, x_dot), _refined(t, y, y_dot)
+    """A curve (x, y) (nt,) of a result, smooth between its instants but for its switches."""
+    cuts = [event.t for event in result.events if event.kind != "record"]
+    return _refined(result.t, x, x_dot, cuts), _refined(result.t, y, y_dot, cuts)
 
 
 def rate_of(result: Result, quantity: Quantity) -> Floats | None:
@@ -65,13 +94,15 @@ def rate_of(result: Result, quantity: Quantity) -> Floats | None:
 class Curve(NamedTuple):
     """One line: its name in the legend, its points, the quantity, the number of its run.
 
-    ``drift`` are words on the drift of a conserved energy; the axis spans ``span`` or more.
+    ``instants`` are the places of the instants among the points. ``drift`` are words on the drift
+    of a conserved energy; the axis spans ``span`` or more.
     """
 
     name: str
     points: tuple[Floats, Floats]
     quantity: Quantity
     run: int
+    instants: list[int]
     drift: str = ""
     span: float = 0.0
 
@@ -129,28 +160,32 @@ class CurvePicture(Picture):
         """Draw the curves of one unit in a panel of a height (inches).
 
         Colours differ from curve to curve, dashes from run to run: curves that lie on one another
-        are still seen. A circle marks the start of a path.
+        are still seen.
         """
         several = len({curve.run for curve in curves}) > 1
         for k, curve in enumerate(curves):
             single = len(curve.quantity.values) == 1
             dash = curve.run if several else k // len(PALETTE)
-            start = "o" if self.x.name != "t" else ""
             ax.plot(
                 *curve.points,
                 color=PALETTE[k % len(PALETTE)],
                 linestyle="none" if single else DASHES[dash % len(DASHES)],
-                marker=MARKERS[k % len(MARKERS)] if single else start,
-                markevery=[0],
-                markersize=4.5,
-                markerfacecolor="none",
                 linewidth=1.4,
+                **self._marks(curve, MARKERS[k % len(MARKERS)] if single else "o"),
                 label=shown_text(curve.name + (curve.drift if len(curves) > 1 else "")),
             )
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_formatter(PlainOffset())
         show_rounding_flat(ax, max(curve.span for curve in curves))
         ax.set_ylabel(folded(_y_label(unit, curves), 15 * height), fontsize=LETTERS)
+
+    def _marks(self, curve: Curve, start: str) -> dict[str, Any]:
+        """Dots at the instants of a curve over time where these are few; else one at a start."""
+        if self.x.name == "t" and 1 < len(curve.instants) <= FEW:
+            return {"marker": ".", "markevery": curve.instants, "markersize": 4.0}
+        seen = self.x.name != "t" or len(curve.instants) == 1
+        return {"marker": start if seen else "", "markevery": [0], "markersize": 4.5,
+                "markerfacecolor": "none"}  # fmt: skip
 
 
 def _y_label(unit: str, curves: Sequence[Curve]) -> str:
@@ -219,10 +254,14 @@ def _curves(
         else _points(part, find(part, over.name), find(part, quantity.name))
         for part in parts
     ]
+    starts = accumulate((len(part[0][0]) + 1 for part in of_parts[:-1]), initial=0)
+    instants = [start + k * _between(len(part.t))
+                for start, part in zip(starts, parts, strict=True)
+                for k in range(len(part.t))]  # fmt: skip
     for name, *points in zip(names, *of_parts, strict=True):
         label = run if alone and run else ", ".join(part for part in (name, run) if part)
         drift, span = drift_of(result, quantity), span_of(result, quantity)
-        yield Curve(label, _interrupted(points), quantity, number, drift, span)
+        yield Curve(label, _interrupted(points), quantity, number, instants, drift, span)
 
 
 def _points(result: Result, over: Quantity, quantity: Quantity) -> list[tuple[Floats, Floats]]:
@@ -230,7 +269,7 @@ def _points(result: Result, over: Quantity, quantity: Quantity) -> list[tuple[Fl
     columns = quantity.values.reshape(len(result.t), -1).T
     over_rate, rate = rate_of(result, over), rate_of(result, quantity)
     rates = [None] * len(columns) if rate is None else rate.reshape(len(result.t), -1).T
-    return [smooth(result.t, over.values, values, over_rate, own)
+    return [smooth(result, over.values, values, over_rate, own)
             for values, own in zip(columns, rates, strict=True)]  # fmt: skip
 
 

@@ -65,7 +65,7 @@ class FitPicture(Picture):
     def _draw_output(self, name: str, above: Axes, below: Axes) -> None:
         fit, t = self.fit, self.fit.result.t
         curve = find(fit.result, fit.quantities[name])
-        points = smooth(t, t, curve.values, np.ones(len(t)), rate_of(fit.result, curve))
+        points = smooth(fit.result, t, curve.values, np.ones(len(t)), rate_of(fit.result, curve))
         marks: Any = dict(color=PALETTE[1], linestyle="none", marker="o", markersize=2.5,
                           markeredgewidth=0.0, alpha=0.7)  # fmt: skip
         above.plot(fit.t, fit.measured[name], label="measured", **marks)

@@ -33,10 +33,12 @@ BENCHMARKS = {
 }
 #: Mechanisms of engineers.
 ENGINEERING = (
+    "crane",
     "engine",
     "excavator",
     "motion_platform",
     "planetary",
+    "quarter_car",
     "rotor",
     "two_link_arm",
     "wiper",

@@ -18,6 +18,7 @@ import numpy as np
 import pen1
 import pen2
 import pytest
+import quarter_car
 import rolling_disk
 import tri
 from scipy.integrate import solve_ivp
@@ -253,3 +254,36 @@ def test_tricycle_velocities_and_accelerations_are_derivatives():
     # second-order differences: h^2 times third derivatives of order 1
     np.testing.assert_allclose((late[0] - early[0]) / (2 * h), now[2][:, :3], rtol=0, atol=1e-7)
     np.testing.assert_allclose((late[2] - early[2]) / (2 * h), now[3], rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("angle", [-0.2, 0.0, 0.15])
+def test_quarter_car_closes_its_loop(angle):
+    m, flat = quarter_car, quarter_car.pose(angle)
+    places, (_, upper, upright) = flat[:9].reshape(3, 3), flat[9:36].reshape(3, 3, 3)
+    ball = m.UPPER_HINGE + upper @ (m.UPPER_BALL - m.UPPER_HINGE)
+    on_upright = [places[2] + upright @ (x - m.CENTRES[2]) for x in (m.UPPER_BALL, m.LEVER)]
+    np.testing.assert_allclose(on_upright[0], ball, rtol=0, atol=1e-14)
+    rod = np.linalg.norm(on_upright[1] - m.RACK) - np.linalg.norm(m.LEVER - m.RACK)
+    assert abs(rod) < 1e-14
+    np.testing.assert_allclose(upright @ upright.T, np.eye(3), rtol=0, atol=1e-14)
+
+
+def test_quarter_car_keeps_its_energy_without_dampers(monkeypatch):
+    m = quarter_car
+    for name in ("C", "TYRE_C", "BUMP"):
+        monkeypatch.setattr(m, name, 0.0)
+
+    def energy(y):
+        r, r_1, _, A, w_1, _, strut, _ = m.kinematics(y[1])
+        v = r_1 * y[3] + [0.0, 0.0, y[2]]
+        w = np.einsum("nij,ni->nj", A, w_1 * y[3])  # in axes of the bodies
+        kinetic = m.CAR * y[2] ** 2 + m.MASSES @ (v * v).sum(axis=1) + (m.INERTIAS * w * w).sum()
+        bend = m.CHASSIS[2] + y[0] + r[2, 2] - m.TYRE
+        springs = m.K * (np.linalg.norm(strut) - m.STRUT) ** 2 + m.TYRE_K * bend**2
+        weight = m.GRAVITY * (m.CAR * y[0] + m.MASSES @ (y[0] + r[:, 2]))
+        return 0.5 * (kinetic + springs) + weight
+
+    start = np.array([0.02, -0.05, 0.1, 1.0])
+    run = solve_ivp(m.rate, (0.0, 0.5), start, "DOP853", rtol=1e-12, atol=1e-13)
+    change = energy(run.y[:, -1]) - energy(start)
+    assert abs(change) < 1e-8  # of 3e2 J in the spring

@@ -103,7 +103,48 @@ def test_curves_between_instants_follow_the_rates():
     np.testing.assert_allclose(path[:, 1], t - 0.5 * g * t**2, atol=1e-12)
     rates = lines(plot(fall, "stone.rd.z"))["stone.rd.z"]
     np.testing.assert_allclose(rates[:, 1], 1.0 - g * rates[:, 0], atol=1e-12)
-    assert len(lines(plot(fall, "stone.rdd.z"))["stone.rdd.z"]) == len(fall.t)  # no rate is known
+
+
+def test_curves_without_rates_keep_the_shape_of_their_instants():
+    """No rate is known of an acceleration: its extreme values are reported ones."""
+    scene = dap.Scene(name="spring")
+    scene.add_body("stone", r=[0.0, 0.0, 1.0])
+    scene.add_force("ptp", P_i="stone.O", P_j="ground.O", k=(2.0 * np.pi) ** 2)
+    run = dap.simulate(scene, t_end=1.0, dt=0.025)
+    ax = plot(run, "stone.rdd.z")
+    data = lines(ax)["stone.rdd.z"]
+    reported = run.rdd[:, 0, 2]
+    assert len(data) > 500
+    np.testing.assert_array_equal(data[ax.get_lines()[0].get_markevery(), 1], reported)
+    assert (np.ptp(data[:, 1]), data[:, 1].max()) == (np.ptp(reported), reported.max())
+    exact = -((2.0 * np.pi) ** 2) * np.cos(2.0 * np.pi * data[:, 0])
+    inner = np.abs(exact) < 0.9 * exact.max()
+    polygon = 0.9 * (2.0 * np.pi * 0.025) ** 2 / 8.0 * exact.max()
+    assert np.abs(data[:, 1] - exact)[inner].max() < 0.1 * polygon
+
+
+def test_curves_without_rates_are_straight_where_a_switch_lies_between():
+    """A ball lands on a soft plane at sqrt(2 * 0.5 / g) = 0.319 s: the acceleration has a kink."""
+    scene = dap.Scene(name="landing")
+    scene.add_body("ball", r=[0.0, 0.0, 0.5])
+    scene.add_force("weight")
+    scene.add_force("plane_stop", "floor", P_i="ball.O", k=1e3, rebound=False)
+    run = dap.simulate(scene, t_end=0.4, dt=0.02)
+    assert [event.kind for event in run.events] == ["switch"]
+    data = lines(plot(run, "ball.rdd.z"))["ball.rdd.z"]
+    between = (len(data) - 1) // 20
+    piece = data[15 * between : 16 * between + 1]  # from 0.30 to 0.32
+    np.testing.assert_allclose(np.diff(piece[:, 1]), np.ptp(piece[:, 1]) / between, rtol=1e-9)
+
+
+def test_few_instants_are_marked(result):
+    """Many are not, nor those of a path, whose start is."""
+    few, many = circling(nt=50)[0], circling(nt=51)[0]
+    (line,) = plot(few, "bob.r.x").get_lines()
+    assert line.get_marker() == "."
+    np.testing.assert_allclose(line.get_xdata()[line.get_markevery()], few.t, rtol=1e-15)
+    assert plot(many, "bob.r.x").get_lines()[0].get_marker() in ("", "None")
+    assert plot(few, "bob.r.y", x="bob.r.x").get_lines()[0].get_markevery() == [0]
 
 
 def test_a_unit_stays_on_one_line(result):

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -177,7 +178,10 @@ def _limits(given: Any) -> Floats | None:
 
 
 def _ends(scene: Scene, kind: str) -> Iterator[tuple[str, str]]:
-    """Names of the two points of each element that has two, given as such or by a vector."""
+    """Names of the two points of each element that has two, given as such or by a vector.
+
+    Of a list of ``points``, such as a cable's, each with the next.
+    """
     for element in getattr(scene, kind).values():
         fields, d = element.fields, element.fields.get("d")
         ends = fields.get("P_i"), fields.get("P_j")
@@ -186,6 +190,9 @@ def _ends(scene: Scene, kind: str) -> Iterator[tuple[str, str]]:
         P_i, P_j = ends
         if isinstance(P_i, str) and isinstance(P_j, str):
             yield P_i, P_j
+        listed = fields.get("points", ())
+        if isinstance(listed, list | tuple) and all(isinstance(one, str) for one in listed):
+            yield from pairwise(listed)
 
 
 def _wheels(scene: Scene, names: Sequence[str]) -> Iterator[tuple[int, float]]:

@@ -27,6 +27,7 @@ class ElementGeometry:
         vectors: field -> body index and direction there.
         numbers: field -> number.
         has_ends: True where the type declares a vector between two points.
+        chain: points of a list, in order.
     """
 
     name: str
@@ -37,6 +38,7 @@ class ElementGeometry:
     vectors: dict[str, Located]
     numbers: dict[str, float]
     has_ends: bool
+    chain: list[Located]
 
     def place(self, slot: str) -> Located:
         """The element's point on the body of a slot, the origin where it has none."""
@@ -104,6 +106,8 @@ def _geometry(group: Group, member: int, name: str) -> ElementGeometry:
     points: dict[str, Located] = {}
     vectors: dict[str, Located] = {}
     numbers: dict[str, float] = {}
+    chain: list[Located] = []
+    lists = tuple(f"{field}_" for field, spec in specs.items() if spec.kind == "points")
     for field, (at, shape) in layout.numbers.items():
         values = plain(group.numbers[member, at : at + (3 if shape else 1)])
         kind = specs[field].kind if field in specs else ""
@@ -111,12 +115,15 @@ def _geometry(group: Group, member: int, name: str) -> ElementGeometry:
         is_end = has_ends and field in ("P_i", "P_j")
         if shape == (3,) and slot in bodies and (kind == "point" or is_end):
             points[slot] = bodies[slot], values
+            if field.startswith(lists):
+                chain.append(points[slot])
         elif shape == (3,) and field in on:
             vectors[field] = on[field], values
         elif shape == () and kind == "number":
             numbers[field] = values[0]
+    symbol = group.type_info.type.symbol
     return ElementGeometry(
-        name, group.keyword, group.type_info.type.symbol, bodies, points, vectors, numbers, has_ends
+        name, group.keyword, symbol, bodies, points, vectors, numbers, has_ends, chain
     )
 
 

@@ -163,10 +163,12 @@ def _wheel(to: Drawer, one: ElementGeometry) -> Pieces:
 
 
 def _declared_fields(to: Drawer, one: ElementGeometry) -> Pieces:
-    """Points as balls, vectors as lines, a vector between points as a rod."""
+    """Points as balls, vectors as lines, a vector between points as a rod, a list as a chain."""
     if one.has_ends:
         yield Span("", "rod", one.place("i"), one.place("j"), 0.5 * to.unit)
-    for point in one.points.values():
+    for start, end in pairwise(one.chain):
+        yield Span("", "rod", start, end, 0.5 * to.unit)
+    for point in one.chain or one.points.values():
         yield ball("", *point, 1.8 * to.unit)
     for field, (_, axis) in one.vectors.items():
         yield bar(*to.base(one, field), axis, 0.6 * to.unit, 12.0 * to.unit)

@@ -47,6 +47,7 @@ def hung():
     scene.add_vector2("d", P_i="bob.O", P_j="hook")
     scene.add_force("ptp", "spring", d="d", k=1.0, l0=2.0)
     scene.add_joint("sph-sph", "rod", P_i="other.O", P_j="ground.O", length=1.0)
+    scene.add_joint("cable", "rope", points=["hook", "other.O", "bob.O"])
     scene.animation.points.append(AnimationPoint(body="bob", sPp=[0, 0.5, 0]))
     scene.animation.limits = [[-1, 2], [-1, 1], [-1, 3]]
     return scene
@@ -65,9 +66,10 @@ def test_lines_run_from_mass_centres_to_points():
     places = sticks.positions(r, p)
     (line,) = places[sticks.lines]
     np.testing.assert_allclose(line, [[0, 0, 0], [0, 0.5, 0]])
-    (spring,), (link,) = places[sticks.springs], places[sticks.links]
+    (spring,), (link, *rope) = places[sticks.springs], places[sticks.links]
     np.testing.assert_allclose(spring, [[0, 0, 0], [0, 0, 2]])
     np.testing.assert_allclose(link, [[1, 0, 0], [0, 0, 0]])
+    np.testing.assert_allclose(rope, [[[0, 0, 2], [1, 0, 0]], [[1, 0, 0], [0, 0, 0]]])
     assert {tuple(place) for place in places[sticks.anchors]} == {(0, 0, 2), (0, 0, 0)}
     assert sticks.names == ("bob", "other")
     assert sticks.colors[0] == SHADES["green"]

@@ -78,11 +78,11 @@ def test_a_missing_model_names_the_nearest():
 
 
 def test_a_missing_file_names_the_nearest_in_its_folder(tmp_path, monkeypatch):
-    (tmp_path / "crane.toml").write_text(TEXT)
-    near = str(tmp_path / "crane.toml")
-    assert f"did you mean {near!r}?" in refused(tmp_path / "crane.tml")
+    (tmp_path / "derrick.toml").write_text(TEXT)
+    near = str(tmp_path / "derrick.toml")
+    assert f"did you mean {near!r}?" in refused(tmp_path / "derrick.tml")
     monkeypatch.chdir(tmp_path)
-    assert "did you mean 'crane.toml'?" in refused("crane")
+    assert "did you mean 'derrick.toml'?" in refused("derrick")
 
 
 @pytest.mark.parametrize(

@@ -66,6 +66,21 @@ def test_springs_run_between_their_ends(four):
     assert spring["end"] == (0, (0.0, 0.0, 0.0))
 
 
+def test_a_cable_runs_from_point_to_point():
+    """Two blocks over a movable pulley: three spans of points of which two are on ground."""
+    scene = dap.Scene(name="tackle")
+    scene.add_body("block", r=(0.0, 0.0, -1.0))
+    scene.add_body("weight", r=(2.0, 0.0, -1.0))
+    scene.add_point("rail", "ground", (1.0, 0.0, 0.0))
+    scene.add_joint("cable", "rope", points=["ground.O", "block.O", "rail", "weight.O"])
+    spans = [
+        s for s in dap.view(dap.simulate(scene, t_end=0.1)).data["spans"] if s["owner"] == "rope"
+    ]
+    assert [s["start"] for s in spans[1:]] == [s["end"] for s in spans[:-1]]
+    assert [s["start"][0] for s in spans] + [spans[-1]["end"][0]] == [0, 1, 0, 2]
+    assert spans[1]["end"] == (0, (1.0, 0.0, 0.0))
+
+
 def test_a_rail_is_as_long_as_the_motion():
     scene = dap.Scene(name="sliding")
     scene.add_body("block", r=(0.5, 0.0, 0.0))
