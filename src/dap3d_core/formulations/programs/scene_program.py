@@ -113,6 +113,7 @@ def write_program(
     names: dict[str, str],
     head: str = "",
     varied: Varied = None,
+    tracer: StraightLine | None = None,
 ) -> tuple[str, dict[str, str]]:
     """LLVM IR of one program, and the declarations that it needs.
 
@@ -122,11 +123,12 @@ def write_program(
         names: of the program, its ``counter``, and the ``general`` function.
         head: of a projection, which is then behind the right-hand side.
         varied: as of ``constants``.
+        tracer: records the program; left out, one of at most ``MOST_INSTRUCTIONS``.
 
     Raises:
         TraceError: the program would be too long.
     """
-    tracer = StraightLine(MOST_INSTRUCTIONS)
+    tracer = tracer or StraightLine(MOST_INSTRUCTIONS)
     system = SymbolicSystem(evaluator, tracer, varied)
     y = _items(tracer, "%y", state)
     out = rates = np.zeros(state.size, dtype=object)

@@ -1,0 +1,121 @@
+"""What the programs of a scene compute: their operations, by the functions that they come from."""
+
+import re
+import sys
+from collections import Counter
+from pathlib import Path
+from types import FrameType
+
+import attrs
+
+from dap3d_core.assembly.arrays import Floats
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.programs.scene_program import (
+    MOST_INSTRUCTIONS,
+    off_constraints,
+    reads_rates,
+    write_program,
+)
+from dap3d_core.kernels.compiler.straight_line import StraightLine
+
+#: Packages whose functions are named; what they call for arithmetic belongs to them.
+NAMED = ("assembly", "formulations", "linear")
+#: Kinds of operations, and the instructions that they are.
+KINDS = {
+    "loads": ("load",),
+    "sums and products": ("fadd", "fsub", "fmul", "fneg"),
+    "quotients and roots": ("fdiv", "sqrt"),
+    "choices": ("fcmp", "select", "and", "or", "xor"),
+    "calls": ("call",),
+}
+_CORE = Path(__file__).parents[2]
+_LINE = re.compile(r"\s*(?:(%[\w.]+) = )?(.*)")
+
+
+@attrs.frozen
+class ProgramOperations:
+    """Operations of a program, without those that no result needs.
+
+    Attributes:
+        name: "right-hand side", or "projection" with the right-hand side before it.
+        parts: function -> kind of operation -> how many, the largest first.
+        guards: conditions that are tested, all at once.
+    """
+
+    name: str
+    parts: dict[str, dict[str, int]]
+    guards: int
+
+    @property
+    def total(self) -> dict[str, int]:
+        """Kind of operation -> how many in all."""
+        return {kind: sum(part[kind] for part in self.parts.values()) for kind in KINDS}
+
+
+class _Counting(StraightLine):
+    """Notes which function of the core each instruction comes from."""
+
+    def __init__(self) -> None:
+        super().__init__(MOST_INSTRUCTIONS)
+        self.owner: dict[str, str] = {}
+
+    def new(self, text: str) -> str:
+        name = super().new(text)
+        if name not in self.owner:
+            self.owner[name] = _owner(sys._getframe(1))
+        return name
+
+
+def _owner(frame: FrameType | None) -> str:
+    """The function of the core, or the kernels of a type, that a frame was called by."""
+    while frame is not None:
+        file = Path(frame.f_code.co_filename)
+        if not file.exists():  # the loop over the instances of a type, written for it
+            return f"{frame.f_globals.get('__name__', '')}"
+        if file.is_relative_to(_CORE):
+            package, *_ = file.relative_to(_CORE).parts
+            if package in NAMED and "programs" not in file.parts:
+                return f"{package}.{file.stem}.{frame.f_code.co_name}"
+        frame = frame.f_back
+    return "results"
+
+
+def operations(evaluator: Evaluator, time: float, state: Floats) -> list[ProgramOperations]:
+    """The operations of the programs of a scene, at a state.
+
+    Raises:
+        TraceError, CompileError: it has none; says why.
+    """
+    names = dict.fromkeys(("name", "counter", "general"), "program")
+    heads = {"right-hand side": "", "projection": "  br label %program"}
+    found = []
+    for name, head in heads.items():
+        if head and not reads_rates(evaluator):
+            continue
+        tracer = _Counting()
+        text, _ = write_program(evaluator, time, off_constraints(state), names, head, tracer=tracer)
+        body = text.partition("program:")[2].partition("general:")[0].splitlines()
+        counts = _counts(body, tracer.owner)
+        found.append(ProgramOperations(name, counts, len(tracer.guards)))
+    return found
+
+
+def _counts(lines: list[str], owner: dict[str, str]) -> dict[str, dict[str, int]]:
+    """Operations of each part that stores and guards need, read from the last line to the first."""
+    needed: set[str] = set()
+    parts: dict[str, Counter[str]] = {}
+    for line in reversed(lines):
+        found = _LINE.match(line)
+        assert found is not None
+        name, text = found.groups()
+        if name and name not in needed:
+            continue
+        needed.update(re.findall(r"%[\w.]+", text))
+        words = text.split()
+        kind = next((k for k, w in KINDS.items() if words and words[0] in w), None)
+        if kind == "calls" and ".sqrt" in text:
+            kind = "quotients and roots"
+        if name and kind:
+            parts.setdefault(owner.get(name, "results"), Counter())[kind] += 1
+    ordered = sorted(parts, key=lambda part: -sum(parts[part].values()))
+    return {part: {kind: parts[part][kind] for kind in KINDS} for part in ordered}
