@@ -12,7 +12,7 @@ from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import split
 from dap3d_core.registry import load_registry
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import INFORMATION, Result
+from dap3d_core.result import INFORMATION, Quantity
 from dap3d_core.result.arrays import AXES, EULER
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.scene import Mistake, Scene, SceneError, ValidatedScene, check, load
@@ -36,6 +36,8 @@ from dap3d_core.study.parameters import SceneParameter, with_values
 if TYPE_CHECKING:
     import xarray
 
+#: Attributes that say of each point whether something is true of it.
+MARKS = ("given", "turning", "branching", "stable")
 #: What changes by less than this part of its size over the whole path is constant.
 CONSTANT = 1e-12
 
@@ -46,8 +48,11 @@ class EquilibriumPath:
     Attributes:
         parameter, unit: its dotted name and SI unit.
         values: (k,) values of the parameter.
+        length: (k,) of the path so far, in parts of the range of the parameter and of the scene.
         given: (k,) bool, True where the parameter has one of the values that were given.
         turning: (k,) bool, True at turning points, where the parameter is largest or least.
+        branching: (k,) bool, True where a stiffness changes its sign without a turn: another path
+            crosses there, as where a column buckles.
         stable: (k,) bool as ``Equilibrium.stable``; False at turning points.
         stiffness: (k,) the least stiffness of a freedom, N m, as of ``Equilibrium``.
         u: (k, 13 n) states: r, p, zero velocities.
@@ -67,12 +72,13 @@ class EquilibriumPath:
         self._compiled, self._family, self._points = compiled, family, points
         self.parameter, self.unit = family.parameter.name, family.parameter.unit
         self.values = read_only(np.array([family.value_of(point.s) for point in points]))
+        self.length = read_only(family.lengths(points))
         kinds = [point.kind for point in points]
-        self.given = np.array([kind is Kind.GIVEN for kind in kinds])
+        self.given = np.isin([point.s for point in points], family.given)
         self.turning = np.array([kind is Kind.TURNING for kind in kinds])
-        stability = [family.stability(point) for point in points]
-        self.stable = np.array([stable for stable, _ in stability])
-        self.stiffness = np.array([least for _, least in stability])
+        self.branching = np.array([kind is Kind.BRANCHING for kind in kinds])
+        self.stable = np.array([family.is_stable(point) for point in points])
+        self.stiffness = np.array([np.min(point.stiffness, initial=np.inf) for point in points])
         self.u = read_only(np.array([point.pose.u for point in points]))
         parts = [split(u) for u in self.u]
         self.r, self.p = (read_only(np.array([part[q] for part in parts])) for q in (0, 1))
@@ -82,6 +88,7 @@ class EquilibriumPath:
         self.Lam = read_only(self._rows[:, lam])
         self.end = end.value
         self.notes = notes
+        self._quantities: dict[str, Quantity] = {}
 
     def __repr__(self) -> str:
         turns = int(np.sum(self.turning))
@@ -100,25 +107,28 @@ class EquilibriumPath:
         Raises:
             UnknownNameError: there is no such quantity; names the nearest.
         """
-        return self._quantity(quantity)[0]
+        return self.quantity(quantity).values
 
-    def _quantity(self, name: str) -> tuple[Floats, str, str]:
-        """Values of a quantity, its label, its unit."""
-        family = self._family
-        reduction = Reduction(self._compiled, [family.parameter], [Output("t", "t")])
-        family.load(self._points[0].s, self._points[0])
-        model = family.evaluator.model
-        whole: Result = reduction.result(model, self._rows, family.evaluator)
-        quantity = find(whole, name)
-        reduction = Reduction(self._compiled, [family.parameter], [Output(name, name)])
-        if all(reduction.of_rows.values()):
-            return quantity.values, quantity.label, quantity.unit
-        values = []
-        for point, row in zip(self._points, self._rows, strict=True):
-            family.load(point.s, point)
-            one = reduction.result(family.evaluator.model, row[None], family.evaluator)
-            values.append(one.quantity(name).values[0])
-        return np.array(values), quantity.label, quantity.unit
+    def quantity(self, name: str) -> Quantity:
+        """A quantity with its label, unit and components; as ``of``."""
+        if name not in self._quantities:
+            self._quantities[name] = self._family.quantity(name, self._points, self._rows)
+        return self._quantities[name]
+
+    def largest_motion(self) -> str:
+        """The coordinate of a body that changes most along the path, ``node.r.z``."""
+        names = self._compiled.model.body_names
+        length = self._family.statics.statics.length
+        ranges = {
+            f"{name}.r.{axis}": float(np.ptp(self.r[:, k, q])) / length
+            for k, name in enumerate(names)
+            for q, axis in enumerate(AXES)
+        }
+        most = max(ranges, key=ranges.__getitem__)
+        if ranges[most] > CONSTANT:
+            return most
+        angles = [f"{name}.{angle}" for name in names for angle in ("roll", "pitch", "yaw")]
+        return max(angles, key=lambda name: float(np.ptp(self.of(name))))
 
     @checked
     def equilibrium(self, k: int) -> Equilibrium:
@@ -142,7 +152,7 @@ class EquilibriumPath:
             "unit": self.unit,
             "end": self.end,
             **{name: getattr(self, name).tolist()
-               for name in ("values", "given", "turning", "stable", "stiffness", "residual")},
+               for name in ("values", *MARKS, "stiffness", "residual")},
             "quantities": {name: self.of(name).tolist() for name in quantities},
             "notes": list(self.notes),
         }  # fmt: skip
@@ -159,11 +169,12 @@ class EquilibriumPath:
             "stiffness": ("point", self.stiffness, {"units": "N m"}),
         }
         for name in quantities:
-            values, label, unit = self._quantity(name)
-            dimensions = ("point", f"component of {name}")[: values.ndim]
-            data[name] = (dimensions, values, {"units": unit, "long_name": label})
+            found = self.quantity(name)
+            dimensions = ("point", f"component of {name}")[: found.values.ndim]
+            data[name] = (dimensions, found.values,
+                          {"units": found.unit, "long_name": found.label})  # fmt: skip
         about = {"units": self.unit, "long_name": self.parameter}
-        marks = {name: ("point", getattr(self, name)) for name in ("given", "turning", "stable")}
+        marks = {name: ("point", getattr(self, name)) for name in MARKS}
         labels = {"body": list(names), "axis": list(AXES), "euler": list(EULER)}
         coordinates = {"value": ("point", self.values, about), **marks, **labels}
         return xarray.Dataset(data, coordinates, {"parameter": self.parameter, "end": self.end})
@@ -217,7 +228,7 @@ def equilibrium_path(
     end = continuation.run(rest.u)
     path = EquilibriumPath(compiled, family, continuation.points, end, list(rest.notes))
     _check_effect(path, values)
-    path.notes += _end_notes(path, numbers)
+    path.notes += _path_notes(path, numbers)
     return path
 
 
@@ -249,9 +260,18 @@ def _check_effect(path: EquilibriumPath, values: Any) -> None:
     raise SceneError([Mistake("parameter", path.parameter, what)])
 
 
-def _end_notes(path: EquilibriumPath, numbers: Floats) -> list[str]:
-    """How the path ends, where not at the last value."""
+def _path_notes(path: EquilibriumPath, numbers: Floats) -> list[str]:
+    """Where other paths cross, and how the path ends where not at the last value."""
     name, last = path.parameter, f"{path.values[-1]:.6g}"
+    notes = [
+        f"another path crosses at {name} = {value:.6g}, where a stiffness changes its sign though "
+        "the parameter does not turn; a start aside leads to that path"
+        for value in path.values[path.branching]
+    ]
+    return notes + _end_notes(path, numbers, name, last)
+
+
+def _end_notes(path: EquilibriumPath, numbers: Floats, name: str, last: str) -> list[str]:
     if path.end == "returned":
         return [
             f"{INFORMATION}the path turns before {name} = {numbers[-1]:g}, and ends at {last} "
@@ -316,15 +336,20 @@ class _Family:
         self.statics.load(0.0)
         self.evaluator.start(0.0, rest.u, rest.angles, rest.states)
 
-    def stability(self, point: PathPoint) -> tuple[bool, float]:
-        """Whether a point is stable, and its least stiffness, N m."""
+    def lengths(self, points: list[PathPoint]) -> Floats:
+        """(k,) length of the path up to each point, of its chords."""
+        chords = [
+            np.hypot(np.linalg.norm(self.statics.way(a.pose.u, b.pose.u)), b.s - a.s)
+            for a, b in zip(points, points[1:], strict=False)
+        ]
+        return np.concatenate([[0.0], np.cumsum(chords)])
+
+    def is_stable(self, point: PathPoint) -> bool:
+        """Whether a point is stable: at a turning point the potential has no minimum."""
+        if point.kind is Kind.TURNING:
+            return False
         self.load(point.s, point)
-        statics = self.statics.statics
-        if point.kind is Kind.TURNING:  # the potential has no minimum there, only an inflection
-            values = np.linalg.eigvals(statics.stiffness(point.pose))
-            return False, float(np.min(values.real, initial=np.inf))
-        found = stability_of(statics, point.pose)
-        return found.stable, float(np.min(found.stiffness.real, initial=np.inf))
+        return stability_of(self.statics.statics, point.pose).stable
 
     def row(self, point: PathPoint) -> Floats:
         """A row of a result at rest at a point."""
@@ -338,3 +363,18 @@ class _Family:
             [[0.0], evaluator.integrated(u), report[: evaluator.report_size]]
         )
         return row
+
+    def quantity(self, name: str, points: list[PathPoint], rows: Floats) -> Quantity:
+        """A quantity of points with their rows (k, ...)."""
+        reduction = Reduction(self._compiled, [self.parameter], [Output("t", "t")])
+        self.load(points[0].s, points[0])
+        quantity = find(reduction.result(self.evaluator.model, rows, self.evaluator), name)
+        reduction = Reduction(self._compiled, [self.parameter], [Output(name, name)])
+        if all(reduction.of_rows.values()):
+            return quantity
+        values = []
+        for point, row in zip(points, rows, strict=True):
+            self.load(point.s, point)
+            one = reduction.result(self.evaluator.model, row[None], self.evaluator)
+            values.append(one.quantity(name).values[0])
+        return quantity._replace(values=np.array(values))

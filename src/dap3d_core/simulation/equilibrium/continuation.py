@@ -17,18 +17,22 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, displacement
-from dap3d_core.simulation.equilibrium.trust_region import BALANCED, held_solution
+from dap3d_core.simulation.equilibrium.trust_region import (
+    BALANCED,
+    held_solution,
+    zero_stiffness,
+)
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 
 #: Steps are parts of the range of the parameter, and displacements as of Statics: the first one,
 #: the longest, and the shortest, at which the path ends. At most so many are taken.
-FIRST_STEP, LONGEST_STEP, SHORTEST_STEP, MOST_STEPS = 0.02, 0.2, 1e-9, 5000
+FIRST_STEP, LONGEST_STEP, SHORTEST_STEP, MOST_STEPS = 0.05, 0.2, 1e-9, 5000
 #: Largest rotation of a body in a step, rad.
 MOST_TURN = 0.2
 #: Cosine of the angle between the tangents at the ends of a step: at least; longer steps follow
 #: above the second.
 LEAST_COSINE, GOOD_COSINE = 0.95, 0.99
-GROW, SHRINK = 1.5, 0.5
+GROW, SHRINK = 2.0, 0.5
 #: A correction is at most this part of its step: a longer one may lead to another path.
 MOST_CORRECTION = 0.3
 #: Newton passes; derivatives are kept where unbalanced forces are below this part.
@@ -41,9 +45,9 @@ MOST_HALVINGS, LOCATED, TURNED = 60, 1e-12, 1e-13
 
 
 class Kind(Enum):
-    """Why a point belongs to a path."""
+    """What a point of a path is: where the parameter turns, where another path crosses, neither."""
 
-    GIVEN, TURNING, STEP = "given", "turning", "step"
+    TURNING, BRANCHING, REGULAR = "turning", "branching", "regular"
 
 
 class End(Enum):
@@ -62,7 +66,8 @@ class PathPoint:
         states: (s,) states of elements at rest.
         counters: turns of angles and unknowns of joints, as the evaluator stores them.
         tangent: (6 n + 1,) unit vector of displacements, scaled, and of the parameter.
-        kind: why it belongs to the path.
+        stiffness: (f,) real parts of the eigenvalues of the stiffness, N m, rising.
+        kind: whether it is a special point.
     """
 
     s: float
@@ -70,7 +75,14 @@ class PathPoint:
     states: Floats
     counters: Floats
     tangent: Floats
-    kind: Kind = Kind.STEP
+    stiffness: Floats
+    kind: Kind = Kind.REGULAR
+
+    @property
+    def negative_count(self) -> int:
+        """Number of freedoms of negative stiffness."""
+        zero = zero_stiffness(np.abs(self.stiffness), self.pose.size)
+        return int(np.sum(self.stiffness < -zero))
 
 
 @attrs.frozen(eq=False)
@@ -127,11 +139,13 @@ class ParameterStatics:
         self.load(s)
         evaluator.count_turns(0.0, pose.u)
         counters, states = evaluator.system.par[self._counted], evaluator.states.copy()
-        tangent = self._solve(pose, self.slopes(s, pose), normal, along=True)
+        slopes = self.slopes(s, pose)
+        tangent = self._solve(pose, slopes, normal, along=True)
         length = float(np.linalg.norm(tangent))
         if not 0.0 < length < np.inf:
             return None
-        return PathPoint(s, pose, states, counters, tangent / length)
+        stiffness = np.sort(np.linalg.eigvals(slopes.stiffness).real)
+        return PathPoint(s, pose, states, counters, tangent / length, stiffness)
 
     def corrected(
         self, u: Floats, way: Floats, s: float, normal: Floats
@@ -233,7 +247,7 @@ class Continuation:
         start = family.point(0.0, family.statics.at(u), normal)
         if start is None:
             raise SimulationError("no path leaves the equilibrium at the first value")
-        self.points = [attrs.evolve(start, kind=Kind.GIVEN)]
+        self.points = [start]
         for _ in range(MOST_STEPS):
             found = self._advance(self.points[-1])
             if not found:
@@ -296,16 +310,23 @@ class Continuation:
             b = self.family.point(at, pose, a.tangent)
         except (AssemblyError, SimulationError, np.linalg.LinAlgError):
             return None
-        return b if b is None or s is None else attrs.evolve(b, s=s, kind=Kind.GIVEN)
+        return b if b is None or s is None else attrs.evolve(b, s=s)
 
     def _crossed(self, a: PathPoint, b: PathPoint) -> list[PathPoint] | None:
         """The points between the ends of a step that are reported, then its end."""
         corners = [a, b]
         if a.tangent[-1] * b.tangent[-1] < 0.0:
-            turning = self._turning(a, b)
+            turning = self._located(a, b, Kind.TURNING, lambda point: float(point.tangent[-1]))
             if turning is None:
                 return None
             corners = [a, turning, b]
+        elif a.negative_count != b.negative_count:
+            k = min(a.negative_count, b.negative_count)
+            branching = self._located(a, b, Kind.BRANCHING, lambda point: point.stiffness[k])
+            if branching is not None and abs(branching.s - a.s) < SHORTEST_STEP:
+                self.points[-1] = attrs.evolve(a, kind=Kind.BRANCHING)
+            elif branching is not None:
+                corners = [a, branching, b]
         found: list[PathPoint] = []
         for p, q in zip(corners, corners[1:], strict=False):
             low, high = sorted((p.s, q.s))
@@ -318,23 +339,25 @@ class Continuation:
             found.append(q)
         return found
 
-    def _turning(self, a: PathPoint, b: PathPoint) -> PathPoint | None:
-        """The point between two at which the parameter turns; None where it is not located."""
+    def _located(
+        self, a: PathPoint, b: PathPoint, kind: Kind, value: Callable[[PathPoint], float]
+    ) -> PathPoint | None:
+        """The point between two at which a value vanishes; None where it is not located."""
         from scipy.optimize import brentq
 
-        def rate(length: float) -> float:
+        def value_at(length: float) -> float:
             point = self._at(a, length) if length else a
             if point is None:
                 raise AssemblyError("the path is not resolved")
-            found = float(point.tangent[-1])
-            return found if abs(found) > TURNED else 0.0
+            found = float(value(point))
+            return found if kind is not Kind.TURNING or abs(found) > TURNED else 0.0
 
         try:
-            length = brentq(rate, 0.0, self._length(a, b), xtol=LOCATED, rtol=LOCATED)
+            length = brentq(value_at, 0.0, self._length(a, b), xtol=LOCATED, rtol=LOCATED)
         except (AssemblyError, ValueError):
             return None
         point = self._at(a, float(length))
-        return None if point is None else attrs.evolve(point, kind=Kind.TURNING)
+        return None if point is None else attrs.evolve(point, kind=kind)
 
     def _between(self, a: PathPoint, b: PathPoint, s: float) -> PathPoint | None:
         """The point at s between two, from one to the other of which the parameter does not turn.
