@@ -167,7 +167,8 @@ def _loci(x: Floats, values: "Complex") -> Iterator[tuple[Floats, "Complex"]]:
                 for z in both:
                     yield along, z
         is_pair = values[k : k + 2].imag != 0.0
-        for z in values[k : k + 2, is_pair[0] == is_pair[1]].T:
+        is_there = np.all(np.isfinite(values[k : k + 2]), axis=0)
+        for z in values[k : k + 2, is_there & (is_pair[0] == is_pair[1])].T:
             yield over, z
             if z[0].imag:
                 yield over, z.conj()

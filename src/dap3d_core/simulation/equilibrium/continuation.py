@@ -35,6 +35,9 @@ LEAST_COSINE, GOOD_COSINE = 0.95, 0.99
 GROW, SHRINK = 2.0, 0.5
 #: A correction is at most this part of its step: a longer one may lead to another path.
 MOST_CORRECTION = 0.3
+#: Steps below this length may cross a corner of the curve, as where a stop is touched: neither
+#: their tangents nor their corrections, of at most the second part, are judged as those of others.
+CORNER, CORNER_CORRECTION = 1e-5, 3.0
 #: Newton passes; derivatives are kept where unbalanced forces are below this part.
 MOST_PASSES, KEPT_BELOW = 12, 1e-6
 #: Differences of the parameter, as a part of its range.
@@ -137,6 +140,8 @@ class ParameterStatics:
         """The point of an equilibrium, its tangent on the side of a normal (6 n + 1,)."""
         evaluator = self.evaluator
         self.load(s)
+        if evaluator.model.state_count:
+            self._check_states(pose)
         evaluator.count_turns(0.0, pose.u)
         counters, states = evaluator.system.par[self._counted], evaluator.states.copy()
         slopes = self.slopes(s, pose)
@@ -146,6 +151,15 @@ class ParameterStatics:
             return None
         stiffness = np.sort(np.linalg.eigvals(slopes.stiffness).real)
         return PathPoint(s, pose, states, counters, tangent / length, stiffness)
+
+    def _check_states(self, pose: StaticPose) -> None:
+        """Refuse a pose at which states of elements do not come to rest."""
+        from dap3d_core.simulation.equilibrium.states_at_rest import moving_states
+
+        if moving := moving_states(self.evaluator, 0.0, pose.u):
+            names = ", ".join(f"{state.element}.{state.name}" for state in moving)
+            raise SimulationError(f"a path cannot be followed: the rate of {names} vanishes for no "
+                                  "value of the state at a pose")  # fmt: skip
 
     def corrected(
         self, u: Floats, way: Floats, s: float, normal: Floats
@@ -285,7 +299,7 @@ class Continuation:
             if abs(rate) * length >= abs(nearest - a.s):
                 s, length = nearest, (nearest - a.s) / rate
         b = self._at(a, length, s)
-        if b is None or a.tangent @ b.tangent < LEAST_COSINE:
+        if b is None or (a.tangent @ b.tangent < LEAST_COSINE and length > CORNER):
             return None
         return b
 
@@ -305,7 +319,8 @@ class Continuation:
                 return None
             at, pose = found
             moved = np.append(self.family.way(a.pose.u, pose.u), at - a.s)
-            if np.linalg.norm(moved - length * a.tangent) > MOST_CORRECTION * length:
+            most = MOST_CORRECTION if length > CORNER else CORNER_CORRECTION
+            if np.linalg.norm(moved - length * a.tangent) > most * length:
                 return None
             b = self.family.point(at, pose, a.tangent)
         except (AssemblyError, SimulationError, np.linalg.LinAlgError):
