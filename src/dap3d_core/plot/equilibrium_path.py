@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.plot.style import (
@@ -18,6 +17,7 @@ from dap3d_core.plot.style import (
     PlainOffset,
     folded,
     legend_above,
+    show_rounding_flat,
     shown_text,
     style_axes,
     with_unit,
@@ -31,8 +31,8 @@ SPECIAL = {
     "turning": ("turning point", "o", PALETTE[1]),
     "branching": ("another path crosses", "D", PALETTE[3]),
 }
-#: A step is drawn by so many pieces.
-BETWEEN = 8
+#: A step is drawn by so many pieces; shorter steps, parts of the range, are at a corner.
+BETWEEN, CORNER = 8, 1e-4
 #: Legends have the entry of stability where it changes.
 STABILITY = ((True, "stable", "-"), (False, "unstable", "--"))
 
@@ -85,7 +85,7 @@ class EquilibriumPathPicture(Picture):
         for k, (name, values) in enumerate(zip(panel.names, panel.values.T, strict=True)):
             colour = PALETTE[k % len(PALETTE)]
             fine, x, y = _smooth(path.length, path.values, values)
-            for stable, rows in _runs(path.stable):
+            for stable, rows in _runs(path):
                 dash = next(dash for which, _, dash in STABILITY if which == stable)
                 ends = path.length[rows][[0, -1]]
                 part = (fine >= ends[0]) & (fine <= ends[1])
@@ -103,6 +103,7 @@ class EquilibriumPathPicture(Picture):
                         markersize=5.0, label=label, zorder=3)  # fmt: skip
         for axis in (ax.xaxis, ax.yaxis):
             axis.set_major_formatter(PlainOffset())
+        show_rounding_flat(ax)
         ax.set_xlabel(with_unit(path.parameter, path.unit), fontsize=LETTERS)
         label = with_unit(panel.label, panel.unit)
         ax.set_ylabel(folded(label, 15 * height), fontsize=LETTERS)
@@ -117,25 +118,31 @@ def _panel(path: "EquilibriumPath", name: str) -> Panel:
 
 
 def _smooth(length: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
-    """Points and more between them, on curves over the length that follow corners closely."""
-    from scipy.interpolate import Akima1DInterpolator
+    """Points and more between them, on cubic splines over the length from corner to corner."""
+    from scipy.interpolate import CubicSpline
 
-    if len(length) < 3 or np.any(np.diff(length) <= 0.0):
-        return length, x, y
-    parts = np.linspace(0.0, 1.0, BETWEEN, endpoint=False)
-    fine = np.append((length[:-1, None] + np.diff(length)[:, None] * parts).ravel(), length[-1])
-    curves = (Akima1DInterpolator(length, column)(fine) for column in (x, y))
-    return fine, *curves
+    corners = np.flatnonzero(np.diff(length) < CORNER)
+    ends = [-1, *corners.tolist(), len(length) - 1]
+    pieces = []
+    for first, last in zip(ends, ends[1:], strict=False):
+        own = slice(first + 1, last + 1)
+        known = np.stack([length[own], x[own], y[own]])
+        if known.shape[1] > 1:
+            parts = np.linspace(0.0, 1.0, BETWEEN, endpoint=False)
+            fine = (known[0, :-1, None] + np.diff(known[0])[:, None] * parts).ravel()
+            fine = np.append(fine, known[0, -1])
+            known = np.vstack([fine, CubicSpline(known[0], known[1:], axis=1)(fine)])
+        pieces.append(known)
+    whole = np.hstack(pieces)
+    return whole[0], whole[1], whole[2]
 
 
-def _runs(stable: NDArray[np.bool_]) -> Iterator[tuple[bool, slice]]:
-    """Rows of one stability after the other; each run begins where the one before it ends.
-
-    A turning point, which counts as unstable, is an end of both.
-    """
-    ends = np.flatnonzero(np.diff(stable.astype(int)))
+def _runs(path: "EquilibriumPath") -> Iterator[tuple[bool, slice]]:
+    """Rows of one stability after the other; a special point, where it changes, is of both."""
+    stable, special = path.stable, path.turning | path.branching
     first = 0
-    for end in [*ends.tolist(), len(stable) - 1]:
-        last = end + 1 if end < len(stable) - 1 and stable[end] else end
+    for end in np.flatnonzero(np.diff(stable.astype(int))).tolist():
+        last = end if special[end] else end + 1
         yield bool(stable[end]), slice(first, last + 1)
         first = last
+    yield bool(stable[-1]), slice(first, len(stable))

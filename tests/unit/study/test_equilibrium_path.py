@@ -178,7 +178,11 @@ def test_column_that_is_pushed_follows_one_path():
 
 @pytest.mark.parametrize(
     ("parameter", "values"),
-    [("forces.spring.k", "50:300:4"), ("points.tip.sPp.z", "1:0.6:3"), ("bodies.bar.mass", "1:9:3")],
+    [
+        ("forces.spring.k", "50:300:4"),
+        ("points.tip.sPp.z", "1:0.6:3"),
+        ("bodies.bar.mass", "1:9:3"),
+    ],
 )
 def test_path_without_turns_is_that_of_separate_searches(parameter, values):
     """Each given value has the equilibrium that a search of its own finds there."""

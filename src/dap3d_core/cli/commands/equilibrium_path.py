@@ -49,9 +49,12 @@ def follow(
     from dap3d_core.cli.console.progress import PreparationProgress
     from dap3d_core.result import UnknownNameError
 
-    with PreparationProgress(quiet=quiet or as_json) as progress, options.over_values(over) as (
-        name,
-        values,
+    with (
+        PreparationProgress(quiet=quiet or as_json) as progress,
+        options.over_values(over) as (
+            name,
+            values,
+        ),
     ):
         path = dap.equilibrium_path(scene, name, values, start=start, allow_code=allow_code,
                                     announce=progress.announce)  # fmt: skip

@@ -226,7 +226,9 @@ class ParameterStatics:
         """(6 n + 1,) Newton step across the normal; ``along``: the tangent on its side."""
         basis = pose.free.T @ slopes.free
         K, force, shift = basis @ slopes.stiffness @ basis.T, basis @ slopes.force, slopes.shift
-        weight = float(np.max(np.abs(K), initial=max(pose.size, np.max(np.abs(force), initial=0.0))))
+        weight = float(
+            np.max(np.abs(K), initial=max(pose.size, np.max(np.abs(force), initial=0.0)))
+        )
         weight = weight or 1.0
         border = normal[:-1] @ pose.free
         corner = normal[-1] + normal[:-1] @ shift

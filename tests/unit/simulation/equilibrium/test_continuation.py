@@ -70,7 +70,8 @@ def test_toggle_turns_where_virtual_work_says():
 
 
 @pytest.mark.parametrize(
-    ("parameter", "values"), [("points.crank_a.sPp.x", "-0.5:-0.4:3"), ("points.wall.sPp.x", "4:3.8:3")]
+    ("parameter", "values"),
+    [("points.crank_a.sPp.x", "-0.5:-0.4:3"), ("points.wall.sPp.x", "4:3.8:3")],
 )
 def test_geometry_as_parameter(parameter, values):
     """Joints close at each value; poses are those that a search finds there."""
@@ -85,4 +86,6 @@ def test_geometry_as_parameter(parameter, values):
 def test_directions_that_nothing_holds_are_left_out():
     """The least solution of equations one of which is empty."""
     matrix = np.diag([4.0, 1e-15, 2.0])
-    np.testing.assert_allclose(held_solution(matrix, np.array([8.0, 1.0, 2.0]), 1.0), [2.0, 0.0, 1.0])
+    np.testing.assert_allclose(
+        held_solution(matrix, np.array([8.0, 1.0, 2.0]), 1.0), [2.0, 0.0, 1.0]
+    )
