@@ -1,6 +1,7 @@
-"""Paths of equilibria: quantities over the parameter, turning points marked, unstable parts dashed."""
+"""Paths of equilibria over a parameter: turning points marked, unstable parts dashed."""
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -124,7 +125,7 @@ def _smooth(length: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats, Float
     corners = np.flatnonzero(np.diff(length) < CORNER)
     ends = [-1, *corners.tolist(), len(length) - 1]
     pieces = []
-    for first, last in zip(ends, ends[1:], strict=False):
+    for first, last in pairwise(ends):
         own = slice(first + 1, last + 1)
         known = np.stack([length[own], x[own], y[own]])
         if known.shape[1] > 1:

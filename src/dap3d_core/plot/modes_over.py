@@ -20,7 +20,6 @@ from dap3d_core.plot.style import (
     style_axes,
     with_unit,
 )
-
 from dap3d_core.plot.sweep.style import LINE_COLORS, norm_of
 
 if TYPE_CHECKING:
@@ -127,8 +126,8 @@ class RootLocusPicture(Picture):
         points = [np.column_stack([z.real, z.imag]) for _, z in curves]
         pieces = [np.stack([one[:-1], one[1:]], axis=1) for one in points]
         colours = [0.5 * (over[:-1] + over[1:]) for over, _ in curves]
-        lines = LineCollection(np.concatenate([np.zeros((0, 2, 2)), *pieces]), cmap=LINE_COLORS,
-                               norm=norm, linewidth=1.6)  # fmt: skip
+        segments = list(np.concatenate([np.zeros((0, 2, 2)), *pieces]))
+        lines = LineCollection(segments, cmap=LINE_COLORS, norm=norm, linewidth=1.6)
         lines.set_array(np.concatenate([x[:0], *colours]))
         for row, marker, label in ((0, "o", "first value"), (-1, "s", "last value")):
             ends = np.concatenate([values[row], values[row].conj()])

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -307,7 +308,9 @@ class _Family:
         self._compiled, self._own = compiled, own
         self._first, self._range = float(numbers[0]), float(numbers[-1] - numbers[0])
         self.given = (numbers - self._first) / self._range
-        self._exact = dict(zip(self.given.tolist(), numbers.tolist(), strict=True))
+        self._exact: dict[float, float] = dict(
+            zip(self.given.tolist(), numbers.tolist(), strict=True)
+        )
         self._load(1.0)  # mistakes at the last value are reported at once
         self.statics = ParameterStatics(self.evaluator, self._load)
 
@@ -340,7 +343,7 @@ class _Family:
         """(k,) length of the path up to each point, of its chords."""
         chords = [
             np.hypot(np.linalg.norm(self.statics.way(a.pose.u, b.pose.u)), b.s - a.s)
-            for a, b in zip(points, points[1:], strict=False)
+            for a, b in pairwise(points)
         ]
         return np.concatenate([[0.0], np.cumsum(chords)])
 

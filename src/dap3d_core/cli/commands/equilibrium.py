@@ -12,6 +12,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
+    from dap3d_core.scene import Scene
     from dap3d_core.simulation.equilibrium.equilibrium import Equilibrium
 
 #: Bodies and joints that are printed.
@@ -68,34 +69,21 @@ def equilibrium(
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
-    from dap3d_core.cli.console.progress import PreparationProgress
-    from dap3d_core.cli.framework.paths import open_state, writable, write_text
-    from dap3d_core.scene import SceneError
+    from dap3d_core.cli.framework.paths import open_state, write_text
 
     if quantities and over is None:
         raise Refused("--of names quantities of a path: give --over PARAMETER=FROM:TO:N")
     scene = dap.load(model)
     start, source = (None, None) if start_file is None else open_state(start_file)
-    target = None
-    if output is not None:
-        if over is not None:
-            check_picture(output)
-        target = writable(Path(output), force=force, sources=(scene.path, source))
+    target = _target(output, over, (scene.path, source), force=force)
     if over is not None:
         from dap3d_core.cli.commands.equilibrium_path import follow
 
         return follow(scene, over, quantities, start, target, force=force, allow_code=allow_code,
                       as_json=as_json, quiet=quiet)  # fmt: skip
-    with PreparationProgress(quiet=quiet or as_json) as progress:
-        try:
-            found = dap.equilibrium(
-                scene, start=start, allow_code=allow_code, announce=progress.announce
-            )
-        except SceneError as error:
-            raise options.in_options(error, {"start": "--from"}) from error
-    rest = None
-    if target is not None:
-        rest = found.scene()
+    found = _found(scene, start, allow_code=allow_code, quiet=quiet or as_json)
+    rest = None if target is None else found.scene()
+    if target is not None and rest is not None:
         write_text(target, rest.to_toml())
     data = _data(found, model, rest.notes if rest is not None else [])
     if as_json:
@@ -105,16 +93,38 @@ def equilibrium(
     return DONE
 
 
-def check_picture(output: str) -> None:
-    """Refuse a file that is no picture.
+def _target(
+    output: str | None, over: str | None, sources: tuple[Any, ...], *, force: bool
+) -> Path | None:
+    """The file to write: a scene, or with --over a picture.
 
     Raises:
-        Refused: it is none.
+        Refused: it cannot be written, or is no picture.
     """
-    from dap3d_core.plot.figure_file import check_suffix
+    from dap3d_core.cli.framework.paths import writable
 
-    with refusing(ValueError):
-        check_suffix(Path(output))
+    if output is None:
+        return None
+    if over is not None:
+        from dap3d_core.plot.figure_file import check_suffix
+
+        with refusing(ValueError):
+            check_suffix(Path(output))
+    return writable(Path(output), force=force, sources=sources)
+
+
+def _found(scene: "Scene", start: Any, *, allow_code: bool, quiet: bool) -> "Equilibrium":
+    """The equilibrium; mistakes of a start are those of --from."""
+    import dap3d_core as dap
+    from dap3d_core.cli.console.progress import PreparationProgress
+
+    with PreparationProgress(quiet=quiet) as progress:
+        try:
+            return dap.equilibrium(
+                scene, start=start, allow_code=allow_code, announce=progress.announce
+            )
+        except dap.SceneError as error:
+            raise options.in_options(error, {"start": "--from"}) from error
 
 
 def _data(found: "Equilibrium", model: str, more_notes: list[str]) -> dict[str, Any]:

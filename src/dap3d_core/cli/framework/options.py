@@ -190,4 +190,5 @@ def over_values(over: str) -> Iterator[tuple[str, str]]:
     try:
         yield name, values
     except SceneError as error:
-        raise in_options(error, {"parameter": "--over", "values": "--over"}) from error
+        names = {"parameter": "--over", "values": "--over", "start": "--from"}
+        raise in_options(error, names) from error

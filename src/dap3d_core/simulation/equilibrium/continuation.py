@@ -10,6 +10,7 @@ Keller, in: Applications of Bifurcation Theory, 1977.
 
 from collections.abc import Callable, Iterator
 from enum import Enum
+from itertools import pairwise
 
 import attrs
 import numpy as np
@@ -199,7 +200,8 @@ class ParameterStatics:
         """Derivatives at a pose; ``moves``: by the parameter as well, which otherwise holds."""
         K = self.statics.stiffness(pose)
         force, shift = np.zeros(len(pose.unbalanced)), np.zeros(len(pose.force))
-        offsets, weights = (-1.0, 1.0), (-0.5, 0.5)
+        offsets: tuple[float, ...] = (-1.0, 1.0)
+        weights: tuple[float, ...] = (-0.5, 0.5)
         if not DIFFERENCE <= s <= 1.0 - DIFFERENCE:
             side = 1.0 if s < 0.5 else -1.0
             offsets, weights = (0.0, side, 2.0 * side), (-1.5 * side, 2.0 * side, -0.5 * side)
@@ -345,7 +347,7 @@ class Continuation:
             elif branching is not None:
                 corners = [a, branching, b]
         found: list[PathPoint] = []
-        for p, q in zip(corners, corners[1:], strict=False):
+        for p, q in pairwise(corners):
             low, high = sorted((p.s, q.s))
             inside = self.given[(self.given > low) & (self.given < high)]
             for s in inside if p.s < q.s else inside[::-1]:
