@@ -341,10 +341,7 @@ class _Family:
 
     def lengths(self, points: list[PathPoint]) -> Floats:
         """(k,) length of the path up to each point, of its chords."""
-        chords = [
-            np.hypot(np.linalg.norm(self.statics.way(a.pose.u, b.pose.u)), b.s - a.s)
-            for a, b in pairwise(points)
-        ]
+        chords = [np.linalg.norm(self.statics.chord(a, b.s, b.pose.u)) for a, b in pairwise(points)]
         return np.concatenate([[0.0], np.cumsum(chords)])
 
     def is_stable(self, point: PathPoint) -> bool:

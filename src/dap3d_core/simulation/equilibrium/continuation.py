@@ -25,11 +25,12 @@ from dap3d_core.simulation.equilibrium.trust_region import (
 )
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 
-#: Steps are parts of the range of the parameter, and displacements as of Statics: the first one,
-#: the longest, and the shortest, at which the path ends. At most so many are taken.
-FIRST_STEP, LONGEST_STEP, SHORTEST_STEP, MOST_STEPS = 0.05, 0.2, 1e-9, 5000
+#: The first step, and the shortest, at which the path ends; at most so many are taken. Lengths are
+#: of the parameter, as a part of its range, and of the root mean square of displacements, as parts
+#: of the scene's extent and in rad.
+FIRST_STEP, SHORTEST_STEP, MOST_STEPS = 0.05, 1e-9, 5000
 #: Largest rotation of a body in a step, rad.
-MOST_TURN = 0.2
+MOST_TURN = 0.3
 #: Cosine of the angle between the tangents at the ends of a step: at least; longer steps follow
 #: above the second.
 LEAST_COSINE, GOOD_COSINE = 0.95, 0.99
@@ -69,7 +70,8 @@ class PathPoint:
         pose: the balance of forces.
         states: (s,) states of elements at rest.
         counters: turns of angles and unknowns of joints, as the evaluator stores them.
-        tangent: (6 n + 1,) unit vector of displacements, scaled, and of the parameter.
+        tangent: (6 n + 1,) unit vector of displacements, in the measure of ``ParameterStatics``,
+            and of the parameter.
         stiffness: (f,) real parts of the eigenvalues of the stiffness, N m, rising.
         kind: whether it is a special point.
     """
@@ -111,6 +113,7 @@ class ParameterStatics:
 
     Attributes:
         statics: the balance at one value.
+        measure: (6 n,) of displacements in the length of the path, over those of ``statics``.
     """
 
     def __init__(self, evaluator: Evaluator, load: Callable[[float], None]) -> None:
@@ -122,6 +125,9 @@ class ParameterStatics:
         counted = [places[place] for place in evaluator.turn_places()]
         self._counted = np.concatenate([places[:0], *counted])
         self.statics = Statics(evaluator)
+        n, part = evaluator.model.body_count, self.statics.length
+        extent = max(evaluator.model.extent, part)
+        self.measure = np.tile(np.repeat([part / extent, 1.0], 3), n) / np.sqrt(max(n, 1))
 
     def load(self, s: float, point: PathPoint | None = None) -> None:
         """Evaluate the model at s; counters and states stay, or are those of a point."""
@@ -147,6 +153,7 @@ class ParameterStatics:
         counters, states = evaluator.system.par[self._counted], evaluator.states.copy()
         slopes = self.slopes(s, pose)
         tangent = self._solve(pose, slopes, normal, along=True)
+        tangent[:-1] *= self.measure
         length = float(np.linalg.norm(tangent))
         if not 0.0 < length < np.inf:
             return None
@@ -169,12 +176,12 @@ class ParameterStatics:
 
         Args:
             u: (13 n,) state that the prediction starts from.
-            way: (6 n,) predicted displacement, scaled.
+            way: (6 n,) predicted displacement, in the measure of the path.
             s: predicted parameter.
             normal: (6 n + 1,) direction along which the equilibrium does not leave the prediction.
         """
         self.load(s)
-        pose = self._at(u, way)
+        pose = self._at(u, way / self.measure)
         slopes: Slopes | None = None
         for _ in range(MOST_PASSES):
             if slopes is None or pose.residual > KEPT_BELOW:
@@ -196,7 +203,7 @@ class ParameterStatics:
                 break
         return (s, pose) if pose.residual <= BALANCED else None
 
-    def slopes(self, s: float, pose: StaticPose, *, moves: bool = True) -> "Slopes":
+    def slopes(self, s: float, pose: StaticPose, *, moves: bool = True) -> Slopes:
         """Derivatives at a pose; ``moves``: by the parameter as well, which otherwise holds."""
         K = self.statics.stiffness(pose)
         force, shift = np.zeros(len(pose.unbalanced)), np.zeros(len(pose.force))
@@ -220,20 +227,23 @@ class ParameterStatics:
         shift, turn = displacement(u, other)
         return np.hstack([shift / self.statics.length, turn]).ravel()
 
+    def chord(self, a: PathPoint, s: float, u: Floats) -> Floats:
+        """(6 n + 1,) from a point to the state u (13 n,) at s, in the measure of the path."""
+        return np.append(self.measure * self.way(a.pose.u, u), s - a.s)
+
     def _at(self, u: Floats, way: Floats) -> StaticPose:
         return self.statics.at(self.statics.closed(self.statics.moved(u, way)))
 
-    @staticmethod
-    def _solve(pose: StaticPose, slopes: "Slopes", normal: Floats, *, along: bool) -> Floats:
-        """(6 n + 1,) Newton step across the normal; ``along``: the tangent on its side."""
+    def _solve(self, pose: StaticPose, slopes: Slopes, normal: Floats, *, along: bool) -> Floats:
+        """(6 n + 1,) Newton step across the normal, scaled; ``along``: the tangent on its side."""
         basis = pose.free.T @ slopes.free
         K, force, shift = basis @ slopes.stiffness @ basis.T, basis @ slopes.force, slopes.shift
         weight = float(
             np.max(np.abs(K), initial=max(pose.size, np.max(np.abs(force), initial=0.0)))
         )
         weight = weight or 1.0
-        border = normal[:-1] @ pose.free
-        corner = normal[-1] + normal[:-1] @ shift
+        across = self.measure * normal[:-1]
+        border, corner = across @ pose.free, normal[-1] + across @ shift
         matrix = np.block([[K, -force[:, None]], [weight * border, weight * corner]])
         balance = 0.0 * pose.unbalanced if along else pose.unbalanced
         y = held_solution(matrix, np.append(balance, weight if along else 0.0), pose.size)
@@ -286,15 +296,14 @@ class Continuation:
                 continue
             cosine = float(a.tangent @ b.tangent)
             self._step *= GROW if cosine > GOOD_COSINE else 1.0
-            self._step = min(self._step, LONGEST_STEP)
             return found
         return []
 
     def _next(self, a: PathPoint) -> PathPoint | None:
         """A point one step away, or at the next given value; None where the step is too long."""
         rate = float(a.tangent[-1])
-        turn = float(np.max(np.linalg.norm(a.tangent[:-1].reshape(-1, 6)[:, 3:], axis=1),
-                            initial=0.0))  # fmt: skip
+        rotations = (a.tangent[:-1] / self.family.measure).reshape(-1, 6)[:, 3:]
+        turn = float(np.max(np.linalg.norm(rotations, axis=1), initial=0.0))
         length = min(self._step, MOST_TURN / turn if turn > 0.0 else np.inf)
         ahead = self.given[(self.given - a.s) * rate > 0.0]
         s = None
@@ -322,7 +331,7 @@ class Continuation:
             if found is None:
                 return None
             at, pose = found
-            moved = np.append(self.family.way(a.pose.u, pose.u), at - a.s)
+            moved = self.family.chord(a, at, pose.u)
             most = MOST_CORRECTION if length > CORNER else CORNER_CORRECTION
             if np.linalg.norm(moved - length * a.tangent) > most * length:
                 return None
@@ -398,8 +407,7 @@ class Continuation:
 
     def _length(self, a: PathPoint, b: PathPoint) -> float:
         """How far a point is along the tangent of another."""
-        moved = np.append(self.family.way(a.pose.u, b.pose.u), b.s - a.s)
-        return float(a.tangent @ moved)
+        return float(a.tangent @ self.family.chord(a, b.s, b.pose.u))
 
 
 def _cubic(y0: float, d0: float, y1: float, d1: float) -> Floats:

@@ -38,7 +38,7 @@ def test_table_fits_sixty_columns(model, capsys, monkeypatch):
     words = [line.split() for line in lines]
     assert ["-42.9143", "0.27788", "unstable", "turns"] in words
     assert ["0", "0", "unstable"] in words
-    assert sum(line[-1:] == ["stable"] for line in words) == 6
+    assert sum(line[-1:] == ["stable"] for line in words) == 8
     assert "-42.914326 N, 42.914326 N" in " ".join(" ".join(words_) for words_ in words)
     assert main([*model, "-o", "curve.png"]) == 2  # it exists
 
