@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from unit.simulation.equilibrium.test_continuation import reach
 from unit.study.test_equilibrium_path import truss, truss_load, turning_height
 
 from dap3d_core.cli import main
@@ -50,6 +51,13 @@ def test_path_that_returns(model, capsys):
     out = " ".join(capsys.readouterr().out.split())
     assert "back at the first value" in out
     assert "values that begin beyond it follow the path further" in out
+
+
+def test_path_that_ends_on_its_way(model, capsys):
+    """What was found is printed; the exit code is that of a run that stopped early."""
+    reach().save("reach.toml")
+    assert main(["equilibrium", "reach.toml", "--over", "points.pin.sPp.x=0.6:1.2:4"]) == 3
+    assert "where no step goes on" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

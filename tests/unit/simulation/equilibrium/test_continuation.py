@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from unit.simulation.equilibrium.test_states_at_rest import hanging
 
 import dap3d_core as dap
 from dap3d_core.simulation.equilibrium.trust_region import held_solution
@@ -81,6 +82,40 @@ def test_geometry_as_parameter(parameter, values):
     for k in np.flatnonzero(found.given):
         alone = dap.equilibrium(found.equilibrium(int(k)).compiled.scene)
         np.testing.assert_allclose(found.u[k], alone.u, atol=1e-9)
+
+
+def reach():
+    """A mass on a rail below a pin, from which a rod of 1 m holds it."""
+    scene = dap.Scene(name="reach")
+    scene.add_body("m", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, -0.8))
+    scene.add_joint("tran", "rail", P_i="m.O", P_j="ground.O", a_j="ground.z")
+    scene.add_point("pin", body="ground", sPp=(0.6, 0.0, 0.0))
+    scene.add_joint("sph-sph", "rod", P_i="m.O", P_j="pin", length=1.0)
+    scene.add_force("weight", "gravity")
+    return scene
+
+
+def test_path_without_freedoms():
+    """Joints alone move the mass along a circle."""
+    found = dap.equilibrium_path(reach(), "points.pin.sPp.x", "0.6:0.9:4")
+    np.testing.assert_allclose(found.of("m.r.z"), -np.sqrt(1.0 - found.values**2), atol=1e-13)
+    assert found.end == "reached"
+
+
+def test_path_that_ends_on_its_way():
+    """Nearly 1 m aside the rod is at the end of its reach: what was found is returned."""
+    found = dap.equilibrium_path(reach(), "points.pin.sPp.x", "0.6:1.2:4")
+    assert found.end == "stuck"
+    assert 0.999 < found.values[-1] <= 1.0
+    assert "no step goes on there" in found.notes[-1]
+
+
+def test_states_of_elements_follow():
+    """The relaxed part of a solid: its state is its extension, m g / k_p."""
+    found = dap.equilibrium_path(hanging(), "forces.solid.k_p", "50:200:4")
+    exact = 2.0 * 9.81 / found.values
+    np.testing.assert_allclose(found.of("solid.z"), exact, rtol=1e-11)
+    np.testing.assert_allclose(np.linalg.norm(found.of("bob.r"), axis=1), 1.0 + exact, rtol=1e-11)
 
 
 def test_directions_that_nothing_holds_are_left_out():
