@@ -228,7 +228,7 @@ def equilibrium_path(
     continuation = Continuation(family.statics, family.given)
     end = continuation.run(rest.u)
     path = EquilibriumPath(compiled, family, continuation.points, end, list(rest.notes))
-    _check_effect(path, values)
+    _check_effect(path)
     path.notes += _path_notes(path, numbers)
     return path
 
@@ -247,7 +247,7 @@ def _check_values(varied: SceneParameter, values: Any, numbers: Floats) -> None:
         raise SceneError([Mistake("values", values, what)])
 
 
-def _check_effect(path: EquilibriumPath, values: Any) -> None:
+def _check_effect(path: EquilibriumPath) -> None:
     """Refuse a parameter that nothing depends on."""
     parts = (path.u, path.Lam, path.stiffness[:, None], path.stable[:, None].astype(float))
     for part in parts:
@@ -366,7 +366,7 @@ class _Family:
 
     def quantity(self, name: str, points: list[PathPoint], rows: Floats) -> Quantity:
         """A quantity of points with their rows (k, ...)."""
-        reduction = Reduction(self._compiled, [self.parameter], [Output("t", "t")])
+        reduction = Reduction(self._compiled, [self.parameter], [])
         self.load(points[0].s, points[0])
         quantity = find(reduction.result(self.evaluator.model, rows, self.evaluator), name)
         reduction = Reduction(self._compiled, [self.parameter], [Output(name, name)])
