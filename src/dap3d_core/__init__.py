@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from dap3d_core.simulation.rerun import rerun
     from dap3d_core.simulation.resume import resume
     from dap3d_core.simulation.stepwise.stepped_run import start
+    from dap3d_core.study.equilibrium_path import EquilibriumPath, equilibrium_path
     from dap3d_core.study.fit.fit import fit
     from dap3d_core.study.fit.fit_parameters import Parameter
     from dap3d_core.study.fit.fit_result import Fit
@@ -52,6 +53,7 @@ _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
     "Controller": ("simulation.control.controller", "Controller"),
     "Equilibrium": ("simulation.equilibrium.equilibrium", "Equilibrium"),
+    "EquilibriumPath": ("study.equilibrium_path", "EquilibriumPath"),
     "Event": ("simulation", "Event"),
     "Fit": ("study.fit.fit_result", "Fit"),
     "Linearization": ("simulation.linearization.linearization", "Linearization"),
@@ -66,6 +68,7 @@ _HOMES = {
     "animate": ("plot", "animate"),
     "compile": ("simulation", "compile_scene"),
     "equilibrium": ("simulation.equilibrium.equilibrium", "equilibrium"),
+    "equilibrium_path": ("study.equilibrium_path", "equilibrium_path"),
     "export": ("exchange", "export"),
     "export_model": ("formats.export_model", "export_model"),
     "fit": ("study.fit.fit", "fit"),
@@ -95,6 +98,7 @@ __all__ = [
     "AssemblyError",
     "Controller",
     "Equilibrium",
+    "EquilibriumPath",
     "Event",
     "Fit",
     "Linearization",
@@ -109,6 +113,7 @@ __all__ = [
     "animate",
     "compile",
     "equilibrium",
+    "equilibrium_path",
     "export",
     "export_model",
     "fit",

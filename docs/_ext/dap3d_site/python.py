@@ -20,8 +20,8 @@ SECTIONS = {
          "simulation.stepwise.stepped_run.SteppedRun"),
     ),
     "Analyses": (
-        ("equilibrium", "kinematics", "inverse", "linearize", "modes_over", "Equilibrium",
-         "Linearization", "ModesOver"),
+        ("equilibrium", "equilibrium_path", "kinematics", "inverse", "linearize", "modes_over",
+         "Equilibrium", "EquilibriumPath", "Linearization", "ModesOver"),
         (),
     ),
     "Results": (

@@ -18,10 +18,14 @@ if TYPE_CHECKING:
     import xarray
 
     from dap3d_core.simulation.linearization.linearization import Linearization
+    from dap3d_core.study.equilibrium_path import EquilibriumPath
     from dap3d_core.study.fit.fit_result import Fit
     from dap3d_core.study.modes_over import ModesOver
 
-    Drawable = Result | Mapping[str, Result] | Fit | Linearization | ModesOver | xarray.Dataset
+    Drawable = (
+        Result | Mapping[str, Result] | Fit | Linearization | ModesOver | EquilibriumPath
+        | xarray.Dataset
+    )  # fmt: skip
 
 #: Backends that matplotlib falls back on where it cannot open windows.
 FILE_BACKENDS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
@@ -43,11 +47,15 @@ def picture_of(
 
         return sweep_picture(cast("xarray.Dataset", result), names, x, at)
     if hasattr(result, "grows"):
-        if names or x is not None or at:
-            raise ValueError("of modes over a parameter the frequencies are drawn: name no more")
-        from dap3d_core.plot.modes_over import ModesOverPicture
+        from dap3d_core.plot.modes_over import modes_over_picture
 
-        return ModesOverPicture(cast("ModesOver", result))
+        return modes_over_picture(cast("ModesOver", result), names, x, at)
+    if hasattr(result, "turning"):
+        if x is not None or at:
+            raise ValueError("a path of equilibria is drawn over its parameter: leave x and at out")
+        from dap3d_core.plot.equilibrium_path import EquilibriumPathPicture
+
+        return EquilibriumPathPicture(cast("EquilibriumPath", result), names)
     drawn = result.values() if isinstance(result, Mapping) else [result]
     is_result = all(isinstance(one, Result) for one in drawn)
     if (
@@ -56,8 +64,8 @@ def picture_of(
         and not hasattr(result, "measured")
     ):
         words = (
-            "a Result, a dictionary of these, a Fit, a Linearization, a ModesOver or the data of "
-            "a sweep"
+            "a Result, a dictionary of these, a Fit, a Linearization, a ModesOver, an "
+            "EquilibriumPath or the data of a sweep"
         )
         reader = f"; dap.open({result!r}) reads one" if isinstance(result, (str, Path)) else ""
         raise TypeError(f"the argument result should be {words}, not {result!r}{reader}")
@@ -91,7 +99,8 @@ def plot(
     Args:
         result: a ``Result``; several as names and results, {"rtol 1e-6": result, ...}; a ``Fit``:
             its data, its curves and its residuals; a ``Linearization``: its eigenvalues; a
-            ``ModesOver``: its frequencies; or the data set of a sweep.
+            ``ModesOver``: its frequencies, or with "eigenvalues" its root locus; an
+            ``EquilibriumPath``: quantities over its parameter; or the data set of a sweep.
         quantities: names such as ``crank.r.z``, ``crank.w`` (all components), ``energy.total``;
             each unit has a panel of its own. Of a fit its outputs, by default all. Of a sweep as
             well: lines over one number, a map over two, parallel coordinates over more, curves

@@ -1,27 +1,52 @@
-"""Campbell diagrams: frequencies of modes over a parameter."""
+"""Campbell diagrams and root loci: frequencies and eigenvalues of modes over a parameter."""
 
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.plot.style import (
     DASHES,
     HEIGHT,
     LETTERS,
     PALETTE,
     Picture,
+    folded,
+    legend_above,
     style_axes,
     with_unit,
 )
+from dap3d_core.plot.sweep.style import LINE_COLORS, norm_of
 
 if TYPE_CHECKING:
+    from dap3d_core.simulation.linearization.eigenvalues import Complex
     from dap3d_core.study.modes_over import ModesOver
 
 #: The colour of what grows, which no curve has.
 GROWS = PALETTE[1]
 COLOURS = tuple(colour for colour in PALETTE if colour != GROWS)
+#: What is drawn, by name; frequencies by default.
+FREQUENCIES, EIGENVALUES = "frequencies", "eigenvalues"
+#: A real part below this part of the largest magnitude is drawn as zero.
+ROUNDING = 1e-9
+#: Points of a curve on which a pair meets the real axis.
+MEETING = 24
+
+
+def modes_over_picture(
+    modes: "ModesOver", names: Sequence[str], x: str | None, at: Mapping[str, float] | None
+) -> Picture:
+    """The Campbell diagram of modes over a parameter, or their root locus; errors as ``plot``."""
+    if list(names) not in ([], [FREQUENCIES], [EIGENVALUES]) or x is not None or at:
+        raise ValueError(
+            f"of modes over a parameter the {FREQUENCIES} or the {EIGENVALUES} are drawn: name no "
+            "more"
+        )
+    return RootLocusPicture(modes) if EIGENVALUES in names else ModesOverPicture(modes)
 
 
 class ModesOverPicture(Picture):
@@ -56,3 +81,117 @@ class ModesOverPicture(Picture):
         ax.set_ylabel("frequency [Hz]", fontsize=LETTERS)
         style_axes(ax)
         return ax
+
+
+class RootLocusPicture(Picture):
+    """Eigenvalues in the complex plane, coloured by the parameter.
+
+    Circles are those at the first value, squares those at the last one; motions grow on the tinted
+    side.
+    """
+
+    def __init__(self, modes: "ModesOver") -> None:
+        self.modes = modes
+
+    @property
+    def height(self) -> float:
+        """A suitable height of the figure, inches."""
+        return HEIGHT
+
+    def draw(self, figure: Figure) -> list[Axes]:
+        """Draw on an empty figure."""
+        ax = figure.add_subplot()
+        lines = self._draw_lines(ax)
+        bar = figure.colorbar(lines, ax=ax, pad=0.02)
+        bar.ax.tick_params(labelsize=LETTERS)
+        label = with_unit(self.modes.parameter, self.modes.unit)
+        bar.set_label(folded(label, 15 * figure.get_figheight()), fontsize=LETTERS)
+        _, labels = ax.get_legend_handles_labels()
+        legend_above(ax, labels, figure.get_figwidth())
+        return [ax]
+
+    def draw_on(self, ax: Axes) -> Axes:
+        """Draw on axes of the user."""
+        self._draw_lines(ax)
+        ax.legend(fontsize=LETTERS, frameon=False)
+        return ax
+
+    def _draw_lines(self, ax: Axes) -> LineCollection:
+        found, x = self.modes, self.modes.values
+        values = np.where(np.isnan(found.eigenvalues), complex(np.nan, np.nan), found.eigenvalues)
+        size = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
+        values.real[np.abs(values.real) <= ROUNDING * size] = 0.0
+        norm = norm_of(x)
+        curves = list(_loci(x, values))
+        points = [np.column_stack([z.real, z.imag]) for _, z in curves]
+        pieces = [np.stack([one[:-1], one[1:]], axis=1) for one in points]
+        colours = [0.5 * (over[:-1] + over[1:]) for over, _ in curves]
+        segments = list(np.concatenate([np.zeros((0, 2, 2)), *pieces]))
+        lines = LineCollection(segments, cmap=LINE_COLORS, norm=norm, linewidth=1.6)
+        lines.set_array(np.concatenate([x[:0], *colours]))
+        for row, marker, label in ((0, "o", "first value"), (-1, "s", "last value")):
+            ends = np.concatenate([values[row], values[row].conj()])
+            ax.plot(ends.real, ends.imag, marker, color=LINE_COLORS(norm(x[row])), linestyle="",
+                    markerfacecolor="white", markersize=4.5, label=label)  # fmt: skip
+        ax.add_collection(lines)
+        ax.autoscale_view()
+        if not np.any(values.real[np.isfinite(values)]):
+            ax.set_xlim(-size, size)
+        ax.margins(0.08)
+        ax.axvline(0.0, color="0.6", linewidth=0.8, zorder=0)
+        left, right = ax.get_xlim()
+        if right > 0.0:
+            ax.axvspan(0.0, right, color=GROWS, alpha=0.08, linewidth=0.0, zorder=0)
+            ax.set_xlim(left, right)
+        ax.set_xlabel("real part [1/s]", fontsize=LETTERS)
+        ax.set_ylabel("imaginary part [rad/s]", fontsize=LETTERS)
+        style_axes(ax)
+        return lines
+
+
+def _loci(x: Floats, values: "Complex") -> Iterator[tuple[Floats, "Complex"]]:
+    """Values of the parameter and eigenvalues of each piece of a locus.
+
+    Args:
+        x: (n,) the parameter.
+        values: (n, modes) eigenvalues, of pairs that with Im > 0; NaN where there is no such mode.
+    """
+    for k in range(len(x) - 1):
+        over = x[k : k + 2]
+        for before, after, forward in ((values[k], values[k + 1], True),
+                                       (values[k + 1], values[k], False)):  # fmt: skip
+            for pair, reals in _meetings(before, after):
+                parts, both = _meeting(before[pair], after[reals])
+                along = over[0] + np.diff(over) * (parts if forward else 1.0 - parts)
+                for z in both:
+                    yield along, z
+        is_pair = values[k : k + 2].imag != 0.0
+        is_there = np.all(np.isfinite(values[k : k + 2]), axis=0)
+        for z in values[k : k + 2, is_there & (is_pair[0] == is_pair[1])].T:
+            yield over, z
+            if z[0].imag:
+                yield over, z.conj()
+
+
+def _meetings(before: "Complex", after: "Complex") -> Iterator[tuple[int, list[int]]]:
+    """Pairs that meet on the real axis, and the two eigenvalues that they leave it as."""
+    begun = [int(j) for j in np.flatnonzero(np.isnan(before) & (after.imag == 0.0))]
+    for k in np.flatnonzero((before.imag > 0.0) & (after.imag == 0.0)):
+        if begun:
+            j = min(begun, key=lambda j: abs(after[j] + after[k] - 2.0 * before[k].real))
+            begun.remove(j)
+            yield int(k), [int(k), j]
+
+
+def _meeting(pair: complex, reals: "Complex") -> tuple[Floats, list["Complex"]]:
+    """Parts of the step from a pair to two real eigenvalues, and both eigenvalues there.
+
+    Mean and squared half difference of both are smooth, and are taken for linear.
+    """
+    below, above = pair.imag**2, (0.5 * np.ptp(reals.real)) ** 2
+    parts = np.sort(np.append(np.linspace(0.0, 1.0, MEETING), below / (below + above)))
+    mean = pair.real + parts * (np.mean(reals.real) - pair.real)
+    square = parts * above - (1.0 - parts) * below
+    square[np.abs(square) <= ROUNDING * (below + above)] = 0.0
+    root = np.sqrt(square.astype(complex))
+    return parts, [mean + root, mean - root]

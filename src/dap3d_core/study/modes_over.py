@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry import load_registry
 from dap3d_core.registry.arguments import checked
-from dap3d_core.scene import Mistake, Scene, SceneError, check, load
+from dap3d_core.scene import Scene, check, load
 from dap3d_core.simulation import SimulationError
 from dap3d_core.simulation.linearization.linearization import (
     MANY_BODIES,
@@ -20,14 +20,13 @@ from dap3d_core.simulation.linearization.linearization import (
     Linearization,
     linearize,
 )
-from dap3d_core.study.design import design_of
-from dap3d_core.study.parameters import SceneParameter, parameters_named, with_values
+from dap3d_core.study.parameter_values import read_values
+from dap3d_core.study.parameters import SceneParameter, with_values
 
 #: Weight of the distance of eigenvalues beside the likeness of shapes: it only breaks ties.
 TIE = 1e-3
 #: Eigenvalues within this part of each other share a space of shapes, of which any is a mode's.
 REPEATED = 1e-6
-FORMS = "1:5:9 (from:to:count), 1:100:5:log or 10,50,100 (a list)"
 
 
 @attrs.frozen(eq=False)
@@ -115,7 +114,8 @@ def modes_over(
     if modes is not None and modes < 1:
         raise ValueError(f"modes must be a whole number above zero, not {modes!r}")
     scene = scene if isinstance(scene, Scene) else load(scene)
-    varied, numbers = _read(scene, parameter, values, allow_code)
+    own = check(scene, load_registry(), allow_code=allow_code)
+    varied, numbers = read_values(own, parameter, values)
     follower = _Follower()
     stable: list[bool] = []
     steady: list[bool] = []
@@ -127,29 +127,6 @@ def modes_over(
         notes |= dict.fromkeys(point.notes)
     return ModesOver(varied.name, varied.unit, numbers, follower.eigenvalues()[:, :modes],
                      np.array(stable), np.array(steady), tuple(notes))  # fmt: skip
-
-
-def _read(scene: Scene, name: str, values: Any, allow_code: bool) -> tuple[SceneParameter, Floats]:
-    """The parameter and its values (n,)."""
-    if isinstance(values, str) and "~" in values:
-        raise SceneError([Mistake("values", values, f"values are {FORMS}")])
-    own = check(scene, load_registry(), allow_code=allow_code)
-    mistakes: list[Mistake] = []
-    try:
-        [parameter] = parameters_named(own, [name])
-    except SceneError as error:
-        mistakes += [attrs.evolve(m, key="parameter") for m in error.mistakes]
-    try:
-        numbers = design_of({name: values}, None, "lhs", 0).varied[0].values
-    except SceneError as error:  # samples have no order to follow modes in
-        mistakes += [attrs.evolve(m, key="values", remedy=m.remedy.partition(", or sample")[0])
-                     for m in error.mistakes]  # fmt: skip
-    if mistakes or numbers is None:
-        raise SceneError(mistakes)
-    if parameter.whole and np.any(numbers != np.round(numbers)):
-        what = f"{name} is a whole number; list whole values"
-        raise SceneError([Mistake("values", values, what)])
-    return parameter, numbers
 
 
 def _linearised(

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.framework import options
+from dap3d_core.cli.framework import completion, options
 from dap3d_core.cli.framework.command import command
-from dap3d_core.cli.process.exit_codes import DONE
+from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
+    from dap3d_core.scene import Scene
     from dap3d_core.simulation.equilibrium.equilibrium import Equilibrium
 
 #: Bodies and joints that are printed.
@@ -23,7 +24,14 @@ ROUNDING = 1e-12
 @command(
     "Find where a model comes to rest.",
     options.MODEL,
-    options.output("Scene file to write, whose bodies start at rest there."),
+    options.output("Scene file to write, whose bodies start at rest there; with --over a picture, "
+                   ".png, .svg or .pdf."),
+    click.option("--over", metavar="PARAMETER=FROM:TO:N", shell_complete=completion.parameters,
+                 help="Follow the equilibrium over the values of a parameter, through turning "
+                      "points; also FROM:TO:N:log or a list."),
+    click.option("--of", "quantities", multiple=True, metavar="QUANTITY",
+                 help="With --over: what is listed and drawn, such as crank.r.z, as often as "
+                      "wanted; by default the coordinate that changes most."),
     click.option("--from", "start_file", metavar="RESULT[@TIME]",
                  help="Search from the state of a result, at its end or at a time in s."),
     options.FORCE, options.ALLOW_CODE, options.JSON, options.QUIET,
@@ -32,6 +40,8 @@ def equilibrium(
     model: str,
     *,
     output: str | None,
+    over: str | None,
+    quantities: tuple[str, ...],
     start_file: str | None,
     force: bool,
     allow_code: bool,
@@ -44,33 +54,36 @@ def equilibrium(
     dap3d equilibrium pen2
     dap3d equilibrium car.toml -o rest.toml
     dap3d run car.toml --start equilibrium
+    dap3d equilibrium truss.toml --over forces.load.f.z=60:-60:13 -o curve.png
 
     Of several equilibria it is the one that the start of the scene leads to. A start that is an
     equilibrium is reported as it is, stable or not. Forces are those at rest and at t = 0, drivers
     have their initial values, friction is left out. Exit code 1 where nothing holds a freedom: the
     message says which bodies give way, and where to.
+
+    With --over the equilibrium at the first value is followed along its path, stable or not, to the
+    last one. Where there is none beyond a value, as at the load at which a truss snaps through, the
+    path turns: it may come to a value several times, and ends where it is back at the first one.
+    Listed are the given values and the turning points, which the picture marks; unstable parts of
+    it are dashed. --json has all points. Exit code 3 where the path ends on its way.
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
-    from dap3d_core.cli.console.progress import PreparationProgress
-    from dap3d_core.cli.framework.paths import open_state, writable, write_text
-    from dap3d_core.scene import SceneError
+    from dap3d_core.cli.framework.paths import open_state, write_text
 
+    if quantities and over is None:
+        raise Refused("--of names quantities of a path: give --over PARAMETER=FROM:TO:N")
     scene = dap.load(model)
     start, source = (None, None) if start_file is None else open_state(start_file)
-    target = None
-    if output is not None:
-        target = writable(Path(output), force=force, sources=(scene.path, source))
-    with PreparationProgress(quiet=quiet or as_json) as progress:
-        try:
-            found = dap.equilibrium(
-                scene, start=start, allow_code=allow_code, announce=progress.announce
-            )
-        except SceneError as error:
-            raise options.in_options(error, {"start": "--from"}) from error
-    rest = None
-    if target is not None:
-        rest = found.scene()
+    target = _target(output, over, (scene.path, source), force=force)
+    if over is not None:
+        from dap3d_core.cli.commands.equilibrium_path import follow
+
+        return follow(scene, over, quantities, start, target, force=force, allow_code=allow_code,
+                      as_json=as_json, quiet=quiet)  # fmt: skip
+    found = _found(scene, start, allow_code=allow_code, quiet=quiet or as_json)
+    rest = None if target is None else found.scene()
+    if target is not None and rest is not None:
         write_text(target, rest.to_toml())
     data = _data(found, model, rest.notes if rest is not None else [])
     if as_json:
@@ -78,6 +91,40 @@ def equilibrium(
     elif not quiet:
         _show(stdout(), data, target)
     return DONE
+
+
+def _target(
+    output: str | None, over: str | None, sources: tuple[Any, ...], *, force: bool
+) -> Path | None:
+    """The file to write: a scene, or with --over a picture.
+
+    Raises:
+        Refused: it cannot be written, or is no picture.
+    """
+    from dap3d_core.cli.framework.paths import writable
+
+    if output is None:
+        return None
+    if over is not None:
+        from dap3d_core.plot.figure_file import check_suffix
+
+        with refusing(ValueError):
+            check_suffix(Path(output))
+    return writable(Path(output), force=force, sources=sources)
+
+
+def _found(scene: "Scene", start: Any, *, allow_code: bool, quiet: bool) -> "Equilibrium":
+    """The equilibrium; mistakes of a start are those of --from."""
+    import dap3d_core as dap
+    from dap3d_core.cli.console.progress import PreparationProgress
+
+    with PreparationProgress(quiet=quiet) as progress:
+        try:
+            return dap.equilibrium(
+                scene, start=start, allow_code=allow_code, announce=progress.announce
+            )
+        except dap.SceneError as error:
+            raise options.in_options(error, {"start": "--from"}) from error
 
 
 def _data(found: "Equilibrium", model: str, more_notes: list[str]) -> dict[str, Any]:

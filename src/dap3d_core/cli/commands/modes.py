@@ -41,6 +41,9 @@ NAMED, LEAST_SHARE = 3, 0.05
     click.option("--plot", type=click.Path(), metavar="FILE",
                  help="Draw the eigenvalues, with --over the frequencies over the parameter, into "
                       "a .png, .svg or .pdf file."),
+    click.option("--locus", is_flag=True,
+                 help="With --over and --plot: draw the root locus, the eigenvalues in the complex "
+                      "plane, in place of the frequencies."),
     click.option("--mode", type=click.IntRange(min=1), metavar="NUMBER",
                  help="With -o: the mode whose motion is written; the first by default."),
     options.output("Write the motion of a mode as a result, for `dap3d view` and `animate`."),
@@ -54,6 +57,7 @@ def modes(
     over: str | None,
     number: int | None,
     plot: str | None,
+    locus: bool,
     mode: int | None,
     output: str | None,
     force: bool,
@@ -71,6 +75,7 @@ def modes(
     dap3d modes pen1 --from pen1.nc@1.5
     dap3d modes pen1 --plot modes.png
     dap3d modes pen1 --over bodies.cone.mass=1:5:9 --plot campbell.png
+    dap3d modes pen1 --over bodies.cone.mass=1:5:9 --plot locus.png --locus
     dap3d modes pen1 --mode 1 -o mode.nc     then: dap3d view mode.nc
     """
     import dap3d_core as dap
@@ -79,22 +84,20 @@ def modes(
     targets = _targets(plot, output, force)
     if start is not None and time is not None:
         raise Refused("--t does not go with --from: the time is that of the result, RESULT@TIME")
-    if over is not None and not (start is None and mode is None and output is None):
-        raise Refused("--over does not go with --from, --mode and -o: it is about many starts")
     if mode is not None and output is None:
         raise Refused("--mode chooses the motion that -o writes: name its file, -o FILE.nc")
+    if locus and (over is None or plot is None):
+        raise Refused("--locus draws eigenvalues over a parameter: give --over and --plot FILE.png")
     scene = dap.load(model)
     if over is not None:
-        return _over(scene, over, time, number, plot, force, allow_code, as_json)
+        if not (start is None and output is None):
+            raise Refused("--over does not go with --from, --mode and -o: it is about many starts")
+        return _over(scene, over, time, number, plot, locus, force, allow_code, as_json)
     at, t = state_of(start, allow_code) if start else (None, time or 0.0)
     with refusing(dap.SimulationError):
         found = dap.linearize(scene, at=at, t=t, modes=number, allow_code=allow_code)
         data = _data(scene.name, found, number or LISTED)
-    if plot is not None:
-        from dap3d_core.plot import save_plot
-
-        with refusing(ValueError):
-            save_plot(found, [], plot, force=force)
+    _draw(found, [], plot, force=force)
     if output is not None:
         with refusing(IndexError):
             found.motion((mode or 1) - 1).save(output, force=force)
@@ -109,18 +112,14 @@ def modes(
 
 def _over(
     scene: "Scene", over: str, time: float | None, number: int | None, plot: str | None,
-    force: bool, allow_code: bool, as_json: bool,
+    locus: bool, force: bool, allow_code: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """Follow the modes over a parameter, and report them."""
     from dap3d_core.cli.commands.modes_over import data_of, find_modes_over, show
     from dap3d_core.cli.console.console import print_json, stdout
 
     found = find_modes_over(scene, over, time, number or LISTED, allow_code=allow_code)
-    if plot is not None:
-        from dap3d_core.plot import save_plot
-
-        with refusing(ValueError):
-            save_plot(found, [], plot, force=force)
+    _draw(found, ["eigenvalues" if locus else "frequencies"], plot, force=force)
     if as_json:
         print_json(data_of(scene.name, found))
     else:
@@ -128,6 +127,15 @@ def _over(
         if plot is not None:
             stdout().say(f"{plot} written", whole=True)
     return DONE
+
+
+def _draw(found: Any, names: list[str], plot: str | None, *, force: bool) -> None:
+    """Draw into the file of --plot, where there is one."""
+    if plot is not None:
+        from dap3d_core.plot import save_plot
+
+        with refusing(ValueError):
+            save_plot(found, names, plot, force=force)
 
 
 def _targets(plot: str | None, output: str | None, force: bool) -> list[Path]:

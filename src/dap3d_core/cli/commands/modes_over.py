@@ -2,7 +2,8 @@
 
 from typing import TYPE_CHECKING, Any
 
-from dap3d_core.cli.process.exit_codes import Refused, refusing
+from dap3d_core.cli.framework import options
+from dap3d_core.cli.process.exit_codes import refusing
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
@@ -19,23 +20,11 @@ def find_modes_over(
         Refused: it is not PARAMETER=FROM:TO:N, or the scene cannot be linearised at a value.
         SceneError: there is no such parameter, or the values are none.
     """
-    import attrs
-
     import dap3d_core as dap
-    from dap3d_core.study.modes_over import FORMS
 
-    name, sign, values = (part.strip() for part in over.rpartition("="))
-    if not (name and sign and values):
-        raise Refused(f"--over {over}: write PARAMETER=FROM:TO:N, with values such as {FORMS}")
-    try:
-        with refusing(dap.SimulationError):
-            return dap.modes_over(scene, name, values, t=time or 0.0, modes=number,
-                                  allow_code=allow_code)  # fmt: skip
-    except dap.SceneError as error:
-        raise dap.SceneError(
-            attrs.evolve(m, key="--over") if m.key in ("parameter", "values") else m
-            for m in error.mistakes
-        ) from error
+    with options.over_values(over) as (name, values), refusing(dap.SimulationError):
+        return dap.modes_over(scene, name, values, t=time or 0.0, modes=number,
+                              allow_code=allow_code)  # fmt: skip
 
 
 def data_of(name: str, found: "ModesOver") -> dict[str, Any]:

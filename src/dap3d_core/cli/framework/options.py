@@ -1,12 +1,14 @@
 """Arguments and options of commands, each defined once."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from dap3d_core.cli.framework import completion
 from dap3d_core.cli.framework.command import Option
+from dap3d_core.cli.process.exit_codes import Refused
 
 if TYPE_CHECKING:
     from dap3d_core.scene import Scene, SceneError
@@ -170,3 +172,23 @@ def in_options(error: "SceneError", options: Mapping[str, str] = SETTINGS) -> "S
         else m
         for m in error.mistakes
     )
+
+
+@contextmanager
+def over_values(over: str) -> Iterator[tuple[str, str]]:
+    """The parameter and the values of ``--over``; mistakes in them are those of the option.
+
+    Raises:
+        Refused: it is not PARAMETER=FROM:TO:N.
+    """
+    from dap3d_core.scene import SceneError
+    from dap3d_core.study.parameter_values import FORMS
+
+    name, sign, values = (part.strip() for part in over.rpartition("="))
+    if not (name and sign and values):
+        raise Refused(f"--over {over}: write PARAMETER=FROM:TO:N, with values such as {FORMS}")
+    try:
+        yield name, values
+    except SceneError as error:
+        names = {"parameter": "--over", "values": "--over", "start": "--from"}
+        raise in_options(error, names) from error

@@ -4,7 +4,9 @@ import importlib.util
 import linecache
 import sys
 from contextlib import suppress
+from functools import lru_cache
 from pathlib import Path
+from types import CodeType
 from typing import Any
 
 from dap3d_core.kernels.runtime.cache import cache_folder
@@ -52,5 +54,11 @@ def load(path: Path | None, name: str, text: str) -> dict[str, Any]:
         spec = importlib.util.spec_from_file_location(path.stem, path)
         module = sys.modules[path.stem] = importlib.util.module_from_spec(spec)
         namespace = vars(module)
-    exec(compile(text, file, "exec"), namespace)  # our own text, as an import would do
+    exec(_code(text, file), namespace)  # our own text, as an import would do
     return namespace
+
+
+@lru_cache(maxsize=256)
+def _code(text: str, file: str) -> CodeType:
+    """Bytecode of a text: derivatives run the same loops again and again."""
+    return compile(text, file, "exec")

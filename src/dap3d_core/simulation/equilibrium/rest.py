@@ -68,21 +68,29 @@ def find_rest(
     statics, pose = Statics(evaluator), search.pose
     stability = stability_of(statics, pose)
     rows = evaluator.rows(0.0, pose.u)
-    force, D = evaluator.applied_forces(0.0, pose.u).ravel(), rows.dense()
-    multipliers = np.zeros(len(D))
-    if len(D):
-        multipliers = -np.linalg.lstsq(D.T * statics.scale[:, None], statics.scale * force,
-                                       rcond=RCOND)[0]  # fmt: skip
+    multipliers, unbalanced = least_multipliers(statics, pose.u)
     return Rest(
         pose.u,
         evaluator.counted_angles(0.0, pose.u),
         evaluator.states.copy(),
         multipliers,
-        (force + D.T @ multipliers).reshape(-1, 6),
+        unbalanced,
         search,
         stability,
         (*findings(search, stability, evaluator.model), *assumptions(evaluator, u, rows)),
     )
+
+
+def least_multipliers(statics: Statics, u: Floats) -> tuple[Floats, Floats]:
+    """(rows,) multipliers of least norm at an equilibrium u (13 n,), (n, 6) what they leave."""
+    evaluator = statics.evaluator
+    D = evaluator.rows(statics.t, u).dense()
+    force = evaluator.applied_forces(statics.t, u).ravel()
+    multipliers = np.zeros(len(D))
+    if len(D):
+        multipliers = -np.linalg.lstsq(D.T * statics.scale[:, None], statics.scale * force,
+                                       rcond=RCOND)[0]  # fmt: skip
+    return multipliers, (force + D.T @ multipliers).reshape(-1, 6)
 
 
 def _with_states(evaluator: Evaluator, search: Search) -> Search:

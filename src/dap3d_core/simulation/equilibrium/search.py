@@ -17,6 +17,7 @@ from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, at_re
 from dap3d_core.simulation.equilibrium.trust_region import (
     BALANCED,
     Step,
+    held_solution,
     trust_region_step,
     zero_stiffness,
 )
@@ -199,9 +200,7 @@ class _Search:
             if pose.residual <= ROUNDING:
                 return steps
             K = self.statics.stiffness(pose)
-            left, values, right = np.linalg.svd(K)
-            held = values > zero_stiffness(values, pose.size)
-            y = right[held].T @ ((left.T @ pose.unbalanced)[held] / values[held])
+            y = held_solution(K, pose.unbalanced, pose.size)
             trial = self._trial(pose, Step(y, 0.0, True))
             if trial is None or not trial.residual < pose.residual:
                 return steps

@@ -79,6 +79,17 @@ def zero_stiffness(w: Floats, size: float) -> float:
     return NEUTRAL * max(float(np.max(np.abs(w), initial=0.0)), size)
 
 
+def held_solution(matrix: Floats, side: Floats, size: float) -> Floats:
+    """The least solution of equations of stiffness, without directions that none holds.
+
+    size: of forces, N m: a part of it is zero.
+    """
+    left, values, right = np.linalg.svd(matrix)
+    held = values > zero_stiffness(values, size)
+    solution: Floats = right[held].T @ ((left.T @ side)[held] / values[held])
+    return solution
+
+
 def _gain(K: Floats, g: Floats, y: Floats) -> float:
     return float(g @ y - 0.5 * y @ K @ y)
 

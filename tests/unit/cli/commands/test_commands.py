@@ -93,6 +93,18 @@ REFUSED = [
     (("rerun", "fall.toml"), "it is not a NetCDF-4 file"),
     # analyses
     (("equilibrium", "pne1"), "did you mean 'pen1'"),
+    (("equilibrium", "fall.toml", "--over", "bodies.stone.mass"), "write PARAMETER=FROM:TO:N"),
+    (
+        ("equilibrium", "fall.toml", "--over", "bodies.stnoe.mass=1:2:3"),
+        "did you mean 'bodies.stone.mass'",
+    ),
+    (("equilibrium", "fall.toml", "--over", "bodies.stone.mass=1:2"), "add how many, 1:2:9"),
+    (
+        ("equilibrium", "fall.toml", "--over", "bodies.stone.mass=1:2:3", "-o", "rest.toml"),
+        "a figure is one of",
+    ),
+    (("equilibrium", "fall.toml", "--of", "stone.r.z"), "give --over PARAMETER=FROM:TO:N"),
+    (("modes", "fall.toml", "--locus"), "give --over and --plot FILE.png"),
     (("kinematics", "pne1"), "did you mean 'pen1'"),
     (("inverse", "pne1"), "Missing argument 'MOTION'"),
     (("modes", "fall.toml", "-n", "0"), "is not in the range x>=1"),
