@@ -21,7 +21,12 @@ if TYPE_CHECKING:
     "Explain a type or a model: equations, fields, quantities.",
     click.argument("keyword", metavar="KEYWORD | MODEL"),
     click.option("--names", is_flag=True, help="Also list the names that its kernels may use."),
-    click.option("--source", is_flag=True, help="Also show its kernels, written or derived."),
+    click.option(
+        "--source",
+        is_flag=True,
+        help="Also show the kernels of a type, written or derived; of a model "
+        "the operations of its own program (decision 92).",
+    ),
     options.ALLOW_CODE,
     options.JSON,
 )
@@ -37,10 +42,9 @@ def describe(keyword: str, *, names: bool, source: bool, allow_code: bool, as_js
 
     registry = dap.load_registry()
     if not _is_type(registry, keyword) and is_model(keyword):
-        if names or source:
-            option = "--names" if names else "--source"
-            raise Refused(f"{option} is of types, and {keyword} is a model; give a keyword")
-        model = model_data(keyword, allow_code=allow_code)
+        if names:
+            raise Refused(f"--names is of types, and {keyword} is a model; give a keyword")
+        model = model_data(keyword, allow_code=allow_code, source=source)
         if as_json:
             print_json({"model": model})
         else:

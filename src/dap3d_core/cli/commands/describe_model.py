@@ -8,6 +8,13 @@ if TYPE_CHECKING:
     from dap3d_core.result import Result
     from dap3d_core.simulation import CompiledModel
 
+#: Parts of a program that are shown, and short names of kinds of operations.
+MOST_PARTS = 15
+ABBREVIATED = {
+    "loads": "loads", "sums and products": "+ - *", "quotients and roots": "/ sqrt",
+    "choices": "choices", "calls": "calls",
+}  # fmt: skip
+
 
 def is_model(word: str) -> bool:
     """True for the name of a shipped model, a file or a folder."""
@@ -16,8 +23,10 @@ def is_model(word: str) -> bool:
     return word in shipped_models() or os.path.exists(word)  # no error for impossible paths
 
 
-def model_data(model: str, *, allow_code: bool) -> dict[str, Any]:
+def model_data(model: str, *, allow_code: bool, source: bool = False) -> dict[str, Any]:
     """The description of a model as data: its parts, joint coordinates, parameters, outputs.
+
+    With ``source``, also the operations of its program (formulations/programs).
 
     Raises:
         SceneError, PluginError: as ``compile``.
@@ -46,6 +55,33 @@ def model_data(model: str, *, allow_code: bool) -> dict[str, Any]:
             for name, expression in probe.outputs.items()
             for quantity in [find(probe, name)]
         ],
+    } | (_programs(compiled) if source else {})  # fmt: skip
+
+
+def _programs(compiled: "CompiledModel") -> dict[str, Any]:
+    """The operations of the programs of a model, or the reason why there are none."""
+    from dap3d_core.formulations.programs.change_over import MOST_BODIES
+    from dap3d_core.formulations.programs.operations import operations
+    from dap3d_core.kernels.compiler.trace import TraceError
+    from dap3d_core.kernels.compiler.types import CompileError
+
+    evaluator, settings = compiled.new_evaluator(), compiled.scene.simulation
+    about: dict[str, Any] = {"method": compiled.method, "programs": []}
+    if not 0 < evaluator.model.body_count <= MOST_BODIES:
+        return about | {"reason": f"scenes of up to {MOST_BODIES} bodies have programs"}
+    start = compiled.start(bool(settings.correct), settings.hold, str(settings.correct_metric))
+    state = evaluator.coordinates.start(start.u)
+    evaluator.start(0.0, start.u)
+    try:
+        found = operations(evaluator, 0.0, state)
+    except (TraceError, CompileError) as error:
+        return about | {"reason": f"the scene has no program of its own: {error}"}
+    return about | {
+        "programs": [
+            {"name": program.name, "guards": program.guards, "total": program.total,
+             "parts": program.parts}
+            for program in found
+        ]
     }  # fmt: skip
 
 
@@ -96,6 +132,29 @@ def show_model(console: "Terminal", data: dict[str, Any]) -> None:
         console.title("outputs")
         rows = [(o["name"], o["unit"], o["expression"]) for o in data["outputs"]]
         console.table(("output", "unit", "is"), rows, fixed=(0, 1))
+    if "reason" in data:
+        console.prose(data["reason"])
+    for program in data.get("programs", ()):
+        _show_program(console, program, data["method"])
+
+
+def _show_program(console: "Terminal", program: dict[str, Any], method: str) -> None:
+    """Print the operations of a program by part, the largest ones first."""
+    from dap3d_core.cli.console.console import count
+
+    total, parts = program["total"], program["parts"]
+    console.title(f"{program['name']}, by method {method}")
+    console.prose(
+        f"{count(sum(total.values()), 'operation')} and {count(program['guards'], 'guard')}"
+    )
+    shown = dict(list(parts.items())[:MOST_PARTS])
+    if others := list(parts.values())[MOST_PARTS:]:
+        summed = {kind: sum(part[kind] for part in others) for kind in total}
+        shown[f"{len(others)} others"] = summed
+    rows = [(name, *(f"{n:,}" if n else "" for n in part.values()))
+            for name, part in {**shown, "all": total}.items()]  # fmt: skip
+    right = tuple(range(1, len(total) + 1))
+    console.table(("part", *(ABBREVIATED[kind] for kind in total)), rows, right=right)
 
 
 def _coordinates_text(joint: dict[str, Any]) -> str:

@@ -3,7 +3,7 @@
 import re
 import sys
 from collections import Counter
-from pathlib import Path
+from collections.abc import Mapping
 from types import FrameType
 
 import attrs
@@ -13,9 +13,11 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.programs.scene_program import (
     MOST_INSTRUCTIONS,
     off_constraints,
+    python_loops,
     reads_rates,
     write_program,
 )
+from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.compiler.straight_line import StraightLine
 
 #: Packages whose functions are named; what they call for arithmetic belongs to them.
@@ -28,7 +30,6 @@ KINDS = {
     "choices": ("fcmp", "select", "and", "or", "xor"),
     "calls": ("call",),
 }
-_CORE = Path(__file__).parents[2]
 _LINE = re.compile(r"\s*(?:(%[\w.]+) = )?(.*)")
 
 
@@ -55,29 +56,29 @@ class ProgramOperations:
 class _Counting(StraightLine):
     """Notes which function of the core each instruction comes from."""
 
-    def __init__(self) -> None:
+    def __init__(self, loops: Mapping[str, str]) -> None:
+        """Args: name of a module -> the loop over instances of a type that it holds."""
         super().__init__(MOST_INSTRUCTIONS)
+        self._loops = loops
         self.owner: dict[str, str] = {}
 
     def new(self, text: str) -> str:
         name = super().new(text)
         if name not in self.owner:
-            self.owner[name] = _owner(sys._getframe(1))
+            self.owner[name] = self._owner(sys._getframe(1))
         return name
 
-
-def _owner(frame: FrameType | None) -> str:
-    """The function of the core, or the kernels of a type, that a frame was called by."""
-    while frame is not None:
-        file = Path(frame.f_code.co_filename)
-        if not file.exists():  # the loop over the instances of a type, written for it
-            return f"{frame.f_globals.get('__name__', '')}"
-        if file.is_relative_to(_CORE):
-            package, *_ = file.relative_to(_CORE).parts
-            if package in NAMED and "programs" not in file.parts:
-                return f"{package}.{file.stem}.{frame.f_code.co_name}"
-        frame = frame.f_back
-    return "results"
+    def _owner(self, frame: FrameType | None) -> str:
+        """The function of the core, or the kernels of a type, that a frame was called by."""
+        while frame is not None:
+            module = frame.f_globals.get("__name__", "")
+            if module in self._loops:
+                return self._loops[module]
+            _, _, place = module.partition("dap3d_core.")
+            if place.partition(".")[0] in NAMED and ".programs" not in place:
+                return f"{place.rpartition('.')[2]}.{frame.f_code.co_name}"
+            frame = frame.f_back
+        return "results"
 
 
 def operations(evaluator: Evaluator, time: float, state: Floats) -> list[ProgramOperations]:
@@ -87,12 +88,18 @@ def operations(evaluator: Evaluator, time: float, state: Floats) -> list[Program
         TraceError, CompileError: it has none; says why.
     """
     names = dict.fromkeys(("name", "counter", "general"), "program")
+    written = [write(group.type_info, kind) for kind, group in evaluator.loop_groups]
+    loops = {
+        loop.__module__: source.name
+        for loop, source in zip(python_loops(evaluator), written, strict=True)
+        if source is not None
+    }
     heads = {"right-hand side": "", "projection": "  br label %program"}
     found = []
     for name, head in heads.items():
         if head and not reads_rates(evaluator):
             continue
-        tracer = _Counting()
+        tracer = _Counting(loops)
         text, _ = write_program(evaluator, time, off_constraints(state), names, head, tracer=tracer)
         body = text.partition("program:")[2].partition("general:")[0].splitlines()
         counts = _counts(body, tracer.owner)
@@ -111,8 +118,9 @@ def _counts(lines: list[str], owner: dict[str, str]) -> dict[str, dict[str, int]
         if name and name not in needed:
             continue
         needed.update(re.findall(r"%[\w.]+", text))
-        words = text.split()
-        kind = next((k for k, w in KINDS.items() if words and words[0] in w), None)
+        word = text.partition(" ")[0]
+        kind = next((k for k, words in KINDS.items() if word in words), None)
+        kind = None if text.startswith("load ptr") else kind
         if kind == "calls" and ".sqrt" in text:
             kind = "quotients and roots"
         if name and kind:

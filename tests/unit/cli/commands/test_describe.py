@@ -100,6 +100,17 @@ def test_the_kernels_of_a_type_can_be_read():
     assert facts["source"]["C"] == "def C(r_P_i, r_P_j):\n    return sub(r_P_j, r_P_i)"
 
 
+def test_the_program_of_a_model_is_counted():
+    """By the functions that its operations come from; a scene of too many bodies has none."""
+    text = described("pen1", "--source", width=60)
+    assert "right-hand side, by method standard" in text
+    assert "factor.factor_pivot" in text
+    (rates, _) = json.loads(described("pen1", "--source", "--json"))["model"]["programs"]
+    parts = rates["parts"].values()
+    assert rates["total"] == {k: sum(part[k] for part in parts) for k in rates["total"]}
+    assert "scenes of up to 64 bodies have programs" in described("A02-40", "--source")
+
+
 def test_a_required_function_is_in_the_example():
     """Of an argument as well; it is left out only where other fields can take its place."""
     registry = registry_of(Cam)
