@@ -62,6 +62,7 @@ def _programs(compiled: "CompiledModel") -> dict[str, Any]:
     """The operations of the programs of a model, or the reason why there are none."""
     from dap3d_core.formulations.programs.change_over import MOST_BODIES
     from dap3d_core.formulations.programs.operations import operations
+    from dap3d_core.integrators.stepping.integration import off_constraints
     from dap3d_core.kernels.compiler.trace import TraceError
     from dap3d_core.kernels.compiler.types import CompileError
 
@@ -70,7 +71,7 @@ def _programs(compiled: "CompiledModel") -> dict[str, Any]:
     if not 0 < evaluator.model.body_count <= MOST_BODIES:
         return about | {"reason": f"scenes of up to {MOST_BODIES} bodies have programs"}
     start = compiled.start(bool(settings.correct), settings.hold, str(settings.correct_metric))
-    state = evaluator.coordinates.start(start.u)
+    state = off_constraints(evaluator.coordinates.start(start.u))
     evaluator.start(0.0, start.u)
     try:
         found = operations(evaluator, 0.0, state)

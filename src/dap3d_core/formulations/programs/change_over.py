@@ -30,7 +30,7 @@ BESIDE = True
 #: Bodies of a scene at most: the program of a larger one would be too long.
 MOST_BODIES = 64
 #: Programs of right-hand sides and projections whose guards fail more often are given up.
-MOST_FAILURES = (0.05, 0.3)
+MOST_FAILURES = (0.05, 0.5)
 
 
 @attrs.define
@@ -42,11 +42,13 @@ class Record:
             as long as there are none.
         reason: why there are none and will be none; "" while there may be.
         is_requested: True if they are being compiled by another process.
+        is_anew: True once they were made anew, as guards of the first ones failed.
     """
 
     programs: list[Any] = attrs.field(factory=list)
     reason: str = ""
     is_requested: bool = False
+    is_anew: bool = False
 
 
 #: Seconds that general code has taken, by a rough description of the scene; records by identity.
@@ -81,7 +83,7 @@ class ChangeOver:
             integration.advance(budget)
 
         if self._is_open and integration.takes_programs:
-            start = integration.t, integration.y
+            start = integration.t, integration.trial
             self.call(run, integration.functions.addresses, start, counts)
         else:
             run()
@@ -100,7 +102,7 @@ class ChangeOver:
         Args:
             run: the call.
             addresses: of the functions that it calls.
-            start: time and state at which it begins.
+            start: time, and a state as projections are given.
             counts: right-hand sides and projections so far.
         """
         record = self._record_of(start)
@@ -155,6 +157,8 @@ class ChangeOver:
         from dap3d_core.formulations.programs import scene_program
 
         evaluator, path = self._evaluator, scene_program.path_of(name)
+        if path is not None and record.is_anew and not record.is_requested:
+            path.unlink(missing_ok=True)
         stored = None if path is None else objects.read_object(path)
         if stored is None:
             if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
@@ -170,13 +174,17 @@ class ChangeOver:
 def _give_up(record: Record, program: Any, k: int) -> None:
     """Take other code from here on where guards of a program fail too often.
 
-    Of a projection that is the general one behind a right-hand side of its own, which moves up: one
-    alone would read what programs of right-hand sides do not leave.
+    First programs of a state as they are now, whose branches may be others: those of a
+    projection follow from the tolerances. Then general code; of a projection the general one
+    behind a right-hand side of its own, which moves up: one alone would read what programs of
+    right-hand sides do not leave.
     """
     with _making:
         if program not in record.programs:  # another thread was faster
             return
-        if k == RHS:
+        if not record.is_anew:
+            record.programs, record.is_anew, record.is_requested = [], True, False
+        elif k == RHS:
             record.programs, record.reason = [], "guards fail: branches depend on the motion"
         else:
             record.programs = [one for one in record.programs if one is not program]

@@ -12,7 +12,6 @@ from dap3d_core.assembly.arrays import Floats
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.programs.scene_program import (
     MOST_INSTRUCTIONS,
-    off_constraints,
     python_loops,
     reads_rates,
     write_program,
@@ -82,7 +81,7 @@ class _Counting(StraightLine):
 
 
 def operations(evaluator: Evaluator, time: float, state: Floats) -> list[ProgramOperations]:
-    """The operations of the programs of a scene, at a state.
+    """The operations of the programs of a scene, at a state as projections are given.
 
     Raises:
         TraceError, CompileError: it has none; says why.
@@ -100,7 +99,7 @@ def operations(evaluator: Evaluator, time: float, state: Floats) -> list[Program
         if head and not reads_rates(evaluator):
             continue
         tracer = _Counting(loops)
-        text, _ = write_program(evaluator, time, off_constraints(state), names, head, tracer=tracer)
+        text, _ = write_program(evaluator, time, state, names, head, tracer=tracer)
         body = text.partition("program:")[2].partition("general:")[0].splitlines()
         counts = _counts(body, tracer.owner)
         found.append(ProgramOperations(name, counts, len(tracer.guards)))

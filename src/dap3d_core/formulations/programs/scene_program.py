@@ -32,9 +32,6 @@ from dap3d_core.kernels.runtime.source_digest import origin
 
 #: Instructions of a program at most: larger scenes gain less, and take long to compile.
 MOST_INSTRUCTIONS = 20_000
-#: Part of the largest number by which a state whose projection is traced is off its constraints:
-#: one pass brings it back, as most ends of steps.
-OFF = 1e-10
 ARGUMENTS = "double %t, ptr %y, i64 %y.1, ptr %out, i64 %out.1, ptr %system, ptr %loops"
 
 _PROGRAM = """
@@ -229,7 +226,6 @@ def write_programs(
     """
     rhs, project = (_named(entry) for entry in evaluator.functions.entries[: PROJECT + 1])
     symbols, size = symbols_of(evaluator, name), state.size
-    state = off_constraints(state)
     names = {"name": symbols[0], "counter": symbols[1], "general": rhs}
     text, needs = write_program(evaluator, time, state, names, varied=varied)
     if len(symbols) > 2:
@@ -244,13 +240,6 @@ def write_programs(
         text, needs = text + other + behind(name=symbols[4]), needs | needed
     declared = [f"declare void @{symbol}({ARGUMENTS})" for symbol in (rhs, project)]
     return "\n".join([*needs.values(), *declared, text, _WEIGHTS])
-
-
-def off_constraints(state: Floats) -> Floats:
-    """A state a little off its constraints, where a projection does as at most ends of steps."""
-    noise = np.random.default_rng(0).standard_normal(state.size)
-    off: Floats = state + OFF * float(np.max(np.abs(state))) * noise
-    return off
 
 
 def load_programs(evaluator: Evaluator, name: str, code: bytes) -> list[Program]:

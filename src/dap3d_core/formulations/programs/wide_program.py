@@ -16,7 +16,6 @@ from dap3d_core.formulations.programs.scene_program import (
     constant_parts,
     formulation_module,
     name_of,
-    off_constraints,
     python_loops,
     reads_rates,
 )
@@ -53,7 +52,7 @@ def write_wide(
     """
     tracer = StraightLine(MOST_INSTRUCTIONS)
     system = SymbolicSystem(evaluator, tracer, varied)
-    given = Rates.of(time, off_constraints(state), evaluator.length_count)
+    given = Rates.of(time, state, evaluator.length_count)
     rates = system.symbolic(given, lambda: "%rates", "rates.")
     with run_with_symbols():
         module, loops = formulation_module(evaluator), python_loops(evaluator)
@@ -86,7 +85,7 @@ def program_rates(
     Args:
         evaluator: of the scene.
         count: sets of numbers.
-        time, state: where branches are decided.
+        time, state: where branches are decided; a state as projections are given.
         varied: numbers that differ from set to set (symbolic_arrays.py).
 
     Raises:

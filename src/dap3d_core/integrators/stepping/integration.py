@@ -21,6 +21,11 @@ from dap3d_core.integrators.stepping.rounding import tolerance_of
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
+#: Part of a state by which projections move it at most, as a rule.
+MOST_MOVED = 1e-3
+#: Part of the largest number by which a state is off its constraints, where no step has shown it.
+OFF = 1e-10
+
 
 class StepCounts(NamedTuple):
     """Counts of an integration so far."""
@@ -30,6 +35,13 @@ class StepCounts(NamedTuple):
     rhs: int  # calls of rhs alone
     projections: int  # calls of project
     reports: int  # calls of report
+
+
+def off_constraints(y: Floats) -> Floats:
+    """A state (n,) a little off its constraints: one pass of a projection brings it back."""
+    noise = np.random.default_rng(0).standard_normal(y.size)
+    off: Floats = y + OFF * float(np.max(np.abs(y))) * noise
+    return off
 
 
 class Integration(Restorable):
@@ -322,6 +334,17 @@ class Integration(Restorable):
     def y(self) -> Floats:
         """(n,) state at ``t``, a copy."""
         y: Floats = self.work.state[at.Y].copy()
+        return y
+
+    @property
+    def trial(self) -> Floats:
+        """(n,) a state near ``y`` that is off its constraints as usual at the end of a step."""
+        if self.work.step_count == 0:
+            return off_constraints(self.y)
+        y, other = self.y, self.work.state[at.OTHER]  # as it was before the last projection, or
+        for state in (other.copy(), y + other):  # by how much that moved it
+            if np.max(np.abs(state - y)) <= MOST_MOVED * np.max(np.abs(y)):
+                return state
         return y
 
     @property

@@ -14,7 +14,7 @@ from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.step import advance
-from dap3d_core.integrators.stepping.integration_state import Status, Y
+from dap3d_core.integrators.stepping.integration_state import Status
 from dap3d_core.kernels.runtime.cache import jit_is_on, table_of
 from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, procedure_signature
 from dap3d_core.model.groups import Floats, Integers
@@ -143,8 +143,7 @@ class CompiledBatch:
     @property
     def _place(self) -> tuple[float, Floats]:
         """Time and state where branches of programs are decided."""
-        work = self.integration.work
-        return work.t, work.state[Y]
+        return self.integration.t, self.integration.trial
 
     def _programs_for(self, places: Integers) -> ChangeOver:
         """Programs of the scene in which the numbers at these places are not constants."""

@@ -90,8 +90,10 @@ def test_numbers_that_change_in_a_run_stop_the_program(at_once):
 def test_a_program_whose_guards_fail_is_given_up(at_once, monkeypatch):
     """General code runs from there on, with the same bits."""
     monkeypatch.setattr(change_over, "MOST_FAILURES", (-2.0, -2.0))
-    assert_same(dap.simulate("pen1", **SETTINGS), general("pen1"))
+    for _ in range(2):  # the first time they are made anew
+        assert_same(dap.simulate("pen1", **SETTINGS), general("pen1"))
     [record] = at_once.values()
+    assert record.is_anew
     assert "guards" in record.reason
     assert not record.programs
 
@@ -99,7 +101,7 @@ def test_a_program_whose_guards_fail_is_given_up(at_once, monkeypatch):
 def test_two_threads_give_up_one_projection_once():
     """What reads the right-hand side's factors never stands behind a program of that."""
     rhs, project, behind = ("rhs",), ("project",), ("behind",)
-    record = change_over.Record([rhs, project, behind])
+    record = change_over.Record([rhs, project, behind], is_anew=True)
     for _ in range(2):
         change_over._give_up(record, project, 1)
     assert record.programs == [rhs, behind]

@@ -8,7 +8,8 @@ from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.formulations.programs.operations import operations
-from dap3d_core.formulations.programs.scene_program import off_constraints, write_program
+from dap3d_core.formulations.programs.scene_program import write_program
+from dap3d_core.integrators.stepping.integration import off_constraints
 
 pytestmark = long_in_plain_python
 
@@ -27,12 +28,12 @@ def without_dead_code(text):
 @pytest.mark.parametrize("name", ["pen1", "fourbar3"])
 def test_they_are_those_that_results_need(name):
     evaluator = dap.compile(name).new_evaluator()
-    state = evaluator.coordinates.start(evaluator.model.u0)
+    state = off_constraints(evaluator.coordinates.start(evaluator.model.u0))
     evaluator.start(0.0, evaluator.model.u0)
     for program in operations(evaluator, 0.0, state):
         head = "  br label %program" if program.name == "projection" else ""
         names = {"name": "one", "counter": "two", "general": "three"}
-        text, needs = write_program(evaluator, 0.0, off_constraints(state), names, head)
+        text, needs = write_program(evaluator, 0.0, state, names, head)
         arguments = "double, ptr, i64, ptr, i64, ptr, ptr"
         declared = [*needs.values(), f"declare void @three({arguments})"]
         left = without_dead_code("\n".join([*declared, text, "!0 = !{}", "!1 = !{}"]))
