@@ -9,6 +9,7 @@ from functools import cache
 from importlib.util import spec_from_file_location
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pluggy
 
@@ -52,7 +53,7 @@ def load(
             raise PluginError(source.fault)
         if given_up and limit_s is not None:
             raise PluginError(f"its package was not loaded after {given_up}")
-        type_ = source.type
+        type_: Any = source.type
         if type_ is None:
             module = importlib.import_module(source.module)
             types = types_of(module, (source.kind,))[source.kind]

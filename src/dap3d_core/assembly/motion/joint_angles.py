@@ -94,10 +94,10 @@ def _origin_of_motions(model: Model) -> Any:
     groups = []
     for group in model.joints:
         loops = tuple(compiled_loop(group.type_info, kind) for kind in KINDS)
-        arrays = group.members, group.bodies, group.functions, group.packed_numbers(0)
-        groups.append((group.type_info.type, loops, *(array.tobytes() for array in arrays)))
-    arrays = model.mass, model.Jp, model.u0
-    return (*groups, model.part_size, *(array.tobytes() for array in arrays))
+        places = (group.members, group.bodies, group.functions)
+        numbers = group.packed_numbers(0).tobytes()
+        groups.append((group.type_info.type, loops, numbers, *(a.tobytes() for a in places)))
+    return (*groups, model.part_size, *(a.tobytes() for a in (model.mass, model.Jp, model.u0)))
 
 
 def _has_same_joints(model: Model, other: Model) -> bool:
