@@ -191,6 +191,7 @@ def takes_long(page):
 def test_the_steps_of_a_page(page, tmp_path, monkeypatch):
     """Files, scripts and commands of a page, in their order; scripts hold assertions."""
     monkeypatch.setenv("MPLBACKEND", "Agg")
+    monkeypatch.setattr(sys, "path", [*sys.path])
     assert follow(page, tmp_path)
 
 

@@ -2,7 +2,6 @@
 
 import json
 import os
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -10,12 +9,15 @@ from xml.etree import ElementTree
 
 import pytest
 from click.testing import CliRunner
+from support.outside import isolated, pip
 from support.process import environment
 
 from dap3d_core.cli.app import dap3d as group
+from dap3d_core.interface.hooks import EXTENSIONS, GROUPS
 from dap3d_core.registry import load_registry
 
-KINDS = ("joint", "force", "function")
+#: Kind -> the file that the package brings to try it.
+SAMPLES = dict.fromkeys((*GROUPS, *EXTENSIONS), "scene.toml") | {"importer": "model.type"}
 
 
 def new_plugin(folder, *words):
@@ -25,15 +27,15 @@ def new_plugin(folder, *words):
     return done.output
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", SAMPLES)
 def test_the_package_is_complete(kind, tmp_path):
-    """An entry point that names a module with a type of this keyword, a scene, a README, tests."""
+    """An entry point that names a module of this keyword, what tries it, a README, tests."""
     folder = tmp_path / "here"
     words = ("My.own-Type", "--kind", kind, "--author", 'A "B" Ç')
     said = new_plugin(folder, *words)
     files = {p.relative_to(folder).as_posix() for p in folder.rglob("*") if p.is_file()}
     module = "dap3d_my_own_type"
-    assert files == {"pyproject.toml", "README.md", "scene.toml", f"src/{module}/__init__.py",
+    assert files == {"pyproject.toml", "README.md", SAMPLES[kind], f"src/{module}/__init__.py",
                      "tests/test_my_own_type.py", ".github/badge.py",
                      ".github/workflows/tests.yml"}  # fmt: skip
     assert all(name in said for name in files)
@@ -42,11 +44,15 @@ def test_the_package_is_complete(kind, tmp_path):
     assert project["project"]["authors"] == [{"name": 'A "B" Ç'}]
     assert project["project"]["entry-points"] == {f"dap3d.{kind}s": {"My.own-Type": module}}
     (dependency,) = project["project"]["dependencies"]
-    registry = load_registry().with_file(folder / "src" / module / "__init__.py")
-    type_info = registry.get(kind, "My.own-Type")
-    assert bool(type_info.derived) == dependency.startswith("dap3d[derive]>=")
-    assert type_info.type.__name__ == "MyOwnType"
-    assert "My.own-Type" in (folder / "scene.toml").read_text()
+    source = folder / "src" / module / "__init__.py"
+    if kind in GROUPS:
+        type_info = load_registry().with_file(source).get(kind, "My.own-Type")
+        assert bool(type_info.derived) == dependency.startswith("dap3d[derive]>=")
+        assert type_info.type.__name__ == "MyOwnType"
+        assert "My.own-Type" in (folder / "scene.toml").read_text()
+    else:  # of the installed package, below
+        assert dependency.startswith("dap3d>=")
+        compile(source.read_text(), source, "exec")
     for name in files:
         assert "$" not in (folder / name).read_text(), name
 
@@ -80,7 +86,7 @@ def test_the_workflow_publishes_the_badge(tmp_path):
     new_plugin(folder, "mine", "--kind", "force")
     steps = yaml.safe_load((folder / ".github/workflows/tests.yml").read_text())
     runs = {s["name"]: s["run"] for s in steps["jobs"]["tests"]["steps"] if "run" in s}
-    assert runs["Check the formulas"].startswith("dap3d check-plugin mine --json")
+    assert runs["Check the force type"].startswith("dap3d check-plugin mine --json")
 
     def shell(words, where):
         done = subprocess.run(
@@ -104,29 +110,19 @@ def test_the_workflow_publishes_the_badge(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_tests_of_the_packages_pass(tmp_path):
-    """Those that they bring: the kit, and the scene against its closed form.
-
-    A type is found as plugin.py of the scene's folder: nothing is installed here.
-    """
-    sources = []
-    for kind in KINDS:
-        folder = tmp_path / kind
-        new_plugin(folder, f"my-{kind}", "--kind", kind)
-        sources.append(str(folder / "src"))
-        shutil.copy(folder / "src" / f"dap3d_my_{kind}" / "__init__.py", folder / "plugin.py")
-        test = folder / "tests" / f"test_my_{kind}.py"
-        text = test.read_text()
-        assert "dap.simulate(scene, rtol" in text
-        test.write_text(
-            text.replace("dap.simulate(scene, ", "dap.simulate(scene, allow_code=True, ")
-        )
-    paths = os.pathsep.join([*sources, os.environ.get("PYTHONPATH", "")])
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *KINDS],
-        cwd=tmp_path, env=environment(PYTHONPATH=paths), capture_output=True, text=True,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout + done.stderr
+def test_the_packages_install_and_their_tests_pass(tmp_path):
+    """Those that they bring: formulas by the kit, scenes and files against closed forms."""
+    for kind in SAMPLES:
+        new_plugin(tmp_path / kind, f"my-{kind}", "--kind", kind)
+    site = tmp_path / "site"
+    pip("install", "--quiet", "--no-deps", *isolated(), "--target", site,
+        *(tmp_path / kind for kind in SAMPLES))  # fmt: skip
+    paths = environment(PYTHONPATH=os.pathsep.join([str(site), os.environ.get("PYTHONPATH", "")]))
+    tests = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", *SAMPLES]
+    checks = [sys.executable, "-m", "dap3d_core.cli", "check-plugin", "-q"]
+    for words in (tests, [*checks, *(f"my-{kind}" for kind in EXTENSIONS)]):
+        done = subprocess.run(words, cwd=tmp_path, env=paths, capture_output=True, text=True)
+        assert done.returncode == 0, done.stdout + done.stderr
 
 
 @pytest.mark.parametrize(
@@ -148,8 +144,24 @@ def test_a_keyword_that_is_taken_is_refused_and_may_be_forced(refuse, dap3d):
     new_plugin(dap3d.folder / "other", "sph", "--kind", "force")  # scenes tell them apart
 
 
+@pytest.mark.parametrize(
+    ("kind", "taken", "words"),
+    [
+        ("importer", "urdf", "there is an importer 'urdf' already, from distribution dap3d"),
+        ("integrator", "auto", "dap3d itself has the integrator 'auto'"),
+        ("shape", "box", "dap3d itself has the shape 'box'"),
+        ("exporter", "vtk", "dap3d itself has the exporter 'vtk'"),
+    ],
+)
+def test_names_of_extensions_that_are_taken_are_refused(refuse, kind, taken, words):
+    """Of a built-in one also with --force: it would never be reached."""
+    assert words in refuse("new-plugin", taken, "--kind", kind)
+    if "itself" in words:
+        assert words in refuse("new-plugin", taken, "--kind", kind, "--force")
+
+
 def test_modules_of_dap3d_are_never_replaced(refuse):
-    for name in ("core", "joints"):
+    for name in ("core", "joints", "formats"):
         assert "would hide dap3d's own" in refuse("new-plugin", name, "--force")
 
 
@@ -176,6 +188,9 @@ def test_json(tmp_path):
     assert found["module"] == "dap3d_mine"
     assert set(found["files"]) >= {"pyproject.toml", "scene.toml"}
     assert found["next"][2] == "dap3d check-plugin mine"
+    found = json.loads(new_plugin(tmp_path / "i", "mine", "--kind", "importer", "--json"))
+    assert "model.mine" in found["files"]
+    assert found["next"][3] == "dap3d import model.mine"
 
 
 def test_what_it_says_fits_60_columns(tmp_path, monkeypatch):

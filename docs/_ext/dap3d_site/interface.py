@@ -106,7 +106,7 @@ def _hooks() -> Iterator[str]:
     yield "## Formats, integrators, shapes"
     yield (
         "Importers and exporters of files of models have entry points of their own "
-        "([robots](../how-to/robots.md#formats-of-your-own)); `hookimpl`, and all else that they "
+        "([how](../how-to/formats-of-your-own.md)); `hookimpl`, and all else that they "
         "need, is in `dap3d_core.interface.formats`. Integrators and shapes: "
         "`dap3d_core.interface.integrators` and `dap3d_core.interface.shapes`."
     )

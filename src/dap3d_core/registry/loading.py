@@ -9,6 +9,7 @@ from functools import cache
 from importlib.util import spec_from_file_location
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pluggy
 
@@ -23,6 +24,9 @@ from dap3d_core.registry.guard import guard, within
 from dap3d_core.registry.plugin_module import hooks_of
 from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.suggestions import nearest
+
+#: What modules of packages bring: the same in all registries of a process.
+_loaded: dict[tuple[Source, ModuleType], TypeInfo] = {}
 
 
 def load(
@@ -39,6 +43,9 @@ def load(
     Raises:
         PluginError: names distribution, module or file, reason and remedy.
     """
+    module = sys.modules.get(source.module)
+    if module is not None and (source, module) in _loaded:
+        return _loaded[source, module]
     if limit_s is not None:
         importlib.import_module("dap3d_core.kernels")  # imported by all plugins: not counted
     with guard(source, notes), within(limit_s):
@@ -46,11 +53,12 @@ def load(
             raise PluginError(source.fault)
         if given_up and limit_s is not None:
             raise PluginError(f"its package was not loaded after {given_up}")
-        type_ = source.type
+        type_: Any = source.type
         if type_ is None:
             module = importlib.import_module(source.module)
             types = types_of(module, (source.kind,))[source.kind]
             type_ = _with_keyword(source, types)
+            _loaded[source, module] = _examined(type_)
         return _examined(type_)
 
 

@@ -467,6 +467,21 @@ def test_a_model_file_without_types_or_missing_is_refused(tmp_path):
         load_registry().with_file(tmp_path / "nothing.py")
 
 
+def test_hooks_are_called_once_for_each_module(install):
+    """In all registries of a process; a module that took the place of another brings its own."""
+    text = GOOD.replace("return [Push]", "calls.append(1)\n        return [Push]")
+    module = install(
+        "dap3d-push", text.replace("interface_version", "calls = []\n    interface_version")
+    )
+    types = [load_registry().get("force", "push") for _ in range(3)]
+    assert types[0] is types[1] is types[2]
+    assert len(sys.modules[module].calls) == 1
+    del sys.modules[module]
+    again = load_registry().get("force", "push")
+    assert again is not types[0]
+    assert again.type is sys.modules[module].Push
+
+
 @pytest.mark.parametrize(
     ("kind", "word", "keyword"),
     [

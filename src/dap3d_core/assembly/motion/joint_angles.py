@@ -1,6 +1,7 @@
 """Constants by which the driver measures the angles of joints (assembly/turns.py)."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import attrs
 import numpy as np
@@ -9,9 +10,17 @@ from dap3d_core.assembly import turns as at
 from dap3d_core.assembly.arrays import Floats, Integers
 from dap3d_core.assembly.motion.coordinates import PARALLEL, angle_columns
 from dap3d_core.assembly.motion.joint_motion import JointMotions, ModelMotions
+from dap3d_core.interface.codegen.compile_loops import compiled_loop
 from dap3d_core.model import Model
 from dap3d_core.model.joint_angles import JointAngles
 from dap3d_core.model.rigid_motion import cross
+
+#: Loops that motions are found by.
+KINDS = ("position", "acceleration", "angle")
+#: The motions found last, with their angles, by what they follow from: scripts and studies compile
+#: the same scene again and again, and to find its motions takes a third of that.
+_found: dict[Any, tuple[ModelMotions, JointAngles]] = {}
+KEPT = 64
 
 
 def joint_angles(motions: ModelMotions) -> JointAngles:
@@ -70,8 +79,25 @@ def with_motions(model: Model, known: Model | None = None) -> Model:
         return attrs.evolve(model, motions=known.motions, joint_angles=known.joint_angles)
     from dap3d_core.assembly.motion.classify import classify
 
-    motions = classify(model)
-    return attrs.evolve(model, motions=motions, joint_angles=joint_angles(motions))
+    key = _origin_of_motions(model)
+    if key not in _found:
+        for old in list(_found)[: 1 - KEPT]:
+            _found.pop(old, None)
+        motions = classify(model)
+        _found[key] = motions, joint_angles(motions)
+    motions, angles = _found[key]
+    return attrs.evolve(model, motions=motions, joint_angles=angles)
+
+
+def _origin_of_motions(model: Model) -> Any:
+    """All that the motions of a model's joints follow from, to be compared."""
+    groups = []
+    for group in model.joints:
+        loops = tuple(compiled_loop(group.type_info, kind) for kind in KINDS)
+        places = (group.members, group.bodies, group.functions)
+        numbers = group.packed_numbers(0).tobytes()
+        groups.append((group.type_info.type, loops, numbers, *(a.tobytes() for a in places)))
+    return (*groups, model.part_size, *(a.tobytes() for a in (model.mass, model.Jp, model.u0)))
 
 
 def _has_same_joints(model: Model, other: Model) -> bool:

@@ -1,10 +1,11 @@
-"""``dap3d new-plugin``: writes a package with a type, ready to be installed and changed."""
+"""``dap3d new-plugin``: writes a package with a type or an extension, to be changed."""
 
 import importlib.util
 import json
 import keyword as python
 import re
 import shlex
+from collections.abc import Collection
 from importlib.metadata import version
 from importlib.resources import files
 from pathlib import Path
@@ -15,12 +16,15 @@ import click
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, Refused
+from dap3d_core.interface.hooks import EXTENSIONS, GROUPS
 
 #: Keywords after which a distribution and a module can be named.
 KEYWORD = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?", re.ASCII)
 LONGEST = 60
 #: Names that the modules import: a class of such a name is named after its kind too.
-IMPORTED = ("Force", "Function", "Joint", "Point", "Vector")
+IMPORTED = ("Actuator", "Articulation", "Counter", "Exporter", "Force", "FormatError", "Frame",
+            "Function", "Importer", "Inertial", "Joint", "Link", "Path", "Place", "Point",
+            "Remarks", "ShapeKind", "Vector")  # fmt: skip
 #: Modules of dap3d itself.
 OWN = "dap3d_core"
 
@@ -28,8 +32,8 @@ OWN = "dap3d_core"
 @command(
     "Write a package with a type of its own.",
     click.argument("name"),
-    click.option("--kind", type=click.Choice(("joint", "force", "function")), default="joint",
-                 show_default=True, help="Kind of the type."),
+    click.option("--kind", type=click.Choice([*GROUPS, *EXTENSIONS]), default="joint",
+                 show_default=True, help="What the package brings."),
     options.output("Where to write; by default dap3d-NAME.", metavar="FOLDER"),
     click.option("--author", metavar="WORDS", help="Author, for pyproject.toml."),
     click.option("--force", is_flag=True,
@@ -42,7 +46,10 @@ def new_plugin(
 ) -> int:
     """Write a package that brings a type of a joint, a force or a function.
 
-    NAME is the keyword that scenes will have for the type: letters, digits, and - _ . between them.
+    Or an integrator, an importer or exporter of models, a kind of shape: --kind says which.
+
+    NAME is the keyword that scenes will have for the type (an importer or exporter: what --format
+    names): letters, digits, and - _ . between them.
 
     The package is complete: a type that works, its tests, a scene that runs, a README, and a
     workflow that runs the checks at each push, on GitHub Actions. Make the type your own, and let
@@ -53,15 +60,16 @@ def new_plugin(
     names = _names(name, kind, author)
     _check_free(names, force=force)
     folder = _folder(output or names["distribution"], force=force)
-    texts = _texts(names)
+    about = _about(names)
+    texts = _texts(names | about)
     _write(folder, texts)
     commands = [f"cd {shlex.quote(str(folder))}", 'pip install -e ".[test]"',
-                f"dap3d check-plugin {name}", "dap3d run scene.toml", "pytest"]  # fmt: skip
+                f"dap3d check-plugin {name}", about["command"], "pytest"]  # fmt: skip
     if as_json:
         print_json({"keyword": name, "kind": kind, "folder": folder, "files": list(texts),
                     "module": names["module"], "next": commands})  # fmt: skip
         return DONE
-    heading = f"{folder} holds a package with the {kind} type {name}:"
+    heading = f"{folder} holds a package with the {about['noun']} {name}:"
     for title, lines in ((heading, texts), ("What comes next:", commands)):
         stdout().say(title)
         for line in lines:
@@ -91,6 +99,7 @@ def _names(name: str, kind: str, author: str | None) -> dict[str, str]:
         "distribution": "dap3d-" + "-".join(words).lower(),
         "module": "dap3d_" + "_".join(words).lower(),
         "class_name": class_name,
+        "suffix": words[-1].lower(),
         "authors": f"authors = [{{ name = {quoted} }}]\n" if author else "",
     }
 
@@ -100,31 +109,48 @@ def _check_free(names: dict[str, str], *, force: bool) -> None:
 
     The modules of dap3d itself are never replaced.
     """
-    import dap3d_core as dap
+    from dap3d_core.registry.discovery import discover
+    from dap3d_core.registry.guard import noun_of
 
-    sources, module = dap.load_registry().sources, names["module"]
-    own = {OWN} | {
-        source.module.partition(".")[0]
-        for each in sources.values()
-        for source in each
-        if source.distribution == "dap3d"
-    }
-    if module in own:
+    kind, keyword, module = names["kind"], names["keyword"], names["module"]
+    sources = discover([group for group, _ in (GROUPS | EXTENSIONS).values()])
+    own = {s.module.partition(".")[0] for s in sources if s.distribution == "dap3d"}
+    if module in {OWN, *own}:
         raise Refused(f"the module {module} would hide dap3d's own; use another name")
+    if keyword in _built_in(kind):
+        raise Refused(f"dap3d itself has the {noun_of(kind)} {keyword!r}; use another name")
     if force:
         return
-    kind, keyword = names["kind"], names["keyword"]
-    if rivals := sources.get((kind, keyword)):
-        raise Refused(
-            f"there is a {kind} type {keyword!r} already, from {rivals[0]}: with both installed "
-            f'scenes must say which, type = "{names["distribution"]}:{keyword}". Use another '
-            "name, or --force"
-        )
+    for rival in sources:
+        if (rival.kind, rival.keyword) == (kind, keyword):
+            both = (
+                "only one of them can be installed"
+                if kind in EXTENSIONS
+                else "with both installed scenes must say which, "
+                f'type = "{names["distribution"]}:{keyword}"'
+            )
+            raise Refused(
+                f"there is {_article(kind)} {noun_of(kind)} {keyword!r} already, from {rival}: "
+                f"{both}. Use another name, or --force"
+            )
     if importlib.util.find_spec(module) is not None:
         raise Refused(
             f"a module {module} is installed already; use another name, or --force if it will be "
             "removed"
         )
+
+
+def _article(kind: str) -> str:
+    return "an" if kind[0] in "aeiou" else "a"
+
+
+def _built_in(kind: str) -> Collection[str]:
+    """Words that scenes and commands take for dap3d's own, whatever packages bring."""
+    from dap3d_core.exchange import FORMATS
+    from dap3d_core.scene import INTEGRATORS
+    from dap3d_core.scene.validate.shapes import SHAPES
+
+    return {"integrator": INTEGRATORS, "shape": SHAPES, "exporter": FORMATS}.get(kind, ())
 
 
 def _folder(output: str, *, force: bool) -> Path:
@@ -141,21 +167,31 @@ def _folder(output: str, *, force: bool) -> Path:
     return folder
 
 
-def _texts(names: dict[str, str]) -> dict[str, str]:
-    """The files of the package, by their paths in it."""
-    kind, module = names["kind"], names["module"]
-    values = names | dict(line.split(" = ", 1) for line in _template(kind, "about").splitlines())
+def _about(names: dict[str, str]) -> dict[str, str]:
+    """What the texts say of the kind, by the names of their places."""
     bound = ".".join(version("dap3d").split(".")[:2])
-    values["dependency"] = Template(values["dependency"]).substitute(bound=bound)
-    values["about_dependencies"] = (
-        '# What the type leaves out is derived when it is first used; "derive" brings sympy for it.'
-        if "derive" in values["dependency"]
-        else "# Where formulas are left out, to be derived, this is dap3d[derive]."
-    )
+    text = Template(_template(names["kind"], "about")).substitute(names, bound=bound)
+    about = dict(line.split(" = ", 1) for line in text.splitlines())
+    about["about_dependencies"] = ""
+    if names["kind"] in GROUPS:
+        about["about_dependencies"] = (
+            "# What the type leaves out is derived when it is first used; "
+            '"derive" brings sympy for it.\n'
+            if "derive" in about["dependency"]
+            else "# Where formulas are left out, to be derived, this is dap3d[derive].\n"
+        )
+    return about
+
+
+def _texts(values: dict[str, str]) -> dict[str, str]:
+    """The files of the package, by their paths in it."""
+    kind, module = values["kind"], values["module"]
+    inside = _template("every" if kind in GROUPS else kind, "inside")
+    values = values | {"inside": Template(inside).substitute(values)}
     places = {
         "pyproject.toml": ("every", "pyproject.toml"),
         "README.md": ("every", "README.md"),
-        "scene.toml": (kind, "scene"),
+        values["sample"]: (kind, "scene"),
         ".github/workflows/tests.yml": ("every", "tests.yml"),
         ".github/badge.py": ("every", "badge.py"),
         f"src/{module}/__init__.py": (kind, "type"),

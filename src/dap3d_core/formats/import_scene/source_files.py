@@ -50,6 +50,19 @@ class SourceFiles:
     _count: int = 0
     _meshes: dict[Path, tuple[Floats, Integers]] = attrs.Factory(dict)
 
+    def read_text(self) -> str:
+        """The text of the file itself.
+
+        Raises:
+            FormatError: it cannot be read, is too large, or is not UTF-8.
+        """
+        try:
+            return self._read(self.path, NOWHERE).decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            line = error.object[: error.start].count(b"\n") + 1
+            what = f"{error.object[error.start]:#04x} is no character of UTF-8"
+            raise FormatError(what, Place(self.path.name, line), "save it as UTF-8") from None
+
     def xml(self) -> XmlElement:
         """The root of the file itself."""
         if self.text is not None:

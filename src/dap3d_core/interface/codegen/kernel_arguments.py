@@ -6,6 +6,7 @@ other names of a body are reserved.
 
 from collections.abc import Callable, Iterable, Mapping
 from inspect import Parameter, signature
+from types import FunctionType
 from typing import Any
 
 import attrs
@@ -295,6 +296,8 @@ def _tuple(pattern: str, n: int) -> str:
 
 def parameters(kernel: Callable[..., Any]) -> tuple[str, ...]:
     """The parameters of a kernel."""
+    if isinstance(kernel, FunctionType) and not hasattr(kernel, "__wrapped__"):  # most are
+        return kernel.__code__.co_varnames[: kernel.__code__.co_argcount]
     positional = (Parameter.POSITIONAL_OR_KEYWORD, Parameter.POSITIONAL_ONLY)
     return tuple(n for n, p in signature(kernel).parameters.items() if p.kind in positional)
 

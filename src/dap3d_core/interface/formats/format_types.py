@@ -39,6 +39,9 @@ class Source(Protocol):
     arguments: Mapping[str, str]
     unused: set[str]
 
+    def read_text(self) -> str:
+        """The text of the file itself, UTF-8."""
+
     def xml(self) -> XmlElement:
         """The root of the file itself."""
 

@@ -155,6 +155,17 @@ class Compiled:
 
 def entries_of(functions: Sequence[Any], arguments: tuple[Any, ...]) -> list[Entry]:
     """Functions for types of their arguments, as one unit of compiled code."""
+    if all(f.__module__.startswith("dap3d_core.") for f in functions):
+        return list(_entries_of_core(tuple(functions), arguments))
+    return _entries_of(functions, arguments)  # their constants may be others the next time
+
+
+@cache
+def _entries_of_core(functions: tuple[Any, ...], arguments: tuple[Any, ...]) -> list[Entry]:
+    return _entries_of(functions, arguments)
+
+
+def _entries_of(functions: Sequence[Any], arguments: tuple[Any, ...]) -> list[Entry]:
     plain = [inspect.unwrap(f) for f in functions]
     parts = [f"{f.__module__}.{f.__qualname__}" for f in plain]
     label = f"{plain[0].__module__.split('.')[-1]}.{plain[0].__name__}"

@@ -19,12 +19,13 @@ from typing import Any, NamedTuple
 
 from dap3d_core.kernels import table_lookup
 from dap3d_core.kernels.compiler.trace import trace
+from dap3d_core.kernels.compiler.types import Struct
 from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime import generated_modules, loop_support
 from dap3d_core.kernels.runtime.cache import cache_folder, jit_is_on, names_of
 from dap3d_core.kernels.runtime.function_lists import LOOP, LoopArrays
 from dap3d_core.kernels.runtime.outer_references import refuse_outer_references
-from dap3d_core.kernels.runtime.source_digest import places, reached, sources
+from dap3d_core.kernels.runtime.source_digest import places, reached, sources, sources_of
 
 #: Functions that the text of loops calls.
 _SUPPORT = (loop_support.vector_at, loop_support.matrix_at, loop_support.unwound,
@@ -77,10 +78,14 @@ def build(loop: Loop, announce: Callable[[str], None] | None = None) -> Callable
 def unit_names(loop: Loop, text: str) -> tuple[str, str]:
     """Names of a loop's unit: digests of its text, its sources, and the layout of its arrays."""
     kernels = loop.kernels.values()
-    layout = repr(array_members())
-    functions, _ = reached(*kernels)  # a kernel may be given others
-    return names_of("loop", functions, text, layout, *places(*kernels),
-                    *sources(*kernels), *_support_sources())  # fmt: skip
+    functions, constants = reached(*kernels)  # a kernel may be given others
+    return names_of("loop", functions, text, _layout(LoopArrays.type_of()), *places(*kernels),
+                    *sources_of(functions, constants), *_support_sources())  # fmt: skip
+
+
+@cache
+def _layout(struct: Struct) -> str:
+    return repr(_members(struct))
 
 
 @cache
@@ -136,8 +141,12 @@ def _build(
 
 def array_members() -> dict[str, tuple[int, str, int]]:
     """Of each array: its first word in the table, LLVM's type of its items, width of its rows."""
+    return _members(LoopArrays.type_of())
+
+
+def _members(struct: Struct) -> dict[str, tuple[int, str, int]]:
     members, first, widths = {}, 0, {"body": loop_support.BODY_WIDTH, "F": 5}
-    for name, type_ in LoopArrays.type_of().members:
+    for name, type_ in struct.members:
         members[name] = first, type_.item.words[0], widths.get(name, 0)
         first += len(type_.words)
     return members

@@ -5,8 +5,8 @@ import inspect
 import os
 import sys
 import types
-from collections.abc import Iterator
-from functools import cache
+from collections.abc import Collection
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -75,18 +75,24 @@ def reached(*functions) -> tuple[list, list[str]]:
 
 def _named_values(function) -> list[tuple[str, Any]]:
     """Names that a function reads from outside itself, with values; one step through modules."""
-    codes = [function.__code__]
-    for code in codes:
-        codes += [c for c in code.co_consts if isinstance(c, types.CodeType)]
-    names = {name for code in codes for name in code.co_names}
+    names = _names_in(function)
     cells = (cell.cell_contents for cell in function.__closure__ or ())
     outer = dict(zip(function.__code__.co_freevars, cells, strict=True))
-    outer |= {n: function.__globals__[n] for n in sorted(names) if n in function.__globals__}
+    outer |= {n: function.__globals__[n] for n in names if n in function.__globals__}
     for name, value in list(outer.items()):
         file = getattr(value, "__file__", None) if isinstance(value, types.ModuleType) else None
         if is_an_authors(file or ""):
             outer |= {f"{name}.{n}": getattr(value, n) for n in names if hasattr(value, n)}
     return sorted(outer.items())
+
+
+@lru_cache(maxsize=4096)  # scenes make functions of their own
+def _names_in(function) -> list[str]:
+    """The names in a function and in those within it, sorted."""
+    codes = [function.__code__]
+    for code in codes:
+        codes += [c for c in code.co_consts if isinstance(c, types.CodeType)]
+    return sorted({name for code in codes for name in code.co_names})
 
 
 @cache
@@ -104,7 +110,11 @@ def sources(*functions) -> list[str | bytes]:
     Names of modules, because cached code imports them by name: a model's own file has another one
     in each folder. Files are ordered by name and content, wherever a package is installed.
     """
-    functions, constants = reached(*functions)
+    return sources_of(*reached(*functions))
+
+
+def sources_of(functions: Collection[Any], constants: list[str]) -> list[str | bytes]:
+    """The same of the functions that some reach, and of the constants that they read."""
     modules = sorted({function.__module__ for function in functions})
     paths = dict.fromkeys(function.__code__.co_filename for function in functions)
     files = sorted((Path(path).name, _content(path)) for path in paths)
@@ -129,15 +139,17 @@ def identities(*functions) -> list[str | bytes]:
     return [*places(*functions), *(part for f in functions for part in bytecode(f))]
 
 
-def bytecode(function) -> Iterator[str | bytes]:
+@lru_cache(maxsize=4096)
+def bytecode(function) -> tuple[str | bytes, ...]:
     """Instructions of a function and of those within it, with the names and constants in them."""
+    parts: list[str | bytes] = []
     codes = [function.__code__]
     for code in codes:
-        yield code.co_code
-        yield repr(code.co_names)
+        parts += [code.co_code, repr(code.co_names)]
         for constant in code.co_consts:
             if isinstance(constant, types.CodeType):
                 codes.append(constant)
             else:  # the order of a set is another one in each process
-                yield repr(sorted(map(repr, constant)) if isinstance(constant, frozenset)
-                           else constant)  # fmt: skip
+                parts.append(repr(sorted(map(repr, constant)) if isinstance(constant, frozenset)
+                                  else constant))  # fmt: skip
+    return tuple(parts)

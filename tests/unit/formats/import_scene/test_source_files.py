@@ -1,8 +1,11 @@
 """Files that a model names: nested and included models, and where they lie."""
 
 import numpy as np
+import pytest
 
 import dap3d_core as dap
+from dap3d_core.formats.import_scene.source_files import SourceFiles
+from dap3d_core.interface.formats import FormatError
 from dap3d_core.model.rotations import rotation
 
 INNER = """
@@ -48,3 +51,22 @@ def test_frames_of_included_models(tmp_path):
     point, axis = scene.points[joint["P_j"]], joint["a_j"]
     assert (point.body, axis) == ("hand::palm", "hand::palm.y")
     np.testing.assert_allclose(point.sPp, (0.5, 0, 0), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("data", "found"),
+    [
+        ("\ufeffé 1\n".encode(), "é 1\n"),
+        (b"1\n2 \xff\n", "a.txt:2: 0xff is no character of UTF-8\n    save it as UTF-8"),
+    ],
+    ids=["UTF-8", "Latin-1"],
+)
+def test_text_is_utf_8(tmp_path, data, found):
+    """With or without its mark; of another character the line is named."""
+    path = tmp_path / "a.txt"
+    path.write_bytes(data)
+    try:
+        text = SourceFiles(path, tmp_path).read_text()
+    except FormatError as error:
+        text = str(error)
+    assert text == found
