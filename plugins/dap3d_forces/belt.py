@@ -13,7 +13,19 @@ from dap3d_core.interface import (
     points,
     vector,
 )
-from dap3d_core.kernels import add, by_body, cross, dot, maximum, neg, norm2, scale, sqrt, sub
+from dap3d_core.kernels import (
+    add,
+    by_body,
+    cross,
+    dot,
+    maximum,
+    neg,
+    norm2,
+    scale,
+    sqrt,
+    sub,
+    where,
+)
 
 interface_version = 1
 
@@ -31,11 +43,13 @@ class Belt(Force):
         P_k = r_k + rho_k n,  P_(k+1) = r_(k+1) + rho_(k+1) n,  e along P_(k+1) - P_k
         x_dot = e . (v_P(k+1) - v_P_k),  T = max(0, pretension + k x + c x_dot)
         force T e at P_k on pulley k, -T e at P_(k+1) on the next
+        energy = sum of max(0, pretension + k x)^2 / (2 k)
 
     v_P_k is the velocity of the point of the pulley there. The elongations x of the spans since the
     start are states. The forces load the bearings: with the axis fixed, the moment on a pulley is
     rho (T_out - T_in), where T_out is the tension of the span that begins there. With ``crossed``
-    the belt of two pulleys crosses itself, as with a negative second radius.
+    the belt of two pulleys crosses itself, as with a negative second radius. Of
+    no stretch: joint ``belt``.
     """
 
     keyword = "belt"
@@ -78,6 +92,9 @@ class Belt(Force):
             on += [on_points[a], on_points[b]]
         return by_body(on, parts, body_count)
 
+    def energy(k, pretension, x):
+        return sum(stored(k, pretension, x_k) for x_k in x)
+
     def rate(r_points, v_points, w_points, rho, axis_i):
         return (tuple(
             speed(e, arm_a, arm_b, v_points, w_points, a, b)
@@ -89,6 +106,12 @@ class Belt(Force):
             pretension + k * x[a] + c * speed(e, arm_a, arm_b, v_points, w_points, a, b)
             for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i)
         )
+
+
+def stored(k, pretension, x):
+    """Energy of a span, J: what it does until it is slack; without k it does not become slack."""
+    T = maximum(pretension + k * x, 0.0)
+    return where(k > 0.0, 0.5 * T * T / where(k > 0.0, k, 1.0), pretension * x)
 
 
 def across(d, axis):
