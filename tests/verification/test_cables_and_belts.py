@@ -114,6 +114,106 @@ def test_a_belt_carries_a_moment(crossed, by_joints):
     np.testing.assert_allclose(abs(load[1]), difference * abs(sine), rtol=1e-5)
 
 
+RIGID = {
+    "open": ([(0.0, 0.0), (1.0, 0.0)], [0.1, 0.25], {}),
+    "crossed": ([(0.0, 0.0), (1.0, 0.0)], [0.1, 0.25], {"crossed": True}),
+    "three": ([(0.0, 0.0), (1.0, 0.0), (0.4, 0.9)], [0.1, 0.25, 0.15], {}),
+    "idler": ([(0.0, 0.0), (0.5, 0.1), (1.0, 0.0), (0.5, 0.6)], [0.1, -0.05, 0.25, 0.1], {}),
+}
+
+
+def rigid_belt(places, radii, fields, moment):
+    """Pulleys on hinges of ground, the last one driven by a moment."""
+    scene = dap.Scene(name="belt")
+    names = "abcd"[: len(places)]
+    for name, (x, y), rho in zip(names, places, radii, strict=True):
+        scene.add_body(name, mass=1.0, Jp=[0.1, 0.1, 2.0 * rho * rho], r=[x, y, 0.0])
+        scene.add_point(f"{name}_pin", body="ground", sPp=[x, y, 0.0])
+        pins = {"P_i": f"{name}.O", "P_j": f"{name}_pin"}
+        scene.add_joint("rev", f"{name}_axis", **pins, a_i=f"{name}.z", a_j="ground.z")
+    scene.add_joint("belt", "belt", joints=[f"{n}_axis" for n in names], radii=radii, **fields)
+    scene.add_force("np", "drive", body_i=names[-1], np=[0.0, 0.0, moment])
+    return scene
+
+
+def tangents(places, radii):
+    """Directions of spans by angles: a span to the right of the line of centres, turned by asin."""
+    found = []
+    for k, start in enumerate(places):
+        after = (k + 1) % len(places)
+        dx, dy = np.subtract(places[after], start)
+        turn = np.arctan2(dy, dx) + np.arcsin((radii[k] - radii[after]) / np.hypot(dx, dy))
+        found.append(np.array([np.cos(turn), np.sin(turn)]))
+    return found
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_a_rigid_belt_couples_speeds_and_loads_bearings(name):
+    """Closed forms: rho w is one speed; M = J w_dot + rho (T_out - T_in); loads are tensions.
+
+    The rows are kept at each step, so that speeds after 10 s, of some 1e3 rad/s, are in ratio to
+    rounding; multipliers have that of the solution of the equations.
+    """
+    places, radii, fields = RIGID[name]
+    moment = 0.5 if radii[-1] > 0.0 and not fields else -0.5
+    result = dap.simulate(rigid_belt(places, radii, fields, moment), t_end=10.0, dt=1.0)
+    rho = np.array([radii[0], -radii[1]] if fields else radii)
+    speed = result.w[:, :, 2] * rho
+    np.testing.assert_allclose(speed, np.repeat(speed[:, :1], len(rho), axis=1), rtol=1e-9)
+    inertia = 2.0 * rho * rho
+    belt_dot = moment / rho[-1] / np.sum(inertia / rho**2)
+    np.testing.assert_allclose(speed[:, 0], belt_dot * result.t, rtol=1e-8, atol=1e-12)
+    T = np.append(result.quantity("belt.lambda").values.reshape(len(result.t), -1)[-1], 0.0)
+    assert np.all(T >= 0.0)
+    assert not [note for note in result.notes if "push" in note]
+    M = np.zeros(len(rho))
+    M[-1] = moment
+    np.testing.assert_allclose(M + rho * (T - np.roll(T, 1)), inertia * belt_dot / rho, atol=1e-9)
+    e = tangents(places, rho)
+    for k, body in enumerate("abcd"[: len(rho)]):
+        pull = T[k] * e[k] - T[k - 1] * e[k - 1]
+        load = result.reaction(f"{body}_axis")["i"].force[-1, :2]
+        np.testing.assert_allclose(load, -pull, atol=1e-8)
+
+
+def test_a_rigid_belt_on_a_carrier():
+    """Willis: with the wheel a held, (w_b - w_c) r_b = -w_c r_a; the carrier is driven at 2 rad/s.
+
+    Rows of velocities hold to rounding.
+    """
+    scene = dap.Scene(name="carrier")
+    scene.add_body("carrier", mass=1.0, Jp=JP, r=[0.5, 0.0, 0.0], r_dot=[0.0, 1.0, 0.0],
+                   w=[0.0, 0.0, 2.0])  # fmt: skip
+    scene.add_body("b", mass=1.0, Jp=JP, r=[1.0, 0.0, 0.0], r_dot=[0.0, 2.0, 0.0],
+                   w=[0.0, 0.0, 1.2])  # fmt: skip
+    scene.add_point("end", body="carrier", sPp=[0.5, 0.0, 0.0])
+    scene.add_point("hub", body="carrier", sPp=[-0.5, 0.0, 0.0])
+    axes = {"a_j": "carrier.z"}
+    scene.add_joint("rev", "arm", P_i="hub", P_j="ground.O", a_i="carrier.z", a_j="ground.z")
+    scene.add_joint("rev", "b_axis", P_i="b.O", P_j="end", a_i="b.z", **axes)
+    pulleys = {"points": ["ground.O", "b.O"], "radii": [0.1, 0.25], "axis_i": "carrier.z"}
+    scene.add_joint("belt", "belt", **pulleys)
+    result = dap.simulate(scene, t_end=2.0, dt=0.5)
+    np.testing.assert_allclose(result.w[:, 0, 2], 2.0, rtol=1e-9)
+    np.testing.assert_allclose(result.w[:, 1, 2], 2.0 * (1.0 - 0.1 / 0.25), rtol=1e-9)
+
+
+def test_a_rigid_belt_says_which_span_is_slack():
+    """A moment the other way round tightens the span that is taken to be slack."""
+    places, radii, fields = RIGID["open"]
+    result = dap.simulate(rigid_belt(places, radii, fields, -0.5), t_end=0.1, dt=0.1)
+    assert any("this span would have to push" in note for note in result.notes)
+
+
+def test_two_pulleys_of_a_belt_on_one_body_are_refused():
+    scene = rigid_belt(*RIGID["open"], 0.5)
+    scene.joints["belt"].fields = {
+        "points": ("a.O", "b.O", "a_pin", "b_pin"), "radii": (0.1,) * 4, "axis_i": "ground.z"
+    }  # fmt: skip
+    with pytest.raises(dap.SceneError, match="two points on ground; each is to be on a body of"):
+        dap.compile(scene)
+
+
 def test_a_belt_stores_energy():
     """Pulleys swing against each other on a belt without damping, and a span becomes slack.
 

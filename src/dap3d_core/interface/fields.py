@@ -55,6 +55,7 @@ class FieldSpec:
         size: name of the number of entries of a list, which the scene gives by its length; "" of
             all else.
         least: smallest number of entries of a list.
+        apart: each entry of a list is on a body of its own.
     """
 
     kind: str
@@ -83,6 +84,7 @@ class FieldSpec:
     gives: Mapping[str, str] = attrs.field(factory=dict)
     size: str = ""
     least: int = 1
+    apart: bool = False
 
     @property
     def for_prepare(self) -> bool:
@@ -172,14 +174,15 @@ def numbers(count: int | str, default: Any = REQUIRED, *, unit: str = "", doc: s
     return field_of(FieldSpec("numbers", default, unit, doc, columns=count))
 
 
-def points(size: str = "n", *, least: int = 1, doc: str = "") -> Any:
+def points(size: str = "n", *, least: int = 1, apart: bool = False, doc: str = "") -> Any:
     """A list of points on any bodies, by name; its length is the size of this name.
 
-    Several may lie on one body. A field ``points`` offers tuples ``r_points``, ``s_points``,
-    ``v_points``, ``s_points_dot``, and ``w_points`` of the bodies that they lie on; ``on_points``
-    are the indices of these bodies, for ``by_body``; the size and ``body_count`` are whole numbers.
+    Several may lie on one body, unless they are ``apart``. A field ``points`` offers tuples
+    ``r_points``, ``s_points``, ``v_points``, ``s_points_dot``, and ``w_points`` of the bodies that
+    they lie on; ``on_points`` are the indices of these bodies, for ``by_body``; the size and
+    ``body_count`` are whole numbers.
     """
-    return field_of(FieldSpec("points", REQUIRED, "m", doc, size=size, least=least))
+    return field_of(FieldSpec("points", REQUIRED, "m", doc, size=size, least=least, apart=apart))
 
 
 def vectors(size: str = "n", *, least: int = 1, doc: str = "") -> Any:

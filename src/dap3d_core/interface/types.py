@@ -123,12 +123,14 @@ class Joint(TypeBase):
 
     Attributes:
         keyword: the name of the type in a scene.
-        rows: number of constraint equations.
+        rows: number of constraint equations; of a type with lists also by the size of one: "n",
+            "n - 1".
         holonomic: True, False, or one truth value a row: the rows of the position level.
         drives: it prescribes a freedom that other joints leave; where there are none between its
             bodies a scene gets a note.
         unilateral: rows, from 0, with multipliers that are not negative in a valid motion: ground
-            carries and does not pull. A run where one is gets a note with the instant.
+            carries and does not pull. A run where one is gets a note with the instant. True: all
+            rows of a type whose rows are counted by a list.
         unilateral_words: the meaning of a negative multiplier, for that note.
         unknowns: names of unknowns of its own, such as the place of a contact, that C may name: of
             ``rows`` as many fewer constrain the bodies. They are solved for at all levels, from
@@ -145,7 +147,7 @@ class Joint(TypeBase):
         "C", "C_dot", "G", "J", "gamma", "nu", "friction", "switch", "rate", "impulse", "reset"
     )  # fmt: skip
     switch_words: ClassVar[str] = ""
-    rows: ClassVar[int] = 0
+    rows: ClassVar[int | str] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
     drives: ClassVar[bool] = False
     unilateral: ClassVar[tuple[int, ...]] = ()

@@ -332,6 +332,11 @@ class _Reading:
         places = [entry_of(self.report, geometry, key, kind, name) for name in value]
         self.good &= None not in places
         self.places[field.name] = places
+        bodies = [place[0] for place in places if place is not None]
+        if field.spec.apart and len(set(bodies)) < len(bodies):
+            twice = next(body for k, body in enumerate(bodies) if body in bodies[:k])
+            on = self.reader.body_names[twice]
+            self.refuse(field.name, f"has two {kind} on {on}; each is to be on a body of its own")
 
     def shape(self) -> Any:
         """The lengths of the lists and the slots of their entries, whose values become fields."""

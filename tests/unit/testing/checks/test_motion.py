@@ -51,6 +51,7 @@ INSTALLED = {
     "couple": ["refused: it joins three bodies"],
     "gear": [ONE_ROW] * 2,
     "rack": [ONE_ROW],
+    "belt": ["refused: it joins three bodies"],
     "cable": ["refused: it joins three bodies"] * 4 + [ON_TIME] * 2,  # two lists each
     "follow": ["refused: it joins three bodies"] * 2,
     "point-on-plane": [ONE_ROW],
