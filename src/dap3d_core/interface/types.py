@@ -126,6 +126,7 @@ class Joint(TypeBase):
         rows: number of constraint equations; of a type with lists also by the size of one: "n",
             "n - 1".
         holonomic: True, False, or one truth value a row: the rows of the position level.
+        coordinate: "angle" or "length", what a motor in this joint acts on; "" for what it says.
         drives: it prescribes a freedom that other joints leave; where there are none between its
             bodies a scene gets a note.
         unilateral: rows, from 0, with multipliers that are not negative in a valid motion: ground
@@ -147,8 +148,9 @@ class Joint(TypeBase):
         "C", "C_dot", "G", "J", "gamma", "nu", "friction", "switch", "rate", "impulse", "reset"
     )  # fmt: skip
     switch_words: ClassVar[str] = ""
-    rows: ClassVar[int | str] = 0
+    rows: ClassVar[int] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
+    coordinate: ClassVar[str] = ""
     drives: ClassVar[bool] = False
     unilateral: ClassVar[tuple[int, ...]] = ()
     unilateral_words: ClassVar[str] = ""

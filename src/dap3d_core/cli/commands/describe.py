@@ -191,6 +191,7 @@ def _allowed(spec: Any) -> str:
     bounds = {">": 0.0 if spec.positive else None, ">=": spec.minimum, "<=": spec.maximum}
     usual = _bounds({">=": spec.usual[0], "<=": spec.usual[1]})
     words = [f"of {spec.argument}"] if spec.argument else []
+    words += [f"a number, or the name of a {' or '.join(spec.by_name)}"] * bool(spec.by_name)
     words += ["rows of equal length"] * bool(spec.by_rows)
     if spec.choices:
         words.append(", ".join(map(_word, spec.choices)))

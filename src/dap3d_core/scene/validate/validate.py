@@ -45,8 +45,8 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     geometry = read_geometry(report, bodies)
     types = Types(report, registry, allow_code=allow_code, to_install=_check_requires(report))
     inputs, functions = _read_signals(report, geometry, types)
-    joints = read_elements(report, geometry, "joints", types.of("joints"), functions)
-    forces = read_elements(report, geometry, "forces", types.of("forces"), functions)
+    joints = read_elements(report, geometry, "joints", types, functions)
+    forces = read_elements(report, geometry, "forces", types, functions)
     _report_twins(report, "joints", joints)
     _report_twins(report, "forces", forces)
     _check_shapes_and_outputs(report, bodies)
@@ -96,7 +96,7 @@ def _read_signals(
         from dap3d_core.scene.signals.inputs import read_inputs
 
         inputs = read_inputs(report)
-    functions = read_elements(report, geometry, "functions", types.of("functions"))
+    functions = read_elements(report, geometry, "functions", types)
     if any(combines(function.type_info) for function in functions):
         from dap3d_core.scene.signals.combinations import combine_functions
 
