@@ -50,7 +50,9 @@ def scene_for(type_info, rng, *, ground=None, values=None):
         owner[ground] = "ground"
     fields = {}
     specs = specs_of(type_info.type)
-    replaced = {s.instead_of for n, s in specs.items() if s.kind == "input" and values.get(n)}
+    chosen = [n for n, s in specs.items() if s.instead_of and values.get(n)]
+    replaced = {other for n in chosen for other in specs[n].instead_of}
+    replaced |= {n for n, s in specs.items() if s.by_name and s.instead_of and n not in chosen}
     for name, spec in specs.items():
         if name in replaced:
             continue

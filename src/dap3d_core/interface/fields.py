@@ -169,7 +169,7 @@ def number(
     function of time or an input: a field ``torque`` offers its value then, and ``torque_dot``,
     ``torque_ddot``, ``torque_dddot``, which are zero of numbers and inputs. Left out it is zero.
     Kernels for where it is given may be a variant of the type, for ``torque=True``. A scene gives
-    it or a field of ``instead_of``, not both.
+    it or a field of ``instead_of``, not both. Of a driver the first such field is its coordinate.
     """
     names = tuple(by_name), tuple(instead_of)
     spec = FieldSpec("number", default, unit, doc, positive, minimum, maximum, whole, usual)
