@@ -5,7 +5,7 @@ from graphlib import CycleError, TopologicalSorter
 import attrs
 
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.scene.validate.elements import arguments_of
+from dap3d_core.scene.signals.names import arguments_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance
 

@@ -1,6 +1,6 @@
 """Reads joints, forces and functions: from fields as written to the values their types need."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -11,6 +11,7 @@ from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
 from dap3d_core.scene.scene import GROUND, ZERO, Element
+from dap3d_core.scene.signals.names import arguments_of, counted, named_row
 from dap3d_core.scene.validate.coerce_values import (
     READERS,
     Fault,
@@ -258,6 +259,10 @@ class _Reading:
 
     def function(self, field: _Field, value: Any) -> None:
         self.name_of(field, value, self.reader.function_index)
+        self.check_arguments(field, value)
+
+    def check_arguments(self, field: _Field, value: Any) -> None:
+        """A function takes as many arguments as the field gives it."""
         count = self.reader.arguments.get(value) if isinstance(value, str) else None
         if count is not None and count != field.spec.arguments:
             given = field.spec.argument or "time"
@@ -301,9 +306,15 @@ class _Reading:
             self.values[field.name] = value
             return
         self.refuse_both(field, value)
-        if spec.by_name and type(value) is str and self.named(field, value):
-            self.values[field.name] = 0.0
-            return
+        if spec.by_name and type(value) is str:
+            row = named_row(self.report, spec, value, self.reader.rows, field.value_of)
+            if isinstance(row, Fault):
+                self.refuse(field.name, row.what, row.nearest, row.remedy)
+            elif row is not None:
+                self.values[field.name], self.rows[field.name] = 0.0, row
+                self.check_arguments(field, value)
+            if row is not None:
+                return
         key = (*self.key, field.name)
         result = self.report.read(key, value, field.value_of)
         self.values[field.name] = result
@@ -317,27 +328,6 @@ class _Reading:
         for other in field.spec.instead_of if value is not None else ():
             if self.element.fields.get(other) is not None:
                 self.refuse(field.name, f"give {other} or {field.name}, not both")
-
-    def named(self, field: _Field, value: str) -> bool:
-        """Whether the text in place of a number is a name; its row of F, or its mistake."""
-        rows, kinds = self.reader.rows, field.spec.by_name
-        found = [kind for kind in rows if value in rows[kind]]
-        if not found:
-            if not isinstance(field.value_of(value), Fault):  # "1500 rpm"
-                return False
-            known = [name for kind in kinds for name in rows[kind]]
-            words, near, _ = missing_words(self.report, " or ".join(kinds), value, known)
-            self.refuse(field.name, f"should be a number or a name; {words}", near)
-        elif len(found) > 1:
-            self.refuse(field.name, "is a function and an input; rename one of them")
-        elif found[0] not in kinds:
-            self.refuse(field.name, f"is an {found[0]}, which steps from value to value",
-                        remedy=f"give a number or a {kinds[0]}")  # fmt: skip
-        else:
-            self.rows[field.name] = rows[found[0]][value]
-            if found[0] == "function" and self.reader.arguments.get(value, 1) != 1:
-                self.refuse(field.name, "takes two arguments, and is to be a function of time")
-        return True
 
     def list(self, field: _Field, value: Any) -> None:
         """A list of points, vectors or bodies by name."""
@@ -454,21 +444,6 @@ _FIELD_READERS = {
     "vectors": _Reading.list,
     "bodies": _Reading.list,
 }
-
-
-def counted(count: int) -> str:
-    """A number of arguments, in words."""
-    return "one argument" if count == 1 else "two arguments"
-
-
-def arguments_of(functions: Iterable[Instance]) -> dict[str, int]:
-    """How many arguments each function takes."""
-    return {f.name: f.type_info.type.arguments for f in functions}  # type: ignore[attr-defined]
-
-
-def combines(type_info: TypeInfo) -> bool:
-    """True if a type of function combines other functions."""
-    return any(spec.kind == "functions" for spec in specs_of(type_info.type).values())
 
 
 def _of(field: _Field) -> str:

@@ -89,7 +89,8 @@ def _read_signals(
     report: Collector, geometry: "Geometry", types: "Types"
 ) -> tuple[dict[str, float], list[Instance]]:
     """Inputs, and functions with those that they combine."""
-    from dap3d_core.scene.validate.elements import combines, read_elements
+    from dap3d_core.scene.signals.names import combines
+    from dap3d_core.scene.validate.elements import read_elements
 
     inputs = {}
     if report.scene.inputs:
