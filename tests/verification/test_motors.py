@@ -174,6 +174,19 @@ def test_a_linear_model_has_the_moment_as_an_input():
     assert np.max(np.abs(linear.B)) == pytest.approx(J**-0.5, rel=1e-9)
 
 
+def test_the_ledger_has_the_work_of_a_motor():
+    """A speed that is a number does work against gravity: the energy is no constant."""
+    scene = machine()
+    scene.add_force("weight", "gravity")
+    scene.points["P"].sPp = (0.5, 1.0, 0.3)
+    scene.points["Q"].sPp = (0.5, 0.0, 0.3)
+    scene.add_joint("motor", "motor", joint="guide", speed=3.0)
+    result = dap.simulate(scene, t_end=1.0, dt=0.05)
+    assert result.ledger["energy"].ok
+    assert "total energy" not in result.ledger
+    assert not dap.compile(scene).is_conservative
+
+
 def test_kinematics_over_the_coordinate_of_a_motor():
     """Its own coordinate takes the place of a speed."""
     scene = machine()

@@ -37,7 +37,8 @@ def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
     driven = driven or any(
         np.any(g.functions[:, : len(g.type_info.layout.functions)] > 0) for g in model.forces
     )
-    if driven or model.iterated_forces:
+    drivers = any(getattr(g.type_info.type, "drives", False) for g in model.joints)
+    if driven or model.iterated_forces or (drivers and np.any(evaluator.rows(0.0, u).nu)):
         return False
     if any("energy" not in g.type_info.kernels for g in model.forces):
         return False
