@@ -30,10 +30,11 @@ class Motor(Force):
     """A moment or force in the coordinate of a joint, given, or as a speed takes it.
 
     ``torque`` and ``force`` are a number, or the name of a function of time or of an input. With a
-    ``limit`` they saturate:
+    ``limit`` they saturate. Body i is given the moment T a_j, or the force F a_j at P_i, and body j
+    the opposite:
 
-        T = min(max(torque, -limit), limit),  moment T a_j on body i, -T a_j on body j
-        F = min(max(force, -limit), limit),   force F a_j at P_i on body i, -F a_j there on body j
+        T = min(max(torque, -limit), limit)
+        F = min(max(force, -limit), limit)
 
     A ``speed`` needs a limit. With the rate q_dot of the coordinate, the angle of body i against
     body j about a_j, or how far P_i is along a_j as seen from body j:

@@ -29,23 +29,20 @@ class Motor(Joint):
 
     q is the angle theta by which body i has turned against body j about a_j, or the length x by
     which P_i has moved along a_j as seen from body j, as the joint reports them: zero in the poses
-    of the scene. A motor in ``rev`` and ``cyl`` acts on the angle, in ``tran`` on the length, and
-    wherever ``coordinate`` says so. With n_j and m_j, which complete a_j to a triad on body j, u_i,
-    which is n_j in the poses as given, Z = a_j . u_i, and d = r_Pi - r_Pj:
+    of the scene. A motor in ``rev`` and ``cyl`` acts on the angle, in ``tran`` on the length; else
+    ``coordinate`` says on which. The rows are those of ``drive-rot`` and ``drive-tran``:
 
-        C     = theta - position, in (-pi, pi]        C     = a_j . d - x_0 - position
-        J_i   = [0, h^T],  J_j = [0, -h^T]            J_i   = [a_j^T, (s_i x a_j)^T],  J_j opposite
-        h     = (a_j - Z u_i) / (1 - Z^2)             nu    = position_dot, or speed
-        gamma = nu_dot - h_dot . (w_i - w_j)          gamma = nu_dot + that of a_j . d
+        C  = q - position,  nu = position_dot
+        nu = speed
 
-    Both are a number, or the name of a function of time; a ``speed`` may be an input, too, held
-    between settings, where velocities jump. Of a speed the row is one of the velocity level alone.
-    A position is not an input, which would step: bodies would have to jump.
+    C of an angle is brought into (-pi, pi]; of a speed there is no C, the row is one of the
+    velocity level alone. A ``position`` is a number or the name of a function of time, a ``speed`` also that of an input,
+    held between settings, where velocities jump. A position is not an input, which steps: bodies
+    would have to jump.
 
-    The multiplier is the moment or force of the motor on body i, of any size. A motor with a
-    largest one is the force ``motor``: it holds a speed up to its ``limit``. No row, and no smooth
-    force, holds a position within a limit: give the force ``motor`` a ``torque`` with a ``limit``,
-    set by a controller (docs/how-to/inputs-and-controllers.md).
+    The multiplier is the moment or force of the motor on body i, of any size. One with a largest
+    moment is the force ``motor``, which takes a speed with a ``limit``. A position within a limit
+    takes a controller that sets its ``torque`` (docs/how-to/inputs-and-controllers.md).
     """
 
     keyword, rows = "motor", 1
