@@ -77,6 +77,12 @@ class Belt(Force):
             on += [on_points[a], on_points[b]]
         return by_body(on, parts, body_count)
 
+    def tension(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x):
+        return tuple(
+            maximum(pull, 0.0)
+            for pull in pulls(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x)
+        )
+
     def energy(k, pretension, x):
         return sum(stored(k, pretension, x_k) for x_k in x)
 
@@ -87,10 +93,15 @@ class Belt(Force):
         ),)  # fmt: skip
 
     def switch(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x):
-        return tuple(
-            pretension + k * x[a] + c * speed(e, arm_a, arm_b, v_points, w_points, a, b)
-            for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i)
-        )
+        return pulls(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x)
+
+
+def pulls(r, v, w, rho, axis, k, c, pretension, x):
+    """The tension of each span, N; negative where it is slack."""
+    return tuple(
+        pretension + k * x[a] + c * speed(e, arm_a, arm_b, v, w, a, b)
+        for a, b, e, arm_a, arm_b in runs(r, rho, axis)
+    )
 
 
 def stored(k, pretension, x):

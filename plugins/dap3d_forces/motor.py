@@ -51,7 +51,7 @@ class Motor(Force):
     """
 
     keyword = "motor"
-    synonyms = ("actuator", "engine", "torque")
+    synonyms = ("actuator", "rotational-motor")
     symbol = "ring"
     example: ClassVar[Mapping[str, str]] = {"torque": "2.0"}
     joint: str = joint_fields(

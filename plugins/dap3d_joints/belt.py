@@ -44,7 +44,7 @@ class Belt(Joint):
     """
 
     keyword, rows, holonomic = "belt", "n - 1", False
-    synonyms = ("pulley", "timing-belt", "chain")
+    synonyms = ("timing-belt", "chain")
     unilateral = True
     unilateral_words = (
         "this span would have to push: the last span, which closes the belt, is the slack one; "

@@ -36,9 +36,9 @@ class Motor(Joint):
         nu = speed
 
     C of an angle is brought into (-pi, pi]; of a speed there is no C, the row is one of the
-    velocity level alone. A ``position`` is a number or the name of a function of time, a ``speed`` also that of an input,
-    held between settings, where velocities jump. A position is not an input, which steps: bodies
-    would have to jump.
+    velocity level alone. A ``position`` is a number or the name of a function of time, a ``speed``
+    also that of an input, held between settings, where velocities jump. A position is not an input,
+    which steps: bodies would have to jump.
 
     The multiplier is the moment or force of the motor on body i, of any size. One with a largest
     moment is the force ``motor``, which takes a speed with a ``limit``. A position within a limit
@@ -46,7 +46,7 @@ class Motor(Joint):
     """
 
     keyword, rows = "motor", 1
-    synonyms = ("actuator", "engine", "rotational-motor")
+    synonyms = ("actuator", "rotational-motor")
     symbol = "ring"
     drives = True
     example: ClassVar[Mapping[str, str]] = {"position": "0.5"}

@@ -126,6 +126,8 @@ def _field(scene, name, spec, owner, rng, wanted):
         return scene.add_function("grid", f"{name}_of_two", x=places, y=places, z=values)
     if spec.kind == "function":
         return scene.add_function("a", f"{name}_of_time", coeff=rng.uniform(-1, 1, 3))
+    if spec.kind == "choice" and wanted is None and not spec.required and spec.default is None:
+        return None
     if spec.kind == "choice":
         return spec.choices[0] if wanted is None else wanted
     return "vector2"

@@ -47,6 +47,7 @@ def test_an_elastic_cable_swings_about_its_stretch():
     result = dap.simulate(scene, t_end=1.0, dt=0.05, rtol=1e-9, atol=1e-11)
     sink = 2.0 * G / 800.0 * (1.0 - np.cos(20.0 * result.t))
     np.testing.assert_allclose(result.r[:, 0, 2], -1.0 - sink, atol=1e-7)
+    np.testing.assert_allclose(result.quantity("rope.tension").values, 800.0 * sink, atol=1e-4)
 
 
 def test_a_slack_cable_does_not_push():
@@ -107,6 +108,10 @@ def test_a_belt_carries_a_moment(crossed, by_joints):
     np.testing.assert_allclose(result.wd[-1, 0, 2], alpha, rtol=1e-6)
     np.testing.assert_allclose(result.wd[-1, 1, 2], ratio * alpha, rtol=1e-6)
     difference = (M - J_a * alpha) / r_a
+    T = result.quantity("belt.tension").values[-1]
+    np.testing.assert_allclose(T[1] - T[0], difference, rtol=1e-5)
+    np.testing.assert_allclose(np.sum(T), 2.0 * T_0, rtol=1e-5)
+    np.testing.assert_allclose(result.quantity("belt.tension.2").values[-1], T[1])
     sine = (r_a - (-r_b if crossed else r_b)) / 1.0
     along = 2.0 * T_0 * np.sqrt(1.0 - sine**2)  # the mean of both spans is the pretension
     load = result.reaction("a_axis")["i"].force[-1]

@@ -188,6 +188,8 @@ class Force(TypeBase):
     and ``rate`` are as for joints. A force that defines neither and names one joint, by a ``joint``
     field, switches on the friction of that joint; one with a ``wrench`` does not.
 
+    ``tension``, a number or a tuple, positive where it pulls, is for results alone.
+
     Where a ``switch`` changes its sign velocities may jump (docs/jumps.md), by ``impulse``:
 
     * without ``J``: for each body slot (impulse, moment of impulse about the mass centre), global;
@@ -215,7 +217,7 @@ class Force(TypeBase):
     """
 
     kind = "force"
-    kernel_names = ("wrench", "energy", "switch", "rate", "J", "impulse", "reset")
+    kernel_names = ("wrench", "energy", "switch", "rate", "J", "impulse", "reset", "tension")
     switch_words: ClassVar[str] = ""
     unilateral: ClassVar[tuple[int, ...]] = ()
     restitution: ClassVar[str] = ""

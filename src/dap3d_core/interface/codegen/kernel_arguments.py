@@ -16,7 +16,7 @@ from dap3d_core.interface.types import TypeBase
 
 #: Kernels that may use quantities of the velocity level; all others use positions and time only.
 VELOCITY_KERNELS = (
-    "C_dot", "gamma", "wrench", "friction", "switch", "rate", "impulse", "reset"
+    "C_dot", "gamma", "wrench", "friction", "switch", "rate", "impulse", "reset", "tension"
 )  # fmt: skip
 #: Numbers of a force ``friction`` for the kernel ``friction`` of its joint.
 FRICTION_NUMBERS = ("mu", "v_tol", "radius")

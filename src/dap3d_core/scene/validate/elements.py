@@ -11,7 +11,6 @@ from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
 from dap3d_core.scene.scene import GROUND, ZERO, Element
-from dap3d_core.scene.signals.names import arguments_of, counted, named_row
 from dap3d_core.scene.validate.coerce_values import (
     READERS,
     Fault,
@@ -25,6 +24,7 @@ from dap3d_core.scene.validate.geometry import (
     body_of,
     entry_of,
     missing_words,
+    named_row,
     point_of,
     two_ends,
     vector_of,
@@ -32,7 +32,7 @@ from dap3d_core.scene.validate.geometry import (
 from dap3d_core.scene.validate.joint_fields import with_joint_fields
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.types import Types
-from dap3d_core.scene.validate.validated_scene import Instance
+from dap3d_core.scene.validate.validated_scene import Instance, arguments_of
 
 #: The two points that may be given in place of a vector of type 2.
 ENDS = ("P_i", "P_j")
@@ -444,6 +444,11 @@ _FIELD_READERS = {
     "vectors": _Reading.list,
     "bodies": _Reading.list,
 }
+
+
+def counted(count: int) -> str:
+    """A number of arguments, in words."""
+    return "one argument" if count == 1 else "two arguments"
 
 
 def _of(field: _Field) -> str:

@@ -10,7 +10,7 @@ from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.scene import NAMED, Scene, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene
+from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
 
 if TYPE_CHECKING:
     from dap3d_core.scene.validate.bodies import Bodies
@@ -89,7 +89,6 @@ def _read_signals(
     report: Collector, geometry: "Geometry", types: "Types"
 ) -> tuple[dict[str, float], list[Instance]]:
     """Inputs, and functions with those that they combine."""
-    from dap3d_core.scene.signals.names import combines
     from dap3d_core.scene.validate.elements import read_elements
 
     inputs = {}
