@@ -193,8 +193,11 @@ def test_kinematics_over_the_coordinate_of_a_motor():
     scene.add_joint("motor", "motor", joint="guide", speed=3.0)
     result = dap.kinematics(scene, over="motor.q=0:6:7")
     np.testing.assert_allclose(coordinate(result)[0], np.arange(7.0), atol=1e-9)
+    scene = machine()
+    scene.add_joint("motor", "motor", joint="guide", position="course")
     inverse = dap.inverse(scene, dap.simulate(scene, t_end=1.0, dt=0.25))
-    np.testing.assert_allclose(inverse.quantity("motor.actuation").values, 0.0, atol=1e-6)
+    np.testing.assert_allclose(np.abs(inverse.quantity("motor.actuation").values), 4.0 * J,
+                               rtol=1e-6)  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -204,6 +207,7 @@ def test_kinematics_over_the_coordinate_of_a_motor():
         ("joint", {"position": "signal"}, "is an input, which steps from value to value"),
         ("joint", {"position": 1.0, "speed": 1.0}, "give position or speed, not both"),
         ("joint", {"speed": "rampe"}, "no function or input 'rampe'.*'ramp'"),
+        ("joint", {"speed": "12"}, "no function or input '12'.*write 12 without quotes"),
         ("joint", {"speed": True}, "should be a number, not a truth value"),
         ("joint", {"speed": 1.0, "limit": 2.0}, r"the force motor has it: \[forces.NAME\]"),
         ("joint", {"speed": 1.0, "a_j": "ground.x"}, "give joint or a_j, not both"),

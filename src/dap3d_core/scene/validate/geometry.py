@@ -232,11 +232,12 @@ def named_row(
     if found:
         remedy = f"give a number or a {spec.by_name[0]}"
         return Fault(f"is an {found[0]}, which steps from value to value", remedy)
-    if not isinstance(read(text), Fault):
+    fault = read(text)
+    if not isinstance(fault, Fault):
         return None
     known = [name for kind in spec.by_name for name in rows[kind]]
     words, near, _ = missing_words(report, " or ".join(spec.by_name), text, known)
-    return Fault(f"should be a number or a name; {words}", "", near)
+    return Fault(f"should be a number or a name; {words}", fault.remedy, near)
 
 
 def _numbered(number: int, declared: Collection[str]) -> str:
