@@ -1,5 +1,6 @@
 """Elastic belt over two or more pulleys."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 from dap3d_core.interface import (
@@ -13,7 +14,16 @@ from dap3d_core.interface import (
     points,
     vector,
 )
-from dap3d_core.kernels import add, by_body, cross, dot, maximum, neg, norm2, scale, sqrt, sub
+from dap3d_core.kernels import (
+    add,
+    by_body,
+    cross,
+    maximum,
+    neg,
+    scale,
+    where,
+)
+from dap3d_joints.belt import runs, signed_radii, speed
 
 interface_version = 1
 
@@ -31,16 +41,19 @@ class Belt(Force):
         P_k = r_k + rho_k n,  P_(k+1) = r_(k+1) + rho_(k+1) n,  e along P_(k+1) - P_k
         x_dot = e . (v_P(k+1) - v_P_k),  T = max(0, pretension + k x + c x_dot)
         force T e at P_k on pulley k, -T e at P_(k+1) on the next
+        energy = sum of max(0, pretension + k x)^2 / (2 k)
 
     v_P_k is the velocity of the point of the pulley there. The elongations x of the spans since the
     start are states. The forces load the bearings: with the axis fixed, the moment on a pulley is
     rho (T_out - T_in), where T_out is the tension of the span that begins there. With ``crossed``
-    the belt of two pulleys crosses itself, as with a negative second radius.
+    the belt of two pulleys crosses itself, as with a negative second radius. Of
+    no stretch: joint ``belt``.
     """
 
     keyword = "belt"
     synonyms = ("pulley", "timing-belt", "chain")
     states: ClassVar = {"x": "n"}
+    example: ClassVar[Mapping[str, str]] = {"radii": "[0.1, 0.3]", "k": "1e4"}
     joints: tuple = joint_fields(points="P", axis_i="a", doc="hinges of the pulleys, in order")
     points: tuple = points("n", least=2, doc="centres of the pulleys, in order along the belt")
     radii: tuple = numbers("n", unit="m", doc="radii; negative of a pulley on the belt's back")
@@ -51,21 +64,7 @@ class Belt(Force):
     crossed: bool = choice((False, True), False, doc="the belt of two pulleys crosses itself")
 
     def prepare(self, bodies):
-        rho = list(self.radii)
-        if self.crossed and len(rho) > 2:
-            raise ValueError("crossed is for two pulleys; of more, give some a negative radius")
-        if self.crossed:
-            rho[1] = -rho[1]
-        places = [pose.place(P) for P, pose in zip(self.points, bodies["points"], strict=True)]
-        axis = bodies["i"].to_global(self.axis_i)
-        for k, place in enumerate(places):
-            after = (k + 1) % len(places)
-            if norm2(across(sub(places[after], place), axis)) <= (rho[k] - rho[after]) ** 2:
-                raise ValueError(
-                    f"pulleys {k + 1} and {after + 1} are too near for a belt between them; "
-                    "give smaller radii or other points"
-                )
-        return {"rho": tuple(rho)}
+        return {"rho": signed_radii(self, bodies)}
 
     def wrench(r_points, s_points, v_points, w_points, on_points, body_count, rho, axis_i, k, c,
                pretension, x):  # fmt: skip
@@ -78,6 +77,15 @@ class Belt(Force):
             on += [on_points[a], on_points[b]]
         return by_body(on, parts, body_count)
 
+    def tension(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x):
+        return tuple(
+            maximum(pull, 0.0)
+            for pull in pulls(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x)
+        )
+
+    def energy(k, pretension, x):
+        return sum(stored(k, pretension, x_k) for x_k in x)
+
     def rate(r_points, v_points, w_points, rho, axis_i):
         return (tuple(
             speed(e, arm_a, arm_b, v_points, w_points, a, b)
@@ -85,39 +93,21 @@ class Belt(Force):
         ),)  # fmt: skip
 
     def switch(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x):
-        return tuple(
-            pretension + k * x[a] + c * speed(e, arm_a, arm_b, v_points, w_points, a, b)
-            for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i)
-        )
+        return pulls(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x)
 
 
-def across(d, axis):
-    """The part of a vector that is normal to the axis."""
-    return sub(d, scale(dot(d, axis), axis))
+def pulls(r, v, w, rho, axis, k, c, pretension, x):
+    """The tension of each span, N; negative where it is slack."""
+    return tuple(
+        pretension + k * x[a] + c * speed(e, arm_a, arm_b, v, w, a, b)
+        for a, b, e, arm_a, arm_b in runs(r, rho, axis)
+    )
 
 
-def runs(r, rho, axis):
-    """Of each span: its pulleys, its direction, the arms from their centres to where it ends."""
-    spans = []
-    for a in range(len(r)):
-        b = (a + 1) % len(r)
-        d = across(sub(r[b], r[a]), axis)
-        l = sqrt(norm2(d))
-        u = scale(1.0 / l, d)
-        m = cross(axis, u)
-        s = (rho[a] - rho[b]) / l
-        z = sqrt(1.0 - s * s)
-        n = sub(scale(s, u), scale(z, m))
-        arm_a, arm_b = scale(rho[a], n), scale(rho[b], n)
-        e = sub(add(r[b], arm_b), add(r[a], arm_a))
-        spans.append((a, b, scale(1.0 / sqrt(norm2(e)), e), arm_a, arm_b))
-    return spans
-
-
-def speed(e, arm_a, arm_b, v, w, a, b):
-    """The rate at which a span becomes longer, m/s."""
-    v_a, v_b = add(v[a], cross(w[a], arm_a)), add(v[b], cross(w[b], arm_b))
-    return dot(e, sub(v_b, v_a))
+def stored(k, pretension, x):
+    """Energy of a span, J: what it does until it is slack; without k it does not become slack."""
+    T = maximum(pretension + k * x, 0.0)
+    return where(k > 0.0, 0.5 * T * T / where(k > 0.0, k, 1.0), pretension * x)
 
 
 @hookimpl

@@ -47,6 +47,10 @@ class ElasticCable(Force):
         T = tension(x, length_rate(r_points, v_points), k, c, pushes)
         return pulled(T, r_points, s_points, on_points, body_count)
 
+    def tension(r_points, v_points, length, pushes, k, c):
+        x = stretch(r_points, length)
+        return tension(x, length_rate(r_points, v_points), k, c, pushes)
+
     def energy(r_points, length, pushes, k):
         return stored(stretch(r_points, length), k, pushes)
 
@@ -65,6 +69,10 @@ class Driven(ElasticCable, function=True):
         T = tension(x, length_rate(r_points, v_points) - f_dot, k, c, pushes)
         return pulled(T, r_points, s_points, on_points, body_count)
 
+    def tension(r_points, v_points, length, counted, pushes, k, c, f, f_0, f_dot):
+        x = stretch(r_points, length + (f - counted * f_0))
+        return tension(x, length_rate(r_points, v_points) - f_dot, k, c, pushes)
+
     def energy(r_points, length, counted, pushes, k, f, f_0):
         return stored(stretch(r_points, length + (f - counted * f_0)), k, pushes)
 
@@ -80,6 +88,10 @@ class Wound(ElasticCable, input=True):
         x = stretch(r_points, length + input)
         T = tension(x, length_rate(r_points, v_points), k, c, pushes)
         return pulled(T, r_points, s_points, on_points, body_count)
+
+    def tension(r_points, v_points, length, pushes, k, c, input):
+        x = stretch(r_points, length + input)
+        return tension(x, length_rate(r_points, v_points), k, c, pushes)
 
     def energy(r_points, length, pushes, k, input):
         return stored(stretch(r_points, length + input), k, pushes)

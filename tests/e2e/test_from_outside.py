@@ -112,7 +112,7 @@ def the_first_run_compiles_for_all_that_follow(outside):
 
 def a_plugin_that_was_written_there_is_checked_and_its_scene_runs(outside):
     package = outside.folder / "dap3d-cord"
-    said = outside.dap3d("check-plugin", "cord", "motor").stdout
+    said = outside.dap3d("check-plugin", "cord", "position-servo").stdout
     assert "2 types checked: nothing is wrong" in said
     outside.dap3d("run", "scene.toml", "-o", "cord.nc", cwd=package)
     script = "import dap3d_core as dap; r = dap.open('cord.nc'); print(r.r[-1, 0, 2])"

@@ -50,7 +50,9 @@ def scene_for(type_info, rng, *, ground=None, values=None):
         owner[ground] = "ground"
     fields = {}
     specs = specs_of(type_info.type)
-    replaced = {s.instead_of for n, s in specs.items() if s.kind == "input" and values.get(n)}
+    chosen = [n for n, s in specs.items() if s.instead_of and values.get(n)]
+    replaced = {other for n in chosen for other in specs[n].instead_of}
+    replaced |= {n for n, s in specs.items() if s.by_name and s.instead_of and n not in chosen}
     for name, spec in specs.items():
         if name in replaced:
             continue
@@ -124,6 +126,8 @@ def _field(scene, name, spec, owner, rng, wanted):
         return scene.add_function("grid", f"{name}_of_two", x=places, y=places, z=values)
     if spec.kind == "function":
         return scene.add_function("a", f"{name}_of_time", coeff=rng.uniform(-1, 1, 3))
+    if spec.kind == "choice" and wanted is None and not spec.required and spec.default is None:
+        return None
     if spec.kind == "choice":
         return spec.choices[0] if wanted is None else wanted
     return "vector2"

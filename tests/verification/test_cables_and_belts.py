@@ -47,6 +47,7 @@ def test_an_elastic_cable_swings_about_its_stretch():
     result = dap.simulate(scene, t_end=1.0, dt=0.05, rtol=1e-9, atol=1e-11)
     sink = 2.0 * G / 800.0 * (1.0 - np.cos(20.0 * result.t))
     np.testing.assert_allclose(result.r[:, 0, 2], -1.0 - sink, atol=1e-7)
+    np.testing.assert_allclose(result.quantity("rope.tension").values, 800.0 * sink, atol=1e-4)
 
 
 def test_a_slack_cable_does_not_push():
@@ -107,11 +108,141 @@ def test_a_belt_carries_a_moment(crossed, by_joints):
     np.testing.assert_allclose(result.wd[-1, 0, 2], alpha, rtol=1e-6)
     np.testing.assert_allclose(result.wd[-1, 1, 2], ratio * alpha, rtol=1e-6)
     difference = (M - J_a * alpha) / r_a
+    T = result.quantity("belt.tension").values[-1]
+    np.testing.assert_allclose(T[1] - T[0], difference, rtol=1e-5)
+    np.testing.assert_allclose(np.sum(T), 2.0 * T_0, rtol=1e-5)
+    np.testing.assert_allclose(result.quantity("belt.tension.2").values[-1], T[1])
     sine = (r_a - (-r_b if crossed else r_b)) / 1.0
     along = 2.0 * T_0 * np.sqrt(1.0 - sine**2)  # the mean of both spans is the pretension
     load = result.reaction("a_axis")["i"].force[-1]
     np.testing.assert_allclose(-load[0], along, rtol=1e-5)
     np.testing.assert_allclose(abs(load[1]), difference * abs(sine), rtol=1e-5)
+
+
+RIGID = {
+    "open": ([(0.0, 0.0), (1.0, 0.0)], [0.1, 0.25], {}),
+    "crossed": ([(0.0, 0.0), (1.0, 0.0)], [0.1, 0.25], {"crossed": True}),
+    "three": ([(0.0, 0.0), (1.0, 0.0), (0.4, 0.9)], [0.1, 0.25, 0.15], {}),
+    "idler": ([(0.0, 0.0), (0.5, 0.1), (1.0, 0.0), (0.5, 0.6)], [0.1, -0.05, 0.25, 0.1], {}),
+}
+
+
+def rigid_belt(places, radii, fields, moment):
+    """Pulleys on hinges of ground, the last one driven by a moment."""
+    scene = dap.Scene(name="belt")
+    names = "abcd"[: len(places)]
+    for name, (x, y), rho in zip(names, places, radii, strict=True):
+        scene.add_body(name, mass=1.0, Jp=[0.1, 0.1, 2.0 * rho * rho], r=[x, y, 0.0])
+        scene.add_point(f"{name}_pin", body="ground", sPp=[x, y, 0.0])
+        pins = {"P_i": f"{name}.O", "P_j": f"{name}_pin"}
+        scene.add_joint("rev", f"{name}_axis", **pins, a_i=f"{name}.z", a_j="ground.z")
+    scene.add_joint("belt", "belt", joints=[f"{n}_axis" for n in names], radii=radii, **fields)
+    scene.add_force("np", "drive", body_i=names[-1], np=[0.0, 0.0, moment])
+    return scene
+
+
+def tangents(places, radii):
+    """Directions of spans by angles: a span to the right of the line of centres, turned by asin."""
+    found = []
+    for k, start in enumerate(places):
+        after = (k + 1) % len(places)
+        dx, dy = np.subtract(places[after], start)
+        turn = np.arctan2(dy, dx) + np.arcsin((radii[k] - radii[after]) / np.hypot(dx, dy))
+        found.append(np.array([np.cos(turn), np.sin(turn)]))
+    return found
+
+
+@pytest.mark.parametrize("name", RIGID)
+def test_a_rigid_belt_couples_speeds_and_loads_bearings(name):
+    """Closed forms: rho w is one speed; M = J w_dot + rho (T_out - T_in); loads are tensions.
+
+    The rows are kept at each step, so that speeds after 10 s, of some 1e3 rad/s, are in ratio to
+    rounding; multipliers have that of the solution of the equations.
+    """
+    places, radii, fields = RIGID[name]
+    moment = 0.5 if radii[-1] > 0.0 and not fields else -0.5
+    result = dap.simulate(rigid_belt(places, radii, fields, moment), t_end=10.0, dt=1.0)
+    rho = np.array([radii[0], -radii[1]] if fields else radii)
+    speed = result.w[:, :, 2] * rho
+    np.testing.assert_allclose(speed, np.repeat(speed[:, :1], len(rho), axis=1), rtol=1e-9)
+    inertia = 2.0 * rho * rho
+    belt_dot = moment / rho[-1] / np.sum(inertia / rho**2)
+    np.testing.assert_allclose(speed[:, 0], belt_dot * result.t, rtol=1e-8, atol=1e-12)
+    T = np.append(result.quantity("belt.lambda").values.reshape(len(result.t), -1)[-1], 0.0)
+    assert np.all(T >= 0.0)
+    assert not [note for note in result.notes if "push" in note]
+    M = np.zeros(len(rho))
+    M[-1] = moment
+    np.testing.assert_allclose(M + rho * (T - np.roll(T, 1)), inertia * belt_dot / rho, atol=1e-9)
+    e = tangents(places, rho)
+    for k, body in enumerate("abcd"[: len(rho)]):
+        pull = T[k] * e[k] - T[k - 1] * e[k - 1]
+        load = result.reaction(f"{body}_axis")["i"].force[-1, :2]
+        np.testing.assert_allclose(load, -pull, atol=1e-8)
+
+
+def test_a_rigid_belt_on_a_carrier():
+    """Willis: with the wheel a held, (w_b - w_c) r_b = -w_c r_a; the carrier is driven at 2 rad/s.
+
+    Rows of velocities hold to rounding.
+    """
+    scene = dap.Scene(name="carrier")
+    scene.add_body("carrier", mass=1.0, Jp=JP, r=[0.5, 0.0, 0.0], r_dot=[0.0, 1.0, 0.0],
+                   w=[0.0, 0.0, 2.0])  # fmt: skip
+    scene.add_body("b", mass=1.0, Jp=JP, r=[1.0, 0.0, 0.0], r_dot=[0.0, 2.0, 0.0],
+                   w=[0.0, 0.0, 1.2])  # fmt: skip
+    scene.add_point("end", body="carrier", sPp=[0.5, 0.0, 0.0])
+    scene.add_point("hub", body="carrier", sPp=[-0.5, 0.0, 0.0])
+    axes = {"a_j": "carrier.z"}
+    scene.add_joint("rev", "arm", P_i="hub", P_j="ground.O", a_i="carrier.z", a_j="ground.z")
+    scene.add_joint("rev", "b_axis", P_i="b.O", P_j="end", a_i="b.z", **axes)
+    pulleys = {"points": ["ground.O", "b.O"], "radii": [0.1, 0.25], "axis_i": "carrier.z"}
+    scene.add_joint("belt", "belt", **pulleys)
+    result = dap.simulate(scene, t_end=2.0, dt=0.5)
+    np.testing.assert_allclose(result.w[:, 0, 2], 2.0, rtol=1e-9)
+    np.testing.assert_allclose(result.w[:, 1, 2], 2.0 * (1.0 - 0.1 / 0.25), rtol=1e-9)
+
+
+def test_a_rigid_belt_says_which_span_is_slack():
+    """A moment the other way round tightens the span that is taken to be slack."""
+    places, radii, fields = RIGID["open"]
+    result = dap.simulate(rigid_belt(places, radii, fields, -0.5), t_end=0.1, dt=0.1)
+    assert any("this span would have to push" in note for note in result.notes)
+
+
+def test_two_pulleys_of_a_belt_on_one_body_are_refused():
+    scene = rigid_belt(*RIGID["open"], 0.5)
+    scene.joints["belt"].fields = {
+        "points": ("a.O", "b.O", "a_pin", "b_pin"), "radii": (0.1,) * 4, "axis_i": "ground.z"
+    }  # fmt: skip
+    with pytest.raises(dap.SceneError, match="two points on ground; each is to be on a body of"):
+        dap.compile(scene)
+
+
+def test_a_belt_stores_energy():
+    """Pulleys swing against each other on a belt without damping, and a span becomes slack.
+
+    About equal angles, k' = 2 k r^2 of both spans and I' = J_a J_b / (J_a + J_b): the first swing
+    is w = sqrt(k' / I'); the energy is 2 T_0^2 / (2 k) at the start. Steps leave 1e-9 of it.
+    """
+    for pretension, spin in ((300.0, 1.0), (20.0, 5.0)):
+        scene = belt(False)
+        del scene.forces["motor"]
+        scene.forces["belt"].fields |= {"c": 0.0, "pretension": pretension, "radii": [0.1, 0.1]}
+        scene.bodies["a"].w = [0.0, 0.0, spin]
+        result = dap.simulate(scene, t_end=0.1, dt=0.0005, rtol=1e-10, atol=1e-12)
+        energy = result.quantity("energy.total").values
+        start = 0.5 * 0.02 * spin**2 + pretension**2 / 1e5
+        np.testing.assert_allclose(energy, start, rtol=1e-8)
+        assert result.ledger["total energy"].ok
+        if spin == 1.0:
+            w = np.sqrt(2.0 * 1e5 * 0.01 * (1.0 / 0.02 + 1.0 / 0.05))
+            common = 0.02 / 0.07
+            swing = common + (1.0 - common) * np.cos(w * result.t)
+            np.testing.assert_allclose(result.w[:, 0, 2], swing, atol=1e-6)
+        else:
+            x = result.quantity("belt.x").values
+            assert np.min(pretension + 1e5 * x) < 0.0
 
 
 @pytest.mark.parametrize("kind", ["rP", "drive-tran", "sph-sph", "drive-rot"])

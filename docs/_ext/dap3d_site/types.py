@@ -105,4 +105,4 @@ def _first(doc: str) -> str:
 def _counts(facts: dict[str, Any], what: str) -> str:
     """A number of a joint, or those of its variants."""
     counts = [facts[what], *(variant[what] for variant in facts["variants"])]
-    return ", ".join(str(n) for n in dict.fromkeys(sorted(counts)))
+    return ", ".join(str(n) for n in dict.fromkeys(sorted(counts))) if None not in counts else ""

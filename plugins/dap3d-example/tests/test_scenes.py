@@ -74,7 +74,7 @@ def test_a_free_bead_runs_along_a_geodesic():
 
 def test_a_motor_at_its_limit():
     """J e' = -T tanh(k e / T) for the error e of the speed: sinh(k e / T) ~ exp(-k t / J)."""
-    result = run("motor")
+    result = run("position-servo")
     start = np.sinh(0.5 * 20.0 / 2.0)
     error = 2.0 / 0.5 * np.arcsinh(start * np.exp(-0.5 / 0.1 * result.t))
     np.testing.assert_allclose(result.w[:, 0, 2], 20.0 - error, atol=1e-7)
@@ -85,7 +85,7 @@ def test_a_controller_with_integral_part():
 
     The limit is 5e4 times the torque needed: it changes the torque by 1e-10 of it.
     """
-    result = run("motor")
+    result = run("position-servo")
     gain, integral, inertia = 0.1, 0.5, 0.02
     decay = gain / (2.0 * inertia)
     omega = np.sqrt(integral / inertia - decay**2)

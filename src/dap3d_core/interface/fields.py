@@ -50,11 +50,14 @@ class FieldSpec:
         by_rows: a table is given as rows of equal length.
         axes: the fields an angle is measured between: two vectors, and the axis.
         rows: number of rows that a joint must have; None for any.
-        instead_of: field that an input takes the place of; "" for none.
+        by_name: what a number may also name: a function (of time), an input.
+        instead_of: fields that an input or a number takes the place of.
         gives: fields that a joint gives -> its own, as of ``joint_fields``.
+        facts: fields that it gives where the scene does not, by attributes of its type.
         size: name of the number of entries of a list, which the scene gives by its length; "" of
             all else.
         least: smallest number of entries of a list.
+        apart: each entry of a list is on a body of its own.
     """
 
     kind: str
@@ -79,15 +82,23 @@ class FieldSpec:
     by_rows: bool = False
     axes: tuple[str, str, str] = ("", "", "")
     rows: int | None = None
-    instead_of: str = ""
+    by_name: tuple[str, ...] = ()
+    instead_of: tuple[str, ...] = ()
     gives: Mapping[str, str] = attrs.field(factory=dict)
+    facts: tuple[str, ...] = ()
     size: str = ""
     least: int = 1
+    apart: bool = False
 
     @property
     def for_prepare(self) -> bool:
         """True if ``prepare`` alone reads the field, and no kernel."""
         return self.by_rows or self.kind == "square"
+
+    @property
+    def is_reference(self) -> bool:
+        """True if it names a function or input, so that variants may ask for its presence."""
+        return self.kind in ("function", "input") or bool(self.by_name)
 
     @property
     def required(self) -> bool:
@@ -146,14 +157,23 @@ def number(
     maximum: float | None = None,
     whole: bool = False,
     usual: tuple[float | None, float | None] = (None, None),
+    by_name: Sequence[str] = (),
+    instead_of: Sequence[str] = (),
 ) -> Any:
     """A finite number; a whole one (of teeth, say) with ``whole``.
 
     With ``default=None`` the scene may omit it: ``prepare`` then returns it. Outside of ``usual``,
     (least, greatest) with None for no limit, it is allowed, and noted.
+
+    With ``by_name``, ("function", "input") or one of them, the scene gives a number, or names a
+    function of time or an input: a field ``torque`` offers its value then, and ``torque_dot``,
+    ``torque_ddot``, ``torque_dddot``, which are zero of numbers and inputs. Left out it is zero.
+    Kernels for where it is given may be a variant of the type, for ``torque=True``. A scene gives
+    it or a field of ``instead_of``, not both. Of a driver the first such field is its coordinate.
     """
+    names = tuple(by_name), tuple(instead_of)
     spec = FieldSpec("number", default, unit, doc, positive, minimum, maximum, whole, usual)
-    return field_of(spec)
+    return field_of(attrs.evolve(spec, by_name=names[0], instead_of=names[1]))
 
 
 def vec3(default: Any = REQUIRED, *, unit: str = "", direction: bool = False, doc: str = "") -> Any:
@@ -172,14 +192,15 @@ def numbers(count: int | str, default: Any = REQUIRED, *, unit: str = "", doc: s
     return field_of(FieldSpec("numbers", default, unit, doc, columns=count))
 
 
-def points(size: str = "n", *, least: int = 1, doc: str = "") -> Any:
+def points(size: str = "n", *, least: int = 1, apart: bool = False, doc: str = "") -> Any:
     """A list of points on any bodies, by name; its length is the size of this name.
 
-    Several may lie on one body. A field ``points`` offers tuples ``r_points``, ``s_points``,
-    ``v_points``, ``s_points_dot``, and ``w_points`` of the bodies that they lie on; ``on_points``
-    are the indices of these bodies, for ``by_body``; the size and ``body_count`` are whole numbers.
+    Several may lie on one body, unless they are ``apart``. A field ``points`` offers tuples
+    ``r_points``, ``s_points``, ``v_points``, ``s_points_dot``, and ``w_points`` of the bodies that
+    they lie on; ``on_points`` are the indices of these bodies, for ``by_body``; the size and
+    ``body_count`` are whole numbers.
     """
-    return field_of(FieldSpec("points", REQUIRED, "m", doc, size=size, least=least))
+    return field_of(FieldSpec("points", REQUIRED, "m", doc, size=size, least=least, apart=apart))
 
 
 def vectors(size: str = "n", *, least: int = 1, doc: str = "") -> Any:
@@ -262,7 +283,8 @@ def input_(default: Any = None, *, instead_of: str = "", unit: str = "", doc: st
     belong to a variant of the type for ``input=True`` (the name of the field). A scene gives it or
     the field ``instead_of``, not both.
     """
-    return field_of(FieldSpec("input", default, unit, doc, instead_of=instead_of))
+    others = (instead_of,) if instead_of else ()
+    return field_of(FieldSpec("input", default, unit, doc, instead_of=others))
 
 
 def choice(
@@ -288,16 +310,18 @@ def joint(*, rows: int | None = None, doc: str = "") -> Any:
     return field_of(FieldSpec("joint", REQUIRED, doc=doc, rows=rows))
 
 
-def joint_fields(*same: str, doc: str = "", **others: str) -> Any:
+def joint_fields(*same: str, facts: Sequence[str] = (), doc: str = "", **others: str) -> Any:
     """A joint by name, from which an element takes fields that it then leaves out.
 
     ``joint_fields("body_i", "body_j", "a_j")`` takes fields of the same names: what acts in the
     coordinate of a joint names the joint. ``joint_fields(P_j="P", a_j="a")`` takes the point and
     the axis that the joint has on the body that moves: body i, or body j where body i is ground.
-    The scene gives the joint or the fields. A list field takes something of each of several joints.
+    The scene gives the joint or the fields. ``facts`` are attributes of the joint's type, such as
+    ``coordinate``, for fields of the same names that the scene does not give. A list field takes
+    something of each of several joints.
     """
     gives = {name: name for name in same} | others
-    return field_of(FieldSpec("joint_fields", None, doc=doc, gives=gives))
+    return field_of(FieldSpec("joint_fields", None, doc=doc, gives=gives, facts=tuple(facts)))
 
 
 def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:

@@ -123,12 +123,15 @@ class Joint(TypeBase):
 
     Attributes:
         keyword: the name of the type in a scene.
-        rows: number of constraint equations.
+        rows: number of constraint equations; of a type with lists also by the size of one: "n",
+            "n - 1".
         holonomic: True, False, or one truth value a row: the rows of the position level.
+        coordinate: "angle" or "length", what a motor in this joint acts on; "" for what it says.
         drives: it prescribes a freedom that other joints leave; where there are none between its
             bodies a scene gets a note.
         unilateral: rows, from 0, with multipliers that are not negative in a valid motion: ground
-            carries and does not pull. A run where one is gets a note with the instant.
+            carries and does not pull. A run where one is gets a note with the instant. True: all
+            rows of a type whose rows are counted by a list.
         unilateral_words: the meaning of a negative multiplier, for that note.
         unknowns: names of unknowns of its own, such as the place of a contact, that C may name: of
             ``rows`` as many fewer constrain the bodies. They are solved for at all levels, from
@@ -147,6 +150,7 @@ class Joint(TypeBase):
     switch_words: ClassVar[str] = ""
     rows: ClassVar[int] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
+    coordinate: ClassVar[str] = ""
     drives: ClassVar[bool] = False
     unilateral: ClassVar[tuple[int, ...]] = ()
     unilateral_words: ClassVar[str] = ""
@@ -184,6 +188,8 @@ class Force(TypeBase):
     and ``rate`` are as for joints. A force that defines neither and names one joint, by a ``joint``
     field, switches on the friction of that joint; one with a ``wrench`` does not.
 
+    ``tension``, a number or a tuple, positive where it pulls, is for results alone.
+
     Where a ``switch`` changes its sign velocities may jump (docs/jumps.md), by ``impulse``:
 
     * without ``J``: for each body slot (impulse, moment of impulse about the mass centre), global;
@@ -211,7 +217,7 @@ class Force(TypeBase):
     """
 
     kind = "force"
-    kernel_names = ("wrench", "energy", "switch", "rate", "J", "impulse", "reset")
+    kernel_names = ("wrench", "energy", "switch", "rate", "J", "impulse", "reset", "tension")
     switch_words: ClassVar[str] = ""
     unilateral: ClassVar[tuple[int, ...]] = ()
     restitution: ClassVar[str] = ""

@@ -286,6 +286,8 @@ class Grouping:
         numbers = np.zeros((len(instances), type_info.layout.par_width))
         for name, (offset, shape) in type_info.layout.numbers.items():
             column = [values.get(name) for values in given]
+            if name in fields and fields[name].by_name:  # left out it is zero
+                column = [value or 0.0 for value in column]
             if None in column:
                 words = "is missing" if name in fields else "is not among what prepare returned"
                 raise PrepareError((members[column.index(None)], f"{name} {words}"))

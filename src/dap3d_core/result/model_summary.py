@@ -101,8 +101,7 @@ def summary_of(model: Model) -> ModelSummary:
         point_names=model.point_names,
         point_body=model.point_body,
         point_local=model.point_local,
-        has_potential=not model.state_count
-        and all("energy" in g.type_info.type.kernels() for g in model.forces),
+        has_potential=all("energy" in g.type_info.type.kernels() for g in model.forces),
         is_isolated=not model.forces
         and all(len(slots) > 1 and 0 not in slots for slots in model.joint_slots),
         angle_count=model.angle_count,

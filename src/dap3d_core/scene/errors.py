@@ -1,6 +1,6 @@
 """Mistakes in a scene, and the error that reports all of them at once."""
 
-from collections.abc import Collection, Iterable
+from collections.abc import Callable, Collection, Iterable
 from typing import Any, Final
 
 import attrs
@@ -79,7 +79,13 @@ class MistakeList:
         self.mistakes.append((key, Mistake(dotted(key), value, what, nearest, remedy)))
 
     def add_unknown_keys(
-        self, key: Key, table: dict[str, Any], allowed: Collection[str], *, in_order: bool = False
+        self,
+        key: Key,
+        table: dict[str, Any],
+        allowed: Collection[str],
+        *,
+        in_order: bool = False,
+        remedy: Callable[[str], str] = lambda name: "",
     ) -> None:
         """Append a mistake for each key of a table that is not allowed.
 
@@ -88,6 +94,7 @@ class MistakeList:
             table: its content.
             allowed: the keys it may have.
             in_order: list these in their order, else sorted.
+            remedy: of a key that is not allowed.
         """
         if table.keys() <= set(allowed):
             return
@@ -95,7 +102,7 @@ class MistakeList:
         what = f"unknown key; allowed: {', '.join(words) or 'none'}"
         for name, value in table.items():
             if name not in allowed:
-                self.add((*key, name), value, what, self.nearest(name, allowed))
+                self.add((*key, name), value, what, self.nearest(name, allowed), remedy(name))
 
     def nearest(self, word: Any, allowed: Collection[str]) -> str:
         """The nearest right spelling; "" after many mistakes."""

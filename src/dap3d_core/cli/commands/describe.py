@@ -160,7 +160,10 @@ def _class_data(type_info: "TypeInfo") -> dict[str, Any]:
         "derived": list(type_info.derived),
         "source": {name: _source(type_info.kernels[name]) for name in kernels},
     }
-    if type_.kind == "joint":
+    if type_.kind == "joint" and isinstance(type_.rows, str):  # by the size of a list
+        rows = type_.rows
+        data |= {"rows": rows, "position_rows": rows if type_.holonomic else 0, "freedoms": None}
+    elif type_.kind == "joint":
         data |= {
             "rows": type_info.row_count,
             "position_rows": len(type_.position_rows()),
@@ -192,6 +195,7 @@ def _allowed(spec: Any) -> str:
     bounds = {">": 0.0 if spec.positive else None, ">=": spec.minimum, "<=": spec.maximum}
     usual = _bounds({">=": spec.usual[0], "<=": spec.usual[1]})
     words = [f"of {spec.argument}"] if spec.argument else []
+    words += [f"a number, or the name of a {' or '.join(spec.by_name)}"] * bool(spec.by_name)
     words += ["rows of equal length"] * bool(spec.by_rows)
     if spec.choices:
         words.append(", ".join(map(_word, spec.choices)))
@@ -285,10 +289,10 @@ def bodies_text(data: dict[str, Any]) -> str:
 def rows_text(data: dict[str, Any]) -> str:
     """The constraint equations of a joint, in words."""
     rows, freedoms, bodies = data["rows"], data["freedoms"], len(data["bodies"])
-    text = f"{rows} constraint equation{'s' if rows > 1 else ''}"
-    if data["position_rows"] < rows:
+    text = f"{rows} constraint equation{'' if rows == 1 else 's'}"
+    if data["position_rows"] != rows:
         text += f", {data['position_rows'] or 'none'} of them at position level"
-    if bodies < 3:
+    if freedoms is not None and bodies < 3:
         between = "between two bodies" if bodies == 2 else "of the body"
         text += f"; leaves {freedoms} of 6 freedoms {between}"
     return text + ("; see the variants" if data["variants"] else "")

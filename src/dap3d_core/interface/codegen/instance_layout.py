@@ -137,6 +137,8 @@ def layout_of(type_: type[TypeBase], constants: Mapping[str, Any]) -> InstanceLa
             width += size(numbers[name][1])
             if spec.kind == "vector" and not spec.ground and slot_of(name) not in slots:
                 others.append(name)
+            if spec.by_name and _is_named(type_, name):
+                functions.append(name)
         elif spec.kind == "input" or (spec.kind == "function" and not spec.argument):
             if _is_named(type_, name):
                 functions.append(name)

@@ -17,7 +17,7 @@ from dap3d_core.interface.types import TypeBase
 
 #: Kernels that may use quantities of the velocity level; all others use positions and time only.
 VELOCITY_KERNELS = (
-    "C_dot", "gamma", "wrench", "friction", "switch", "rate", "impulse", "reset"
+    "C_dot", "gamma", "wrench", "friction", "switch", "rate", "impulse", "reset", "tension"
 )  # fmt: skip
 #: Numbers of a force ``friction`` for the kernel ``friction`` of its joint.
 FRICTION_NUMBERS = ("mu", "v_tol", "radius")
@@ -162,6 +162,8 @@ def _offer_field(
         rates = {"rate": grows, "rate_name": f"{name}_dot"}
         offer(name, (3,), "sub(x_r_P_j, x_r_P_i)", ("r_P_i", "r_P_j"), doc=between, **rates)
         offer(f"{name}_dot", (3,), "sub(x_v_P_j, x_v_P_i)", ("v_P_i", "v_P_j"), True, rate)
+    elif spec.by_name:
+        _offer_function(offer, name, prefix, spec, layout, f"{stored(layout, name)} + ")
     elif spec.kind in ("number", "numbers", "vec3", "matrix"):
         doc = f"{spec.doc or name}{f', {spec.unit}' if spec.unit else ''}"
         offer(name, layout.numbers[name][1], stored(layout, name), doc=doc)
@@ -184,8 +186,14 @@ def _offer_field(
 
 
 def _offer_function(
-    offer: Callable[..., None], name: str, f: str, spec: FieldSpec, layout: InstanceLayout
+    offer: Callable[..., None],
+    name: str,
+    f: str,
+    spec: FieldSpec,
+    layout: InstanceLayout,
+    number: str = "",
 ) -> None:
+    """A function; of time with a ``number`` that is added to its value."""
     if spec.argument:
         for order, suffix in enumerate(derivative_names(spec.arguments)):
             which = suffix.strip("_") if spec.arguments > 1 and order else order
@@ -195,10 +203,12 @@ def _offer_function(
     at = _row_of(name, layout)
     for order, suffix in enumerate(DERIVATIVES):
         doc, code = f"function of time, derivative {order}", f"F[{at}, {order}]"
+        if number:
+            doc, code = f"{spec.doc}, derivative {order}", code if order else f"{number}{code}"
         higher = f"{f}{DERIVATIVES[order + 1]}" if order < 3 else ""
         rates = {"rate": f"x_{higher}", "rate_name": higher} if higher else {"derivable": False}
         offer(f"{f}{suffix}", (), code, doc=doc, **rates)
-    offer(f"{f}_0", (), f"F[{at}, 4]", doc="its value at t = 0")
+    offer(f"{f}_0", (), f"{number}F[{at}, 4]", doc="its value at t = 0")
 
 
 def _row_of(name: str, layout: InstanceLayout) -> str:

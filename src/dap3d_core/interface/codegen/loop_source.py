@@ -31,6 +31,7 @@ LOOP_KINDS = {
     "rate": ("rate",),
     "bound": (),  # as switches; of unknowns
     "reset": ("reset",),
+    "tension": ("tension",),  # of results (result/post/force_output.py)
     "knot": ("knot",),  # as switches; of functions of an argument (specialise.py)
 }
 
@@ -121,7 +122,7 @@ def store(type_info: TypeInfo, kernel: str) -> Iterable[str]:
         yield from (f"F[row, {k}] = {path}" for k, path in enumerate(paths[:4]))
         # of two arguments, for tests alone: behind y
         yield from (f"F[row + 1, {k}] = {path}" for k, path in enumerate(paths[4:], 1))
-    elif kernel in ("switch", "knot"):
+    elif kernel in ("switch", "knot", "tension"):
         yield from append(paths)
     elif kernel == "G":
         yield from (f"out1[{k}] = {path}" for k, path in enumerate(paths))

@@ -76,8 +76,8 @@ class TypeInfo:
 
         def holds(name: str, wanted: Any) -> bool:
             value = values[name]
-            is_reference = specs[name].kind in ("function", "input")
-            return (value is not None) == wanted if is_reference else bool(value == wanted)
+            is_given = value is not None
+            return is_given == wanted if specs[name].is_reference else bool(value == wanted)
 
         for conditions, type_info in self.variants:
             if all(holds(name, wanted) for name, wanted in conditions.items()):

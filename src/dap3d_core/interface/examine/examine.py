@@ -307,8 +307,8 @@ def _check_conditions(type_: type[TypeBase], conditions: Mapping[str, Any], vari
     for name, wanted in conditions.items():
         spec = specs.get(name)
         allowed = spec.choices if spec is not None and spec.kind == "choice" else (True, False)
-        kinds = ("choice", "function", "input")
-        if spec is None or spec.kind not in kinds or wanted not in allowed:
+        known = spec is not None and (spec.kind == "choice" or spec.is_reference)
+        if not known or wanted not in allowed:
             raise PluginError(
                 f"{where_is(variant)} is the variant for {name} = {wanted!r}, "
                 f"which no choice, function or input of {type_.__name__} can be"
@@ -476,7 +476,7 @@ def _expected(
     if kernel == "J" and type_.kind == "force":
         count = max(1, size(checked_shape(value)) // (6 * slots))
         return (slots, count, 6), f"a block of rows x 6 for each of {slots} bodies"
-    if kernel == "switch":
+    if kernel in ("switch", "tension"):
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"
     if kernel in ("wrench", "friction"):

@@ -16,6 +16,7 @@ from dap3d_core.interface.codegen.instance_layout import body_slots
 from dap3d_core.interface.codegen.kernel_arguments import KernelArgument, parameters
 from dap3d_core.interface.codegen.specialise import bound_kernel
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.fields import SLOTS, FieldSpec, field_of, sized_fields, specs_of
 from dap3d_core.interface.types import TypeBase
 
@@ -88,7 +89,8 @@ def sample_classes(type_: Any) -> list[Any]:
     fixed, least = range(len(body_slots(type_))), max(spec.least for spec in lists.values())
     on_bodies = any(spec.kind in ENTRIES for spec in lists.values())
     classes = []
-    for entries in SAMPLES if on_bodies else SAMPLES[:1]:
+    apart = any(spec.apart for spec in lists.values())
+    for entries in SAMPLES if on_bodies and not apart else SAMPLES[:1]:
         bodies = [*entries, *range(max(entries) + 1, max(entries) + 1 + least - len(entries))]
         on = {name: bodies for name, spec in lists.items() if spec.kind in ENTRIES}
         slots = shared_slots(fixed, on)[1]
@@ -122,6 +124,10 @@ def sized_class(type_: Any, shape: Shape) -> Any:
             members[name] = field_of(of_length(spec, sizes[spec.size]))
     members["__annotations__"] = {n: Any for n in members if n[0] != "_" and n != "shape_of_lists"}
     members["__module__"], members["__qualname__"] = type_.__module__, type_.__qualname__
+    if isinstance(getattr(type_, "rows", 0), str):
+        members["rows"] = rows_of(type_, sizes)
+        if type_.unilateral is True:
+            members["unilateral"] = tuple(range(members["rows"]))
     if type_.states:
         members["states"] = {n: sizes.get(k, k) for n, k in type_.state_lengths().items()}
     known = _known_names(type_, shape)
@@ -134,6 +140,19 @@ def sized_class(type_: Any, shape: Shape) -> Any:
     if type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__()):
         members["prepare"] = _prepare(type_, on)
     return type(type_.__name__, (type_,), members)
+
+
+def rows_of(type_: Any, sizes: Mapping[str, int]) -> int:
+    """Rows of a joint for sizes of its lists, by ``rows = "n"`` or ``"n - 1"``."""
+    name, _, less = type_.rows.partition("-")
+    try:
+        return sizes[name.strip()] - int(less or 0)
+    except (KeyError, ValueError):
+        known = ", ".join(sizes)
+        raise PluginError(
+            f"{where_is(type_)} declares rows = {type_.rows!r}; write the size of a list "
+            f'({known}), or one less a whole number, as "n - 1"'
+        ) from None
 
 
 def entry_fields(name: str, slots: Sequence[str]) -> list[str]:

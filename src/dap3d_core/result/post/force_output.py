@@ -27,7 +27,7 @@ class ForceOutput:
         length: (nt,) m, distance of its ends P_i and P_j.
         length_rate: (nt,) m/s, its time derivative; NaN at zero length.
         tension: (nt,) N, force along the line of its ends, positive where it pulls them together;
-            NaN at zero length.
+            NaN at zero length. (nt,) or (nt, k) by a kernel ``tension``, of each span, say.
     """
 
     on: Mapping[str, Reaction]
@@ -56,8 +56,7 @@ def force_output(
     Args:
         evaluator: evaluates the model.
         t: (nt,) s.
-        u: (nt, 13 n) states.
-        v_dot: (nt, 6 n) accelerations.
+        u, v_dot: (nt, 13 n) states, (nt, 6 n) accelerations.
         name: its name, for the error.
         element: its index among the forces of the model.
         Lam: (nt, m) multipliers, m rows in the order of the model.
@@ -71,10 +70,11 @@ def force_output(
         UnknownNameError: the element acts on every body or in a joint.
     """
     group, index = group_of(evaluator, name, element)
-    field = getattr(group.type_info.type, "actuates", "")
     loops, bodies = ForceLoops(evaluator, group, index), group.bodies[index]
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
-    out, potential = np.zeros((len(t), len(bodies), 6)), np.zeros(len(t))
+    out, potential, tensions = (
+        np.zeros((len(t), *shape)) for shape in ((len(bodies), 6), (), (loops.tension_count,))
+    )
     minus_lambda = np.zeros_like(evaluator.system.multipliers)
     for k, time in place_at(evaluator, t, u, states, inputs):
         if angles is None:
@@ -82,16 +82,17 @@ def force_output(
         else:
             loops.parameters.set_angles(angles[k])
         if actuation is not None:
-            loops.parameters.scale_field(group, field, actuation[k])
+            loops.parameters.scale_field(group, loops.actuated, actuation[k])
         force[:] = energy[:] = 0.0
         if group.read:
             minus_lambda[evaluator.system.row] = -Lam[k]
         loops.call(loops.law, time, force, minus_lambda)
         loops.call("energy", time, energy)
         out[k], potential[k] = force.reshape(-1, 6)[bodies], energy[0]
+        loops.call("tension", time, tensions[k], np.zeros(1))  # from place 0 on
     on = actions_of(evaluator.model, u, group, index, out)
-    has_potential = loops.has("energy") and actuation is None
-    output = ForceOutput(on, potential if has_potential else None)
+    potentials = potential if loops.has("energy") and actuation is None else None
+    output = ForceOutput(on, potentials, tension=loops.own_tension(tensions))
     if any(spec.kind == "vector2" for spec in specs_of(group.type_info.type).values()):
         length, rate, tension = _along(group, index, u, v_dot, on["i"].force)
         return attrs.evolve(output, length=length, length_rate=rate, tension=tension)
@@ -133,10 +134,13 @@ class ForceLoops:
     """The loops over one force element, with a copy of its parameters."""
 
     def __init__(self, evaluator: "Evaluator", group: Group, index: int) -> None:
+        from dap3d_core.interface.codegen.compile_loops import compiled_loop
         from dap3d_core.interface.codegen.loop_source import stride
+        from dap3d_core.kernels.runtime.function_lists import loop_list
 
         s = evaluator.system
         self._evaluator = evaluator
+        self.actuated = getattr(group.type_info.type, "actuates", "")
         self._loops = {kind: q for q, (kind, g) in enumerate(evaluator.loop_groups) if g is group}
         #: The loop of its wrench; one that reads reactions is called as friction is.
         self.law = "wrench" if "wrench" in self._loops else "friction"
@@ -146,10 +150,24 @@ class ForceLoops:
         self._groups, start = s.groups.copy(), self.parameters.start
         for q in self._loops.values():
             self._groups[q] = s.groups[q, 0] + index * stride(group.type_info), start, 1
+        self._lists = {
+            kind: (evaluator.loops, q, self._groups[q]) for kind, q in self._loops.items()
+        }
+        paths = group.type_info.outputs.get("tension", ())
+        self.tension_count, self.is_single = len(paths), paths == ("out",)
+        if paths:  # no run has its loop
+            loops = loop_list([compiled_loop(group.type_info, "tension")])
+            self._lists["tension"] = loops, 0, self._lists[self.law][2]
+
+    def own_tension(self, values: Floats) -> Floats | None:
+        """(nt,) of one number, (nt, k) of a tuple, from (nt, k) values; None without a kernel."""
+        if not self.has("tension"):
+            return None
+        return values[:, 0] if self.is_single else values
 
     def has(self, kind: str) -> bool:
         """True if there is a loop of a kind."""
-        return kind in self._loops
+        return kind in self._lists
 
     def call(self, kind: str, time: float, out: Floats, multipliers: Floats | None = None) -> None:
         """Runs a loop, if there is one, at the current poses; it adds to ``out``.
@@ -162,6 +180,6 @@ class ForceLoops:
             s = self._evaluator.system
             par = self.parameters.par
             arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=par, states=s.states)
-            q, loops = self._loops[kind], self._evaluator.loops
+            loops, q, group = self._lists[kind]
             given = out if multipliers is None else multipliers
-            call_loop(loops, q, time, arrays, self._groups[q], out, given, given)
+            call_loop(loops, q, time, arrays, group, out, given, given)

@@ -190,6 +190,11 @@ def _columns(result: QuantitySource, owner: QuantityOwner, attribute: str) -> tu
     """Names of the columns of a quantity."""
     if attribute == "lambda" and owner.kind == "joint":
         return tuple(str(k + 1) for k in range(result.summary.joint_rows[owner.place]))
+    if attribute == "tension" and owner.kind == "force":
+        with suppress(ResultError, UnknownNameError):
+            tension = result.force(owner.name).tension
+            shape = () if tension is None else tension.shape[1:]
+            return tuple(str(k + 1) for count in shape for k in range(count))
     if known := QUANTITIES[owner.kind].get(attribute):
         return known.components
     return tuple(c for c in states_of(result.summary, owner).get(attribute, {}) if c)

@@ -5,9 +5,8 @@ from graphlib import CycleError, TopologicalSorter
 import attrs
 
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.scene.validate.elements import arguments_of
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.validated_scene import Instance
+from dap3d_core.scene.validate.validated_scene import Instance, arguments_of
 
 #: Most functions in one combination, each counted as often as it occurs: all become one kernel.
 MOST_TERMS = 200

@@ -314,3 +314,28 @@ def oddity(spec: FieldSpec, value: Any) -> str:
         if abs(length - 1.0) > ROUNDING:
             return f"is a direction of length {length:.9g}, not 1; it is used as it is"
     return ""
+
+
+#: Readers of the kinds of fields that hold values and no references.
+READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
+    "number": lambda spec, value: bounded(
+        angle_of(value, unit)
+        if (unit := spec.unit.partition(" or ")[0]) in ANGLE_UNITS
+        else number_of(value),
+        positive=spec.positive,
+        minimum=spec.minimum,
+        maximum=spec.maximum,
+        whole=spec.whole,
+    ),
+    "numbers": lambda spec, x: list_of(x) if spec.size else numbers_of(x, spec.columns),
+    "vec3": lambda spec, value: numbers_of(value, 3),
+    "matrix": lambda spec, value: matrix_of(value),
+    "square": lambda spec, value: square_of(value, spec.columns),
+    "table": lambda spec, value: rows_of(value) if spec.by_rows else list_of(value),
+    "choice": lambda spec, value: word_of(value, spec.choices, spec.aliases),
+}
+
+
+def unread(spec: FieldSpec, value: Any) -> Any:
+    """The value itself, of a kind without a reader."""
+    return value

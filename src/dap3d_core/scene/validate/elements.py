@@ -1,6 +1,6 @@
 """Reads joints, forces and functions: from fields as written to the values their types need."""
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -12,18 +12,10 @@ from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
 from dap3d_core.scene.scene import GROUND, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
-    ANGLE_UNITS,
+    READERS,
     Fault,
-    angle_of,
-    bounded,
-    list_of,
-    matrix_of,
-    number_of,
-    numbers_of,
     oddity,
-    rows_of,
-    square_of,
-    word_of,
+    unread,
 )
 from dap3d_core.scene.validate.geometry import (
     BAD,
@@ -32,13 +24,15 @@ from dap3d_core.scene.validate.geometry import (
     body_of,
     entry_of,
     missing_words,
+    named_row,
     point_of,
     two_ends,
     vector_of,
 )
 from dap3d_core.scene.validate.joint_fields import with_joint_fields
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.validated_scene import Instance
+from dap3d_core.scene.validate.types import Types
+from dap3d_core.scene.validate.validated_scene import Instance, arguments_of
 
 #: The two points that may be given in place of a vector of type 2.
 ENDS = ("P_i", "P_j")
@@ -46,28 +40,6 @@ ENDS = ("P_i", "P_j")
 _ABSENT: Any = object()
 #: Body of a slot that no field has given yet.
 _UNKNOWN = -2
-
-#: Readers of the kinds of fields that hold values and no references.
-READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
-    "number": lambda spec, value: bounded(
-        angle_of(value, spec.unit) if spec.unit in ANGLE_UNITS else number_of(value),
-        positive=spec.positive,
-        minimum=spec.minimum,
-        maximum=spec.maximum,
-        whole=spec.whole,
-    ),
-    "numbers": lambda spec, x: list_of(x) if spec.size else numbers_of(x, spec.columns),
-    "vec3": lambda spec, value: numbers_of(value, 3),
-    "matrix": lambda spec, value: matrix_of(value),
-    "square": lambda spec, value: square_of(value, spec.columns),
-    "table": lambda spec, value: rows_of(value) if spec.by_rows else list_of(value),
-    "choice": lambda spec, value: word_of(value, spec.choices, spec.aliases),
-}
-
-
-def _unread(spec: FieldSpec, value: Any) -> Any:
-    """The value itself, of a kind without a reader."""
-    return value
 
 
 @attrs.frozen
@@ -90,6 +62,7 @@ class Reader:
         geometry: resolves references to points, vectors and bodies.
         report: takes mistakes and notes.
         arguments: how many each function of the scene takes, as far as known.
+        known: the type of a kind and keyword, if there is one.
     """
 
     def __init__(
@@ -99,7 +72,9 @@ class Reader:
         geometry: Geometry,
         report: Collector,
         arguments: Mapping[str, int],
+        known: Callable[[str, Any], TypeInfo | None],
     ) -> None:
+        self.known_type = known
         self.type_info, self.table = type_info, table
         self.geometry, self.report, self.arguments = geometry, report, arguments
         self.body_names = (GROUND, *geometry.bodies.body_names)
@@ -119,7 +94,7 @@ class Reader:
         self.kinds = {name: spec.kind for name, spec in specs.items()}
         self.lists = {name: spec for name, spec in specs.items() if spec.size}
         self.known = dict.fromkeys([*specs, *self.ends])
-        self.of_joints = {name: spec.gives for name, spec in specs.items() if spec.gives}
+        self.of_joints = {name: spec for name, spec in specs.items() if spec.gives}
         # Bodies and points that may be left out follow from the other fields of their slot.
         self.late = [
             f for f in self.fields if f.spec.kind in ("body", "point") and f.spec.default is None
@@ -129,21 +104,26 @@ class Reader:
         letter = slot_of(name)
         slot = self.slots.index(letter) if letter in self.slots else -1
         read = _FIELD_READERS.get(spec.kind, _Reading.value)
-        return _Field(name, spec, slot, read, partial(READERS.get(spec.kind, _unread), spec))
+        return _Field(name, spec, slot, read, partial(READERS.get(spec.kind, unread), spec))
 
     def read(self, element: Element) -> Instance | None:
         """The instance of an element; None where a mistake was reported."""
         if self.of_joints and not self.of_joints.keys().isdisjoint(element.fields):
             whole = with_joint_fields(
-                self.report, self.geometry, self.table, element, self.of_joints, self.lists
-            )
+                self.report, self.geometry, self.table, element, self.of_joints, self.lists,
+                self.known_type,
+            )  # fmt: skip
             if whole is None:
                 return None
             element = whole
         reading = _Reading(self, element)
         if not element.fields.keys() <= self.known.keys():
             reading.report.add_unknown_keys(
-                reading.key, element.fields, tuple(self.known), in_order=True
+                reading.key,
+                element.fields,
+                tuple(self.known),
+                in_order=True,
+                remedy=self.other_kind,
             )
             reading.good = False
         for field in self.fields:
@@ -169,18 +149,25 @@ class Reader:
             from dap3d_core.interface.examine.sized_types import sized
 
             type_info, bodies = sized(type_info, shape, examine), tuple(reading.bodies)
-        functions = tuple(
-            [self.rows[self.kinds[n]].get(values[n], 0) for n in type_info.layout.functions]
-        )
+        functions = tuple([reading.rows.get(name, 0) for name in type_info.layout.functions])
         others = tuple([reading.others[name] for name in type_info.layout.others])
         return Instance(element.name, type_info, bodies, functions, values, others)
+
+    def other_kind(self, field: str) -> str:
+        """Where an unknown field is one of the type of the other kind with the same keyword."""
+        keyword = self.type_info.type.keyword
+        for kind in {"joint", "force"} - {self.type_info.type.kind}:
+            other = self.known_type(kind, keyword)
+            if other is not None and field in specs_of(other.type):
+                return f"the {kind} {keyword} has it: [{kind}s.NAME]"
+        return ""
 
 
 class _Reading:
     """One element: values of its fields, the body of each slot and the field that gave it."""
 
     __slots__ = ("bodies", "element", "given_by", "good", "key", "others", "places", "reader",
-                 "report", "values")  # fmt: skip
+                 "report", "rows", "values")  # fmt: skip
 
     def __init__(self, reader: Reader, element: Element) -> None:
         count = len(reader.slots)
@@ -190,6 +177,7 @@ class _Reading:
         self.bodies, self.given_by = [_UNKNOWN] * count, [""] * count
         self.others: dict[str, int] = {}  # bodies of vectors of no slot
         self.places: dict[str, Sequence[Located]] = {}  # of the entries of lists
+        self.rows: dict[str, int] = {}  # of F, of fields that name functions and inputs
         self.good = True
 
     def refuse(self, name: str, what: str, nearest: str = "", remedy: str = "") -> None:
@@ -271,6 +259,10 @@ class _Reading:
 
     def function(self, field: _Field, value: Any) -> None:
         self.name_of(field, value, self.reader.function_index)
+        self.check_arguments(field, value)
+
+    def check_arguments(self, field: _Field, value: Any) -> None:
+        """A function takes as many arguments as the field gives it."""
         count = self.reader.arguments.get(value) if isinstance(value, str) else None
         if count is not None and count != field.spec.arguments:
             given = field.spec.argument or "time"
@@ -289,9 +281,7 @@ class _Reading:
                 self.refuse(field.name, *missing_words(self.report, "function", name, declared))
 
     def input(self, field: _Field, value: Any) -> None:
-        other = field.spec.instead_of
-        if value is not None and self.element.fields.get(other) is not None:
-            self.refuse(field.name, f"give {other} or {field.name}, not both")
+        self.refuse_both(field, value)
         is_function = isinstance(value, str) and value in self.reader.function_index
         remedy = f"{value} is a function, not one of [inputs]" if is_function else ""
         self.name_of(field, value, self.report.scene.inputs, remedy)
@@ -303,6 +293,8 @@ class _Reading:
         self, field: _Field, value: Any, declared: dict[str, Any], remedy: str = ""
     ) -> None:
         self.values[field.name] = value
+        if isinstance(value, str) and field.spec.kind in self.reader.rows:
+            self.rows[field.name] = self.reader.rows[field.spec.kind].get(value, 0)
         if value is not None and not (isinstance(value, str) and value in declared):
             words, near, other = missing_words(self.report, field.spec.kind, value, declared)
             self.refuse(field.name, words, near, other or remedy)
@@ -313,6 +305,16 @@ class _Reading:
         if (value is None and spec.default is None) or (spec.size and value is spec.default):
             self.values[field.name] = value
             return
+        self.refuse_both(field, value)
+        if spec.by_name and type(value) is str:
+            row = named_row(self.report, spec, value, self.reader.rows, field.value_of)
+            if isinstance(row, Fault):
+                self.refuse(field.name, row.what, row.nearest, row.remedy)
+            elif row is not None:
+                self.values[field.name], self.rows[field.name] = 0.0, row
+                self.check_arguments(field, value)
+            if row is not None:
+                return
         key = (*self.key, field.name)
         result = self.report.read(key, value, field.value_of)
         self.values[field.name] = result
@@ -320,6 +322,12 @@ class _Reading:
             self.good = False
         elif odd := oddity(spec, result):
             self.report.note(f"{dotted(key)} = {shown(value)} {odd}")
+
+    def refuse_both(self, field: _Field, value: Any) -> None:
+        """Refuse a field of which another takes the place."""
+        for other in field.spec.instead_of if value is not None else ():
+            if self.element.fields.get(other) is not None:
+                self.refuse(field.name, f"give {other} or {field.name}, not both")
 
     def list(self, field: _Field, value: Any) -> None:
         """A list of points, vectors or bodies by name."""
@@ -332,6 +340,11 @@ class _Reading:
         places = [entry_of(self.report, geometry, key, kind, name) for name in value]
         self.good &= None not in places
         self.places[field.name] = places
+        bodies = [place[0] for place in places if place is not None]
+        if field.spec.apart and len(set(bodies)) < len(bodies):
+            twice = next(body for k, body in enumerate(bodies) if body in bodies[:k])
+            on = self.reader.body_names[twice]
+            self.refuse(field.name, f"has two {kind} on {on}; each is to be on a body of its own")
 
     def shape(self) -> Any:
         """The lengths of the lists and the slots of their entries, whose values become fields."""
@@ -438,16 +451,6 @@ def counted(count: int) -> str:
     return "one argument" if count == 1 else "two arguments"
 
 
-def arguments_of(functions: Iterable[Instance]) -> dict[str, int]:
-    """How many arguments each function takes."""
-    return {f.name: f.type_info.type.arguments for f in functions}  # type: ignore[attr-defined]
-
-
-def combines(type_info: TypeInfo) -> bool:
-    """True if a type of function combines other functions."""
-    return any(spec.kind == "functions" for spec in specs_of(type_info.type).values())
-
-
 def _of(field: _Field) -> str:
     """The kind and the description of a field, for the message that it is missing."""
     kinds = {
@@ -468,7 +471,7 @@ def read_elements(
     report: Collector,
     geometry: Geometry,
     table: str,
-    types: dict[str, TypeInfo],
+    types: Types,
     functions: Sequence[Instance] = (),
 ) -> list[Instance]:
     """The elements of a table that are without mistakes, in file order.
@@ -477,11 +480,14 @@ def read_elements(
         report: takes mistakes and notes; its scene is read.
         geometry: resolves references.
         table: joints, forces or functions.
-        types: the examined types that could be loaded, by keyword.
+        types: loads the types of the scene.
         functions: of the scene, for those that name them.
     """
     arguments = arguments_of(functions)
-    readers = {k: Reader(e, table, geometry, report, arguments) for k, e in types.items()}
+    readers = {
+        keyword: Reader(type_info, table, geometry, report, arguments, types.known)
+        for keyword, type_info in types.of(table).items()
+    }
     instances = []
     for element in getattr(report.scene, table).values():
         reader = readers.get(element.type) if type(element.type) is str else None

@@ -1,6 +1,6 @@
 """Points and vectors: the body of each, and the resolution of references."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from itertools import islice
 from typing import Any
 
@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.interface.fields import FieldSpec
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import MISSING, Key
 from dap3d_core.scene.scene import GROUND, ZERO
@@ -205,6 +206,38 @@ def missing_words(
         few = ", ".join(islice(declared, 8)) + (", ..." if len(declared) > 8 else "")
         words += f" (there are {few})"
     return words, near, ""
+
+
+def named_row(
+    report: Collector,
+    spec: FieldSpec,
+    text: str,
+    rows: Mapping[str, Mapping[str, int]],
+    read: Callable[[Any], Any],
+) -> int | Fault | None:
+    """The row of F that a text in place of a number names; None where it is a number, "1500 rpm".
+
+    Args:
+        report: knows names that are near.
+        spec: of the field.
+        text: as written.
+        rows: function, input -> rows of F by name.
+        read: reads a number.
+    """
+    found = [kind for kind in rows if text in rows[kind]]
+    if len(found) > 1:
+        return Fault("is a function and an input; rename one of them")
+    if found and found[0] in spec.by_name:
+        return rows[found[0]][text]
+    if found:
+        remedy = f"give a number or a {spec.by_name[0]}"
+        return Fault(f"is an {found[0]}, which steps from value to value", remedy)
+    fault = read(text)
+    if not isinstance(fault, Fault):
+        return None
+    known = [name for kind in spec.by_name for name in rows[kind]]
+    words, near, _ = missing_words(report, " or ".join(spec.by_name), text, known)
+    return Fault(f"should be a number or a name; {words}", fault.remedy, near)
 
 
 def _numbered(number: int, declared: Collection[str]) -> str:

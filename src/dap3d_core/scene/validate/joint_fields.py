@@ -1,11 +1,12 @@
 """Fields that an element takes from a joint which it names: its bodies, points and axes."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import attrs
 
-from dap3d_core.interface.fields import slot_of
+from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.interface.fields import FieldSpec, slot_of
 from dap3d_core.scene.scene import GROUND, Element
 from dap3d_core.scene.validate.geometry import Geometry, missing_words
 from dap3d_core.scene.validate.mistake_collector import Collector
@@ -16,8 +17,9 @@ def with_joint_fields(
     geometry: Geometry,
     table: str,
     element: Element,
-    references: Mapping[str, Mapping[str, str]],
-    lists: Collection[str] = (),
+    references: Mapping[str, FieldSpec],
+    lists: Collection[str],
+    known: Callable[[str, Any], TypeInfo | None],
 ) -> Element | None:
     """The element with the fields of the joints that it names; None where a mistake is reported.
 
@@ -26,8 +28,9 @@ def with_joint_fields(
         geometry: resolves points and vectors to bodies.
         table: of the element.
         element: as written.
-        references: fields that name joints -> what each gives, as of ``joint_fields``.
+        references: fields that name joints, as of ``joint_fields``.
         lists: fields of the element that take something of each of several joints.
+        known: the type of a kind and keyword, if there is one.
     """
     fields, good = dict(element.fields), True
 
@@ -36,8 +39,8 @@ def with_joint_fields(
         report.add((table, element.name, field), element.fields[field], what, nearest, remedy)
         good = False
 
-    for field, gives in references.items():
-        given = element.fields.get(field)
+    for field, spec in references.items():
+        given, gives = element.fields.get(field), spec.gives
         names = given if isinstance(given, tuple) else () if given is None else (given,)
         found = []
         for name in names:
@@ -57,6 +60,10 @@ def with_joint_fields(
                 break
             else:
                 fields[own] = tuple(values) if own in lists else values[0]
+        for name in spec.facts if found else ():
+            type_info = known("joint", found[0].type)
+            if fact := getattr(type_info and type_info.type, name, ""):
+                fields.setdefault(name, fact)
     return attrs.evolve(element, fields=fields) if good else None
 
 

@@ -140,7 +140,7 @@ def _added(report: Collector, key: Key, word: Any) -> Mapping[str, Field] | None
     from dap3d_core.interface.errors import PluginError
     from dap3d_core.interface.fields import specs_of
     from dap3d_core.registry.extensions import extensions
-    from dap3d_core.scene.validate.elements import READERS
+    from dap3d_core.scene.validate.coerce_values import READERS
 
     added = extensions("shape")
     if not isinstance(word, str) or word not in added.keywords:

@@ -1,6 +1,7 @@
 """Types that a scene names, from the registry; the model's own file only where needed."""
 
 from pathlib import Path
+from typing import Any
 
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError
@@ -55,6 +56,13 @@ class Types:
                 elements.setdefault(keyword, []).append(name)
         types = {keyword: self._get(table, keyword, names) for keyword, names in elements.items()}
         return {keyword: type_ for keyword, type_ in types.items() if type_ is not None}
+
+    def known(self, kind: str, keyword: Any) -> TypeInfo | None:
+        """The type of a keyword; None where it cannot be had, for whatever reason."""
+        try:
+            return self.registry.get(kind, keyword)
+        except (UnknownTypeError, PluginError, TypeError):
+            return None
 
     def note_unused_file(self) -> None:
         """Note that the model's own file was not needed."""

@@ -10,7 +10,7 @@ from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.scene import NAMED, Scene, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene
+from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
 
 if TYPE_CHECKING:
     from dap3d_core.scene.validate.bodies import Bodies
@@ -45,8 +45,8 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     geometry = read_geometry(report, bodies)
     types = Types(report, registry, allow_code=allow_code, to_install=_check_requires(report))
     inputs, functions = _read_signals(report, geometry, types)
-    joints = read_elements(report, geometry, "joints", types.of("joints"), functions)
-    forces = read_elements(report, geometry, "forces", types.of("forces"), functions)
+    joints = read_elements(report, geometry, "joints", types, functions)
+    forces = read_elements(report, geometry, "forces", types, functions)
     _report_twins(report, "joints", joints)
     _report_twins(report, "forces", forces)
     _check_shapes_and_outputs(report, bodies)
@@ -89,14 +89,14 @@ def _read_signals(
     report: Collector, geometry: "Geometry", types: "Types"
 ) -> tuple[dict[str, float], list[Instance]]:
     """Inputs, and functions with those that they combine."""
-    from dap3d_core.scene.validate.elements import combines, read_elements
+    from dap3d_core.scene.validate.elements import read_elements
 
     inputs = {}
     if report.scene.inputs:
         from dap3d_core.scene.signals.inputs import read_inputs
 
         inputs = read_inputs(report)
-    functions = read_elements(report, geometry, "functions", types.of("functions"))
+    functions = read_elements(report, geometry, "functions", types)
     if any(combines(function.type_info) for function in functions):
         from dap3d_core.scene.signals.combinations import combine_functions
 

@@ -1,10 +1,12 @@
 """The validated scene, from which the model is built: arrays and instances, names resolved."""
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import attrs
 
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.interface.fields import specs_of
 from dap3d_core.registry import Registry
 from dap3d_core.scene.scene import Scene
 
@@ -89,3 +91,13 @@ class ValidatedScene:
     functions: list[Instance]
     inputs: dict[str, float]
     notes: list[str]
+
+
+def arguments_of(functions: Iterable[Instance]) -> dict[str, int]:
+    """How many arguments each function takes."""
+    return {f.name: f.type_info.type.arguments for f in functions}  # type: ignore[attr-defined]
+
+
+def combines(type_info: TypeInfo) -> bool:
+    """True if a type of function combines other functions."""
+    return any(spec.kind == "functions" for spec in specs_of(type_info.type).values())

@@ -6,6 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Mistake, Scene, SceneError
@@ -27,10 +28,14 @@ class DriverCoordinate:
         driver: name of the joint.
         values: (nt,) values of the coordinate, rising or falling: how far the driver has moved from
             the poses as given, rad or m.
+        field: of the driver, that names its coordinate as a function of time.
+        replaced: fields that may be given in its place.
     """
 
     driver: str
     values: Floats
+    field: str = "function"
+    replaced: tuple[str, ...] = ()
 
     def replaced_in(self, scene: Scene) -> Scene:
         """A copy of a scene whose driver moves by f(x) = x: time is its coordinate."""
@@ -41,7 +46,9 @@ class DriverCoordinate:
         kind, coefficients = IDENTITY
         scene.add_function(kind, name, coeff=coefficients)
         fields = scene.joints[self.driver].fields
-        before, fields["function"] = fields.get("function"), name
+        before, fields[self.field] = fields.get(self.field), name
+        for other in self.replaced:
+            fields.pop(other, None)
         users = (part.fields for part in (*scene.joints.values(), *scene.forces.values()))
         if before is not None and all(before not in map(str, used.values()) for used in users):
             del scene.functions[before]
@@ -68,7 +75,11 @@ def read_coordinate(over: Any, compiled: CompiledModel) -> DriverCoordinate:
     if what not in ("", COORDINATE):
         words = f"the coordinate of a driver is called {COORDINATE}"
         raise SceneError([Mistake("over", over, words, f"{name}.{COORDINATE}")])
-    return DriverCoordinate(name, values)
+    (driver,) = (joint for joint in compiled.checked.joints if joint.name == name)
+    specs = specs_of(driver.type_info.type)
+    field = next((n for n, spec in specs.items() if spec.by_name), "function")
+    replaced = tuple(n for n, spec in specs.items() if field in spec.instead_of)
+    return DriverCoordinate(name, values, field, replaced)
 
 
 def _no_driver(over: Any, name: str, drivers: list[str], compiled: CompiledModel) -> Mistake:

@@ -119,7 +119,7 @@ def _by_input(point: OperatingPoint, evaluator: Evaluator, name: str) -> Floats:
 def _has_one_function(group: Group) -> bool:
     """True if a type of joint has one function of time, and no input."""
     specs, fields = specs_of(group.type_info.type), group.type_info.layout.functions
-    return [specs[field].kind for field in fields] == ["function"]
+    return [specs[field].kind != "input" for field in fields] == [True]
 
 
 def _driver(point: OperatingPoint, evaluator: Evaluator, name: str) -> list[Floats]:

@@ -44,7 +44,8 @@ def potential(subject: SampledType) -> CheckOutcome:
             continue
         for slot in range(len(wrench)):
             for column in range(6):
-                for rate in rates(still, "energy", Direction.of(slot, column), c):
+                direction = _with_states(still, Direction.of(slot, column))
+                for rate in rates(still, "energy", direction, c):
                     got = wrench[slot, column // 3, column % 3]
                     letter = still.kernels.type_info.layout.slots[slot]
                     words = dict(
@@ -56,6 +57,14 @@ def potential(subject: SampledType) -> CheckOutcome:
                               tolerance=rate.tolerance, rows=[6 * slot + column],
                               scale=float(np.max(np.abs(wrench))))  # fmt: skip
     return c.outcome()
+
+
+def _with_states(still: Sample, along: Direction) -> Direction:
+    """A direction of the bodies with what states follow of it: their rates less those at rest."""
+    if not len(still.state.own):
+        return along
+    moving = attrs.evolve(still.state, v=along.move, w=along.turn)
+    return attrs.evolve(along, own=still.value("rate", moving) - still.value("rate"))
 
 
 def balance(subject: SampledType, kernel: str = "wrench") -> CheckOutcome:

@@ -306,6 +306,8 @@ def _numbers(type_info: TypeInfo, values: Mapping[str, Any], rng: random.Random)
     par = [rng.uniform(0.5, 1.5) for _ in range(layout.par_width)]  # of given functions, too
     for name, (offset, shape) in layout.numbers.items():
         value = values.get(name)
+        if value is None and name in fields and fields[name].by_name:
+            value = 0.0
         if value is None and (name in fields or name in layout.constants):
             raise RefusalError(f"{name} is missing")
         if value is None:  # of a friction

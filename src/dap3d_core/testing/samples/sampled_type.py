@@ -161,7 +161,8 @@ class SampledType:
         specs = specs_of(self.type)
         conditions = dict.fromkeys(self.type_info.argument_functions, True) | dict(self.choices)
         return {n: "cubic" if specs[n].kind == "function" else v for n, v in conditions.items()
-                if v is not False or specs[n].kind == "choice"}  # fmt: skip
+                if not specs[n].by_name and (v is not False or specs[n].kind == "choice")
+                }  # fmt: skip
 
     @property
     def kernels(self) -> Kernels:
@@ -300,8 +301,7 @@ def own_values(type_info: TypeInfo) -> dict[str, Any] | None:
     without = [(False,) * (not specs[n].required) for n in names]
     ways = [specs[n].choices or way for n, way in zip(names, without, strict=True)]
     for values in (dict(zip(names, way, strict=True)) for way in product(*ways)):
-        references = ("function", "input")
-        given = {n: v or None if specs[n].kind in references else v for n, v in values.items()}
+        given = {n: v or None if specs[n].is_reference else v for n, v in values.items()}
         if type_info.chosen(given) is type_info:
             return values
     return None

@@ -212,3 +212,28 @@ type = "gravitation"
 t_end = 1.0
 dt = 0.5
 """
+
+
+class Level(Joint):
+    """Points of different bodies stay at one height."""
+
+    keyword, rows, ground_axes = "level", "n - 1", True
+    unilateral = True
+    points: tuple = points("n", least=2, apart=True)
+
+    def C(r_points, n):
+        return tuple(r_points[k][2] - r_points[0][2] for k in range(1, n))
+
+
+def test_rows_are_counted_by_a_list():
+    """One less than points; lists that are apart have one sample."""
+    assert check_type(examine(Level)).ok
+    (class_,) = sample_classes(Level)
+    assert (class_.rows, class_.unilateral) == (2, (0, 1))
+
+
+@pytest.mark.parametrize("rows", ["m - 1", "n - x", "n + 1", ""])
+def test_rows_of_no_list_are_refused(rows):
+    wrong = type("Wrong", (Level,), {"rows": rows, "__module__": __name__})
+    with pytest.raises(dap.PluginError, match=r"declares rows = .* size of a list \(n\), or one"):
+        examine(wrong)

@@ -81,8 +81,8 @@ def test_what_statics_leaves_out_is_noted():
     scene = at_rest.pendulum(0.3)
     scene.bodies["rod"].w = (0.0, 1.0, 0.0)
     scene.add_function("a", "turning", coeff=(0.0, 0.1, 0.0))
-    scene.add_force("motor", "drive", body_i="rod", a_j="ground.y", gain=1.0, torque_max=5.0,
-                    function="turning")  # fmt: skip
+    scene.add_force("position-servo", "drive", body_i="rod", a_j="ground.y", gain=1.0,
+                    torque_max=5.0, function="turning")  # fmt: skip
     scene.add_input("u")
     scene.add_force("f", "push", body_i="rod", f=(1.0, 0.0, 0.0), input="u")  # held, not of time
     notes = " ".join(dap.equilibrium(scene).notes)

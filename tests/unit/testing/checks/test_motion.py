@@ -48,9 +48,11 @@ INSTALLED = {
     "inline": ["refused: its 2 rows cost less than 4 joint coordinates"],
     "inplane": [ONE_ROW],
     "cv": ["refused: the axes of its free motions are constant in neither body"],
+    "motor": [ON_TIME, ON_TIME, ON_VELOCITY, ON_VELOCITY],
     "couple": ["refused: it joins three bodies"],
     "gear": [ONE_ROW] * 2,
     "rack": [ONE_ROW],
+    "belt": ["refused: it joins three bodies"],
     "cable": ["refused: it joins three bodies"] * 4 + [ON_TIME] * 2,  # two lists each
     "follow": ["refused: it joins three bodies"] * 2,
     "point-on-plane": [ONE_ROW],

@@ -109,7 +109,7 @@ class GammaOfOtherSign(Fed):
 
 PLANTED = [
     (Upright, {"rate frame"}, "row 1 of rate notices where ground is: .* common rigid motion"),
-    (Drifting, {"rate frame"}, "row 1 of rate notices where ground is: .* common velocity"),
+    (Drifting, {"energy", "rate frame"}, "row 1 of rate notices .* common velocity"),
     (Noisy, {"purity"}, "rate is not pure: it uses random of the module random"),
     (Counting, {"purity"}, "row 1 of rate gives other numbers when it is called again"),
     (Branching, {"plain"}, r"rate branches on a number \[.*\]; branch by where\("),

@@ -1,4 +1,4 @@
-"""Motor with a speed controller."""
+"""Motor with a controller of its speed and angle."""
 
 from dap3d_core.interface import (
     Body,
@@ -18,7 +18,7 @@ interface_version = 1
 ZERO = (0.0, 0.0, 0.0)
 
 
-class Motor(Force):
+class PositionServo(Force):
     """A torque on body i, the rotor, about the axis a_j of body j, which follows a prescribed turn.
 
     theta is the angle of the rotor against body j about a_j, counted over whole turns from the
@@ -33,7 +33,7 @@ class Motor(Force):
     work; there is no energy.
     """
 
-    keyword = "motor"
+    keyword = "position-servo"
     body_i: Body = body(doc="the rotor")
     a_j: Vector = vector(doc="axis, on the body that holds the motor")
     gain: float = number(unit="N m s/rad", minimum=0.0, doc="torque for an error of the speed")
@@ -55,4 +55,4 @@ class Motor(Force):
 @hookimpl
 def dap3d_forces():
     """The force types of this module."""
-    return [Motor]
+    return [PositionServo]

@@ -1,0 +1,144 @@
+"""Motor that holds the speed or the position of a joint, whatever moment or force that takes."""
+
+from collections.abc import Mapping
+from typing import ClassVar
+
+from dap3d_core.interface import (
+    Body,
+    Joint,
+    Point,
+    Vector,
+    body,
+    choice,
+    hookimpl,
+    joint_fields,
+    number,
+    point,
+    vector,
+)
+from dap3d_core.kernels import atan2, cos, dot, neg, normals, row, sin, sub
+from dap3d_joints.relative_rows import offset_gamma, offset_rows, turning, turning_rate
+
+interface_version = 1
+
+ZERO = (0.0, 0.0, 0.0)
+
+
+class Motor(Joint):
+    """A motor in a joint prescribes its coordinate q, or the rate of it.
+
+    q is the angle theta by which body i has turned against body j about a_j, or the length x by
+    which P_i has moved along a_j as seen from body j, as the joint reports them: zero in the poses
+    of the scene. A motor in ``rev`` and ``cyl`` acts on the angle, in ``tran`` on the length; else
+    ``coordinate`` says on which. The rows are those of ``drive-rot`` and ``drive-tran``:
+
+        C  = q - position,  nu = position_dot
+        nu = speed
+
+    C of an angle is brought into (-pi, pi]; of a speed there is no C, the row is one of the
+    velocity level alone. A ``position`` is a number or the name of a function of time, a ``speed``
+    also that of an input, held between settings, where velocities jump. A position is not an input,
+    which steps: bodies would have to jump.
+
+    The multiplier is the moment or force of the motor on body i, of any size. One with a largest
+    moment is the force ``motor``, which takes a speed with a ``limit``. A position within a limit
+    takes a controller that sets its ``torque`` (docs/how-to/inputs-and-controllers.md).
+    """
+
+    keyword, rows = "motor", 1
+    synonyms = ("actuator", "rotational-motor")
+    symbol = "ring"
+    drives = True
+    example: ClassVar[Mapping[str, str]] = {"position": "0.5"}
+    joint: str = joint_fields(
+        "body_i", "body_j", "P_i", "P_j", "a_j", facts=("coordinate",), doc="joint that it moves"
+    )
+    body_i: Body = body(default=None, doc="body that is moved; that of P_i")
+    body_j: Body = body(default=None, doc="body that holds the motor; that of P_j and a_j")
+    P_i: Point = point(default=None, doc="on body i; the mass centre when left out")
+    P_j: Point = point(default=None, doc="on body j; the mass centre when left out")
+    a_j: Vector = vector(doc="axis, on body j")
+    coordinate: str = choice(("angle", "length"), None, doc="the joint's when left out, else angle")
+    position: float = number(
+        default=None, unit="rad or m", by_name=("function",), doc="of body i, from where it is"
+    )
+    speed: float = number(
+        default=None,
+        unit="rad/s or m/s",
+        by_name=("function", "input"),
+        instead_of=("position",),
+        doc="rate of the coordinate",
+    )
+
+    def prepare(self, bodies):
+        if self.position is None and self.speed is None:
+            raise ValueError("give position or speed; a motor of a given torque is a force motor")
+        i, j = bodies["i"], bodies["j"]
+        n, m = normals(self.a_j)
+        x_0 = dot(j.to_global(self.a_j), sub(i.place(self.P_i), j.place(self.P_j)))
+        return {"n_j": n, "m_j": m, "u_i": i.to_local(j.to_global(n)), "x_0": x_0}
+
+    def C(n_j, m_j, u_i, position):
+        X, Y, c, s = dot(n_j, u_i), dot(m_j, u_i), cos(position), sin(position)
+        return atan2(Y * c - X * s, X * c + Y * s)
+
+    def J(a_j, u_i):
+        h = turning(a_j, u_i)
+        return row(ZERO, h), row(ZERO, neg(h))
+
+    def nu(position_dot):
+        return position_dot
+
+    def gamma(a_j, u_i, a_j_dot, u_i_dot, w_i, w_j, position_ddot):
+        return position_ddot - dot(turning_rate(a_j, u_i, a_j_dot, u_i_dot), sub(w_i, w_j))
+
+
+class Moved(Motor, speed=False, coordinate="length"):
+    """It moves along its axis."""
+
+    def C(a_j, r_P_i, r_P_j, x_0, position):
+        return dot(a_j, sub(r_P_i, r_P_j)) - x_0 - position
+
+    def J(a_j, s_P_i, r_P_i, r_j):
+        return offset_rows(a_j, s_P_i, r_P_i, r_j)
+
+    def gamma(
+        a_j, a_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j, position_ddot
+    ):  # fmt: skip
+        d, d_dot = sub(r_P_i, r_P_j), sub(v_P_i, v_P_j)
+        return position_ddot + offset_gamma(a_j, a_j_dot, d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j)
+
+
+class MovedAt(Moved, speed=True, coordinate="length"):
+    """It moves along its axis at a speed."""
+
+    holonomic = False
+    C = None
+
+    def nu(speed):
+        return speed
+
+    def gamma(
+        a_j, a_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j, speed_dot
+    ):  # fmt: skip
+        d, d_dot = sub(r_P_i, r_P_j), sub(v_P_i, v_P_j)
+        return speed_dot + offset_gamma(a_j, a_j_dot, d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j)
+
+
+class TurningAt(Motor, speed=True):
+    """It turns at a speed."""
+
+    holonomic = False
+    C = None
+
+    def nu(speed):
+        return speed
+
+    def gamma(a_j, u_i, a_j_dot, u_i_dot, w_i, w_j, speed_dot):
+        return speed_dot - dot(turning_rate(a_j, u_i, a_j_dot, u_i_dot), sub(w_i, w_j))
+
+
+@hookimpl
+def dap3d_joints():
+    """The joint types of this module."""
+    return [Motor]
