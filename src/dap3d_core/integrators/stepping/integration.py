@@ -342,7 +342,8 @@ class Integration(Restorable):
         if self.work.step_count == 0:
             return off_constraints(self.y)
         y, other = self.y, self.work.state[at.OTHER]  # as it was before the last projection, or
-        for state in (other.copy(), y + other):  # by how much that moved it
+        candidates: tuple[Floats, Floats] = other.copy(), y + other  # by how much that moved it
+        for state in candidates:
             if np.max(np.abs(state - y)) <= MOST_MOVED * np.max(np.abs(y)):
                 return state
         return y
