@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.programs.change_over import MOST_BODIES
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import STATE, VELOCITIES
@@ -20,6 +21,11 @@ MOST_NAMES = 8
 MANY_BODIES = 64
 #: A note says where method joint would take less than this part of the time.
 WORTHWHILE = 0.7
+#: Which code runs.
+PROGRAM = (
+    "one of the scene's own, once general code has run for a while; describe --source counts its "
+    "operations"
+)
 
 
 def explain(
@@ -65,6 +71,8 @@ def explain(
         lines.append(f"  joint      {in_joint_coordinates(joint_cost)}")
     kernels = sorted({f"{group.keyword} ({kind})" for kind, group in evaluator.loop_groups})
     lines.append(f"  kernels    {', '.join(kernels) or 'none'}")
+    few = n <= MOST_BODIES
+    lines.append(f"  program    {PROGRAM if few else f'none: more than {MOST_BODIES} bodies'}")
     left_out = _left_out(checked, model)
     lines.append("left out")
     lines += [f"  {line}" for line in left_out] or ["  nothing"]
