@@ -174,7 +174,7 @@ REFUSED = [
     (("models", "--jsn"), "'--json'"),
     (("describe",), "Missing argument"),
     (("describe", "shp"), "did you mean 'sph'"),
-    (("describe", "pen1", "--source"), "--source is of types, and pen1 is a model"),
+    (("describe", "pen1", "--names"), "--names is of types, and pen1 is a model"),
     (("check-plugin", "shp"), "did you mean 'sph'"),
     (("check-plugin", "nothing.py"), "there is no file nothing.py"),
     (("check-plugin",), "give --all"),

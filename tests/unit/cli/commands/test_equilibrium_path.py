@@ -74,4 +74,4 @@ def test_what_is_refused(model, words, said, capsys):
     """One message, exit status 2."""
     first = model[:2] if "--over" in words else model
     assert main([*first, *words]) == 2
-    assert said in capsys.readouterr().err
+    assert said in " ".join(capsys.readouterr().err.split())
