@@ -133,7 +133,7 @@ def integration_options(evaluator: Evaluator, settings: Simulation) -> dict[str,
         "atol": atol_vector(resolved_atol(settings.atol, evaluator), evaluator),
         "step": settings.step,
         "project_on": settings.project,
-        "error_size": evaluator.coordinates.size,  # the work does not steer the step
+        "error_size": evaluator.coordinates.size,  # the work steers long steps alone
         "report_size": evaluator.report_size,
         "ends": effects_of(evaluator.switches),
         "kinds": kinds_of(evaluator),

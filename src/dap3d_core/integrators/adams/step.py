@@ -58,11 +58,15 @@ from dap3d_core.integrators.stepping.step_control import (
     first_step,
     step_floor,
     turns_are_certain,
+    work_error,
 )
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_beyond, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.scalar_math import where
 
+#: The first step is no longer part of the run: one of order 1 sees nothing of what comes to rest.
+FIRST_PART = 0.01
 #: The step is doubled, kept, or multiplied by a factor in between these.
 SLOWEST, STEADY = 0.5, 0.9
 #: The error that a next step is planned for, and how often a step fails before order 1 is taken.
@@ -104,7 +108,8 @@ def begin(work: AdamsState, rhs: Function, system: Any, loops: Any) -> None:
         work.t_stop, work.status = work.t, NOT_FINITE
         return
     if work.h == 0.0:
-        work.h = first_step(work, f, rhs, system, loops)
+        longest = FIRST_PART * (work.times[-1] - work.times[0])
+        work.h = min(first_step(work, f, rhs, system, loops), longest)
     for i in range(y.size):
         f[1, i] = 0.0
     for j in range(ROWS):
@@ -141,14 +146,17 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
     for i in range(trial.size):
         change[i] = rates[i] - change[i]  # Phi_k at t1
     sizes = difference_norms(work, k, h)
-    error = h * abs(table[G_ROW, k - 1] - table[G_ROW, k]) * sizes[0]
+    weight = h * abs(table[G_ROW, k - 1] - table[G_ROW, k])
+    error = weight * sizes[0]
     here, below, lower = compare_orders(table, h, k, sizes)
+    of_work = work_error(work, h, weight * change[change.size - 1])
     if 1.0 < error <= LARGEST and h * SLOWEST < step_floor(work):
         doubt, size, f0 = EPSILON * max(abs(t), abs(t1)), work.error_size, work.differences[0]
         found = scaled_beyond(
             change, work.state[Y], trial, f0, rates, doubt, size, work.rtol, work.tolerance
         )
         error = min(error, error * (found / sizes[0]))
+    error = where(of_work > error, of_work, error)
     if error <= 1.0:
         g = h * table[G_ROW, k]
         for i in range(trial.size):

@@ -11,6 +11,7 @@ import math
 from typing import Any
 
 from dap3d_core.integrators.stepping.integration_state import (
+    ABSOLUTE,
     PROJECTED,
     RUNNING,
     SCRATCH,
@@ -23,6 +24,7 @@ from dap3d_core.integrators.stepping.output import NEAR_SINGULAR
 from dap3d_core.integrators.stepping.vector_ops import combine, scaled_beyond, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.scalar_math import where
 
 #: A step is never shorter than this part of the time or of the whole span, sixteen roundings.
 EPSILON = 2.220446049250313e-16
@@ -42,6 +44,8 @@ NOTES, JUDGES, STEP_FOR_TURNS = 1, 2, 0.5
 #: What an accepted state is announced with, and the end of a step to be judged: one that the error
 #: limits, or one of a given length.
 FROM_START, FROM_END, OF_ERROR, OF_LENGTH = 1.0, 2.0, 0.0, -1.0
+#: The work done may be off by so many times rtol, in steps that are no smaller part of the run.
+WORK_SLACK, WORK_STEP = 100.0, 1e-3
 #: The last step is stretched by at most this factor, to end at t_end.
 STRETCH = 1.01
 
@@ -111,10 +115,28 @@ def error_norm(work: Any, h: float) -> float:
     k, table, first = work.k, work.table, work.k.shape[0]
     combine(error, 0.0, y, h, table, first, k)
     main = scaled_largest(error, y, trial, size, rtol, tolerance, h)
+    of_work = work_error(work, h, error[error.size - 1])
     if work.estimate_count == 1:
-        return main
+        return where(of_work > main, of_work, main)
     combine(error, 0.0, y, h, table, first + 1, k)
-    return combined_error(main, scaled_largest(error, y, trial, size, rtol, tolerance, h))
+    other = scaled_largest(error, y, trial, size, rtol, tolerance, h)
+    main = combined_error(main, other)
+    of_work = combined_error(of_work, work_error(work, h, error[error.size - 1]))
+    return where(of_work > main, of_work, main)
+
+
+@compiled
+def work_error(work: Any, h: float, error: float) -> float:
+    """Scaled error of the work done in a long step, where that does not steer the step as the rest.
+
+    Where the motion is prescribed it may be followed in a few long steps, over which the work is
+    not; elsewhere the error of the motion is the larger one by far.
+    """
+    last = work.state.shape[1] - 1
+    if work.error_size > last or h < WORK_STEP * (work.times[-1] - work.times[0]):
+        return 0.0
+    most = max(work.largest_work, abs(work.state[Y, last]), abs(work.state[TRIAL, last]))
+    return abs(error) / (work.tolerance[ABSOLUTE, last] + WORK_SLACK * work.rtol * most)
 
 
 @compiled
