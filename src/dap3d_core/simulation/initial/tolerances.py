@@ -128,7 +128,7 @@ def _largest(vectors: Floats) -> float:
 def atol_vector(atol: float | Mapping[str, float], evaluator: Evaluator) -> float | Floats:
     """Absolute tolerances of the components of y, in its order; a number may stay one.
 
-    States of elements have those that their fields give.
+    States of elements have those that their fields give, the work the largest of all.
     """
     own = np.zeros(0)
     if evaluator.model.state_count:
@@ -139,7 +139,8 @@ def atol_vector(atol: float | Mapping[str, float], evaluator: Evaluator) -> floa
         if not own.any():
             return atol
         atol = dict.fromkeys(QUANTITIES, atol)
-    every = np.array([*(atol[name] for name in evaluator.coordinates.quantities), USUAL_ATOL])
+    of_motion = [atol[name] for name in evaluator.coordinates.quantities]
+    every = np.array([*of_motion, max(atol.values())])
     last = len(every) - 1
     every[last - len(own) : last] = np.where(own > 0.0, own, every[last - len(own) : last])
     return every
