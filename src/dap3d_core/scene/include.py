@@ -12,7 +12,10 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.interface.errors import PluginError
+from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.registry import UnknownTypeError, load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import MISSING, Key, MistakeList, dotted
@@ -30,6 +33,7 @@ from dap3d_core.scene.scene import (
 )
 from dap3d_core.scene.validate.coerce_values import (
     Fault,
+    angle_of,
     from_axis_angle,
     from_rpy,
     numbers_of,
@@ -48,6 +52,10 @@ PLACE = ("r", *ORIENTATIONS)
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 #: Entries of a rotation matrix below this are rounding, as of a turn of 90 deg.
 ROUNDING = 1e-15
+#: Elements whose type may take something from ground that is not written, and the kind of each.
+KINDS = {"joints": "joint", "forces": "force"}
+#: The field of a constant orientation A_i^T A_j, which is another one where ground is turned.
+RELATIVE = "A_c"
 #: A name in an expression: quoted, or a dotted word.
 _NAMES = re.compile(r"""'[^']*'|"[^"]*"|(?<![\w.])[^\W\d]\w*(?:\.\w+)*""")
 
@@ -134,10 +142,13 @@ class _Place:
         """Euler parameters behind the turn of the place, or a fault."""
         word = next((w for w in ("rpy", "axis_angle") if given.get(w) is not None), "p")
         p = ORIENTATIONS[word](given.get(word, NO_TURN))
+        if isinstance(p, Fault) and word == "rpy":
+            p = _quaternion(given[word]) or p
         if isinstance(p, Fault):
             return p
-        e0, e, f0, f = self.p[0], np.array(self.p[1:]), p[0], np.array(p[1:])
-        return tuple(map(float, (e0 * f0 - e @ f, *(e0 * f + f0 * e + np.cross(e, f)))))
+        e0, e1, e2, e3 = self.p
+        left = ((e0, -e1, -e2, -e3), (e1, e0, -e3, e2), (e2, e3, e0, -e1), (e3, -e2, e1, e0))
+        return tuple(_sum(list(zip(row, p, strict=True))) for row in left)
 
 
 def _place(mistakes: MistakeList, key: Key, at: Any) -> _Place | None:
@@ -156,7 +167,10 @@ def _place(mistakes: MistakeList, key: Key, at: Any) -> _Place | None:
         r = ZERO
     p = ORIENTATIONS[words[0]](at[words[0]]) if words else NO_TURN
     if isinstance(p, Fault):
-        mistakes.add((*key, words[0]), at[words[0]], p.what, p.nearest, p.remedy)
+        given = at[words[0]]
+        if type(given) is tuple and any(map(_is_expression, given)):
+            p = Fault("takes numbers: expressions may move a sub-assembly, not turn it")
+        mistakes.add((*key, words[0]), given, p.what, p.nearest, p.remedy)
         return None
     e0, e1, e2, e3 = p
     A = np.eye(3) + 2.0 * (
@@ -167,6 +181,22 @@ def _place(mistakes: MistakeList, key: Key, at: Any) -> _Place | None:
     )  # fmt: skip
     A[np.abs(A) < ROUNDING] = 0.0
     return _Place(A, p, r)
+
+
+def _quaternion(rpy: Any) -> tuple[str, ...] | None:
+    """Euler parameters, as expressions, of roll, pitch and yaw with expressions; None of others."""
+    if type(rpy) is not tuple or len(rpy) != 3:
+        return None
+    angles = [x[1:].strip() if _is_expression(x) else angle_of(x) for x in rpy]
+    if any(isinstance(x, Fault) for x in angles):
+        return None
+    (c0, s0), (c1, s1), (c2, s2) = ((f"cos(({x}) / 2)", f"sin(({x}) / 2)") for x in angles)
+    return (
+        f"= {c2} * {c1} * {c0} + {s2} * {s1} * {s0}",
+        f"= {c2} * {c1} * {s0} - {s2} * {s1} * {c0}",
+        f"= {c2} * {s1} * {c0} + {s2} * {c1} * {s0}",
+        f"= {s2} * {c1} * {c0} - {c2} * {s1} * {s0}",
+    )
 
 
 def _is_number(x: Any) -> bool:
@@ -189,6 +219,14 @@ def _sum(terms: list[tuple[float, Any]]) -> Any:
     texts = [f"({x[1:].strip()})" if _is_expression(x) else f"({x!r})" for _, x in terms]
     factors = ["" if a == 1.0 else f"{a!r} * " for a, _ in terms]
     return "= " + " + ".join(f"{a}{x}" for a, x in zip(factors, texts, strict=True))
+
+
+def _specs(kind: str, keyword: Any) -> Mapping[str, FieldSpec]:
+    """The fields of an installed type; none where the check of the scene has to refuse it."""
+    try:
+        return specs_of(load_registry().get(kind, keyword).type)
+    except (UnknownTypeError, PluginError, TypeError):
+        return {}
 
 
 class _Part:
@@ -259,6 +297,8 @@ class _Part:
                     continue
                 if table == "shapes" and fields.get("body") == GROUND and self.place.is_moved:
                     self._shape(entry.type, fields)
+                if table in KINDS and self.place.is_moved:
+                    self._write_out(_specs(KINDS[table], entry.type), entry.fields, fields)
                 entries[name] = Element(name, entry.type, fields)
             else:
                 given = attrs.asdict(entry, recurse=False)
@@ -280,7 +320,7 @@ class _Part:
             if place.is_turned:
                 p = place.orientation(attrs.asdict(entry, recurse=False))
                 if isinstance(p, Fault):
-                    what = f"is turned with the sub-assembly, which needs numbers: {p.what}"
+                    what = f"is turned with the sub-assembly, which needs numbers or rpy: {p.what}"
                     mistakes.add((table, entry.name), MISSING, what)
                 else:
                     entry.p, entry.rpy, entry.axis_angle = p, None, None
@@ -300,6 +340,46 @@ class _Part:
             fields["axis"] = put.direction(fields.get("axis", AXES["z"]))
         if "p" in known and not isinstance(p := put.orientation(fields), Fault):
             fields["p"] = p
+
+    def _write_out(
+        self, specs: Mapping[str, FieldSpec], given: Mapping[str, Any], fields: dict[str, Any]
+    ) -> None:
+        """Write what an element on ground takes from its origin and axes by default."""
+        joints = [spec.gives for field, spec in specs.items() if spec.gives and field in given]
+        for field, spec in specs.items():
+            if spec.kind != "point" or spec.default is not None or field in given:
+                continue
+            taken = any(field in gives for gives in joints)
+            if not taken and self._is_on_ground(specs, given, str(slot_of(field))):
+                fields[field] = self._name(f"{GROUND}.O")
+        if RELATIVE in specs and self.place.is_turned:
+            A = fields.get(RELATIVE, specs[RELATIVE].default)
+            turned = self.place.direction
+            if self._is_on_ground(specs, given, "j"):
+                fields[RELATIVE] = tuple(map(turned, A))
+            elif self._is_on_ground(specs, given, "i"):
+                columns = map(turned, zip(*A, strict=True))
+                fields[RELATIVE] = tuple(zip(*columns, strict=True))
+
+    def _is_on_ground(
+        self, specs: Mapping[str, FieldSpec], given: Mapping[str, Any], slot: str
+    ) -> bool:
+        """Whether a body of an element is ground, by what it names there."""
+        ends = [self.part.vectors2[v] for v in given.values()
+                if isinstance(v, str) and v in self.part.vectors2]  # fmt: skip
+        values = {f"P_{slot}": getattr(end, f"P_{slot}", None) for end in ends} | dict(given)
+        body = specs.get(f"body_{slot}")
+        named = [value for field, value in values.items() if slot_of(field) == slot]
+        if not named and body is not None:
+            named = [body.default]
+        return any(self._body_of(name) == GROUND for name in named)
+
+    def _body_of(self, name: Any) -> Any:
+        """The body of a point or vector, or the body itself."""
+        if not isinstance(name, str):
+            return None
+        located = self.part.points.get(name) or self.part.vectors.get(name)
+        return located.body if located else name.rpartition(".")[0] or name
 
     def _find_meshes(self, scene: Scene, way: str) -> None:
         """Name the files of meshes as seen from the folder of the other scene."""

@@ -246,3 +246,125 @@ def test_a_text_includes_nothing():
     scene = parse('[include.a]\nfile = "x.toml"\n')
     with pytest.raises(dap.SceneError, match="a text has no folder"):
         dap.compile(scene)
+
+
+SLIDER = """
+[parameters]
+lean = 0.3
+
+[bodies.wheel]
+mass = 1.0
+Jp = [0.1, 0.2, 0.3]
+r = [0.0, 0.0, 0.5]
+rpy = ["= lean", "= -lean", "40 deg"]
+w = [0.0, 0.0, 0.0]
+
+[bodies.block]
+mass = 2.0
+Jp = [0.1, 0.2, 0.3]
+r = [0.2, 0.0, 0.0]
+r_dot = [0.4, 0.0, 0.0]
+
+[bodies.sun]
+mass = 1.0
+Jp = [0.1, 0.1, 0.1]
+r = [0.5, 0.0, 0.0]
+w = [0.0, 0.0, 2.0]
+
+[points.centre]
+body = "ground"
+sPp = [0.5, 0.0, 0.0]
+
+[points.rim]
+body = "ground"
+sPp = [0.2, 0.0, 0.0]
+
+[joints.pin]
+type = "sph"
+P_i = "wheel.O"
+P_j = "ground.O"
+
+[joints.bearing]
+type = "rev"
+P_i = "sun.O"
+P_j = "centre"
+a_i = "sun.z"
+a_j = "ground.z"
+
+[joints.planet]
+type = "rev"
+P_i = "planet.O"
+P_j = "rim"
+a_i = "planet.z"
+a_j = "ground.z"
+
+[bodies.planet]
+mass = 1.0
+Jp = [0.1, 0.1, 0.1]
+r = [0.2, 0.0, 0.0]
+
+[joints.rail]
+type = "tran"
+SIDES
+a_j = "AXIS"
+
+[forces.pull]
+type = "motor"
+joint = "bearing"
+torque = 0.3
+"""
+
+
+@pytest.mark.parametrize(
+    ("sides", "axis"),
+    [
+        ('P_i = "block.O"\nP_j = "ground.O"', "ground.x"),
+        ('P_i = "ground.O"\nP_j = "block.O"', "block.x"),
+        ('d = "line"', "ground.x"),
+        ('P_i = "block.O"\nP_j = "ground.O"\nA_c = [[0, 1, 0], [-1, 0, 0], [0, 0, 1]]', "ground.x"),
+    ],
+)
+def test_what_is_taken_from_ground_unwritten_is_turned_too(sides, axis):
+    """A slider keeps its orientation to the axes of ground, from either side: it starts where its
+    own file has it. Euler parameters are correct to rounding, as is the correction of the start.
+    """
+    text = SLIDER.replace("SIDES", sides).replace("AXIS", axis)
+    if "line" in sides:
+        text += '\n[vectors2.line]\nP_i = "block.O"\nP_j = "ground.O"\n'
+    if "A_c" in sides:
+        text = text.replace("\nr_dot", '\nrpy = [0, 0, "90 deg"]\nr_dot')
+    scene, part = dap.Scene(), parse(text)
+    dap.include(scene, "a", part, {"r": [1.0, 2.0, 3.0], "rpy": [0.3, -0.7, 1.1]})
+    R = Rotation.from_euler("xyz", [0.3, -0.7, 1.1])
+    alone, result = (dap.simulate(s, t_end=0.1, dt=0.1, rtol=1e-10) for s in (part, scene))
+    np.testing.assert_allclose(alone.r[0, 1], [0.2, 0.0, 0.0], atol=1e-12)
+    for k in range(4):
+        r = result.r[:, k] - np.array([1.0, 2.0, 3.0])
+        np.testing.assert_allclose(r, R.apply(alone.r[:, k].copy()), atol=1e-9)
+        turned = R * Rotation.from_quat(alone.p[:, k], scalar_first=True)
+        found = Rotation.from_quat(result.p[:, k], scalar_first=True)
+        assert (turned.inv() * found).magnitude().max() < 1e-9
+
+
+def test_points_that_are_left_out_are_those_of_the_part():
+    """A ring without P_j has its centre in the origin of ground, wherever that comes to lie."""
+    part = dap.load("planetary")
+    del part.joints["planet_and_ring"].fields["P_j"]
+    part.forces["torque"] = type(part.forces["torque"])(
+        "torque", "motor", {"joint": "bearing_of_sun", "torque": 0.05}
+    )
+    scene = dap.Scene()
+    dap.include(scene, "a", part, {"r": [1.0, 2.0, 3.0], "rpy": [0.3, -0.7, 1.1]})
+    alone, result = (dap.simulate(s, t_end=1.0, dt=0.5, rtol=1e-10) for s in (part, scene))
+    w = Rotation.from_euler("xyz", [0.3, -0.7, 1.1]).apply(alone.w[-1].copy())
+    np.testing.assert_allclose(result.w[-1], w, rtol=1e-8)
+    fields = scene.joints["a/planet_and_ring"].fields
+    assert fields["P_j"] == "a/ground O"
+    assert "P_i" not in fields, "that is the hinge's"
+
+
+def test_a_turn_by_an_expression_is_refused():
+    scene = dap.Scene(parameters={"a": 1.0})
+    part = dap.load("pen1")
+    with pytest.raises(dap.SceneError, match="expressions may move a sub-assembly, not turn it"):
+        dap.include(scene, "b", part, {"rpy": [0.0, 0.0, "= a"]})

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 #: Bodies and joints that are printed.
 MOST_ROWS = 12
+#: Suffixes of pictures, which are no names for a scene.
+PICTURES = (".png", ".svg", ".pdf")
 #: Smaller numbers, as parts of the largest of a table, are printed as zero.
 ROUNDING = 1e-12
 
@@ -99,7 +101,7 @@ def _target(
     """The file to write: a scene, or with --over a picture.
 
     Raises:
-        Refused: it cannot be written, or is no picture.
+        Refused: it cannot be written, or is no picture, or one without a path.
     """
     from dap3d_core.cli.framework.paths import writable
 
@@ -110,6 +112,8 @@ def _target(
 
         with refusing(ValueError):
             check_suffix(Path(output))
+    elif Path(output).suffix.lower() in PICTURES:
+        raise Refused(f"-o {output}: a picture is that of a path: give --over PARAMETER=FROM:TO:N")
     return writable(Path(output), force=force, sources=sources)
 
 

@@ -147,14 +147,18 @@ class Terminal(Console):
         """Print a table without lines.
 
         Columns ``right`` are aligned to the right; columns ``fixed`` are broken into lines only if
-        no other column can be.
+        no other column can be. Columns without a word, beside which others would be broken, are
+        left out.
         """
+        rows = list(rows)
+        kept = [k for k, name in enumerate(columns) if name or any(row[k] for row in rows)]
         grid = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0), header_style="cyan")
-        for k, name in enumerate(columns):
+        for k in kept:
             justify: Any = "right" if k in right else "left"
-            grid.add_column(name, justify=justify, no_wrap=k in fixed, overflow="fold")
+            grid.add_column(columns[k], justify=justify, no_wrap=k in fixed, overflow="fold")
         for row in rows:
-            grid.add_row(*(Text(clean(c)) if isinstance(c, str) else c for c in row))
+            cells = (row[k] for k in kept)
+            grid.add_row(*(Text(clean(c)) if isinstance(c, str) else c for c in cells))
         self.show(_indented(grid, 2))
 
 

@@ -52,7 +52,7 @@ class Tracer(Writer):
         if isinstance(x, (tuple, list, str)) or x is None:
             raise TraceError(f"takes a {type(x).__name__} for a number; "
                              "for vectors use add, sub, scale, dot")  # fmt: skip
-        return t.Value(t.FLOAT, (t.bits(float(x)),))
+        return t.Value(t.FLOAT, (t.bits(float(x)),), float(x))
 
     def word(self, x: Any) -> str:
         """The LLVM value of a number, as a double."""

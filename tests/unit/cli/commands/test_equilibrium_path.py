@@ -74,4 +74,11 @@ def test_what_is_refused(model, words, said, capsys):
     """One message, exit status 2."""
     first = model[:2] if "--over" in words else model
     assert main([*first, *words]) == 2
-    assert said in " ".join(capsys.readouterr().err.split())
+    assert said in capsys.readouterr().err
+
+
+def test_a_picture_without_a_path_is_refused(model, capsys, tmp_path):
+    """A scene is not written into a file of a picture's name."""
+    assert main([*model[:2], "-o", "curve.png"]) == 2
+    assert "give --over PARAMETER=FROM:TO:N" in " ".join(capsys.readouterr().err.split())
+    assert not (tmp_path / "curve.png").exists()

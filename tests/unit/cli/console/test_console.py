@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dap3d_core.cli.console.console import clean, count, plain, seconds, size
+from dap3d_core.cli.console.console import clean, count, plain, seconds, size, stdout
 
 
 def test_control_characters_do_not_reach_the_terminal():
@@ -23,3 +23,10 @@ def test_numbers_for_people():
     assert sizes == ["999 bytes", "1.5 kB", "2.35 MB", "5 GB"]
     counts = [count(n, "body", "bodies") for n in (0, 1, 2000)]
     assert counts == ["no bodies", "1 body", "2,000 bodies"]
+
+
+def test_an_empty_column_breaks_no_other(capsys):
+    stdout().table(("a", "", ""), [("1", "stable", ""), ("-2", "stable", "")], right=(0,))
+    assert [line.rstrip() for line in capsys.readouterr().out.splitlines()] == [
+        "   a", "   1  stable", "  -2  stable",
+    ]  # fmt: skip

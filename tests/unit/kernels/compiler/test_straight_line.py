@@ -68,6 +68,14 @@ def test_zeros_and_ones_fold_and_equal_expressions_are_one():
     assert traced(lambda a, b, c, d: (a * 0.0, 3.0 - 3.0))[1] == (0.0, 0.0)
 
 
+def test_integers_are_numbers():
+    """As of ``sum``, which begins with the integer 0."""
+    run = compiled(lambda a, b, c, d: (sum([a, b]), 2 * a, 1 - b, 3 / a))
+    holds, out = run(0.3, -2.0, 0.0, 0.0)
+    assert holds
+    assert out.tolist() == [0.3 - 2.0, 0.6, 3.0, 3 / 0.3]
+
+
 def test_a_branch_becomes_a_guard():
     """The way of the start is taken; elsewhere the guard says that it is the wrong one."""
     run = compiled(lambda a, b, c, d: (a + b,) if a > 0.0 and not b > 0.0 else (a - b,))
