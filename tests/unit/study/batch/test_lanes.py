@@ -241,6 +241,21 @@ def test_notes_say_how_points_are_run():
     assert of.notes == (f"points are run in {lanes_of(of).count} lanes of a vector",)
 
 
+def test_a_start_that_fails_beside_one_that_does_not_leaves_it_its_numbers():
+    """The first lane alone has a run; the frame of the others is too long for their rods."""
+    scene = four_bar()
+    scene.simulation.t_end, scene.simulation.dt = 0.5, 0.1
+    make = ensemble(scene, ["points.P7.sPp.y"], ["follower.r:series"]).requested
+    points = [[4.05], [40.0], [41.0], [42.0]]
+    of, other = Ensemble(make), Ensemble(make)
+    other._runner().compiled_batch.takes_lanes = False
+    batch, alone = of.run(points), other.run(points)
+    assert sum(RUN) == len(points)
+    assert (batch.status == DONE).tolist() == [True, False, False, False]
+    for name, values in alone.values.items():
+        assert np.array_equal(batch.values[name][0], values[0])
+
+
 def test_lanes_made_between_points_leave_the_numbers_of_the_scene():
     """A start that is corrected is not that of the model, to which a tree would refer."""
     of = swinging("bodies.bob.mass")
