@@ -177,6 +177,7 @@ def next_step(
             if points.stops.shape[0] != 0:
                 work.t_limit = next_stop(points.stops, work, functions, drives[0], system, loops)
             if plan_step(work, lanes, k, functions, system, loops):
+                exchange_kept(lane_points, k, system, True)  # it may have taken steps
                 lanes.does[k] = TAKES_STEP
                 return 1
         work.t_limit = np.inf
