@@ -60,11 +60,11 @@ def test_a_call_that_needs_programs_is_not_made_without_them(record, monkeypatch
     """Also where another thread has just given them up."""
     monkeypatch.setattr(ChangeOver, "_record_of", lambda self, start: record)
     calls, addresses = [], np.zeros(2, dtype=np.int64)
-    programs = ChangeOver(dap.compile("pen1").evaluator)
-    start, counts = (0.0, np.zeros(0)), lambda: (0, 0)
-    for needs in (True, False):
-        programs.call(lambda: calls.append(needs), addresses, start, counts, needs_programs=needs)
-    assert calls == [False]
+    call = ChangeOver(dap.compile("pen1").evaluator).call
+    given = addresses, (0.0, np.zeros(0)), lambda: (0, 0)
+    call(lambda: calls.append("needed"), *given, needs_programs=True)
+    call(lambda: calls.append("not needed"), *given)
+    assert calls == ["not needed"]
 
 
 def test_another_mass_is_another_program(at_once):
