@@ -94,6 +94,8 @@ class ChangeOver:
         addresses: "Integers",
         start: "tuple[float, Floats]",
         counts: "Callable[[], tuple[int, int]]",
+        *,
+        needs_programs: bool = False,
     ) -> None:
         """Make a call that evaluates the scene, by programs where there are some.
 
@@ -104,14 +106,18 @@ class ChangeOver:
             addresses: of the functions that it calls.
             start: time, and a state as projections are given.
             counts: right-hand sides and projections so far.
+            needs_programs: do not make it without them.
         """
         record = self._record_of(start)
-        if record is None:
+        # taken at once, as another thread may give them up
+        programs = [] if record is None else record.programs[: PROJECT + 1]
+        if record is None or not programs:
+            if needs_programs:
+                return
             clock = time.perf_counter()
             run()
             _spent[self._key] = _spent.get(self._key, 0.0) + time.perf_counter() - clock
             return
-        programs = record.programs[: PROJECT + 1]
         general = addresses[: len(programs)].copy()
         failures, done = [program.failures() for program in programs], counts()
         addresses[: len(programs)] = [program.address for program in programs]
@@ -124,13 +130,9 @@ class ChangeOver:
             if programs[k].failures() - failures[k] > 1 + MOST_FAILURES[k] * (now[k] - done[k]):
                 _give_up(record, programs[k], k)
 
-    def has_programs(self, start: "tuple[float, Floats]") -> bool:
-        """True if a call that begins there would run programs."""
-        return self._is_open and self._record_of(start) is not None
-
     def _record_of(self, start: "tuple[float, Floats]") -> Record | None:
         """The record, where this call may run its programs."""
-        if _spent.get(self._key, 0.0) < LOAD_AFTER:
+        if not self._is_open or _spent.get(self._key, 0.0) < LOAD_AFTER:
             return None
         from dap3d_core.formulations.programs import scene_program
 

@@ -199,11 +199,12 @@ class CompiledBatch:
         system, loops = self.evaluator.system, self.evaluator.loops
         programs = self._programs_for(points.places)
 
-        def run(call: Callable[[], Any]) -> None:
+        def run(call: Callable[[], Any], *, needs_programs: bool = False) -> None:
             with np.errstate(all="ignore"):  # as compiled code does
                 if jit_is_on() and count:
                     addresses = self.evaluator.functions.addresses
-                    programs.call(call, addresses, self._place, counts)
+                    place = self._place
+                    programs.call(call, addresses, place, counts, needs_programs=needs_programs)
                 else:
                     call()
 
@@ -215,9 +216,8 @@ class CompiledBatch:
             from dap3d_core.formulations.programs.scene_program import reads_rates
 
             lanes = self._lanes_for(points.places)
-            alone = not reads_rates(self.evaluator) or programs.has_programs(self._place)
-            if not isinstance(lanes, str) and lanes.is_ready and alone:
-                run(lambda: lanes.run(points, CALL))
+            if not isinstance(lanes, str) and lanes.is_ready:
+                run(lambda: lanes.run(points, CALL), needs_programs=reads_rates(self.evaluator))
         while True:
             run(lambda: driver.run_points(points, work, *problem, system, loops, CALL))
             if points.at[driver.POINT] == count:

@@ -132,12 +132,21 @@ def place_with_spin(y: Floats, system: System) -> None:
     place_bodies(y, body, system.metric)
 
 
+@compiled_into
+def store_function_values(system: System) -> None:
+    """Store functions' values as those at the start."""
+    F = system.F
+    for k in range(F.shape[0]):
+        F[k, 4] = F[k, 0]
+
+
 @compiled
 def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Correct a state of independent rows, in the metric of the system, which is unit."""
     size, length, before = out[SIZE], system.settings[LENGTH], 1e300
     out[OPEN], out[PASSES] = 1.0, 0.0
     place(t, y, system, loops)
+    store_function_values(system)  # joints that are driven begin with those of this run
     worst = residuals(t, system, loops)
     linearise(t, system, loops)
     out[C_BEFORE], out[V_BEFORE] = worst, velocity_residuals(system)
@@ -178,9 +187,8 @@ def store_start(t: float, y: Floats, system: System, loops: Any) -> None:
 @compiled_into
 def count_from_here(t: float, y: Floats, system: System, loops: Any) -> None:
     """Store functions' values at the start and count turns, at bodies and functions as placed."""
-    counts, F = system.settings[SCRATCH : SCRATCH + 1], system.F
-    for k in range(F.shape[0]):
-        F[k, 4] = F[k, 0]
+    counts = system.settings[SCRATCH : SCRATCH + 1]
+    store_function_values(system)
     system.settings[UNSETTLED], counts[0] = 0.0, 1.0
     call_kinds(ANGLE, ANGLE, t, system, loops, system.settings[DOUBTFUL:], counts, counts)
     begin_turns(t, y, system)

@@ -166,16 +166,18 @@ def next_step(
             if p == points.diagnostics.shape[0]:
                 return 0
             at[POINT] = p + 1
+            lane_points.loaded[0] = p  # also where its run does not begin
             if not start(points, p, work, starting, system, loops):
                 points.diagnostics[p, ENDED] = NO_START
                 continue
             set_lane(points, p, lane_points, k, system)
-            lane_points.point[k] = lane_points.loaded[0] = p
+            lane_points.point[k] = p
         load(points, lane_points, k, system)
         while work.status == RUNNING:
             if points.stops.shape[0] != 0:
                 work.t_limit = next_stop(points.stops, work, functions, drives[0], system, loops)
             if plan_step(work, lanes, k, functions, system, loops):
+                exchange_kept(lane_points, k, system, True)  # it may have taken steps
                 lanes.does[k] = TAKES_STEP
                 return 1
         work.t_limit = np.inf

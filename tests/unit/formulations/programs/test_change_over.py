@@ -55,6 +55,18 @@ def test_bits_are_those_of_general_code(model, method, at_once):
     assert len(project) in (0, 1, 2)
 
 
+@pytest.mark.parametrize("record", [None, change_over.Record()])
+def test_a_call_that_needs_programs_is_not_made_without_them(record, monkeypatch):
+    """Also where another thread has just given them up."""
+    monkeypatch.setattr(ChangeOver, "_record_of", lambda self, start: record)
+    calls, addresses = [], np.zeros(2, dtype=np.int64)
+    call = ChangeOver(dap.compile("pen1").evaluator).call
+    given = addresses, (0.0, np.zeros(0)), lambda: (0, 0)
+    call(lambda: calls.append("needed"), *given, needs_programs=True)
+    call(lambda: calls.append("not needed"), *given)
+    assert calls == ["not needed"]
+
+
 def test_another_mass_is_another_program(at_once):
     """Numbers of the scene are constants of its program."""
     scene = dap.load("pen1")

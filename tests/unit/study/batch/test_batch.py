@@ -177,6 +177,19 @@ def test_a_driver_without_position_level_is_left_out_of_the_correction_of_positi
         np.testing.assert_allclose(found, single[output.name], rtol=0.0, atol=1e-11)
 
 
+@long_in_plain_python
+def test_drives_begin_with_the_value_at_the_start_of_their_own_point():
+    """A drive counts from its function's value at the start, which moves no start here."""
+    of = ensemble("wiper", ["functions.turning.coeff.x"], ["rod_end.lambda:max"],
+                  t_end=0.05, dt=0.05)  # fmt: skip
+    points = np.array([[0.0], [0.06], [-0.03]])
+    batch = of.run(points)
+    assert path_of(of) == "copied"
+    assert batch.notes == [""] * 3
+    for name, single in singly(of, points).items():
+        np.testing.assert_allclose(batch.values[name], single, rtol=1e-9, atol=1e-9)
+
+
 def test_failing_points_are_noted_and_the_others_run():
     of = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.r.y"], t_end=0.02, dt=0.01)
     batch = of.run([[1.0], [-1.0], [np.nan], [2.0]])

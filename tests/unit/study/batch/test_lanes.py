@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support import trees
+from support import mechanisms, trees
 from support.on_axles import driven, stone, wheel
 from support.state_types import stated
 from unit.study.batch.test_batch import DONE, ensemble, path_of, singly
@@ -239,6 +239,40 @@ def test_notes_say_how_points_are_run():
     of = swinging("bodies.bob.mass", method="standard")
     of.run(np.linspace(1.0, 2.0, 5)[:, None])
     assert of.notes == (f"points are run in {lanes_of(of).count} lanes of a vector",)
+
+
+def test_turns_are_counted_in_steps_near_singular_poses():
+    """A crank turns by 1.6 rad a step through poses in line, to which each run steps by itself.
+
+    Of two such steps whose turns were not counted, the second one would be cut.
+    """
+    scene, speed = mechanisms.planar_four_bar(), -40.0
+    for name, joint in (("J2", scene.joints.pop("J2")), ("J4", scene.joints.pop("J4"))):
+        scene.add_joint("sph", name, P_i=joint.fields["P_i"], P_j=joint.fields["P_j"])
+    for name, arm in (("left", 0.5), ("top", 1.0), ("right", 0.5)):
+        scene.bodies[name].r_dot = (-arm * speed, 0.0, 0.0)
+        scene.bodies[name].w = (0.0, 0.0, 0.0 if name == "top" else speed)
+        scene.bodies[name].Jp = (0.1, 0.1, 0.1)
+    axes = {"v_i": "left.x", "v_j": "ground.x", "axis": "ground.z"}
+    scene.add_force("rot_sda", "coil", k=1.0, turns=True, **axes)
+    settings = {"t_end": 0.2, "dt": 0.2, "integrator": "rk4", "step": 0.04}
+    of = ensemble(scene, ["forces.coil.k"], ["left.w.z:series"], method="standard", **settings)
+    check(lambda: Ensemble(of.requested), np.linspace(0.2, 1.0, 9)[:, None])
+
+
+def test_a_start_that_fails_beside_one_that_does_not_leaves_it_its_numbers():
+    """The first lane alone has a run; the frame of the others is too long for their rods."""
+    scene = four_bar()
+    scene.simulation.t_end, scene.simulation.dt = 0.5, 0.1
+    make = ensemble(scene, ["points.P7.sPp.y"], ["follower.r:series"]).requested
+    points = [[4.05], [40.0], [41.0], [42.0]]
+    of, other = Ensemble(make), Ensemble(make)
+    other._runner().compiled_batch.takes_lanes = False
+    batch, alone = of.run(points), other.run(points)
+    assert sum(RUN) == len(points)
+    assert (batch.status == DONE).tolist() == [True, False, False, False]
+    for name, values in alone.values.items():
+        assert np.array_equal(batch.values[name][0], values[0])
 
 
 def test_lanes_made_between_points_leave_the_numbers_of_the_scene():
