@@ -74,7 +74,7 @@ def test_what_is_refused(model, words, said, capsys):
     """One message, exit status 2."""
     first = model[:2] if "--over" in words else model
     assert main([*first, *words]) == 2
-    assert said in capsys.readouterr().err
+    assert said in " ".join(capsys.readouterr().err.split())
 
 
 def test_a_picture_without_a_path_is_refused(model, capsys, tmp_path):
