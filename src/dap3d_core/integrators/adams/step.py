@@ -146,17 +146,8 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
     for i in range(trial.size):
         change[i] = rates[i] - change[i]  # Phi_k at t1
     sizes = difference_norms(work, k, h)
-    weight = h * abs(table[G_ROW, k - 1] - table[G_ROW, k])
-    error = weight * sizes[0]
+    error = error_of(work, t1, h, k, sizes[0])
     here, below, lower = compare_orders(table, h, k, sizes)
-    of_work = work_error(work, h, weight * change[change.size - 1])
-    if 1.0 < error <= LARGEST and h * SLOWEST < step_floor(work):
-        doubt, size, f0 = EPSILON * max(abs(t), abs(t1)), work.error_size, work.differences[0]
-        found = scaled_beyond(
-            change, work.state[Y], trial, f0, rates, doubt, size, work.rtol, work.tolerance
-        )
-        error = min(error, error * (found / sizes[0]))
-    error = where(of_work > error, of_work, error)
     if error <= 1.0:
         g = h * table[G_ROW, k]
         for i in range(trial.size):
@@ -179,6 +170,23 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
         reject(work, t1, h, 1 if work.failure_count >= PATIENCE else order, factor, STEP_FLOOR)
     else:
         reject(work, t1, h, 1, 0.1, NOT_FINITE)
+
+
+@compiled
+def error_of(work: AdamsState, t1: float, h: float, k: int, size: float) -> float:
+    """Error of a step to t1 whose difference Phi_k has a scaled size; up to 1.0 it is good enough."""
+    table, change, rates = work.table, work.state[SCRATCH], work.scaled[ROWS - 1]
+    weight = h * abs(table[G_ROW, k - 1] - table[G_ROW, k])
+    error = weight * size
+    if 1.0 < error <= LARGEST and h * SLOWEST < step_floor(work):
+        y, trial, f0 = work.state[Y], work.state[TRIAL], work.differences[0]
+        doubt = EPSILON * max(abs(work.t), abs(t1))
+        found = scaled_beyond(
+            change, y, trial, f0, rates, doubt, work.error_size, work.rtol, work.tolerance
+        )
+        error = min(error, error * (found / size))
+    of_work = work_error(work, h, weight * change[change.size - 1])
+    return where(of_work > error, of_work, error)
 
 
 @compiled
