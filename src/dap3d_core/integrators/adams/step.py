@@ -174,7 +174,7 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
 
 @compiled
 def error_of(work: AdamsState, t1: float, h: float, k: int, size: float) -> float:
-    """Error of a step to t1 whose difference Phi_k has a scaled size; up to 1.0 it is good enough."""
+    """Error of a step to t1 whose Phi_k has a scaled size; up to 1.0 it is good enough."""
     table, change, rates = work.table, work.state[SCRATCH], work.scaled[ROWS - 1]
     weight = h * abs(table[G_ROW, k - 1] - table[G_ROW, k])
     error = weight * size
