@@ -18,7 +18,7 @@ class GlobalForce(Force):
     actuates = "f"
     body_i: Body = body(default=None, doc="the body it acts on")
     P_i: Point = point(default=None, doc="where it acts; the mass centre when left out")
-    f: tuple = vec3(unit="N", doc="components in ground axes")
+    f: tuple = vec3(unit="N", in_ground=True, doc="components in ground axes")
     function: str = function(doc="factor of f, a function of time")
     input: str = input_(instead_of="function", doc="factor of f, an input")
 

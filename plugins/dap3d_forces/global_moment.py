@@ -18,7 +18,7 @@ class GlobalMoment(Force):
     synonyms = ("torque", "moment")
     actuates = "n"
     body_i: Body = body(doc="the body it acts on")
-    n: tuple = vec3(unit="N m", doc="components in ground axes")
+    n: tuple = vec3(unit="N m", in_ground=True, doc="components in ground axes")
     function: str = function(doc="factor of n, a function of time")
     input: str = input_(instead_of="function", doc="factor of n, an input")
 

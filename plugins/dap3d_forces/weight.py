@@ -22,7 +22,10 @@ class Weight(Force):
         default=9.81, unit="m/s^2", usual=(0.0, None), doc="gravitational acceleration"
     )
     wgt: tuple = vec3(
-        default=(0.0, 0.0, -1.0), direction=True, doc="direction of gravity, used as given"
+        default=(0.0, 0.0, -1.0),
+        direction=True,
+        in_ground=True,
+        doc="direction of gravity, used as given",
     )
 
     def wrench(mass_i, gravity, wgt):

@@ -43,6 +43,7 @@ class FieldSpec:
         across: the field of a vector that this one must not be parallel to at the start of a run.
         unit_length: a vector is normalised (with a warning where its length is not 1).
         ground: a vector must be fixed in ground.
+        in_ground: three numbers are components in ground axes.
         argument: the argument of a function, or both of one of two; "" for time.
         arguments: how many a function takes.
         columns: numbers in a row of a table; count of ``numbers``; size of a square matrix.
@@ -75,6 +76,7 @@ class FieldSpec:
     direction: bool | tuple[str, ...] = False
     across: str = ""
     ground: bool = False
+    in_ground: bool = False
     argument: str = ""
     arguments: int = 1
     columns: int = 1
@@ -176,9 +178,21 @@ def number(
     return field_of(attrs.evolve(spec, by_name=names[0], instead_of=names[1]))
 
 
-def vec3(default: Any = REQUIRED, *, unit: str = "", direction: bool = False, doc: str = "") -> Any:
-    """Three finite numbers; with ``direction`` a length other than 1 is noted."""
-    return field_of(FieldSpec("vec3", default, unit, doc, direction=direction))
+def vec3(
+    default: Any = REQUIRED,
+    *,
+    unit: str = "",
+    direction: bool = False,
+    in_ground: bool = False,
+    doc: str = "",
+) -> Any:
+    """Three finite numbers; with ``direction`` a length other than 1 is noted.
+
+    With ``in_ground`` they are components in ground axes: a scene that is included in another, and
+    turned there, has them turned.
+    """
+    spec = FieldSpec("vec3", default, unit, doc, direction=direction, in_ground=in_ground)
+    return field_of(spec)
 
 
 def numbers(count: int | str, default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:

@@ -344,7 +344,7 @@ class _Part:
     def _write_out(
         self, specs: Mapping[str, FieldSpec], given: Mapping[str, Any], fields: dict[str, Any]
     ) -> None:
-        """Write what an element on ground takes from its origin and axes by default."""
+        """Write what an element takes from ground, by default or as components in its axes."""
         joints = [spec.gives for field, spec in specs.items() if spec.gives and field in given]
         for field, spec in specs.items():
             if spec.kind != "point" or spec.default is not None or field in given:
@@ -352,6 +352,9 @@ class _Part:
             taken = any(field in gives for gives in joints)
             if not taken and self._is_on_ground(specs, given, str(slot_of(field))):
                 fields[field] = self._name(f"{GROUND}.O")
+        for field, spec in specs.items():
+            if spec.in_ground and field in fields:
+                fields[field] = self.place.direction(fields[field])
         if RELATIVE in specs and self.place.is_turned:
             A = fields.get(RELATIVE, specs[RELATIVE].default)
             turned = self.place.direction

@@ -76,6 +76,11 @@ P_j = "anchor"
 k = 1.0
 l0 = 0.2
 
+[forces.push]
+type = "f"
+body_i = "bob"
+f = [0.3, -0.2, 0.1]
+
 [forces.turn]
 type = "rot_sda"
 v_i = "rod.x"
@@ -161,8 +166,9 @@ def test_the_scene_that_is_written_has_all_parts(folder):
     scene.save(again)
     assert dap.load(again) == scene
     assert scene.parameters["right_L"] == "= d / 4"
-    assert list(scene.forces) == ["weight", *(f"{n}/{f}" for n in ("left", "right")
-                                              for f in ("spring", "pull", "turn"))]  # fmt: skip
+    forces = ("spring", "pull", "push", "turn")
+    names = [f"{name}/{force}" for name in ("left", "right") for force in forces]
+    assert list(scene.forces) == ["weight", *names]
     assert "left: weight left out" in scene.notes[0]
     assert scene.forces["left/turn"].fields["input"] == "left_u"
     assert scene.joints["left/hinge"].fields["P_j"] == "ground.O"
