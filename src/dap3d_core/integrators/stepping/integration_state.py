@@ -190,7 +190,7 @@ def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
     return {
         "status": {*range(SWITCHED), Status.ENDED, STALLED, *by_switch, *by_method},
         "next_report": range(instants if running else instants + 1),
-        "row_count": (0,),
+        **dict.fromkeys(("row_count", "is_projected"), (0,)),
         **dict.fromkeys(("first_stage_valid", "last_rejected", "switch_rates_valid"), (0, 1)),
         "rounding_state": (0, 1, 2),
         "segment_step_count": range(most_steps + 1),
