@@ -3,9 +3,13 @@
 import matplotlib
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result import UnknownNameError
+
+pytestmark = long_in_plain_python
+
 
 #: Truss of von Mises: a node 0.5 m above the line between two supports, 2 m apart.
 K, LENGTH = 1000.0, np.sqrt(1.25)

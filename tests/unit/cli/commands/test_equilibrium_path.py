@@ -4,10 +4,13 @@ import json
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 from unit.simulation.equilibrium.test_continuation import reach
 from unit.study.test_equilibrium_path import truss, truss_load, turning_height
 
 from dap3d_core.cli import main
+
+pytestmark = long_in_plain_python
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 from unit.simulation.equilibrium.test_states_at_rest import hanging
 
 import dap3d_core as dap
@@ -60,6 +61,7 @@ def toggle_load(angle):
     return -2.0 * np.tan(angle) * 200.0 * (2.0 * np.cos(angle) - 1.2)
 
 
+@long_in_plain_python
 def test_toggle_turns_where_virtual_work_says():
     """Its derivative vanishes where cos^3 = 0.6: three bodies with redundant joints."""
     found = dap.equilibrium_path(toggle(), "forces.load.f.z", "80:-200:8")
@@ -70,6 +72,7 @@ def test_toggle_turns_where_virtual_work_says():
     assert any("redundant" in note for note in found.notes)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(
     ("parameter", "values"),
     [("points.crank_a.sPp.x", "-0.5:-0.4:3"), ("points.wall.sPp.x", "4:3.8:3")],
@@ -102,6 +105,7 @@ def test_path_without_freedoms():
     assert found.end == "reached"
 
 
+@long_in_plain_python
 def test_path_that_ends_on_its_way():
     """Nearly 1 m aside the rod is at the end of its reach: what was found is returned."""
     found = dap.equilibrium_path(reach(), "points.pin.sPp.x", "0.6:1.2:4")
