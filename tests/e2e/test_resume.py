@@ -117,7 +117,7 @@ def test_killed_at_any_moment_a_run_leaves_what_it_had(tmp_path):
 @pytest.mark.slow
 def test_a_run_is_terminated_resumed_and_made_again(dap3d):
     """By the command line: the file is that of a run that was not ended, but for its notes."""
-    settings = ("pen1", "--t-end", "64000", "--dt", "4")
+    settings = ("pen1", "--t-end", "48000", "--dt", "3")
     process = dap3d.start("run", *settings, "--checkpoint", "1s")
     for line in process.stderr:
         if "left" in line:

@@ -38,7 +38,18 @@ def at_once(monkeypatch):
     return monkeypatch
 
 
-@pytest.mark.parametrize("model", MODELS, ids=lambda path: path.stem + path.parent.name)
+#: Each model is of a kind of its own, but for those of engineers, whose elements others have too.
+RUN = [
+    pytest.param(
+        path,
+        id=path.stem + path.parent.name,
+        marks=[pytest.mark.long] if path.parent.name == "engineering" else [],
+    )
+    for path in MODELS
+]
+
+
+@pytest.mark.parametrize("model", RUN)
 def test_bits_are_those_of_general_code(model, at_once):
     """With each formulation and integrator that takes the scene."""
     scene, ran = dap.load(model), 0
