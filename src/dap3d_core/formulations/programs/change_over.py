@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from dap3d_core.formulations.programs.symbolic_arrays import Varied
     from dap3d_core.kernels.array_types import Floats, Integers
 
+    Start = Callable[[], tuple[float, Floats]]
+
 #: Seconds in general code from which on a program is looked for in the cache folder, and made.
 LOAD_AFTER, MAKE_AFTER = 0.02, 0.25
 #: Whether another process compiles programs where it can, so that the run goes on.
@@ -83,8 +85,8 @@ class ChangeOver:
             integration.advance(budget)
 
         if self._is_open and integration.takes_programs:
-            start = integration.t, integration.trial
-            self.call(run, integration.functions.addresses, start, counts)
+            addresses = integration.functions.addresses
+            self.call(run, addresses, lambda: (integration.t, integration.trial), counts)
         else:
             run()
 
@@ -92,7 +94,7 @@ class ChangeOver:
         self,
         run: "Callable[[], None]",
         addresses: "Integers",
-        start: "tuple[float, Floats]",
+        start: "Start",
         counts: "Callable[[], tuple[int, int]]",
         *,
         needs_programs: bool = False,
@@ -104,7 +106,7 @@ class ChangeOver:
         Args:
             run: the call.
             addresses: of the functions that it calls.
-            start: time, and a state as projections are given.
+            start: gives a time, and a state as projections are given, where these are needed.
             counts: right-hand sides and projections so far.
             needs_programs: do not make it without them.
         """
@@ -130,7 +132,7 @@ class ChangeOver:
             if programs[k].failures() - failures[k] > 1 + MOST_FAILURES[k] * (now[k] - done[k]):
                 _give_up(record, programs[k], k)
 
-    def _record_of(self, start: "tuple[float, Floats]") -> Record | None:
+    def _record_of(self, start: "Start") -> Record | None:
         """The record, where this call may run its programs."""
         if not self._is_open or _spent.get(self._key, 0.0) < LOAD_AFTER:
             return None
@@ -141,7 +143,7 @@ class ChangeOver:
                 return None
             self._parts = scene_program.constant_parts(self._evaluator, self._varied)
             self._numbers = scene_program.constant_numbers(self._parts)
-            size = start[1].size
+            size = start()[1].size
             self._name = scene_program.name_of(self._evaluator, size, self._numbers, self._varied)
         if not np.array_equal(self._numbers, scene_program.constant_numbers(self._parts)):
             return None
@@ -154,7 +156,7 @@ class ChangeOver:
                     record.reason = f"{type(error).__name__}: {error}"
         return record if record.programs else None
 
-    def _make(self, record: Record, name: str, start: "tuple[float, Floats]") -> None:
+    def _make(self, record: Record, name: str, start: "Start") -> None:
         """Load programs that the cache folder has, or let them be compiled."""
         from dap3d_core.formulations.programs import scene_program
 
@@ -165,7 +167,7 @@ class ChangeOver:
         if stored is None:
             if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
                 return
-            text = scene_program.write_programs(evaluator, name, *start, self._varied)
+            text = scene_program.write_programs(evaluator, name, *start(), self._varied)
             if BESIDE and path is not None and optimiser.request(text, [], path):
                 record.is_requested = True
                 return

@@ -203,8 +203,9 @@ class CompiledBatch:
             with np.errstate(all="ignore"):  # as compiled code does
                 if jit_is_on() and count:
                     addresses = self.evaluator.functions.addresses
-                    place = self._place
-                    programs.call(call, addresses, place, counts, needs_programs=needs_programs)
+                    programs.call(
+                        call, addresses, lambda: self._place, counts, needs_programs=needs_programs
+                    )
                 else:
                     call()
 
