@@ -61,7 +61,7 @@ def test_a_call_that_needs_programs_is_not_made_without_them(record, monkeypatch
     monkeypatch.setattr(ChangeOver, "_record_of", lambda self, start: record)
     calls, addresses = [], np.zeros(2, dtype=np.int64)
     call = ChangeOver(dap.compile("pen1").evaluator).call
-    given = addresses, (0.0, np.zeros(0)), lambda: (0, 0)
+    given = addresses, lambda: (0.0, np.zeros(0)), lambda: (0, 0)
     call(lambda: calls.append("needed"), *given, needs_programs=True)
     call(lambda: calls.append("not needed"), *given)
     assert calls == ["not needed"]
