@@ -56,7 +56,7 @@ def test_a_number_that_is_none_stops_the_run_and_keeps_what_was_before(dap3d, br
 
 def _stop(dap3d, number):
     """Send a signal to a long run once it shows progress; its exit code and messages."""
-    process = dap3d.start("run", "pen1", "--t-end", "1e5", "--dt", "1")
+    process = dap3d.start("run", "pen1", "--t-end", "1e5", "--dt", "1", DAP3D_PLAIN="1")
     lines = []
     for line in process.stderr:
         lines.append(line)
