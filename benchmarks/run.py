@@ -2,8 +2,8 @@
 
 ``make bench``, or ``python benchmarks/run.py [--only NAME ...] [-o FILE]``. scale_long and
 streaming, some minutes, study and start are run only when they are named. With
-``--docs`` the figures of hard_cases, long_time, chaos, flips and hinges go to docs/hard-cases.md as
-well; ``--only hard`` is all of these.
+``--docs`` the figures of hard_cases, long_time, chaos, flips and hinges go to
+docs/reference/hard-cases.md as well; ``--only hard`` is all of these.
 """
 
 import argparse
@@ -49,7 +49,7 @@ NAMED = ("scale_long", "streaming", "study", "start")
 COLUMNS = 8
 #: Columns that every table of one title has, and those of sentences, which stand below.
 LEADING, WORDS = ("case", "run"), ("why", "said")
-#: What docs/hard-cases.md is made of.
+#: What docs/reference/hard-cases.md is made of.
 HARD = ("hard_cases", "long_time", "chaos", "flips", "hinges")
 
 

@@ -12,7 +12,7 @@ def measure():
 
 
 def write_page(rows):
-    """Renew docs/hard-cases.md from rows of ``measure`` or of ``long_time.measure``."""
+    """Renew docs/reference/hard-cases.md from rows of ``measure`` or of ``long_time.measure``."""
     from hard.page import write
 
     write(rows)

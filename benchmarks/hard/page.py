@@ -1,7 +1,7 @@
 """The page on hard cases from its figures.
 
-The figures stand beside the page, in docs/hard-cases.json, so that a test can tell whether they
-agree. Times stand as ratios to the first run of their case: seconds are those of one machine.
+The figures stand beside the page, docs/reference/hard-cases.json, so that a test can tell whether
+they agree. Times stand as ratios to the first run of their case: seconds are those of one machine.
 """
 
 import json
@@ -10,7 +10,7 @@ from pathlib import Path
 from hard.list import CASES
 from hard.tables import chaos_table, flips_table, hinges_table, table
 
-DOCS = Path(__file__).resolve().parents[2] / "docs"
+DOCS = Path(__file__).resolve().parents[2] / "docs" / "reference"
 FIGURES, PAGE = DOCS / "hard-cases.json", DOCS / "hard-cases.md"
 PICTURE = DOCS / "hard-cases-long-time.png"
 CHAOS, HINGES = DOCS / "hard-cases-chaos.png", DOCS / "hard-cases-hinges.png"

@@ -1,4 +1,4 @@
-"""Tables and pictures of docs/peers.md, made from results.json.
+"""Tables and pictures of docs/reference/peers.md, made from results.json.
 
 ``python benchmarks/peers/document.py`` after ``make bench-peers``; tests compare the tables.
 """
@@ -13,7 +13,7 @@ import levels
 import tables
 
 HERE = Path(__file__).parent
-DOCS = HERE.parents[1] / "docs"
+DOCS = HERE.parents[1] / "docs" / "reference"
 PAGE = DOCS / "peers.md"
 
 

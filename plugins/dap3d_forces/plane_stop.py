@@ -11,10 +11,10 @@ class PlaneStop(Force):
     """A ball of a radius about P_i at the plane through P_j with normal a_j, without friction.
 
     The gap is g = a_j . (r_P_i - r_P_j) - radius. Where it closes faster than v_rest an impulse
-    along a_j makes g_dot of it -e g_dot, the joints of the bodies held (docs/jumps.md); slower
-    contact is carried by a spring and damper, of stiffness k and of the damping ratio zeta, that
-    pushes and does not pull. zeta is that of the mass ``m_c`` on the spring, by default of the two
-    bodies alone. Without ``rebound`` all contact is carried.
+    along a_j makes g_dot of it -e g_dot, the joints of the bodies held (docs/how-to/jumps.md);
+    slower contact is carried by a spring and damper, of stiffness k and of the damping ratio
+    zeta, that pushes and does not pull. zeta is that of the mass ``m_c`` on the spring, by default
+    of the two bodies alone. Without ``rebound`` all contact is carried.
     """
 
     keyword = "plane_stop"

@@ -12,7 +12,8 @@ class PointToPointStop(Force):
 
     With u = d / l the gap is g = l - l_stop for side "min", g = l_stop - l for side "max". Where it
     closes faster than v_rest an impulse along u makes g_dot of it -e g_dot, the joints of the
-    bodies held (docs/jumps.md); slower contact is carried by a spring and damper, of stiffness k
+    bodies held (docs/how-to/jumps.md); slower
+    contact is carried by a spring and damper, of stiffness k
     and of the damping ratio zeta for the two bodies alone, that pushes and does not pull.
     """
 

@@ -16,7 +16,7 @@ class RotationStop(Force):
     side "max" limits that angle from below. It is measured from v_i to v_j and counts whole turns;
     theta_dot = u . (w_j - w_i). The gap is g = theta - theta_stop for side "min",
     g = theta_stop - theta for side "max". Where it closes faster than w_rest an impulsive moment
-    along u makes g_dot of it -e g_dot, the joints of the bodies held (docs/jumps.md); slower
+    along u makes g_dot of it -e g_dot, the joints of the bodies held (docs/how-to/jumps.md); slower
     contact is carried by a spring and damper, of stiffness k and of the damping ratio zeta, that
     pushes and does not pull. zeta is that of the inertia ``J_c``, by default of the two bodies
     alone. Without ``rebound`` all contact is carried.

@@ -16,27 +16,19 @@ from support.process import REPOSITORY, environment
 
 from dap3d_core.cli import main
 
+#: Pages with tests of their own, here and in test_import_matlab.py.
+ON_THEIR_OWN = ("new-plugin", "check-plugin", "import-matlab")
+#: Pages of figures and symbols, without anything to follow.
+WITHOUT_STEPS = ("hard-cases", "notation", "peers", "performance", "security")
 #: Pages that are followed from the first step to the last, in an empty folder.
 FOLLOWED = [
     REPOSITORY / "docs" / "index.md",
     *(
-        REPOSITORY / "docs" / f"{name}.md"
-        for name in (
-            "bad-input",
-            "events",
-            "jumps",
-            "methods",
-            "post-processing",
-            "report",
-            "view",
-            "what-a-type-can-say",
-        )
-    ),
-    *(
         page
         for folder in ("start", "tutorials", "how-to", "concepts", "reference")
         for page in sorted((REPOSITORY / "docs" / folder).glob("*.md"))
-        if page.name != "your-own-joint.md"  # it installs a package: test_from_outside.py
+        if page.stem not in (*ON_THEIR_OWN, *WITHOUT_STEPS)
+        and page.name != "your-own-joint.md"  # it installs a package: test_from_outside.py
         and page.name != "look-at-sweeps.md"  # its pictures are compared: test_look_at_sweeps.py
     ),
 ]
@@ -114,7 +106,7 @@ def test_the_readme_runs_in_sequence_and_once_more(tmp_path):
 @pytest.mark.slow
 def test_the_page_on_new_plugins(tmp_path):
     """Its commands, in an empty folder; what the command says comes next is what the page says."""
-    text = (REPOSITORY / "docs" / "new-plugin.md").read_text()
+    text = (REPOSITORY / "docs" / "how-to" / "new-plugin.md").read_text()
     first, *others = commands(text, "dap3d")
     done = dap3d(first, tmp_path)
     assert done.returncode == 0, done.stderr
@@ -150,7 +142,7 @@ def test_the_page_on_checking_types(tmp_path):
 
     The test runs without compiling, which is the command's part.
     """
-    text = (REPOSITORY / "docs" / "check-plugin.md").read_text()
+    text = (REPOSITORY / "docs" / "how-to" / "check-plugin.md").read_text()
     joint, test = blocks(text, "python")
     (tmp_path / "plane.py").write_text(joint)
     (tmp_path / "test_plane.py").write_text(test)

@@ -105,7 +105,7 @@ def test_a_folder_takes_a_scene_toml(dap3d):
 @pytest.mark.slow
 def test_the_page_on_importing(dap3d):
     """Its folder, its commands and its script, in this order, give what the page says."""
-    text = (REPOSITORY / "docs" / "import-matlab.md").read_text()
+    text = (REPOSITORY / "docs" / "how-to" / "import-matlab.md").read_text()
 
     def blocks(language):
         return re.findall(rf"^```{language}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)

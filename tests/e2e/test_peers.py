@@ -88,7 +88,7 @@ def test_times_are_interpolated_between_settings(beside):
 
 
 def test_the_page_says_what_is_stored(beside):
-    """The tables of docs/peers.md are those that its command makes of the stored results."""
+    """The tables of docs/reference/peers.md are those that its command makes of stored results."""
     document = beside("document")
     data = json.loads((PEERS / "results.json").read_text())
     text = document.PAGE.read_text()

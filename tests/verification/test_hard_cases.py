@@ -1,4 +1,4 @@
-"""The cases of docs/hard-cases.md: what the page says passes does, and its references are right.
+"""Cases of docs/reference/hard-cases.md: what the page says passes does, and references are right.
 
 The cases stand in benchmarks/hard, with their references and what limits their errors: 1000 times
 rtol, and the reason where it is more. Details of many of them are tested elsewhere; the page says
@@ -239,7 +239,7 @@ def test_at_rounding_drifts_grow_with_the_root_of_the_steps(run, step):
 
 
 def test_the_page_shows_its_figures():
-    """Its tables are those of docs/hard-cases.json, with a row for each case."""
+    """Its tables are those of docs/reference/hard-cases.json, with a row for each case."""
     figures = json.loads(page.FIGURES.read_text())
     text = page.PAGE.read_text()
     assert page.renewed(text, figures) == text, "python benchmarks/run.py --only hard_cases --docs"

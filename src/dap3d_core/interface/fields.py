@@ -199,7 +199,7 @@ def numbers(count: int | str, default: Any = REQUIRED, *, unit: str = "", doc: s
     """As many finite numbers as ``count``.
 
     With the name of a size, ``numbers("n")``, the length of the list in the scene is that size, and
-    a default is one number, of all entries (docs/what-a-type-can-say.md, Sizes).
+    a default is one number, of all entries (docs/how-to/what-a-type-can-say.md, Sizes).
     """
     if isinstance(count, str):
         return field_of(FieldSpec("numbers", default, unit, doc, size=count))

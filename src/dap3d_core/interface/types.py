@@ -43,7 +43,7 @@ class TypeBase:
     #: Classes that replace this one for certain values of fields: (conditions, class).
     variants: ClassVar[tuple[tuple[Mapping[str, Any], type["TypeBase"]], ...]] = ()
     #: True for a type of two bodies or more that uses the axes of ground in its formulas: it need
-    #: not be invariant to a common rigid motion of its bodies (docs/check-plugin.md).
+    #: not be invariant to a common rigid motion of its bodies (docs/how-to/check-plugin.md).
     ground_axes: ClassVar[bool] = False
     symbol: ClassVar[str] = ""
     #: Of the example of ``describe``: fields -> what is written there, where no value is usual.
@@ -111,9 +111,9 @@ class Joint(TypeBase):
       ``lam`` (its multipliers), ``mu``, ``v_tol``, ``radius``; a force ``friction`` switches it on;
     * ``switch``    a number, or a tuple of numbers, smooth in time. With ``switch_words`` the run
       ends with this message where one becomes negative; without, the integration restarts where
-      one changes its sign: there the element's law takes another branch (docs/events.md);
+      one changes its sign: there the element's law takes another branch (docs/how-to/events.md);
     * ``impulse``   impulses on its bodies where a switch changes its sign, as for forces without
-      ``J``. Its own rows hold through a jump (docs/jumps.md);
+      ``J``. Its own rows hold through a jump (docs/how-to/jumps.md);
     * ``rate``      the derivatives in time of its ``states``: a number, or a tuple in their order.
 
     ``prepare(self, bodies)`` may return constants of the poses in the scene. A subclass that names
@@ -190,7 +190,7 @@ class Force(TypeBase):
 
     ``tension``, a number or a tuple, positive where it pulls, is for results alone.
 
-    Where a ``switch`` changes its sign velocities may jump (docs/jumps.md), by ``impulse``:
+    Where a ``switch`` changes its sign velocities may jump (docs/how-to/jumps.md), by ``impulse``:
 
     * without ``J``: for each body slot (impulse, moment of impulse about the mass centre), global;
     * with ``J``, one block of rows x 6 a body slot, as of a joint: the change of J v, one number a

@@ -81,7 +81,7 @@ class Report:
         return recommend(self.runs, self.reference.uncertainty, 1e-6 if wanted is None else wanted)
 
     def to_dict(self) -> dict[str, Any]:
-        """The report in JSON; see docs/report.md."""
+        """The report in JSON; see docs/how-to/report.md."""
         reference = self.reference
         expected = reference.expected
         return {

@@ -7,7 +7,7 @@
         check()
 
 ``check_type`` runs all checks and returns a report; ``dap3d check-plugin`` shows it
-(docs/check-plugin.md).
+(docs/how-to/check-plugin.md).
 """
 
 from dap3d_core.testing.checks.findings import CheckOutcome, Finding, Report

@@ -211,7 +211,7 @@ def test_every_kernel_of_a_joint_is_on_the_page_about_levels():
 
 def test_everything_that_a_type_may_say_has_an_example():
     """Kernels, declarations and fields of types appear in the examples of the page about them."""
-    page = (DOCS / "what-a-type-can-say.md").read_text()
+    page = (DOCS / "how-to" / "what-a-type-can-say.md").read_text()
     examples = "\n".join(re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL))
     for base in (interface.Joint, interface.Force, interface.Function):
         for kernel in base.kernel_names:

@@ -96,7 +96,7 @@ def test_rotation_matrices_and_euler_parameters_fit_each_other():
 
 
 def test_rates_of_euler_parameters_in_place_of_an_angular_velocity(read):
-    """p_dot = G^T w / 2 with G = [-e, e~ + e0 I] (docs/notation.md), turned round."""
+    """p_dot = G^T w / 2 with G = [-e, e~ + e0 I] (docs/reference/notation.md), turned round."""
     p, w = np.array([0.5, 0.5, 0.5, 0.5]), np.array([1.0, -2.0, 3.0])
     e0, e = p[0], p[1:]
     skew = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])

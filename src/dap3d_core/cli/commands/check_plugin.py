@@ -55,7 +55,7 @@ def check_plugin(
 
     J, nu and gamma are compared with time derivatives, by complex step and by differences, at
     random poses on and off the constraints; energies with wrenches; and much else
-    (docs/check-plugin.md). Errors are reported row by row; the exit code is then 1.
+    (docs/how-to/check-plugin.md). Errors are reported row by row; the exit code is then 1.
     """
     import attrs
 

@@ -59,7 +59,8 @@ def report(
 
     Each is run on a ladder of tolerances or steps, timed in turns, and compared with a reference:
     two independent runs at the tightest tolerance, whose difference is the reference's own
-    uncertainty. Errors are relative, over all reported positions and velocities (docs/report.md).
+    uncertainty. Errors are relative, over all reported positions and velocities
+    (docs/how-to/report.md).
 
     \b
     dap3d report pen1 --quick

@@ -5,7 +5,7 @@ that the round begins with, and all are met at once:
 
     M dv - D^T Lambda_D - G^T Lambda = P,    D dv = nu - D v,    G dv = change,    Lambda >= 0
 
-where they push (docs/jumps.md). Then elements reset their states, and where that moves the
+where they push (docs/how-to/jumps.md). Then elements reset their states, and where that moves the
 right-hand side nu of a joint, velocities follow. What touches and approaches after that answers in
 the next round, until nothing does: so impacts travel through bodies that touch, as through Newton's
 cradle. Rounds without end become smaller and smaller; after ROUNDS what still approaches is

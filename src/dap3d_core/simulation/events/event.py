@@ -219,7 +219,7 @@ class Instant:
 
         All that holds in this run alone. Velocities and states are set together when the action has
         returned: by impulses on these bodies, with the joints held, so that the velocities of all
-        others follow (docs/jumps.md).
+        others follow (docs/how-to/jumps.md).
 
         Args:
             name: of the force, body, joint or input.
