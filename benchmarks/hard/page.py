@@ -72,27 +72,21 @@ def renewed(page, kept):
 
 
 def cases_table(kept):
-    """A row for each case."""
-    rows = []
+    """A row for each case; below, what makes each hard, what fails and why."""
+    rows, told = [], []
     for case in CASES:
         of_case = [row for row in kept if row["case"] == case.name]
         good = [row for row in of_case if row["passes"]]
         best = min(good, key=lambda row: row["error"])
-        link = f"[{Path(case.test).stem}](../{case.test})"
-        failed = "; ".join(f"{row['run']}: {row['why']}" for row in of_case if not row["passes"])
-        rows.append(
-            (
-                f"**{case.name}** {case.title}",
-                case.hard,
-                "; ".join(row["run"] for row in good),
-                f"{best['error']:.1e} ({best['run']})",
-                f"{best['steps']}",
-                failed or "none",
-                link,
-            )
-        )
-    heads = ("case", "what makes it hard", "passes", "best e", "steps", "fails", "test")
-    return table(heads, rows)
+        count = f"{len(good)} of {len(of_case)}"
+        name = f"**{case.name}**"
+        rows.append((name, count, f"{best['error']:.1e}", best["run"], f"{best['steps']}"))
+        told.append(f"- {name}: {case.title}; {case.hard} ([test](../../{case.test})).\n")
+        told += [
+            f"  - fails: {row['run']}: {row['why']}.\n" for row in of_case if not row["passes"]
+        ]
+    heads = ("case", "runs that pass", "least e", "by", "steps")
+    return table(heads, rows) + "\n" + "".join(told)
 
 
 def runs_table(kept):
