@@ -195,7 +195,6 @@ class Reduction:
         self.units: dict[str, str] = {}
         self.of_rows: dict[str, bool] = {}
         self.outputs = self._look_up(outputs)
-        self._columns = self._find_columns()
         timing = [parameter.name for parameter in parameters if parameter.path in TIMING]
         series = [output.name for output in self.outputs if output.reduction == "series"]
         if timing and series:
@@ -210,11 +209,8 @@ class Reduction:
         for output in self.outputs:
             if not self.of_rows[output.name]:
                 continue
-            if output.name in self._columns:
-                values = rows[:, :, self._columns[output.name]]
-            else:
-                result = result or self.result(self.compiled.model, rows.reshape(k * nt, width))
-                values = result.quantity(str(output.of)).values.reshape(k, nt)
+            result = result or self.result(self.compiled.model, rows.reshape(k * nt, width))
+            values = result.quantity(str(output.of)).values.reshape(k, nt)
             values_of[output.name] = REDUCTIONS[output.reduction](values, times)
         return values_of
 
@@ -248,21 +244,6 @@ class Reduction:
         if mistakes:
             raise SceneError(mistakes)
         return tuple(expanded)
-
-    def _find_columns(self) -> dict[str, int]:
-        """Output -> column of the rows: one that a quantity of random rows is equal to."""
-        evaluator = self.compiled.evaluator
-        width = 1 + len(evaluator.integrated(evaluator.model.u0)) + evaluator.report_size
-        rows = np.random.default_rng(0).random((3, width))
-        result = self.result(evaluator.model, rows)
-        columns = {}
-        for output in self.outputs:
-            if self.of_rows[output.name]:
-                values = result.quantity(str(output.of)).values
-                same = np.flatnonzero(np.all(rows == values[:, None], axis=0))
-                if len(same):
-                    columns[output.name] = int(same[0])
-        return columns
 
     def _is_of_rows(self, quantity: Quantity) -> bool:
         """True if a quantity is computed with nothing that varies from point to point."""
