@@ -11,7 +11,13 @@ from dap3d_core.interface.formats.articulation import (
     Limits,
     Link,
 )
-from dap3d_core.interface.formats.format_types import Exporter, Importer, Source, hookimpl
+from dap3d_core.interface.formats.format_types import (
+    Exporter,
+    FolderImporter,
+    Importer,
+    Source,
+    hookimpl,
+)
 from dap3d_core.interface.formats.frames import (
     IDENTITY,
     Frame,
@@ -44,6 +50,7 @@ __all__ = [
     "Articulation",
     "Coupling",
     "Exporter",
+    "FolderImporter",
     "FormatError",
     "Frame",
     "Geometry",

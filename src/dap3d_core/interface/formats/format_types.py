@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import pluggy
 
@@ -83,6 +83,33 @@ class Importer:
 
         Raises:
             FormatError: it cannot be read.
+        """
+        raise NotImplementedError
+
+
+class FolderImporter(Importer):
+    """A format whose models are folders, and say what a scene says.
+
+    Attributes:
+        marker: name of the file by which a folder is known for a model.
+    """
+
+    marker: ClassVar[str] = ""
+
+    def read_folder(self, folder: Path, registry: Any) -> tuple[Any, Any]:
+        """The ``Scene`` of a folder, and a report: a record of attrs.
+
+        The report has ``title``, that of the importer, ``folder``, ``files`` (with name, state and
+        holds), ``defaulted``, ``changed``, ``unused`` (with text and place) and ``notes``; and of
+        code that is not translated ``user_force``, its text, with ``stub``, a plugin.py to be
+        completed, both "" without any.
+
+        Args:
+            folder: the folder, which may be none of a model.
+            registry: the installed types.
+
+        Raises:
+            SceneError: it cannot be read; with files and lines.
         """
         raise NotImplementedError
 
