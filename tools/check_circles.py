@@ -15,7 +15,7 @@ import grimp
 
 PACKAGES = (
     "dap3d_core", "dap3d_joints", "dap3d_forces", "dap3d_functions", "dap3d_formats",
-    "dap3d_matlab",
+    "dap3d_matlab", "dap3d_results",
 )  # fmt: skip
 #: Imports, of a file from another, that close a circle -> why.
 ALLOWED = {

@@ -50,6 +50,7 @@ def the_wheels_hold_what_they_should_and_no_more(outside):
         "dap3d_functions",
         "dap3d_formats",
         "dap3d_matlab",
+        "dap3d_results",
     }
     assert {n for n in names["dap3d"] if "dist-info" not in n} == own
     assert {n for n in names["dap3d_example"] if "dist-info" not in n} == {"dap3d_example"}

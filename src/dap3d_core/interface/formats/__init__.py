@@ -15,6 +15,7 @@ from dap3d_core.interface.formats.format_types import (
     Exporter,
     FolderImporter,
     Importer,
+    ResultExporter,
     Source,
     hookimpl,
 )
@@ -63,6 +64,7 @@ __all__ = [
     "Place",
     "Remark",
     "Remarks",
+    "ResultExporter",
     "Source",
     "XmlElement",
     "axis_angle",

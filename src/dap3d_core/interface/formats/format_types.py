@@ -1,6 +1,6 @@
 """Base classes of importers and exporters, and their hooks."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
@@ -136,6 +136,26 @@ class Exporter:
 
         Raises:
             FormatError: the format cannot say something that would change the mechanism.
+        """
+        raise NotImplementedError
+
+
+class ResultExporter(Exporter):
+    """A format that results are written to: ``dap3d export RESULT --format KEYWORD``."""
+
+    def write_result(
+        self, result: Any, path: Path, *, model: Any, progress: Callable[[int, int], None] | None
+    ) -> Sequence[str]:
+        """Write a file; returns notes of what is left out, and why.
+
+        Args:
+            result: the ``Result``, with one or more instants.
+            path: the file, which gets its name at the end.
+            model: the model (a name, a folder, a file) in whose folder meshes of shapes lie.
+            progress: called as progress(done, total).
+
+        Raises:
+            ResultError: it cannot be written.
         """
         raise NotImplementedError
 

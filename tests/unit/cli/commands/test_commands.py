@@ -159,7 +159,7 @@ REFUSED = [
     (("post", R, "-o", "x.txt"), "name a .nc or a .csv file"),
     (("post", R, "-o", "x.csv", "--format", "nc"), "leave one out"),
     (("post", R, "-o", R, "--force"), "is the input file"),
-    (("export", R, "-o", "x.txt"), ".vtkhdf, .glb, .mat, .csv"),
+    (("export", R, "-o", "x.txt"), ".csv, .glb, .mat, .vtkhdf"),
     (("export", R, "-o", "x.csv", "--format", "mat"), "its name says csv"),
     (("export", R, "--fps", "0"), "a number above 0"),
     (("export", R, "-o", "sub"), "or a format"),
