@@ -75,7 +75,7 @@ no-fma: $(VENV)/.installed-test  ## tests of compiled bits as on a processor wit
 
 # What meets the dependencies: commands, files, pictures, the compiler, clusters, formats.
 SMOKE := tests/e2e/test_run.py tests/e2e/test_commands.py tests/unit/result/file tests/unit/plot \
-    tests/unit/kernels/compiler tests/unit/matlab tests/unit/formats tests/unit/study/sweep
+    tests/unit/kernels/compiler tests/matlab tests/unit/formats tests/unit/study/sweep
 # Old packages use what newer ones have deprecated since.
 SMOKE_TEST = -m pytest -n auto -m "not slow" -W ignore::DeprecationWarning $(SMOKE)
 LOWEST_VENV := build/lowest-venv

@@ -13,7 +13,10 @@ from graphlib import CycleError, TopologicalSorter
 
 import grimp
 
-PACKAGES = ("dap3d_core", "dap3d_joints", "dap3d_forces", "dap3d_functions", "dap3d_formats")
+PACKAGES = (
+    "dap3d_core", "dap3d_joints", "dap3d_forces", "dap3d_functions", "dap3d_formats",
+    "dap3d_matlab", "dap3d_results",
+)  # fmt: skip
 #: Imports, of a file from another, that close a circle -> why.
 ALLOWED = {
     ("dap3d_core.scene.scene", "dap3d_core.scene.files.write_toml"): "Scene.save, Scene.to_toml",

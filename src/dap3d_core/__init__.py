@@ -14,9 +14,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from dap3d_core.exchange import export
     from dap3d_core.formats.export_model import export_model
-    from dap3d_core.formats.import_model import import_model
+    from dap3d_core.formats.import_model import import_matlab, import_model
     from dap3d_core.interface import PluginError
-    from dap3d_core.matlab import import_matlab
     from dap3d_core.plot import animate, plot
     from dap3d_core.registry import load_registry
     from dap3d_core.report import report
@@ -72,7 +71,7 @@ _HOMES = {
     "export": ("exchange", "export"),
     "export_model": ("formats.export_model", "export_model"),
     "fit": ("study.fit.fit", "fit"),
-    "import_matlab": ("matlab", "import_matlab"),
+    "import_matlab": ("formats.import_model", "import_matlab"),
     "import_model": ("formats.import_model", "import_model"),
     "include": ("scene.include", "include"),
     "inverse": ("simulation.kinematics.inverse", "inverse"),

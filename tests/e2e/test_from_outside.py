@@ -43,7 +43,15 @@ def the_wheels_hold_what_they_should_and_no_more(outside):
             names[wheel.name.partition("-")[0]] = {n.partition("/")[0] for n in archive.namelist()}
             if wheel.name.startswith("dap3d-"):
                 assert "dap3d_core/cli/templates/joint/type.txt" in archive.namelist()
-    own = {"dap3d_core", "dap3d_joints", "dap3d_forces", "dap3d_functions", "dap3d_formats"}
+    own = {
+        "dap3d_core",
+        "dap3d_joints",
+        "dap3d_forces",
+        "dap3d_functions",
+        "dap3d_formats",
+        "dap3d_matlab",
+        "dap3d_results",
+    }
     assert {n for n in names["dap3d"] if "dist-info" not in n} == own
     assert {n for n in names["dap3d_example"] if "dist-info" not in n} == {"dap3d_example"}
 

@@ -39,6 +39,14 @@ def test_what_is_written_reads_as_the_scene_of_the_library(dap3d):
     assert dap.load(dap3d.folder / "scene.toml") == scene
 
 
+def test_import_takes_the_folder_too(dap3d):
+    done = dap3d("import", MODELS / "ball1", "--stub")
+    assert done.returncode == 0, done.stderr
+    assert "MATLAB model ball1" in done.stdout
+    folder = dap3d.folder / "ball1"
+    assert {one.name for one in folder.iterdir()} == {"scene.toml", "plugin.py"}
+
+
 def test_the_report_as_json(dap3d):
     done = dap3d("import-matlab", MODELS / "ball1", "--stub", "--json")
     assert done.returncode == 0, done.stderr

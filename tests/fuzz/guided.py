@@ -88,7 +88,7 @@ GUIDED = {
         check_scene_bytes, scene_seeds, TOML_WORDS, ("tomllib", "dap3d_core.scene")
     ),
     "matlab-bytes": Guided(
-        check_matlab_bytes, matlab_seeds, MATLAB_WORDS, ("dap3d_core.matlab", "dap3d_core.scene")
+        check_matlab_bytes, matlab_seeds, MATLAB_WORDS, ("dap3d_matlab", "dap3d_core.scene")
     ),
 }
 

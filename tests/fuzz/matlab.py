@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import strategies as st
 from support.matlab import MODELS, SMALL
 
-from dap3d_core.matlab.import_matlab import import_matlab
+from dap3d_core.formats.import_model import import_matlab
 from dap3d_core.scene import SceneError, check, parse
 from fuzz.acceptable import registry, strict
 from fuzz.damage import flipped, seeds

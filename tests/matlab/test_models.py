@@ -6,7 +6,6 @@ import pytest
 from support.matlab import MODELS
 
 import dap3d_core as dap
-from dap3d_core.matlab import import_matlab
 from dap3d_core.scene import AnimationPoint
 
 NAMES = ("bodies2", "pen1", "pen2", "fourbar2", "fourbar3", "fourbar4", "tri")
@@ -49,7 +48,7 @@ def test_a_model_moves_as_the_shipped_scene(name):
 
 def test_the_ball_moves_as_the_shipped_scene_with_its_force_filled_in(tmp_path):
     """Before and after the first touch, which is at 0.428 s."""
-    scene, report = import_matlab(MODELS / "ball1")
+    scene, report = dap.import_matlab(MODELS / "ball1")
     assert scene.forces["F1"].type == "user"
     assert scene.forces["F1"].fields == {"body_i": "body1"}
     plugin = (dap.shipped_models()["ball1"] / "plugin.py").read_text()
@@ -62,7 +61,7 @@ def test_the_ball_moves_as_the_shipped_scene_with_its_force_filled_in(tmp_path):
 
 def test_every_file_of_the_folders_is_read():
     for name in (*NAMES, "ball1"):
-        _, report = import_matlab(MODELS / name)
+        _, report = dap.import_matlab(MODELS / name)
         states = {f.state for f in report.files}
         assert states <= {"read", "absent", "shown"}, name
         assert {f.name for f in report.files if f.state != "absent"} == {
@@ -72,7 +71,7 @@ def test_every_file_of_the_folders_is_read():
 
 def test_names_and_drawing_of_a_model():
     """What no motion shows: names, colours, animation points, limits."""
-    scene, report = import_matlab(MODELS / "bodies2")
+    scene, report = dap.import_matlab(MODELS / "bodies2")
     assert list(scene.bodies) == ["body1", "body2"]
     assert [b.color for b in scene.bodies.values()] == ["b", "r"]
     assert list(scene.vectors2) == ["d1", "d2"]

@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from dap3d_core.matlab.language.interpreter import follow
-from dap3d_core.matlab.language.parse import Grammar, SourceFile, syntax_mistakes
+from dap3d_matlab.language.interpreter import follow
+from dap3d_matlab.language.parse import Grammar, SourceFile, syntax_mistakes
 
 #: The models of the manual as its MATLAB program has them, in our own words.
 MODELS = Path(__file__).parents[1] / "matlab"

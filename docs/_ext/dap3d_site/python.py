@@ -10,7 +10,7 @@ SECTIONS = {
         ("load", "shipped_models", "Scene", "include", "import_matlab", "import_model",
          "export_model"),
         ("scene.Simulation", "scene.Body", "scene.Animation", "scene.Mistake",
-         "matlab.ImportReport", "formats.import_model.ImportReport",
+         "dap3d_matlab.files.report.ImportReport", "formats.import_model.ImportReport",
          "formats.export_model.ExportReport"),
     ),
     "Runs": (
@@ -64,6 +64,7 @@ def _parts() -> Iterator[str]:
 
 def _documented(path: str) -> str:
     """The directive that shows something public."""
+    path = path.removeprefix("dap3d_core.") if "dap3d_matlab" in path else path
     name = path.rpartition(".")[2]
     if name.endswith("Error"):
         return directive("autoexception", path, ":show-inheritance:")

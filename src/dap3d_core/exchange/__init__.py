@@ -1,5 +1,5 @@
-"""The exchange floor: results as files of other programs: VTK, glTF, MATLAB, CSV."""
+"""The exchange layer: results as files of other programs, by exporters of plugins."""
 
-from dap3d_core.exchange.export import FORMATS, Export, check_fps, export, format_of
+from dap3d_core.exchange.export import Export, check_fps, export, exporter_of, result_exporters
 
-__all__ = ["FORMATS", "Export", "check_fps", "export", "format_of"]
+__all__ = ["Export", "check_fps", "export", "exporter_of", "result_exporters"]

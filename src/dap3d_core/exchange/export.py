@@ -2,21 +2,18 @@
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import attrs
 
+from dap3d_core.interface.errors import PluginError
+from dap3d_core.interface.formats import ResultExporter
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import Result, ResultError
+from dap3d_core.registry.extensions import extensions
+from dap3d_core.result import Result
 from dap3d_core.result.file.atomic_write import whole_file
-from dap3d_core.scene import Scene
 from dap3d_core.view.scene3d.sampled_motion import at_instants, instants_to_show
-from dap3d_core.view.scene3d.scene_data import scene_of
-
-#: Format -> suffix of its files.
-FORMATS = {"vtk": ".vtkhdf", "gltf": ".glb", "mat": ".mat", "csv": ".csv"}
-#: Files of moving points beyond this are refused, bytes.
-LARGEST = 8 * 2**30
 
 Progress = Callable[[int, int], None]
 
@@ -26,7 +23,7 @@ class Export:
     """A file that ``export`` wrote.
 
     Attributes:
-        path, format: the file, and one of FORMATS.
+        path, format: the file, and the keyword of its exporter.
         instants: number of instants in it.
         notes: contents that are left out, and why.
     """
@@ -57,7 +54,7 @@ def export(
     Args:
         result: the result.
         path: the file.
-        format: "vtk", "gltf", "mat" or "csv"; by default that of the suffix.
+        format: "vtk", "gltf", "mat", "csv" or one of a plugin; by default that of the suffix.
         fps: instants a second, the nearest reported ones; every instant by default.
         model: the model (a name, a folder, a file) in whose folder meshes of shapes lie.
         progress: called as progress(done, total).
@@ -68,69 +65,43 @@ def export(
         ResultError: the file cannot be written, or exists and ``force`` is off.
     """
     target = Path(path)
-    kind = format_of(target, format)
+    exporter = exporter_of(target, format)
     if not len(result.t):
         raise ValueError("the result has no instants: there is nothing to export")
     check_fps(fps)
     shown = result if fps is None else at_instants(result, instants_to_show(result.t, 1, fps))
     with whole_file(target, force) as part:
-        if kind in ("vtk", "gltf"):
-            notes = _write_scene(shown, scene_of(shown, model), part, kind, progress)
-        else:
-            notes = _write_arrays(shown, part, kind)
-    return Export(target.absolute(), kind, len(shown.t), tuple(notes))
+        notes = exporter.write_result(shown, part, model=model, progress=progress)
+    return Export(target.absolute(), exporter.keyword, len(shown.t), tuple(notes))
 
 
-def format_of(target: Path, format: str | None) -> str:
-    """The format of a path; a ValueError where there is none, or the suffix names another."""
-    named = {suffix: kind for kind, suffix in FORMATS.items()}.get(target.suffix.lower())
-    if format is not None and format not in FORMATS:
-        raise ValueError(f"{format!r} is no format; one of {', '.join(FORMATS)}")
-    if format is None and named is None:
-        suffixes = ", ".join(FORMATS.values())
+def result_exporters() -> dict[str, ResultExporter]:
+    """Exporters of results by keyword, without those that cannot be loaded."""
+    installed, found = extensions("exporter"), {}
+    for keyword in installed.keywords:
+        with suppress(PluginError):
+            exporter = installed.load(keyword)()
+            if isinstance(exporter, ResultExporter):
+                found[keyword] = exporter
+    return found
+
+
+def exporter_of(target: Path, format: str | None) -> ResultExporter:
+    """The exporter for a path; a ValueError where there is none, or the suffix names another."""
+    known = result_exporters()
+    named = {one.suffix: one for one in known.values()}.get(target.suffix.lower())
+    if format is not None and format not in known:
+        raise ValueError(f"{format!r} is no format; one of {', '.join(known)}")
+    exporter = named if format is None else known[format]
+    if exporter is None:
+        suffixes = ", ".join(one.suffix for one in known.values())
         raise ValueError(f"cannot write {target}: name a file with one of {suffixes}, or a format")
-    if format is not None and named is not None and format != named:
-        raise ValueError(f"cannot write {target}: its name says {named}, not {format}")
-    return format or str(named)
+    if named is not None and exporter is not named:
+        raise ValueError(f"cannot write {target}: its name says {named.keyword}, not {format}")
+    return exporter
 
 
 def check_fps(fps: float | None) -> None:
     """Refuse, by a ValueError, an fps that is not above 0."""
     if fps is not None and not 0.0 < fps <= 1e6:
         raise ValueError(f"fps is a number above 0, at most 1e6, not {fps:g}")
-
-
-def _write_scene(
-    result: Result, scene: Scene, part: Path, kind: str, progress: Progress | None
-) -> list[str]:
-    """Write the moving scene; returns notes."""
-    from dap3d_core.exchange.gltf import write_gltf
-    from dap3d_core.exchange.moving_solids import MovingScene
-    from dap3d_core.exchange.vtkhdf import point_count, write_vtkhdf
-
-    moving = MovingScene.of(result, scene)
-    if kind == "gltf":
-        write_gltf(moving, part, progress)
-        return moving.notes
-    size = 24 * point_count(moving) * len(result.t)
-    if size > LARGEST:
-        raise ResultError(
-            f"{point_count(moving):,} points at {len(result.t):,} instants are "
-            f"{size / 1e9:.1f} GB, more than {LARGEST / 1e9:.1f}: a smaller fps leaves instants out"
-        )
-    write_vtkhdf(moving, part, progress)
-    return moving.notes
-
-
-def _write_arrays(result: Result, part: Path, kind: str) -> list[str]:
-    """Write arrays or columns; returns notes."""
-    from dap3d_core.exchange.matlab_file import write_mat
-    from dap3d_core.result.quantities.csv_table import columns_of, write_csv
-    from dap3d_core.result.quantities.netcdf_export import why_no_reactions
-
-    left_out = why_no_reactions(result)
-    if kind == "mat":
-        write_mat(result, part, reactions=not left_out)
-    else:
-        write_csv(result, part, columns_of(result, not left_out), force=True)
-    return [f"reactions are left out: {left_out}"] if left_out else []

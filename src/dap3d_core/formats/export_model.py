@@ -6,7 +6,15 @@ from pathlib import Path
 import attrs
 
 from dap3d_core.formats.export_scene.articulation import articulation_of
-from dap3d_core.interface.formats import Articulation, FormatError, Geometry, Remark, Remarks
+from dap3d_core.interface.errors import PluginError
+from dap3d_core.interface.formats import (
+    Articulation,
+    FormatError,
+    Geometry,
+    Remark,
+    Remarks,
+    ResultExporter,
+)
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.extensions import extensions
@@ -58,6 +66,8 @@ def export_model(
         OSError: the file cannot be written, or exists and ``force`` is off.
     """
     exporter = extensions("exporter").load(format)()
+    if isinstance(exporter, ResultExporter):
+        raise PluginError(f"{format} is a format of results, which dap.export writes")
     given = scene if isinstance(scene, Scene) else load(scene)
     check(given, load_registry() if registry is None else registry)
     remarks = Remarks()

@@ -14,7 +14,13 @@ from dap3d_core.formats.import_scene.scene_of_model import ImportOptions, scene_
 from dap3d_core.formats.import_scene.shapes import MeshFiles
 from dap3d_core.formats.import_scene.source_files import SourceFiles
 from dap3d_core.interface.errors import PluginError
-from dap3d_core.interface.formats import Articulation, FormatError, Importer, Remark, Remarks
+from dap3d_core.interface.formats import (
+    Articulation,
+    FolderImporter,
+    FormatError,
+    Importer,
+    Remark,
+)
 from dap3d_core.interface.formats.articulation import KINDS
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.arguments import checked
@@ -82,11 +88,11 @@ def import_model(
     positions: Mapping[str, float | Sequence[float]] | None = None,
     rates: Mapping[str, float | Sequence[float]] | None = None,
     registry: Registry | None = None,
-) -> tuple[Scene, ImportReport]:
+) -> tuple[Scene, Any]:
     """The scene of a model of another program: URDF, SDF, MJCF, or a format of a plugin.
 
     Args:
-        path: the file.
+        path: the file; or a folder, where the format is one of folders.
         format: keyword of an importer; by default that of the file.
         packages: name of a package, in ``package://NAME/...``, -> its folder.
         root: the folder that files which the model names must lie in; by default that of the file.
@@ -104,46 +110,52 @@ def import_model(
         registry: the installed types; by default all.
 
     Returns:
-        The scene and a report of what was taken, translated and left out.
+        The scene and a report: an ``ImportReport``, or for a folder that of its importer.
 
     Raises:
-        SceneError: the file cannot be imported; with its line.
+        SceneError: it cannot be imported; with its line.
     """
     file = _path(path)
-    meshes = MeshFiles()
+    if (folders := _folder_importer(file, format)) is not None:
+        return _read_folder(folders, file, registry, strict=strict, given=any(
+            (packages, root, free_base, keep_fixed, balance_inertia, arguments, positions, rates))
+        )  # fmt: skip
     try:
         options = ImportOptions(free_base, keep_fixed, balance_inertia, limits)
         model, source, keyword = read_articulation(
             file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes,
             arguments=arguments)  # fmt: skip
-        for what, given in ((options.positions, positions), (options.rates, rates)):
-            what.update(_coordinates(given, model, positions=given is positions))
-        scene, notes = _checked_scene(model, source, options, meshes, registry)
+        options.positions.update(_coordinates(positions, model, positions=True))
+        options.rates.update(_coordinates(rates, model, positions=False))
+        return _checked_scene(model, source, keyword, options, registry, strict)
     except FormatError as error:
         raise _refusal(error, file) from None
-    if strict:
-        _refuse_omissions(source.remarks)
-    return scene, _report(file, keyword, model, source.remarks, notes, meshes)
 
 
 def _checked_scene(
-    model: Articulation, source: SourceFiles, options: ImportOptions, meshes: MeshFiles,
-    registry: Registry | None,
-) -> tuple[Scene, Sequence[str]]:  # fmt: skip
-    """The scene of a model, and the notes of its check.
+    model: Articulation, source: SourceFiles, keyword: str, options: ImportOptions,
+    registry: Registry | None, strict: bool,
+) -> tuple[Scene, ImportReport]:  # fmt: skip
+    """The scene of a model, and the report.
 
     Raises:
         FormatError: the model is no mechanism.
-        SceneError: the scene is invalid; with lines of the file.
+        SceneError: the scene is invalid, or something is left out and ``strict``; with lines.
     """
-    names = Names()
+    names, meshes = Names(), MeshFiles()
     scene = scene_of(model, source.remarks, options, meshes=meshes, names=names)
     scene.description = f"From {source.path.name}."
     try:
         checked = check(scene, load_registry() if registry is None else registry)
     except SceneError as error:
         raise SceneError(_relocated(m, names, source.path) for m in error.mistakes) from None
-    return scene, checked.notes
+    _refuse_omissions(source.remarks.left_out, strict)
+    parts = ("links", "joints", "couplings", "actuators")
+    return scene, ImportReport(
+        str(source.path), keyword, {part: len(getattr(model, part)) for part in parts},
+        source.remarks.translated, source.remarks.left_out, tuple(checked.notes),
+        {path: name for (path, _), name in meshes.names.items()},
+    )  # fmt: skip
 
 
 def _path(path: Any) -> Path:
@@ -158,30 +170,73 @@ def _path(path: Any) -> Path:
         raise _refusal(FormatError(f"a model is a file, not {path!r}")) from None
 
 
-def _refuse_omissions(remarks: Remarks) -> None:
-    """Refuse a model of which something is left out.
+@checked
+def import_matlab(
+    folder: str | os.PathLike[str], registry: Registry | None = None
+) -> tuple[Scene, Any]:
+    """Read a model of the MATLAB program DAP3D; no code of it is run.
+
+    Args:
+        folder: with inBodies.m and the other files of a model (manual, "Describing A Model").
+        registry: the installed types; by default all.
+
+    Returns:
+        The scene, checked but for the user's force, and a report of what was read, defaulted,
+        changed and left out.
+
+    Raises:
+        SceneError: holds every mistake, with file and line; or the packages of the extra "matlab"
+            are not installed.
+    """
+    return _read_folder(extensions("importer").load("matlab")(), _path(folder), registry)
+
+
+def _read_folder(
+    importer: FolderImporter, folder: Path, registry: Registry | None, *, strict: bool = False,
+    given: bool = False,
+) -> tuple[Scene, Any]:  # fmt: skip
+    """The scene of a folder, and the report of its importer.
+
+    Raises:
+        SceneError: it cannot be read; or options are given that are for other formats.
+    """
+    if given:
+        what = f"a {importer.title} model takes no options of packages, links, joints and macros"
+        raise _refusal(FormatError(what, remedy="leave them out"), folder)
+    scene, report = importer.read_folder(folder, load_registry() if registry is None else registry)
+    _refuse_omissions(report.unused, strict)
+    return scene, report
+
+
+def _folder_importer(folder: Path, wanted: str | None) -> FolderImporter | None:
+    """The importer of a folder, as wanted or by a file in it; None where it is one of files."""
+    if wanted is None and not folder.is_dir():
+        return None
+    formats = extensions("importer")
+    for keyword in formats.first if wanted is None else [wanted]:
+        try:
+            importer = formats.load(keyword)()
+        except PluginError:
+            if wanted is not None:
+                raise
+            continue
+        if isinstance(importer, FolderImporter) and (wanted or (folder / importer.marker).exists()):
+            return importer
+    return None
+
+
+def _refuse_omissions(remarks: Sequence[Any], strict: bool) -> None:
+    """Refuse a model of which something is left out, where strict.
 
     Raises:
         SceneError: each omission, with its line.
     """
-    if remarks.left_out:
+    if strict and remarks:
         raise SceneError(
             Mistake("", MISSING, f"{one.text}: it would be left out", file=one.place.file,
                     line=one.place.line)
-            for one in remarks.left_out
+            for one in remarks
         )  # fmt: skip
-
-
-def _report(
-    file: Path, keyword: str, model: Articulation, remarks: Remarks, notes: Sequence[str],
-    meshes: MeshFiles,
-) -> ImportReport:  # fmt: skip
-    parts = ("links", "joints", "couplings", "actuators")
-    return ImportReport(
-        str(file), keyword, {part: len(getattr(model, part)) for part in parts},
-        remarks.translated, remarks.left_out, tuple(notes),
-        {path: name for (path, _), name in meshes.names.items()},
-    )  # fmt: skip
 
 
 def read_articulation(
@@ -263,9 +318,12 @@ def _importer(source: SourceFiles, wanted: str | None) -> tuple[Importer, str]:
     named = [one[1:] for one in suffixes if one[1:] in formats.keywords]
     for keyword in [*named, *(one for one in formats.first if one not in named)]:
         try:
-            loaded[keyword] = importer = formats.load(keyword)()
+            importer = formats.load(keyword)()
         except PluginError:  # a broken one hurts its own files alone
             continue
+        if isinstance(importer, FolderImporter):
+            continue
+        loaded[keyword] = importer
         if suffixes[-1:] and suffixes[-1] in importer.suffixes:
             fitting[keyword] = importer
             if keyword in named or not importer.roots or source.xml().name in importer.roots:

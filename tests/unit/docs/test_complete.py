@@ -245,7 +245,9 @@ def test_what_public_names_hand_out_exists(site):
     for _, others in SECTIONS.values():
         for path in others:
             floor, _, name = path.rpartition(".")
-            assert inspect.getdoc(getattr(import_module(f"dap3d_core.{floor}"), name)), path
+            assert inspect.getdoc(
+                getattr(import_module(floor if "dap3d_" in floor else f"dap3d_core.{floor}"), name)
+            ), path
 
 
 def test_every_setting_formulation_and_integrator_is_there(pages):

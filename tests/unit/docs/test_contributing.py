@@ -35,8 +35,7 @@ def test_the_map_has_every_folder_of_the_core():
 OF_SEVERAL = {
     "docs/test_complete.py", "docs/test_contributing.py", "kernels/compiler/test_bits.py",
     "kernels/compiler/test_complex.py", "kernels/compiler/test_core.py",
-    "kernels/compiler/test_refusals.py", "matlab/test_refusals.py",
-    "simulation/test_only_what_is_needed.py",
+    "kernels/compiler/test_refusals.py", "simulation/test_only_what_is_needed.py",
 }  # fmt: skip
 
 

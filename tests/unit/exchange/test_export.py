@@ -10,11 +10,11 @@ from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 import dap3d_core as dap
-from dap3d_core.exchange.gltf import write_gltf
-from dap3d_core.exchange.moving_solids import MovingScene
 from dap3d_core.result import ResultError
 from dap3d_core.view.scene3d.primitives import SOLIDS
 from dap3d_core.view.scene3d.solids import solid, spring
+from dap3d_results.gltf import write_gltf
+from dap3d_results.moving_solids import MovingScene
 
 #: A pyramid that no symmetry maps to itself: its vertices tell its pose.
 PYRAMID = "v 0 0 0\nv 1 0 0\nv 0 2 0\nv 0 0 3\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n"
@@ -199,7 +199,7 @@ def test_a_motion_beyond_single_precision_is_refused(tmp_path):
     scene.add_body("a", r=[1e60, 0.0, 0.0])
     result = dap.simulate(scene, t_end=0.1, dt=0.1)
     with pytest.raises(ResultError, match="single precision"):
-        write_gltf(MovingScene.of(result, scene), tmp_path / "a.glb")
+        write_gltf(MovingScene.of(result, None), tmp_path / "a.glb")
 
 
 @pytest.mark.parametrize("form", [*map(solid, SOLIDS), spring(10.0)])
@@ -271,3 +271,25 @@ def test_an_existing_file_is_kept_and_an_interrupted_one_vanishes(result, tmp_pa
 def test_meshes_that_are_not_at_hand_are_noted(result, tmp_path):
     made = dap.export(result, tmp_path / "a.glb")
     assert ["kite" in note and "--model" in note for note in made.notes] == [True]
+
+
+def test_a_package_brings_a_format_of_results(install, result, tmp_path):
+    """Found by its keyword or by the suffix; it is no format of models."""
+    text = (
+        "from dap3d_core.interface.formats import ResultExporter, hookimpl\n"
+        "interface_version = 1\n"
+        "class Instants(ResultExporter):\n"
+        "    keyword, title, suffix = 'instants', 'Instants', '.txt'\n"
+        "    def write_result(self, result, path, *, model, progress):\n"
+        "        path.write_text(' '.join(map(str, result.t)))\n"
+        "        return ['bodies are left out']\n"
+        "@hookimpl\n"
+        "def dap3d_exporters():\n"
+        "    return [Instants]\n"
+    )
+    install("parts", text, "instants", "dap3d.exporters")
+    made = dap.export(result, tmp_path / "a.txt")
+    assert (made.format, made.notes) == ("instants", ("bodies are left out",))
+    assert [float(one) for one in made.path.read_text().split()] == result.t.tolist()
+    with pytest.raises(dap.PluginError, match=r"instants is a format of results"):
+        dap.export_model("pen1", format="instants")

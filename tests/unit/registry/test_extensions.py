@@ -189,7 +189,7 @@ def one_is_broken(install, kind, text, words):
     assert words in found[keyword].reason
     assert f"{kind} '{keyword}' of distribution parts 1.2" in found[keyword].reason
     others = [i for i in extension_listing(limit_s=3.0) if i.distribution == "dap3d"]
-    assert len(others) == 5  # three importers, two exporters
+    assert len(others) == 10  # four importers, six exporters
     assert {i.state for i in others} == {"ok"}
 
 

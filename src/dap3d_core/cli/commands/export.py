@@ -49,21 +49,21 @@ def export(
     dap3d export pen1.nc -o pen1.glb --fps 60
     dap3d export fourbar4 --format mjcf
 
-    Ctrl-C leaves no file behind.
+    Ctrl-C leaves no file.
     """
+    from dap3d_core import export as write
     from dap3d_core.cli.console.console import count, show_written, stderr
     from dap3d_core.cli.console.progress import counting
     from dap3d_core.cli.framework.paths import open_result, output_path, refuse_all, writable
-    from dap3d_core.exchange import FORMATS, check_fps, format_of
-    from dap3d_core.exchange import export as write
+    from dap3d_core.exchange import check_fps, exporter_of, result_exporters
     from dap3d_core.result import ResultError
 
-    if kind is not None and kind not in FORMATS:
+    if kind not in (known := result_exporters()) and kind is not None:
         return _export_model(result, kind, output, strict=strict, force=force, as_json=as_json)
-    target = output_path(result, output, FORMATS[kind or "vtk"])
+    target = output_path(result, output, known[kind or "vtk"].suffix)
     opened = open_result(result, model=model, allow_code=allow_code)
     refuse_all(
-        partial(format_of, target, kind),
+        partial(exporter_of, target, kind),
         partial(check_fps, fps),
         partial(writable, target, force=force, sources=(Path(result),)),
     )
@@ -78,8 +78,8 @@ def export(
         stderr().say(f"interrupted; {target} was not written", "bold red")
         return INTERRUPTED
     data = {"format": made.format, "instants": made.instants}
-    contents = count(made.instants, "instant")
-    show_written(target, contents, data, made.notes, as_json=as_json, quiet=quiet)
+    show_written(target, count(made.instants, "instant"), data, made.notes, as_json=as_json,
+                 quiet=quiet)  # fmt: skip
     return DONE
 
 
@@ -90,15 +90,14 @@ def _export_model(
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.cli.framework.paths import writable
-    from dap3d_core.exchange import FORMATS
     from dap3d_core.registry.extensions import extensions
     from dap3d_core.registry.suggestions import nearest
 
     formats = extensions("exporter")
     if kind not in formats.keywords:
-        near = nearest(kind, known := [*FORMATS, *formats.keywords])
+        near = nearest(kind, formats.keywords)
         hint = f"did you mean {near!r}? " if near else ""
-        raise Refused(f"--format {kind}: unknown; {hint}formats: {', '.join(known)}")
+        raise Refused(f"--format {kind}: unknown; {hint}formats: {', '.join(formats.keywords)}")
     scene = dap.load(model)
     name = Path(model).stem if Path(model).is_file() else Path(model).name
     target = Path(output) if output is not None else Path(name + formats.load(kind).suffix)

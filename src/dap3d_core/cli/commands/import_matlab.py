@@ -1,7 +1,7 @@
 """``dap3d import-matlab``: a scene made of a model of the MATLAB program."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -11,7 +11,6 @@ from dap3d_core.cli.process.exit_codes import DONE
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
-    from dap3d_core.matlab import ImportReport
     from dap3d_core.scene import Scene
 
 #: Tables of a scene, with the nouns of their entries.
@@ -38,7 +37,7 @@ TABLES = (
     saves=True,
 )  # fmt: skip
 def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json: bool) -> int:
-    """Make a scene of a model of the MATLAB program DAP3D.
+    """Make a scene of a model of the MATLAB program DAP3D, as ``dap3d import FOLDER`` does.
 
     FOLDER holds the files of the model: inBodies.m, inPoints.m, inVectors1.m, inVectors2.m,
     inJoints.m, inForces.m, inFuncts.m, inAnimate.m. They are read, never run: assignments of
@@ -48,16 +47,24 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
 
     The report says what was read, defaulted, changed and left out. Needs the extra "matlab".
     """
+    import dap3d_core as dap
+
+    scene, report = dap.import_matlab(folder)
+    path = Path(output)
+    path = path / "scene.toml" if path.is_dir() else path
+    return write_folder(scene, report, path, force=force, stub=stub, as_json=as_json)
+
+
+def write_folder(
+    scene: "Scene", report: Any, path: Path, *, force: bool, stub: bool, as_json: bool
+) -> int:
+    """Write the scene of a folder, a plugin.py to be filled in, and the report."""
     import attrs
 
-    import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.cli.framework.paths import writable, write_text
 
-    scene, report = dap.import_matlab(folder)
-    sources = tuple(Path(folder) / f.name for f in report.files)
-    path = Path(output)
-    path = path / "scene.toml" if path.is_dir() else path
+    sources = tuple(Path(report.folder) / f.name for f in report.files)
     target = writable(path, force=force, sources=sources)
     plugin = None
     if stub and report.stub:
@@ -77,7 +84,7 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
 def _show(
     console: "Terminal",
     scene: "Scene",
-    report: "ImportReport",
+    report: Any,
     target: Path,
     plugin: Path | None,
     *,
@@ -85,7 +92,7 @@ def _show(
 ) -> None:
     from dap3d_core.cli.console.console import count
 
-    console.title(f"MATLAB model {scene.name}")
+    console.title(f"{report.title} model {scene.name}")
     rows = [(f.name, f.state, f.holds) for f in report.files]
     console.table(("file", "was", "holds"), rows, fixed=(0, 1))
     console.section("defaulted (the files leave it out)", [str(r) for r in report.defaulted])
@@ -100,11 +107,11 @@ def _show(
     if stub and not report.stub:
         console.say("No force is of type user: there is no plugin to fill in.")
     code = " --allow-code" if report.user_force else ""
-    console.say("A MATLAB model does not say how long to simulate. Simulate it with:")
+    console.say(f"A {report.title} model does not say how long to simulate. Simulate it with:")
     console.say(f"dap3d run {target} --t-end 2 --dt 0.02{code}", indent=4, whole=True)
 
 
-def _show_user_force(console: "Terminal", report: "ImportReport", plugin: Path | None) -> None:
+def _show_user_force(console: "Terminal", report: Any, plugin: Path | None) -> None:
 
     console.title("user_force.m (not translated)")
     console.say(report.user_force.strip("\n"), indent=4, whole=True)

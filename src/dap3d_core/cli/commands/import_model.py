@@ -16,12 +16,13 @@ if TYPE_CHECKING:
 
 
 @command(
-    "Make a scene of a URDF, SDF or MJCF model.",
+    "Make a scene of a URDF, SDF, MJCF or MATLAB model.",
     click.argument("file", type=click.Path()),
     options.output("The folder for the scene and its meshes; by default that of the file's name, "
                    "in the current folder.", metavar="FOLDER"),
     click.option("-f", "--format", "kind", metavar="NAME",
-                 help="The importer: urdf, sdf, mjcf or one of a plugin; by default by the file."),
+                 help="The importer: urdf, sdf, mjcf, matlab or one of a plugin; by default by the "
+                 "file."),
     click.option("--package", "packages", multiple=True, metavar="NAME=FOLDER",
                  help="The folder of a package, for files package://NAME/...; may be repeated."),
     click.option("--root", type=click.Path(), metavar="FOLDER",
@@ -44,6 +45,8 @@ if TYPE_CHECKING:
                  help="Evaluate the expressions of a xacro file, which are code."),
     click.option("--arg", "arguments", multiple=True, metavar="NAME:=VALUE",
                  help="An argument of a xacro file; may be repeated."),
+    click.option("--stub", is_flag=True,
+                 help="Write a plugin.py for code of a MATLAB model too, to be filled in."),
     options.FORCE, options.JSON,
     saves=True, name="import",
 )  # fmt: skip
@@ -63,13 +66,14 @@ def import_model(
     strict: bool,
     allow_code: bool,
     arguments: tuple[str, ...],
+    stub: bool,
     force: bool,
     as_json: bool,
 ) -> int:
     """Make a scene of a model of another program.
 
-    FILE is a URDF, xacro, SDF or MJCF file. Links that fixed joints hold together become one body,
-    closed loops stay closed, shapes and meshes are drawn.
+    FILE is a URDF, xacro, SDF or MJCF file, or the folder of a MATLAB model. Links that fixed
+    joints hold together become one body, closed loops stay closed, shapes and meshes are drawn.
 
     \b
     dap3d import arm.urdf                 write arm/scene.toml and arm/meshes/
@@ -80,7 +84,7 @@ def import_model(
     """
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
-    from dap3d_core.cli.framework.paths import writable
+    from dap3d_core.formats.import_model import ImportReport
 
     scene, report = dap.import_model(
         file, format=kind, packages=_pairs("--package", packages), root=root, free_base=free_base,
@@ -88,23 +92,35 @@ def import_model(
         shapes=not no_shapes, strict=strict, allow_code=allow_code,
         arguments=_pairs("--arg", arguments, ":="), positions=_numbers(positions),
     )  # fmt: skip
-    folder = Path(output or Path(file).stem)
+    folder = Path(output or Path(file).resolve().stem)
     if folder.is_file():
         raise Refused(f"{folder} is a file; -o names a folder")
     _make(folder)
-    sources = (Path(file), *report.meshes)
-    for name in ("scene.toml", *report.meshes.values()):
-        _make((folder / name).parent)
-        writable(folder / name, force=force, sources=sources)
-    try:
-        target = report.save(scene, folder)
-    except OSError as error:
-        raise Refused(f"cannot write {folder}: {error.strerror or error}") from error
+    if not isinstance(report, ImportReport):
+        from dap3d_core.cli.commands.import_matlab import write_folder
+
+        return write_folder(scene, report, folder / "scene.toml", force=force, stub=stub,
+                            as_json=as_json)  # fmt: skip
+    target = _save(scene, report, folder, Path(file), force=force)
     if as_json:
         print_json({"scene": target} | _as_data(report))
     else:
         _show(stdout(), scene, report, target)
     return DONE
+
+
+def _save(scene: "Scene", report: "ImportReport", folder: Path, file: Path, *, force: bool) -> Path:
+    """Write the scene and its meshes into a folder."""
+    from dap3d_core.cli.framework.paths import writable
+
+    sources = (file, *report.meshes)
+    for name in ("scene.toml", *report.meshes.values()):
+        _make((folder / name).parent)
+        writable(folder / name, force=force, sources=sources)
+    try:
+        return report.save(scene, folder)
+    except OSError as error:
+        raise Refused(f"cannot write {folder}: {error.strerror or error}") from error
 
 
 def _make(folder: Path) -> None:

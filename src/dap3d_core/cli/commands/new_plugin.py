@@ -146,11 +146,10 @@ def _article(kind: str) -> str:
 
 def _built_in(kind: str) -> Collection[str]:
     """Words that scenes and commands take for dap3d's own, whatever packages bring."""
-    from dap3d_core.exchange import FORMATS
     from dap3d_core.scene import INTEGRATORS
     from dap3d_core.scene.validate.shapes import SHAPES
 
-    return {"integrator": INTEGRATORS, "shape": SHAPES, "exporter": FORMATS}.get(kind, ())
+    return {"integrator": INTEGRATORS, "shape": SHAPES}.get(kind, ())
 
 
 def _folder(output: str, *, force: bool) -> Path:

@@ -11,7 +11,14 @@ from dap3d_core.interface.formats.articulation import (
     Limits,
     Link,
 )
-from dap3d_core.interface.formats.format_types import Exporter, Importer, Source, hookimpl
+from dap3d_core.interface.formats.format_types import (
+    Exporter,
+    FolderImporter,
+    Importer,
+    ResultExporter,
+    Source,
+    hookimpl,
+)
 from dap3d_core.interface.formats.frames import (
     IDENTITY,
     Frame,
@@ -44,6 +51,7 @@ __all__ = [
     "Articulation",
     "Coupling",
     "Exporter",
+    "FolderImporter",
     "FormatError",
     "Frame",
     "Geometry",
@@ -56,6 +64,7 @@ __all__ = [
     "Place",
     "Remark",
     "Remarks",
+    "ResultExporter",
     "Source",
     "XmlElement",
     "axis_angle",

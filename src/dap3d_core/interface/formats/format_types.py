@@ -1,9 +1,9 @@
 """Base classes of importers and exporters, and their hooks."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import pluggy
 
@@ -87,6 +87,33 @@ class Importer:
         raise NotImplementedError
 
 
+class FolderImporter(Importer):
+    """A format whose models are folders, and say what a scene says.
+
+    Attributes:
+        marker: name of the file by which a folder is known for a model.
+    """
+
+    marker: ClassVar[str] = ""
+
+    def read_folder(self, folder: Path, registry: Any) -> tuple[Any, Any]:
+        """The ``Scene`` of a folder, and a report: a record of attrs.
+
+        The report has ``title``, that of the importer, ``folder``, ``files`` (with name, state and
+        holds), ``defaulted``, ``changed``, ``unused`` (with text and place) and ``notes``; and of
+        code that is not translated ``user_force``, its text, with ``stub``, a plugin.py to be
+        completed, both "" without any.
+
+        Args:
+            folder: the folder, which may be none of a model.
+            registry: the installed types.
+
+        Raises:
+            SceneError: it cannot be read; with files and lines.
+        """
+        raise NotImplementedError
+
+
 class Exporter:
     """A format that models are written to.
 
@@ -109,6 +136,26 @@ class Exporter:
 
         Raises:
             FormatError: the format cannot say something that would change the mechanism.
+        """
+        raise NotImplementedError
+
+
+class ResultExporter(Exporter):
+    """A format that results are written to: ``dap3d export RESULT --format KEYWORD``."""
+
+    def write_result(
+        self, result: Any, path: Path, *, model: Any, progress: Callable[[int, int], None] | None
+    ) -> Sequence[str]:
+        """Write a file; returns notes of what is left out, and why.
+
+        Args:
+            result: the ``Result``, with one or more instants.
+            path: the file, which gets its name at the end.
+            model: the model (a name, a folder, a file) in whose folder meshes of shapes lie.
+            progress: called as progress(done, total).
+
+        Raises:
+            ResultError: it cannot be written.
         """
         raise NotImplementedError
 

@@ -159,7 +159,7 @@ REFUSED = [
     (("post", R, "-o", "x.txt"), "name a .nc or a .csv file"),
     (("post", R, "-o", "x.csv", "--format", "nc"), "leave one out"),
     (("post", R, "-o", R, "--force"), "is the input file"),
-    (("export", R, "-o", "x.txt"), ".vtkhdf, .glb, .mat, .csv"),
+    (("export", R, "-o", "x.txt"), ".csv, .glb, .mat, .vtkhdf"),
     (("export", R, "-o", "x.csv", "--format", "mat"), "its name says csv"),
     (("export", R, "--fps", "0"), "a number above 0"),
     (("export", R, "-o", "sub"), "or a format"),
@@ -271,7 +271,7 @@ def test_a_missing_package_is_told_with_its_extra(call, folder, monkeypatch, pac
     (folder / "sub" / "inBodies.m").write_text("B1 = Body_struct;\n")
     for name in [n for n in sys.modules if n.split(".")[0].startswith(package)]:
         monkeypatch.delitem(sys.modules, name)
-    for name in [n for n in sys.modules if n.startswith("dap3d_core.matlab")]:
+    for name in [n for n in sys.modules if n.startswith("dap3d_matlab")]:
         monkeypatch.delitem(sys.modules, name)
     monkeypatch.setitem(sys.modules, package, None)
     code, _, err = call(*words)

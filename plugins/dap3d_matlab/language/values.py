@@ -6,8 +6,8 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.matlab.language.parse import Place
-from dap3d_core.matlab.language.structures import STRUCTURES, Default, Structure
+from dap3d_matlab.language.parse import Place
+from dap3d_matlab.language.structures import STRUCTURES, Default, Structure
 
 #: A matrix of numbers; a single number is 1 x 1.
 Numbers = NDArray[np.float64]

@@ -5,15 +5,16 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from dap3d_core.matlab.language.expressions import (
+from dap3d_core.scene import Mistake
+from dap3d_matlab.language.expressions import (
     Expressions,
     arguments_of,
     check_field,
     named_children,
 )
-from dap3d_core.matlab.language.operators import RefusalError, ReportedError, numbers
-from dap3d_core.matlab.language.parse import Place, SourceFile, excerpt, text_of
-from dap3d_core.matlab.language.values import (
+from dap3d_matlab.language.operators import RefusalError, ReportedError, numbers
+from dap3d_matlab.language.parse import Place, SourceFile, excerpt, text_of
+from dap3d_matlab.language.values import (
     BROKEN,
     LARGEST_MATRIX,
     Broken,
@@ -22,7 +23,6 @@ from dap3d_core.matlab.language.values import (
     copied,
     kind_of,
 )
-from dap3d_core.scene import Mistake
 
 if TYPE_CHECKING:
     from tree_sitter import Node

@@ -1,36 +1,30 @@
 """Imports a folder with a MATLAB model as a scene, with a report."""
 
-import os
 import re
 from pathlib import Path
 
 import attrs
 
-from dap3d_core.matlab.files.model_folder import Model, read_folder
-from dap3d_core.matlab.files.report import ImportReport, remark
-from dap3d_core.matlab.language.parse import Place
-from dap3d_core.matlab.translate.bodies import add_animation, add_bodies, add_geometry
-from dap3d_core.matlab.translate.elements import add_forces, add_functions, add_joints
-from dap3d_core.matlab.translate.fields import NAMES, Fields, name_of
-from dap3d_core.matlab.translate.user_force import KEYWORD, add_user_forces
-from dap3d_core.registry import Registry, load_registry
-from dap3d_core.registry.arguments import checked
+from dap3d_core.registry import Registry
 from dap3d_core.scene import Mistake, Scene, SceneError, check
-from dap3d_core.scene.errors import file_error
+from dap3d_matlab.files.model_folder import Model, read_folder
+from dap3d_matlab.files.report import ImportReport, remark
+from dap3d_matlab.language.parse import Place
+from dap3d_matlab.translate.bodies import add_animation, add_bodies, add_geometry
+from dap3d_matlab.translate.elements import add_forces, add_functions, add_joints
+from dap3d_matlab.translate.fields import NAMES, Fields, name_of
+from dap3d_matlab.translate.user_force import KEYWORD, add_user_forces
 
 #: Note of the check on bodies that only a user's force may act on.
 _LEFT_ALONE = "no joint and no force acts on it"
 
 
-@checked
-def import_matlab(
-    folder: str | os.PathLike[str], registry: Registry | None = None
-) -> tuple[Scene, ImportReport]:
+def import_matlab(folder: Path, registry: Registry) -> tuple[Scene, ImportReport]:
     """Read a model of the MATLAB program DAP3D; no code of it is run.
 
     Args:
         folder: with inBodies.m and the other files of a model (manual, "Describing A Model").
-        registry: the installed types; by default all.
+        registry: the installed types.
 
     Returns:
         The scene, checked but for the user's force, and a report of what was read, defaulted,
@@ -43,20 +37,16 @@ def import_matlab(
     scene, fields = translate(folder)
     if fields.model.mistakes:
         raise SceneError(_in_order(fields.model.mistakes))
-    _check(scene, fields, load_registry() if registry is None else registry)
+    _check(scene, fields, registry)
     return scene, fields.report
 
 
-def translate(folder: str | os.PathLike[str]) -> tuple[Scene, Fields]:
+def translate(path: Path) -> tuple[Scene, Fields]:
     """The scene of a folder before its check, and the reader with report and mistakes.
 
     Raises:
         SceneError: there is no model to read.
     """
-    try:
-        path = Path(os.fsdecode(folder))
-    except TypeError:
-        raise file_error("", f"a MATLAB model is a folder, not {folder!r}") from None
     model = read_folder(path)
     report = ImportReport(str(path), files=model.files, unused=model.unused)
     fields = Fields(model, report)

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from dap3d_core.matlab.language.parse import text_of
-from dap3d_core.matlab.language.values import LARGEST_MATRIX, Broken, Numbers, kind_of, size_of
+from dap3d_matlab.language.parse import text_of
+from dap3d_matlab.language.values import LARGEST_MATRIX, Broken, Numbers, kind_of, size_of
 
 if TYPE_CHECKING:
     from tree_sitter import Node

@@ -4,11 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.matlab.files.report import remark
-from dap3d_core.matlab.language.structures import LIMITS
-from dap3d_core.matlab.language.values import Numbers, Struct, plain_value
-from dap3d_core.matlab.translate.fields import Fields, name_of
 from dap3d_core.scene import MISSING, Mistake, Scene
+from dap3d_matlab.files.report import remark
+from dap3d_matlab.language.structures import LIMITS
+from dap3d_matlab.language.values import Numbers, Struct, plain_value
+from dap3d_matlab.translate.fields import Fields, name_of
 
 #: Tolerance of a rotation matrix.
 ROTATION_TOLERANCE = 1e-6

@@ -1,8 +1,10 @@
 """Report of an import: files, names, defaults, changes and omissions."""
 
+from typing import ClassVar
+
 import attrs
 
-from dap3d_core.matlab.language.parse import Place
+from dap3d_matlab.language.parse import Place
 
 
 @attrs.frozen
@@ -18,6 +20,11 @@ class Remark:
     file: str
     line: int | None
     text: str
+
+    @property
+    def place(self) -> Place:
+        """File and line."""
+        return Place(self.file, self.line)
 
     def __str__(self) -> str:
         place = ":".join(str(p) for p in (self.file, self.line) if p)
@@ -52,6 +59,7 @@ class ImportReport:
         stub: a ``plugin.py`` for it, to be completed; "" where none is needed.
     """
 
+    title: ClassVar[str] = "MATLAB"
     folder: str
     files: list[FileFacts] = attrs.field(factory=list)
     names: dict[str, str] = attrs.field(factory=dict)

@@ -1,17 +1,18 @@
 """A result as solids that move, for the writers of VTK and glTF files."""
 
+import os
+
 import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import to_global
 from dap3d_core.result import Result
-from dap3d_core.scene.scene import Scene
 from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.elements import elements_of
 from dap3d_core.view.scene3d.primitives import Span, turned_to
 from dap3d_core.view.scene3d.sampled_motion import Motion
-from dap3d_core.view.scene3d.scene_data import notes_of, scene_geometry
+from dap3d_core.view.scene3d.scene_data import notes_of, scene_geometry, scene_of
 from dap3d_core.view.scene3d.shapes import Line, Part, parts_of
 from dap3d_core.view.scene3d.solids import Triangles, solid, spring
 
@@ -76,8 +77,9 @@ class MovingScene:
     notes: list[str]
 
     @classmethod
-    def of(cls, result: Result, scene: Scene) -> "MovingScene":
-        """The moving scene of a result; the folder of ``scene`` holds its meshes."""
+    def of(cls, result: Result, model: str | os.PathLike[str] | None) -> "MovingScene":
+        """The moving scene of a result; the folder of the model holds its meshes."""
+        scene = scene_of(result, model)
         elements = elements_of(result)
         geometry = scene_geometry(result, scene, elements)
         motion = Motion(result)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.exchange.moving_solids import MovingScene, Stretched, rgb
+from dap3d_core.interface.formats import Exporter, ResultExporter, hookimpl
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.result import ResultError
@@ -21,6 +21,7 @@ from dap3d_core.result.file.atomic_write import cannot
 from dap3d_core.view.scene3d.primitives import turned_to
 from dap3d_core.view.scene3d.shapes import Line, Part
 from dap3d_core.view.scene3d.solids import Triangles
+from dap3d_results.moving_solids import MovingScene, Stretched, rgb
 
 Progress = Callable[[int, int], None]
 
@@ -33,6 +34,22 @@ TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 LARGEST = 2**32 - 1
 #: Layers that are translucent, as in pages.
 OPACITY = {"inertia": 0.32}
+
+interface_version = 1
+
+
+class GltfExporter(ResultExporter):
+    """The moving scene for Blender, browsers and viewers."""
+
+    keyword, title, suffix = "gltf", "glTF", ".glb"
+
+    def write_result(
+        self, result: Any, path: Path, *, model: Any, progress: Progress | None
+    ) -> list[str]:
+        """Write a file; returns notes."""
+        moving = MovingScene.of(result, model)
+        write_gltf(moving, path, progress)
+        return moving.notes
 
 
 def write_gltf(scene: MovingScene, path: Path, progress: Progress | None = None) -> None:
@@ -223,3 +240,9 @@ def _linear(level: int) -> float:
     """A part of an sRGB colour, 0 to 255, as linear intensity."""
     c = level / 255.0
     return c / 12.92 if c <= 0.04045 else float(((c + 0.055) / 1.055) ** 2.4)
+
+
+@hookimpl
+def dap3d_exporters() -> list[type[Exporter]]:
+    """The exporters of this module."""
+    return [GltfExporter]

@@ -1,13 +1,33 @@
 """The arrays of a result as a MATLAB file."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from dap3d_core.interface.formats import Exporter, ResultExporter, hookimpl
 from dap3d_core.result import Result, ResultError
 from dap3d_core.result.file.atomic_write import cannot
-from dap3d_core.result.quantities.netcdf_export import dataset_to_write
+from dap3d_core.result.quantities.netcdf_export import dataset_to_write, why_no_reactions
+
+Progress = Callable[[int, int], None]
+
+interface_version = 1
+
+
+class MatExporter(ResultExporter):
+    """All arrays, for MATLAB and Octave."""
+
+    keyword, title, suffix = "mat", "MATLAB", ".mat"
+
+    def write_result(
+        self, result: Any, path: Path, *, model: Any, progress: Progress | None
+    ) -> list[str]:
+        """Write a file; returns notes."""
+        left_out = why_no_reactions(result)
+        write_mat(result, path, reactions=not left_out)
+        return [f"reactions are left out: {left_out}"] if left_out else []
 
 
 def write_mat(result: Result, path: Path, *, reactions: bool) -> None:
@@ -47,3 +67,9 @@ def write_mat(result: Result, path: Path, *, reactions: bool) -> None:
             f"the arrays do not fit into a .mat file ({error}): a smaller fps leaves instants out; "
             "MATLAB reads the result itself as well"
         ) from error
+
+
+@hookimpl
+def dap3d_exporters() -> list[type[Exporter]]:
+    """The exporters of this module."""
+    return [MatExporter]

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dap3d_core.matlab.language.operators import RefusalError, check_size, checked
-from dap3d_core.matlab.language.values import LARGEST_MATRIX, Numbers
+from dap3d_matlab.language.operators import RefusalError, check_size, checked
+from dap3d_matlab.language.values import LARGEST_MATRIX, Numbers
 
 if TYPE_CHECKING:
     from tree_sitter import Node

@@ -6,9 +6,12 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.matlab.files.report import FileFacts, Remark, remark
-from dap3d_core.matlab.language.interpreter import Workspace, follow
-from dap3d_core.matlab.language.parse import (
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.scene import MISSING, Mistake, SceneError
+from dap3d_core.scene.errors import file_error
+from dap3d_matlab.files.report import FileFacts, Remark, remark
+from dap3d_matlab.language.interpreter import Workspace, follow
+from dap3d_matlab.language.parse import (
     Grammar,
     Place,
     SourceFile,
@@ -16,7 +19,7 @@ from dap3d_core.matlab.language.parse import (
     read_source,
     syntax_mistakes,
 )
-from dap3d_core.matlab.language.structures import (
+from dap3d_matlab.language.structures import (
     DISKS,
     FILES,
     LIMITS,
@@ -24,10 +27,7 @@ from dap3d_core.matlab.language.structures import (
     USER_FORCE_FILE,
     ModelFile,
 )
-from dap3d_core.matlab.language.values import Broken, Struct, kind_of
-from dap3d_core.registry.suggestions import nearest
-from dap3d_core.scene import MISSING, Mistake, SceneError
-from dap3d_core.scene.errors import file_error
+from dap3d_matlab.language.values import Broken, Struct, kind_of
 
 #: Number of other files that are listed by name.
 OTHERS = 50

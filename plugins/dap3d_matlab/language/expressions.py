@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dap3d_core.matlab.language.builtins import CONSTANTS, FUNCTIONS, call
-from dap3d_core.matlab.language.operators import (
+from dap3d_core.registry.suggestions import nearest
+from dap3d_matlab.language.builtins import CONSTANTS, FUNCTIONS, call
+from dap3d_matlab.language.operators import (
     EXTRAS,
     OPERATIONS,
     Operation,
@@ -17,10 +18,9 @@ from dap3d_core.matlab.language.operators import (
     checked,
     numbers,
 )
-from dap3d_core.matlab.language.parse import SourceFile, text_of
-from dap3d_core.matlab.language.structures import MAKERS
-from dap3d_core.matlab.language.values import Broken, Numbers, Struct, kind_of, make, size_of
-from dap3d_core.registry.suggestions import nearest
+from dap3d_matlab.language.parse import SourceFile, text_of
+from dap3d_matlab.language.structures import MAKERS
+from dap3d_matlab.language.values import Broken, Numbers, Struct, kind_of, make, size_of
 
 if TYPE_CHECKING:
     from tree_sitter import Node

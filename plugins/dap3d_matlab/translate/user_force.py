@@ -3,11 +3,11 @@
 import re
 from typing import Any
 
-from dap3d_core.matlab.files.report import remark
-from dap3d_core.matlab.language.parse import Place
-from dap3d_core.matlab.language.structures import USER_FORCE_FILE
-from dap3d_core.matlab.translate.fields import Fields, name_of
 from dap3d_core.scene import MISSING, Mistake, Scene
+from dap3d_matlab.files.report import remark
+from dap3d_matlab.language.parse import Place
+from dap3d_matlab.language.structures import USER_FORCE_FILE
+from dap3d_matlab.translate.fields import Fields, name_of
 
 #: The keyword of the force type that the stub makes; the manual's word.
 KEYWORD = "user"

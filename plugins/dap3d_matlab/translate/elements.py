@@ -4,10 +4,13 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.matlab.files.report import remark
-from dap3d_core.matlab.language.structures import DISKS
-from dap3d_core.matlab.language.values import GivenValue, Struct
-from dap3d_core.matlab.translate.field_rules import (
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.scene import Scene
+from dap3d_core.scene.scene import Element
+from dap3d_matlab.files.report import remark
+from dap3d_matlab.language.structures import DISKS
+from dap3d_matlab.language.values import GivenValue, Struct
+from dap3d_matlab.translate.field_rules import (
     AT,
     BODY_I,
     DISK_ALIASES,
@@ -22,10 +25,7 @@ from dap3d_core.matlab.translate.field_rules import (
     D,
     Rule,
 )
-from dap3d_core.matlab.translate.fields import GROUND, Fields, name_of
-from dap3d_core.registry.suggestions import nearest
-from dap3d_core.scene import Scene
-from dap3d_core.scene.scene import Element
+from dap3d_matlab.translate.fields import GROUND, Fields, name_of
 
 #: Fields of bodies, implied by points and vectors of a type.
 _BODY_FIELDS = {"iBindex": "i", "jBindex": "j"}

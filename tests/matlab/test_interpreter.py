@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from support.matlab import variables_of
 
-from dap3d_core.matlab.language.structures import STRUCTURES
-from dap3d_core.matlab.language.values import Broken, Struct
+from dap3d_matlab.language.structures import STRUCTURES
+from dap3d_matlab.language.values import Broken, Struct
 
 
 def value_of(expression, before=""):

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from support.matlab import write
 
+import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.matlab import import_matlab
-from dap3d_core.matlab.import_matlab import translate
-from dap3d_core.matlab.translate.bodies import parameters_of, rotation_of
 from dap3d_core.model.rotations import rotation
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import SceneError
+from dap3d_matlab.import_matlab import translate
+from dap3d_matlab.translate.bodies import parameters_of, rotation_of
 
 
 @pytest.fixture
@@ -36,7 +36,7 @@ def mistakes(tmp_path):
     def call(**files):
         folder = write(tmp_path / "small", **files)
         with pytest.raises(SceneError) as caught:
-            import_matlab(folder)
+            dap.import_matlab(folder)
         return [str(m).replace(f"{folder}/", "") for m in caught.value.mistakes]
 
     return call
@@ -216,7 +216,7 @@ def test_joints_are_accepted_by_their_types(tmp_path, word):
         text = text.replace("[0 -1 0 1 0 0 0 0 1]", "eye(3)")
     if word not in load_registry().keywords("joint"):
         pytest.fail(f"the type {word} is not installed")
-    scene, _ = import_matlab(write(tmp_path, inJoints=text))
+    scene, _ = dap.import_matlab(write(tmp_path, inJoints=text))
     assert scene.joints["J1"].type == word
 
 
@@ -258,7 +258,7 @@ def test_forces_are_accepted_by_their_types(tmp_path, word):
     if word not in load_registry().keywords("force"):
         pytest.fail(f"the type {word} is not installed")
     text = f"S = Force_struct; S.type = '{word}'; S.{given};\nForces = [S];\n"
-    scene, _ = import_matlab(write(tmp_path, inForces=text))
+    scene, _ = dap.import_matlab(write(tmp_path, inForces=text))
     assert scene.forces["F1"].type == word
 
 
@@ -283,7 +283,7 @@ FUNCTIONS = {
 def test_functions(tmp_path, word):
     given, expected = FUNCTIONS[word]
     text = f"C = Funct_struct; C.type = '{word}'; C.{given};\nFuncts = [C];\n"
-    scene, report = import_matlab(write(tmp_path, inFuncts=text))
+    scene, report = dap.import_matlab(write(tmp_path, inFuncts=text))
     assert scene.functions["f1"].type == word
     assert scene.functions["f1"].fields == expected
     if word == "c":
@@ -358,7 +358,7 @@ def test_friction_of_a_joint_becomes_a_force(read, mistakes):
 def test_friction_of_joints_is_accepted_by_its_type(tmp_path, word):
     given = JOINTS[word][0].replace("[0 -1 0 1 0 0 0 0 1]", "eye(3)")
     line = f"J = Joint_struct; J.type = '{word}'; J.{given}; J.mu = 0.2;\nJoints = [J];\n"
-    scene, _ = import_matlab(write(tmp_path, inJoints=line))
+    scene, _ = dap.import_matlab(write(tmp_path, inJoints=line))
     assert scene.forces["friction_J1"].fields["mu"] == 0.2
 
 
@@ -410,7 +410,7 @@ def test_absent_files_and_others_are_told(read, tmp_path):
 
 def test_notes_of_the_check_are_part_of_the_report(tmp_path):
     text = "V1 = Vector1_struct; V1.Bindex = 1; V1.sp = [0; 2; 0];\nVectors = [V1];\n"
-    scene, report = import_matlab(write(tmp_path, inVectors1=text))
+    scene, report = dap.import_matlab(write(tmp_path, inVectors1=text))
     assert list(scene.vectors) == ["V1"]
     assert any("V1" in note for note in report.notes)
 
@@ -424,7 +424,7 @@ def test_a_stub_for_the_force_of_the_user(tmp_path):
     """It names the bodies, shows the text, and is refused as long as it is not filled in."""
     text = 'f = Bodies(2).r; % Bodies(9)\nBodies(1).f = """quotes""" + f; \\\n'
     folder = write(tmp_path / "m", inForces=USER, user_force=text)
-    scene, report = import_matlab(folder)
+    scene, report = dap.import_matlab(folder)
     assert scene.forces["F1"].fields == {"body_i": "body1", "body_j": "body2"}
     assert report.user_force == text
     (tmp_path / "plugin.py").write_text(report.stub)
@@ -439,7 +439,7 @@ def test_a_stub_for_the_force_of_the_user(tmp_path):
 def test_what_the_stub_cannot_hold_is_told(tmp_path):
     for text in ("Bodies(k).f = 1;", "Bodies(1).f + Bodies(2).f", "x = 1;"):
         folder = write(tmp_path / "m", inForces=USER, user_force=text)
-        scene, report = import_matlab(folder)
+        scene, report = dap.import_matlab(folder)
         assert scene.forces["F1"].fields["body_i"] == "body1"
         is_told = any("it speaks of bodies" in t for t in told(report.unused))
         assert is_told == ("Bodies(2)" not in text), text
@@ -473,3 +473,23 @@ def test_without_the_extra_the_error_says_which(tmp_path):
     assert 'pip install "dap3d[matlab]"' in found["error"]
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "scene.toml").exists()
+
+
+# ---------------------------------------------------------------- among the other formats
+
+
+def test_import_model_knows_the_folder_by_its_file(tmp_path):
+    folder = write(tmp_path / "model")
+    scene, report = dap.import_model(folder)
+    assert (scene, report) == dap.import_matlab(folder)
+    assert dap.import_model(folder, format="matlab") == (scene, report)
+    with pytest.raises(SceneError, match="takes no options of packages, links, joints"):
+        dap.import_model(folder, positions={"J1": 1.0})
+    more = write(tmp_path / "more", user_force="x = 1;")
+    with pytest.raises(SceneError, match=r"user_force\.m.*would be left out"):
+        dap.import_model(more, strict=True)
+    with pytest.raises(SceneError, match="is a file; a MATLAB model is a folder"):
+        dap.import_model(folder / "inBodies.m", format="matlab")
+    (folder / "inBodies.m").unlink()
+    with pytest.raises(SceneError, match="is a folder"):
+        dap.import_model(folder)

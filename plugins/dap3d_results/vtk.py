@@ -11,12 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.exchange.moving_solids import MovingScene, rgb
+from dap3d_core.interface.formats import Exporter, ResultExporter, hookimpl
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import rotation
+from dap3d_core.result import ResultError
 from dap3d_core.result.file.library import NETCDF, guarded
 from dap3d_core.view.scene3d.primitives import LAYERS
 from dap3d_core.view.scene3d.shapes import Line, Part
+from dap3d_results.moving_solids import MovingScene, rgb
 
 Progress = Callable[[int, int], None]
 
@@ -24,6 +26,30 @@ Progress = Callable[[int, int], None]
 CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 #: Numbers of coordinates that are computed at once.
 BLOCK = 3_000_000
+#: Files of points beyond this are refused, bytes.
+LARGEST = 8 * 2**30
+
+interface_version = 1
+
+
+class VtkExporter(ResultExporter):
+    """The moving scene for ParaView 5.12 and later."""
+
+    keyword, title, suffix = "vtk", "VTK", ".vtkhdf"
+
+    def write_result(
+        self, result: Any, path: Path, *, model: Any, progress: Progress | None
+    ) -> list[str]:
+        """Write a file; returns notes."""
+        moving = MovingScene.of(result, model)
+        points, instants = point_count(moving), len(result.t)
+        if 24 * points * instants > LARGEST:
+            raise ResultError(
+                f"{points:,} points at {instants:,} instants are {24 * points * instants / 1e9:.1f}"
+                f" GB, more than {LARGEST / 1e9:.1f}: a smaller fps leaves instants out"
+            )
+        write_vtkhdf(moving, path, progress)
+        return moving.notes
 
 
 def write_vtkhdf(scene: MovingScene, path: Path, progress: Progress | None = None) -> None:
@@ -161,3 +187,9 @@ def _array(
         name, kind, tuple(names), fill_value=False, zlib=chunk is not None, complevel=1,
         shuffle=True, chunksizes=chunks,
     )  # fmt: skip
+
+
+@hookimpl
+def dap3d_exporters() -> list[type[Exporter]]:
+    """The exporters of this module."""
+    return [VtkExporter]

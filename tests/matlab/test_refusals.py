@@ -7,8 +7,8 @@ from support.matlab import SMALL, write
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.matlab.language.parse import LARGEST_FILE
 from dap3d_core.scene import MISSING, SceneError
+from dap3d_matlab.language.parse import LARGEST_FILE
 
 
 @pytest.fixture(scope="module")
