@@ -14,6 +14,7 @@ from dap3d_core.assembly.arrays import (
     Floats,
     Integers,
 )
+from dap3d_core.assembly.metric import METRIC_CONSTANTS
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
 from dap3d_core.kernels.compiler.types import FLOAT, Array, Struct
@@ -23,8 +24,6 @@ from dap3d_core.kernels.runtime.loop_support import MASS
 
 #: Numbers of ``settings`` that a run changes.
 COUNTED = (SCRATCH, UNSETTLED, SINGULAR, DOUBTFUL)
-#: Columns of ``metric`` that follow from masses and inertias.
-METRIC_CONSTANTS = 7
 #: Members of a system -> flat indices of numbers that differ from run to run; None: all runs are
 #: of one model.
 Varied = Mapping[str, Integers] | None
@@ -131,8 +130,9 @@ class SymbolicSystem:
         symbols = self._memory[id(root)][1][first : first + array.size]
         numbers = array.ravel().tolist()
         for k, number in enumerate(numbers):
-            if symbols[k] is None:
-                symbols[k] = Item(self._tracer, (pointer, k), number)
+            if symbols[k] is None:  # of rows that do not move nothing is ever written
+                item = Item(self._tracer, (pointer, k), number)
+                symbols[k] = 0.0 if name == "nu" else item
         for k in self._constants.get(name, ()):
             symbols[k] = numbers[k]
         if name in CHECKPOINTED:
