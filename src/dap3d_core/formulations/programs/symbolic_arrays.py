@@ -95,8 +95,9 @@ class SymbolicSystem:
         self._tracer = tracer
         #: Of each piece of memory: its first item's address, and its items as symbols.
         self._memory: dict[int, Any] = {}
-        #: Of members that are kept from one evaluation to another: symbols, pointer, as they were.
-        self._kept: list[tuple[Any, Callable[[], str], Any]] = []
+        #: Of members that are kept from one evaluation to another: name, symbols, pointer, as they
+        #: were.
+        self._kept: list[tuple[str, Any, Callable[[], str], Any]] = []
         self._constants = dict(constants(evaluator, varied))
         self.struct = self.symbolic(evaluator.system, lambda: "%system", "")
 
@@ -136,14 +137,14 @@ class SymbolicSystem:
         for k in self._constants.get(name, ()):
             symbols[k] = numbers[k]
         if name in CHECKPOINTED:
-            self._kept.append((symbols, pointer, symbols.copy()))
+            self._kept.append((name, symbols, pointer, symbols.copy()))
         return symbols.reshape(array.shape)
 
     def stores(self) -> list[tuple[Callable[[], str], int, Any]]:
         """Pointer, index and number of what was written and outlives an evaluation."""
         return [
             (pointer, k, symbols[k])
-            for symbols, pointer, before in self._kept
+            for name, symbols, pointer, before in self._kept
             for k in range(len(symbols))
-            if symbols[k] is not before[k]
+            if symbols[k] is not before[k] and (name, k) != ("settings", SCRATCH)
         ]
