@@ -65,7 +65,7 @@ class System(LoopArrays):
         "tree": TreeArrays.type_of(),
     }
 
-    metric: Floats  # (n+1, 16): 1/sqrt(m); U = L^-T by rows, upper triangle; B = A U by rows
+    metric: Floats  # (n+1, METRIC_WIDTH): 1/sqrt(m); U = L^-T, upper triangle; B = A U; w'; by rows
     force: Floats  # (6 (n+1),) applied force and moment on each body, global axes
     acceleration: Floats  # (6 (n+1),) scaled; until it is solved for, the scaled forces
     velocity: Floats  # (6 (n+1),) scaled

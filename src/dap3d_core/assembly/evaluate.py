@@ -7,11 +7,10 @@ end: the states of elements that have some (docs/decisions/0054), and the work d
 
 from typing import Any
 
-import numpy as np
-
 from dap3d_core.assembly.arrays import RATE, VALUE, Floats, System
-from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
+from dap3d_core.assembly.metric import gyroscopic_moment, scaled, scaled_moment, unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
+from dap3d_core.assembly.orientation import orient_by_state
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import where
@@ -19,33 +18,18 @@ from dap3d_core.kernels.scalar_math import where
 
 @compiled
 def place_bodies(y: Floats, body: Floats, metric: Floats) -> None:
-    """Poses and velocities of the bodies of a state: fills body (r, A, v, w, p) and B of metric."""
+    """Poses and velocities of the bodies of a state: body (r, A, v, w, p), metric (B, w')."""
     n = body.shape[0] - 1
     for b in range(1, n + 1):
         c, f = coordinate_offset(b), velocity_offset(b, n)
         s, k = body[b], metric[b]
-        e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
-        h = 1.0 / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
-        e0, e1, e2, e3 = e0 * h, e1 * h, e2 * h, e3 * h
-        a00 = 1.0 - 2.0 * (e2 * e2 + e3 * e3)
-        a01 = 2.0 * (e1 * e2 - e0 * e3)
-        a02 = 2.0 * (e1 * e3 + e0 * e2)
-        a10 = 2.0 * (e1 * e2 + e0 * e3)
-        a11 = 1.0 - 2.0 * (e1 * e1 + e3 * e3)
-        a12 = 2.0 * (e2 * e3 - e0 * e1)
-        a20 = 2.0 * (e1 * e3 - e0 * e2)
-        a21 = 2.0 * (e2 * e3 + e0 * e1)
-        a22 = 1.0 - 2.0 * (e1 * e1 + e2 * e2)
-        w0, w1, w2 = y[f + 3], y[f + 4], y[f + 5]
+        orient_by_state(s, 0, (y[c + 3], y[c + 4], y[c + 5], y[c + 6]))
+        w0, w1, w2 = k[16], k[17], k[18] = y[f + 3], y[f + 4], y[f + 5]
         s[0], s[1], s[2] = y[c], y[c + 1], y[c + 2]
-        s[3], s[4], s[5] = a00, a01, a02
-        s[6], s[7], s[8] = a10, a11, a12
-        s[9], s[10], s[11] = a20, a21, a22
         s[12], s[13], s[14] = y[f], y[f + 1], y[f + 2]
-        s[15] = a00 * w0 + a01 * w1 + a02 * w2
-        s[16] = a10 * w0 + a11 * w1 + a12 * w2
-        s[17] = a20 * w0 + a21 * w1 + a22 * w2
-        s[18], s[19], s[20], s[21] = e0, e1, e2, e3
+        s[15] = s[3] * w0 + s[4] * w1 + s[5] * w2
+        s[16] = s[6] * w0 + s[7] * w1 + s[8] * w2
+        s[17] = s[9] * w0 + s[10] * w1 + s[11] * w2
         place_metric(s, k)
 
 
@@ -136,11 +120,7 @@ def scale_forces(body: Floats, metric: Floats, force: Floats, out: Floats) -> fl
         f0, f1, f2 = force[o], force[o + 1], force[o + 2]
         n0, n1, n2 = force[o + 3], force[o + 4], force[o + 5]
         power += f0 * s[12] + f1 * s[13] + f2 * s[14] + n0 * s[15] + n1 * s[16] + n2 * s[17]
-        w0, w1, w2 = in_body_axes(s, s[15], s[16], s[17])
-        h0 = s[23] * w0 + s[24] * w1 + s[25] * w2
-        h1 = s[26] * w0 + s[27] * w1 + s[28] * w2
-        h2 = s[29] * w0 + s[30] * w1 + s[31] * w2
-        g0, g1, g2 = w1 * h2 - w2 * h1, w2 * h0 - w0 * h2, w0 * h1 - w1 * h0
+        g0, g1, g2 = gyroscopic_moment(s, k[16], k[17], k[18])
         out[o], out[o + 1], out[o + 2] = f0 * k[0], f1 * k[0], f2 * k[0]
         g0, g1, g2 = scaled_moment(k, g0, g1, g2)
         out[o + 3] = k[7] * n0 + k[10] * n1 + k[13] * n2 - g0
@@ -154,9 +134,8 @@ def scale_velocities(body: Floats, metric: Floats, out: Floats) -> None:
     """The velocities of the bodies in scaled coordinates: (sqrt(m) v, L^T w')."""
     for b in range(1, body.shape[0]):
         s, k, o = body[b], metric[b], 6 * b
-        w0, w1, w2 = in_body_axes(s, s[15], s[16], s[17])
         out[o], out[o + 1], out[o + 2] = s[12] / k[0], s[13] / k[0], s[14] / k[0]
-        out[o + 3], out[o + 4], out[o + 5] = scaled(k, w0, w1, w2)
+        out[o + 3], out[o + 4], out[o + 5] = scaled(k, k[16], k[17], k[18])
 
 
 @compiled

@@ -7,6 +7,9 @@ upper triangular, A the rotation matrix. All functions are put into their caller
 from dap3d_core.assembly.arrays import Floats
 from dap3d_core.kernels.runtime.cache import compiled_into
 
+#: Columns of the metric, and those that hold constants of a body: 1/sqrt(m), then U by rows.
+METRIC_WIDTH, METRIC_CONSTANTS = 19, 7
+
 
 @compiled_into
 def in_body_axes(s: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
@@ -15,6 +18,20 @@ def in_body_axes(s: Floats, x: float, y: float, z: float) -> tuple[float, float,
         s[3] * x + s[6] * y + s[9] * z,
         s[4] * x + s[7] * y + s[10] * z,
         s[5] * x + s[8] * y + s[11] * z,
+    )
+
+
+@compiled_into
+def gyroscopic_moment(s: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """w' x J' w', of angular velocity (x, y, z), both in body axes.
+
+    By differences of the moments of inertia: of a sphere it is zero to the last digit.
+    """
+    j01, j02, j12 = s[24], s[25], s[28]
+    return (
+        (s[31] - s[27]) * (y * z) + j12 * (y * y - z * z) + x * (j02 * y - j01 * z),
+        (s[23] - s[31]) * (z * x) + j02 * (z * z - x * x) + y * (j01 * z - j12 * x),
+        (s[27] - s[23]) * (x * y) + j01 * (x * x - y * y) + z * (j12 * x - j02 * y),
     )
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.assembly.arrays import EVEN, KINDS, LENGTH, Floats, Integers, System
+from dap3d_core.assembly.metric import METRIC_WIDTH
 from dap3d_core.assembly.turns import (
     BODY_I,
     BODY_J,
@@ -82,7 +83,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
     body[0, A : A + 9 : 4] = body[0, P] = 1.0
     body[1:, MASS] = model.mass
     body[1:, JP : JP + 9] = model.Jp.reshape(n, 9)
-    metric = np.zeros((n + 1, 16))
+    metric = np.zeros((n + 1, METRIC_WIDTH))
     set_metric(metric, model.mass, model.Jp)
     idx, par, groups, starts = _tables(model, plan, what)
     turns, counted = turn_tables(model, len(par))

@@ -90,7 +90,9 @@ def linearise_tree(t: float, system: System, loops: Any) -> float:
     """Scaled forces into ``acceleration``, D^ of all joints; returns the power of the forces."""
     body, metric, size = system.body, system.metric, system.force.shape[0]
     for b in range(1, body.shape[0]):
-        place_metric(body[b], metric[b])
+        s, k = body[b], metric[b]
+        place_metric(s, k)
+        k[16], k[17], k[18] = in_body_axes(s, s[15], s[16], s[17])
     power = scale_forces(body, metric, system.force, system.acceleration)
     linearise(t, system, loops)
     if has_friction(system):

@@ -9,6 +9,7 @@ For trees that are too large for a program of their own (formulations/programs).
 from typing import Any
 
 from dap3d_core.assembly.arrays import System
+from dap3d_core.formulations import RHS
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.joint.equations import apply_forces
 from dap3d_core.formulations.joint.half_angles import LARGEST, largest_angle, small_half_angles
@@ -52,7 +53,7 @@ def tree_rates(evaluator: Evaluator, count: int) -> WideRates:
         CompileError: kernels of the scene decide by a number.
     """
     loops = _wide_loops(evaluator, count)
-    functions = [wide_function(rhs, SIGNATURE.arguments, count)]
+    functions = {RHS: wide_function(rhs, SIGNATURE.arguments, count)}
     return WideRates(evaluator, evaluator.coordinates.size + 1, count, ARRAYS, functions, loops)
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from dap3d_core.formulations import PROJECT, RHS
+from dap3d_core.formulations import PROJECT, RHS, WATCH
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.background import optimiser
 from dap3d_core.kernels.runtime.cache import jit_is_on
@@ -31,8 +31,9 @@ LOAD_AFTER, MAKE_AFTER = 0.02, 0.25
 BESIDE = True
 #: Bodies of a scene at most: the program of a larger one would be too long.
 MOST_BODIES = 64
-#: Programs of right-hand sides and projections whose guards fail more often are given up.
-MOST_FAILURES = (0.05, 0.5)
+#: Programs whose guards fail more often are given up: by the function, as parts of the right-hand
+#: sides, or projections, of the call.
+MOST_FAILURES = {RHS: 0.05, PROJECT: 0.5, WATCH: 0.5}
 
 
 @attrs.define
@@ -40,14 +41,13 @@ class Record:
     """What is known of the scenes of one name.
 
     Attributes:
-        programs: of right-hand side and projection, as ``load_programs`` returns them; empty
-            as long as there are none.
+        programs: as ``load_programs`` returns them; empty as long as there are none.
         reason: why there are none and will be none; "" while there may be.
         is_requested: True if they are being compiled by another process.
         is_anew: True once they were made anew, as guards of the first ones failed.
     """
 
-    programs: list[Any] = attrs.field(factory=list)
+    programs: dict[int, Any] = attrs.field(factory=dict)
     reason: str = ""
     is_requested: bool = False
     is_anew: bool = False
@@ -68,6 +68,8 @@ class ChangeOver:
         model = evaluator.model
         self._evaluator, self._varied = evaluator, varied
         self._name: str | None = None
+        #: Ends the programs of a call before its end, where constants of theirs change.
+        self.stop: Callable[[], None] = lambda: None
         #: Constants of the programs: where they stand, and their numbers.
         self._parts: list[tuple[Floats, Integers]] = []
         self._numbers: Floats = np.zeros(0)
@@ -112,7 +114,7 @@ class ChangeOver:
         """
         record = self._record_of(start)
         # taken at once, as another thread may give them up
-        programs = [] if record is None else record.programs[: PROJECT + 1]
+        programs = {} if record is None else dict(record.programs)
         if record is None or not programs:
             if needs_programs:
                 return
@@ -120,17 +122,21 @@ class ChangeOver:
             run()
             _spent[self._key] = _spent.get(self._key, 0.0) + time.perf_counter() - clock
             return
-        general = addresses[: len(programs)].copy()
-        failures, done = [program.failures() for program in programs], counts()
-        addresses[: len(programs)] = [program.address for program in programs]
+        general, done = addresses.copy(), counts()
+        failures = {k: program.failures() for k, program in programs.items()}
+        for k in programs.keys() & MOST_FAILURES.keys():
+            addresses[k] = programs[k].address
+        self.stop = lambda: np.copyto(addresses, general)
         try:
             run()
         finally:
-            addresses[: len(programs)] = general
-        now = counts()
-        for k in reversed(range(len(programs))):
-            if programs[k].failures() - failures[k] > 1 + MOST_FAILURES[k] * (now[k] - done[k]):
-                _give_up(record, programs[k], k)
+            self.stop()
+        rhs, projections = (after - before for after, before in zip(counts(), done, strict=True))
+        for k in (WATCH, PROJECT, RHS):
+            if k in programs:
+                most = MOST_FAILURES[k] * (projections if k == PROJECT else rhs)
+                if programs[k].failures() - failures[k] > 1 + most:
+                    _give_up(record, programs[k], k)
 
     def _record_of(self, start: "Start") -> Record | None:
         """The record, where this call may run its programs."""
@@ -167,12 +173,12 @@ class ChangeOver:
         if stored is None:
             if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
                 return
-            text = scene_program.write_programs(evaluator, name, *start(), self._varied)
-            if BESIDE and path is not None and optimiser.request(text, [], path):
+            text, written = scene_program.write_programs(evaluator, name, *start(), self._varied)
+            if BESIDE and path is not None and optimiser.request(text, written, path):
                 record.is_requested = True
                 return
-            stored = [], objects.optimised(text, [], path)
-        record.programs = scene_program.load_programs(evaluator, name, stored[1])
+            stored = written, objects.optimised(text, written, path)
+        record.programs = scene_program.load_programs(evaluator, name, *stored)
 
 
 def _give_up(record: Record, program: Any, k: int) -> None:
@@ -180,15 +186,20 @@ def _give_up(record: Record, program: Any, k: int) -> None:
 
     First programs of a state as they are now, whose branches may be others: those of a
     projection follow from the tolerances. Then general code; of a projection the general one
-    behind a right-hand side of its own, which moves up: one alone would read what programs of
-    right-hand sides do not leave.
+    behind a right-hand side of its own: one alone would read what programs of right-hand sides do
+    not leave.
     """
     with _making:
-        if program not in record.programs:  # another thread was faster
+        if record.programs.get(k) is not program:  # another thread was faster
             return
+        others = {q: one for q, one in record.programs.items() if q != k}
         if not record.is_anew:
-            record.programs, record.is_anew, record.is_requested = [], True, False
+            record.programs, record.is_anew, record.is_requested = {}, True, False
         elif k == RHS:
-            record.programs, record.reason = [], "guards fail: branches depend on the motion"
+            record.programs, record.reason = {}, "guards fail: branches depend on the motion"
         else:
-            record.programs = [one for one in record.programs if one is not program]
+            if k == PROJECT:
+                from dap3d_core.formulations.programs.scene_program import BEHIND
+
+                others[PROJECT] = others.pop(BEHIND)
+            record.programs = others

@@ -9,16 +9,18 @@ from types import FrameType
 import attrs
 
 from dap3d_core.assembly.arrays import Floats
+from dap3d_core.formulations import PROJECT, RHS, WATCH
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.programs.scene_program import (
     MOST_INSTRUCTIONS,
+    programmed,
     python_loops,
-    reads_rates,
     write_program,
 )
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.compiler.straight_line import StraightLine
 
+NAMES = {RHS: "right-hand side", PROJECT: "projection", WATCH: "switches"}
 #: Packages whose functions are named; what they call for arithmetic belongs to them.
 NAMED = ("assembly", "formulations", "linear")
 #: Kinds of operations, and the instructions that they are.
@@ -37,7 +39,7 @@ class ProgramOperations:
     """Operations of a program, without those that no result needs.
 
     Attributes:
-        name: "right-hand side", or "projection" with the right-hand side before it.
+        name: "right-hand side", "projection" with the right-hand side before it, or "switches".
         parts: function -> kind of operation -> how many, the largest first.
         guards: conditions that are tested, all at once.
     """
@@ -93,16 +95,13 @@ def operations(evaluator: Evaluator, time: float, state: Floats) -> list[Program
         for loop, source in zip(python_loops(evaluator), written, strict=True)
         if source is not None
     }
-    heads = {"right-hand side": "", "projection": "  br label %program"}
     found = []
-    for name, head in heads.items():
-        if head and not reads_rates(evaluator):
-            continue
+    for k in programmed(evaluator):
         tracer = _Counting(loops)
-        text, _ = write_program(evaluator, time, state, names, head, tracer=tracer)
+        text, _ = write_program(evaluator, k, time, state, names, tracer=tracer)
         body = text.partition("program:")[2].partition("general:")[0].splitlines()
         counts = _counts(body, tracer.owner)
-        found.append(ProgramOperations(name, counts, len(tracer.guards)))
+        found.append(ProgramOperations(NAMES[k], counts, len(tracer.guards)))
     return found
 
 

@@ -1,4 +1,4 @@
-"""Right-hand side and projection of one scene as straight-line programs.
+"""Right-hand side, projection and switches of one scene as straight-line programs.
 
 The functions of a formulation are run once with symbols for numbers: what is left is the arithmetic
 of this scene (kernels/compiler/straight_line.py). A program leaves nothing in the arrays of the
@@ -9,7 +9,6 @@ of its state left, computes that itself.
 import ctypes
 import inspect
 from collections.abc import Callable
-from functools import partial
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -17,7 +16,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.formulations import OUTCOMES, PROJECT
+from dap3d_core.formulations import OUTCOMES, PROJECT, RHS, WATCH
+from dap3d_core.formulations.common import switching_functions
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, Varied, constants
 from dap3d_core.interface.codegen.compile_loops import write
@@ -30,6 +30,9 @@ from dap3d_core.kernels.runtime.cache import cache_folder, names_of, run_with_sy
 from dap3d_core.kernels.runtime.loop_modules import python_loop
 from dap3d_core.kernels.runtime.source_digest import origin
 
+#: Behind the indices of functions: the general projection behind a right-hand side of its own, for
+#: where guards of that program fail.
+BEHIND = -1
 #: Instructions of a program at most: larger scenes gain less, and take long to compile.
 MOST_INSTRUCTIONS = 20_000
 ARGUMENTS = "double %t, ptr %y, i64 %y.1, ptr %out, i64 %out.1, ptr %system, ptr %loops"
@@ -79,7 +82,6 @@ program:
   ret void
 }}
 """
-_NONE = "define i64 @{counter}() nounwind {{\n  ret i64 0\n}}\n"
 _WEIGHTS = '!0 = !{}\n!1 = !{!"branch_weights", i32 1000, i32 1}\n'
 
 
@@ -102,23 +104,47 @@ def reads_rates(evaluator: Evaluator) -> bool:
     return evaluator.formulation.needs_joints and evaluator.length_count > 0
 
 
+def results(
+    evaluator: Evaluator, k: int, t_now: Any, y: Any, outcome: Any, struct: Any
+) -> Any:
+    """What function k of an evaluator gives for symbols; a projection changes y, too.
+
+    outcome: of a projection, which is behind the right-hand side of its state.
+    """
+    with run_with_symbols():
+        module, loops = formulation_module(evaluator), python_loops(evaluator)
+        if k == WATCH:
+            own = evaluator.formulation.has_own_coordinates
+            values = np.zeros(len(evaluator.switches), dtype=object)
+            (module if own else switching_functions).watch(t_now, y, values, struct, loops)
+            return values
+        rates = np.zeros(y.size, dtype=object)
+        module.rhs(t_now, y, rates, struct, loops)
+        if k == RHS:
+            return rates
+        module.project(t_now, y, outcome, struct, loops)
+        return outcome
+
+
 @IGNORE_FLOAT_ERRORS
 def write_program(
     evaluator: Evaluator,
+    k: int,
     time: float,
     state: Floats,
     names: dict[str, str],
-    head: str = "",
+    head: str = _HEAD,
     varied: Varied = None,
     tracer: StraightLine | None = None,
 ) -> tuple[str, dict[str, str]]:
-    """LLVM IR of one program, and the declarations that it needs.
+    """LLVM IR of the program of one function, and the declarations that it needs.
 
     Args:
         evaluator: of the scene, as a run begins.
+        k: the function, by its index.
         time, state: where branches on numbers are decided.
         names: of the program, its ``counter``, and the ``general`` function.
-        head: of a projection, which is then behind the right-hand side.
+        head: the first block of its code.
         varied: as of ``constants``.
         tracer: records the program; left out, one of at most ``MOST_INSTRUCTIONS``.
 
@@ -127,25 +153,17 @@ def write_program(
     """
     tracer = tracer or StraightLine(MOST_INSTRUCTIONS)
     system = SymbolicSystem(evaluator, tracer, varied)
-    y = _items(tracer, "%y", state)
-    out = rates = np.zeros(state.size, dtype=object)
-    loops = python_loops(evaluator)
+    first = np.array([1.0, *np.zeros(OUTCOMES - 1 + evaluator.length_count)])
+    y, outcome = _items(tracer, "%y", state), _items(tracer, "%out", first)
     t_now = Symbol(tracer, tracer.at(t.Value(t.FLOAT, ("%t",)), time))
-    module = formulation_module(evaluator)
-    with run_with_symbols():
-        module.rhs(t_now, y, rates, system.struct, loops)
-        if head:
-            first = np.zeros(OUTCOMES + evaluator.length_count)
-            first[0] = 1.0
-            out = _items(tracer, "%out", first)
-            module.project(t_now, y, out, system.struct, loops)
+    out = results(evaluator, k, t_now, y, outcome, system.struct)
     guard, body = tracer.guard(), tracer.taken_lines()
-    for base, numbers in (("%out", out), ("%y", y if head else ())):
-        for k, x in enumerate(numbers):
-            tracer.store(base, k, x)
-    for pointer, k, x in system.stores():
-        tracer.store(pointer(), k, x)
-    text = _PROGRAM.format(head=head or _HEAD, arguments=ARGUMENTS, body=body, guard=guard,
+    for base, numbers in (("%out", out), ("%y", y if k == PROJECT else ())):
+        for place, x in enumerate(numbers):
+            tracer.store(base, place, x)
+    for pointer, place, x in system.stores():
+        tracer.store(pointer(), place, x)
+    text = _PROGRAM.format(head=head, arguments=ARGUMENTS, body=body, guard=guard,
                            stores=tracer.taken_lines(), **names)  # fmt: skip
     return text, tracer.needs
 
@@ -207,13 +225,18 @@ def path_of(name: str) -> Path | None:
     return None if folder is None else folder / f"{name}.o"
 
 
+def programmed(evaluator: Evaluator) -> list[int]:
+    """Indices of the functions that have programs."""
+    return [RHS, *([PROJECT] * reads_rates(evaluator)), *([WATCH] * bool(evaluator.switches))]
+
+
 def write_programs(
     evaluator: Evaluator, name: str, time: float, state: Floats, varied: Varied = None
-) -> str:
-    """LLVM IR of programs of right-hand side and, where it reads what that leaves, projection.
+) -> tuple[str, list[int]]:
+    """LLVM IR of the programs of a scene, and the indices of their functions.
 
-    Then the general projection behind a right-hand side of its own, for where guards of that
-    program fail.
+    All but the right-hand side are left out where they would be too long. With projections comes
+    ``BEHIND``.
 
     Args:
         evaluator: of the scene, as a run begins.
@@ -224,40 +247,57 @@ def write_programs(
     Raises:
         TypeError, ValueError, ArithmeticError: the scene has none; says why.
     """
-    rhs, project = (_named(entry) for entry in evaluator.functions.entries[: PROJECT + 1])
-    symbols, size = symbols_of(evaluator, name), state.size
-    names = {"name": symbols[0], "counter": symbols[1], "general": rhs}
-    text, needs = write_program(evaluator, time, state, names, varied=varied)
-    if len(symbols) > 2:
-        head = _PROJECTION_HEAD.format(project=project, arguments=ARGUMENTS)
-        names = {"name": symbols[2], "counter": symbols[3], "general": symbols[4]}
-        behind = partial(_BEHIND.format, head=head, rhs=rhs, project=project,
-                         arguments=ARGUMENTS, size=size)  # fmt: skip
+    entries = evaluator.functions.entries
+    found, general = programmed(evaluator), {}
+    texts: list[str] = []
+    needs: dict[str, str] = {}
+    written: list[int] = []
+    for k in found:
+        general[k], head = _named(entries[k]), _HEAD
+        program, counter = symbols_of(name, k)
+        names = {"name": program, "counter": counter, "general": general[k]}
+        if k == PROJECT:
+            given = {"project": general[PROJECT], "arguments": ARGUMENTS}
+            head = _PROJECTION_HEAD.format(**given)
+            names["general"] = behind = symbols_of(name, BEHIND)[0]
+            texts.append(_BEHIND.format(name=behind, head=head, rhs=general[RHS], size=state.size,
+                                        **given))  # fmt: skip
+            written.append(BEHIND)
         try:
-            other, needed = write_program(evaluator, time, state, names, head, varied)
-        except TraceError:  # too long: the right-hand side alone has a program
-            other, needed = behind(name=symbols[2]) + _NONE.format(counter=symbols[3]), {}
-        text, needs = text + other + behind(name=symbols[4]), needs | needed
-    declared = [f"declare void @{symbol}({ARGUMENTS})" for symbol in (rhs, project)]
-    return "\n".join([*needs.values(), *declared, text, _WEIGHTS])
+            text, needed = write_program(evaluator, k, time, state, names, head, varied)
+        except TraceError:
+            if k == RHS:
+                raise
+            continue
+        texts.append(text)
+        written.append(k)
+        needs |= needed
+    declared = [f"declare void @{symbol}({ARGUMENTS})" for symbol in general.values()]
+    return "\n".join([*needs.values(), *declared, *texts, _WEIGHTS]), written
 
 
-def load_programs(evaluator: Evaluator, name: str, code: bytes) -> list[Program]:
-    """Programs from their object code, in the order in which they were written."""
-    for entry in evaluator.functions.entries[: PROJECT + 1]:
-        _named(entry)
-    symbols = symbols_of(evaluator, name)
-    addresses = objects.load(code, symbols)
-    programs = [
-        Program(addresses[k], ctypes.CFUNCTYPE(ctypes.c_int64)(addresses[k + 1]))
-        for k in range(0, len(symbols) - 1, 2)
-    ]
-    return [*programs, *(Program(address, int) for address in addresses[4:])]
+def load_programs(
+    evaluator: Evaluator, name: str, written: list[int], code: bytes
+) -> dict[int, Program]:
+    """Programs from their object code, by the indices that were written."""
+    for k in programmed(evaluator):
+        _named(evaluator.functions.entries[k])
+    symbols = [symbols_of(name, k) for k in written]
+    addresses = iter(objects.load(code, [symbol for pair in symbols for symbol in pair]))
+    programs = {}
+    for k, pair in zip(written, symbols, strict=True):
+        address, *counter = (next(addresses) for _ in pair)
+        count = ctypes.CFUNCTYPE(ctypes.c_int64)(counter[0]) if counter else int
+        programs[k] = Program(address, count)
+    if BEHIND in programs and PROJECT not in programs:
+        programs[PROJECT] = programs.pop(BEHIND)
+    return programs
 
 
-def symbols_of(evaluator: Evaluator, name: str) -> list[str]:
-    """Symbols of programs and their counters, and of the projection behind a right-hand side."""
-    return [f"{name.replace('-', '_')}_{k}" for k in range(5 if reads_rates(evaluator) else 2)]
+def symbols_of(name: str, k: int) -> list[str]:
+    """Symbols of a program and of what counts failures of its guards; ``BEHIND`` has none."""
+    symbol = f"{name.replace('-', '_')}_{k if k >= 0 else 'behind'}"
+    return [symbol] if k == BEHIND else [symbol, f"{symbol}_failures"]
 
 
 def _named(entry: Entry) -> str:

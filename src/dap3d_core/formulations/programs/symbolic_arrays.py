@@ -14,6 +14,7 @@ from dap3d_core.assembly.arrays import (
     Floats,
     Integers,
 )
+from dap3d_core.assembly.metric import METRIC_CONSTANTS
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
 from dap3d_core.kernels.compiler.types import FLOAT, Array, Struct
@@ -23,8 +24,6 @@ from dap3d_core.kernels.runtime.loop_support import MASS
 
 #: Numbers of ``settings`` that a run changes.
 COUNTED = (SCRATCH, UNSETTLED, SINGULAR, DOUBTFUL)
-#: Columns of ``metric`` that follow from masses and inertias.
-METRIC_CONSTANTS = 7
 #: Members of a system -> flat indices of numbers that differ from run to run; None: all runs are
 #: of one model.
 Varied = Mapping[str, Integers] | None
@@ -96,8 +95,9 @@ class SymbolicSystem:
         self._tracer = tracer
         #: Of each piece of memory: its first item's address, and its items as symbols.
         self._memory: dict[int, Any] = {}
-        #: Of members that are kept from one evaluation to another: symbols, pointer, as they were.
-        self._kept: list[tuple[Any, Callable[[], str], Any]] = []
+        #: Of members that are kept from one evaluation to another: name, symbols, pointer, as they
+        #: were.
+        self._kept: list[tuple[str, Any, Callable[[], str], Any]] = []
         self._constants = dict(constants(evaluator, varied))
         self.struct = self.symbolic(evaluator.system, lambda: "%system", "")
 
@@ -131,19 +131,20 @@ class SymbolicSystem:
         symbols = self._memory[id(root)][1][first : first + array.size]
         numbers = array.ravel().tolist()
         for k, number in enumerate(numbers):
-            if symbols[k] is None:
-                symbols[k] = Item(self._tracer, (pointer, k), number)
+            if symbols[k] is None:  # of rows that do not move nothing is ever written
+                item = Item(self._tracer, (pointer, k), number)
+                symbols[k] = 0.0 if name == "nu" else item
         for k in self._constants.get(name, ()):
             symbols[k] = numbers[k]
         if name in CHECKPOINTED:
-            self._kept.append((symbols, pointer, symbols.copy()))
+            self._kept.append((name, symbols, pointer, symbols.copy()))
         return symbols.reshape(array.shape)
 
     def stores(self) -> list[tuple[Callable[[], str], int, Any]]:
         """Pointer, index and number of what was written and outlives an evaluation."""
         return [
             (pointer, k, symbols[k])
-            for symbols, pointer, before in self._kept
+            for name, symbols, pointer, before in self._kept
             for k in range(len(symbols))
-            if symbols[k] is not before[k]
+            if symbols[k] is not before[k] and (name, k) != ("settings", SCRATCH)
         ]

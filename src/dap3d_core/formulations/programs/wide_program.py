@@ -1,23 +1,24 @@
-"""Right-hand side and projection of one scene for several sets of its numbers at once.
+"""Functions of one scene for several sets of its numbers at once.
 
 They are programs of the scene (scene_program.py), widened (kernels/compiler/lanes.py). Where a
 guard fails, the results of that lane are not valid, which ``bound`` says.
 """
 
-from contextlib import suppress
+from contextlib import nullcontext, suppress
+from functools import partial
 
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats
+from dap3d_core.formulations import PROJECT, RHS, WATCH
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.programs.scene_program import (
     MOST_INSTRUCTIONS,
     constant_numbers,
     constant_parts,
-    formulation_module,
     name_of,
-    python_loops,
-    reads_rates,
+    programmed,
+    results,
 )
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, Varied
 from dap3d_core.formulations.wide_rates import SIGNATURE, Rates, WideRates
@@ -26,7 +27,6 @@ from dap3d_core.kernels.compiler.straight_line import StraightLine
 from dap3d_core.kernels.compiler.trace import Symbol, TraceError
 from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.kernels.compiler.units import Entry
-from dap3d_core.kernels.runtime.cache import run_with_symbols
 from dap3d_core.kernels.runtime.lanes import wide_unit
 
 _PROGRAM = """
@@ -36,15 +36,17 @@ entry:
   ret void
 }}
 """
+#: Members of ``Rates`` for the results of a function.
+RESULTS = {RHS: "out", PROJECT: "outcome", WATCH: "switches"}
 #: What ``bound`` is where all guards hold, and where one fails.
 VALID, INVALID = 0.0, 2.0
 
 
 @IGNORE_FLOAT_ERRORS
 def write_wide(
-    evaluator: Evaluator, time: float, state: Floats, symbol: str, varied: Varied, projects: bool
+    evaluator: Evaluator, k: int, time: float, state: Floats, symbol: str, varied: Varied
 ) -> str:
-    """LLVM IR of a right-hand side, or projection, as a function of ``Rates``, for one set.
+    """LLVM IR of function k of a formulation as a function of ``Rates``, for one set.
 
     Raises:
         TraceError: the program would be too long.
@@ -52,27 +54,23 @@ def write_wide(
     """
     tracer = StraightLine(MOST_INSTRUCTIONS)
     system = SymbolicSystem(evaluator, tracer, varied)
-    given = Rates.of(time, state, evaluator.length_count)
+    given = Rates.of(time, state, evaluator)
     rates = system.symbolic(given, lambda: "%rates", "rates.")
-    with run_with_symbols():
-        module, loops = formulation_module(evaluator), python_loops(evaluator)
-        out = np.zeros(state.size, dtype=object)
-        module.rhs(rates.t[0], rates.y, out, system.struct, loops)
-        if projects:
-            outcome = np.array([1.0, *np.zeros(given.outcome.size - 1)], dtype=object)
-            module.project(rates.t[0], rates.y, outcome, system.struct, loops)
+    outcome = np.array([1.0, *np.zeros(given.outcome.size - 1)], dtype=object)
+    found = {RESULTS[k]: results(evaluator, k, rates.t[0], rates.y, outcome, system.struct)}
+    if k == PROJECT:
+        found["y"] = rates.y
     if system.stores():
         raise CompileError("an evaluation leaves something to the next one")
     valid: Symbol | float = VALID
     if (guard := tracer.guard()) != "true":
         word = tracer.new(f"select i1 {guard}, double {VALID}, double {INVALID}")
         valid = Symbol(tracer, t.Value(t.FLOAT, (word,)))
-    results = {"y": rates.y, "outcome": outcome} if projects else {"out": out}
     members = [name for name, _ in Rates.type_of().members]
-    for name, numbers in {**results, "bound": [valid]}.items():
+    for name, numbers in {**found, "bound": [valid]}.items():
         pointer = system.pointer(lambda: "%rates", 2 * members.index(name))
-        for k, x in enumerate(numbers):
-            tracer.store(pointer(), k, x)
+        for place, x in enumerate(numbers):
+            tracer.store(pointer(), place, x)
     text = _PROGRAM.format(name=symbol, lines=tracer.taken_lines())
     return "\n".join([*tracer.needs.values(), text])
 
@@ -80,7 +78,7 @@ def write_wide(
 def program_rates(
     evaluator: Evaluator, count: int, time: float, state: Floats, varied: Varied
 ) -> WideRates:
-    """Right-hand side and, where it reads what that leaves, projection of ``count`` sets.
+    """Functions of ``count`` sets: all but the right-hand side are left out where they have none.
 
     Args:
         evaluator: of the scene.
@@ -94,18 +92,12 @@ def program_rates(
     numbers = constant_numbers(constant_parts(evaluator, varied))
     name = name_of(evaluator, state.size, numbers, varied)
 
-    def entry(projects: bool) -> Entry:
-        def text(symbol: str) -> str:
-            return write_wide(evaluator, time, state, symbol, varied, projects)
-
-        kind = "projection" if projects else "rates"
-        unit = wide_unit(f"{name}-{kind}{count}", count, text, optimise=False)
-        return Entry(unit, 0, SIGNATURE)
-
-    functions = [entry(False)]
-    if reads_rates(evaluator):
-        with suppress(CompileError, TraceError):  # then each set is projected by itself
-            functions.append(entry(True))
+    functions = {}
+    for k in programmed(evaluator):
+        write = partial(write_wide, evaluator, k, time, state, varied=varied)
+        with nullcontext() if k == RHS else suppress(CompileError, TraceError):
+            unit = wide_unit(f"{name}-{k}x{count}", count, write, optimise=False)
+            functions[k] = Entry(unit, 0, SIGNATURE)
     names = [name for name, array in evaluator.system.walk() if array.dtype == float]
     loops = evaluator.loops.entries
     return WideRates(evaluator, state.size, count, names, functions, loops)

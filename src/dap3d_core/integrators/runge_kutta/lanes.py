@@ -20,10 +20,12 @@ from dap3d_core.integrators.runge_kutta.step import (
     step_error,
 )
 from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA
-from dap3d_core.integrators.stepping.event_location import is_sample_across, next_length
+from dap3d_core.integrators.stepping.event_location import is_cut_at_sample, next_length
 from dap3d_core.integrators.stepping.integration_state import (
     GIVEN,
+    OTHER,
     PROJECTED,
+    SAMPLE,
     SCRATCH,
     TRIAL,
     Function,
@@ -40,6 +42,7 @@ from dap3d_core.integrators.stepping.step_control import (
     end_of_step,
     first_step,
 )
+from dap3d_core.integrators.stepping.switch_values import count_from_far_edges
 from dap3d_core.integrators.stepping.vector_ops import combine
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
@@ -59,7 +62,7 @@ class Lanes(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(("does", "rejected"), INTEGER_VECTOR),
-        **dict.fromkeys(("y", "out", "outcome"), MATRIX),
+        **dict.fromkeys(("y", "out", "outcome", "switches"), MATRIX),
     }
 
     does: Integers
@@ -74,6 +77,7 @@ class Lanes(Arrays):
     y: Floats  # (n, L)
     out: Floats  # (n, L)
     outcome: Floats  # (m, L)
+    switches: Floats  # (s, L)
 
 
 @compiled
@@ -126,15 +130,7 @@ def after_step(
 
 
 @compiled
-def put_stage(
-    work: RungeKuttaState,
-    lanes: Lanes,
-    k: int,
-    i: int,
-    functions: Any,
-    system: Any,
-    loops: Any,
-) -> int:
+def put_stage(work: RungeKuttaState, lanes: Lanes, k: int, i: int) -> int:
     """State of a stage, and as the argument of the right-hand side; 1 where that is wanted."""
     t1, table, stages = lanes.end[k], work.table, work.stage_count
     h, c = lanes.length[k], table[i, ABSCISSA]
@@ -142,14 +138,32 @@ def put_stage(
     combine(x, 1.0, work.state[Y], h, table, i, work.k)
     if i == stages and work.error_uses_last_stage == 0:
         return 0
-    t = t1 if c == 1.0 else work.t + c * h
-    watch = functions[4] if work.switch_count != 0 else functions[0]
-    if is_sample_across(work, t, x, watch, system, loops):
-        lanes.does[k] = CUT
-        return 0
-    work.rhs_count += 1
-    put_argument(lanes, k, t, x)
+    put_argument(lanes, k, t1 if c == 1.0 else work.t + c * h, x)
     return 1
+
+
+@compiled
+def begin_stage(work: RungeKuttaState, lanes: Lanes, k: int) -> int:
+    """1 where the rates of a stage are wanted still; 0 where it lies across a switch.
+
+    The switches are in ``SAMPLE``, without bands.
+    """
+    if work.sampled_switch_count != 0:
+        count_from_far_edges(work.switches, SAMPLE)
+        if is_cut_at_sample(work, lanes.t[k]):
+            lanes.does[k] = CUT
+            return 0
+    work.rhs_count += 1
+    return 1
+
+
+@compiled
+def argument_of(work: RungeKuttaState, lanes: Lanes, k: int) -> Floats:
+    """The state at which a lane wants its rates, for a function of one scene."""
+    argument = work.state[OTHER]
+    for j in range(argument.shape[0]):
+        argument[j] = lanes.y[j, k]
+    return argument
 
 
 @compiled

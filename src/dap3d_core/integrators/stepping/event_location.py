@@ -145,13 +145,19 @@ def distance_to_crossing(work: IntegrationState, h: float, short: float) -> floa
 def is_sample_across(
     work: IntegrationState, t: float, x: Floats, watch: Function, system: Any, loops: Any
 ) -> bool:
-    """True if a state within a step lies across a switch; then the step is cut.
-
-    Not of what is UNSEEN: where a function takes another form it is smooth: a step may mix both.
-    """
+    """True if a state within a step lies across a switch; then the step is cut."""
     if work.sampled_switch_count == 0:
         return False
     evaluate(work, t, x, SAMPLE, watch, system, loops)
+    return is_cut_at_sample(work, t)
+
+
+@compiled
+def is_cut_at_sample(work: IntegrationState, t: float) -> bool:
+    """``is_sample_across`` once the values of the sample are known.
+
+    Not of what is UNSEEN: where a function takes another form it is smooth: a step may mix both.
+    """
     s = work.switches
     for k in range(s.shape[1]):
         if s[DOES, k] == UNSEEN:

@@ -38,8 +38,13 @@ def evaluate(
     One with a band counts from the far edge of it: what rests where it is zero, to rounding, does
     not change its side again and again.
     """
-    s = work.switches
-    watch(t, x, s[row], system, loops)
+    watch(t, x, work.switches[row], system, loops)
+    count_from_far_edges(work.switches, row)
+
+
+@compiled
+def count_from_far_edges(s: Floats, row: int) -> None:
+    """Values of a row as ``evaluate`` gives them, from those of the switches."""
     for k in range(s.shape[1]):
         s[row, k] += s[SIDE, k] * s[BAND, k]
 

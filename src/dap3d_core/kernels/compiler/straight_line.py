@@ -9,6 +9,7 @@ has stored nothing, and calls the function that it stands for. Results have the 
 
 import ast
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -19,6 +20,7 @@ from dap3d_core.kernels.compiler.trace import Symbol, TraceError, Tracer
 from dap3d_core.kernels.compiler.writer import COMPARISONS, OPERATORS
 
 _ZERO = (0.0, -0.0)
+_NEGATIVE = re.compile(r"-(%\w+)")
 
 
 class StraightLine(Tracer):
@@ -40,12 +42,23 @@ class StraightLine(Tracer):
 
     def new(self, text: str) -> str:
         """As of ``Writer``; the same instruction once."""
+        text = self._with_negatives(text)
         name = self._known.get(text)
         if name is None:
             if len(self._known) > self._most:
                 raise TraceError(f"takes more than {self._most} instructions")
             name = self._known[text] = super().new(text)
         return name
+
+    def line(self, text: str) -> None:
+        """As of ``Writer``."""
+        super().line(self._with_negatives(text))
+
+    def _with_negatives(self, text: str) -> str:
+        """An instruction with the names of negatives, which are computed where they are used."""
+        if "-%" not in text:
+            return text
+        return _NEGATIVE.sub(lambda found: self.new(f"fneg double {found[1]}"), text)
 
     def guard(self) -> str:
         """The condition that all guards are as they were."""
@@ -85,10 +98,15 @@ class StraightLine(Tracer):
         return truth
 
     def operation(self, node: Any, op: ast.operator, a: t.Value, b: t.Value) -> t.Value:
-        """As of ``Writer``, but for zeros and ones."""
+        """As of ``Writer``, but for zeros, ones and signs; a + b is b + a."""
         folded = _folded(op, a, b)
         if folded is not None:
             return self.negative(node, b) if folded is NEGATIVE else folded
+        signed = self._signed(node, op, a, b)
+        if signed is not None:
+            return signed
+        if isinstance(op, (ast.Add, ast.Mult)) and a.words > b.words:
+            a, b = b, a
         result = super().operation(node, op, a, b)
         if result.constant is None:
             number = OPERATORS[type(op)][0]
@@ -96,10 +114,35 @@ class StraightLine(Tracer):
             self.at(result, number(np.float64(x) if result.type == t.FLOAT else x, y))
         return result
 
+    def _signed(self, node: Any, op: ast.operator, a: t.Value, b: t.Value) -> t.Value | None:
+        """The result by operands without their signs; None where they have none."""
+        if a.constant is not None and b.constant is not None:
+            return None
+        x, y = self._without_sign(op, a), self._without_sign(op, b)
+        if isinstance(op, ast.Add) and (x or y):
+            return self.operation(node, ast.Sub(), *((a, y) if y else (b, x)))
+        if isinstance(op, ast.Sub) and y:
+            return self.operation(node, ast.Add(), a, y)
+        if isinstance(op, (ast.Sub, ast.Mult, ast.Div)) and (x or y):
+            result = self.operation(node, ast.Add() if isinstance(op, ast.Sub) else op,
+                                    x or a, y or b)  # fmt: skip
+            return result if x and y else self.negative(node, result)
+        return None
+
+    def _without_sign(self, op: ast.operator, value: t.Value) -> t.Value | None:
+        """What a number is the negative of; of constants, where it is a factor."""
+        if value.constant is None:
+            negative = value.word.startswith("-")
+            return value._replace(words=(value.word[1:],)) if negative else None
+        is_factor = isinstance(op, (ast.Mult, ast.Div))
+        return t.constant(-value.constant) if is_factor and value.constant < 0 else None
+
     def negative(self, node: Any, value: t.Value) -> t.Value:
-        """As of ``Writer``."""
-        result = super().negative(node, value)
-        return result if result.constant is not None else self.at(result, -self.number(value))
+        """As of ``Writer``, by the sign of the word: most are sums and products in the end."""
+        if value.constant is not None or value.type != t.FLOAT:
+            return super().negative(node, value)
+        word = value.word[1:] if value.word.startswith("-") else f"-{value.word}"
+        return self.at(value._replace(words=(word,)), -self.number(value))
 
     def comparison(self, node: Any, op: ast.cmpop, a: t.Value, b: t.Value) -> t.Value:
         """As of ``Writer``."""
@@ -153,7 +196,8 @@ NEGATIVE = t.Value(t.NOTHING)
 def _folded(op: ast.operator, a: t.Value, b: t.Value) -> t.Value | None:
     """The result where one operand is zero or one; NEGATIVE: -b; None: it is none of these."""
     if (a.constant is None) == (b.constant is None):
-        return None
+        same = isinstance(op, ast.Sub) and a.constant is None and a.words == b.words
+        return t.constant(0.0) if same else None
     if isinstance(op, ast.Add):
         return b if a.constant in _ZERO else a if b.constant in _ZERO else None
     if isinstance(op, ast.Sub):

@@ -16,7 +16,7 @@ from dap3d_core.linear.ldlt.factor import solve
 def scale_blocks(blocks: Integers, D: Floats, metric: Floats) -> None:
     """Turn D into D^, in place.
 
-    metric: (n+1, 16), with 1/sqrt(m) in column 0 and B by rows from column 7.
+    metric: (n+1, METRIC_WIDTH), with 1/sqrt(m) in column 0 and B by rows from column 7.
     """
     D = pointer(D)
     for q in range(blocks.shape[0]):

@@ -14,6 +14,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import STEPS, System
+from dap3d_core.formulations import WATCH
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.programs.change_over import MOST_BODIES as MOST_BODIES_OF_PROGRAM
 from dap3d_core.formulations.wide_rates import SIGNATURE, WideRates
@@ -22,6 +23,8 @@ from dap3d_core.integrators.runge_kutta.lanes import (
     IDLE,
     TAKES_STEP,
     Lanes,
+    argument_of,
+    begin_stage,
     end_step,
     judge_step,
     plan_step,
@@ -29,7 +32,7 @@ from dap3d_core.integrators.runge_kutta.lanes import (
     take_projection,
 )
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
-from dap3d_core.integrators.stepping.integration_state import OTHER, RUNNING, Function
+from dap3d_core.integrators.stepping.integration_state import RUNNING, SAMPLE, Function
 from dap3d_core.kernels.compiler.trace import TraceError
 from dap3d_core.kernels.compiler.types import INT, CompileError, Table, Tuple
 from dap3d_core.kernels.compiler.units import Entry
@@ -66,13 +69,13 @@ class LanePoints(Arrays):
     """Points in L lanes, and the numbers of a system that lanes have each for itself."""
 
     types: ClassVar[dict[str, Any]] = {
-        **dict.fromkeys(("loaded", "point", "projects", "places"), INTEGER_VECTOR),
+        **dict.fromkeys(("loaded", "point", "has", "places"), INTEGER_VECTOR),
         **dict.fromkeys(("par", "body", "metric", "constants", "F", "smallest", "kept"), MATRIX),
     }
 
     loaded: Integers  # (1,) the point whose numbers the system of one scene has
     point: Integers  # (L,) of each lane
-    projects: Integers  # (1,) whether states are projected in all lanes at once
+    has: Integers  # functions of all lanes that there are (formulations/wide_rates.py)
     par: Floats  # (numbers, L) each: parts of a system that differ from point to point
     body: Floats
     metric: Floats
@@ -207,9 +210,13 @@ def take_stages(
         asked = 0
         for k, work in works:
             if lanes.does[k] > IDLE:
-                if work.sampled_switch_count != 0:
-                    load(points, lane_points, k, system)
-                asked += put_stage(work, lanes, k, i, functions, system, loops)
+                asked += put_stage(work, lanes, k, i)
+        if asked > 0:
+            watch_stages(points, lane_points, works, lanes, wide, functions, system, loops)
+            asked = 0
+            for k, work in works:
+                if lanes.does[k] > IDLE:
+                    asked += begin_stage(work, lanes, k)
         if asked > 0:
             rhs(rates, wide_system, wide_loops)
             for k, work in works:
@@ -227,11 +234,40 @@ def take_stages(
             if lanes.does[k] == HAS_RATES:
                 stage = work.k[stages]
                 take_rates(points, lane_points, work, lanes, k, stage, functions, system, loops)
-        if lane_points.projects[0] != 0:
+        if lane_points.has[1] != 0:
             table[1](rates, wide_system, wide_loops)
             for k, work in works:
                 if lanes.does[k] == HAS_RATES and work.projects != 0:
                     take_projection(work, lanes, k)
+
+
+@compiled
+def watch_stages(
+    points: Points,
+    lane_points: LanePoints,
+    works: Any,
+    lanes: Lanes,
+    wide: Any,
+    functions: Any,
+    system: System,
+    loops: Any,
+) -> None:
+    """Values of the switches at the stages of all lanes, where their steps are sampled."""
+    table, rates, wide_system, wide_loops = wide
+    if works[0][1].sampled_switch_count == 0:
+        return
+    is_wide = lane_points.has[2] != 0
+    if is_wide:
+        table[2](rates, wide_system, wide_loops)
+    for k, work in works:
+        if lanes.does[k] > IDLE:
+            sample = work.switches[SAMPLE]
+            if is_wide and lanes.bound[k] < 1.0:
+                for j in range(sample.shape[0]):
+                    sample[j] = lanes.switches[j, k]
+            else:
+                load(points, lane_points, k, system)
+                functions[WATCH](lanes.t[k], argument_of(work, lanes, k), sample, system, loops)
 
 
 @compiled
@@ -252,10 +288,7 @@ def take_rates(
             stage[j] = lanes.out[j, k]
         return
     load(points, lane_points, k, system)
-    argument = work.state[OTHER]
-    for j in range(stage.shape[0]):
-        argument[j] = lanes.y[j, k]
-    functions[0](lanes.t[k], argument, stage, system, loops)
+    functions[0](lanes.t[k], argument_of(work, lanes, k), stage, system, loops)
     exchange_kept(lane_points, k, system, True)
 
 
@@ -321,7 +354,7 @@ class LaneBatch:
             rejected=np.zeros(count, dtype=np.int64),
             **{name: np.zeros(count) for name in ("h", "end", "length", "goal", "error")},
             **{name: wide.lanes[name][0] for name in ("t", "bound")},
-            **{name: wide.lanes[name] for name in ("y", "out", "outcome")},
+            **{name: wide.lanes[name] for name in ("y", "out", "outcome", "switches")},
         )
         places = [np.arange(system.par.size)[k] for k in evaluator.turn_places()]
         kept = np.concatenate([np.zeros(0, dtype=np.int64), *places])
@@ -330,7 +363,7 @@ class LaneBatch:
         self._points = LanePoints(
             loaded=np.full(1, NONE),
             point=np.full(count, NONE),
-            projects=np.full(1, int(wide.has_projection)),
+            has=wide.has,
             **{name: wide.matrix(getattr(system, name)) for name in parts},
             constants=tree,
             places=kept,

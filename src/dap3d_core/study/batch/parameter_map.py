@@ -13,6 +13,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.assembly.metric import METRIC_CONSTANTS, METRIC_WIDTH
 from dap3d_core.assembly.turns import IS_POINT
 from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.evaluator import Evaluator
@@ -34,8 +35,6 @@ from dap3d_core.study.parameters import SceneParameter
 
 Booleans = NDArray[np.bool_]
 
-#: Columns of the metric, and those that hold constants of a body: 1/sqrt(m), then U by rows.
-METRIC_WIDTH, METRIC_CONSTANTS = 16, 7
 #: Fields of a body's initial state.
 STATES = ("r", "r_dot", "w")
 

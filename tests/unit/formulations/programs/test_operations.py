@@ -30,10 +30,9 @@ def test_they_are_those_that_results_need(name):
     evaluator = dap.compile(name).new_evaluator()
     state = off_constraints(evaluator.coordinates.start(evaluator.model.u0))
     evaluator.start(0.0, evaluator.model.u0)
-    for program in operations(evaluator, 0.0, state):
-        head = "  br label %program" if program.name == "projection" else ""
+    for k, program in enumerate(operations(evaluator, 0.0, state)):
         names = {"name": "one", "counter": "two", "general": "three"}
-        text, needs = write_program(evaluator, 0.0, state, names, head)
+        text, needs = write_program(evaluator, k, 0.0, state, names)
         arguments = "double, ptr, i64, ptr, i64, ptr, ptr"
         declared = [*needs.values(), f"declare void @three({arguments})"]
         left = without_dead_code("\n".join([*declared, text, "!0 = !{}", "!1 = !{}"]))
