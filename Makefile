@@ -60,8 +60,11 @@ verify: $(VENV)/.installed-docs  ## the slow verification alone
 verify-long: $(VENV)/.installed-docs  ## verification that takes longest, for a release
 	@$(PYTHON) -m pytest -n auto --dist loadfile -m long
 
+# Packages that run kernels; what the others do is the same with and without a compiler.
+PLAIN := $(addprefix tests/unit/,assembly formulations integrators interface kernels linear model \
+    simulation study testing)
 unit-nojit: $(VENV)/.installed-test  ## quick unit tests with kernels as plain Python
-	@DAP3D_PLAIN=1 $(PYTHON) -m pytest -n auto -m "not slow" tests/unit
+	@DAP3D_PLAIN=1 $(PYTHON) -m pytest -n auto -m "not slow" $(PLAIN)
 
 coverage: $(VENV)/.installed-test  ## the same, and what part of the sources they run
 	@DAP3D_PLAIN=1 $(PYTHON) -m pytest -n auto -m "not slow" --cov --cov-report=term tests/unit
