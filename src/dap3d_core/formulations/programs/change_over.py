@@ -68,23 +68,21 @@ class ChangeOver:
         model = evaluator.model
         self._evaluator, self._varied = evaluator, varied
         self._name: str | None = None
-        #: Ends the programs of a call before its end, where constants of theirs change.
-        self.stop: Callable[[], None] = lambda: None
         #: Constants of the programs: where they stand, and their numbers.
         self._parts: list[tuple[Floats, Integers]] = []
         self._numbers: Floats = np.zeros(0)
         self._key = evaluator.method, model.body_count, model.row_count, len(evaluator.loop_groups)
         self._is_open = jit_is_on() and 0 < model.body_count <= MOST_BODIES
 
-    def advance(self, integration: Any, budget: int) -> None:
-        """``integration.advance``, by programs where there are some."""
+    def during(self, integration: Any, run: "Callable[[], None]") -> None:
+        """Advance an integration, which ``run`` does, by programs where there are some.
+
+        What else it does changes no number of the scene but inputs.
+        """
 
         def counts() -> tuple[int, int]:
             now = integration.statistics
             return now.rhs, now.projections
-
-        def run() -> None:
-            integration.advance(budget)
 
         if self._is_open and integration.takes_programs:
             addresses = integration.functions.addresses
@@ -126,11 +124,10 @@ class ChangeOver:
         failures = {k: program.failures() for k, program in programs.items()}
         for k in programs.keys() & MOST_FAILURES.keys():
             addresses[k] = programs[k].address
-        self.stop = lambda: np.copyto(addresses, general)
         try:
             run()
         finally:
-            self.stop()
+            addresses[:] = general
         rhs, projections = (after - before for after, before in zip(counts(), done, strict=True))
         for k in (WATCH, PROJECT, RHS):
             if k in programs:

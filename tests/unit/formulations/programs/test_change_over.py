@@ -94,10 +94,10 @@ def test_numbers_that_change_in_a_run_stop_the_program(at_once):
 
     integration.advance = advanced
     programs = ChangeOver(evaluator)
-    programs.advance(integration, 1)
+    programs.during(integration, lambda: integration.advance(1))
     assert np.array_equal(addresses, before)
     evaluator.system.par[0] += 1e-3
-    programs.advance(integration, 1)
+    programs.during(integration, lambda: integration.advance(1))
     assert seen == [False, True]
 
 
