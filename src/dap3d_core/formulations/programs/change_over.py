@@ -10,8 +10,6 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import attrs
-import numpy as np
-
 from dap3d_core.formulations import PROJECT, RHS, WATCH
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.background import optimiser
@@ -33,7 +31,7 @@ BESIDE = True
 MOST_BODIES = 64
 #: Programs whose guards fail more often are given up: by the function, as parts of the right-hand
 #: sides, or projections, of the call.
-MOST_FAILURES = {RHS: 0.05, PROJECT: 0.5, WATCH: 0.5}
+MOST_FAILURES = {WATCH: 0.5, PROJECT: 0.5, RHS: 0.05}
 
 
 @attrs.define
@@ -70,7 +68,7 @@ class ChangeOver:
         self._name: str | None = None
         #: Constants of the programs: where they stand, and their numbers.
         self._parts: list[tuple[Floats, Integers]] = []
-        self._numbers: Floats = np.zeros(0)
+        self._constants = b""
         self._key = evaluator.method, model.body_count, model.row_count, len(evaluator.loop_groups)
         self._is_open = jit_is_on() and 0 < model.body_count <= MOST_BODIES
 
@@ -80,9 +78,10 @@ class ChangeOver:
         What else it does changes no number of the scene but inputs.
         """
 
+        work = integration.work
+
         def counts() -> tuple[int, int]:
-            now = integration.statistics
-            return now.rhs, now.projections
+            return work.rhs_count, work.projection_count
 
         if self._is_open and integration.takes_programs:
             addresses = integration.functions.addresses
@@ -112,7 +111,7 @@ class ChangeOver:
         """
         record = self._record_of(start)
         # taken at once, as another thread may give them up
-        programs = {} if record is None else dict(record.programs)
+        programs = None if record is None else record.programs
         if record is None or not programs:
             if needs_programs:
                 return
@@ -121,19 +120,19 @@ class ChangeOver:
             _spent[self._key] = _spent.get(self._key, 0.0) + time.perf_counter() - clock
             return
         general, done = addresses.copy(), counts()
-        failures = {k: program.failures() for k, program in programs.items()}
-        for k in programs.keys() & MOST_FAILURES.keys():
-            addresses[k] = programs[k].address
+        replaced = [(k, programs[k]) for k in MOST_FAILURES if k in programs]
+        failures = [program.failures() for _, program in replaced]
+        for k, program in replaced:
+            addresses[k] = program.address
         try:
             run()
         finally:
             addresses[:] = general
         rhs, projections = (after - before for after, before in zip(counts(), done, strict=True))
-        for k in (WATCH, PROJECT, RHS):
-            if k in programs:
-                most = MOST_FAILURES[k] * (projections if k == PROJECT else rhs)
-                if programs[k].failures() - failures[k] > 1 + most:
-                    _give_up(record, programs[k], k)
+        for (k, program), before in zip(replaced, failures, strict=True):
+            most = MOST_FAILURES[k] * (projections if k == PROJECT else rhs)
+            if program.failures() - before > 1 + most:
+                _give_up(record, program, k)
 
     def _record_of(self, start: "Start") -> Record | None:
         """The record, where this call may run its programs."""
@@ -145,11 +144,14 @@ class ChangeOver:
             if not scene_program.is_optimised(self._evaluator):
                 return None
             self._parts = scene_program.constant_parts(self._evaluator, self._varied)
-            self._numbers = scene_program.constant_numbers(self._parts)
-            size = start()[1].size
-            self._name = scene_program.name_of(self._evaluator, size, self._numbers, self._varied)
-        if not np.array_equal(self._numbers, scene_program.constant_numbers(self._parts)):
+            self._constants = scene_program.constant_numbers(self._parts)
+            of = start()[1].size, self._constants, self._varied
+            self._name = scene_program.name_of(self._evaluator, *of)
+        if self._constants != scene_program.constant_numbers(self._parts):
             return None
+        record = _records.get(self._name)
+        if record is not None and record.programs:
+            return record
         with _making:
             record = _records.setdefault(self._name, Record())
             if not (record.programs or record.reason):
