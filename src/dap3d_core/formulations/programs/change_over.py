@@ -42,13 +42,13 @@ class Record:
         programs: as ``load_programs`` returns them; empty as long as there are none.
         reason: why there are none and will be none; "" while there may be.
         is_requested: True if they are being compiled by another process.
-        is_anew: True once they were made anew, as guards of the first ones failed.
+        anew: time and state at which they are made anew, as guards of the first ones failed.
     """
 
     programs: dict[int, Any] = attrs.field(factory=dict)
     reason: str = ""
     is_requested: bool = False
-    is_anew: bool = False
+    anew: "tuple[float, Floats] | None" = None
 
 
 #: Seconds that general code has taken, by a rough description of the scene; records by identity.
@@ -132,7 +132,7 @@ class ChangeOver:
         for (k, program), before in zip(replaced, failures, strict=True):
             most = MOST_FAILURES[k] * (projections if k == PROJECT else rhs)
             if program.failures() - before > 1 + most:
-                _give_up(record, program, k)
+                _give_up(record, program, k, start())
 
     def _record_of(self, start: "Start") -> Record | None:
         """The record, where this call may run its programs."""
@@ -166,13 +166,13 @@ class ChangeOver:
         from dap3d_core.formulations.programs import scene_program
 
         evaluator, path = self._evaluator, scene_program.path_of(name)
-        if path is not None and record.is_anew and not record.is_requested:
+        if path is not None and record.anew is not None and not record.is_requested:
             path.unlink(missing_ok=True)
         stored = None if path is None else objects.read_object(path)
         if stored is None:
             if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
                 return
-            text, written = scene_program.write_programs(evaluator, name, *start(), self._varied)
+            text, written = scene_program.write_programs(evaluator, name, *(record.anew or start()), self._varied)
             if BESIDE and path is not None and optimiser.request(text, written, path):
                 record.is_requested = True
                 return
@@ -180,10 +180,10 @@ class ChangeOver:
         record.programs = scene_program.load_programs(evaluator, name, *stored)
 
 
-def _give_up(record: Record, program: Any, k: int) -> None:
+def _give_up(record: Record, program: Any, k: int, place: "tuple[float, Floats]") -> None:
     """Take other code from here on where guards of a program fail too often.
 
-    First programs of a state as they are now, whose branches may be others: those of a
+    First programs made at a state as they are now, whose branches may be others: those of a
     projection follow from the tolerances. Then general code; of a projection the general one
     behind a right-hand side of its own: one alone would read what programs of right-hand sides do
     not leave.
@@ -192,8 +192,8 @@ def _give_up(record: Record, program: Any, k: int) -> None:
         if record.programs.get(k) is not program:  # another thread was faster
             return
         others = {q: one for q, one in record.programs.items() if q != k}
-        if not record.is_anew:
-            record.programs, record.is_anew, record.is_requested = {}, True, False
+        if record.anew is None:
+            record.programs, record.anew, record.is_requested = {}, place, False
         elif k == RHS:
             record.programs, record.reason = {}, "guards fail: branches depend on the motion"
         else:
