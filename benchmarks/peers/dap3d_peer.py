@@ -10,9 +10,12 @@ from mechanisms import GROUND, rotation_of
 
 import dap3d_core as dap
 from dap3d_core.formulations.pivots import store_reference_pivots
+from dap3d_core.formulations.programs import scene_program
 from dap3d_core.integrators import TABLEAUS, RungeKutta
 from dap3d_core.integrators.adams.integration import AdamsIntegration
 from dap3d_core.integrators.prepared import PreparedRun
+from dap3d_core.integrators.stepping.integration import off_constraints
+from dap3d_core.kernels.compiler import objects
 from dap3d_core.simulation import CompiledModel
 
 VERSION = importlib.metadata.version("dap3d")
@@ -75,6 +78,15 @@ class Model:
             "report_size": evaluator.report_size,
             "length_count": evaluator.length_count,
         }
+
+    def take_programs(self):
+        """Let runs take programs of the scene, as those of ``dap.simulate`` after a while."""
+        y0, evaluator, name = self.problem[3], self.evaluator, f"peer_{id(self)}"
+        text, written = scene_program.write_programs(evaluator, name, 0.0, off_constraints(y0))
+        code = objects.optimised(text, written, None)
+        for k, program in scene_program.load_programs(evaluator, name, written, code).items():
+            if k >= 0:
+                evaluator.functions.addresses[k] = program.address
 
     def prepared(self, method, project, **control):
         """An integration that can be run again and again."""

@@ -4,7 +4,7 @@
 
 heyoka gets the least equations there are: quaternion and omega' of a body about a fixed point, the
 angle of a rod. Euler's equations are its input, and it compiles Taylor series of these very
-equations. dap3d gets the scene. Ratios of CPU times of the thread to reach an error at the end, the
+equations. dap3d gets the scene, and runs by its programs. Ratios of CPU times of the thread to reach an error at the end, the
 least of several rounds in turn; errors against references.json.
 """
 
@@ -96,6 +96,7 @@ def trials_of(mechanism):
     settings = [("heyoka", "taylor", parameter, start) for parameter in TOLERANCES]
     for method in ("unconstrained",) if mechanism.name == "free-body" else ("standard", "joint"):
         model = dap3d_peer.Model(scene, mechanism.t_end, method=method)
+        model.take_programs()
         for name in ("dop853", "adams"):
             trial = model.trial(name)
             settings += [("dap3d", f"{method}, {name}", tol, trial) for tol in TOLERANCES]

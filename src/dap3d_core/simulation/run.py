@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 import attrs
@@ -239,6 +240,7 @@ class Run(RunState):
 
     def _integrate(self) -> None:
         """Advance in chunks, as many right-hand sides each as fit into ``CHUNK_SECONDS``."""
+        run: Callable[[], object]
         integration, progress = self.present, self.callbacks.progress
         # step by step, where it is to end at the first step behind a time
         first = max(1, FIRST_CHUNK // self.evaluator.model.body_count)
@@ -247,11 +249,16 @@ class Run(RunState):
             before, clock = integration.statistics.rhs, time.perf_counter()
             self.is_whole = False
             if self.control is not None:
-                self.control.advance(integration, self.event_locator, self.until < np.inf)
+                of_control = integration, self.event_locator, self.until < np.inf
+                run = partial(self.control.advance, *of_control)
             elif self.event_locator:
-                self.event_locator.advance(integration, budget)
+                run = partial(self.event_locator.advance, integration, budget)
             else:
-                self.programs.advance(integration, budget)
+                run = partial(integration.advance, budget)
+            if self.event_locator:  # it may change numbers of the scene meanwhile
+                run()
+            else:
+                self.programs.during(integration, run)
             if self.jumps is not None:
                 self._let_jump(self.jumps, integration)
             self._take_rows()

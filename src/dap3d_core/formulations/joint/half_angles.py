@@ -58,5 +58,5 @@ def small_half_angles(q: Floats, sines: Floats, cosines: Floats) -> None:
         odd = abs(k - 2.0 * np.rint(0.5 * k))  # k mod 2
         half = 0.5 * (k - odd)
         sign = 1.0 - 2.0 * abs(half - 2.0 * np.rint(0.5 * half))  # -1 where k mod 4 > 1
-        sines[i] = sign * (odd * c + (1.0 - odd) * s)
-        cosines[i] = sign * ((1.0 - odd) * c - odd * s)
+        sines[i] = sign * where(odd == 1.0, c, s)
+        cosines[i] = sign * where(odd == 1.0, -s, c)

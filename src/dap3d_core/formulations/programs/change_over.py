@@ -10,8 +10,6 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import attrs
-import numpy as np
-
 from dap3d_core.formulations import PROJECT, RHS, WATCH
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.background import optimiser
@@ -33,7 +31,7 @@ BESIDE = True
 MOST_BODIES = 64
 #: Programs whose guards fail more often are given up: by the function, as parts of the right-hand
 #: sides, or projections, of the call.
-MOST_FAILURES = {RHS: 0.05, PROJECT: 0.5, WATCH: 0.5}
+MOST_FAILURES = {WATCH: 0.5, PROJECT: 0.5, RHS: 0.05}
 
 
 @attrs.define
@@ -44,13 +42,13 @@ class Record:
         programs: as ``load_programs`` returns them; empty as long as there are none.
         reason: why there are none and will be none; "" while there may be.
         is_requested: True if they are being compiled by another process.
-        is_anew: True once they were made anew, as guards of the first ones failed.
+        anew: time and state at which they are made anew, as guards of the first ones failed.
     """
 
     programs: dict[int, Any] = attrs.field(factory=dict)
     reason: str = ""
     is_requested: bool = False
-    is_anew: bool = False
+    anew: "tuple[float, Floats] | None" = None
 
 
 #: Seconds that general code has taken, by a rough description of the scene; records by identity.
@@ -68,23 +66,22 @@ class ChangeOver:
         model = evaluator.model
         self._evaluator, self._varied = evaluator, varied
         self._name: str | None = None
-        #: Ends the programs of a call before its end, where constants of theirs change.
-        self.stop: Callable[[], None] = lambda: None
         #: Constants of the programs: where they stand, and their numbers.
         self._parts: list[tuple[Floats, Integers]] = []
-        self._numbers: Floats = np.zeros(0)
+        self._constants = b""
         self._key = evaluator.method, model.body_count, model.row_count, len(evaluator.loop_groups)
         self._is_open = jit_is_on() and 0 < model.body_count <= MOST_BODIES
 
-    def advance(self, integration: Any, budget: int) -> None:
-        """``integration.advance``, by programs where there are some."""
+    def during(self, integration: Any, run: "Callable[[], None]") -> None:
+        """Advance an integration, which ``run`` does, by programs where there are some.
+
+        What else it does changes no number of the scene but inputs.
+        """
+
+        work = integration.work
 
         def counts() -> tuple[int, int]:
-            now = integration.statistics
-            return now.rhs, now.projections
-
-        def run() -> None:
-            integration.advance(budget)
+            return work.rhs_count, work.projection_count
 
         if self._is_open and integration.takes_programs:
             addresses = integration.functions.addresses
@@ -114,7 +111,7 @@ class ChangeOver:
         """
         record = self._record_of(start)
         # taken at once, as another thread may give them up
-        programs = {} if record is None else dict(record.programs)
+        programs = None if record is None else record.programs
         if record is None or not programs:
             if needs_programs:
                 return
@@ -123,20 +120,19 @@ class ChangeOver:
             _spent[self._key] = _spent.get(self._key, 0.0) + time.perf_counter() - clock
             return
         general, done = addresses.copy(), counts()
-        failures = {k: program.failures() for k, program in programs.items()}
-        for k in programs.keys() & MOST_FAILURES.keys():
-            addresses[k] = programs[k].address
-        self.stop = lambda: np.copyto(addresses, general)
+        replaced = [(k, programs[k]) for k in MOST_FAILURES if k in programs]
+        failures = [program.failures() for _, program in replaced]
+        for k, program in replaced:
+            addresses[k] = program.address
         try:
             run()
         finally:
-            self.stop()
+            addresses[:] = general
         rhs, projections = (after - before for after, before in zip(counts(), done, strict=True))
-        for k in (WATCH, PROJECT, RHS):
-            if k in programs:
-                most = MOST_FAILURES[k] * (projections if k == PROJECT else rhs)
-                if programs[k].failures() - failures[k] > 1 + most:
-                    _give_up(record, programs[k], k)
+        for (k, program), before in zip(replaced, failures, strict=True):
+            most = MOST_FAILURES[k] * (projections if k == PROJECT else rhs)
+            if program.failures() - before > 1 + most:
+                _give_up(record, program, k, start())
 
     def _record_of(self, start: "Start") -> Record | None:
         """The record, where this call may run its programs."""
@@ -148,11 +144,14 @@ class ChangeOver:
             if not scene_program.is_optimised(self._evaluator):
                 return None
             self._parts = scene_program.constant_parts(self._evaluator, self._varied)
-            self._numbers = scene_program.constant_numbers(self._parts)
-            size = start()[1].size
-            self._name = scene_program.name_of(self._evaluator, size, self._numbers, self._varied)
-        if not np.array_equal(self._numbers, scene_program.constant_numbers(self._parts)):
+            self._constants = scene_program.constant_numbers(self._parts)
+            of = start()[1].size, self._constants, self._varied
+            self._name = scene_program.name_of(self._evaluator, *of)
+        if self._constants != scene_program.constant_numbers(self._parts):
             return None
+        record = _records.get(self._name)
+        if record is not None and record.programs:
+            return record
         with _making:
             record = _records.setdefault(self._name, Record())
             if not (record.programs or record.reason):
@@ -167,13 +166,13 @@ class ChangeOver:
         from dap3d_core.formulations.programs import scene_program
 
         evaluator, path = self._evaluator, scene_program.path_of(name)
-        if path is not None and record.is_anew and not record.is_requested:
+        if path is not None and record.anew is not None and not record.is_requested:
             path.unlink(missing_ok=True)
         stored = None if path is None else objects.read_object(path)
         if stored is None:
             if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
                 return
-            text, written = scene_program.write_programs(evaluator, name, *start(), self._varied)
+            text, written = scene_program.write_programs(evaluator, name, *(record.anew or start()), self._varied)
             if BESIDE and path is not None and optimiser.request(text, written, path):
                 record.is_requested = True
                 return
@@ -181,10 +180,10 @@ class ChangeOver:
         record.programs = scene_program.load_programs(evaluator, name, *stored)
 
 
-def _give_up(record: Record, program: Any, k: int) -> None:
+def _give_up(record: Record, program: Any, k: int, place: "tuple[float, Floats]") -> None:
     """Take other code from here on where guards of a program fail too often.
 
-    First programs of a state as they are now, whose branches may be others: those of a
+    First programs made at a state as they are now, whose branches may be others: those of a
     projection follow from the tolerances. Then general code; of a projection the general one
     behind a right-hand side of its own: one alone would read what programs of right-hand sides do
     not leave.
@@ -193,8 +192,8 @@ def _give_up(record: Record, program: Any, k: int) -> None:
         if record.programs.get(k) is not program:  # another thread was faster
             return
         others = {q: one for q, one in record.programs.items() if q != k}
-        if not record.is_anew:
-            record.programs, record.is_anew, record.is_requested = {}, True, False
+        if record.anew is None:
+            record.programs, record.anew, record.is_requested = {}, place, False
         elif k == RHS:
             record.programs, record.reason = {}, "guards fail: branches depend on the motion"
         else:

@@ -178,7 +178,7 @@ def _items(tracer: StraightLine, base: str, numbers: Floats) -> Any:
     )
 
 
-def name_of(evaluator: Evaluator, size: int, numbers: Floats, varied: Varied = None) -> str:
+def name_of(evaluator: Evaluator, size: int, numbers: bytes, varied: Varied = None) -> str:
     """Name of the programs of an evaluator: a digest of all that decides them.
 
     Args:
@@ -187,7 +187,7 @@ def name_of(evaluator: Evaluator, size: int, numbers: Floats, varied: Varied = N
         numbers: constants of the programs.
         varied: as of ``constants``.
     """
-    parts: list[str | bytes] = [f"{size} {evaluator.model.input_rows}", numbers.tobytes()]
+    parts: list[str | bytes] = [f"{size} {evaluator.model.input_rows}", numbers]
     parts += [entry.unit.name for entry in _entries(evaluator)]
     for name, array in evaluator.system.walk():
         parts += [f"{name} {array.shape}", b"" if array.dtype == float else array.tobytes()]
@@ -202,10 +202,9 @@ def constant_parts(evaluator: Evaluator, varied: Varied = None) -> list[tuple[Fl
     return [(arrays[name].reshape(-1), places) for name, places in constants(evaluator, varied)]
 
 
-def constant_numbers(parts: list[tuple[Floats, Integers]]) -> Floats:
+def constant_numbers(parts: list[tuple[Floats, Integers]]) -> bytes:
     """The numbers that are constants of programs, as they are now."""
-    found: Floats = np.concatenate([array[places] for array, places in parts])
-    return found
+    return b"".join([array.take(places).tobytes() for array, places in parts])
 
 
 def is_optimised(evaluator: Evaluator) -> bool:

@@ -115,6 +115,8 @@ class CompiledBatch:
         self._programs: tuple[Any, ChangeOver] | None = None
         self._lanes: tuple[Any, LaneBatch | str] | None = None
         self._calls, self._point_calls = 0.0, USUAL_CALLS
+        #: Numbers of the model, and the places of those that have differed in a point.
+        self._numbers, self._varied = numbers_of(evaluator), np.zeros(0, dtype=np.int64)
         self.run(np.zeros((0, 0)), np.zeros(0, dtype=np.int64), y0[None][:0])  # to compile it
 
     @property
@@ -122,15 +124,15 @@ class CompiledBatch:
         """What ran points in lanes of vectors; in words why none; None where none was needed."""
         return None if self._lanes is None else self._lanes[1]
 
-    def _lanes_for(self, places: Integers) -> "LaneBatch | str":
+    def _lanes_for(self) -> "LaneBatch | str":
         """What runs many points in lanes; in words why they are run one by one."""
         from dap3d_core.study.batch.lanes import LaneBatch, reason_against, wide_rates
 
-        key = id(self.evaluator.system), places.tobytes()
+        key = id(self.evaluator.system), self._varied.tobytes()
         if self._lanes is None or self._lanes[0] != key:
             found: LaneBatch | str = reason_against(self.evaluator, self._place[1].size)
             if not found:
-                varied = varied_at(self.evaluator.system, places)
+                varied = varied_at(self.evaluator.system, self._varied)
                 wide = wide_rates(self.evaluator, *self._place, varied)
                 found = (
                     wide
@@ -145,11 +147,13 @@ class CompiledBatch:
         """Time and state where branches of programs are decided."""
         return self.integration.t, self.integration.trial
 
-    def _programs_for(self, places: Integers) -> ChangeOver:
-        """Programs of the scene in which the numbers at these places are not constants."""
-        key = id(self.evaluator.system), places.tobytes()
+    def _programs_for(self, table: Floats, places: Integers) -> ChangeOver:
+        """Programs of the scene in which numbers that differ from point to point are loaded."""
+        differ = places[np.any(table != self._numbers[places], axis=0)]
+        self._varied = np.union1d(self._varied, differ)
+        key = id(self.evaluator.system), self._varied.tobytes()
         if self._programs is None or self._programs[0] != key:
-            varied = varied_at(self.evaluator.system, places)
+            varied = varied_at(self.evaluator.system, self._varied)
             self._programs = key, ChangeOver(self.evaluator, varied)
         return self._programs[1]
 
@@ -197,7 +201,7 @@ class CompiledBatch:
         )
         problem = (self.evaluator.functions, _drives(), self._begin)
         system, loops = self.evaluator.system, self.evaluator.loops
-        programs = self._programs_for(points.places)
+        programs = self._programs_for(points.table, points.places)
 
         def run(call: Callable[[], Any], *, needs_programs: bool = False) -> None:
             with np.errstate(all="ignore"):  # as compiled code does
@@ -216,7 +220,7 @@ class CompiledBatch:
         if start != driver.CORRECT_ONLY and self.takes_lanes and self._is_long(count):
             from dap3d_core.formulations.programs.scene_program import reads_rates
 
-            lanes = self._lanes_for(points.places)
+            lanes = self._lanes_for()
             if not isinstance(lanes, str) and lanes.is_ready:
                 run(lambda: lanes.run(points, CALL), needs_programs=reads_rates(self.evaluator))
         while True:

@@ -94,10 +94,10 @@ def test_numbers_that_change_in_a_run_stop_the_program(at_once):
 
     integration.advance = advanced
     programs = ChangeOver(evaluator)
-    programs.advance(integration, 1)
+    programs.during(integration, lambda: integration.advance(1))
     assert np.array_equal(addresses, before)
     evaluator.system.par[0] += 1e-3
-    programs.advance(integration, 1)
+    programs.during(integration, lambda: integration.advance(1))
     assert seen == [False, True]
 
 
@@ -107,7 +107,7 @@ def test_a_program_whose_guards_fail_is_given_up(at_once, monkeypatch):
     for _ in range(2):  # the first time they are made anew
         assert_same(dap.simulate("pen1", **SETTINGS), general("pen1"))
     [record] = at_once.values()
-    assert record.is_anew
+    assert record.anew is not None
     assert "guards" in record.reason
     assert not record.programs
 
@@ -116,9 +116,9 @@ def test_two_threads_give_up_one_projection_once():
     """What reads the right-hand side's factors never stands behind a program of that."""
     rhs, project, behind = ("rhs",), ("project",), ("behind",)
     programs = {RHS: rhs, PROJECT: project, BEHIND: behind}
-    record = change_over.Record(programs, is_anew=True)
+    record = change_over.Record(programs, anew=(0.0, np.zeros(1)))
     for _ in range(2):
-        change_over._give_up(record, project, PROJECT)
+        change_over._give_up(record, project, PROJECT, record.anew)
     assert record.programs == {RHS: rhs, PROJECT: behind}
 
 
