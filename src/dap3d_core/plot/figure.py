@@ -6,11 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from dap3d_core.plot.curves import curve_picture
 from dap3d_core.plot.figure_file import check_suffix, save_figure
-from dap3d_core.plot.style import WIDTH, Picture
+from dap3d_core.plot.style import HEIGHT, LETTERS, PALETTE, WIDTH, Picture, style_axes
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, ResultError
 
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
         Result | Mapping[str, Result] | Fit | Linearization | ModesOver | EquilibriumPath
         | xarray.Dataset
     )  # fmt: skip
+    from dap3d_core.simulation.linearization.linearization import Linearization
 
 #: Backends that matplotlib falls back on where it cannot open windows.
 FILE_BACKENDS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
@@ -35,6 +38,10 @@ NO_WINDOW = (
     "cannot open a window: there is no display, or no package that opens windows (pip install "
     "PyQt6); -o writes a file instead"
 )
+#: Eigenvalues whose numbers are written beside them.
+MOST_LABELS = 12
+#: A real part below this part of the largest magnitude is drawn as zero.
+ROUNDING = 1e-9
 
 
 def picture_of(
@@ -78,7 +85,6 @@ def picture_of(
     if hasattr(result, "mode_eigenvalues"):
         if names:
             raise ValueError("of a linearisation the eigenvalues are drawn: leave names out")
-        from dap3d_core.plot.eigenvalues import EigenvaluePicture
 
         return EigenvaluePicture(cast("Linearization", result))
     from dap3d_core.plot.fit import fit_picture
@@ -190,3 +196,50 @@ def show_plot(
     picture.draw(figure)
     pyplot.show()
     pyplot.close(figure)
+
+
+class EigenvaluePicture(Picture):
+    """The eigenvalues of a linearisation.
+
+    Modes have their numbers; those that grow are drawn as crosses, to the right of the axis.
+    """
+
+    def __init__(self, linearization: "Linearization") -> None:
+        self.linearization = linearization
+
+    @property
+    def height(self) -> float:
+        """A suitable height of the figure, inches."""
+        return HEIGHT
+
+    def draw(self, figure: Figure) -> list[Axes]:
+        """Draw on an empty figure."""
+        return [self.draw_on(figure.add_subplot())]
+
+    def draw_on(self, ax: Axes) -> Axes:
+        """Draw on axes of the user."""
+        return draw_eigenvalues(ax, self.linearization)
+
+
+def draw_eigenvalues(ax: Axes, linearization: "Linearization") -> Axes:
+    """Draw the eigenvalues of a linearisation on axes; returns these."""
+    values = linearization.eigenvalues
+    size = float(np.max(np.abs(values), initial=0.0)) or 1.0
+    real = np.where(np.abs(values.real) > ROUNDING * size, values.real, 0.0)
+    grows = real > 0.0
+    ax.axvline(0.0, color="0.6", linewidth=0.8)
+    ax.plot(real[~grows], values.imag[~grows], "o", color=PALETTE[0], markersize=4.5)
+    ax.plot(real[grows], values.imag[grows], "X", color=PALETTE[1], markersize=5.5)
+    modes = linearization.mode_eigenvalues
+    for k, value in enumerate(modes[:MOST_LABELS]):
+        x = value.real if abs(value.real) > ROUNDING * size else 0.0
+        if abs(value) > 0.0:
+            ax.annotate(str(k + 1), (x, value.imag), xytext=(4, 3), textcoords="offset points",
+                        fontsize=LETTERS)  # fmt: skip
+    if not np.any(real):
+        ax.set_xlim(-size, size)
+    ax.margins(0.12)
+    ax.set_xlabel("real part [1/s]", fontsize=LETTERS)
+    ax.set_ylabel("imaginary part [rad/s]", fontsize=LETTERS)
+    style_axes(ax)
+    return ax

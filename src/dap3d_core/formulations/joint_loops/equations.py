@@ -32,7 +32,18 @@ from dap3d_core.formulations.joint.multipliers import joint_multipliers
 from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
-from dap3d_core.formulations.joint_loops.layout import PART_OF_ROW
+from dap3d_core.formulations.joint_loops.layout import (
+    CUT_WIDTH,
+    END_BLOCK,
+    END_BODY,
+    END_WIDTH,
+    FIRST,
+    FIRST_END,
+    FIRST_ROW,
+    LAST_END,
+    PART_OF_ROW,
+    ROW_COUNT,
+)
 from dap3d_core.formulations.joint_loops.loads import (
     carry_rows,
     lacking_accelerations,
@@ -40,13 +51,10 @@ from dap3d_core.formulations.joint_loops.loads import (
     multiply_loads,
     push_freedoms,
 )
-from dap3d_core.formulations.joint_loops.multipliers import (
-    add_kept_reactions,
-    power_of_kept_drivers,
-)
 from dap3d_core.formulations.joint_loops.profile import factor_profile, solve_profile, weigh_rows
 from dap3d_core.formulations.joint_loops.projection import factorise_anyway, project_onto_kept
 from dap3d_core.formulations.lsq import minimum_norm_multipliers
+from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled
 
 
@@ -132,3 +140,35 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
                 system.total[k] = system.multipliers[k]
             minimum_norm_multipliers(system)
         report_multipliers(system, out)
+
+
+@compiled
+def add_kept_reactions(system: System, left: Floats) -> None:
+    """-lambda of the kept rows into ``multipliers``, and what is left for the joints of the tree.
+
+    left: as of ``joint_multipliers``.
+    """
+    kept = system.tree.kept
+    cuts, ends, D = pointer(kept.cuts), pointer(kept.ends), pointer(system.D)
+    for q in range(kept.cuts.shape[0]):
+        c = CUT_WIDTH * q
+        rows, first, place = cuts[c + ROW_COUNT], cuts[c + FIRST], cuts[c + FIRST_ROW]
+        for r in range(rows):
+            system.multipliers[place + r] = -kept.multipliers[first + r]
+        for e in range(cuts[c + FIRST_END], cuts[c + LAST_END]):
+            b = 6 * ends[END_WIDTH * e + END_BODY]
+            for r in range(rows):
+                d, x = ends[END_WIDTH * e + END_BLOCK] + 6 * r, kept.multipliers[first + r]
+                for i in range(6):
+                    left[b + i] -= D[d + i] * x
+
+
+@compiled
+def power_of_kept_drivers(system: System) -> float:
+    """Power of the reactions of kept rows: only those that move do work."""
+    kept, power = system.tree.kept, 0.0
+    for q in range(kept.cuts.shape[0]):
+        first, place = kept.cuts[q, FIRST], kept.cuts[q, FIRST_ROW]
+        for r in range(kept.cuts[q, ROW_COUNT]):
+            power += kept.multipliers[first + r] * system.nu[place + r]
+    return power

@@ -9,8 +9,14 @@ from dap3d_core.result import INFORMATION
 from dap3d_core.simulation.equilibrium.notes import assumptions, failure, findings
 from dap3d_core.simulation.equilibrium.search import Outcome, Search, search_equilibrium
 from dap3d_core.simulation.equilibrium.stability import Stability, stability_of
-from dap3d_core.simulation.equilibrium.statics import Statics
-from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.equilibrium.states_at_rest import (
+    MOST_STEPS,
+    OPEN,
+    SETTLED,
+    unsettled_part,
+)
+from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
+from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.initial.start_state import StartState
 
 #: Singular values of the Jacobian below this part are left out of the least multipliers.
@@ -99,7 +105,6 @@ def _with_states(evaluator: Evaluator, search: Search) -> Search:
     Raises:
         SimulationError: states do not come to rest; names them.
     """
-    from dap3d_core.simulation.equilibrium.balanced_states import find_together
     from dap3d_core.simulation.equilibrium.states_at_rest import moving_states
 
     moving = moving_states(evaluator, 0.0, search.pose.u)
@@ -125,3 +130,43 @@ def start_at_rest(evaluator: Evaluator, u: Floats) -> StartState:
     steps = rest.search.steps
     note = f"{INFORMATION}the run starts at an equilibrium, found in {steps} steps"
     return StartState(rest.u, rest.angles, (note, *rest.notes), states=rest.states)
+
+
+def find_together(statics: Statics, pose: StaticPose) -> StaticPose | None:
+    """The pose at which forces and rates vanish, by Newton's method; None where it finds none."""
+    evaluator, kept, before = statics.evaluator, statics.evaluator.states, np.inf
+    for _ in range(MOST_STEPS):
+        fixed = statics.fixed_tangent(pose)
+        own = fixed.states
+        assert own is not None
+        left = max(pose.residual, unsettled_part(own, evaluator.states))
+        if left <= SETTLED:
+            return pose
+        if not left < 1e3 * before:
+            break
+        before = min(before, left)
+        basis = statics.scale[:, None] * pose.free
+        matrix = np.block(
+            [[-statics.reduced(fixed.stiffness, pose), basis.T @ own.force_by_states.toarray()],
+             [own.rate_by_displacement @ basis, own.rate_by_states.toarray()]]
+        )  # fmt: skip
+        step = _least_solution(matrix, -np.concatenate([pose.unbalanced, own.rates]))
+        evaluator.states = evaluator.states + step[pose.free.shape[1] :]
+        try:
+            moved = statics.moved(pose.u, pose.free @ step[: pose.free.shape[1]])
+            pose = statics.at(statics.closed(moved))
+        except (AssemblyError, np.linalg.LinAlgError):
+            break
+    evaluator.states = kept
+    return None
+
+
+def _least_solution(matrix: Floats, side: Floats) -> Floats:
+    """The least solution of equations of different units, columns and rows scaled."""
+    rows = np.max(np.abs(matrix), axis=1, initial=0.0)
+    rows[rows == 0.0] = 1.0
+    columns = np.max(np.abs(matrix / rows[:, None]), axis=0, initial=0.0)
+    columns[columns == 0.0] = 1.0
+    scaled = matrix / rows[:, None] / columns
+    found: Floats = np.linalg.lstsq(scaled, side / rows, rcond=OPEN)[0] / columns
+    return found

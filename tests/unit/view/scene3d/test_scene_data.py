@@ -6,12 +6,11 @@ from unit.view.test_page import numbers, shaped
 
 import dap3d_core as dap
 from dap3d_core.model.rotations import to_global
-from dap3d_core.view.scene3d.bodies import inertia_ellipsoid
 from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import CYCLE, chains_of, colors
 from dap3d_core.view.scene3d.primitives import turned_to
 from dap3d_core.view.scene3d.sampled_motion import Extent, instants_to_show
-from dap3d_core.view.scene3d.scene_data import MODEST
+from dap3d_core.view.scene3d.scene_data import MODEST, inertia_ellipsoid
 
 
 @pytest.fixture(scope="module")
