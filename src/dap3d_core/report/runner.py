@@ -29,7 +29,7 @@ from dap3d_core.report.settings_ladder import (
     ladder_of_steps,
 )
 from dap3d_core.report.timing import Announce, Bench, Progress
-from dap3d_core.result import Result
+from dap3d_core.result import Computed, Result
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
 from dap3d_core.simulation import report_times
 
@@ -214,7 +214,7 @@ class _Measurement:
             self._measure(reference)
             self._time()
         except BaseException as error:
-            error.report = self._report(header, "interrupted")  # type: ignore[attr-defined]
+            Computed(report=self._report(header, "interrupted")).attach(error)
             raise
         return self._report(header, "done")
 

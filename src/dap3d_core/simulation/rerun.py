@@ -9,7 +9,7 @@ import numpy as np
 
 from dap3d_core.interface import PluginError
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import Result, ResultError, current_versions
+from dap3d_core.result import Computed, Result, ResultError, current_versions
 from dap3d_core.result.arrays import COLUMNS, Arrays
 from dap3d_core.result.model_summary import is_summary_of
 from dap3d_core.scene import SceneError, load, parse
@@ -104,7 +104,7 @@ def rerun(
     try:
         again = simulate(compiled, watch=look, announce=announce, **settings)
     except (_EnoughError, SimulationError) as error:
-        again = error.result  # type: ignore[union-attr]
+        again = Computed.of(error).result
     instants, differences = _compared(first, again)
     versions = {
         name: (number, current_versions().get(name, "none"))

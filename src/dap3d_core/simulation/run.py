@@ -13,7 +13,7 @@ from dap3d_core.integrators.added import integrator_named
 from dap3d_core.integrators.stepping.singular_poses import begin_singular
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.result import INFORMATION, Result, ResultError
+from dap3d_core.result import INFORMATION, Computed, Result, ResultError
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.handover import cannot_cross, crossing_notes, hand_over, stiffness_notes
@@ -123,13 +123,13 @@ class Run(RunState):
     def _interrupt(self, error: BaseException) -> None:
         """Keep what was computed until an exception ended the integration."""
         if isinstance(error, ResultError):  # the disk: what is there stays as it is
-            error.part = self.recorder.part  # type: ignore[attr-defined]
-            if self.checkpoint_writer is not None and self.checkpoint_writer.has_written:
-                error.checkpoint = self.checkpoint_writer.path  # type: ignore[attr-defined]
+            writer = self.checkpoint_writer
+            checkpoint = writer.path if writer is not None and writer.has_written else None
+            Computed(checkpoint=checkpoint, part=self.recorder.part).attach(error)
             return
         self._take_rows()
         status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
-        error.result = self._result(status)  # type: ignore[attr-defined]
+        Computed(self._result(status)).attach(error)
         if self.checkpoint_writer is not None and self.recorder.count:
             self.checkpoint_writer.leave(error)
         elif self.checkpoint_writer is not None:

@@ -87,10 +87,13 @@ def _judge(error: BaseException) -> tuple[int, str]:
     if isinstance(error, FileNotFoundError) and _folder_is_gone():
         text = "the current folder no longer exists; change to another one (cd)"
         return exit_codes.REFUSED, text
-    if part := getattr(error, "part", None):  # a disk that filled up during a run
-        text = f"{error}; what was computed until then is in {part}"
-        if checkpoint := getattr(error, "checkpoint", None):
-            text += f"; once there is room, dap3d resume {checkpoint} continues the run"
+    from dap3d_core.result import Computed
+
+    computed = Computed.of(error)
+    if computed.part:  # a disk that filled up during a run
+        text = f"{error}; what was computed until then is in {computed.part}"
+        if computed.checkpoint:
+            text += f"; once there is room, dap3d resume {computed.checkpoint} continues the run"
         return exit_codes.PARTIAL, text
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""

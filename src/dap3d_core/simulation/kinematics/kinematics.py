@@ -11,7 +11,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
+from dap3d_core.result import INFORMATION, Computed, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import arrays_of
 from dap3d_core.result.file.atomic_write import check_target, check_utf8
 from dap3d_core.result.model_summary import summary_of
@@ -151,7 +151,7 @@ class _Kinematics:
             part = self.result(status, error)
             if part is not None and output is not None:
                 part.save(output, force=force)
-            error.result = part  # type: ignore[attr-defined]
+            Computed(part).attach(error)
             raise
         assert result is not None
         if output is not None:

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from dap3d_core.result import INFORMATION, Result, estimated_error
+from dap3d_core.result import INFORMATION, Computed, Result, estimated_error
 from dap3d_core.result.post.global_error import MEANINGLESS
 from dap3d_core.scene import SceneError, Simulation
 from dap3d_core.scene.validate.settings import SMALLEST_RTOL
@@ -119,7 +119,7 @@ def add_error(
         return
     except BaseException as error:
         _amend(result, output, "the estimate of its error was ended early and left out")
-        error.result = result  # type: ignore[attr-defined]
+        Computed(result).attach(error)
         raise
     if not _same_instants(result, second):
         _amend(result, output, f"{none}: a second run at {words} ended elsewhere, by its events")
