@@ -69,7 +69,7 @@ def compiled_for(
         settings = attrs.evolve(scene.scene.simulation, method=method)
         check_simulation(settings, scene.model.body_names)
     other = method not in (None, scene.requested_method)
-    if other and scene.choice(str(method))[0] != scene.method:
+    if other and scene.select_method(str(method))[0] != scene.method:
         words = f"the model was compiled for method {scene.method}; compile it for {method}"
         raise SimulationError(words)
     return scene.for_integrator(integrator or str(scene.scene.simulation.integrator))
