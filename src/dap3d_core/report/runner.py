@@ -14,10 +14,10 @@ from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.integrators import INTEGRATORS
 from dap3d_core.registry.arguments import checked
 from dap3d_core.report.error_norms import PARTED, final_position_error, trajectory_error
+from dap3d_core.report.measurement import Failed, MeasuredRun, measures_of
 from dap3d_core.report.recommend import front
 from dap3d_core.report.reference import Reference, find_reference
 from dap3d_core.report.report import Report
-from dap3d_core.report.run import Failed, MeasuredRun, measures_of
 from dap3d_core.report.settings_ladder import (
     ADAPTIVE,
     QUICK_TOLERANCES,

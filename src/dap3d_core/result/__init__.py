@@ -1,4 +1,4 @@
-"""The result floor: what a run left behind, on disk and in memory; the post-processor's arrays."""
+"""The result layer: what a run left behind, on disk and in memory; the post-processor's arrays."""
 
 from dap3d_core.result.errors import Computed, ResultError, UnknownNameError
 from dap3d_core.result.event_record import EventRecord

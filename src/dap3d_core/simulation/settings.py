@@ -11,7 +11,7 @@ from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators import EXPLICIT, Integrator
-from dap3d_core.integrators.added import integrator_named
+from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene import (
     METHODS,
@@ -75,7 +75,7 @@ def compiled_for(
     return scene.for_integrator(integrator or str(scene.scene.simulation.integrator))
 
 
-def compiled_exactly(
+def compile_exact(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     allow_code: bool,
     announce: Callable[[str], None] | None = None,

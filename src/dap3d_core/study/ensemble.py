@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dap3d_core.integrators.added import integrator_named
+from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import INFORMATION, Computed, Result
 from dap3d_core.scene import Scene, SceneError

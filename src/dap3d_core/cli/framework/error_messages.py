@@ -6,7 +6,7 @@ import sys
 import traceback
 from typing import Any
 
-from dap3d_core.cli.console.console import Terminal, plain, print_json, stderr
+from dap3d_core.cli.console.console import Terminal, json_value, print_json, stderr
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.memory import address_space, is_used_up
 from dap3d_core.cli.process.streams import leave_stderr
@@ -48,7 +48,7 @@ def mistakes_of(error: BaseException) -> list[dict[str, Any]]:
     names = ("file", "line", "key", "value", "what", "nearest", "remedy")
     return [
         {name: getattr(m, name) for name in names}
-        | {"value": None if m.value is MISSING else plain(m.value)}
+        | {"value": None if m.value is MISSING else json_value(m.value)}
         for m in error.mistakes
     ]
 

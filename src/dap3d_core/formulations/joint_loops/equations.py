@@ -83,7 +83,7 @@ from dap3d_core.formulations.joint_loops.profile import (
     factor_profile,
     pivot_lengths,
     solve_profile,
-    weigh_rows,
+    weigh_kept_rows,
 )
 from dap3d_core.formulations.lsq import minimum_norm_multipliers
 from dap3d_core.kernels.runtime.array_struct import pointer
@@ -120,7 +120,7 @@ def factorise(system: System) -> None:
     """Factors of the kept rows' matrix, of the inertias in ``tree.work``."""
     carry_rows(system)
     multiply_loads(system)
-    weigh_rows(system, system.tree.kept.settings[PART_OF_ROW])
+    weigh_kept_rows(system, system.tree.kept.settings[PART_OF_ROW])
     factor_profile(system)
 
 
@@ -221,11 +221,11 @@ def factorise_anyway(system: System) -> bool:
     carry_rows(system)
     multiply_loads(system)
     part = system.tree.kept.settings[PART_OF_ROW]
-    weigh_rows(system, part)
+    weigh_kept_rows(system, part)
     if factor_profile(system):
         return True
     multiply_loads(system)
-    weigh_rows(system, PART)
+    weigh_kept_rows(system, PART)
     factor_profile(system)
     return False
 
@@ -287,7 +287,7 @@ def have_come_to_hold(system: System) -> bool:
     for j in range(kept.profile.shape[0]):
         kept.solution[j] = kept.matrix[kept.profile[j, PLACE] + j]
     multiply_loads(system)
-    weigh_rows(system, kept.settings[PART_OF_ROW] / LESS)
+    weigh_kept_rows(system, kept.settings[PART_OF_ROW] / LESS)
     factor_profile(system)
     for j in range(kept.profile.shape[0]):
         inverse = kept.matrix[kept.profile[j, PLACE] + j]

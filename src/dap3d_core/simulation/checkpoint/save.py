@@ -61,7 +61,7 @@ class CheckpointWriter:
         if math.isfinite(self._seconds):
             self._save()
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Write a checkpoint if it is time."""
         if time.perf_counter() >= self._next:
             self._save()

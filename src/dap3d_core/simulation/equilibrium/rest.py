@@ -36,7 +36,7 @@ ALONG_AXIS = 0.999
 
 
 @attrs.frozen(eq=False)
-class Rest:
+class EquilibriumSolution:
     """An equilibrium as it was found.
 
     Attributes:
@@ -65,7 +65,7 @@ def find_rest(
     u: Floats,
     angles: Floats | None = None,
     states: Floats | None = None,
-) -> Rest:
+) -> EquilibriumSolution:
     """The equilibrium that a model comes to from a state u (13 n,) on the constraints.
 
     Args:
@@ -87,7 +87,7 @@ def find_rest(
     stability = stability_of(statics, pose)
     rows = evaluator.rows(0.0, pose.u)
     multipliers, unbalanced = least_multipliers(statics, pose.u)
-    return Rest(
+    return EquilibriumSolution(
         pose.u,
         evaluator.counted_angles(0.0, pose.u),
         evaluator.states.copy(),
@@ -124,7 +124,7 @@ def _with_states(evaluator: Evaluator, search: Search) -> Search:
         return search
     statics = Statics(evaluator)
     statics.settles = False
-    found = find_together(statics, search.pose)
+    found = solve_coupled(statics, search.pose)
     if found is None:
         names = ", ".join(f"{state.element}.{state.name}" for state in moving)
         raise SimulationError(f"no equilibrium: the rate of {names} vanishes neither for any "
@@ -144,7 +144,7 @@ def start_at_rest(evaluator: Evaluator, u: Floats) -> StartState:
     return StartState(rest.u, rest.angles, (note, *rest.notes), states=rest.states)
 
 
-def find_together(statics: Statics, pose: StaticPose) -> StaticPose | None:
+def solve_coupled(statics: Statics, pose: StaticPose) -> StaticPose | None:
     """The pose at which forces and rates vanish, by Newton's method; None where it finds none."""
     evaluator, kept, before = statics.evaluator, statics.evaluator.states, np.inf
     for _ in range(MOST_STEPS):

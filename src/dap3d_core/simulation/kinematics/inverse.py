@@ -23,7 +23,7 @@ from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.failure.negative_reactions import Pulling
+from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
 from dap3d_core.simulation.kinematics.driver_coordinate import driver_names
 from dap3d_core.simulation.kinematics.kinematics import check_output
 from dap3d_core.simulation.kinematics.motion_data import (
@@ -39,7 +39,7 @@ from dap3d_core.simulation.kinematics.pose_equations import (
     required_forces,
 )
 from dap3d_core.simulation.redundancy.freedoms import motion_words
-from dap3d_core.simulation.settings import compiled_exactly
+from dap3d_core.simulation.settings import compile_exact
 
 Progress = Callable[[float, float], None]
 
@@ -247,7 +247,7 @@ def inverse(
     """
     check_output(output, force=force)
     given = read_motion(motion)
-    compiled = compiled_exactly(scene, allow_code, announce)
+    compiled = compile_exact(scene, allow_code, announce)
     with compiled.borrow_evaluator() as evaluator:
         result = _solved(compiled, evaluator, given, actuators, progress)
     if output is not None:
@@ -311,8 +311,8 @@ def _solved(
         np.tile(evaluator.states, (len(motion.t), 1)),
         np.tile(model.input_values, (len(motion.t), 1)),
     )  # fmt: skip
-    pulling = Pulling(model)
-    pulling.look(arrays)
+    pulling = UnilateralMonitor(model)
+    pulling.update(arrays)
     notes = [*compiled.notes, *misfit_notes(motion.misfit), *_notes(evaluator, chosen, forces)]
     notes += held_states(model)
     about = RunMetadata(

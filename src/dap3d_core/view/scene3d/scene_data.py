@@ -25,8 +25,8 @@ from dap3d_core.view.scene3d.primitives import (
     Span,
     ball,
     bar,
+    floats_of,
     pack,
-    plain,
     rod,
     turned_to,
 )
@@ -211,7 +211,7 @@ def attachment_points(
     """
     attached: list[list[Point]] = [[] for _ in range(summary.body_count + 1)]
     for body, at in zip(summary.point_body, summary.point_local, strict=True):
-        attached[int(body)].append(plain(at))
+        attached[int(body)].append(floats_of(at))
     for one in elements:
         for body, at in one.points.values():
             attached[body].append(at)
@@ -258,7 +258,7 @@ def inertia_ellipsoid(body: int, mass: float, Jp: Floats, most: float, color: st
     semi = np.maximum(semi, 0.05 * semi.max())
     semi *= min(1.0, most / semi.max())
     axes[:, 2] *= np.sign(np.linalg.det(axes))
-    return Mark("inertia", "sphere", body, ORIGIN, plain(semi), quaternion(axes), color, name)
+    return Mark("inertia", "sphere", body, ORIGIN, floats_of(semi), quaternion(axes), color, name)
 
 
 def bare_body(body: int, mass: float, Jp: Floats, most: float, color: str, name: str) -> list[Mark]:
@@ -268,7 +268,7 @@ def bare_body(body: int, mass: float, Jp: Floats, most: float, color: str, name:
     """
     ellipsoid = inertia_ellipsoid(body, mass, Jp, most, color, name)
     reach = max(ellipsoid.size)
-    arms = [plain(axis) for axis in 1.5 * reach * np.eye(3)]
+    arms = [floats_of(axis) for axis in 1.5 * reach * np.eye(3)]
     return [ellipsoid, *links(body, arms, 0.06 * reach, color, name)]
 
 
@@ -307,7 +307,7 @@ class Drawer:
 
     def start(self, body: int, point: Located) -> Located:
         """A point of another body at the first instant, in coordinates of a body."""
-        return body, plain(self.motion.point_in(body, self.motion.points([point])[0, 0]))
+        return body, floats_of(self.motion.point_in(body, self.motion.points([point])[0, 0]))
 
     def home(self, one: ElementGeometry, body: int) -> Located:
         """The point on a body of an element without points.
