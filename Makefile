@@ -91,15 +91,16 @@ newest: $(NEWEST_VENV)/.installed  ## the same part with the newest Python that 
 	else cat $<; fi
 
 # All checks run, also after one has failed; the last line says which.
-lint: $(VENV)/.installed-dev  ## format, lint, types, floors, circles, sizes
+lint: $(VENV)/.installed-dev  ## format, lint, types, layers, circles, sizes, words
 	@failed=""; \
 	check() { name="$$1"; shift; echo "-- $$name"; "$$@" || failed="$$failed $$name"; }; \
 	check format $(PYTHON) -m ruff format --check .; \
 	check ruff $(PYTHON) -m ruff check .; \
 	check mypy $(PYTHON) -m mypy; \
-	check floors $(VENV)/bin/lint-imports; \
+	check layers $(VENV)/bin/lint-imports; \
 	check circles $(PYTHON) tools/check_circles.py; \
 	check sizes $(PYTHON) tools/check_sizes.py; \
+	check words $(PYTHON) tools/check_words.py; \
 	if [ -n "$$failed" ]; then echo "lint failed:$$failed" >&2; exit 1; fi; \
 	echo "lint: all clean"
 

@@ -142,8 +142,8 @@ __all__ = [
 def __getattr__(name: str) -> Any:
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    floor, attribute = _HOMES[name]
-    value = getattr(import_module(f"dap3d_core.{floor}"), attribute)
+    layer, attribute = _HOMES[name]
+    value = getattr(import_module(f"dap3d_core.{layer}"), attribute)
     if name not in ("plot", "report", "view"):  # modules have the same names
         globals()[name] = value
     return value

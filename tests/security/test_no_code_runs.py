@@ -166,7 +166,7 @@ ALLOWED = {
     ("kernels/compiler/objects.py", "subprocess"): "Python itself, to try a named processor",
     ("registry/arguments.py", "eval"): "annotations of public functions",
     ("testing/packages.py", "subprocess"): "pytest, on the tests of packages, when it is asked for",
-    ("plot/film/encoding.py", "subprocess"): "ffmpeg, without a shell",
+    ("plot/film/animation.py", "subprocess"): "ffmpeg, without a shell",
     ("simulation/checkpoint/file.py", "allow_pickle"): "switched off",
     (
         "study/workers/dask_cluster.py",

@@ -11,7 +11,7 @@ from support.process import run
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.kernels.runtime.folder_security import distrust
+from dap3d_core.kernels.runtime.cache import distrust
 from dap3d_core.result import ResultError, check_target
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and owners as POSIX has them")

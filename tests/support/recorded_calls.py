@@ -33,7 +33,7 @@ from dap3d_core.kernels.runtime.array_struct import Arrays, pointer
 from dap3d_core.kernels.runtime.cache import Compiled
 from dap3d_core.kernels.runtime.function_lists import LOOP
 from dap3d_core.kernels.runtime.loop_modules import array_members
-from dap3d_core.kernels.runtime.source_digest import COMPILED_FLOORS
+from dap3d_core.kernels.runtime.source_digest import COMPILED_LAYERS
 from support.at_all_levels import all_made_of, function_of, made_of, same_bits
 
 #: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.
@@ -91,7 +91,7 @@ class Recorder:
 
 def all_compiled_functions():
     """The compiled functions of the core's floors."""
-    for floor in COMPILED_FLOORS:
+    for floor in COMPILED_LAYERS:
         package = importlib.import_module(f"dap3d_core.{floor}")
         for info in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
             module = importlib.import_module(info.name)

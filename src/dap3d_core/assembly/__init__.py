@@ -1,1 +1,1 @@
-"""The assembly floor: positions -> C, J; velocities -> nu, gamma; forces."""
+"""The assembly layer: positions -> C, J; velocities -> nu, gamma; forces."""

@@ -1,1 +1,1 @@
-"""The formats floor: models of other programs as scenes, and scenes as their models."""
+"""The formats layer: models of other programs as scenes, and scenes as their models."""

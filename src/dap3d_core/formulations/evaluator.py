@@ -49,7 +49,7 @@ from dap3d_core.model.state_layout import bodies_of, join, split, u_from_y, velo
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 IGNORE_FLOAT_ERRORS = np.errstate(all="ignore")
 #: How often the unknowns of joints are solved for at the start, by a few Newton passes each time.
-SEEKING = 12
+UNKNOWN_PASSES = 12
 
 
 class Evaluator:
@@ -222,7 +222,7 @@ class Evaluator:
                     self.system.par[place] = 0.0
                 self.system.par[places[0]] = group.numbers[:, layout.numbers[f"{name}{START}"][0]]
                 signs.append(places[-1])
-        for _ in range(SEEKING if signs else 0):
+        for _ in range(UNKNOWN_PASSES if signs else 0):
             self._count_own(0.0, self.model.u0)
         for place in signs:  # of what was found
             self.system.par[place] = 0.0

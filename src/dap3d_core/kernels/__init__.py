@@ -1,4 +1,4 @@
-"""The lowest floor: functions that kernels are written with, and the compiler.
+"""The lowest layer: functions that kernels are written with, and the compiler.
 
 A plugin imports only these functions; the compiler and its runtime serve the core.
 """

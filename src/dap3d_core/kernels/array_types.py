@@ -1,4 +1,4 @@
-"""Types of the arrays that all floors hand to each other."""
+"""Types of the arrays that all layers hand to each other."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -1,1 +1,1 @@
-"""The linear floor: block LDL^T of the saddle-point matrix in a static order; rank."""
+"""The linear layer: block LDL^T of the saddle-point matrix in a static order; rank."""

@@ -1,4 +1,4 @@
-"""The model floor: scene -> arrays, groups, row and column pointers."""
+"""The model layer: scene -> arrays, groups, row and column pointers."""
 
 from dap3d_core.model.groups import Group
 from dap3d_core.model.model import Model, ModelError, build_model

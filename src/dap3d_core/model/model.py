@@ -1,4 +1,4 @@
-"""The model: a checked scene as integers and arrays. No names are looked up after this floor.
+"""The model: a checked scene as integers and arrays. No names are looked up after this layer.
 
 Coordinates stand in the state u in the order of the manual: r, p of every body, then r_dot, omega
 of every body.

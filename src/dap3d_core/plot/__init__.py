@@ -1,4 +1,4 @@
-"""Plot floor: quantities of a result as curves, in a window or a file; its motion as a film."""
+"""Plot layer: quantities of a result as curves, in a window or a file; its motion as a film."""
 
 import os
 import sys

@@ -10,7 +10,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.plot.energies import drift_of, span_of
 from dap3d_core.plot.style import (
     DASHES,
     HEIGHT,
@@ -34,6 +33,8 @@ from dap3d_core.result.post.smooth_parts import cubic, smooth_parts
 POINTS = 600
 #: So many instants, or fewer, have a marker each.
 FEW = 50
+#: Quantities that are drawn on the scale of the energies of their run.
+ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
 
 
 def _shaped(t: Floats, x: Floats, cuts: Sequence[float]) -> Floats:
@@ -281,3 +282,31 @@ def _interrupted(parts: Sequence[tuple[Floats, Floats]]) -> tuple[Floats, Floats
     x, y = (np.concatenate([z for part in axis for z in (part, gap)][:-1])
             for axis in zip(*parts, strict=True))  # fmt: skip
     return x, y
+
+
+def span_of(result: Result, quantity: Quantity) -> float:
+    """The span, J, that an axis should have at least to show an energy of a run, else 0.
+
+    It is the larger of the changes of kinetic and potential energy. Where neither changes by more
+    than the ledger allows for errors, as of a body that turns freely, it is the kinetic energy.
+    """
+    if quantity.name not in ENERGIES:
+        return 0.0
+    kinetic, potential = result.energy.kinetic, result.energy.potential
+    exchanged, most = max(float(np.ptp(kinetic)), float(np.ptp(potential))), float(kinetic.max())
+    entry = result.ledger.get("energy")
+    errors = most * (entry.limit or 0.0) if entry else 0.0
+    return exchanged if exchanged > errors else most
+
+
+def drift_of(result: Result, quantity: Quantity) -> str:
+    """Words on the drift of the total energy of a run that should conserve it, else "".
+
+    It is relative, as the ledger's: "total energy" where there are potentials, "energy" of bodies
+    on which nothing does work.
+    """
+    if quantity.name != "energy.total":
+        return ""
+    free = not result.summary.has_potential and not np.any(result.work - result.work[0])
+    entry = result.ledger.get("energy" if free else "total energy")
+    return f" (drift {entry.value:.1g})" if entry else ""

@@ -1,18 +1,40 @@
 """``plot``, ``save_plot`` and ``show_plot``: results, fits, linearisations, sweeps as figures."""
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Any, NamedTuple, cast
 
+import attrs
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
-from dap3d_core.plot.curves import curve_picture
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.plot.curves import curve_picture, rate_of, smooth
 from dap3d_core.plot.figure_file import check_suffix, save_figure
-from dap3d_core.plot.style import WIDTH, Picture
+from dap3d_core.plot.style import (
+    HEIGHT,
+    LETTERS,
+    PALETTE,
+    PANEL_HEIGHT,
+    WIDTH,
+    Picture,
+    PlainOffset,
+    folded,
+    legend_above,
+    show_rounding_flat,
+    shown_text,
+    style_axes,
+    unit_text,
+    with_unit,
+)
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import Result, ResultError
+from dap3d_core.result import Result, ResultError, find
+from dap3d_core.result.errors import unknown
+from dap3d_core.study.fit.fit_result import Fit
 
 if TYPE_CHECKING:
     import xarray
@@ -26,6 +48,8 @@ if TYPE_CHECKING:
         Result | Mapping[str, Result] | Fit | Linearization | ModesOver | EquilibriumPath
         | xarray.Dataset
     )  # fmt: skip
+    from dap3d_core.simulation.linearization.linearization import Linearization
+    from dap3d_core.study.equilibrium_path import EquilibriumPath
 
 #: Backends that matplotlib falls back on where it cannot open windows.
 FILE_BACKENDS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
@@ -35,6 +59,21 @@ NO_WINDOW = (
     "cannot open a window: there is no display, or no package that opens windows (pip install "
     "PyQt6); -o writes a file instead"
 )
+#: Eigenvalues whose numbers are written beside them.
+MOST_LABELS = 12
+#: A real part below this part of the largest magnitude is drawn as zero.
+ROUNDING = 1e-9
+#: Attribute of a path -> label, marker and colour of its special points.
+SPECIAL = {
+    "turning": ("turning point", "o", PALETTE[1]),
+    "branching": ("another path crosses", "D", PALETTE[3]),
+}
+#: A step is drawn by so many pieces; shorter steps, parts of the range, are at a corner.
+BETWEEN, CORNER = 8, 1e-4
+#: Legends have the entry of stability where it changes.
+STABILITY = ((True, "stable", "-"), (False, "unstable", "--"))
+#: Inches: of a panel with points and curve, and of the one with residuals below it.
+CURVE_HEIGHT, RESIDUAL_HEIGHT = 1.7, 0.9
 
 
 def picture_of(
@@ -53,7 +92,6 @@ def picture_of(
     if hasattr(result, "turning"):
         if x is not None or at:
             raise ValueError("a path of equilibria is drawn over its parameter: leave x and at out")
-        from dap3d_core.plot.equilibrium_path import EquilibriumPathPicture
 
         return EquilibriumPathPicture(cast("EquilibriumPath", result), names)
     drawn = result.values() if isinstance(result, Mapping) else [result]
@@ -78,10 +116,8 @@ def picture_of(
     if hasattr(result, "mode_eigenvalues"):
         if names:
             raise ValueError("of a linearisation the eigenvalues are drawn: leave names out")
-        from dap3d_core.plot.eigenvalues import EigenvaluePicture
 
         return EigenvaluePicture(cast("Linearization", result))
-    from dap3d_core.plot.fit import fit_picture
 
     return fit_picture(result, names)
 
@@ -190,3 +226,225 @@ def show_plot(
     picture.draw(figure)
     pyplot.show()
     pyplot.close(figure)
+
+
+class EigenvaluePicture(Picture):
+    """The eigenvalues of a linearisation.
+
+    Modes have their numbers; those that grow are drawn as crosses, to the right of the axis.
+    """
+
+    def __init__(self, linearization: "Linearization") -> None:
+        self.linearization = linearization
+
+    @property
+    def height(self) -> float:
+        """A suitable height of the figure, inches."""
+        return HEIGHT
+
+    def draw(self, figure: Figure) -> list[Axes]:
+        """Draw on an empty figure."""
+        return [self.draw_on(figure.add_subplot())]
+
+    def draw_on(self, ax: Axes) -> Axes:
+        """Draw on axes of the user."""
+        return draw_eigenvalues(ax, self.linearization)
+
+
+def draw_eigenvalues(ax: Axes, linearization: "Linearization") -> Axes:
+    """Draw the eigenvalues of a linearisation on axes; returns these."""
+    values = linearization.eigenvalues
+    size = float(np.max(np.abs(values), initial=0.0)) or 1.0
+    real = np.where(np.abs(values.real) > ROUNDING * size, values.real, 0.0)
+    grows = real > 0.0
+    ax.axvline(0.0, color="0.6", linewidth=0.8)
+    ax.plot(real[~grows], values.imag[~grows], "o", color=PALETTE[0], markersize=4.5)
+    ax.plot(real[grows], values.imag[grows], "X", color=PALETTE[1], markersize=5.5)
+    modes = linearization.mode_eigenvalues
+    for k, value in enumerate(modes[:MOST_LABELS]):
+        x = value.real if abs(value.real) > ROUNDING * size else 0.0
+        if abs(value) > 0.0:
+            ax.annotate(str(k + 1), (x, value.imag), xytext=(4, 3), textcoords="offset points",
+                        fontsize=LETTERS)  # fmt: skip
+    if not np.any(real):
+        ax.set_xlim(-size, size)
+    ax.margins(0.12)
+    ax.set_xlabel("real part [1/s]", fontsize=LETTERS)
+    ax.set_ylabel("imaginary part [rad/s]", fontsize=LETTERS)
+    style_axes(ax)
+    return ax
+
+
+class Panel(NamedTuple):
+    """A quantity of a path: its values (k, components), names of the components, label, unit."""
+
+    values: Floats
+    names: tuple[str, ...]
+    label: str
+    unit: str
+
+
+class EquilibriumPathPicture(Picture):
+    """A panel for each quantity, over the parameter."""
+
+    def __init__(self, path: "EquilibriumPath", quantities: Sequence[str]) -> None:
+        self.path = path
+        self.panels = [_panel(path, name) for name in quantities or [path.largest_motion()]]
+
+    @property
+    def height(self) -> float:
+        """A suitable height of the figure, inches."""
+        return HEIGHT if len(self.panels) == 1 else PANEL_HEIGHT * len(self.panels)
+
+    def draw(self, figure: Figure) -> list[Axes]:
+        """Draw all panels on an empty figure; returns their axes."""
+        axes = figure.subplots(len(self.panels), 1, sharex=True, squeeze=False)[:, 0]
+        width, height = figure.get_figwidth(), figure.get_figheight() / len(axes)
+        for ax, panel in zip(axes, self.panels, strict=True):
+            self._draw_panel(ax, panel, height)
+        _, labels = axes[0].get_legend_handles_labels()
+        if labels:
+            legend_above(axes[0], labels, width)
+        for ax in axes[:-1]:
+            ax.set_xlabel("")
+        return list(axes)
+
+    def draw_on(self, ax: Axes) -> Axes:
+        """Draw on axes of the user; a ValueError where there are several quantities."""
+        if len(self.panels) > 1:
+            raise ValueError("one axes takes one quantity: leave ax out")
+        self._draw_panel(ax, self.panels[0], ax.get_window_extent().height / ax.figure.dpi)
+        if ax.get_legend_handles_labels()[1]:
+            ax.legend(fontsize=LETTERS, frameon=False)
+        return ax
+
+    def _draw_panel(self, ax: Axes, panel: Panel, height: float) -> None:
+        path = self.path
+        for k, (name, values) in enumerate(zip(panel.names, panel.values.T, strict=True)):
+            colour = PALETTE[k % len(PALETTE)]
+            fine, x, y = _smooth(path.length, path.values, values)
+            for stable, rows in _runs(path):
+                dash = next(dash for which, _, dash in STABILITY if which == stable)
+                ends = path.length[rows][[0, -1]]
+                part = (fine >= ends[0]) & (fine <= ends[1])
+                ax.plot(x[part], y[part], dash, color=colour, linewidth=1.4)
+            if name:
+                ax.plot([], [], color=colour, linewidth=1.4, label=shown_text(name))
+        if not (path.stable.all() or not path.stable.any()):
+            for _, label, dash in STABILITY:
+                ax.plot([], [], dash, color="0.3", linewidth=1.4, label=label)
+        for mark, (label, marker, colour) in SPECIAL.items():
+            where = getattr(path, mark)
+            if where.any():
+                x = np.repeat(path.values[where], panel.values.shape[1])
+                ax.plot(x, panel.values[where].ravel(), marker, color=colour, linestyle="",
+                        markersize=5.0, label=label, zorder=3)  # fmt: skip
+        for axis in (ax.xaxis, ax.yaxis):
+            axis.set_major_formatter(PlainOffset())
+        show_rounding_flat(ax)
+        ax.set_xlabel(with_unit(path.parameter, path.unit), fontsize=LETTERS)
+        label = with_unit(panel.label, panel.unit)
+        ax.set_ylabel(folded(label, 15 * height), fontsize=LETTERS)
+        style_axes(ax)
+
+
+def _panel(path: "EquilibriumPath", name: str) -> Panel:
+    quantity = path.quantity(name)
+    names = tuple(f"{name}.{c}" for c in quantity.components) or ("",)
+    values = quantity.values.reshape(len(path.values), -1)
+    return Panel(values, names, quantity.label, quantity.unit)
+
+
+def _smooth(length: Floats, x: Floats, y: Floats) -> tuple[Floats, Floats, Floats]:
+    """Points and more between them, on cubic splines over the length from corner to corner."""
+    from scipy.interpolate import CubicSpline
+
+    corners = np.flatnonzero(np.diff(length) < CORNER)
+    ends = [-1, *corners.tolist(), len(length) - 1]
+    pieces = []
+    for first, last in pairwise(ends):
+        own = slice(first + 1, last + 1)
+        known = np.stack([length[own], x[own], y[own]])
+        if known.shape[1] > 1:
+            parts = np.linspace(0.0, 1.0, BETWEEN, endpoint=False)
+            fine = (known[0, :-1, None] + np.diff(known[0])[:, None] * parts).ravel()
+            fine = np.append(fine, known[0, -1])
+            known = np.vstack([fine, CubicSpline(known[0], known[1:], axis=1)(fine)])
+        pieces.append(known)
+    whole = np.hstack(pieces)
+    return whole[0], whole[1], whole[2]
+
+
+def _runs(path: "EquilibriumPath") -> Iterator[tuple[bool, slice]]:
+    """Rows of one stability after the other; a special point, where it changes, is of both."""
+    stable, special = path.stable, path.turning | path.branching
+    first = 0
+    for end in np.flatnonzero(np.diff(stable.astype(int))).tolist():
+        last = end if special[end] else end + 1
+        yield bool(stable[end]), slice(first, last + 1)
+        first = last
+    yield bool(stable[-1]), slice(first, len(stable))
+
+
+@attrs.frozen(eq=False)
+class FitPicture(Picture):
+    """Outputs of a fit, each with its residuals below."""
+
+    fit: Fit
+    outputs: list[str]
+
+    @property
+    def height(self) -> float:
+        """A suitable height of the figure, inches."""
+        return 0.6 + (CURVE_HEIGHT + RESIDUAL_HEIGHT) * len(self.outputs)
+
+    def draw_on(self, ax: Axes) -> Axes:
+        """Refuse: a fit has two panels or more."""
+        raise ValueError("a fit is drawn over time, on a figure of its own: leave x, ax out")
+
+    def draw(self, figure: Figure) -> list[Axes]:
+        """Draw on an empty figure; returns the axes."""
+        ratios = [CURVE_HEIGHT, RESIDUAL_HEIGHT] * len(self.outputs)
+        axes = figure.subplots(len(ratios), 1, sharex=True, height_ratios=ratios)
+        for name, above, below in zip(self.outputs, axes[::2], axes[1::2], strict=True):
+            self._draw_output(name, above, below)
+            for ax in (above, below):
+                style_axes(ax)
+                ax.yaxis.set_major_formatter(PlainOffset())
+                ax.ticklabel_format(axis="y", scilimits=(-3, 4))
+        legend_above(axes[0], ("measured", "fitted"), figure.get_figwidth())
+        axes[-1].set_xlabel("time [s]", fontsize=LETTERS)
+        figure.align_ylabels(axes)
+        if self.fit.result.record.title:
+            figure.suptitle(shown_text(self.fit.result.record.title), fontsize=LETTERS + 1)
+        return list(axes)
+
+    def _draw_output(self, name: str, above: Axes, below: Axes) -> None:
+        fit, t = self.fit, self.fit.result.t
+        curve = find(fit.result, fit.quantities[name])
+        points = smooth(fit.result, t, curve.values, np.ones(len(t)), rate_of(fit.result, curve))
+        marks: Any = dict(color=PALETTE[1], linestyle="none", marker="o", markersize=2.5,
+                          markeredgewidth=0.0, alpha=0.7)  # fmt: skip
+        above.plot(fit.t, fit.measured[name], label="measured", **marks)
+        above.plot(*points, color=PALETTE[0], linewidth=1.2, label="fitted")
+        label = folded(with_unit(curve.label, curve.unit), 15 * CURVE_HEIGHT)
+        above.set_ylabel(label, fontsize=LETTERS)
+        sigma, residuals = fit.sigma.get(name), fit.residuals[name]
+        if sigma is None:
+            below.plot(fit.t, residuals, **marks)
+        else:
+            below.errorbar(fit.t, residuals, sigma, elinewidth=0.5, **marks)
+        below.axhline(0.0, color=PALETTE[0], linewidth=1.0)
+        below.set_ylabel(f"residual\n{unit_text(curve.unit)}", fontsize=LETTERS)
+        reach = np.abs(residuals) + (0.0 if sigma is None else sigma)
+        if (reach > 0.0).any():
+            limit = 1.15 * np.nanmax(reach)
+            below.set_ylim(-limit, limit)
+
+
+def fit_picture(fit: Fit, outputs: Sequence[str]) -> FitPicture:
+    """Picture of outputs of a fit, by default of all; unknown ones are an UnknownNameError."""
+    for name in outputs:
+        if name not in fit.measured:
+            raise unknown("output of the fit", name, fit.measured)
+    return FitPicture(fit, list(dict.fromkeys(outputs)) or list(fit.measured))

@@ -4,10 +4,10 @@ import sys
 from types import ModuleType
 from typing import Any
 
+from dap3d_core.report.measurement import Failed, MeasuredRun
 from dap3d_core.report.recommend import Recommendation
 from dap3d_core.report.reference import Reference
 from dap3d_core.report.report import Report
-from dap3d_core.report.run import Failed, MeasuredRun
 from dap3d_core.report.runner import report
 from dap3d_core.report.settings_ladder import Setting
 from dap3d_core.report.timing import RejectedSetting

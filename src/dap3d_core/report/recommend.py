@@ -7,7 +7,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.report.run import MeasuredRun
+from dap3d_core.report.measurement import MeasuredRun
 
 #: An error counts as smaller than another below this fraction of it: equal motions differ in
 #: their rounding.

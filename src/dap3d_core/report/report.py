@@ -10,9 +10,9 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.report.measurement import Failed, MeasuredRun
 from dap3d_core.report.recommend import Recommendation, recommend
 from dap3d_core.report.reference import Reference
-from dap3d_core.report.run import Failed, MeasuredRun
 from dap3d_core.report.timing import RejectedSetting
 from dap3d_core.result import current_versions
 from dap3d_core.result.file.atomic_write import whole_file

@@ -14,10 +14,10 @@ from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.integrators import INTEGRATORS
 from dap3d_core.registry.arguments import checked
 from dap3d_core.report.error_norms import PARTED, final_position_error, trajectory_error
+from dap3d_core.report.measurement import Failed, MeasuredRun, measures_of
 from dap3d_core.report.recommend import front
 from dap3d_core.report.reference import Reference, find_reference
 from dap3d_core.report.report import Report
-from dap3d_core.report.run import Failed, MeasuredRun, measures_of
 from dap3d_core.report.settings_ladder import (
     ADAPTIVE,
     QUICK_TOLERANCES,
@@ -29,7 +29,7 @@ from dap3d_core.report.settings_ladder import (
     ladder_of_steps,
 )
 from dap3d_core.report.timing import Announce, Bench, Progress
-from dap3d_core.result import Result
+from dap3d_core.result import Computed, Result
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
 from dap3d_core.simulation import report_times
 
@@ -214,7 +214,7 @@ class _Measurement:
             self._measure(reference)
             self._time()
         except BaseException as error:
-            error.report = self._report(header, "interrupted")  # type: ignore[attr-defined]
+            Computed(report=self._report(header, "interrupted")).attach(error)
             raise
         return self._report(header, "done")
 

@@ -1,6 +1,6 @@
-"""The result floor: what a run left behind, on disk and in memory; the post-processor's arrays."""
+"""The result layer: what a run left behind, on disk and in memory; the post-processor's arrays."""
 
-from dap3d_core.result.errors import ResultError, UnknownNameError
+from dap3d_core.result.errors import Computed, ResultError, UnknownNameError
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.atomic_write import check_target
 from dap3d_core.result.file.write import ResultWriter
@@ -16,6 +16,7 @@ from dap3d_core.result.result import Result
 
 __all__ = [
     "INFORMATION",
+    "Computed",
     "Energy",
     "Entry",
     "ErrorEstimate",

@@ -1,6 +1,11 @@
 """Errors of results: files that cannot be written or read, unknown names."""
 
 from collections.abc import Collection
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import attrs
 
 from dap3d_core.registry.suggestions import nearest
 
@@ -35,3 +40,32 @@ def unknown(what: str, name: str, known: Collection[str]) -> UnknownNameError:
     elif len(known) <= LISTED:
         message += f" ({what}s: {', '.join(known)})"
     return UnknownNameError(message, nearest(name, known))
+
+
+@attrs.frozen(eq=False)
+class Computed:
+    """What was computed until an exception: attributes of the exception, each perhaps None.
+
+    Attributes:
+        result: the result, or the data of a study.
+        checkpoint: the file from which the run can be resumed.
+        part: the file of a run whose disk is full.
+        report: the report of methods, as far as it came.
+    """
+
+    result: Any = None
+    checkpoint: Path | None = None
+    part: Path | None = None
+    report: Any = None
+
+    @classmethod
+    def of(cls, error: BaseException) -> "Computed":
+        """What an exception carries."""
+        return cls(*(getattr(error, one.name, None) for one in attrs.fields(cls)))
+
+    def attach(self, error: BaseException) -> None:
+        """Make an exception of any class carry it, besides what it carries already."""
+        with suppress(AttributeError):  # of a class with slots
+            for name, value in attrs.asdict(self, recurse=False).items():
+                if value is not None or not hasattr(error, name):
+                    setattr(error, name, value)

@@ -1,4 +1,4 @@
-"""The simulation floor: initial conditions, method choice, integration, reporting."""
+"""The simulation layer: initial conditions, method choice, integration, reporting."""
 
 from dap3d_core.simulation.compiled_model import CompiledModel, compile_scene
 from dap3d_core.simulation.errors import (

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.integrators.added import integrator_named
+from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
@@ -131,10 +131,7 @@ class CompiledModel:
         #: Equilibria that runs start at, by the options of ``start``; each is found once.
         self.rest_states: dict[tuple[bool, tuple[str, ...], str], StartState] = {}
         self._own = _Evaluators()
-        self._first_method = self.method = choose_method(self.model, requested)[0]
-        if not self._is_large_tree(announce):
-            self._own.stack.append(self.new_evaluator(announce))
-            self.method, self.reason = self.choice(requested)
+        self._take_method(requested, announce)
         self.evaluator.formulation = FORMULATIONS[self.method]
         _ = self.evaluator.functions  # compiled here, and not on the clock of the first run
         self.notes: list[str] = [
@@ -151,6 +148,18 @@ class CompiledModel:
 
             check_outputs(scene, self.scene_text, self.evaluator)
         self.compile_time = time.perf_counter() - started
+
+    def _take_method(self, requested: str, announce: Announce) -> None:
+        """Set the method and its reason, with the evaluator and the start that led to them."""
+        self._first_method = self.method = choose_method(self.model, requested)[0]
+        if (tree := self._tree_of_many_bodies(announce)) is not None:
+            evaluator, self._starts[self._usual_start] = tree
+            self._first_method = self.method = "joint"
+            self.reason = f"the joints of its {self.model.body_count} bodies are a tree"
+            self._own.stack.append(evaluator)
+        else:
+            self._own.stack.append(self.new_evaluator(announce, self.method))
+            self.method, self.reason = self.select_method(requested)
 
     @property
     def evaluator(self) -> Evaluator:
@@ -296,18 +305,27 @@ class CompiledModel:
         """
         key = correct, tuple(hold), metric
         self.evaluator.set_inputs(self.model.input_values)
-        if state is not None or key not in self._starts:
-            try:
-                start = find_start(self.evaluator, *key, state)
-            except AssemblyError as error:
-                raise self._located(error) from error
-            mistakes = undefined_directions(self.scene, self.model, start.u, self.model.size)
-            if mistakes:
-                raise SceneError(mistakes)
-            if state is not None:
-                return start
-            self._starts[key] = start
+        if state is not None:
+            return self._find_start(self.evaluator, key, state)
+        if key not in self._starts:
+            self._starts[key] = self._find_start(self.evaluator, key)
         return self._starts[key]
+
+    def _find_start(
+        self,
+        evaluator: Evaluator,
+        key: tuple[bool, tuple[str, ...], str],
+        state: "StartState | None" = None,
+    ) -> InitialState:
+        """As ``start``, with an evaluator."""
+        try:
+            start = find_start(evaluator, *key, state)
+        except AssemblyError as error:
+            raise self._located(error) from error
+        mistakes = undefined_directions(self.scene, self.model, start.u, self.model.size)
+        if mistakes:
+            raise SceneError(mistakes)
+        return start
 
     def _located(self, error: AssemblyError) -> AssemblyError:
         """The same error with the file and the lines of the joints that are open."""
@@ -317,7 +335,7 @@ class CompiledModel:
         places = [f"{m.file}:{m.line}: {m.key}" for m in found if m.line is not None]
         return AssemblyError("\n".join([str(error), *places]), error.joints)
 
-    def choice(self, requested: str) -> tuple[str, str]:
+    def select_method(self, requested: str) -> tuple[str, str]:
         """The formulation that a run takes for a requested method, and the reason in words.
 
         Raises:
@@ -335,16 +353,21 @@ class CompiledModel:
             return next(fits), f"{rank.redundant} of {rank.rows} rows are redundant"
         return method, f"{reason}, and their rows are independent"
 
+    @property
+    def _usual_start(self) -> tuple[bool, tuple[str, ...], str]:
+        """The options of ``start`` for a run with the scene's own settings."""
+        settings = self.scene.simulation
+        return settings.correct, tuple(settings.hold), str(settings.correct_metric)
+
     def _start_of_scene(self) -> InitialState | None:
         """The initial state of a run; None where it cannot be assembled, which the run reports."""
-        settings = self.scene.simulation
         try:
-            return self.start(settings.correct, settings.hold, str(settings.correct_metric))
+            return self.start(*self._usual_start)
         except AssemblyError:
             return None
 
-    def _is_large_tree(self, announce: Announce) -> bool:
-        """Take joint coordinates where ``auto`` does: for trees of many bodies.
+    def _tree_of_many_bodies(self, announce: Announce) -> tuple[Evaluator, InitialState] | None:
+        """Evaluator and start in joint coordinates, where ``auto`` takes these: in large trees.
 
         In them a tree has no singular poses. Forces that depend on multipliers cost more there.
         """
@@ -352,22 +375,15 @@ class CompiledModel:
         is_open = self.requested_method == "auto" and self._may_choose_joint
         is_open = is_open and not self.model.iterated_forces
         if not is_open or not MANY_BODIES <= count >= joints > 0:
-            return False
-        usual = self._first_method
-        with suppress(SimulationError):  # too many rows to keep
+            return None
+        with suppress(SimulationError):  # too many rows to keep, or no start
             evaluator = self.new_evaluator(announce, "joint")
-            if evaluator.coordinates.kept:
-                return False
-            self._first_method = self.method = "joint"
-            self.reason = f"the joints of its {count} bodies are a tree"
-            self._own.stack.append(evaluator)
-            start = self._start_of_scene()
-            if start is not None and start.redundancy.singular is None:
-                return True
-        self._first_method = self.method = usual
-        self._own.stack.clear()
-        self._starts.clear()
-        return False
+            if not evaluator.coordinates.kept:
+                evaluator.set_inputs(self.model.input_values)
+                start = self._find_start(evaluator, self._usual_start)
+                if start.redundancy.singular is None:
+                    return evaluator, start
+        return None
 
     @cached_property
     def joint_cost(self) -> float | None:

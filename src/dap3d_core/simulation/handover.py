@@ -55,7 +55,7 @@ def hand_over(run: RunState) -> bool:
         run.until = present.t + BEHIND * left
         run.crossed.append(present.t + left)
     if len(run.integrations) == 1:
-        begin_other(run)
+        switch_integrator(run)
     else:
         take_over(run.integrations[0], present)
         run.integrations.reverse()
@@ -65,7 +65,7 @@ def hand_over(run: RunState) -> bool:
     return True
 
 
-def begin_other(run: RunState) -> None:
+def switch_integrator(run: RunState) -> None:
     """Continue with the other one of the explicit and the implicit integrator."""
     present = run.present
     if not present.implicit:
@@ -122,7 +122,7 @@ def _left(run: RunState) -> float:
 
 
 def _aim_across(run: RunState, left: float) -> None:
-    """Let the first step of the explicit integration be one across: a trial step goes closer."""
+    """Aim the first explicit step across the pose; a trial step moves closer."""
     present = run.present
     span = run.t_end
     present.work.lengths[[NOW, RATE]] = lengths_at(run.evaluator, present.t, present.y, span)
@@ -186,7 +186,7 @@ def crossing_notes(crossed: Sequence[float]) -> list[str]:
     ]
 
 
-def cannot_cross(message: str, run: RunState) -> str:
+def singular_failure_message(message: str, run: RunState) -> str:
     """Message for a run that the implicit integrator ended before a singular pose.
 
     message: the former.

@@ -85,11 +85,11 @@ def _unmade(path: str | os.PathLike[str], error: Exception, allowed: bool) -> Re
     """The error for a model that cannot be made again from the scene in a result."""
     return ResultError(
         f"the model of {path} cannot be made again, which the Jacobian, reactions and forces need: "
-        f"{why_unmade(error, allowed=allowed)}. All other arrays are in the file"
+        f"{rebuild_error(error, allowed=allowed)}. All other arrays are in the file"
     )
 
 
-def why_unmade(error: Exception, *, allowed: bool) -> str:
+def rebuild_error(error: Exception, *, allowed: bool) -> str:
     """Message for a stored scene whose model cannot be made, with the remedy.
 
     Args:

@@ -9,13 +9,13 @@ import numpy as np
 
 from dap3d_core.interface import PluginError
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import Result, ResultError, current_versions
+from dap3d_core.result import Computed, Result, ResultError, current_versions
 from dap3d_core.result.arrays import COLUMNS, Arrays
 from dap3d_core.result.model_summary import is_summary_of
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.open_result import open_result, why_unmade
+from dap3d_core.simulation.open_result import open_result, rebuild_error
 from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.output.type_sources import changed_types
 from dap3d_core.simulation.run_state import GIVEN_START
@@ -49,7 +49,7 @@ class Reproduction:
         return not self.differences
 
 
-class _EnoughError(Exception):
+class _StopComparisonError(Exception):
     """The repetition has come as far as the result."""
 
 
@@ -86,7 +86,7 @@ def rerun(
             joint=first.method == "joint",
         )  # fmt: skip
     except (PluginError, SceneError) as error:
-        words = why_unmade(error, allowed=allow_code and model is not None)
+        words = rebuild_error(error, allowed=allow_code and model is not None)
         raise ResultError(f"the run cannot be made again: {words}") from error
     if not is_summary_of(first.summary, compiled.model):
         raise ResultError(
@@ -95,16 +95,16 @@ def rerun(
         )
     end = first.t[-1]
 
-    def look(standing: RunProgress) -> None:
+    def compare_stop(standing: RunProgress) -> None:
         if watch is not None:
             watch(standing)
         if first.status != "done" and standing.t > end:
-            raise _EnoughError
+            raise _StopComparisonError
 
     try:
-        again = simulate(compiled, watch=look, announce=announce, **settings)
-    except (_EnoughError, SimulationError) as error:
-        again = error.result  # type: ignore[union-attr]
+        again = simulate(compiled, watch=compare_stop, announce=announce, **settings)
+    except (_StopComparisonError, SimulationError) as error:
+        again = Computed.of(error).result
     instants, differences = _compared(first, again)
     versions = {
         name: (number, current_versions().get(name, "none"))

@@ -26,10 +26,10 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.controller import Controller
 from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.events.event import Event
-from dap3d_core.simulation.handover import begin_other
+from dap3d_core.simulation.handover import switch_integrator
 from dap3d_core.simulation.initial.given_state import state_of
 from dap3d_core.simulation.initial.start_state import StartState
-from dap3d_core.simulation.open_result import why_unmade
+from dap3d_core.simulation.open_result import rebuild_error
 from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.simulation.run import Run
@@ -75,7 +75,7 @@ def resume(
         SimulationError, ResultError: as ``simulate``.
     """
     found = resumption(path, model=model, allow_code=allow_code, announce=announce)
-    return found.go(
+    return found.execute(
         output, force=force, checkpoint=checkpoint, events=events, progress=progress, watch=watch,
         controllers=controllers,
     )  # fmt: skip
@@ -122,13 +122,13 @@ class ResumedRun:
                 joint=header.get("formulation") == "joint",  # which older checkpoints lack
             )  # fmt: skip
         except (PluginError, SceneError) as error:
-            words = why_unmade(error, allowed=allow_code and model is not None)
+            words = rebuild_error(error, allowed=allow_code and model is not None)
             raise CheckpointError(f"cannot resume from {path}: {words}") from error
         self._check_types()
         # its name alone: what a file says does not point out of its folder
         self.output = path.with_name(Path(header["output"]).name)
 
-    def go(
+    def execute(
         self,
         output: str | os.PathLike[str] | None = None,
         *,
@@ -161,7 +161,7 @@ class ResumedRun:
                       start=self._start_state(), controllers=controllers)  # fmt: skip
             run.save_every(checkpoint, force=force or self._is_ours(target))
             try:
-                result = run.go(restore)
+                result = run.execute(restore)
             except BaseException as error:
                 if hasattr(error, "checkpoint"):  # it takes the place of this one
                     self._remove_what_is_replaced(target)
@@ -252,7 +252,7 @@ class ResumedRun:
         self._check_controllers(run)
         try:
             if header["integrations"] == 2:
-                begin_other(run)
+                switch_integrator(run)
                 if run.integrations[0].implicit != ("0.own" in stored):  # which implicit ones have
                     run.integrations.reverse()
             for k, integration in enumerate(run.integrations):

@@ -10,14 +10,19 @@ import numpy as np
 
 from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators import IMPLICIT, Integration, Status
-from dap3d_core.integrators.added import integrator_named
+from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.integrators.stepping.singular_poses import begin_singular
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.result import INFORMATION, Result, ResultError
+from dap3d_core.result import INFORMATION, Computed, Result, ResultError
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.errors import RedundantError, SimulationError
-from dap3d_core.simulation.handover import cannot_cross, crossing_notes, hand_over, stiffness_notes
+from dap3d_core.simulation.handover import (
+    crossing_notes,
+    hand_over,
+    singular_failure_message,
+    stiffness_notes,
+)
 from dap3d_core.simulation.initial.singular_start import SingularStart
 from dap3d_core.simulation.initial.tolerances import motion_notes, rounding_notes
 from dap3d_core.simulation.initial_state import InitialState, start_notes
@@ -27,7 +32,7 @@ from dap3d_core.simulation.output.error_estimate import (
     add_error,
     ending_after,
 )
-from dap3d_core.simulation.output.termination import doubts, event_notes, why_stopped
+from dap3d_core.simulation.output.termination import accuracy_warnings, event_notes, why_stopped
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.redundancy.redundancy import Redundancy
 from dap3d_core.simulation.run_state import RunState
@@ -53,7 +58,7 @@ BUFFER_NUMBERS = 1_000_000
 #: be quicker.
 MUCH_WORK = 3_000_000
 #: A second run, for the error, leaves a singular pose by a first step of this part.
-AGAIN = 0.8
+SECOND_RUN_FACTOR = 0.8
 
 
 class Run(RunState):
@@ -69,7 +74,7 @@ class Run(RunState):
 
         self.checkpoint_writer = CheckpointWriter(self, seconds, force=force)
 
-    def go(self, restore: Callable[[RunState], None] | None = None) -> Result:
+    def execute(self, restore: Callable[[RunState], None] | None = None) -> Result:
         """Run from the start, or from the state that ``restore`` gives the run, to the end."""
         self.initialise()
         if restore is not None:
@@ -108,7 +113,9 @@ class Run(RunState):
                 self.control.put_back()
         ended = self.present.status
         if ended not in (Status.FINISHED, Status.ENDED):
-            message = cannot_cross(why_stopped(self.evaluator, self.present, self.rank), self)
+            message = singular_failure_message(
+                why_stopped(self.evaluator, self.present, self.rank), self
+            )
             self.notes.append(message)
         result = self._result("done" if ended is Status.FINISHED else "stopped")
         if self.checkpoint_writer is not None:
@@ -118,31 +125,33 @@ class Run(RunState):
         assert result is not None
         if self.estimate_error:
             quick = self.estimate_error == QUICK
-            add_error(result, self.settings, self._again, self.recorder.output, quick=quick)
+            add_error(result, self.settings, self._rerun_with, self.recorder.output, quick=quick)
         return result
 
     def _interrupt(self, error: BaseException) -> None:
         """Keep what was computed until an exception ended the integration."""
         if isinstance(error, ResultError):  # the disk: what is there stays as it is
-            error.part = self.recorder.part  # type: ignore[attr-defined]
-            if self.checkpoint_writer is not None and self.checkpoint_writer.has_written:
-                error.checkpoint = self.checkpoint_writer.path  # type: ignore[attr-defined]
+            writer = self.checkpoint_writer
+            checkpoint = writer.path if writer is not None and writer.has_written else None
+            Computed(checkpoint=checkpoint, part=self.recorder.part).attach(error)
             return
         self._take_rows()
         status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
-        error.result = self._result(status)  # type: ignore[attr-defined]
+        Computed(self._result(status)).attach(error)
         if self.checkpoint_writer is not None and self.recorder.count:
             self.checkpoint_writer.leave(error)
         elif self.checkpoint_writer is not None:
             self.checkpoint_writer.remove()
 
-    def _again(self, settings: Simulation, limits: StepLimits | None, seconds: float) -> Result:
+    def _rerun_with(
+        self, settings: Simulation, limits: StepLimits | None, seconds: float
+    ) -> Result:
         """The result of a second run with other settings and limits of its steps, in memory."""
         events = self.event_locator.events if self.event_locator else ()
         watch = ending_after(seconds, self.callbacks.watch)
         callbacks = attrs.evolve(self.callbacks, watch=watch)
         run = Run(self.compiled, settings, callbacks, events, limits=limits, start=self.start)
-        return run.go()
+        return run.execute()
 
     def _start(self) -> InitialState:
         """The initial state, corrected where the settings say so; its rank must suit the method."""
@@ -234,7 +243,7 @@ class Run(RunState):
         except ValueError as error:
             raise SceneError([Mistake("step", settings.step, str(error))]) from error
         if singular is not None:
-            first = singular.first_step * (1.0 if self.limits is None else AGAIN)
+            first = singular.first_step * (1.0 if self.limits is None else SECOND_RUN_FACTOR)
             begin_singular(integration.work, evaluator.rates(0.0, u0, singular.acceleration), first)
         return integration
 
@@ -264,12 +273,12 @@ class Run(RunState):
             self._take_rows()
             self.is_whole = True
             if self.checkpoint_writer is not None:
-                self.checkpoint_writer.look()
+                self.checkpoint_writer.update()
             done, seconds = integration.statistics.rhs - before, time.perf_counter() - clock
             if progress is not None:
                 progress(integration.t, self.t_end)
             if self.observer is not None:
-                self.observer.look()
+                self.observer.update()
             if done and seconds > 0.0 and self.until == np.inf:
                 budget = int(min(max(1.0, done * CHUNK_SECONDS / seconds), 4.0 * budget, 1e9))
 
@@ -302,7 +311,7 @@ class Run(RunState):
     def _closing_notes(self) -> list[str]:
         """Notes on a run that has come to an end."""
         recorder, event_locator = self.recorder, self.event_locator
-        notes = doubts(self.evaluator)
+        notes = accuracy_warnings(self.evaluator)
         if self.settings.step is None and recorder.count:
             notes += motion_notes(recorder.low, recorder.high, self.settings)
             notes += rounding_notes(self.integrations, self.evaluator)

@@ -17,7 +17,7 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, check_every
 from dap3d_core.simulation.events.locate import EventLocator
 from dap3d_core.simulation.initial.tolerances import atol_notes, resolved_atol
-from dap3d_core.simulation.output.error_estimate import StepLimits, halved
+from dap3d_core.simulation.output.error_estimate import StepLimits, with_midpoints
 from dap3d_core.simulation.output.free_space import check_room, row_width
 from dap3d_core.simulation.output.monitor import Observer, RunProgress
 from dap3d_core.simulation.output.recorder import ResultRecorder
@@ -158,7 +158,7 @@ class RunState:
         """Make an integration the present one; it is compiled first, off the clock of the run."""
         integration.tstops = self.compiled.breakpoints(self.t_end).stops
         if self.limits is not None:
-            integration.tstops = halved(integration.tstops)
+            integration.tstops = with_midpoints(integration.tstops)
             integration.work.longest_step = self.limits.longest
         if self.event_locator is not None:
             integration.follow_steps()

@@ -11,7 +11,7 @@ from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators import EXPLICIT, Integrator
-from dap3d_core.integrators.added import integrator_named
+from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene import (
     METHODS,
@@ -69,13 +69,13 @@ def compiled_for(
         settings = attrs.evolve(scene.scene.simulation, method=method)
         check_simulation(settings, scene.model.body_names)
     other = method not in (None, scene.requested_method)
-    if other and scene.choice(str(method))[0] != scene.method:
+    if other and scene.select_method(str(method))[0] != scene.method:
         words = f"the model was compiled for method {scene.method}; compile it for {method}"
         raise SimulationError(words)
     return scene.for_integrator(integrator or str(scene.scene.simulation.integrator))
 
 
-def compiled_exactly(
+def compile_exact(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     allow_code: bool,
     announce: Callable[[str], None] | None = None,

@@ -78,7 +78,7 @@ def simulate(
                   start=_given_state(start, compiled), controllers=controllers)  # fmt: skip
         if checkpoint is not None:
             run.save_every(checkpoint, force=force)
-        return run.go()
+        return run.execute()
 
 
 def _word(start: "Start | None") -> str | None:

@@ -8,9 +8,9 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dap3d_core.integrators.added import integrator_named
+from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.model.groups import Floats
-from dap3d_core.result import INFORMATION, Result
+from dap3d_core.result import INFORMATION, Computed, Result
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
 from dap3d_core.study.outputs import Reduction
@@ -132,7 +132,7 @@ class Ensemble:
             result = self._result(self.study.scene, point.tolist())
             status, note = PointStatus.DONE, self._note(result)
         except (SceneError, SimulationError) as error:
-            result = getattr(error, "result", None)
+            result = Computed.of(error).result
             status = PointStatus.FAILED if result is None else PointStatus.STOPPED
             note = " ".join(str(error).split())
         batch.status[k], batch.notes[k] = status, note

@@ -1,4 +1,4 @@
-"""The view floor: a result as one page with a three-dimensional scene, plots and the ledger."""
+"""The view layer: a result as one page with a three-dimensional scene, plots and the ledger."""
 
 import sys
 from types import ModuleType

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import attrs
 import numpy as np
 
-from dap3d_core.result import Result, ResultError, UnknownNameError, find
+from dap3d_core.result import Computed, Result, ResultError, UnknownNameError, find
 from dap3d_core.result.file.schema import SWEEP
 from dap3d_core.scene import Mistake, SceneError, load, parse
 from dap3d_core.simulation import CompiledModel, SimulationError, simulate
@@ -149,7 +149,7 @@ class SweepRuns:
             compiled = CompiledModel(scene, registry=self._registry)
             return simulate(compiled, progress=self._between), ""
         except (SceneError, SimulationError) as error:
-            return getattr(error, "result", None), " ".join(str(error).split())
+            return Computed.of(error).result, " ".join(str(error).split())
 
 
 def _own(mistake: Mistake) -> Mistake:

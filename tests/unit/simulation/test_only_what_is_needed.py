@@ -261,7 +261,7 @@ def test_reactions_and_unknowns_cost_other_scenes_nothing():
     )
     *_, loops, arrays, modules = run(f"{script}\n{MODULES}").splitlines()
     theirs = {"dap3d_core.model.reaction_groups", "dap3d_core.interface.codegen.unknowns",
-              "dap3d_core.kernels.elimination"}  # fmt: skip
+              "dap3d_core.kernels.eliminate_unknowns"}  # fmt: skip
     assert not theirs & set(modules.split())
     assert not {"bound", "friction", "angle", "rate"} & set(loops.split())
     assert arrays == "0 False"

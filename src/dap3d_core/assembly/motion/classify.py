@@ -9,15 +9,22 @@ random coordinates. All joints of a type are classified at once (docs/decisions/
 
 from collections.abc import Iterator
 from itertools import product
-from typing import Any
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.assembly.motion.closed_joints import OPEN, ClosedJoints
-from dap3d_core.assembly.motion.elementary import elementary
-from dap3d_core.assembly.motion.joint_motion import JointMotions, ModelMotions, Part, merged
+from dap3d_core.assembly.motion.joint_motion import (
+    BALL,
+    ROTATION,
+    SCREW,
+    TRANSLATION,
+    JointMotions,
+    ModelMotions,
+    Part,
+    merged,
+)
 from dap3d_core.assembly.motion.joint_rows import JointRows
 from dap3d_core.assembly.motion.named_axes import NamedAxes
 from dap3d_core.assembly.motion.refusals import (
@@ -30,7 +37,7 @@ from dap3d_core.assembly.motion.refusals import (
     two_slots,
 )
 from dap3d_core.model import Group, Model
-from dap3d_core.model.rigid_motion import Pose, adjoint, inverse, relative
+from dap3d_core.model.rigid_motion import Pose, adjoint, compose, exponential, inverse, relative
 from dap3d_core.model.state_layout import split
 
 #: Eigenvalues of the sum of two projectors: a twist lies in both spaces, or clearly not.
@@ -43,6 +50,101 @@ AWAY = 1.5
 TRIALS = 2
 #: Seeds of random numbers, one for each attempt: a way may end where both spaces nearly agree.
 SEEDS = 1, 2, 3
+#: Singular values and pitches, in units of the scene's length, that count as zero.
+ZERO = 1e-9
+#: Residuals of a closed joint, and of one that cannot be told from it; see ``residual``.
+CLOSED, OPEN = 1e-13, 1e-10
+NEWTON_STEPS = 20
+#: Added to J J^T of gradients of length one, which may depend on each other.
+REGULAR = 1e-13
+#: Singular values of gradients of length one below which rows depend on each other.
+SINGULAR = 1e-6
+
+
+class ClosedJoints:
+    """Joints in poses with C = 0, near the ones given, and their free twists there.
+
+    Attributes:
+        rows: evaluates C and J.
+        count: number of joints.
+        unit: (6,) units of the numbers of a twist: the scene's length and 1.
+        start: T0, poses of bodies i relative to bodies j.
+        is_closed, is_regular: (m,) whether C = 0 was reached, and the rows are independent there.
+        free: (m, 6, d) orthonormal columns, the null space of J, in ``unit``.
+    """
+
+    def __init__(self, rows: JointRows, pose: Pose) -> None:
+        """Args:
+        rows: of the joints.
+        pose: of bodies i relative to bodies j, as given.
+        """
+        self.rows, self.count = rows, rows.count
+        self.unit = np.repeat([rows.length, 1.0], 3)
+        rows.place(pose)
+        rows.count_turns()
+        self._weight = _weights(rows.gradients())
+        self.start, self.is_closed = self.closed(pose)
+        rows.place(self.start)
+        rows.count_turns()
+        self._weight = _weights(rows.gradients())
+        self.free, self.is_regular = self.free_twists(self.start)
+
+    def residual(self, pose: Pose, base: Pose | None = None) -> Floats:
+        """(m,) the largest of C at other poses: a displacement, relative to the scene and the pose.
+
+        Rounding alone leaves some 1e-16; infinite where C is not a number. ``base``: of bodies j.
+        """
+        self.rows.place(pose, base)
+        C = np.abs(self.rows.residuals() * self._weight)
+        reach = 1.0 + np.max(np.abs(pose.r), axis=-1) / self.rows.length
+        worst: Floats = np.max(C, axis=-1, initial=0.0) / reach
+        return np.where(np.isfinite(worst), worst, np.inf)
+
+    def closed(self, pose: Pose) -> tuple[Pose, Any]:
+        """Poses with C = 0 near those given, by Newton's method, and whether they were found."""
+        worst = self.residual(pose)
+        for _ in range(NEWTON_STEPS):
+            if not np.any(worst >= CLOSED):
+                break
+            C, J = self.rows.residuals() * self._weight, self._gradients()
+            moves: Any = np.isfinite(J).all(axis=(1, 2)) & np.isfinite(C).all(axis=1)
+            step = _shortest_steps(J, C, np.flatnonzero(moves & (worst >= CLOSED)))
+            size = np.linalg.norm(step, axis=-1, keepdims=True)
+            pose = self.moved(pose, step / np.maximum(1.0, size))
+            worst = self.residual(pose)
+        return pose, worst < OPEN
+
+    def free_twists(self, pose: Pose) -> tuple[Floats, Any]:
+        """The null spaces (m, 6, d) of J at poses, and whether the rows are independent there."""
+        self.rows.place(pose)
+        J = self._gradients()
+        finite: Any = np.isfinite(J).all(axis=(1, 2))
+        _, size, directions = np.linalg.svd(np.where(finite[:, None, None], J, 0.0))
+        rows = self.rows.row_count
+        regular = finite & (size[:, -1] > SINGULAR) if rows <= 6 else np.zeros_like(finite)
+        return np.swapaxes(directions[:, rows:], -1, -2), regular
+
+    def moved(self, pose: Pose, twist: Floats) -> Pose:
+        """Poses moved by twists (m, 6) in ``unit``."""
+        return compose(pose, exponential(twist * self.unit))
+
+    def _gradients(self) -> Floats:
+        return self.rows.gradients() * self._weight[..., None]
+
+
+def _shortest_steps(J: Floats, C: Floats, members: Integers) -> Floats:
+    """(m, 6) the steps of Newton's method for some of the joints; zero for the others."""
+    step, J, C = np.zeros((len(J), 6)), J[members], C[members, :, None]
+    J_T = np.swapaxes(J, -1, -2)
+    multipliers = np.linalg.solve(J @ J_T + REGULAR * np.eye(J.shape[1]), C)
+    step[members] = -(J_T @ multipliers)[..., 0]
+    return step
+
+
+def _weights(gradients: Floats) -> Floats:
+    """(m, rows) inverse lengths of gradients; 1 where there is none."""
+    size = np.linalg.norm(gradients, axis=-1)
+    return 1.0 / np.where(np.isfinite(size) & (size > 0.0), size, 1.0)
 
 
 def classify(model: Model, u: Floats | None = None) -> ModelMotions:
@@ -232,3 +334,80 @@ def _random_poses(rng: np.random.Generator, joints: ClosedJoints) -> Pose:
     """A random pose for every body j, within a length of the scene of the origin."""
     r, p = rng.normal(size=(joints.count, 3)), rng.normal(size=(joints.count, 4))
     return Pose(r * joints.rows.length, p / np.linalg.norm(p, axis=-1, keepdims=True))
+
+
+class Elementary(NamedTuple):
+    """Spaces of twists of one kind.
+
+    Attributes:
+        members: (k,) their places among those given.
+        kinds: of the elementary motions, translations first.
+        screws: (k, d, 6) their unit twists, in units of the scene's length.
+    """
+
+    members: Integers
+    kinds: tuple[str, ...]
+    screws: Floats
+
+    def in_metres(self, length: float) -> Floats:
+        """The unit twists in m and 1, of a scene's length in m; those of translations stay."""
+        screws = self.screws.copy()
+        screws[:, self.kinds.count(TRANSLATION) :, :3] *= length
+        return screws
+
+
+def elementary(spaces: Floats) -> Iterator[Elementary]:
+    """Elementary motions that span spaces of twists, each space given by orthonormal columns.
+
+    What has rotations about two axes, or about three and more besides, is left out.
+
+    Args:
+        spaces: (m, 6, d) in units of the scene's length.
+    """
+    m, _, d = spaces.shape
+    every = np.arange(m)
+    if d == 0:
+        yield Elementary(every, (), np.zeros((m, 0, 6)))
+        return
+    _, size, directions = np.linalg.svd(spaces[:, 3:])
+    turning = np.sum(size > ZERO, axis=1)
+    # columns in the order of their rotation: those behind ``turning`` are translations
+    sorted_ = np.einsum("mab,mcb->mca", spaces, directions)
+    for count in (0, 1):
+        if (here := np.flatnonzero(turning == count)).size:
+            yield from _along_and_about(here, sorted_[here], count)
+    if d == 3 and (here := np.flatnonzero(turning == 3)).size:
+        yield from _about_a_point(here, spaces[here])
+
+
+def _along_and_about(members: Integers, twists: Floats, turning: int) -> Iterator[Elementary]:
+    """Translations, and with ``turning`` a rotation, which comes first in ``twists`` (k, d, 6)."""
+    shifts = twists[:, turning:].copy()
+    shifts[..., 3:] = 0.0
+    kinds = (TRANSLATION,) * shifts.shape[1]
+    if not turning:
+        yield Elementary(members, kinds, shifts)
+        return
+    turn = twists[:, 0] / np.linalg.norm(twists[:, 0, 3:], axis=-1, keepdims=True)
+    along = np.einsum("kdc,kc->kd", shifts[..., :3], turn[:, :3])
+    v = turn[:, :3] - np.einsum("kdc,kd->kc", shifts[..., :3], along)
+    w = turn[:, 3:]
+    pitch = np.sum(v * w, axis=-1)
+    advances = np.abs(pitch) > ZERO
+    v = np.where(advances[:, None], v, v - pitch[:, None] * w)
+    screws = np.concatenate([shifts, np.concatenate([v, w], axis=-1)[:, None]], axis=1)
+    for kind, here in ((ROTATION, ~advances), (SCREW, advances)):
+        if here.any():
+            yield Elementary(members[here], (*kinds, kind), screws[here])
+
+
+def _about_a_point(members: Integers, spaces: Floats) -> Iterator[Elementary]:
+    """Rotations about a point c: v = c x w for every twist (v, w)."""
+    G = spaces[:, :3] @ np.linalg.inv(spaces[:, 3:])
+    is_skew = np.abs(G + np.swapaxes(G, -1, -2)).max(axis=(1, 2)) < ZERO
+    members, G = members[is_skew], G[is_skew]
+    if members.size:
+        screws = np.zeros((len(members), 3, 6))
+        screws[..., 3:] = np.eye(3)
+        screws[..., :3] = 0.5 * (np.swapaxes(G, -1, -2) - G)  # row k: c x e_k
+        yield Elementary(members, (BALL,), screws)

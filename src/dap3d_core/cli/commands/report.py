@@ -116,6 +116,7 @@ def _measure(
     """The report and an exit code; a report that ends early has what was measured."""
     import dap3d_core as dap
     from dap3d_core.cli.console.report_tables import ReportProgress
+    from dap3d_core.result import Computed
 
     settings: dict[str, Any] = {name: None if v == () else v for name, v in given.items()}
     with ReportProgress(quiet=quiet) as progress, refusing(ValueError):
@@ -125,7 +126,7 @@ def _measure(
         except dap.SceneError as error:
             raise options.in_options(error) from error
         except (Terminated, KeyboardInterrupt) as error:
-            if (partial := getattr(error, "report", None)) is None:
+            if (partial := Computed.of(error).report) is None:
                 raise
             interrupted = isinstance(error, KeyboardInterrupt)
             return partial, exit_codes.INTERRUPTED if interrupted else exit_codes.PARTIAL

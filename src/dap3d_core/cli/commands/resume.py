@@ -67,7 +67,7 @@ def resume(
         if output is not None:
             writable(Path(output), force=force, sources=(Path(checkpoint),))
         with refusing(CheckpointError):  # a fault of the file that shows as it is restored
-            return resumed[0].go(output, force=force, checkpoint=every, watch=watch)
+            return resumed[0].execute(output, force=force, checkpoint=every, watch=watch)
 
     outcome = execute(ctx, prepare, run, quiet=quiet)
     target = Path(output) if output is not None else resumed[0].output

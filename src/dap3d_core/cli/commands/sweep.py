@@ -119,7 +119,7 @@ def _sweep(
 ) -> "xarray.Dataset":
     """The sweep; refused if it cannot begin."""
     import dap3d_core as dap
-    from dap3d_core.result import ResultError
+    from dap3d_core.result import Computed, ResultError
 
     settings = {name: value for name, value in given.items() if name not in ("vary", "keep")}
     client = None
@@ -136,7 +136,7 @@ def _sweep(
     except dap.SceneError as error:
         raise _in_options(error, given) from error
     except (dap.SimulationError, ResultError) as error:
-        if getattr(error, "result", None) is not None:
+        if Computed.of(error).result is not None:
             raise
         raise Refused(str(error)) from error
     finally:

@@ -205,13 +205,13 @@ def print_json(data: Any) -> None:
     """Print one JSON object to stdout: ASCII, numbers that are not finite as null."""
     try:
         stream = json_stream()
-        stream.write(json.dumps(plain(data), indent=2, allow_nan=False) + "\n")
+        stream.write(json.dumps(json_value(data), indent=2, allow_nan=False) + "\n")
         stream.flush()
     except OSError as error:
         leave_stdout(error)
 
 
-def plain(value: Any) -> Any:
+def json_value(value: Any) -> Any:
     """Data as JSON holds it; numpy's numbers and arrays, tuples and paths are converted."""
     if hasattr(value, "tolist"):
         value = value.tolist()
@@ -222,9 +222,9 @@ def plain(value: Any) -> Any:
     if isinstance(value, (bool, int, float, str, type(None))):
         return value
     if isinstance(value, Mapping):
-        return {str(k): plain(v) for k, v in value.items()}
+        return {str(k): json_value(v) for k, v in value.items()}
     if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(v) for v in value]
+        return [json_value(v) for v in value]
     return str(value)
 
 

@@ -14,7 +14,7 @@ from rich.text import Text
 from dap3d_core.cli.console.console import (
     Terminal,
     count,
-    plain,
+    json_value,
     print_json,
     scene_name,
     seconds,
@@ -129,7 +129,7 @@ def correction_data(
         "changed_bodies": [n for n, x in zip(names, largest, strict=True) if x > PRINTED],
         "most_changed": [names[k] for k in most if largest[k] > PRINTED],
         "bodies": {
-            name: {symbol: plain(values[k]) for symbol, values in arrays.items()}
+            name: {symbol: json_value(values[k]) for symbol, values in arrays.items()}
             for k, name in enumerate(names)
         },
     }

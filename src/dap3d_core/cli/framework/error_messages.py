@@ -6,7 +6,7 @@ import sys
 import traceback
 from typing import Any
 
-from dap3d_core.cli.console.console import Terminal, plain, print_json, stderr
+from dap3d_core.cli.console.console import Terminal, json_value, print_json, stderr
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.memory import address_space, is_used_up
 from dap3d_core.cli.process.streams import leave_stderr
@@ -48,7 +48,7 @@ def mistakes_of(error: BaseException) -> list[dict[str, Any]]:
     names = ("file", "line", "key", "value", "what", "nearest", "remedy")
     return [
         {name: getattr(m, name) for name in names}
-        | {"value": None if m.value is MISSING else plain(m.value)}
+        | {"value": None if m.value is MISSING else json_value(m.value)}
         for m in error.mistakes
     ]
 
@@ -87,10 +87,13 @@ def _judge(error: BaseException) -> tuple[int, str]:
     if isinstance(error, FileNotFoundError) and _folder_is_gone():
         text = "the current folder no longer exists; change to another one (cd)"
         return exit_codes.REFUSED, text
-    if part := getattr(error, "part", None):  # a disk that filled up during a run
-        text = f"{error}; what was computed until then is in {part}"
-        if checkpoint := getattr(error, "checkpoint", None):
-            text += f"; once there is room, dap3d resume {checkpoint} continues the run"
+    from dap3d_core.result import Computed
+
+    computed = Computed.of(error)
+    if computed.part:  # a disk that filled up during a run
+        text = f"{error}; what was computed until then is in {computed.part}"
+        if computed.checkpoint:
+            text += f"; once there is room, dap3d resume {computed.checkpoint} continues the run"
         return exit_codes.PARTIAL, text
     if isinstance(error, OSError) and error.strerror:
         file = f"{error.filename}: " if error.filename else ""

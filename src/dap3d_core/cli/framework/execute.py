@@ -67,6 +67,7 @@ def execute(
     import dap3d_core as dap
     from dap3d_core.cli.console.progress import ProgressBar
     from dap3d_core.cli.console.run_summary import RunOutcome
+    from dap3d_core.result import Computed
 
     with ProgressBar(quiet=quiet) as progress:
         with refusing(dap.SimulationError):  # a method that does not fit the scene
@@ -77,7 +78,7 @@ def execute(
             result = run(compiled, progress.announce, watch)
         except (Exception, KeyboardInterrupt) as error:
             partial, code, reason = partial_result(ctx, error)
-            return RunOutcome(compiled, partial, code, reason, getattr(error, "checkpoint", None))
+            return RunOutcome(compiled, partial, code, reason, Computed.of(error).checkpoint)
         return RunOutcome(compiled, result, exit_codes.DONE, "", None)
 
 
@@ -87,10 +88,10 @@ def partial_result(ctx: click.Context, error: BaseException) -> tuple[Any, int, 
     Raises:
         BaseException: the same exception if it carries no result.
     """
-    from dap3d_core.result import ResultError
+    from dap3d_core.result import Computed, ResultError
     from dap3d_core.simulation import SimulationError
 
-    result = getattr(error, "result", None)
+    result = Computed.of(error).result
     if result is None:
         raise error
     if ctx.meta["dap3d.debug"]:

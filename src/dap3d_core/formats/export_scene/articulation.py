@@ -1,18 +1,41 @@
 """A scene as an articulated model: the tree of its joints, loops, and what acts in joints."""
 
+from math import inf
+from typing import Any
+
 import numpy as np
 
-from dap3d_core.formats.export_scene.elements import SceneElements, SceneJoint
-from dap3d_core.formats.export_scene.forces import add_forces, add_gravity
+from dap3d_core.formats.export_scene.elements import ALIGNED, SceneElements, SceneJoint, leave_out
 from dap3d_core.formats.export_scene.model_builder import ModelBuilder
-from dap3d_core.formats.export_scene.shapes import geometries_of
-from dap3d_core.interface.formats.articulation import WORLD, Articulation, Inertial, Joint, Link
-from dap3d_core.interface.formats.frames import Frame, quaternion
+from dap3d_core.interface.formats.articulation import (
+    WORLD,
+    Actuator,
+    Articulation,
+    Coupling,
+    Geometry,
+    Inertial,
+    Joint,
+    Limits,
+    Link,
+)
+from dap3d_core.interface.formats.frames import Frame, axis_angle, from_quaternion, quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
-from dap3d_core.scene.scene import GROUND, Scene
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.scene.scene import GROUND, Element, Scene
 
 #: Kinds of joints whose points may be apart along the axis.
 SLIDERS = ("prismatic", "cylindrical")
+#: Stops beyond this are none, rad or m.
+NO_STOP = 1e6
+#: Orientations that are one, up to this.
+SAME = 1e-12
+#: Type of dry friction -> kind of its joint, its axis, and its size.
+FRICTION = {
+    "rot_friction": ("revolute", "axis", "n_c"), "tran_friction": ("prismatic", "a_j", "f_c"),
+}  # fmt: skip
+NO_JOINT = "no force on the coordinate of a joint"
+#: Kind of a joint -> the type of force, in axes of its body, that acts on its coordinate.
+TYPES = {"revolute": "np", "prismatic": "fp"}
 
 
 def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
@@ -108,3 +131,330 @@ def _add_joint(builder: ModelBuilder, joint: SceneJoint, *, closes: bool) -> Non
         made.in_parent = Frame(builder.in_link(joint.body_j, j.inverse() @ (i @ here)).r, there.A)
     builder.model.joints[joint.name] = made
     builder.placed[joint.name] = made
+
+
+def geometries_of(builder: ModelBuilder, scene: Scene, body: str) -> list[Geometry]:
+    """The shapes of a body; those that no model has are left out, remarked."""
+    geometries = []
+    for element in scene.shapes.values():
+        fields = element.fields
+        if fields.get("body") != body:
+            continue
+        color = str(fields.get("color") or "")
+        color = color if color.startswith("#") and len(color) == 7 else ""
+        A = from_quaternion(fields["p"]) if "p" in fields else np.eye(3)
+        if "axis" in fields:
+            A = turned_to(np.asarray(fields["axis"], dtype=float))
+        pose = builder.in_link(body, Frame(fields.get("at", (0.0, 0.0, 0.0)), A))
+        if element.type == "box":
+            size = tuple(map(float, fields["size"]))
+            geometries.append(Geometry("box", size, pose, color=color))
+        elif element.type == "sphere":
+            geometries.append(Geometry("sphere", (float(fields["radius"]),), pose, color=color))
+        elif element.type == "cylinder":
+            size = (float(fields["radius"]), float(fields["length"]))
+            geometries.append(Geometry("cylinder", size, pose, color=color))
+        elif element.type == "mesh":
+            scale = (float(fields.get("scale", 1.0)),) * 3
+            geometries.append(Geometry("mesh", (), pose, fields["file"], scale, color))
+        else:
+            leave_out(builder.remarks, element, "no shape of a model", motion=False)
+    return geometries
+
+
+def turned_to(axis: Floats) -> Floats:
+    """The least rotation that turns the z axis to a direction."""
+    x, y, z = axis / np.linalg.norm(axis)
+    sine = float(np.hypot(x, y))
+    if sine < 1e-14:
+        return axis_angle((1.0, 0.0, 0.0), 0.0 if z > 0.0 else float(np.pi))
+    return axis_angle((-y / sine, x / sine, 0.0), float(np.arctan2(sine, z)))
+
+
+def add_gravity(builder: ModelBuilder, scene: Scene) -> None:
+    """Add the weights of a scene as gravity."""
+    total = np.zeros(3)
+    for element in scene.forces.values():
+        if element.type == "weight":
+            direction = np.asarray(element.fields.get("wgt", (0.0, 0.0, -1.0)), dtype=float)
+            total += float(element.fields.get("gravity", 9.81)) * direction
+    x, y, z = (float(g) + 0.0 for g in total)
+    builder.model.gravity = (x, y, z)
+
+
+def add_forces(builder: ModelBuilder, scene: Scene) -> None:
+    """Add forces on coordinates of joints, and rotors; others are left out, remarked."""
+    springs = {"rot_sda": _of_hinge, "tran_sda": _of_slider, "ptp": _on_line}
+    taken = add_actuators(builder, scene)
+    for element in scene.forces.values():
+        if element.name in taken:
+            continue
+        if element.type == "sph_sd":
+            _add_to_ball(builder, element)
+        elif element.type in FRICTION:
+            _add_friction(builder, element)
+        elif element.type in ("rot_stop", "plane_stop"):
+            _add_stop(builder, element)
+        elif element.type != "weight":
+            of = springs.get(str(element.type))
+            found = None if of is None else of(builder, element)
+            if found is None:
+                leave_out(builder.remarks, element, NO_JOINT)
+            else:
+                _add(builder, element, *found)
+    _add_rotors(builder)
+
+
+def _joint_along(
+    builder: ModelBuilder, kind: str, bodies: set[str], axis: str
+) -> tuple[SceneJoint, float] | None:
+    """The joint of two bodies with an axis, and whether the axis has its sense, 1 or -1."""
+    elements = builder.elements
+    on, u = elements.vector(axis)
+    for joint in elements.joints:
+        if joint.kind == kind and {joint.body_i, joint.body_j} == bodies:
+            along = float((elements.turn(joint.body_i, on) @ u) @ joint.axes[0])
+            if abs(abs(along) - 1.0) <= ALIGNED:
+                return joint, float(np.sign(along))
+    return None
+
+
+def _of_hinge(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
+    """The joint of a torsional spring, the sense of its angle, and the angle where q = 0."""
+    elements, fields = builder.elements, element.fields
+    (i, v_i), (j, v_j) = (elements.vector(fields[key]) for key in ("v_i", "v_j"))
+    found = _joint_along(builder, "revolute", {i, j}, fields["axis"])
+    if found is None:
+        return None
+    joint, along = found
+    on, u = elements.vector(fields["axis"])
+    here, there = elements.turn(on, i) @ v_i, elements.turn(on, j) @ v_j
+    theta = float(np.arctan2(u @ np.cross(here, there), here @ there - (here @ u) * (there @ u)))
+    return builder.placed[joint.name], along * (-1.0 if i == joint.body_i else 1.0), theta
+
+
+def _of_slider(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
+    """The joint of a spring along an axis, the sense of its x, and x where q = 0."""
+    elements, fields = builder.elements, element.fields
+    i, j = (elements.point(fields[end])[0] for end in ("P_i", "P_j"))
+    found = _joint_along(builder, "prismatic", {i, j}, fields["a_j"])
+    if found is None:
+        return None
+    joint, along = found
+    axis = elements.bodies[joint.body_i].pose.A @ joint.axes[0]
+    x = -along * float(axis @ _between(builder, fields))
+    return builder.placed[joint.name], along * (1.0 if i == joint.body_i else -1.0), x
+
+
+def _on_line(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
+    """The joint of a spring along its axis, the sense of its length, and that where q = 0."""
+    elements = builder.elements
+    i, j = (elements.point(end)[0] for end in elements.ends(element.fields))
+    d = _between(builder, element.fields)
+    length = float(np.linalg.norm(d))
+    for joint in elements.joints:
+        if joint.kind == "prismatic" and {joint.body_i, joint.body_j} == {i, j} and length:
+            axis = elements.bodies[joint.body_i].pose.A @ joint.axes[0]
+            along = float(axis @ d) / length
+            if abs(abs(along) - 1.0) <= ALIGNED and _limits(builder, element) is not None:
+                sense = float(np.sign(along)) * (-1.0 if i == joint.body_i else 1.0)
+                return builder.placed[joint.name], sense, length
+    return None
+
+
+def _between(builder: ModelBuilder, fields: dict[str, Any]) -> Floats:
+    """The vector from P_i to P_j in global axes."""
+    P_i, P_j = builder.elements.ends(fields)
+    return builder.elements.at(P_j) - builder.elements.at(P_i)
+
+
+def _add_friction(builder: ModelBuilder, element: Element) -> None:
+    """Add dry friction to a hinge or a slider; how it fades is the business of other programs."""
+    elements, fields = builder.elements, element.fields
+    kind, axis, size = FRICTION[str(element.type)]
+    if kind == "revolute":
+        bodies = {str(fields["body_i"]), str(fields["body_j"])}
+    else:
+        bodies = {elements.point(fields["P_i"])[0], elements.vector(fields["a_j"])[0]}
+    found = _joint_along(builder, kind, bodies, fields[axis])
+    if found is None:
+        leave_out(builder.remarks, element, NO_JOINT)
+        return
+    joint = builder.placed[found[0].name]
+    joint.friction = (joint.friction[0] + float(fields[size]),)
+
+
+def _add_to_ball(builder: ModelBuilder, element: Element) -> None:
+    """Add a spring and damper to a ball; its spring is at rest where a model starts."""
+    elements, fields = builder.elements, element.fields
+    i, j = str(fields["body_i"]), str(fields["body_j"])
+    joint = next((one for one in elements.joints if one.kind == "ball"
+                  and {one.body_i, one.body_j} == {i, j}), None)  # fmt: skip
+    if joint is None:
+        leave_out(builder.remarks, element, NO_JOINT)
+        return
+    placed, k = builder.placed[joint.name], float(fields.get("k", 0.0))
+    placed.damping = (placed.damping[0] + float(fields.get("c", 0.0)),)
+    rest = from_quaternion(fields.get("p_c", (1.0, 0.0, 0.0, 0.0)))
+    if k and np.abs(elements.turn(i, j) - rest).max() > SAME:
+        leave_out(
+            builder.remarks, element, "a spring of a ball that has a moment in the pose given"
+        )
+    elif k:
+        placed.stiffness = (placed.stiffness[0] + k,)
+
+
+def _limits(builder: ModelBuilder, element: Element) -> Element | bool | None:
+    """The function of stops of a force; False for none, None for another function."""
+    name = element.fields.get("function")
+    if name is None:
+        return False
+    function = builder.elements.scene.functions[name]
+    return function if function.type == "stops" else None
+
+
+def _add(builder: ModelBuilder, element: Element, joint: Joint, sense: float, zero: float) -> None:
+    """Add a spring, damper or stops to a joint; the coordinate is sense (x - zero)."""
+    fields, stops = element.fields, _limits(builder, element)
+    rest = float(fields.get("theta_0", fields.get("x_0", fields.get("l0", 0.0))))
+    if stops is None or fields.get("n_a") or fields.get("f_a"):
+        leave_out(builder.remarks, element, "a constant force or a function on a joint")
+        return
+    joint.damping = (joint.damping[0] + float(fields.get("c", 0.0)),)
+    if isinstance(stops, Element):
+        low, high = (float(stops.fields[key]) for key in ("lower", "upper"))
+        ends = sorted(sense * (rest + x - zero) if abs(x) < NO_STOP else sense * x * inf
+                      for x in (low, high))  # fmt: skip
+        joint.limits = (Limits(ends[0] + 0.0, ends[1] + 0.0, float(stops.fields["k"])),)
+    elif fields.get("k"):
+        if joint.stiffness[0]:
+            leave_out(builder.remarks, element, "a second spring of a joint")
+            return
+        joint.stiffness = (float(fields["k"]),)
+        joint.rest = (sense * (rest - zero) + 0.0,)
+
+
+def _add_stop(builder: ModelBuilder, element: Element) -> None:
+    """Add a stop as a limit of a joint, whose coordinate is sense (x - zero) for its x."""
+    fields = element.fields
+    if element.type == "rot_stop":
+        found = _of_hinge(builder, element)
+        at = float(fields["theta_stop"])
+    else:
+        found = _of_plane(builder, element)
+        at = float(fields.get("radius", 0.0))
+    if found is None:
+        leave_out(builder.remarks, element, NO_JOINT)
+        return
+    joint, sense, zero = found
+    bound, is_least = sense * (at - zero) + 0.0, fields.get("side", "min") == "min"
+    low, high = joint.limits[0].lower, joint.limits[0].upper
+    ends = (max(low, bound), high) if is_least == (sense > 0.0) else (low, min(high, bound))
+    joint.limits = (Limits(*ends, float(fields["k"])),)
+
+
+def _of_plane(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
+    """The joint of a ball at a plane, the sense of its distance, and that where q = 0."""
+    elements = builder.elements
+    fields = {"P_j": f"{GROUND}.O", "a_j": f"{GROUND}.z"} | element.fields
+    i, j = (elements.point(fields[end])[0] for end in ("P_i", "P_j"))
+    found = _joint_along(builder, "prismatic", {i, j}, fields["a_j"])
+    if found is None or elements.vector(fields["a_j"])[0] != j:
+        return None
+    joint, along = found
+    axis = along * (elements.bodies[joint.body_i].pose.A @ joint.axes[0])
+    distance = -float(axis @ _between(builder, fields))
+    return builder.placed[joint.name], along * (1.0 if i == joint.body_i else -1.0), distance
+
+
+def _add_rotors(builder: ModelBuilder) -> None:
+    """Add wheels as armature of the joint that turns as they do, and couplings of others."""
+    for name, rotor in builder.elements.rotors.items():
+        pairs: list[tuple[str, float]] = []
+        for follower, fields in rotor.followers:
+            joint = _followed(builder, fields)
+            if joint is None:
+                text = f"{follower} of type follow: it follows no joint"
+                builder.remarks.leave_out(NOWHERE, text, motion=True)
+                continue
+            pairs.append((joint.name, float(fields.get("ratio", 1.0))))
+        leader = next((one for one, ratio in pairs if ratio == 1.0), None)
+        if leader is None:
+            text = f"wheel {name}: no joint turns as it does"
+            builder.remarks.leave_out(NOWHERE, text, motion=True)
+            continue
+        builder.placed[leader].armature = (rotor.inertia,)
+        first = True
+        for one, ratio in pairs:
+            if one == leader and first:
+                first = False
+                continue
+            builder.model.couplings.append(Coupling("", one, leader, ratio))
+
+
+def _followed(builder: ModelBuilder, fields: dict[str, Any]) -> SceneJoint | None:
+    """The joint whose coordinate a follower couples."""
+    elements = builder.elements
+    on, axis = elements.vector(fields["a_j"])
+    kind = "prismatic" if fields.get("along") else "revolute"
+    for joint in elements.joints:
+        ends = {joint.body_i, joint.body_j}
+        if joint.kind == kind and ends == {str(fields["body_i"]), on}:
+            along = float((elements.turn(joint.body_i, on) @ axis) @ joint.axes[0])
+            if abs(along - 1.0) <= ALIGNED:
+                return joint
+    return None
+
+
+def add_actuators(builder: ModelBuilder, scene: Scene) -> set[str]:
+    """Add inputs that are factors of forces on the coordinate of one joint.
+
+    Returns:
+        the names of these forces.
+    """
+    taken: set[str] = set()
+    for name, given in scene.inputs.items():
+        users = [e for e in (*scene.forces.values(), *scene.joints.values())
+                 if e.fields.get("input") == name]  # fmt: skip
+        for joint in builder.elements.joints:
+            gear = _gear(builder, joint, users)
+            if gear:
+                builder.model.actuators.append(Actuator(name, joint.name, gear))
+                taken |= {element.name for element in users}
+                if given.value:
+                    text = f"the value of input {name} at the start"
+                    builder.remarks.leave_out(NOWHERE, text, motion=True)
+                break
+    return taken
+
+
+def _gear(builder: ModelBuilder, joint: SceneJoint, users: list[Element]) -> float:
+    """Force on the coordinate of a joint for an input of 1; 0.0 if that is not what acts."""
+    if joint.kind not in TYPES or builder.placed[joint.name].closes:
+        return 0.0
+    type_ = TYPES[joint.kind]
+    acting = {_body_of(builder, e): e for e in users if e.type == type_}
+    moving = [one for one in (joint, joint.reversed()) if one.body_i != GROUND]
+    if len(acting) != len(users) or acting.keys() != {one.body_i for one in moving}:
+        return 0.0
+    forces = [np.asarray(acting[one.body_i].fields[type_], dtype=float) for one in moving]
+    gear = float(forces[0] @ moving[0].axes[0])
+    apart = max(np.abs(f - gear * one.axes[0]).max() for f, one in zip(forces, moving, strict=True))
+    if apart > ALIGNED * abs(gear):
+        return 0.0
+    if type_ == "fp":  # on one line
+        places = [builder.elements.at(_point_of(acting[one.body_i])) for one in moving]
+        axis = builder.elements.bodies[moving[0].body_i].pose.A @ moving[0].axes[0]
+        if np.abs(np.cross(places[-1] - places[0], axis)).max() > ALIGNED:
+            return 0.0
+    return gear
+
+
+def _body_of(builder: ModelBuilder, element: Element) -> str:
+    """The body on which a force acts."""
+    return builder.elements.point(_point_of(element))[0]
+
+
+def _point_of(element: Element) -> str:
+    """The point at which a force acts."""
+    return str(element.fields.get("P_i") or f"{element.fields['body_i']}.O")

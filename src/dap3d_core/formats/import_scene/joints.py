@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
 from dap3d_core.interface.formats.articulation import WORLD, Joint
 from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.interface.formats.joint_motion import reversed_joint
@@ -69,7 +69,7 @@ class JointEnds:
 
     def _named(self, table: str, body: str, vector: Floats, suffix: str) -> str:
         """The name of a point or vector of a body, which is added where there is none."""
-        numbers = plain(vector)
+        numbers = float_tuple(vector)
         made, key = self.builder.names.scene_names, f"{body}: {numbers}"
         if (table, key) not in made:
             name = self.builder.names.free(table, f"{self.name}_{suffix}")

@@ -50,6 +50,6 @@ class SceneBuilder:
         return self.member[joint.parent][0] == self.member[joint.child][0]
 
 
-def plain(vector: Any) -> tuple[float, ...]:
+def float_tuple(vector: Any) -> tuple[float, ...]:
     """The components of a vector as a scene has them: Python's floats, zero without a sign."""
     return tuple(float(x) + 0.0 for x in vector)

@@ -11,7 +11,7 @@ from dap3d_core.formats.import_scene.joint_forces import add_inputs, add_joint_f
 from dap3d_core.formats.import_scene.joints import add_joint
 from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.rigid_groups import RigidGroup, rigid_groups
-from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
 from dap3d_core.formats.import_scene.shapes import MeshFiles, add_shapes
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.formats.import_scene.start import couples, start_of
@@ -157,14 +157,14 @@ def _add_body(builder: SceneBuilder, group: RigidGroup, placed: Placed) -> None:
     fields: dict[str, Any] = {
         "mass": inertial.mass,
         "Jp": inertia_numbers(inertial.inertia),
-        "r": plain(placed.frame.r + arm),
+        "r": float_tuple(placed.frame.r + arm),
         "p": quaternion(placed.frame.A),
     }
     velocity = placed.v + np.cross(placed.w, arm)
     if velocity.any():
-        fields["r_dot"] = plain(velocity)
+        fields["r_dot"] = float_tuple(velocity)
     if placed.w.any():
-        fields["w"] = plain(placed.w)
+        fields["w"] = float_tuple(placed.w)
     builder.scene.add_body(name, **fields)
 
 
@@ -172,8 +172,8 @@ def inertia_numbers(inertia: Floats) -> Any:
     """Three numbers for a diagonal inertia matrix, else three rows; exactly symmetric."""
     symmetric = 0.5 * (inertia + inertia.T)
     if not (symmetric - np.diag(np.diag(symmetric))).any():
-        return plain(np.diag(symmetric))
-    return tuple(plain(row) for row in symmetric)
+        return float_tuple(np.diag(symmetric))
+    return tuple(float_tuple(row) for row in symmetric)
 
 
 def _add_gravity(scene: Scene, gravity: Sequence[float]) -> None:

@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.formats.import_scene.names import usable
-from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, plain
+from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
 from dap3d_core.interface.formats.articulation import Geometry, Link
 from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.scene.validate.shapes import MESHES
@@ -56,7 +56,7 @@ def _shapes(
     builder: SceneBuilder, shape: Geometry, frame: Frame, meshes: MeshFiles
 ) -> list[tuple[str, dict[str, Any]]]:
     """Keyword and fields of the shapes that draw a geometry."""
-    at, z = plain(frame.r), frame.A[:, 2]
+    at, z = float_tuple(frame.r), frame.A[:, 2]
     if shape.size and min(shape.size) <= 0.0:
         builder.remarks.leave_out(shape.place, "a shape of size 0 is not drawn")
         return []
@@ -66,9 +66,9 @@ def _shapes(
         return [("sphere", {"radius": shape.size[0], "at": at})]
     if shape.kind in ("cylinder", "capsule"):
         radius, length = shape.size
-        tube = {"radius": radius, "length": length, "at": at, "axis": plain(z)}
+        tube = {"radius": radius, "length": length, "at": at, "axis": float_tuple(z)}
         caps = [
-            ("sphere", {"radius": radius, "at": plain(frame.r + side * z * length / 2.0)})
+            ("sphere", {"radius": radius, "at": float_tuple(frame.r + side * z * length / 2.0)})
             for side in (1.0, -1.0)
         ]
         return [("cylinder", tube), *(caps if shape.kind == "capsule" else [])]
@@ -93,5 +93,5 @@ def _mesh(
         return []
     name = meshes.name(shape.mesh, (1.0, 1.0, 1.0))
     factor = shape.scale[0]
-    fields = {"file": name, "at": plain(frame.r), "p": quaternion(frame.A)}
+    fields = {"file": name, "at": float_tuple(frame.r), "p": quaternion(frame.A)}
     return [("mesh", fields | ({} if factor == 1.0 else {"scale": factor}))]

@@ -40,7 +40,7 @@ LEAST_FREE = 1e-4
 
 
 @compiled
-def weigh_rows(system: System, part: float) -> None:
+def weigh_kept_rows(system: System, part: float) -> None:
     """E: ``part`` of the diagonal of ``matrix``; 0.0 where rows are independent.
 
     At least that of ``LEAST_FREE`` of the row's square in the metric of its bodies: the tree may

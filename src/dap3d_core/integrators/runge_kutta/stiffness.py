@@ -2,7 +2,7 @@
 
 Two stages at the end of a step, f(g) and f(y1), give h |lambda| = h |f(y1) - f(g)| / |y1 - g| of
 the component that dominates their difference (Hairer, Wanner, Solving Ordinary Differential
-Equations II, IV.2, and their codes DOPRI5 and DOP853, whence the counting of steps, too). Their
+Equations II, IV.2, and their codes DOPRI5 and DOP853, which count steps like this, too). Their
 measure alone, h |lambda| at the boundary of the region of stability, takes fast spins at loose
 tolerances for stiff, and misses stiff scenes at tight ones. Here a step looks stiff where the
 component decays, f(y1) - f(g) pointing against y1 - g, by more than half in a step: such a motion

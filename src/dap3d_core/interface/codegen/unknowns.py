@@ -1,4 +1,4 @@
-"""Lines of group loops of joints that have unknowns of their own (kernels/elimination.py).
+"""Lines of group loops of joints that have unknowns of their own (kernels/eliminate_unknowns.py).
 
 An unknown is kept like an angle whose turns are counted: its value, rate and time at the last
 accepted step, from which it is predicted. Behind them is the sign of its column of R, which is
@@ -25,7 +25,7 @@ from dap3d_core.interface.codegen.loop_source import (
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.element_unknowns import GREATEST, LEAST
 from dap3d_core.interface.types import Joint
-from dap3d_core.kernels.elimination import eliminate, least_change, settled, solved
+from dap3d_core.kernels.eliminate_unknowns import eliminate, least_change, settled, solved
 from dap3d_core.kernels.runtime.loop_modules import Loop
 
 #: What the lines call.

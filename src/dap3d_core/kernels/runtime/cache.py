@@ -7,6 +7,7 @@ another file (docs/decisions/0001, 0026).
 import functools
 import inspect
 import os
+import stat
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +20,6 @@ from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.types import BOOL, FLOAT, INT, NOTHING, Scalar, Signature
 from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, kind_of, type_of
-from dap3d_core.kernels.runtime.folder_security import distrust
 from dap3d_core.kernels.runtime.source_digest import bytecode, digest, origin, source_digest
 
 _RESULTS = {type_.name: type_ for type_ in (NOTHING, BOOL, INT, FLOAT)}
@@ -28,6 +28,8 @@ _units: dict[str, Unit] = {}
 _making = threading.RLock()
 #: The thread in which the functions of the core run with symbols (compiler/straight_line.py).
 _symbolic_thread: int | None = None
+#: The bits of a mode that let others write.
+OTHERS_WRITE = stat.S_IWGRP | stat.S_IWOTH
 
 
 def jit_is_on() -> bool:
@@ -218,3 +220,28 @@ def table_of(signature: Signature, functions: Sequence[Any]) -> Any:
         here = [f for f in rest if f.__module__ == module]
         entries.update(zip(here, entries_of(here, signature.arguments), strict=True))
     return Functions(signature, [entries[f] for f in functions])
+
+
+def distrust(folder: Path) -> str:
+    """Reason why others could put code into a folder; "" if only this user can.
+
+    A trusted folder belongs to this user, nobody else may write to it, and no folder above it lets
+    everybody rename its content. Where files have no owners (Windows), every folder is trusted.
+
+    Raises:
+        OSError: the folder cannot be examined.
+    """
+    if not hasattr(os, "geteuid"):
+        return ""
+    user = os.geteuid()
+    for status in (folder.lstat(), folder.stat()):  # a link, and where it leads
+        if status.st_uid != user:
+            return f"it belongs to another user (uid {status.st_uid})"
+    mode = stat.S_IMODE(folder.stat().st_mode)
+    if mode & OTHERS_WRITE:
+        return f"others may write to it (mode {mode:o}); chmod go-w makes it yours alone"
+    for above in folder.resolve().parents:
+        mode = above.stat().st_mode
+        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+            return f"everybody may rename what is in {above}"
+    return ""

@@ -10,9 +10,9 @@ from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
-#: Floors of the core that hold compiled code, low to high: a function depends on its own floor and
+#: Layers of the core that hold compiled code, low to high: a function depends on its own layer and
 #: those below.
-COMPILED_FLOORS = ("kernels", "model", "assembly", "linear", "formulations", "integrators", "study")
+COMPILED_LAYERS = ("kernels", "model", "assembly", "linear", "formulations", "integrators", "study")
 
 
 def source_digest(*parts: str | bytes) -> str:
@@ -30,21 +30,21 @@ def digest(*parts: str | bytes) -> str:
 
 
 @cache
-def driver_digest(floor: str) -> str:
-    """Digest of all sources that decide what the compiled code of a floor of the core computes."""
+def driver_digest(layer: str) -> str:
+    """Digest of all sources that decide what the compiled code of a layer of the core computes."""
     root = Path(__file__).parents[2]
-    below = COMPILED_FLOORS[: COMPILED_FLOORS.index(floor) + 1]
+    below = COMPILED_LAYERS[: COMPILED_LAYERS.index(layer) + 1]
     files = sorted(f for name in below for f in (root / name).rglob("*.py"))
     parts = ((f.relative_to(root).as_posix(), f.read_bytes()) for f in files)
     return source_digest(*(part for both in parts for part in both))
 
 
 def origin(functions: list[Any]) -> list[str | bytes]:
-    """Digests of all that determines the code of functions: floors of the core, or sources."""
-    floors = {f.__module__.split(".")[1] if f.__module__.startswith("dap3d_core.") else ""
+    """Digests of all that determines the code of functions: layers of the core, or sources."""
+    layers = {f.__module__.split(".")[1] if f.__module__.startswith("dap3d_core.") else ""
               for f in functions}  # fmt: skip
-    if floors <= set(COMPILED_FLOORS):
-        return [driver_digest(floor) for floor in sorted(floors)]
+    if layers <= set(COMPILED_LAYERS):
+        return [driver_digest(layer) for layer in sorted(layers)]
     return [*places(*functions), *sources(*functions)]
 
 

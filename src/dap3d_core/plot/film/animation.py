@@ -2,9 +2,13 @@
 
 import base64
 import os
+import shutil
+import subprocess
+import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -12,7 +16,6 @@ import numpy as np
 from dap3d_core.model.groups import Floats
 from dap3d_core.plot.figure_file import FORMATS as PICTURES
 from dap3d_core.plot.figure_file import fixed_files
-from dap3d_core.plot.film.encoding import FILMS, write_film
 from dap3d_core.plot.film.frame import Stage
 from dap3d_core.plot.film.projection import (
     camera_of,
@@ -23,8 +26,8 @@ from dap3d_core.plot.film.projection import (
 )
 from dap3d_core.plot.film.stick_figure import pose_at, sticks_of
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import Result
-from dap3d_core.result.file.atomic_write import whole_file
+from dap3d_core.result import Result, ResultError
+from dap3d_core.result.file.atomic_write import cannot, whole_file
 
 #: Pixels; a height of 0 becomes one that suits the motion.
 SIZE = (640, 0)
@@ -34,11 +37,96 @@ SHORTEST, LONGEST, ABOUT = 2.0, 10.0, 5.0
 #: More frames are refused as a mistake.
 MOST_FRAMES = 20_000
 BEYOND = "the motion leaves the limits of the scene's [animation]; fit (--fit) frames it all"
-SUFFIXES = (*FILMS, *PICTURES)
 #: Suffix -> media type of what notebooks show.
 MEDIA = {".gif": "image/gif", ".png": "image/png", ".svg": "image/svg+xml", ".mp4": "video/mp4"}
 
 Progress = Callable[[int, int], None]
+NO_FFMPEG = (
+    "an MP4 needs the program ffmpeg, which is not on PATH: install it (apt install ffmpeg, "
+    "brew install ffmpeg, conda install ffmpeg), or name a .gif file"
+)
+#: Colours of a GIF; lines at any angle need shades between theirs and white.
+COLORS = 128
+#: Parts of a colour from here on are as bright as can be.
+PALEST = 248
+
+Frames = Iterator[Any]
+
+
+class FilmFormat(NamedTuple):
+    """A format of films: how it is written, its highest fps, what it makes of an fps."""
+
+    write: Callable[[Path, Frames, float], None]
+    most_fps: float
+    fps: Callable[[float], float]
+
+
+def write_film(form: FilmFormat, part: Path, target: Path, frames: Frames, fps: float) -> None:
+    """Write frames, (height, width, 4) bytes each, each used before the next is requested.
+
+    Raises:
+        ResultError: the disk or the encoder refuses; no ffmpeg.
+    """
+    try:
+        form.write(part, frames, fps)
+    except OSError as error:
+        raise cannot("write", target, error) from error
+
+
+def _write_gif(part: Path, frames: Frames, fps: float) -> None:
+    from PIL import Image
+
+    none = Image.Dither.NONE
+    first = Image.fromarray(next(frames)).convert("RGB")
+    palette = first.quantize(COLORS, method=Image.Quantize.MEDIANCUT, dither=none)
+    # The means of pale shades fall short of white, and colours are looked up in steps of 8.
+    palette.putpalette([s if s < PALEST else 255 for s in palette.getpalette() or []])
+    rest = (Image.fromarray(f).convert("RGB").quantize(palette=palette, dither=none)
+            for f in frames)  # fmt: skip
+    with part.open("wb") as file:
+        palette.save(file, format="GIF", save_all=True, append_images=rest, loop=0,
+                     optimize=False, duration=round(1000.0 / fps))  # fmt: skip
+
+
+def _write_mp4(part: Path, frames: Frames, fps: float) -> None:
+    program = shutil.which("ffmpeg")
+    if program is None:
+        raise ResultError(NO_FFMPEG)
+    first = next(frames)
+    height, width = first.shape[:2]
+    even = "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white"  # what the usual encoders ask for
+    words = [program, "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgba",
+             "-s", f"{width}x{height}", "-r", f"{fps:g}", "-i", "-", "-an", "-vf", even,
+             "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(part)]  # fmt: skip
+    with tempfile.TemporaryFile() as said:
+        # In a session of its own: Ctrl-C is ours to handle, the encoder is ended below.
+        process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=said, stderr=said,
+                                   start_new_session=True)  # fmt: skip
+        assert process.stdin is not None
+        try:
+            with suppress(BrokenPipeError):  # it has ended, and says why
+                process.stdin.write(first.tobytes())
+                for frame in frames:
+                    process.stdin.write(frame.tobytes())
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            with suppress(BrokenPipeError):
+                process.stdin.close()
+            code = process.wait()
+        said.seek(0)
+        why = said.read().decode(errors="replace").strip().splitlines()
+    if code:
+        raise ResultError(f"ffmpeg failed with exit code {code}: {why[-1] if why else 'no reason'}")
+
+
+#: Suffix -> format. Delays of a GIF are multiples of 10 ms.
+FILMS = {
+    ".gif": FilmFormat(_write_gif, 50.0, lambda fps: 100.0 / round(100.0 / fps)),
+    ".mp4": FilmFormat(_write_mp4, 240.0, lambda fps: fps),
+}
+SUFFIXES = (*FILMS, *PICTURES)
 
 
 @attrs.frozen

@@ -297,7 +297,7 @@ def _kind(value: Any) -> str:
     return f"an array of {dtype}" if dtype is not None else f"a {type(value).__name__}"
 
 
-def oddity(spec: FieldSpec, value: Any) -> str:
+def unusual_value_note(spec: FieldSpec, value: Any) -> str:
     """The note on an unusual value of a field, to follow it in a message; "" for no note."""
     if spec.kind == "number":
         low, high = spec.usual

@@ -14,8 +14,8 @@ from dap3d_core.scene.scene import GROUND, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     READERS,
     Fault,
-    oddity,
     unread,
+    unusual_value_note,
 )
 from dap3d_core.scene.validate.geometry import (
     BAD,
@@ -320,7 +320,7 @@ class _Reading:
         self.values[field.name] = result
         if isinstance(result, Fault):
             self.good = False
-        elif odd := oddity(spec, result):
+        elif odd := unusual_value_note(spec, result):
             self.report.note(f"{dotted(key)} = {shown(value)} {odd}")
 
     def refuse_both(self, field: _Field, value: Any) -> None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.kernels.runtime.source_digest import driver_digest
-from dap3d_core.result import Result, ResultError, open_result
+from dap3d_core.result import Computed, Result, ResultError, open_result
 from dap3d_core.result.metadata import to_json
 from dap3d_core.simulation.checkpoint.file import (
     Checkpoint,
@@ -61,7 +61,7 @@ class CheckpointWriter:
         if math.isfinite(self._seconds):
             self._save()
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Write a checkpoint if it is time."""
         if time.perf_counter() >= self._next:
             self._save()
@@ -79,7 +79,7 @@ class CheckpointWriter:
         run = self._run
         if run.is_whole:
             self.write()
-            error.checkpoint = self.path  # type: ignore[attr-defined]
+            Computed(checkpoint=self.path).attach(error)
 
     def write(self) -> None:
         """Write a checkpoint of the present run, once its rows are in a file."""

@@ -16,7 +16,7 @@ from dap3d_core.result.errors import unknown
 from dap3d_core.result.post.reactions import Reaction, reactions
 from dap3d_core.scene import Scene, check
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.equilibrium.rest import Rest, find_rest
+from dap3d_core.simulation.equilibrium.rest import EquilibriumSolution, find_rest
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.assemble import violation
 from dap3d_core.simulation.initial.start_state import NamedState, Start, start_state
@@ -50,7 +50,9 @@ class Equilibrium:
         notes: what was assumed, and what to know of it.
     """
 
-    def __init__(self, compiled: CompiledModel, rest: Rest, notes: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, compiled: CompiledModel, rest: EquilibriumSolution, notes: tuple[str, ...] = ()
+    ) -> None:
         """Compose an equilibrium of a model and what was found."""
         self.compiled, self._rest = compiled, rest
         self.u, self.Lam = read_only(rest.u), read_only(rest.multipliers)

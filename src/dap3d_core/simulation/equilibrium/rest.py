@@ -1,24 +1,42 @@
 """Equilibria of a compiled model: search, stability, reactions, what is to be said of them."""
 
+from collections.abc import Iterator
+
 import attrs
 import numpy as np
 
+from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model import Group, Model
+from dap3d_core.model.state_layout import velocities_of
+from dap3d_core.registry.suggestions import some
 from dap3d_core.result import INFORMATION
-from dap3d_core.simulation.equilibrium.notes import assumptions, failure, findings
 from dap3d_core.simulation.equilibrium.search import Outcome, Search, search_equilibrium
 from dap3d_core.simulation.equilibrium.stability import Stability, stability_of
-from dap3d_core.simulation.equilibrium.statics import Statics
-from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.equilibrium.states_at_rest import (
+    MOST_STEPS,
+    OPEN,
+    SETTLED,
+    unsettled_part,
+)
+from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
+from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.initial.start_state import StartState
 
 #: Singular values of the Jacobian below this part are left out of the least multipliers.
 RCOND = 1e-10
+#: Names that a note lists.
+MOST_NAMES = 6
+#: Bodies that move this part of the largest motion, or more, are named.
+ALIKE = 0.5
+#: A direction counts as an axis if this cosine belongs to it.
+ALONG_AXIS = 0.999
 
 
 @attrs.frozen(eq=False)
-class Rest:
+class EquilibriumSolution:
     """An equilibrium as it was found.
 
     Attributes:
@@ -47,7 +65,7 @@ def find_rest(
     u: Floats,
     angles: Floats | None = None,
     states: Floats | None = None,
-) -> Rest:
+) -> EquilibriumSolution:
     """The equilibrium that a model comes to from a state u (13 n,) on the constraints.
 
     Args:
@@ -69,7 +87,7 @@ def find_rest(
     stability = stability_of(statics, pose)
     rows = evaluator.rows(0.0, pose.u)
     multipliers, unbalanced = least_multipliers(statics, pose.u)
-    return Rest(
+    return EquilibriumSolution(
         pose.u,
         evaluator.counted_angles(0.0, pose.u),
         evaluator.states.copy(),
@@ -99,7 +117,6 @@ def _with_states(evaluator: Evaluator, search: Search) -> Search:
     Raises:
         SimulationError: states do not come to rest; names them.
     """
-    from dap3d_core.simulation.equilibrium.balanced_states import find_together
     from dap3d_core.simulation.equilibrium.states_at_rest import moving_states
 
     moving = moving_states(evaluator, 0.0, search.pose.u)
@@ -107,7 +124,7 @@ def _with_states(evaluator: Evaluator, search: Search) -> Search:
         return search
     statics = Statics(evaluator)
     statics.settles = False
-    found = find_together(statics, search.pose)
+    found = solve_coupled(statics, search.pose)
     if found is None:
         names = ", ".join(f"{state.element}.{state.name}" for state in moving)
         raise SimulationError(f"no equilibrium: the rate of {names} vanishes neither for any "
@@ -125,3 +142,163 @@ def start_at_rest(evaluator: Evaluator, u: Floats) -> StartState:
     steps = rest.search.steps
     note = f"{INFORMATION}the run starts at an equilibrium, found in {steps} steps"
     return StartState(rest.u, rest.angles, (note, *rest.notes), states=rest.states)
+
+
+def solve_coupled(statics: Statics, pose: StaticPose) -> StaticPose | None:
+    """The pose at which forces and rates vanish, by Newton's method; None where it finds none."""
+    evaluator, kept, before = statics.evaluator, statics.evaluator.states, np.inf
+    for _ in range(MOST_STEPS):
+        fixed = statics.fixed_tangent(pose)
+        own = fixed.states
+        assert own is not None
+        left = max(pose.residual, unsettled_part(own, evaluator.states))
+        if left <= SETTLED:
+            return pose
+        if not left < 1e3 * before:
+            break
+        before = min(before, left)
+        basis = statics.scale[:, None] * pose.free
+        matrix = np.block(
+            [[-statics.reduced(fixed.stiffness, pose), basis.T @ own.force_by_states.toarray()],
+             [own.rate_by_displacement @ basis, own.rate_by_states.toarray()]]
+        )  # fmt: skip
+        step = _least_solution(matrix, -np.concatenate([pose.unbalanced, own.rates]))
+        evaluator.states = evaluator.states + step[pose.free.shape[1] :]
+        try:
+            moved = statics.moved(pose.u, pose.free @ step[: pose.free.shape[1]])
+            pose = statics.at(statics.closed(moved))
+        except (AssemblyError, np.linalg.LinAlgError):
+            break
+    evaluator.states = kept
+    return None
+
+
+def _least_solution(matrix: Floats, side: Floats) -> Floats:
+    """The least solution of equations of different units, columns and rows scaled."""
+    rows = np.max(np.abs(matrix), axis=1, initial=0.0)
+    rows[rows == 0.0] = 1.0
+    columns = np.max(np.abs(matrix / rows[:, None]), axis=0, initial=0.0)
+    columns[columns == 0.0] = 1.0
+    scaled = matrix / rows[:, None] / columns
+    found: Floats = np.linalg.lstsq(scaled, side / rows, rcond=OPEN)[0] / columns
+    return found
+
+
+def findings(search: Search, stability: Stability, model: Model) -> Iterator[str]:
+    """Notes on the equilibrium itself."""
+    if not stability.stable:
+        moves = describe_motion(model, stability.escaping[0])
+        where = "the start is" if search.started_balanced else "it is"
+        yield (
+            f"{where} an unstable equilibrium: it leaves along a freedom of {moves}; "
+            "move a body off it to see where the scene comes to rest"
+        )
+    elif search.started_balanced:
+        yield f"{INFORMATION}the start is an equilibrium"
+    if search.left:
+        yield (
+            "an unstable equilibrium lay on the way and was left to one of two sides that are "
+            "alike; the pose on the other side may be another equilibrium"
+        )
+    count = len(stability.indifferent)
+    if count:
+        moves = describe_motion(model, stability.indifferent[0])
+        others = f" and {count - 1} more" if count > 1 else ""
+        yield (
+            f"{INFORMATION}indifferent: nothing drives or holds a freedom of {moves}{others}; "
+            "it is where the start has it"
+        )
+    if not stability.is_symmetric:
+        yield (
+            f"{INFORMATION}forces without a potential act: stability is that of small motions, "
+            "with masses and dampers"
+        )
+
+
+def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> Iterator[str]:
+    """Notes on what statics leaves out.
+
+    Args:
+        evaluator: the model.
+        start: (13 n,) the state that the search began at.
+        rows: of the constraints at the equilibrium.
+    """
+    model = evaluator.model
+    if np.any(velocities_of(start)):
+        yield f"{INFORMATION}velocities of the start are left out"
+    timed = [name for group in model.forces for name in _of_time(group, model)]
+    if timed:
+        listed = some(timed, MOST_NAMES)
+        yield f"{INFORMATION}forces that depend on time are those at t = 0: {listed}"
+    driven = model.row_owners(np.flatnonzero(rows.nu))
+    if driven:
+        listed = some(driven, MOST_NAMES)
+        yield f"{INFORMATION}drivers are at rest at their initial values: {listed}"
+    if model.friction:
+        yield (
+            "friction is left out: with it the scene can rest at other poses near this one as well"
+        )
+    rolling = model.row_owners(np.flatnonzero(~model.position_row & (rows.nu == 0.0)))
+    if rolling:
+        yield (
+            f"{INFORMATION}rolling joints constrain displacements as they do velocities: "
+            f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
+        )
+
+
+def _of_time(group: Group, model: Model) -> Iterator[str]:
+    """Names of the forces of a group that depend on time."""
+    always = "t" in parameters(group.type_info.kernels["wrench"])
+    functions = len(group.type_info.layout.functions)
+    for member, columns in zip(group.members, group.functions[:, :functions], strict=True):
+        if always or set(columns.tolist()) - {0, *model.input_rows.tolist()}:
+            yield model.force_names[int(member)]
+
+
+def failure(search: Search, model: Model) -> str:
+    """Why a search found no equilibrium."""
+    pose = search.pose
+    if search.outcome is Outcome.RUNAWAY:
+        return (
+            f"there is no equilibrium: nothing stops {describe_motion(model, search.motion)} "
+            "without end (free fall, or a drive without a load?); add a joint or a spring that "
+            "holds it"
+        )
+    moves = describe_motion(model, pose.free @ pose.unbalanced)
+    return (
+        f"no equilibrium was found in {search.steps} steps: {pose.residual:.2g} of the forces is "
+        f"not balanced along a freedom of {moves}. Start nearer to the equilibrium; the forces may "
+        "jump there, or have none"
+    )
+
+
+def describe_motion(model: Model, x: Floats) -> str:
+    """Which bodies move most, and how the first of these does.
+
+    Args:
+        model: names of the bodies.
+        x: (n, 6) or (6 n,) displacement in parts of a length of the scene, and rotation vector, of
+            each body, global axes.
+    """
+    x = np.asarray(x).reshape(-1, 6)
+    shift, turn = (np.linalg.norm(part, axis=1) for part in (x[:, :3], x[:, 3:]))
+    slides = float(np.max(shift, initial=0.0)) > float(np.max(turn, initial=0.0))
+    amount, part = (shift, x[:, :3]) if slides else (turn, x[:, 3:])
+    order = np.argsort(-amount, kind="stable")
+    most = [int(k) for k in order if amount[k] >= ALIKE * amount[order[0]]]
+    names = ", ".join(model.body_names[k] for k in sorted(most[:MOST_NAMES]))
+    more = f" and {len(most) - MOST_NAMES} more" if len(most) > MOST_NAMES else ""
+    first = most[0]
+    verb = "moves along" if slides else "turns about"
+    which = "which" if len(most) == 1 else f"of which {model.body_names[first]}"
+    noun = "body" if len(most) == 1 else "bodies"
+    return f"{noun} {names}{more}, {which} {verb} {direction(part[first])}"
+
+
+def direction(vector: Floats) -> str:
+    """The direction of a vector: an axis with its sign, or three components."""
+    unit = vector / np.linalg.norm(vector)
+    k = int(np.argmax(np.abs(unit)))
+    if abs(unit[k]) >= ALONG_AXIS:
+        return f"{'-' if unit[k] < 0.0 else '+'}{'xyz'[k]}"
+    return "(" + ", ".join(f"{c:.2g}" for c in np.round(unit, 2) + 0.0) + ")"

@@ -46,7 +46,7 @@ class CreepMonitor:
         self._stride, self._count = max(1, most // kept), 0
         self._kept: list[Arrays] = []
 
-    def look(self, arrays: Arrays) -> None:
+    def update(self, arrays: Arrays) -> None:
         """Keep some of what was reported next."""
         if self._elements:
             first = -self._count % self._stride

@@ -37,7 +37,7 @@ class _Row:
     least_at: float = 0.0
 
 
-class Pulling:
+class UnilateralMonitor:
     """Looks through what is reported for multipliers that their types say cannot be negative."""
 
     def __init__(self, model: Model) -> None:
@@ -53,7 +53,7 @@ class Pulling:
                         _Row(first + k, first, last, words, str(type_.unilateral_words))
                     )
 
-    def look(self, arrays: Arrays) -> None:
+    def update(self, arrays: Arrays) -> None:
         """Take notice of what was reported next."""
         for one in self._rows:
             own = np.abs(arrays.Lam[:, one.first : one.last])

@@ -251,7 +251,7 @@ def model_size(evaluator: Evaluator) -> float:
     return evaluator.model.size
 
 
-def extent(evaluator: Evaluator, v: Floats) -> float:
+def max_speed(evaluator: Evaluator, v: Floats) -> float:
     """Largest speed at velocities (6 n,), in rad/s or lengths of the model a second."""
     x = np.abs(v.reshape(-1, 6))
     return max(_largest(x[:, :3]) / evaluator.model.size, _largest(x[:, 3:]))

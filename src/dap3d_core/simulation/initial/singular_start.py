@@ -24,7 +24,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import DENSE_ROWS, Rank
 from dap3d_core.model.state_layout import split, velocities_of
-from dap3d_core.simulation.initial.assemble import extent
+from dap3d_core.simulation.initial.assemble import max_speed
 from dap3d_core.simulation.initial.least_change import (
     displaced,
     finite_rows,
@@ -46,10 +46,10 @@ SEARCHES, PASSES, MOST_BRANCHES = 60, 40, 8
 SAME, TIED = 1e-6, 1e-6
 #: An acceleration below this part of what is free is none; velocities whose square is below this
 #: part of the acceleration choose a branch, and no more.
-NONE, SLOW = 1e-9, 1e-9
+ZERO_ACCELERATION, SLOW = 1e-9, 1e-9
 #: How far a motion goes, in rad or parts of the model: to the pose whose pivots are watched in
 #: place of those of the start, and in the first step.
-ASIDE, FIRST = 0.1, 0.05
+OFFSET_ANGLE, FIRST = 0.1, 0.05
 #: Span of the differences in time of the third-order condition, as a part of a radian.
 SPAN = 1e-3
 #: Weights of a derivative at the first of five points, times twelve.
@@ -120,7 +120,7 @@ def _loses_rank(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> bool:
         return False  # a row without a gradient is named where the run stops
     wish = np.random.default_rng(0).standard_normal(6 * n)
     free = wish - least_change(evaluator, rows, rows.product(wish), t)
-    if np.linalg.norm(free) <= NONE * np.linalg.norm(wish):
+    if np.linalg.norm(free) <= ZERO_ACCELERATION * np.linalg.norm(wish):
         return False
     gradient = scaled_rows(rows, evaluator.model.length)[1]  # dependencies are those of scaled rows
     quadratic = quadratic_part(evaluator, still, free, t) / gradient
@@ -133,7 +133,7 @@ def _loses_rank(evaluator: Evaluator, u: Floats, rank: Rank, t: float) -> bool:
 def _size(evaluator: Evaluator, rows: ConstraintRows, v: Floats) -> float:
     """Natural size of gamma at velocities v (6 n,)."""
     flow = np.abs(rows.value * v[rows.column])
-    return float(np.max(np.bincount(rows.row, flow))) * extent(evaluator, v)
+    return float(np.max(np.bincount(rows.row, flow))) * max_speed(evaluator, v)
 
 
 class _Cone:
@@ -268,9 +268,9 @@ class _Cone:
         way: (6 n,) velocities, or accelerations, along it.
         """
         v = velocities_of(self.u)
-        aside = displaced(self.still, ASIDE / extent(self.evaluator, way) * way)
+        aside = displaced(self.still, OFFSET_ANGLE / max_speed(self.evaluator, way) * way)
         acceleration = self.free + self.N @ z
-        speed, rise = extent(self.evaluator, v), extent(self.evaluator, acceleration)
+        speed, rise = max_speed(self.evaluator, v), max_speed(self.evaluator, acceleration)
         first_step = 2.0 * FIRST / (speed + (speed * speed + 2.0 * rise * FIRST) ** 0.5)
         lines = self.words(self._with(T))
         return SingularStart(tuple(lines), acceleration, aside, first_step, words)
@@ -303,7 +303,7 @@ def _moving(cone: _Cone) -> SingularStart:
     if T is None:
         return _refused([], "its velocities are along more than one of the motions from there")
     z = T @ (T.T @ cone.z) - cone.z
-    slow = extent(cone.evaluator, v) ** 2 <= SLOW * extent(cone.evaluator, cone.free)
+    slow = max_speed(cone.evaluator, v) ** 2 <= SLOW * max_speed(cone.evaluator, cone.free)
     for _ in range(0 if slow else 2):  # again on the branch, where less is neglected
         z += np.linalg.lstsq(across, -_third(cone, v, cone.free + cone.N @ z), rcond=FULFILLED)[0]
     return cone.taken(T, z, v, "it goes on as the velocities do, on branch (1)")
@@ -317,7 +317,7 @@ def _gamma(cone: _Cone, v: Floats) -> Floats:
 
 def _third(cone: _Cone, v: Floats, a: Floats) -> Floats:
     """d/dt of lambda^T (D a - gamma) (k,) along a motion with velocities v, accelerations a."""
-    h = SPAN / max(extent(cone.evaluator, v), extent(cone.evaluator, a) ** 0.5)
+    h = SPAN / max(max_speed(cone.evaluator, v), max_speed(cone.evaluator, a) ** 0.5)
     total = np.zeros(len(cone.left))
     for k, weight in enumerate(FORWARD):
         s = k * h
@@ -335,7 +335,7 @@ def _at_rest(cone: _Cone) -> SingularStart | None:
     lines = cone.words(found) if found else []
     if _is_driven(cone):
         return _refused(lines, "from rest there, what drivers do does not say which way they go on")
-    if np.linalg.norm(cone.z) <= NONE * cone.load:
+    if np.linalg.norm(cone.z) <= ZERO_ACCELERATION * cone.load:
         return None
     kept = [float(np.linalg.norm(T.T @ cone.z)) for T in found]
     order = np.argsort(kept)[::-1]

@@ -11,7 +11,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
+from dap3d_core.result import INFORMATION, Computed, Result, RunMetadata, RunStatistics
 from dap3d_core.result.arrays import arrays_of
 from dap3d_core.result.file.atomic_write import check_target, check_utf8
 from dap3d_core.result.model_summary import summary_of
@@ -19,7 +19,7 @@ from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import AssemblyError, RedundantError, SimulationError
-from dap3d_core.simulation.failure.negative_reactions import Pulling
+from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
 from dap3d_core.simulation.initial_state import InitialState, start_notes
 from dap3d_core.simulation.kinematics.driver_coordinate import (
     DriverCoordinate,
@@ -29,7 +29,7 @@ from dap3d_core.simulation.kinematics.driver_coordinate import (
 from dap3d_core.simulation.kinematics.path import KinematicPath, PathEndError, Pose
 from dap3d_core.simulation.kinematics.pose_equations import held_states, required_forces
 from dap3d_core.simulation.redundancy.freedoms import freedoms_left, motion_words
-from dap3d_core.simulation.settings import compiled_exactly, report_times, settings_of
+from dap3d_core.simulation.settings import compile_exact, report_times, settings_of
 
 Progress = Callable[[float, float], None]
 
@@ -83,12 +83,12 @@ def kinematics(
     Source: Nikravesh, Computer-Aided Analysis of Mechanical Systems, 1988, chapters 3 to 5.
     """
     check_output(output, force=force)
-    compiled = compiled_exactly(scene, allow_code, announce)
+    compiled = compile_exact(scene, allow_code, announce)
     coordinate = None
     if over is not None:
         coordinate = _coordinate(over, compiled, t_end, dt)
         replaced = coordinate.replaced_in(compiled.scene)
-        compiled = compiled_exactly(replaced, allow_code, announce)
+        compiled = compile_exact(replaced, allow_code, announce)
     settings = settings_of(compiled, t_end=t_end, dt=dt)
     if coordinate is None:
         times = report_times(settings.t_end, settings.dt)
@@ -144,21 +144,21 @@ class _Kinematics:
     ) -> Result:
         """The result of all instants; in the output, also where an exception ends the analysis."""
         try:
-            self.go(progress)
+            self.execute(progress)
             result = self.result("done")
         except BaseException as error:
             status = "interrupted" if isinstance(error, KeyboardInterrupt) else "stopped"
             part = self.result(status, error)
             if part is not None and output is not None:
                 part.save(output, force=force)
-            error.result = part  # type: ignore[attr-defined]
+            Computed(part).attach(error)
             raise
         assert result is not None
         if output is not None:
             result.save(output, force=force)
         return result
 
-    def go(self, progress: Progress | None) -> None:
+    def execute(self, progress: Progress | None) -> None:
         """All instants, in their order or, where a coordinate falls, in the opposite one.
 
         Raises:
@@ -209,8 +209,8 @@ class _Kinematics:
         arrays = arrays_of(rows, summary)
         kinetic = kinetic_energy(summary, arrays.u)
         arrays = attrs.evolve(arrays, work=kinetic - kinetic[0])
-        pulling = Pulling(model)
-        pulling.look(arrays)
+        pulling = UnilateralMonitor(model)
+        pulling.update(arrays)
         notes += pulling.notes()
         if isinstance(error, SimulationError):
             notes.append(str(error))

@@ -23,7 +23,7 @@ from dap3d_core.result.quantities.lookup import find
 from dap3d_core.result.quantities.measured_data import MeasuredData, read_measured
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.initial.assemble import extent
+from dap3d_core.simulation.initial.assemble import max_speed
 from dap3d_core.simulation.initial.least_change import displaced
 from dap3d_core.simulation.kinematics.pose_equations import ChosenRows, Flags
 from dap3d_core.simulation.redundancy.freedoms import coordinates_of
@@ -154,7 +154,7 @@ def _on_rows(
     for _ in range(MOST_PASSES):
         rows = ChosenRows(evaluator, t, u, chosen)
         change = rows.least(rows.rows.C)
-        size = extent(evaluator, change)
+        size = max_speed(evaluator, change)
         if size <= SETTLED or (size <= ROUNDING and size > 0.5 * before):
             break
         u, before = displaced(u, -change), size
@@ -216,7 +216,7 @@ class _Fit:
             seen = slopes[measured] @ rows.free
             self._check_seen(rows, seen, t, u)
             change = change + rows.free @ np.linalg.lstsq(seen, error, rcond=None)[0]
-            size = extent(self.evaluator, change)
+            size = max_speed(self.evaluator, change)
             if not np.isfinite(size):
                 break
             u = displaced(u, min(1.0, MOST_CHANGE / max(size, 1e-300)) * change)

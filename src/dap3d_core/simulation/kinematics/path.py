@@ -21,7 +21,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import angular_velocities, euler_rates
 from dap3d_core.model.state_layout import join, split, velocities_of
-from dap3d_core.simulation.initial.assemble import extent
+from dap3d_core.simulation.initial.assemble import max_speed
 from dap3d_core.simulation.initial.least_change import displaced, finite_rows
 from dap3d_core.simulation.kinematics.pose_equations import LinearisedRows
 
@@ -39,7 +39,7 @@ SHORTEST = 1e-10
 NEAR_SINGULAR = 1e-7
 #: Closer to a singular pose, positions are interpolated between poses on both sides, this part of a
 #: step away: rounding would be multiplied by the inverse of the singular value there.
-INTERPOLATED, ASIDE = 1e-4, 0.05
+INTERPOLATED, OFFSET_TIME = 1e-4, 0.05
 #: A singular pose is located between poses so many steps aside, which a cubic goes through.
 LOCATED = 2e-3
 #: Tolerances of the integration of rows of the velocity level.
@@ -141,7 +141,7 @@ class KinematicPath:
         pose = self._between(t)
         if pose.rows.least > INTERPOLATED:
             return pose, False
-        h = ASIDE * abs(self.pose.t - self.before.t)
+        h = OFFSET_TIME * abs(self.pose.t - self.before.t)
         y, y_dot, y_ddot = _interpolated(self._between(t - h), self._between(t + h), t)
         r, p = (part.reshape(-1, k) for part, k in zip(_parts(y), (3, 4), strict=True))
         v, a = _velocity(y, y_dot, y_ddot)
@@ -172,8 +172,8 @@ class KinematicPath:
 
     def _limited(self, h: float) -> float:
         """A step that moves nothing too far and ends at the end at most."""
-        speed = extent(self.evaluator, velocities_of(self.pose.u))
-        rise = extent(self.evaluator, self.pose.v_dot)
+        speed = max_speed(self.evaluator, velocities_of(self.pose.u))
+        rise = max_speed(self.evaluator, self.pose.v_dot)
         longest = (
             2.0 * MOST_TURN / max(speed + (speed * speed + 2.0 * rise * MOST_TURN) ** 0.5, 1e-300)
         )
@@ -213,7 +213,7 @@ class KinematicPath:
         C = rows.rows.C
         for passes in range(MOST_PASSES):
             change = rows.solve(C)
-            size = extent(self.evaluator, change)
+            size = max_speed(self.evaluator, change)
             if passes == 0:
                 first = factored_at = size
             if not np.isfinite(size) or size > max(MOST_TURN, 4.0 * before):

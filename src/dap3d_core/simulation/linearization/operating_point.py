@@ -27,7 +27,7 @@ from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
 from dap3d_core.simulation.linearization.steady_motion import SteadyFrames, steady_frames
 from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent_matrices
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
-from dap3d_core.simulation.settings import compiled_exactly
+from dap3d_core.simulation.settings import compile_exact
 
 #: Residuals of the constraints beyond this make a state unfit, in m and m/s.
 OFF_CONSTRAINTS = 1e-6
@@ -93,7 +93,7 @@ def operating_point(
 ) -> OperatingPoint:
     """The state to linearise about; arguments and errors as of ``linearize``."""
     t = time_of(t)
-    compiled = compiled_exactly(scene, allow_code)
+    compiled = compile_exact(scene, allow_code)
     model = compiled.model
     notes: list[str] = []
     with compiled.borrow_evaluator() as evaluator:

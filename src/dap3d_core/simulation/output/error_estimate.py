@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from dap3d_core.result import INFORMATION, Result, estimated_error
+from dap3d_core.result import INFORMATION, Computed, Result, estimated_error
 from dap3d_core.result.post.global_error import MEANINGLESS
 from dap3d_core.scene import SceneError, Simulation
 from dap3d_core.scene.validate.settings import SMALLEST_RTOL
@@ -49,7 +49,7 @@ Again = Callable[[Simulation, StepLimits | None, float], Result]
 Watch = Callable[[Any], None]
 
 
-def finer(settings: Simulation) -> Simulation | None:
+def tightened(settings: Simulation) -> Simulation | None:
     """Settings of the second run; None where tolerances cannot be tightened any more."""
     if settings.step is not None:
         return attrs.evolve(settings, step=settings.step / 2.0)
@@ -100,7 +100,7 @@ def add_error(
     """
     none = f"{INFORMATION if quick else ''}its error was not estimated"
     too_long = f"{none}: that takes longer than {QUICK_SECONDS:g} s"
-    finer_settings = finer(settings)
+    finer_settings = tightened(settings)
     if finer_settings is None:
         _amend(result, output, f"{none}: rtol {settings.rtol:g} cannot be made any tighter")
         return
@@ -119,7 +119,7 @@ def add_error(
         return
     except BaseException as error:
         _amend(result, output, "the estimate of its error was ended early and left out")
-        error.result = result  # type: ignore[attr-defined]
+        Computed(result).attach(error)
         raise
     if not _same_instants(result, second):
         _amend(result, output, f"{none}: a second run at {words} ended elsewhere, by its events")
@@ -127,7 +127,7 @@ def add_error(
     steps = second.stats.steps
     result.arrays = result.arrays.with_error(estimated_error(result.u, second.u, steps))
     note = f"{INFORMATION}its error is estimated by a second run at {words} ({steps:,} steps)"
-    _amend(result, output, note, *_lost(result))
+    _amend(result, output, note, *_divergence_note(result))
 
 
 def _same_instants(result: Result, second: Result) -> bool:
@@ -145,7 +145,7 @@ def _limits(result: Result, settings: Simulation) -> StepLimits | None:
     return StepLimits(FIRST_STEP * mean, mean)
 
 
-def halved(stops: Sequence[tuple[float, bool]]) -> list[tuple[float, bool]]:
+def with_midpoints(stops: Sequence[tuple[float, bool]]) -> list[tuple[float, bool]]:
     """Instants that no step goes over, and others in between: a step of the first run between two
     of them is at least two of the second.
     """
@@ -159,7 +159,7 @@ def _words(settings: Any) -> str:
     return f"rtol {settings.rtol:g}, atol {words_of(settings.atol)}"
 
 
-def _lost(result: Result) -> list[str]:
+def _divergence_note(result: Result) -> list[str]:
     """A note on where the error has become as large as to leave the state no meaning."""
     error = result.error
     assert error is not None

@@ -57,7 +57,7 @@ class Observer:
         if self._start is None:
             self._start = self._energies(integration.y)
 
-    def look(self) -> None:
+    def update(self) -> None:
         """Report the present progress."""
         assert self._of is not None
         assert self._start is not None

@@ -19,7 +19,7 @@ from dap3d_core.result.file.atomic_write import check_utf8
 from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.open import arrays_in
 from dap3d_core.simulation.failure.creep import CreepMonitor
-from dap3d_core.simulation.failure.negative_reactions import Pulling
+from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.redundancy.shared_reactions import ShareSpread
@@ -68,7 +68,7 @@ class ResultRecorder:
         self._model, self._evaluator, self._most, self._force = model, evaluator, most, force
         self._subject = summary_of(model)
         self._parts: list[Arrays] = []
-        self.pulling = Pulling(model)
+        self.pulling = UnilateralMonitor(model)
         self.spread: ShareSpread | None = None
         self.creep = CreepMonitor(model, most)
         self._bytes = 0
@@ -82,16 +82,16 @@ class ResultRecorder:
         self.add(arrays_of(rows, self._subject), record)
 
     def add(self, arrays: Arrays, record: Callable[[], RunMetadata]) -> None:
-        """The same for arrays."""
+        """Array version of ``take``."""
         self._began = min(self._began, time.perf_counter())
         self.count += len(arrays)
         if len(arrays):
             self.low = np.minimum(self.low, np.min(arrays.u, axis=0))
             self.high = np.maximum(self.high, np.max(arrays.u, axis=0))
-        self.pulling.look(arrays)
+        self.pulling.update(arrays)
         if self.spread is not None:
-            self.spread.look(arrays)
-        self.creep.look(arrays)
+            self.spread.update(arrays)
+        self.creep.update(arrays)
         self._bytes += 8 * len(arrays) * arrays.width
         large = self._bytes > LARGE
         if self._writer is None:

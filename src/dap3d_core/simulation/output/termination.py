@@ -22,7 +22,7 @@ REASONS = {
 }
 
 
-def doubts(evaluator: Evaluator) -> list[str]:
+def accuracy_warnings(evaluator: Evaluator) -> list[str]:
     """Notes on what was computed less surely than all else."""
     notes = []
     if (count := evaluator.friction_failure_count) and evaluator.model.friction:

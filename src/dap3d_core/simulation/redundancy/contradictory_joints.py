@@ -13,7 +13,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.assemble import FIT, correct_positions, extent
+from dap3d_core.simulation.initial.assemble import FIT, correct_positions, max_speed
 from dap3d_core.simulation.initial.least_change import displaced, finite_rows
 from dap3d_core.simulation.redundancy.near_redundant import HELD
 
@@ -52,7 +52,7 @@ def find_contradiction(evaluator: Evaluator, t: float, y: Floats, rank: int) -> 
 
 
 def _out_of_reach(evaluator: Evaluator, t: float, u: Floats) -> str:
-    speed = extent(evaluator, velocities_of(u))
+    speed = max_speed(evaluator, velocities_of(u))
     span = FAR / speed if speed else FAR * (1.0 + abs(t))
     good = t
     for part in EARLIER:

@@ -145,7 +145,7 @@ class ShareSpread:
         self._kept: list[tuple[float, Floats, Floats, Floats]] = []
         self._stride, self._seen = 1, 0
 
-    def look(self, arrays: Arrays) -> None:
+    def update(self, arrays: Arrays) -> None:
         """Take notice of what was reported next."""
         for k in range(len(arrays)):
             if self._seen % self._stride == 0:

@@ -10,7 +10,7 @@ from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.result import INFORMATION
 from dap3d_core.scene import SceneError
 from dap3d_core.simulation import AssemblyError
-from dap3d_core.simulation.failure.negative_reactions import Pulling
+from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
 from dap3d_core.simulation.initial.assemble import ROUNDING, Initial, correction_notes, distance
 from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.study.batch import driver, initial_state
@@ -21,7 +21,7 @@ from dap3d_core.study.outputs import Reduction
 from dap3d_core.study.study import Batch, PointStatus
 
 if TYPE_CHECKING:
-    from dap3d_core.study.batch.tree_points import TreePoints
+    from dap3d_core.study.batch.joint_space_batch import TreePoints
 
 
 def batch_runner(reduction: Reduction, times: Floats) -> "BatchRunner | None":
@@ -74,7 +74,7 @@ class BatchRunner:
         self._rebuilder = ModelRebuilder(compiled, evaluator, parameters, end)
         self.compiled_batch = CompiledBatch(evaluator, compiled.scene.simulation, times, stops)
         self._runs = self._point_runs(start)
-        self._pulling = Pulling(compiled.model)
+        self._pulling = UnilateralMonitor(compiled.model)
         self.parameter_map: ParameterMap | None = None
         with contextlib.suppress(NotCopiedError):
             parameter_map = ParameterMap(compiled.checked, evaluator, parameters)
@@ -88,7 +88,7 @@ class BatchRunner:
         batch, compiled = self.compiled_batch, self._compiled
         if not batch.evaluator.formulation.has_own_coordinates:
             return batch
-        from dap3d_core.study.batch.tree_points import TreePoints
+        from dap3d_core.study.batch.joint_space_batch import TreePoints
 
         def of_bodies() -> CompiledBatch:
             return CompiledBatch(

@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import ResultError
+from dap3d_core.result import Computed, ResultError
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
 from dap3d_core.simulation.output.free_space import check_room_of_points
 from dap3d_core.study.design import Design, design_of
@@ -205,8 +205,8 @@ class _Runner:
             if isinstance(store, SweepFile):
                 store.finish()
         except BaseException as error:
-            with suppress(ResultError, AttributeError):
-                error.result = _partial_result(store)  # type: ignore[attr-defined]
+            with suppress(ResultError):
+                Computed(_partial_result(store)).attach(error)
             raise
         return store.dataset() if isinstance(store, InMemory) else open_sweep(store.target)
 

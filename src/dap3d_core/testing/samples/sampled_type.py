@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import attrs
 import numpy as np
 
+from dap3d_core.interface import Function, number
 from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
 from dap3d_core.interface.codegen.terms import bind_terms
@@ -19,7 +20,6 @@ from dap3d_core.interface.examine.examine import ATTEMPTS, examine
 from dap3d_core.interface.examine.random_values import numbers
 from dap3d_core.interface.fields import sized_fields, specs_of
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.testing.samples.cubic import Cubic, CubicOfTwo
 from dap3d_core.testing.samples.random_element import Kernels, RandomElement, RefusalError, draw
 from dap3d_core.testing.samples.random_state import BODIES, HELD, Direction, State, random_state
 
@@ -402,3 +402,33 @@ def _direction(x: Floats) -> Direction:
 
 
 __all__ = ["Sample", "SampledType", "UndefinedError", "assembled", "own_values", "sampled_types"]
+
+
+class Cubic(Function):
+    """f = a + b x + c x^2 + d x^3."""
+
+    keyword = "cubic"
+    a: float = number(doc="coefficient of x^0")
+    b: float = number(doc="of x^1")
+    c: float = number(doc="of x^2")
+    d: float = number(doc="of x^3")
+
+    def value(x: Any, a: Any, b: Any, c: Any, d: Any) -> Any:  # noqa: N805
+        f = a + x * (b + x * (c + x * d))
+        return f, b + x * (2.0 * c + 3.0 * x * d), 2.0 * c + 6.0 * x * d, 6.0 * d
+
+
+class CubicOfTwo(Function):
+    """f = a + b x + c y + x y (d x + e y), with no two derivatives alike."""
+
+    keyword, arguments = "cubic-of-two", 2
+    a: float = number(doc="constant")
+    b: float = number(doc="coefficient of x")
+    c: float = number(doc="of y")
+    d: float = number(doc="of x^2 y")
+    e: float = number(doc="of x y^2")
+
+    def value(x: Any, y: Any, a: Any, b: Any, c: Any, d: Any, e: Any) -> Any:  # noqa: N805
+        f = a + b * x + c * y + x * y * (d * x + e * y)
+        f_x, f_y = b + y * (2.0 * d * x + e * y), c + x * (d * x + 2.0 * e * y)
+        return f, f_x, f_y, 2.0 * d * y, 2.0 * (d * x + e * y), 2.0 * e * x

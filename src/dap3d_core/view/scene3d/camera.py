@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.model.groups import Floats
-from dap3d_core.view.scene3d.primitives import plain
+from dap3d_core.view.scene3d.primitives import floats_of
 from dap3d_core.view.scene3d.sampled_motion import Extent
 
 #: A motion is planar where one of its extents is below this fraction of the largest.
@@ -32,13 +32,13 @@ def stage(reached: Extent, gravity: tuple[float, ...] | None) -> dict[str, Any]:
     least = float(np.minimum(low * up, high * up).sum())
     near_zero = -0.03 * size <= least <= 0.75 * size
     return {
-        "center": plain(0.5 * (low + high)),
-        "extent": plain(extent),
+        "center": floats_of(0.5 * (low + high)),
+        "extent": floats_of(extent),
         "size": size,
         "farthest": [[float(f"{x:.6g}") for x in point] for point in farthest],
-        "up": plain(up + 0.0),
+        "up": floats_of(up + 0.0),
         "ground": 0.0 if near_zero else least - 0.02 * size,
-        "eye": plain(_eye(up, flat)),
+        "eye": floats_of(_eye(up, flat)),
         "gravity": gravity,
     }
 

@@ -10,7 +10,7 @@ from dap3d_core.interface.types import acts_on_all
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Group
 from dap3d_core.result import Result, ResultError
-from dap3d_core.view.scene3d.primitives import Located, Point, plain
+from dap3d_core.view.scene3d.primitives import Located, Point, floats_of
 
 ORIGIN = (0.0, 0.0, 0.0)
 
@@ -85,7 +85,7 @@ def gravity_of(model: Model) -> Point | None:
         if getattr(group.type_info.type, "each_body", False) and {"gravity", "wgt"} <= set(numbers):
             g = group.numbers[0, numbers["gravity"][0]]
             at = numbers["wgt"][0]
-            return plain(g * group.numbers[0, at : at + 3])
+            return floats_of(g * group.numbers[0, at : at + 3])
     return None
 
 
@@ -109,7 +109,7 @@ def _geometry(group: Group, member: int, name: str) -> ElementGeometry:
     chain: list[Located] = []
     lists = tuple(f"{field}_" for field, spec in specs.items() if spec.kind == "points")
     for field, (at, shape) in layout.numbers.items():
-        values = plain(group.numbers[member, at : at + (3 if shape else 1)])
+        values = floats_of(group.numbers[member, at : at + (3 if shape else 1)])
         kind = specs[field].kind if field in specs else ""
         slot = slot_of(field)
         is_end = has_ends and field in ("P_i", "P_j")

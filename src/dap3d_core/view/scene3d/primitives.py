@@ -74,21 +74,23 @@ def rod(
     a, b = np.asarray(start, dtype=float), np.asarray(end, dtype=float)
     length = float(np.linalg.norm(b - a))
     size = (radius, radius, length)
-    return Mark(layer, "cylinder", body, plain(0.5 * (a + b)), size, turned_to(b - a), color, owner)
+    return Mark(
+        layer, "cylinder", body, floats_of(0.5 * (a + b)), size, turned_to(b - a), color, owner
+    )
 
 
 def bar(body: int, at: Any, axis: Any, radius: float, length: float) -> Mark:
     """A cylinder about a point (3,) of a body, along a direction (3,)."""
-    return Mark("", "cylinder", body, plain(at), (radius, radius, length), turned_to(axis))
+    return Mark("", "cylinder", body, floats_of(at), (radius, radius, length), turned_to(axis))
 
 
 def ball(layer: str, body: int, at: Any, radius: float, color: str = "", owner: str = "") -> Mark:
     """A sphere at a point (3,) of a body."""
     size = (radius, radius, radius)
-    return Mark(layer, "sphere", body, plain(at), size, color=color, owner=owner)
+    return Mark(layer, "sphere", body, floats_of(at), size, color=color, owner=owner)
 
 
-def plain(values: Any) -> tuple[float, ...]:
+def floats_of(values: Any) -> tuple[float, ...]:
     """Numbers as a tuple of Python's floats."""
     return tuple(float(x) for x in values)
 

@@ -1,28 +1,48 @@
 """Solids that show a result: bodies, shapes, joints, forces, ground; and the camera."""
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import pairwise
 from typing import Any
 
 import attrs
 import numpy as np
 
+from dap3d_core.interface.fields import slot_of
+from dap3d_core.interface.formats.frames import quaternion
+from dap3d_core.model.groups import Floats
 from dap3d_core.result import Result
+from dap3d_core.result.model_summary import ModelSummary
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.scene.scene import Scene
-from dap3d_core.view.scene3d.bodies import attachment_points, bare_body, links, unit_of
 from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import colors
 from dap3d_core.view.scene3d.elements import ORIGIN, ElementGeometry, Elements
-from dap3d_core.view.scene3d.primitives import Mark, Point, Span, pack
+from dap3d_core.view.scene3d.primitives import (
+    Located,
+    Mark,
+    Point,
+    Span,
+    ball,
+    bar,
+    floats_of,
+    pack,
+    rod,
+    turned_to,
+)
 from dap3d_core.view.scene3d.sampled_motion import Extent, Motion
 from dap3d_core.view.scene3d.shapes import Mesh, SceneShapes, scene_shapes
-from dap3d_core.view.scene3d.symbols import Drawer
 
 #: The colour of what belongs to ground.
 GROUND = "#9aa3ad"
 #: The longest semi-axis of a body without points, as a part of the scene's size: nothing is hidden.
 MODEST = 0.03
+#: Points this near, relative to the largest coordinate, are one.
+_SAME = 1e-6
+#: One calm colour for all joints, one for springs; bodies have colours of their own.
+JOINT, FORCE = "#5b6470", "#8a6d3b"
+
+Pieces = Iterator[Mark | Span]
 
 
 def scene_of(result: Result, model: str | os.PathLike[str] | None = None) -> Scene:
@@ -180,3 +200,251 @@ def notes_of(elements: Elements, shapes: SceneShapes) -> list[str]:
     """Notes on parts of a scene that are not drawn."""
     missing = f"joints and forces are not drawn: {elements.missing}"
     return [*([missing] if elements.missing else []), *shapes.notes]
+
+
+def attachment_points(
+    summary: ModelSummary, elements: Iterable[ElementGeometry]
+) -> list[list[Point]]:
+    """The points (m, body axes) of each body, ground first: its own, and those of elements.
+
+    The origin is left out, and so are duplicates.
+    """
+    attached: list[list[Point]] = [[] for _ in range(summary.body_count + 1)]
+    for body, at in zip(summary.point_body, summary.point_local, strict=True):
+        attached[int(body)].append(floats_of(at))
+    for one in elements:
+        for body, at in one.points.values():
+            attached[body].append(at)
+    return [_distinct(points) for points in attached]
+
+
+def _distinct(points: list[Point]) -> list[Point]:
+    size = max((abs(x) for point in points for x in point), default=0.0)
+    kept: dict[tuple[int, ...], Point] = {}
+    for point in points:
+        if size > 0.0 and max(map(abs, point)) > _SAME * size:
+            kept.setdefault(tuple(round(x / (_SAME * size)) for x in point), point)
+    return list(kept.values())
+
+
+def unit_of(points: list[list[Point]], size: float) -> float:
+    """Radius of a link, m, by the usual length of links and the size of the scene, m."""
+    lengths = [float(np.linalg.norm(at)) for on_body in points[1:] for at in on_body]
+    usual = 0.05 * float(np.median(lengths)) if lengths else 0.01 * size
+    return float(np.clip(usual, 0.0012 * size, 0.008 * size))
+
+
+def links(body: int, points: list[Point], unit: float, color: str, name: str,
+          *, ends: Iterable[Point] = ()) -> list[Mark]:  # fmt: skip
+    """Links of a radius ``unit`` from the origin of a body to points, and a ball at its origin.
+
+    ``ends`` are the points that have a ball, as no joint is drawn there.
+    """
+    marks = [rod("bodies", body, ORIGIN, at, unit, color=color, owner=name) for at in points]
+    marks.append(ball("bodies", body, ORIGIN, 1.5 * unit, color=color, owner=name))
+    marks += [ball("bodies", body, at, 1.25 * unit, color=color, owner=name) for at in ends]
+    return marks
+
+
+def inertia_ellipsoid(body: int, mass: float, Jp: Floats, most: float, color: str,
+                      name: str) -> Mark:  # fmt: skip
+    """The homogeneous ellipsoid of a mass (kg) and an inertia (3, 3) in body axes (kg m^2).
+
+    Its semi-axes are a_k^2 = 5 (J_1 + J_2 + J_3 - 2 J_k) / (2 m) along the principal axes, all
+    scaled down where one is longer than ``most``, m.
+    """
+    J, axes = np.linalg.eigh(Jp)
+    semi = np.sqrt(np.maximum(2.5 * (J.sum() - 2.0 * J) / mass, 0.0))
+    semi = np.maximum(semi, 0.05 * semi.max())
+    semi *= min(1.0, most / semi.max())
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    return Mark("inertia", "sphere", body, ORIGIN, floats_of(semi), quaternion(axes), color, name)
+
+
+def bare_body(body: int, mass: float, Jp: Floats, most: float, color: str, name: str) -> list[Mark]:
+    """A body without points: its ellipsoid of inertia, and its axes, which show that it turns.
+
+    Arguments as ``inertia_ellipsoid``.
+    """
+    ellipsoid = inertia_ellipsoid(body, mass, Jp, most, color, name)
+    reach = max(ellipsoid.size)
+    arms = [floats_of(axis) for axis in 1.5 * reach * np.eye(3)]
+    return [ellipsoid, *links(body, arms, 0.06 * reach, color, name)]
+
+
+@attrs.frozen(eq=False)
+class Drawer:
+    """Draws elements of one scene.
+
+    Attributes:
+        motion: poses of its bodies.
+        unit: radius of a thin link, m; all sizes follow it.
+        joints: all joints, among which a driver finds the one it drives.
+    """
+
+    motion: Motion
+    unit: float
+    joints: Sequence[ElementGeometry]
+
+    def joint(self, one: ElementGeometry) -> list[Mark | Span]:
+        """The solids of a joint."""
+        return self._draw(one, one.symbol, "joints", JOINT)
+
+    def force(self, one: ElementGeometry) -> list[Mark | Span]:
+        """The solids of a force: a spring between its ends, or what its type declares.
+
+        A force between two bodies whose type declares no point on them, such as a contact, has no
+        solids: bodies that it does not touch would look joined. Its arrow shows where it acts.
+        """
+        if not (one.symbol or one.points or one.vectors):
+            return []
+        symbol = one.symbol or ("spring" if one.has_ends else "")
+        return self._draw(one, symbol, "forces", FORCE)
+
+    def _draw(self, one: ElementGeometry, symbol: str, layer: str, color: str) -> list[Mark | Span]:
+        pieces = DRAWINGS[symbol](self, one)
+        return [attrs.evolve(p, layer=layer, color=color, owner=one.name) for p in pieces]
+
+    def start(self, body: int, point: Located) -> Located:
+        """A point of another body at the first instant, in coordinates of a body."""
+        return body, floats_of(self.motion.point_in(body, self.motion.points([point])[0, 0]))
+
+    def home(self, one: ElementGeometry, body: int) -> Located:
+        """The point on a body of an element without points.
+
+        It is at the driven joint, one with a point between the same bodies; else at the origin of
+        the element's first moving body.
+        """
+        between = set(one.bodies.values())
+        for other in self.joints:
+            if other is not one and other.points and set(other.bodies.values()) == between:
+                return self.start(body, next(iter(other.points.values())))
+        return self.start(body, (next((b for b in one.bodies.values() if b), 0), ORIGIN))
+
+    def base(self, one: ElementGeometry, field: str) -> Located:
+        """The start of the vector of a field: the point of its slot, or the home."""
+        slot, body = slot_of(field) or "", one.vectors[field][0]
+        point = one.points.get(slot)
+        if point is not None and point[0] == body:
+            return point
+        if one.points:
+            return self.start(body, next(iter(one.points.values())))
+        return self.home(one, body)
+
+
+def _ball(to: Drawer, one: ElementGeometry) -> Pieces:
+    """A ball at the point; of an element without points around that of its joint."""
+    if one.points:
+        yield ball("", *one.place("i"), 1.8 * to.unit)
+    else:
+        yield ball("", *to.home(one, one.bodies["i"]), 2.6 * to.unit)
+
+
+def _block(to: Drawer, one: ElementGeometry) -> Pieces:
+    edge = 4.5 * to.unit
+    yield Mark("", "box", one.bodies["i"], ORIGIN, (edge, edge, edge))
+
+
+def _cross(to: Drawer, one: ElementGeometry) -> Pieces:
+    """The two arms of the cross, each fixed in its body."""
+    yield ball("", *one.place("i"), 1.5 * to.unit)
+    for field in ("a_i", "n_j"):
+        body, axis = one.vectors[field]
+        yield bar(body, to.base(one, field)[1], axis, 0.9 * to.unit, 8.0 * to.unit)
+
+
+def _hinge(to: Drawer, one: ElementGeometry) -> Pieces:
+    """A pin along the axis, with a collar at its middle."""
+    body, at = one.place("i")
+    axis = one.vectors["a_i"][1]
+    yield bar(body, at, axis, 1.1 * to.unit, 7.0 * to.unit)
+    yield bar(body, at, axis, 2.0 * to.unit, 2.6 * to.unit)
+
+
+def _link(to: Drawer, one: ElementGeometry) -> Pieces:
+    start, end = one.place("i"), one.place("j")
+    yield Span("", "rod", start, end, 0.8 * to.unit)
+    yield ball("", *start, 1.6 * to.unit)
+    yield ball("", *end, 1.6 * to.unit)
+
+
+def _plate(to: Drawer, one: ElementGeometry) -> Pieces:
+    """A ball on the body and a plate on ground, both at the point."""
+    yield ball("", *one.place("i"), 2.0 * to.unit)
+    at = to.motion.points([one.place("i")])[0, 0]
+    yield bar(0, at, one.vectors["a_j"][1], 7.0 * to.unit, 0.3 * to.unit)
+
+
+def _ring(to: Drawer, one: ElementGeometry) -> Pieces:
+    """A ring about the first vector, the axis of a rotation."""
+    field, (_, axis) = next(iter(one.vectors.items()))
+    yield Mark("", "ring", *to.base(one, field), (4.0 * to.unit,) * 3, turned_to(axis))
+
+
+def _sleeve(to: Drawer, one: ElementGeometry) -> Pieces:
+    yield from _on_rail(to, one, "cylinder", 2.2 * to.unit)
+
+
+def _slider(to: Drawer, one: ElementGeometry) -> Pieces:
+    yield from _on_rail(to, one, "box", 4.0 * to.unit)
+
+
+def _on_rail(to: Drawer, one: ElementGeometry, kind: str, width: float) -> Pieces:
+    """A rail along a_j, as long as the motion, and a solid on it."""
+    (body, at), (rail_body, rail_at), along = one.place("i"), one.place("j"), one.vectors["a_j"]
+    direction = to.motion.direction(along)
+    ends = to.motion.points([one.place("i"), one.place("j")])
+    reach = np.einsum("tc,tc->t", ends[:, 0] - ends[:, 1], direction)
+    low, high = min(reach.min(), 0.0) - 6.0 * to.unit, max(reach.max(), 0.0) + 6.0 * to.unit
+    middle = np.asarray(rail_at) + 0.5 * (low + high) * np.asarray(along[1])
+    yield bar(rail_body, middle, along[1], 0.7 * to.unit, float(high - low))
+    axis = to.motion.vector_in(body, direction[0])
+    yield Mark("", kind, body, at, (width, width, 6.0 * to.unit), turned_to(axis))
+
+
+def _spring(to: Drawer, one: ElementGeometry) -> Pieces:
+    yield Span("", "spring", one.place("i"), one.place("j"), 2.2 * to.unit)
+
+
+def _wheel(to: Drawer, one: ElementGeometry) -> Pieces:
+    """A thin disk about the y axis of the body, with spokes that show how it turns."""
+    body, R = one.bodies["i"], one.numbers["radius"]
+    y = (0.0, 1.0, 0.0)
+    yield Mark("", "ring", body, ORIGIN, (0.95 * R, 0.95 * R, 0.5 * R), turned_to(y))
+    yield bar(body, ORIGIN, y, 0.12 * R, 3.0 * (0.04 * R))
+    for axis in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)):
+        yield bar(body, ORIGIN, axis, 0.035 * R, 1.9 * R)
+    yield ball("", body, (0.95 * R, 0.0, 0.0), 0.1 * R)
+
+
+def _declared_fields(to: Drawer, one: ElementGeometry) -> Pieces:
+    """Points as balls, vectors as lines, a vector between points as a rod, a list as a chain."""
+    if one.has_ends:
+        yield Span("", "rod", one.place("i"), one.place("j"), 0.5 * to.unit)
+    for start, end in pairwise(one.chain):
+        yield Span("", "rod", start, end, 0.5 * to.unit)
+    for point in one.chain or one.points.values():
+        yield ball("", *point, 1.8 * to.unit)
+    for field, (_, axis) in one.vectors.items():
+        yield bar(*to.base(one, field), axis, 0.6 * to.unit, 12.0 * to.unit)
+    if not one.points and not one.vectors:
+        bodies = [(body, ORIGIN) for body in one.bodies.values() if body]
+        for start, end in pairwise(bodies):
+            yield Span("", "rod", start, end, 0.5 * to.unit)
+
+
+#: Symbol (``interface.types.SYMBOLS``) -> what draws it.
+DRAWINGS: dict[str, Callable[[Drawer, ElementGeometry], Pieces]] = {
+    "": _declared_fields,
+    "ball": _ball,
+    "block": _block,
+    "cross": _cross,
+    "hinge": _hinge,
+    "link": _link,
+    "plate": _plate,
+    "ring": _ring,
+    "sleeve": _sleeve,
+    "slider": _slider,
+    "spring": _spring,
+    "wheel": _wheel,
+}

@@ -18,7 +18,7 @@ from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.shapes import SHAPES, Shape, mesh_file, read_shapes
 from dap3d_core.view.scene3d.colors import color
-from dap3d_core.view.scene3d.primitives import Located, Mark, plain, turned_to
+from dap3d_core.view.scene3d.primitives import Located, Mark, floats_of, turned_to
 from dap3d_core.view.scene3d.solids import Triangles, solid
 
 #: Meshes of more triangles are not put into a page.
@@ -182,7 +182,7 @@ def _add(shapes: SceneShapes, shape: Shape, hue: str, folder: Path | None) -> st
 def _corners(body: int, at: tuple[float, ...], q: tuple[float, ...], box: Floats) -> list[Located]:
     """The corners of a box (2, 3) least and largest coordinates, placed in a body."""
     corners = np.array(list(product(*box.T)))
-    return [(body, plain(corner)) for corner in np.asarray(at) + to_global(q, corners)]
+    return [(body, floats_of(corner)) for corner in np.asarray(at) + to_global(q, corners)]
 
 
 def _solid(shape: Shape, hue: str) -> Mark:

@@ -25,8 +25,7 @@ from dap3d_core.plot import animate
 from dap3d_core.plot.film.animation import frame_times, usual_speed
 from dap3d_core.plot.film.frame import Stage
 from dap3d_core.plot.film.projection import camera_of, visible_rectangle, with_margin
-from dap3d_core.plot.film.shaded_solids import shapes_of
-from dap3d_core.plot.film.stick_figure import SHADES, pose_at, sticks_of
+from dap3d_core.plot.film.stick_figure import SHADES, pose_at, shapes_of, sticks_of
 from dap3d_core.result import ResultError
 from dap3d_core.scene import Scene
 from dap3d_core.scene.scene import AnimationPoint

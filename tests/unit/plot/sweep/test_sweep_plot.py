@@ -11,8 +11,7 @@ from matplotlib.collections import LineCollection, QuadMesh
 import dap3d_core as dap
 from dap3d_core.plot import save_plot
 from dap3d_core.plot.sweep.panels import Band, Heat, Lines, Scatter, Strands, edges
-from dap3d_core.plot.sweep.parallel_coordinates import Parallel
-from dap3d_core.plot.sweep.sweep_plot import sweep_picture
+from dap3d_core.plot.sweep.sweep_plot import Parallel, sweep_picture
 from dap3d_core.plot.sweep.sweep_table import Variable, table_of
 from dap3d_core.result import UnknownNameError
 from dap3d_core.study.sweep.subsample import evenly

@@ -159,7 +159,7 @@ def test_the_tightest_tolerance_has_no_estimate_and_says_so():
 
 def broken(monkeypatch, error):
     """Lets every second run fail."""
-    original, begun = LOOP.Run.go, []
+    original, begun = LOOP.Run.execute, []
 
     def go(self, *arguments, **options):
         begun.append(self)
@@ -167,7 +167,7 @@ def broken(monkeypatch, error):
             raise error
         return original(self, *arguments, **options)
 
-    monkeypatch.setattr(LOOP.Run, "go", go)
+    monkeypatch.setattr(LOOP.Run, "execute", go)
 
 
 def test_a_second_run_that_fails_leaves_the_first_with_the_reason(monkeypatch, tmp_path):

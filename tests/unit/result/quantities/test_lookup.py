@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.results import ARM, MASS, RATE, circling, model_of, result_of
+from support.state_types import REGISTRY, pulled
 
 import dap3d_core as dap
 from dap3d_core.result import UnknownNameError, find
@@ -166,3 +167,59 @@ def test_what_is_wrong_with_a_name(result, wrong, words):
     with pytest.raises(UnknownNameError) as caught:
         result.quantity(wrong)
     assert words in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def with_states():
+    """A run of two forces with states, one of them with two."""
+    scene = pulled()
+    scene.add_force("test-lag", "lag", body_i="cart", k=2.0, tau=0.5, held_0=(1.0, 2.0, 3.0))
+    return dap.simulate(dap.compile(scene, registry=REGISTRY), t_end=0.2, dt=0.1)
+
+
+def test_states_are_quantities_by_name(with_states):
+    """Numbers and vectors, whole or by components from 1; the first instant has the fields."""
+    assert with_states.quantity("spring.z").values.shape == (3,)
+    assert with_states.quantity("spring.z").values[0] == 0.1
+    held = with_states.quantity("lag.held").values
+    assert held.shape == (3, 3)
+    assert list(held[0]) == [1.0, 2.0, 3.0]
+    assert np.array_equal(with_states.quantity("lag.held.2").values, held[:, 1])
+    assert with_states.quantity("lag.clock").values == pytest.approx([0.0, 0.1, 0.2], abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("spring.zz", ["has force", "z", "not 'zz'"]),
+        ("lag.held.4", ["lag.held has 1, 2, 3, not '4'"]),
+        ("spring.z.1", ["no components"]),
+        ("spring.i.z", ["not 'z'"]),
+    ],
+)
+def test_a_wrong_name_is_refused(with_states, name, words):
+    """The error lists what there is."""
+    with pytest.raises(UnknownNameError) as caught:
+        with_states.quantity(name)
+    for word in words:
+        assert word in str(caught.value)
+
+
+def test_a_file_holds_the_states(with_states, tmp_path):
+    """Saved and opened, with their names; xarray has them as a variable."""
+    with_states.save(tmp_path / "r.nc")
+    opened = dap.open(tmp_path / "r.nc")
+    assert np.array_equal(
+        opened.quantity("lag.held").values, with_states.quantity("lag.held").values
+    )
+    data = with_states.to_xarray()["states"]
+    assert list(data.coords["element_state"].values) == [
+        "forces.spring.z", "forces.lag.held.1", "forces.lag.held.2", "forces.lag.held.3",
+        "forces.lag.clock",
+    ]  # fmt: skip
+
+
+def test_the_force_of_an_element_follows_its_state(with_states):
+    """A force evaluated again at reported instants takes the states of these."""
+    held, force = with_states.quantity("lag.held").values, with_states.force("lag").on["i"].force
+    assert np.array_equal(force, held)

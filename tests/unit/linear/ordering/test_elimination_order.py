@@ -13,9 +13,8 @@ import dap3d_core as dap
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.linear.ldlt import plan
 from dap3d_core.linear.ldlt.plan import make_plan
-from dap3d_core.linear.ordering import elimination_order, nested_dissection, supernodes
-from dap3d_core.linear.ordering.elimination_order import order_nodes
-from dap3d_core.linear.ordering.nested_dissection import dissect
+from dap3d_core.linear.ordering import elimination_order, supernodes
+from dap3d_core.linear.ordering.elimination_order import dissect, order_nodes
 from dap3d_core.linear.rank import rank
 
 EPS = np.finfo(float).eps
@@ -49,7 +48,7 @@ def test_the_cheaper_order_is_taken(monkeypatch):
     greedy = order_nodes(n, slots, rows).work
     assert dissected < 0.8 * greedy
     monkeypatch.setattr(elimination_order, "WIDE", 0)
-    monkeypatch.setattr(nested_dissection, "dissect", lambda neighbours, weight: range(len(weight)))
+    monkeypatch.setattr(elimination_order, "dissect", lambda neighbours, weight: range(len(weight)))
     assert order_nodes(n, slots, rows).work == greedy
 
 
@@ -72,7 +71,7 @@ def test_separators_separate():
                 fresh = {m for m in neighbours[waiting.pop()] if stage[m] == 0} - leaf
                 leaf |= fresh
                 waiting += fresh
-            assert len(leaf) <= nested_dissection.LEAF
+            assert len(leaf) <= elimination_order.LEAF
             seen |= leaf
     assert max(stage) >= 3
     top = [k for k, s in enumerate(stage) if s == max(stage)]
@@ -96,7 +95,7 @@ def test_cost_of_a_row_of_loops_is_linear(family):
 @pytest.mark.parametrize("graph", [chain(800), star(400)])
 def test_trees_are_not_dissected(graph, monkeypatch):
     """Their fronts are narrow: no other order is tried, no panel made."""
-    monkeypatch.delattr(nested_dissection, "dissect")
+    monkeypatch.delattr(elimination_order, "dissect")
     assert order_nodes(*arguments(graph)).panels == ()
 
 
@@ -107,7 +106,7 @@ def test_trees_are_not_dissected(graph, monkeypatch):
 def panels_everywhere(request, monkeypatch):
     """Dissection down to four nodes and panels, whatever the size, many zeros in them."""
     monkeypatch.setattr(elimination_order, "WIDE", 0)
-    monkeypatch.setattr(nested_dissection, "LEAF", 4)
+    monkeypatch.setattr(elimination_order, "LEAF", 4)
     monkeypatch.setattr(supernodes, "ZEROS", request.param)
 
 
@@ -153,7 +152,7 @@ def test_random_graphs_are_solved(n, pairs, seed):
     check_solution(case)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(elimination_order, "WIDE", 0)
-        patch.setattr(nested_dissection, "LEAF", 2)
+        patch.setattr(elimination_order, "LEAF", 2)
         patch.setattr(supernodes, "ZEROS", 0.9)
         check_solution(Case((n, joints), np.random.default_rng(seed)))
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 import dap3d_core as dap
-from dap3d_core.simulation.equilibrium.motion_words import describe_motion, direction
+from dap3d_core.simulation.equilibrium.rest import describe_motion, direction
 
 MODEL = dap.compile("fourbar3").model
 
