@@ -142,7 +142,8 @@ def test_a_planted_error_is_found_and_named(type_, failing, words):
 
 
 @pytest.mark.parametrize(
-    "type_", [Bounce, Clutch, Stage]  # those of plugins: tests/contract
+    "type_",
+    [Bounce, Clutch, Stage],  # those of plugins: tests/contract
 )
 def test_right_jumps_pass(type_):
     report = check_type(type_, poses=2)
