@@ -17,14 +17,16 @@ from dap3d_core.scene import check as checked
 from dap3d_core.testing import checks_for
 
 REGISTRY = load_registry()
-INSTALLED = [(t.kind, t.keyword) for t in REGISTRY.listing() if t.state == "ok"]
+INSTALLED = {(t.kind, t.keyword): t.distribution for t in REGISTRY.listing() if t.state == "ok"}
 #: One pose: e2e/test_check_plugin.py runs ``dap3d check-plugin`` over all types.
 CHECKS = [(key, check) for key in INSTALLED for check in checks_for(REGISTRY.get(*key), poses=1)]
+#: Those of another package are run by its own tests.
+OWN = [(key, check) for key, check in CHECKS if INSTALLED[key] == "dap3d"]
 JOINTS = cases(REGISTRY, "joint")
 
 
 @pytest.mark.parametrize(
-    "check", [c for _, c in CHECKS], ids=[f"{kind}-{word}-{c}" for (kind, word), c in CHECKS]
+    "check", [c for _, c in OWN], ids=[f"{kind}-{word}-{c}" for (kind, word), c in OWN]
 )
 def test_type(check):
     """One check of one type, or of one of its variants."""

@@ -5,6 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from support.levels import quickly
 
 import dap3d_core as dap
 from dap3d_core.cli import main
@@ -219,7 +220,7 @@ def test_a_limit_on_files_is_named_before_the_run(scene_file):
 # ---------------------------------------------------------------- variables of the environment
 
 
-@pytest.mark.parametrize("name", ["nonsense", "../x", "x86-64-v2 ", "pentium4", "'"])
+@pytest.mark.parametrize("name", quickly(["nonsense", "../x", "x86-64-v2 ", "pentium4", "'"]))
 def test_an_unknown_processor_is_one_sentence(scene_file, name):
     """LLVM would end the process; the type whose kernels come first is not blamed."""
     folder = scene_file().parent
@@ -231,7 +232,9 @@ def test_an_unknown_processor_is_one_sentence(scene_file, name):
     assert not (folder / "fall.nc").exists()
 
 
-@pytest.mark.parametrize("command", ["plot fall.nc t -o a.png", "animate fall.nc -o a.gif"])
+@pytest.mark.parametrize(
+    "command", quickly(["plot fall.nc t -o a.png", "animate fall.nc -o a.gif"])
+)
 def test_an_unknown_backend_of_matplotlib_is_one_sentence(scene_file, command):
     folder = scene_file().parent
     found = in_shell(f"$DAP3D run fall.toml -q && $DAP3D {command}", folder, MPLBACKEND="nonsense")

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
+from support.levels import quickly
 
 import dap3d_core as dap
 from dap3d_core.simulation.events.sampling import FRACTIONS, Sampler, turning_points
@@ -80,7 +81,7 @@ def test_a_level_below_an_apex_is_passed_twice(flight, d, every):
     assert result.stats.steps < 20
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "adams", "radau"])
+@pytest.mark.parametrize("integrator", quickly(["dop853", "dopri5", "adams", "radau"]))
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_turning_points_of_a_pendulum(integrator, method):
     """Five passages, in pairs about three turning points; of some the upward ones alone."""
@@ -119,7 +120,7 @@ def test_turning_points_of_a_pendulum(integrator, method):
         (lambda t: 1e-300 * (t - 0.5), [0.5]),
         (lambda t: max(0.0, t - 0.4), []),
         (lambda t: 0.0, []),
-        (lambda t: 1.02 + np.sin(2.0e3 * np.pi * t), []),
+        pytest.param(lambda t: 1.02 + np.sin(2.0e3 * np.pi * t), [], marks=pytest.mark.slow),
     ],
 )  # fmt: skip
 def test_functions_with_close_roots_kinks_and_jumps(flight, function, times):

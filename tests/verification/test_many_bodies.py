@@ -124,9 +124,15 @@ def reference():
 
 @pytest.mark.parametrize(
     ("method", "integrator"),
-    [("standard", "dop853"), ("lsq", "dop853"), ("joint", "dop853"), ("standard", "adams"),
-     ("standard", "radau")],
-)  # fmt: skip
+    [
+        ("standard", "dop853"),
+        ("joint", "dop853"),
+        *(
+            pytest.param(*names, marks=pytest.mark.slow)
+            for names in (("lsq", "dop853"), ("standard", "adams"), ("standard", "radau"))
+        ),
+    ],
+)
 def test_five_bodies_move_as_particles_do(scene, reference, method, integrator):
     """Tolerances of 1e-11 a step leave some 1e-9 of the motion."""
     scene = scene.copy()

@@ -7,6 +7,7 @@ get on says why. Scenes of thin bodies, for which rounding is measured, are in t
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from support.levels import quickly
 
 import dap3d_core as dap
 
@@ -60,7 +61,7 @@ def check_ball(result, k, e, height=0.1, mass=1.0, floor=0.0):
 
 @pytest.mark.parametrize("integrator", ["radau", "auto"])
 @pytest.mark.parametrize("e", [0.0, 0.3, 0.9])
-@pytest.mark.parametrize("k", [1e5, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11, 1e12])
+@pytest.mark.parametrize("k", quickly([1e5, 1e12, 1e6, 1e7, 1e8, 1e9, 1e10, 1e11], 2))
 def test_a_ball_on_a_stiff_plane(k, e, integrator):
     """It never flies higher than e^2 of the height before, and comes to rest."""
     check_ball(run(ball(k, e), 2.0, integrator), k, e)
@@ -124,7 +125,7 @@ def clutch(w_tol):
 
 @pytest.mark.parametrize("integrator", ["radau", "auto"])
 @pytest.mark.parametrize("rtol", [1e-8, 1e-6])
-@pytest.mark.parametrize("w_tol", [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
+@pytest.mark.parametrize("w_tol", quickly([1e-3, 1e-9, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8], 2))
 def test_a_clutch_meets(w_tol, rtol, integrator):
     """w_a = 30 - 7.5 t until both are at 23 rad/s, (0.4 30 - 0.1 5) / 0.5, at 35 / 37.5 s. From
     w_tol on friction fades: a difference of w_tol / 37.5 s at most. To 1e-6 of 23 rad/s at the end;
@@ -232,7 +233,7 @@ def test_a_run_that_stalls_says_why_and_keeps_what_it_has(integrator):
 
 
 @pytest.mark.parametrize("e", [0.5, 0.9])
-@pytest.mark.parametrize("height", [0.1, 0.37, 0.5])
+@pytest.mark.parametrize("height", quickly([0.1, 0.37, 0.5]))
 @pytest.mark.parametrize(("mass", "k"), [(1e-3, 3e9), (1e-3, 5e10), (0.1, 1e12), (1.0, 1e13)])
 def test_a_light_ball_rebounds_every_time(mass, k, height, e):
     """Stages of a step after an impact seemed found, by a first rate of 1e-7 that was that of the

@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from support.levels import quickly
 
 import dap3d_core as dap
 from dap3d_core.result import Result
@@ -91,7 +92,7 @@ def test_a_motion_that_comes_to_rest_again_and_again(method, integrator, dt, rev
 
 
 @pytest.mark.parametrize("method", ["standard", "joint"])
-@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "adams"])
+@pytest.mark.parametrize("integrator", quickly(["dop853", "dopri5", "adams"]))
 def test_a_very_fast_wheel(method, integrator):
     """1e4 rad/s, 1591.5 turns between two reports; the speed is constant."""
     scene = wheel(1e4, 0.0)
@@ -169,7 +170,7 @@ def driven(function="b", joint="drive-rot", **fields):
 @pytest.mark.parametrize(
     "dt", [*(pytest.param(x, marks=pytest.mark.slow) for x in (0.1, 2.0)), 10.0]
 )
-@pytest.mark.parametrize("joint", ["drive-rot", "rel-rot"])
+@pytest.mark.parametrize("joint", quickly(["drive-rot", "rel-rot"]))
 @pytest.mark.parametrize("analysis", [dap.simulate, dap.kinematics])
 def test_a_driven_wheel_follows_its_driver(analysis, joint, dt):
     """At the end 100 rad, as the function says; outputs are made of it."""

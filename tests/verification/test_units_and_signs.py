@@ -260,7 +260,12 @@ def hanging(type_, ground_first):
 @pytest.mark.parametrize("type_", ["rev", "cyl", "tran", "sph", "univ", "weld"])
 @pytest.mark.parametrize(
     ("method", "integrator"),
-    [("standard", "dop853"), ("joint", "dop853"), ("lsq", "dopri5"), ("standard", "radau")],
+    [
+        ("standard", "dop853"),
+        ("joint", "dop853"),
+        pytest.param("lsq", "dopri5", marks=pytest.mark.slow),
+        pytest.param("standard", "radau", marks=pytest.mark.slow),
+    ],
 )
 def test_bodies_of_a_joint_to_ground_may_be_exchanged(type_, method, integrator):
     """The motion, the reactions and the energy stay; rtol 1e-10 leaves some 1e-8."""

@@ -7,7 +7,9 @@ functions of scalar_math.py take dual numbers through the entry point of traced 
 attribute ``tracer`` that has their functions.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 import numpy as np
@@ -113,9 +115,30 @@ class Condition:
     __rand__, __ror__, __rxor__ = __and__, __or__, __xor__
 
 
+#: Of all comparisons by order since ``comparisons`` began, their truth values.
+_recorded: ContextVar[list[Any] | None] = ContextVar("recorded", default=None)
+
+
+@contextmanager
+def comparisons() -> Iterator[list[Any]]:
+    """Truth values of the comparisons by order that are made here, one array for each."""
+    token = _recorded.set([])
+    try:
+        yield _recorded.get()
+    finally:
+        _recorded.reset(token)
+
+
 def _comparison(name: str) -> Callable[..., Condition]:
-    compare = getattr(np, name)
-    return lambda self, other: Condition(compare(self.value, _parts(other)[0]))
+    compare, is_order = getattr(np, name), name not in ("equal", "not_equal")
+
+    def method(self, other):
+        holds = compare(self.value, _parts(other)[0])
+        if is_order and (recorded := _recorded.get()) is not None:
+            recorded.append(holds)
+        return Condition(holds)
+
+    return method
 
 
 class Dual:

@@ -2,13 +2,14 @@
 
 import os
 from collections.abc import Callable
+from functools import lru_cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.model import ModelError, build_model
+from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import split
 from dap3d_core.registry import load_registry
@@ -39,6 +40,8 @@ if TYPE_CHECKING:
 
 #: Attributes that say of each point whether something is true of it.
 MARKS = ("given", "turning", "branching", "stable")
+#: Models that are kept: differences by the parameter come back to a value.
+KEPT = 32
 #: What changes by less than this part of its size over the whole path is constant.
 CONSTANT = 1e-12
 
@@ -308,6 +311,7 @@ class _Family:
         self._compiled, self._own = compiled, own
         self._first, self._range = float(numbers[0]), float(numbers[-1] - numbers[0])
         self.given = (numbers - self._first) / self._range
+        self._model = lru_cache(maxsize=KEPT)(self._build)
         self._exact: dict[float, float] = dict(
             zip(self.given.tolist(), numbers.tolist(), strict=True)
         )
@@ -326,10 +330,12 @@ class _Family:
         """Evaluate the model of a point from here on."""
         self.statics.load(s, point)
 
+    def _build(self, s: float) -> Model:
+        return build_model(check(self.scene(s), self._own.registry))
+
     def _load(self, s: float) -> None:
-        checked_scene = check(self.scene(s), self._own.registry)
         try:
-            self.evaluator.load(build_model(checked_scene))
+            self.evaluator.load(self._model(s))
         except (ModelError, ValueError) as error:
             what = f"at {self.value_of(s):g} the scene has another structure: {error}"
             raise SceneError([Mistake("parameter", self.parameter.name, what)]) from error

@@ -171,10 +171,8 @@ def test_the_listing_says_what_is_wrong_with_one_and_lists_all_others(install, k
     one_is_broken(install, kind, change(KINDS[kind][0]), words)
 
 
-@pytest.mark.parametrize(
-    "kind",
-    [pytest.param(k, marks=() if k == "integrator" else pytest.mark.slow) for k in KINDS],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_listing_does_not_wait_for_one_that_is_never_loaded(install, kind):
     """It keeps a core busy for the seconds that the listing allows."""
     one_is_broken(install, kind, "while True: pass\n", "not loaded after 0.3 s")

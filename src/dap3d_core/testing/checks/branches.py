@@ -14,6 +14,7 @@ import numpy as np
 
 from dap3d_core.interface.derive.derive import missing
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.dual_numbers import comparisons
 from dap3d_core.testing.checks.compare import Comparison, body_words
 from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.samples.complex_step import Stepped
@@ -34,40 +35,39 @@ NEAR = 1e-6
 SMOOTH = 1e-4
 
 
+class ComparedPart(float):
+    """A real part that remembers the results of its comparisons."""
+
+    __slots__ = ()
+    __hash__ = float.__hash__
+    results: ClassVar[list[bool]] = []
+
+
 class ComparedNumber(Stepped):
-    """A number that remembers with what it is compared."""
+    """A number that compares by such a part."""
 
     __slots__ = ()
     __hash__ = complex.__hash__
-    results: ClassVar[list[bool]] = []
 
     @property
-    def real(self) -> "ComparedPart":
-        """The real part, which remembers as well."""
+    def real(self) -> ComparedPart:
+        """The real part."""
         return ComparedPart(super().real)
 
 
-def _compared(number: type, name: str) -> Any:
-    compare = getattr(number, name)
+def _compared(name: str) -> Any:
+    compare = getattr(float, name)
 
     def method(self: Any, other: Any) -> Any:
         holds = compare(self, other)
-        ComparedNumber.results.append(bool(holds))
+        ComparedPart.results.append(bool(holds))
         return holds
 
     return method
 
 
-class ComparedPart(float):
-    """The real part of one, by which kernels such as ``sign`` compare it."""
-
-    __slots__ = ()
-    __hash__ = float.__hash__
-
-
 for _name in ("__lt__", "__le__", "__gt__", "__ge__"):
-    setattr(ComparedNumber, _name, _compared(Stepped, _name))
-    setattr(ComparedPart, _name, _compared(float, _name))
+    setattr(ComparedPart, _name, _compared(_name))
 
 
 def switches(subject: SampledType) -> CheckOutcome:
@@ -153,7 +153,7 @@ class _Path:
         first = self._results(places[0])
         if not first:  # both sides of a where are evaluated: it compares everywhere, or nowhere
             return
-        results = [first, *map(self._results, places[1:])]
+        results = self._all_results(places, first)
         for k in range(PLACES - 1):
             one, other = results[k], results[k + 1]
             for which in np.flatnonzero(np.array(one) != np.array(other)):
@@ -187,11 +187,23 @@ class _Path:
 
     def _results(self, x: float) -> list[bool]:
         """Results of all comparisons that the kernel makes."""
-        ComparedNumber.results.clear()
+        ComparedPart.results.clear()
         self._sample.kernels.value_with(
             ComparedNumber, self._name, self._sample.element, self._at(x)
         )
-        return list(ComparedNumber.results)
+        return list(ComparedPart.results)
+
+    def _all_results(self, places: Floats, first: list[bool]) -> list[list[bool]]:
+        """The same at all places, at once where the kernel takes a vector for each number."""
+        try:
+            with comparisons() as found, np.errstate(all="ignore"):
+                self._sample.kernels.value_at_all(
+                    self._name, self._sample.element, [self._at(x) for x in places]
+                )
+        except Exception:  # it branches on a number, as in a search in a long table
+            found = []
+        results = [[bool(np.ravel(one)[k % one.size]) for one in found] for k in range(len(places))]
+        return results if results[0] == first else [first, *map(self._results, places[1:])]
 
     def _at(self, x: float) -> State:
         state, along = self._sample.state, self._along

@@ -5,7 +5,7 @@ A kernel is run by its group loop: in plain Python on numbers of any kind, and c
 
 import random
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import attrs
@@ -23,6 +23,7 @@ from dap3d_core.interface.examine.examine import ATTEMPTS, prepared, set_ends
 from dap3d_core.interface.examine.random_values import numbers, random_field
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.dual_numbers import Dual
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_modules import build, source_of
 from dap3d_core.testing.samples.complex_step import STEP, Stepped
@@ -104,6 +105,15 @@ class Kernels:
         body = state.body()[: len(self.type_info.layout.slots) + 1]  # no other row is read
         arrays = (to_numbers(x) for x in (body, state.table(), state.own.astype(object)))
         return self._run(name, element, number(state.t), *arrays)
+
+    def value_at_all(
+        self, name: str, element: RandomElement, states: Sequence[State]
+    ) -> NDArray[Any]:
+        """The same of dual numbers without derivatives, of all states at once."""
+        count = len(self.type_info.layout.slots) + 1
+        parts = [(x.body()[:count], x.table(), x.own) for x in states]
+        t = Dual(np.array([[x.t] for x in states]))
+        return self._run(name, element, t, *map(_of_all, zip(*parts, strict=True)))
 
     def state_rate(self, element: RandomElement, state: State, along: Any) -> Floats:
         """The rates of the element's states along a direction."""
@@ -224,6 +234,15 @@ class _Plain:
     par: Any
     states: Any
     rates: Any
+
+
+def _of_all(values: Sequence[Floats]) -> NDArray[Any]:
+    """Arrays of one shape as one of dual numbers, (states, 1) each."""
+    all_values = np.array(values)
+    numbers = np.empty(all_values.shape[1:], object)
+    for index in np.ndindex(numbers.shape):
+        numbers[index] = Dual(all_values[(slice(None), *index)][:, None])
+    return numbers
 
 
 def _stepped(values: Floats, rates: Floats) -> NDArray[Any]:

@@ -43,7 +43,7 @@ def _precession(theta, spin, A=0.02, C=0.005, moment=0.1 * 9.81):
     return (b - np.sqrt(b * b - 4 * a * moment)) / (2 * a)
 
 
-@long_in_plain_python
+@pytest.mark.slow
 def test_errors_follow_the_tolerances():
     """Andrews' mechanism with 100 reports, beside dop853 at 1e-12: no setting errs out of its turn.
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support import mechanisms, problems, trees
 from support.ended import leave, shorten_chunks
+from support.levels import quickly
 from support.plain import long_in_plain_python
 from support.results import same_bits
 
@@ -25,7 +26,7 @@ def short_chunks(monkeypatch):
 
 
 @long_in_plain_python
-@pytest.mark.parametrize("integrator", ["dop853", "adams", "radau"])
+@pytest.mark.parametrize("integrator", quickly(["dop853", "adams", "radau"]))
 def test_rows_that_wait_for_room_come_after_it(integrator, tmp_path, monkeypatch):
     """A row fills the buffer: the others of the step are interpolated when it goes on."""
     if integrator != "dop853" and not jit_is_on():

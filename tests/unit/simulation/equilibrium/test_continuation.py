@@ -75,7 +75,10 @@ def test_toggle_turns_where_virtual_work_says():
 @long_in_plain_python
 @pytest.mark.parametrize(
     ("parameter", "values"),
-    [("points.crank_a.sPp.x", "-0.5:-0.4:3"), ("points.wall.sPp.x", "4:3.8:3")],
+    [
+        ("points.crank_a.sPp.x", "-0.5:-0.4:3"),
+        pytest.param("points.wall.sPp.x", "4:3.8:3", marks=pytest.mark.slow),
+    ],
 )
 def test_geometry_as_parameter(parameter, values):
     """Joints close at each value; poses are those that a search finds there."""
@@ -105,7 +108,7 @@ def test_path_without_freedoms():
     assert found.end == "reached"
 
 
-@long_in_plain_python
+@pytest.mark.slow  # quickly: tests/unit/cli/commands/test_equilibrium_path.py
 def test_path_that_ends_on_its_way():
     """Nearly 1 m aside the rod is at the end of its reach: what was found is returned."""
     found = dap.equilibrium_path(reach(), "points.pin.sPp.x", "0.6:1.2:4")

@@ -92,6 +92,7 @@ def test_every_change_of_sign_of_a_fast_function_is_found(compiled, frequency, s
     assert not any("too fast" in note for note in result.notes)
 
 
+@pytest.mark.slow
 def test_what_is_too_fast_to_be_followed_is_noted(compiled):
     """It nears its level ever faster; a jump that stays on one side is followed, and is cheap."""
     calls = []

@@ -401,7 +401,7 @@ def test_what_a_kernel_prints_while_it_is_checked_is_not_shown(capsys):
 
 def test_of_a_kernel_that_gives_other_numbers_each_time_nothing_else_is_judged():
     """What formulas give by chance is neither right nor wrong."""
-    outcomes = {o.check: o for o in check_type(Noisy).outcomes}
+    outcomes = {o.check: o for o in check_type(Noisy, poses=2).outcomes}
     assert outcomes.pop("purity").state == "failed"
     assert {o.state for o in outcomes.values()} == {"not applicable"}
     assert "other numbers each time" in outcomes["action and reaction"].words
@@ -409,7 +409,7 @@ def test_of_a_kernel_that_gives_other_numbers_each_time_nothing_else_is_judged()
 
 def test_gamma_beside_a_wrong_J_is_compared_with_C():
     """Right or wrong, and the outcome says so; wrong by a known number."""
-    gamma = {o.check: o for o in check_type(WrongSignInJ).outcomes}["gamma"]
+    gamma = {o.check: o for o in check_type(WrongSignInJ, poses=2).outcomes}["gamma"]
     assert gamma.ok
     assert any(n.startswith("row 1 of J or nu is not what C says") for n in gamma.notes)
 
@@ -418,7 +418,7 @@ def test_gamma_beside_a_wrong_J_is_compared_with_C():
             a, b, c = Spherical.gamma(s_P_i, s_P_j, w_i, w_j)
             return a, b + 0.25, c
 
-    (finding,) = (f for f in check_type(BothWrong).findings if f.check == "gamma")
+    (finding,) = (f for f in check_type(BothWrong, poses=2).findings if f.check == "gamma")
     assert (finding.row, finding.error) == (2, pytest.approx(0.25, rel=1e-6))
 
 
@@ -507,7 +507,7 @@ def test_a_kernel_that_fails_on_some_input_is_a_finding():
                 raise LookupError("no such thing")
             return PointOnPlane.gamma(a_j, w_i, s_P_i_dot, f_ddot)
 
-    report = check_type(Fails)
+    report = check_type(Fails, poses=2)
     assert "it could not be carried out: LookupError: no such thing" in str(report)
 
 

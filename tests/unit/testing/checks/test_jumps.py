@@ -134,17 +134,19 @@ class Branches(PlaneStop):
     ids=lambda v: v.__name__ if isinstance(v, type) else "",
 )
 def test_a_planted_error_is_found_and_named(type_, failing, words):
-    report = check_type(type_)
+    """In two poses; that a body is moved without reaction shows where bodies approach."""
+    report = check_type(type_, poses=4 if type_ is NoReaction else 2)
     failing -= set() if jit_is_on() else {"compiled"}
     assert {outcome.check for outcome in report.outcomes if not outcome.ok} == failing
     assert any(words in finding.words for finding in report.findings), str(report)
 
 
 @pytest.mark.parametrize(
-    "type_", [Bounce, Clutch, Stage, PlaneStop, PointToPointStop, RotationStop]
+    "type_",
+    [Bounce, Clutch, Stage],  # those of plugins: tests/contract
 )
 def test_right_jumps_pass(type_):
-    report = check_type(type_)
+    report = check_type(type_, poses=2)
     assert report.ok, str(report)
 
 
