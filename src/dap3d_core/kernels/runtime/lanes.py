@@ -1,7 +1,8 @@
-"""Compiled functions and arrays for several scenes of one structure at once, one in each lane.
+"""Compiled functions and arrays with a vector for each float: scenes, or a value and derivatives.
 
-Sources are those of one scene (kernels/compiler/lanes.py); each lane has the bits of its scene
-alone. An array of one scene becomes one in which item k of all scenes lies together.
+Sources are those of one scene (kernels/compiler/lanes.py, derivatives.py). Scenes of one structure
+are one in each lane, and have the bits of each alone; or lane 0 is a number, with the bits that it
+has alone, and the others are its derivatives. Item k of all lanes lies together.
 """
 
 import functools
@@ -14,10 +15,11 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler import objects
+from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.lanes import widen
-from dap3d_core.kernels.compiler.types import FLOAT, Signature, Struct
-from dap3d_core.kernels.compiler.units import Entry, Unit, address_of
+from dap3d_core.kernels.compiler.types import COMPLEX, FLOAT, Signature, Struct
+from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, address_of
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import cache_folder, names_of
 from dap3d_core.kernels.runtime.source_digest import origin
@@ -68,10 +70,30 @@ def wide_unit(name: str, count: int, text: Callable[[str], str], *, optimise: bo
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
         return widen(text(symbols[0]), count), ["None"]
 
+    return _unit(name, 1, write, optimise)
+
+
+def _unit(name: str, functions: int, write: Any, optimise: bool = False) -> Unit:
     with _making:
         if name not in _units:
-            _units[name] = Unit(name, 1, write, cache_folder(), optimise=optimise)
+            _units[name] = Unit(name, functions, write, cache_folder(), optimise=optimise)
         return _units[name]
+
+
+def differentiated(entry: Entry, count: int) -> Entry:
+    """A compiled function whose floats are ``count`` numbers: a value, and derivatives."""
+    unit = entry.unit
+
+    def write(symbols: list[str]) -> tuple[str, list[Any]]:
+        return differentiate(unit.fresh_text(symbols), count), unit.results
+
+    wide = _unit(f"{unit.name}-d{count}", len(unit.symbols), write)
+    return Entry(wide, entry.k, entry.signature)
+
+
+def differentiated_table(table: Functions, count: int) -> Functions:
+    """A table of functions, each as ``differentiated`` gives it."""
+    return Functions(table.signature, [differentiated(entry, count) for entry in table.entries])
 
 
 class WideArrays:
@@ -102,27 +124,70 @@ class WideArrays:
                 has = array is not None
                 words.append(self._table(array, names, f"{before}{name}.") if has else 0)
                 continue
-            own = before + name in names and type_.item == FLOAT
+            own = self._is_own(before + name, names) and type_.item in (FLOAT, COMPLEX)
             words += [address_of(self.matrix(array) if own else array), *array.shape]
         self._tables.append(np.array(words, dtype=np.int64))
         return address_of(self._tables[-1])
 
+    def _is_own(self, name: str, names: Collection[str]) -> bool:
+        return name in names
+
     def matrix(self, array: Floats) -> Floats:
         """(size, count) view: the items of an array of one scene, for each scene.
 
-        Arrays that lie in one array of one scene do so here.
+        Arrays that lie in one array of one scene do so here. A complex number is two items.
         """
         whole = array if array.base is None else array.base
         if id(whole) not in self._buffers:
-            numbers = np.zeros(whole.size * self._count + ALIGNMENT)
+            numbers = np.zeros(whole.nbytes // 8 * self._count + ALIGNMENT)
             first = -address_of(numbers) // 8 % ALIGNMENT
-            end = first + whole.size * self._count
+            end = first + whole.nbytes // 8 * self._count
             self._buffers[id(whole)] = whole, numbers[first:end].reshape(-1, self._count)
         wide = self._buffers[id(whole)][1]
         first = (address_of(array) - address_of(whole)) // 8 if array.size else 0
-        return wide[first : first + array.size]
+        return wide[first : first + array.nbytes // 8]
 
     def spread(self) -> None:
         """Give each scene the numbers of the one."""
         for whole, wide in self._buffers.values():
             wide[:] = whole.reshape(-1, 1)
+
+
+class DifferentiatedArrays(WideArrays):
+    """A struct of arrays with derivatives: of each number its value and ``count`` - 1 slopes.
+
+    Slopes are zero at first. The numbers themselves stay those of the plain arrays wherever Python
+    reads or changes them, if ``take`` comes before each call of differentiated code, ``give`` after
+    it.
+    """
+
+    def __init__(self, arrays: Arrays, count: int) -> None:
+        """Args: the arrays; numbers for each of theirs."""
+        super().__init__(arrays, count, ())
+        for whole, wide in self._buffers.values():
+            wide[:, 0] = _flat(whole)
+
+    def _is_own(self, name: str, names: Collection[str]) -> bool:
+        return True
+
+    def take(self) -> None:
+        """Take over numbers that Python has changed: their slopes become zero."""
+        for whole, wide in self._buffers.values():
+            changed = _flat(whole).view(np.int64) != np.ascontiguousarray(wide[:, 0]).view(np.int64)
+            if changed.any():
+                wide[changed] = 0.0
+                wide[changed, 0] = _flat(whole)[changed]
+
+    def give(self) -> None:
+        """Give Python the numbers."""
+        for whole, wide in self._buffers.values():
+            _flat(whole)[:] = wide[:, 0]
+
+    def slopes(self, array: Floats) -> Floats:
+        """(size, count - 1) view of the slopes of an array."""
+        return self.matrix(array)[:, 1:]
+
+
+def _flat(array: Floats) -> Floats:
+    flat: Floats = array.reshape(-1).view(np.float64)
+    return flat
