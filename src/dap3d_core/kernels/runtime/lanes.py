@@ -19,7 +19,7 @@ from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.lanes import widen
 from dap3d_core.kernels.compiler.types import COMPLEX, FLOAT, Signature, Struct
-from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, address_of
+from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, address_of, type_of
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import cache_folder, names_of
 from dap3d_core.kernels.runtime.source_digest import origin
@@ -173,19 +173,66 @@ class DifferentiatedArrays(WideArrays):
     def take(self) -> None:
         """Take over numbers that Python has changed: their slopes become zero."""
         for whole, wide in self._buffers.values():
-            changed = _flat(whole).view(np.int64) != np.ascontiguousarray(wide[:, 0]).view(np.int64)
-            if changed.any():
-                wide[changed] = 0.0
-                wide[changed, 0] = _flat(whole)[changed]
+            flat = _flat(whole)
+            changed = flat.view(np.int64) != np.ascontiguousarray(wide[:, 0]).view(np.int64)
+            wide[changed] = 0.0
+            wide[changed, 0] = flat[changed]
 
     def give(self) -> None:
         """Give Python the numbers."""
         for whole, wide in self._buffers.values():
             _flat(whole)[:] = wide[:, 0]
 
+    def has(self, array: Floats) -> bool:
+        """True if an array is one of these."""
+        return id(array if array.base is None else array.base) in self._buffers
+
     def slopes(self, array: Floats) -> Floats:
         """(size, count - 1) view of the slopes of an array."""
         return self.matrix(array)[:, 1:]
+
+
+class Differentiation:
+    """Calls of compiled functions with derivatives of all that their arrays hold.
+
+    Attributes:
+        arrays: of each struct that is an argument, by its id.
+        taken: called before each call, where numbers that Python has changed are known.
+    """
+
+    def __init__(self, count: int) -> None:
+        """Args: numbers for each of the arrays' (value and slopes)."""
+        self.count, self.taken = count, lambda: None
+        self.arrays: dict[int, DifferentiatedArrays] = {}
+        self._kept: dict[int, Any] = {}
+        self._tables: dict[int, Functions] = {}
+
+    def call(self, function: Any, *arguments: Any) -> None:
+        """Call a compiled function of structs, tables and integers in its differentiated form."""
+        types = [type_of(argument) for argument in arguments]
+        entry = differentiated(function.compile(types), self.count)
+        wide = [self._wide(argument) for argument in arguments]
+        for arrays in self.arrays.values():
+            arrays.take()
+        self.taken()
+        entry(*wide)
+        for arrays in self.arrays.values():
+            arrays.give()
+
+    def of(self, struct: Arrays) -> DifferentiatedArrays:
+        """The arrays of a struct with their derivatives."""
+        if id(struct) not in self.arrays:
+            self._kept[id(struct)] = struct
+            self.arrays[id(struct)] = DifferentiatedArrays(struct, self.count)
+        return self.arrays[id(struct)]
+
+    def _wide(self, argument: Any) -> Any:
+        if isinstance(argument, Functions):
+            if id(argument) not in self._tables:
+                self._kept[id(argument)] = argument
+                self._tables[id(argument)] = differentiated_table(argument, self.count)
+            return self._tables[id(argument)]
+        return self.of(argument) if isinstance(argument, Arrays) else argument
 
 
 def _flat(array: Floats) -> Floats:
