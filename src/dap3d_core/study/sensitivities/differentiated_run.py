@@ -58,8 +58,8 @@ class DifferentiatedRun(Run):
         self._seed()
         integration.compile()
         if self.jumps is not None:
-            self.jumps.begin = self._jumping(Jumps.begin)  # type: ignore[method-assign]
-            self.jumps.apply = self._jumping(Jumps.apply)  # type: ignore[method-assign]
+            self.jumps.begin = self._jumping(Jumps.begin)  # type: ignore
+            self.jumps.apply = self._jumping(Jumps.apply)  # type: ignore
 
     def _slopes_of(self, array: Floats) -> Floats:
         """(size, p) view of the derivatives of an array of the integration."""
@@ -77,7 +77,9 @@ class DifferentiatedRun(Run):
         ends = np.cumsum([array.size for array in arrays.values()])[:-1]
         self._stops = np.zeros((len(self.present.tstops), len(self.neighbours)))
         for j, beside in enumerate(self.neighbours):
-            found = beside.derivative(lambda run: finite(np.concatenate([*floats_of(run).values()])))
+            found = beside.derivative(
+                lambda run: finite(np.concatenate([*floats_of(run).values()]))
+            )
             for array, slope in zip(arrays.values(), np.split(found, ends), strict=True):
                 self._slopes_of(array)[:, j] = slope
             stops = beside.derivative(lambda run: np.array([t for t, _ in run.present.tstops]))
@@ -101,7 +103,7 @@ class DifferentiatedRun(Run):
         work, count = integration.work, int(integration.work.row_count)
         raw = work.rows[:count].copy()
         slopes = self._slopes_of(work.rows)[: count * work.rows.shape[1]]
-        slopes = slopes.reshape(count, work.rows.shape[1], -1).copy()
+        slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
         if self.evaluator.formulation.has_own_coordinates and count:
             slopes = self._derivative(lambda run, rows: run.evaluator.body_rows(rows), raw, slopes)
         self.slopes.append(slopes)
@@ -165,4 +167,5 @@ class DifferentiatedRun(Run):
 
 def finite(x: Floats) -> Floats:
     """Numbers, with zero for those that are not finite: limits that are not set."""
-    return np.where(np.isfinite(x), x, 0.0)
+    numbers: Floats = np.where(np.isfinite(x), x, 0.0)
+    return numbers

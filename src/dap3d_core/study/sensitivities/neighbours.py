@@ -43,7 +43,7 @@ def differences(function: Callable[[float], Floats], step: float) -> Floats:
     """The derivative at 0 of a function, by central differences of sixth order."""
     offsets = OFFSETS[0]
     pairs = zip(offsets, weights_of(offsets), strict=True)
-    total: Floats = sum(w * function(k * step) for k, w in pairs) / step  # type: ignore[assignment]
+    total: Floats = sum(w * function(k * step) for k, w in pairs) / step
     return total
 
 
@@ -195,6 +195,6 @@ def total_derivative(
         along = slopes[..., j]
         total = neighbours.derivative(lambda run: function(run, x))
         if step := change_along(x, along):
-            total = total + differences(lambda e, along=along: function(base, x + e * along), step)
+            total = total + differences(lambda e: function(base, x + e * along), step)  # noqa: B023
         found.append(total)
     return np.stack(found, axis=-1)

@@ -1,7 +1,7 @@
 """Public function ``objective``: a number of a run as a function of parameters, with its gradient.
 
-    f = dap.objective(scene, by=["forces.spring.k"], of="mass.r.x:max")
-    scipy.optimize.minimize(f.value_and_gradient, f.x0, jac=True)
+f = dap.objective(scene, by=["forces.spring.k"], of="mass.r.x:max")
+scipy.optimize.minimize(f.value_and_gradient, f.x0, jac=True)
 """
 
 import os

@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 #: Directions of one run at most: with the value, the numbers of the widest vector registers.
 MOST_DIRECTIONS = 7
 #: Motion of each body in data sets.
-OF_BODIES = ("r", "v", "w")
+OF_BODIES = ("r", "rd", "w")
 
 
 class Sensitivities:
@@ -126,11 +127,14 @@ class Sensitivities:
         variables: dict[str, Any] = {}
         for name in quantities or [*usual, *self.result.outputs]:
             values, label, unit = self.result.quantity(name)
-            dims = ("time", "axis")[: values.ndim] if values.ndim < 2 or values.shape[1] == 3 else (
-                "time", f"{name}_row")  # fmt: skip
+            width = values.shape[1] if values.ndim > 1 else 0
+            dims = ("time", *{0: (), 3: ("axis",)}.get(width, (f"{name}_row",)))
             about = {"units": unit, "long_name": label}
             variables[name] = dims, values, about
-            about = {"units": f"{unit} per unit of parameter", "long_name": f"derivative of {label}"}
+            about = {
+                "units": f"{unit} per unit of parameter",
+                "long_name": f"derivative of {label}",
+            }
             variables[f"d {name}"] = (*dims, "parameter"), self.of(name), about
         coordinates = {
             "time": self.result.t,
@@ -153,9 +157,9 @@ class Sensitivities:
         Raises:
             ResultError: the file cannot be written, or exists and ``force`` is off.
         """
-        from dap3d_core.result.quantities.netcdf_export import write_plain
+        from dap3d_core.result.quantities.netcdf_export import write_dataset
 
-        write_plain(self.to_xarray(quantities), path, force)
+        write_dataset(self.to_xarray(quantities), Path(path), force=force)
 
 
 @checked
@@ -207,20 +211,17 @@ def sensitivities(
     base = run_beside(compiled, given, (), state)
     blocks = -(-len(parameters) // MOST_DIRECTIONS)
     lanes = -(-len(parameters) // blocks)
-    runs, result = [], None
+    runs, results = [], []
     for first in range(0, len(parameters), lanes):
-        beside = [
-            neighbours_of(compiled, parameter, given, base)
-            for parameter in parameters[first : first + lanes]
-        ]
+        part = parameters[first : first + lanes]
+        beside = [neighbours_of(compiled, parameter, given, base) for parameter in part]
         with compiled.borrow_evaluator():
             settings = settings_of(compiled, method=method, **given)
             run = DifferentiatedRun(compiled, settings, Callbacks(announce=announce), start=state)
             run.carry(beside, base, lanes)
-            result = run.go() if result is None else (run.go(), result)[1]
+            results.append(run.go())
         runs.append(run)
-    assert result is not None
-    return Sensitivities(result, runs, parameters)
+    return Sensitivities(results[0], runs, parameters)
 
 
 def _parameters(compiled: CompiledModel, names: Sequence[str]) -> tuple[SceneParameter, ...]:

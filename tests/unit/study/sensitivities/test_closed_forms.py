@@ -61,13 +61,37 @@ def test_an_oscillator(integrator):
     assert s.names == tuple(by)
 
 
-def pendulum(length, method="standard"):
-    """A point mass, nearly, on a rod of this length, released 2 rad from hanging."""
+def pendulum(length=0.7):
+    """A weight on a rod of this length, released from 2 rad: all by one parameter."""
     scene = dap.Scene(name="pendulum")
-    scene.add_parameter("length", length)
-    r = ("= length * sin(2.0)", 0.0, "= -length * cos(2.0)")
-    scene.add_body("bob", mass=1.0, Jp=(1e-9, 1e-9, 1e-9), r=r)
+    scene.parameters["length"] = length
+    place = ("= length * sin(2.0)", 0.0, "= -length * cos(2.0)")
+    scene.add_body("bob", mass=1.0, Jp=(0.02, 0.02, 0.02), r=place)
+    scene.add_point("pin", body="bob", sPp=("= -length * sin(2.0)", 0.0, "= length * cos(2.0)"))
+    scene.add_joint("rev", "hinge", P_i="pin", P_j="ground.O", a_i="bob.y", a_j="ground.y")
+    scene.add_force("weight", "gravity", gravity=9.81)
     return scene
+
+
+def swing(t, length, start=2.0):
+    """sin of half the angle of the pendulum."""
+    k = np.sin(0.5 * start)
+    rate = np.sqrt(9.81 * length / (length * length + 0.02))
+    return k * ellipj(ellipk(k * k) - rate * t, k * k)[0]
+
+
+@pytest.mark.parametrize("method", ["standard", "lsq", "joint"])
+def test_a_pendulum_by_its_length(method):
+    """Its period depends on it; points and the start follow it through expressions."""
+    settings = {"t_end": 2.0, "dt": 0.1, "method": method, **TIGHT}
+    s = dap.sensitivities(pendulum(), "parameters.length", **settings)
+    assert dap.simulate(pendulum(), **settings).u.tobytes() == s.result.u.tobytes()
+
+    def height(length):
+        half = swing(s.result.t, length)
+        return -length * (1.0 - 2.0 * half * half)
+
+    close(s.of("bob.r.z")[:, 0], derivative(height, 0.7))
 
 
 def test_a_free_symmetric_top():
