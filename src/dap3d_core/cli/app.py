@@ -22,7 +22,8 @@ COMMANDS = {
     for name in (
         "run", "resume", "rerun", "equilibrium", "kinematics", "inverse", "modes", "response",
         "sensitivities", "sweep", "check", "models", "plugins", "describe", "new-plugin",
-        "check-plugin", "info", "post", "export", "plot", "animate", "view", "report", "import-matlab",
+        "check-plugin", "info", "post", "export", "plot", "animate", "view", "report",
+        "import-matlab",
     )
 } | {"import": "dap3d_core.cli.commands.import_model"}  # fmt: skip
 
@@ -30,7 +31,8 @@ COMMANDS = {
 SYNONYMS = {
     "simulate": "run", "continue": "resume", "repeat": "rerun", "linearize": "modes",
     "linearise": "modes", "eigenvalues": "modes", "bode": "response",
-    "gradients": "sensitivities", "validate": "check", "list": "models", "open": "info", "help": "--help",
+    "gradients": "sensitivities", "validate": "check", "list": "models",
+    "open": "info", "help": "--help",
 }  # fmt: skip
 
 

@@ -145,7 +145,8 @@ class DifferentiatedRun(Run):
                 jumps = Jumps(run.evaluator)
                 jumps.span = self.jumps.span if self.jumps is not None else None
                 change(jumps, run.present)
-                return own.state[Y].copy()
+                result: Floats = own.state[Y].copy()
+                return result
 
             slopes = self._derivative(after, given, np.vstack([of_state, of_time]))
             change(self.jumps, integration)

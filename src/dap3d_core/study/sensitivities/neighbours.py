@@ -76,7 +76,8 @@ def run_beside(
 ) -> Run:
     """A run of a scene with a model of its own, at its start; given: settings; start: a state."""
     changed = with_values(compiled.scene, [p for p, _ in change], [value for _, value in change])
-    model = CompiledModel(changed, method=compiled.method, registry=compiled.checked.registry)
+    registry = compiled.checked.registry
+    model = CompiledModel(changed, method=compiled.method, registry=registry, like=compiled)
     settings = settings_of(model, **{**given, "method": compiled.method})
     run = Run(model, settings, Callbacks(), start=start)
     run.initialise()
