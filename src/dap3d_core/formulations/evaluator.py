@@ -62,6 +62,8 @@ class Evaluator:
         states: (states,) of elements, in evaluations at a state u of the bodies alone.
     """
 
+    model: Model
+
     def __init__(
         self,
         model: Model,
@@ -86,10 +88,8 @@ class Evaluator:
             self.loops, self.loop_groups = build_loops(model, self.formulation.loops, announce)
         else:
             self.plan, self.loops = like.plan, like.loops
-            of_like: Model = like.model
-            self.loop_groups = regrouped(of_like, model, like.loop_groups)
-        known: Model | None = None if like is None else like.model
-        self.model = model = with_motions(model, known)
+            self.loop_groups = regrouped(like.model, model, like.loop_groups)
+        self.model = model = with_motions(model, None if like is None else like.model)
         self.system: System = build_system(model, self.plan, self.loop_groups)
         self.store_initial_function_values()
         self._seek_unknowns()
