@@ -70,10 +70,11 @@ def wide_unit(name: str, count: int, text: Callable[[str], str], *, optimise: bo
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
         return widen(text(symbols[0]), count), ["None"]
 
-    return _unit(name, 1, write, optimise)
+    return unit_of(name, 1, write, optimise)
 
 
-def _unit(name: str, functions: int, write: Any, optimise: bool = False) -> Unit:
+def unit_of(name: str, functions: int, write: Any, optimise: bool = False) -> Unit:
+    """A unit of so many functions, made once; name, write: as of ``Unit``."""
     with _making:
         if name not in _units:
             _units[name] = Unit(name, functions, write, cache_folder(), optimise=optimise)
@@ -87,7 +88,7 @@ def differentiated(entry: Entry, count: int) -> Entry:
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
         return differentiate(unit.fresh_text(symbols), count), unit.results
 
-    wide = _unit(f"{unit.name}-d{count}", len(unit.symbols), write)
+    wide = unit_of(f"{unit.name}-d{count}", len(unit.symbols), write)
     return Entry(wide, entry.k, entry.signature)
 
 

@@ -32,8 +32,8 @@ if TYPE_CHECKING:
 
     from dap3d_core.simulation.initial.start_state import Start
 
-#: Directions of one run at most: with the value, the numbers of the widest vector registers.
-MOST_DIRECTIONS = 7
+#: Directions of one run that make, with the value, vectors of 2, 4 or 8 numbers.
+FAST = (1, 3, 7)
 #: Motion of each body in data sets.
 OF_BODIES = ("r", "rd", "w")
 
@@ -209,11 +209,12 @@ def sensitivities(
                  start=start_word(start))  # fmt: skip
     state = given_state(start, compiled)
     base = run_beside(compiled, given, (), state)
-    blocks = -(-len(parameters) // MOST_DIRECTIONS)
-    lanes = -(-len(parameters) // blocks)
+    blocks = -(-len(parameters) // FAST[-1])
+    directions = -(-len(parameters) // blocks)
+    lanes = next(count for count in FAST if count >= directions)
     runs, results = [], []
-    for first in range(0, len(parameters), lanes):
-        part = parameters[first : first + lanes]
+    for first in range(0, len(parameters), directions):
+        part = parameters[first : first + directions]
         beside = [neighbours_of(compiled, parameter, given, base) for parameter in part]
         with compiled.borrow_evaluator():
             settings = settings_of(compiled, method=method, **given)
