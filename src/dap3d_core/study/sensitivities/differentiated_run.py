@@ -106,8 +106,9 @@ class DifferentiatedRun(Run):
         slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
         if self.evaluator.formulation.has_own_coordinates and count:
             slopes = self._derivative(lambda run, rows: run.evaluator.body_rows(rows), raw, slopes)
-        self.slopes.append(slopes)
-        self.reported.append(self.evaluator.body_rows(raw))
+        if count:
+            self.slopes.append(slopes)
+            self.reported.append(self.evaluator.body_rows(raw))
         for row in work.crossings[: integration.crossing_count]:
             place = int(np.flatnonzero(work.crossings[:, 0] == row[0])[0])
             self.instants[float(row[0])] = self._slopes_of(work.crossings)[3 * place].copy()

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray
+from support.bouncing import swinging
 from support.on_axles import wheel
 
 import dap3d_core as dap
@@ -109,3 +110,37 @@ def test_data_sets(tmp_path):
 def test_what_is_refused(by, said):
     with pytest.raises(dap.SceneError, match=said):
         dap.sensitivities("pen2", by, **SHORT)
+
+
+def test_the_values_of_a_control_history():
+    """A push by a spline through samples: what one sample does is what it does alone."""
+
+    def pushed(y):
+        scene = dap.Scene(name="pushed")
+        scene.add_body("mass", mass=2.0, Jp=(1.0, 1.0, 1.0))
+        scene.add_function("spline", "push", x=(0.0, 0.3, 0.6, 1.0), y=y)
+        scene.add_force("f", "force", body_i="mass", f=(1.0, 0.0, 0.0), function="push")
+        return scene
+
+    settings = {"t_end": 1.0, "dt": 0.5, "rtol": 1e-12, "atol": 1e-14}
+    s = dap.sensitivities(
+        pushed((1.0, -2.0, 0.5, 0.0)), ["functions.push.y.2", "functions.push.y.3"], **settings
+    )
+    for k, y in enumerate([(0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)]):
+        alone = dap.simulate(pushed(y), **settings).quantity("mass.r.x").values[-1]
+        assert s.final("mass.r.x")[k] == pytest.approx(alone, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_a_stop_of_an_angle(method):
+    """Jumps in coordinates of bodies and of joints find one derivative."""
+    settings = {"t_end": 1.2, "dt": 0.2, "rtol": 1e-12, "atol": 1e-14, "method": method}
+    s = dap.sensitivities(swinging(), ["forces.stop.e", "bodies.bar.mass"], **settings)
+    assert s.result.events
+    h = 1e-4
+    scenes = [swinging(), swinging()]
+    for scene, sign in zip(scenes, (1.0, -1.0), strict=True):
+        scene.forces["stop"].fields["e"] += sign * h
+    ends = [dap.simulate(scene, **settings).quantity("bar.r.x").values[-1] for scene in scenes]
+    # the difference errs by h^2
+    assert s.final("bar.r.x")[0] == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-6)
