@@ -16,6 +16,7 @@ from pathlib import Path
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
 import calls
+import derivatives
 import derived
 import extension
 import hard
@@ -93,6 +94,7 @@ def main():
         "choice": trees.choice,
         "tree_loops": tree_loops.measure,
         "kernels": kernels.measure,
+        "derivatives": derivatives.measure,
         "derived": derived.measure,
         "extension": extension.measure,
         "states": states.measure,

@@ -1,7 +1,7 @@
 """Ready-made objects for a wheel, if ``DAP3D_READY_OBJECTS`` names targets (``make wheel``).
 
 Its value is ``all``, or names of targets separated by commas
-(src/dap3d_core/kernels/compiler/ready.py). Without it a wheel holds none, its build has no further
+(src/dap3d_core/kernels/runtime/ready.py). Without it a wheel holds none, its build has no further
 dependencies, and code is compiled at the first run.
 """
 

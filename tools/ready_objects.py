@@ -36,7 +36,7 @@ def main(arguments: list[str]) -> None:
         _declare_entry_points(Path(scratch))
         units = _gathered_alone(Path(scratch))
     _add_sources()
-    from dap3d_core.kernels.compiler.ready import TARGETS
+    from dap3d_core.kernels.runtime.ready import TARGETS
 
     Path(folder).mkdir(parents=True, exist_ok=True)
     with concurrent.futures.ProcessPoolExecutor(initializer=_add_sources) as pool:
@@ -60,8 +60,8 @@ def pack_of(target_name: str, units: dict[str, Any]) -> tuple[bytes, int]:
     from object_symbols import symbols_of
 
     from dap3d_core.kernels.compiler.objects import OPTIMISED, compile_ir
-    from dap3d_core.kernels.compiler.ready import TARGETS, packed
     from dap3d_core.kernels.compiler.writer import EXACT, LIBRARY
+    from dap3d_core.kernels.runtime.ready import TARGETS, packed
 
     llvm.initialize_all_targets()
     llvm.initialize_all_asmprinters()

@@ -44,6 +44,8 @@ if TYPE_CHECKING:
     from dap3d_core.study.fit.fit_parameters import Parameter
     from dap3d_core.study.fit.fit_result import Fit
     from dap3d_core.study.modes_over import ModesOver, modes_over
+    from dap3d_core.study.sensitivities.objective import Objective, objective
+    from dap3d_core.study.sensitivities.sensitivities import Sensitivities, sensitivities
     from dap3d_core.study.sweep.dataset import open_sweep
     from dap3d_core.study.sweep.sweep import sweep
     from dap3d_core.view import view
@@ -57,12 +59,14 @@ _HOMES = {
     "Fit": ("study.fit.fit_result", "Fit"),
     "Linearization": ("simulation.linearization.linearization", "Linearization"),
     "ModesOver": ("study.modes_over", "ModesOver"),
+    "Objective": ("study.sensitivities.objective", "Objective"),
     "Parameter": ("study.fit.fit_parameters", "Parameter"),
     "PluginError": ("interface", "PluginError"),
     "RedundantError": ("simulation", "RedundantError"),
     "Result": ("result", "Result"),
     "Scene": ("scene", "Scene"),
     "SceneError": ("scene", "SceneError"),
+    "Sensitivities": ("study.sensitivities.sensitivities", "Sensitivities"),
     "SimulationError": ("simulation", "SimulationError"),
     "animate": ("plot", "animate"),
     "compile": ("simulation", "compile_scene"),
@@ -80,10 +84,12 @@ _HOMES = {
     "load": ("scene", "load"),
     "load_registry": ("registry", "load_registry"),
     "modes_over": ("study.modes_over", "modes_over"),
+    "objective": ("study.sensitivities.objective", "objective"),
     "open": ("simulation", "open_result"),
     "open_sweep": ("study.sweep.dataset", "open_sweep"),
     "plot": ("plot", "plot"),
     "report": ("report", "report"),
+    "sensitivities": ("study.sensitivities.sensitivities", "sensitivities"),
     "shipped_models": ("scene", "shipped_models"),
     "rerun": ("simulation.rerun", "rerun"),
     "resume": ("simulation.resume", "resume"),
@@ -102,12 +108,14 @@ __all__ = [
     "Fit",
     "Linearization",
     "ModesOver",
+    "Objective",
     "Parameter",
     "PluginError",
     "RedundantError",
     "Result",
     "Scene",
     "SceneError",
+    "Sensitivities",
     "SimulationError",
     "animate",
     "compile",
@@ -125,12 +133,14 @@ __all__ = [
     "load",
     "load_registry",
     "modes_over",
+    "objective",
     "open",
     "open_sweep",
     "plot",
     "report",
     "rerun",
     "resume",
+    "sensitivities",
     "shipped_models",
     "simulate",
     "start",

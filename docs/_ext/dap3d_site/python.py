@@ -30,7 +30,11 @@ SECTIONS = {
          "result.EventRecord", "result.Quantity", "result.post.joint_coordinates.JointCoordinates",
          "result.RunStatistics", "plot.Film"),
     ),
-    "Studies": (("sweep", "open_sweep", "fit", "Fit", "Parameter"), ()),
+    "Studies": (
+        ("sweep", "open_sweep", "fit", "Fit", "Parameter", "sensitivities", "Sensitivities",
+         "objective", "Objective"),
+        (),
+    ),
     "Reports": (
         ("report",),
         ("report.Report", "report.MeasuredRun", "report.Setting", "report.Recommendation",

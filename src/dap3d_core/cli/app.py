@@ -21,16 +21,18 @@ COMMANDS = {
     name: f"dap3d_core.cli.commands.{name.replace('-', '_')}"
     for name in (
         "run", "resume", "rerun", "equilibrium", "kinematics", "inverse", "modes", "response",
-        "sweep", "check", "models", "plugins", "describe", "new-plugin", "check-plugin", "info",
-        "post", "export", "plot", "animate", "view", "report", "import-matlab",
+        "sensitivities", "sweep", "check", "models", "plugins", "describe", "new-plugin",
+        "check-plugin", "info", "post", "export", "plot", "animate", "view", "report",
+        "import-matlab",
     )
 } | {"import": "dap3d_core.cli.commands.import_model"}  # fmt: skip
 
 #: What else a command is called, as in Python or in other programs.
 SYNONYMS = {
     "simulate": "run", "continue": "resume", "repeat": "rerun", "linearize": "modes",
-    "linearise": "modes", "eigenvalues": "modes", "bode": "response", "validate": "check",
-    "list": "models", "open": "info", "help": "--help",
+    "linearise": "modes", "eigenvalues": "modes", "bode": "response",
+    "gradients": "sensitivities", "validate": "check", "list": "models",
+    "open": "info", "help": "--help",
 }  # fmt: skip
 
 

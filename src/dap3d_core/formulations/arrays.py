@@ -172,6 +172,12 @@ def load_numbers(
     system.body[1:, JP : JP + 9] = other.Jp.reshape(-1, 9)
     set_metric(system.metric, other.mass, other.Jp)
     system.settings[[LENGTH, EVEN]] = other.length, masses_differ(other)
+    return regrouped(model, other, what)
+
+
+def regrouped(model: Model, other: Model, what: list[tuple[str, Group]]) -> list[tuple[str, Group]]:
+    """The groups of another model that loops made for a model serve; arguments, errors as above."""
+    twins = _twins(model, other)
     return [(kind, twins[id(group)]) for kind, group in what]
 
 

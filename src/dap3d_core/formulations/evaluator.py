@@ -36,7 +36,7 @@ from dap3d_core.assembly.turns import (
     report_turns,
 )
 from dap3d_core.formulations import FORMULATIONS, REPORT, RHS
-from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers
+from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers, regrouped
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
 from dap3d_core.formulations.switches import Switch, switches_of
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
@@ -62,19 +62,34 @@ class Evaluator:
         states: (states,) of elements, in evaluations at a state u of the bodies alone.
     """
 
+    model: Model
+
     def __init__(
-        self, model: Model, method: str, announce: Callable[[str], None] | None = None
+        self,
+        model: Model,
+        method: str,
+        announce: Callable[[str], None] | None = None,
+        like: "Evaluator | None" = None,
     ) -> None:
         """Args:
-        model: what to evaluate.
-        method: name of the formulation, a key of ``FORMULATIONS``.
-        announce: called with the name of each group loop that has to be compiled.
+            model: what to evaluate.
+            method: name of the formulation, a key of ``FORMULATIONS``.
+            announce: called with the name of each group loop that has to be compiled.
+            like: another one of this method, of a model of the same structure.
+
+        Raises:
+            ValueError: that has another structure.
         """
         self.states: Floats = model.initial_states
         self.formulation = FORMULATIONS[method]
-        self.plan: Plan = make_plan(model.body_count, model.joint_slots, model.joint_rows.tolist())
-        self.loops, self.loop_groups = build_loops(model, self.formulation.loops, announce)
-        self.model = model = with_motions(model)
+        if like is None:
+            rows = model.joint_rows.tolist()
+            self.plan: Plan = make_plan(model.body_count, model.joint_slots, rows)
+            self.loops, self.loop_groups = build_loops(model, self.formulation.loops, announce)
+        else:
+            self.plan, self.loops = like.plan, like.loops
+            self.loop_groups = regrouped(like.model, model, like.loop_groups)
+        self.model = model = with_motions(model, None if like is None else like.model)
         self.system: System = build_system(model, self.plan, self.loop_groups)
         self.store_initial_function_values()
         self._seek_unknowns()

@@ -135,3 +135,17 @@ def floor(x):
 def mod(x, y):
     """What is left of x / y after whole multiples: x - y floor(x / y), of the sign of y."""
     return x - y * floor(x / y)
+
+
+@intrinsic("with_slopes")
+def with_slopes(x: float, source: float) -> float:
+    """The number x; where code is differentiated (compiler/derivatives.py), with the derivatives of
+    ``source``, for results of iterations that stop by their value. Those of a constant are zero.
+    """
+    return x
+
+
+@intrinsic("is_differentiated")
+def is_differentiated() -> bool:
+    """True where code is differentiated: iterations then make one pass more, for derivatives."""
+    return False

@@ -103,10 +103,12 @@ class CompiledModel:
         registry: Registry | None = None,
         announce: Announce | None = None,
         joint: bool | None = None,
+        like: "CompiledModel | None" = None,
     ) -> None:
         """Check a scene, build its model, compile what it needs; arguments as for ``compile``.
 
         joint: whether ``auto`` may choose it; by default where the scene's integrator takes it.
+        like: one of the same structure and method, whose loops are taken; else a ValueError.
         """
         started = time.perf_counter()
         if isinstance(scene, Scene):
@@ -124,6 +126,7 @@ class CompiledModel:
         #: The requested method, perhaps "auto".
         self.requested_method = requested = method or str(scene.simulation.method)
         self._of_bodies: CompiledModel | None = None
+        self._like = like
         usual = takes_joint_coordinates(str(scene.simulation.integrator))
         self._may_choose_joint = usual if joint is None else joint
         self._breakpoints: dict[float, Breakpoints] = {}
@@ -192,7 +195,8 @@ class CompiledModel:
         """An evaluator of the model with arrays of its own, for whoever changes its numbers."""
         first = method or self._first_method
         try:
-            evaluator = Evaluator(self.model, first, announce)
+            like = None if self._like is None else self._like.evaluator
+            evaluator = Evaluator(self.model, first, announce, like)
         except UnsuitableError as error:
             raise SimulationError(f"method {first} does not fit the scene: {error}") from error
         self.model = evaluator.model  # with the motions of its joints

@@ -70,23 +70,23 @@ def simulate(
     compiled = compiled_for(scene, method, allow_code, announce, integrator)
     settings = settings_of(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
                          rtol=rtol, atol=atol, step=step, correct=correct, project=project,
-                         correct_metric=correct_metric, start=_word(start))  # fmt: skip
+                         correct_metric=correct_metric, start=start_word(start))  # fmt: skip
     check_checkpoint(checkpoint, output)
     with compiled.borrow_evaluator():
         run = Run(compiled, settings, Callbacks(announce=announce, progress=progress, watch=watch),
                   events, output=output, force=force, estimate_error=estimate_error,
-                  start=_given_state(start, compiled), controllers=controllers)  # fmt: skip
+                  start=given_state(start, compiled), controllers=controllers)  # fmt: skip
         if checkpoint is not None:
             run.save_every(checkpoint, force=force)
         return run.execute()
 
 
-def _word(start: "Start | None") -> str | None:
+def start_word(start: "Start | None") -> str | None:
     """The setting ``start`` where that is given; None where a state is, or nothing."""
     return start if isinstance(start, str) else None
 
 
-def _given_state(start: "Start | None", compiled: CompiledModel) -> "StartState | None":
+def given_state(start: "Start | None", compiled: CompiledModel) -> "StartState | None":
     """A state in place of the scene's; None where the settings say where a run starts."""
     if start is None or isinstance(start, str):
         return None

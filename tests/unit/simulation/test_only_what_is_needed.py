@@ -189,7 +189,7 @@ def test_a_run_needs_no_analysis_and_no_other_start(tmp_path):
     )
     assert "dap3d_core.simulation.run" in found
     floors = ("equilibrium", "kinematics", "linearization", "initial.start_state")
-    core = (*(f"simulation.{name}" for name in floors), "kernels.dual_numbers",
+    core = (*(f"simulation.{name}" for name in floors), "kernels.compiler.derivatives",
             "interface.codegen.loop_derivatives")  # fmt: skip
     others = (*(f"dap3d_core.{name}" for name in core), "scipy.sparse.linalg", "control")
     assert not {m for m in found if m.startswith(others)}

@@ -1,4 +1,4 @@
-"""Derivatives by and of the states of elements, exact to rounding, by dual numbers.
+"""Derivatives by and of the states of elements, exact to rounding, by differentiated loops.
 
 What linearisation and equilibrium need besides the derivatives by the motion of the bodies
 (simulation/linearization/tangent.py, where displacements and forces are explained).

@@ -38,6 +38,7 @@ class AdamsIntegration(Integration):
     state_class = AdamsState
     takes_programs = True
     keeps_step = False
+    loop = staticmethod(advance_adams)
 
     def __init__(self, *args: Any, step: float | None = None, **options: Any) -> None:
         if step is not None:
@@ -55,9 +56,6 @@ class AdamsIntegration(Integration):
             "scaled": np.zeros((ROWS, size)),
             "table": make_table(),
         }
-
-    def _advance(self, budget: int) -> None:
-        advance_adams(self.work, *self._arguments, budget)
 
     def state_arrays(self) -> list[Any]:
         """As ``Integration.state_arrays``; here the table holds the times of past rates."""

@@ -63,7 +63,7 @@ from dap3d_core.integrators.stepping.step_control import (
 from dap3d_core.integrators.stepping.vector_ops import all_finite, scaled_beyond, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.scalar_math import where
+from dap3d_core.kernels.scalar_math import where, with_slopes
 
 #: The first step is no longer part of the run: one of order 1 sees nothing of what comes to rest.
 FIRST_PART = 0.01
@@ -109,7 +109,7 @@ def begin(work: AdamsState, rhs: Function, system: Any, loops: Any) -> None:
         return
     if work.h == 0.0:
         longest = FIRST_PART * (work.times[-1] - work.times[0])
-        work.h = min(first_step(work, f, rhs, system, loops), longest)
+        work.h = with_slopes(min(first_step(work, f, rhs, system, loops), longest), 0.0)
     for i in range(y.size):
         f[1, i] = 0.0
     for j in range(ROWS):
@@ -126,7 +126,7 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
         if work.status != RUNNING:
             return
     t, t_end, k = work.t, work.times[-1], work.next_order
-    h = min(work.h, work.longest_step)
+    h = with_slopes(min(work.h, work.longest_step), 0.0)  # chosen: not to be differentiated
     end = t_end if t + STRETCH * h >= t_end else t + h
     t1 = min(end, work.t_limit)
     h = t1 - t

@@ -174,6 +174,7 @@ class RadauIntegration(Integration):
     state_class = RadauState
     state_rows = at.RADAU_STATES
     unscaled_size = 1  # the work done
+    loop = staticmethod(advance)
 
     def __init__(
         self, evaluator: Evaluator, y0: ArrayLike, times: ArrayLike, **options: Any
@@ -233,12 +234,12 @@ class RadauIntegration(Integration):
         )  # fmt: skip
         return table_of(signature, parts)
 
-    def _advance(self, budget: int) -> None:
+    @property
+    def loop_arguments(self) -> tuple[Any, ...]:
+        """As ``Integration.loop_arguments``."""
         evaluator = self.evaluator
-        advance(
-            self.work, evaluator.functions, self._parts, evaluator.system, evaluator.loops,
-            self.tangent, self.matrix, budget,
-        )  # fmt: skip
+        return (self.work, evaluator.functions, self._parts, evaluator.system, evaluator.loops,
+                self.tangent, self.matrix)  # fmt: skip
 
     def _project(self) -> bool:
         """Nothing to do: ``start`` projects the state."""

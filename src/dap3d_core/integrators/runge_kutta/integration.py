@@ -29,6 +29,7 @@ class RungeKutta(Integration):
 
     state_class = RungeKuttaState
     takes_programs = True
+    loop = staticmethod(advance)
 
     def __init__(
         self, method: Tableau, *args: Any, stop_when_stiff: bool = False, **options: Any
@@ -49,9 +50,6 @@ class RungeKutta(Integration):
             "table": combinations(method),
             "lengths": np.full((ROWS, length_count), np.nan),
         }
-
-    def _advance(self, budget: int) -> None:
-        advance(self.work, *self._arguments, budget)
 
     def prepared(self) -> Callable[[int], Any]:
         """As ``Integration.prepared``; types and addresses of arguments are looked up once."""

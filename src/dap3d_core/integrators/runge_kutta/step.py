@@ -86,7 +86,7 @@ from dap3d_core.integrators.stepping.step_control import (
 from dap3d_core.integrators.stepping.vector_ops import all_finite, combine, copy, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.scalar_math import where
+from dap3d_core.kernels.scalar_math import where, with_slopes
 
 #: Near a singular state nothing is known better than to this part of the largest component.
 POSITION_NOISE = 1e-11
@@ -129,7 +129,9 @@ def step(work: RungeKuttaState, functions: Any, system: Any, loops: Any) -> None
         work.h = first_step(work, work.k, rhs, system, loops)
     end = t1 = end_of_step(work)
     longest = t1 - work.t
-    h = limit_step_at_singularity(work, longest) if adaptive else longest
+    h = longest
+    if adaptive:
+        h = min(h, with_slopes(limit_step_at_singularity(work, longest), 0.0))
     if work.switch_count != 0 or min(work.t_limit, work.t + work.step_limit_at_switch) < t1:
         h = min(h, next_length(work, t1, work.k[0], project, watch, system, loops))
         if h == 0.0:

@@ -61,6 +61,7 @@ from dap3d_core.integrators.stepping.switch_values import (
 )
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.scalar_math import is_differentiated, with_slopes
 
 #: A crossing this part of a usual step away is reached by an Euler step: its error is of the order
 #: of the square.
@@ -75,6 +76,8 @@ MAX_STALLS_AT_ZERO = 10
 #: Attempts in a row that may be cut because a cubic, and no sample, shows two crossings; and the
 #: error of the cubic, as a part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
 MAX_SUSPICIONS, CUBIC_ERROR = 8, 0.25
+#: Newton steps for derivatives of an instant; each leaves some 1e-4, the error of rates.
+CROSSING_PASSES = 4
 #: A switch that changes its sign more often than this while time advances by less than this part of
 #: the run chatters.
 CHATTER, CHATTER_SPAN = 100, 1e-6
@@ -92,13 +95,14 @@ def next_length(
     longest = min(end, work.t_limit) - work.t
     h = longest
     short = max(EULER_STEP_FRACTION * usual_step(work), 4.0 * FLOOR * time_span(work))
+    short = with_slopes(short, 0.0)  # as all lengths that are chosen
     if work.switch_count != 0:
         if work.switch_rates_valid == 0:
             evaluate_start(work, slope, watch, system, loops)
             if work.end_status != 0:
                 return 0.0
-        h = distance_to_crossing(work, h, short)
-    h = min(h, work.step_limit_at_switch)
+        h = min(h, with_slopes(distance_to_crossing(work, h, short), 0.0))
+    h = min(h, with_slopes(work.step_limit_at_switch, 0.0))
     short *= 2.0 ** min(work.stalled_steps, MAX_STALLS)
     if h > short or h == end - work.t:
         return h
@@ -287,10 +291,11 @@ def bisect_crossing(
                 low = middle
             middle = 0.5 * (low + high)
         if failure == RUNNING:
+            high = differentiated_crossing(work, high, slope, project, watch, system, loops)
             failure = euler_step(work, high, slope, project, watch, system, loops)
         record_crossings(work, t + high)
         if failure == RUNNING and work.end_status == SWITCHED:
-            high = low
+            high = with_slopes(low, high)
             failure = euler_step(work, high, slope, project, watch, system, loops)
     if failure != RUNNING:
         work.t_stop, work.status = t + high, failure
@@ -320,6 +325,31 @@ def bisect_crossing(
         for k in range(s.shape[1]):
             if s[CROSSED, k] != 0.0 and work.end_status == 0:
                 work.status = JUMPED
+
+
+@compiled
+def differentiated_crossing(
+    work: IntegrationState, h: float, slope: Floats, project: Function, watch: Function,
+    system: Any, loops: Any,
+) -> float:  # fmt: skip
+    """The length h of an Euler step to a crossing, with the derivatives that keep the switch zero.
+
+    Bisection gives none. A Newton step corrects them; more correct the difference in its rate.
+    """
+    if not is_differentiated():
+        return h
+    s, count = work.switches, work.projection_count
+    for _ in range(CROSSING_PASSES):
+        euler_step(work, h, slope, project, watch, system, loops)
+        find_switch_rates(work, work.t + h, work.state[TRIAL], slope, FOUND, FOUND_RATE, watch,
+                          system, loops)  # fmt: skip
+        first = 0
+        for k in range(s.shape[1]):
+            if first == 0 and s[FOUND, k] * s[SIDE, k] < 0.0 and s[FOUND_RATE, k] != 0.0:
+                h = with_slopes(h, h - s[FOUND, k] / s[FOUND_RATE, k])
+                first = 1
+    work.projection_count = count
+    return h
 
 
 @compiled

@@ -15,12 +15,19 @@ from dap3d_core.integrators.stepping.restore import Restorable
 from dap3d_core.integrators.stepping.rounding import tolerance_of
 from dap3d_core.integrators.stepping.step_control import FLOOR
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 
 #: Part of a state by which projections move it at most, as a rule.
 MOST_MOVED = 1e-3
 #: Part of the largest number by which a state is off its constraints, where no step has shown it.
 OFF = 1e-10
+
+
+@compiled
+def project_here(work: Any, functions: Sequence[Function], system: Any, loops: Any) -> None:
+    """Bring the state onto its constraints."""
+    project = functions[1]
+    project(work.t, work.state[at.Y], work.real[at.PROJECTED :], system, loops)
 
 
 class StepCounts(NamedTuple):
@@ -107,6 +114,8 @@ class Integration(Restorable):
     #: Whether its formulas are implicit; whether it goes on with its step where rates jump.
     implicit = False
     keeps_step = True
+    #: The compiled loop of the integrator.
+    loop: Callable[..., None]
     #: Whether programs of a scene's own may take the place of its functions.
     takes_programs = False
 
@@ -184,9 +193,18 @@ class Integration(Restorable):
         self._advance(0)
         self.work.status = status
 
+    @property
+    def loop_arguments(self) -> tuple[Any, ...]:
+        """Arguments of the compiled loop, but for its budget."""
+        return self.work, *self._arguments
+
     def _advance(self, budget: int) -> None:
         """Call the compiled loop of the integrator."""
-        raise NotImplementedError
+        self.call(self.loop, *self.loop_arguments, budget)
+
+    def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Call a compiled function of arrays; derivatives are carried by another call."""
+        return function(*arguments)
 
     def prepared(self) -> Callable[[int], Any]:
         """``advance`` for many short calls; of an integration whose rows are taken in time."""
@@ -250,12 +268,11 @@ class Integration(Restorable):
 
     def project(self) -> bool:
         """Bring the state onto its constraints; False if that failed."""
-        functions, system, loops = self._arguments
         work = self.work
         work.projection_moved = work.projection_outcome = 0.0
         work.projection_count += 1
         with np.errstate(all="ignore"):  # as compiled code does
-            functions[1](self.t, work.state[at.Y], work.real[at.PROJECTED :], system, loops)
+            self.call(project_here, work, *self._arguments)
         if work.projection_outcome == FAILED:
             work.t_stop, work.status = self.t, Status.PROJECTION_FAILED
         return bool(work.projection_outcome != FAILED)

@@ -24,7 +24,7 @@ from dap3d_core.integrators.stepping.output import NEAR_SINGULAR
 from dap3d_core.integrators.stepping.vector_ops import combine, scaled_beyond, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.scalar_math import where
+from dap3d_core.kernels.scalar_math import where, with_slopes
 
 #: A step is never shorter than this part of the time or of the whole span, sixteen roundings.
 EPSILON = 2.220446049250313e-16
@@ -87,7 +87,7 @@ def end_of_step(work: Any) -> float:
     """The time at which the step that comes next ends."""
     t, t_end, fixed = work.t, work.times[-1], work.fixed_step
     if fixed == 0.0:
-        h = min(work.h, work.longest_step)
+        h = with_slopes(min(work.h, work.longest_step), 0.0)  # chosen: not to be differentiated
         return t_end if t + STRETCH * h >= t_end else t + h
     target = t_end if work.has_dense_output != 0 else work.times[work.next_report]
     if work.segment_step == work.segment_step_count:

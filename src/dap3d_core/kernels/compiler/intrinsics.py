@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.kernels.compiler import types as t
-from dap3d_core.kernels.compiler.writer import EXACT, LIBRARY, Writer
+from dap3d_core.kernels.compiler.writer import DIFFERENTIATED, EXACT, LIBRARY, SLOPES, Writer
 
 #: Python functions by the name of their compiled form.
 KNOWN: dict[Any, str] = {
@@ -87,6 +87,15 @@ def _where(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
     return w.select(node, w.cast(node, values[0], t.BOOL), *values[1:])
 
 
+def _with_slopes(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
+    x, source = (w.cast(node, value, t.FLOAT).word for value in values)
+    return w.emit(t.FLOAT, f"select i1 true, double {x}, double {source} {SLOPES}")
+
+
+def _is_differentiated(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
+    return w.emit(t.BOOL, f"and i1 false, false {DIFFERENTIATED}")
+
+
 def _pointer(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
     first, *lengths = values[0].words
     return t.Value(t.Array(values[0].type.item, 1), (first, w.count_of(lengths)))
@@ -98,5 +107,5 @@ FORMS: dict[str, Form] = {
     "int": _conversion(t.INT), "float": _conversion(t.FLOAT), "bool": _conversion(t.BOOL),
     "complex": _complex, "integer ceil": _ceil, "abs": _abs, "sign": _sign,
     "min": _extreme(ast.Lt()), "max": _extreme(ast.Gt()), "pointer": _pointer,
-    "where": _where,
+    "where": _where, "with_slopes": _with_slopes, "is_differentiated": _is_differentiated,
 }  # fmt: skip

@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.kernels.compiler import background, objects, ready
+from dap3d_core.kernels.compiler import background, objects
 from dap3d_core.kernels.compiler import types as t
+from dap3d_core.kernels.runtime import ready
 
 #: Time of optimised compilation over that of unoptimised compilation (measured: 55 to 80).
 COST_RATIO = 60.0
@@ -57,7 +58,7 @@ class Unit:
             optimise: compile optimised code at once; for short code.
             ready_name: name among ready-made objects, of which symbols are made as well.
         """
-        self.name = name
+        self.name, self._write = name, write
         symbol = (ready_name or name).replace("-", "_")
         self.symbols = [f"{symbol}_{k}" for k in range(count)]
         self.path = None if folder is None else folder / f"{name}.o"
@@ -83,6 +84,10 @@ class Unit:
         code = objects.compile_ir(self.text, objects.UNOPTIMISED)
         self.cost = COST_RATIO * (time.perf_counter() - start)
         return results, code
+
+    def fresh_text(self, symbols: list[str]) -> str:
+        """LLVM IR of the unit under other symbols; also where its code was loaded."""
+        return self._write(symbols)[0]
 
     def register_slot(self, table: Any, index: int, k: int) -> None:
         """Store the address of function k in a table, now and whenever it changes."""

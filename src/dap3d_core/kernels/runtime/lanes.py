@@ -1,7 +1,8 @@
-"""Compiled functions and arrays for several scenes of one structure at once, one in each lane.
+"""Compiled functions and arrays with a vector for each float: scenes, or a value and derivatives.
 
-Sources are those of one scene (kernels/compiler/lanes.py); each lane has the bits of its scene
-alone. An array of one scene becomes one in which item k of all scenes lies together.
+Sources are those of one scene (kernels/compiler/lanes.py, derivatives.py). Scenes of one structure
+are one in each lane, and have the bits of each alone; or lane 0 is a number, with the bits that it
+has alone, and the others are its derivatives. Item k of all lanes lies together.
 """
 
 import functools
@@ -14,10 +15,11 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler import objects
+from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.lanes import widen
-from dap3d_core.kernels.compiler.types import FLOAT, Signature, Struct
-from dap3d_core.kernels.compiler.units import Entry, Unit, address_of
+from dap3d_core.kernels.compiler.types import COMPLEX, FLOAT, Signature, Struct
+from dap3d_core.kernels.compiler.units import Entry, Functions, Unit, address_of, type_of
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import cache_folder, names_of
 from dap3d_core.kernels.runtime.source_digest import origin
@@ -68,10 +70,31 @@ def wide_unit(name: str, count: int, text: Callable[[str], str], *, optimise: bo
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
         return widen(text(symbols[0]), count), ["None"]
 
+    return unit_of(name, 1, write, optimise)
+
+
+def unit_of(name: str, functions: int, write: Any, optimise: bool = False) -> Unit:
+    """A unit of so many functions, made once; name, write: as of ``Unit``."""
     with _making:
         if name not in _units:
-            _units[name] = Unit(name, 1, write, cache_folder(), optimise=optimise)
+            _units[name] = Unit(name, functions, write, cache_folder(), optimise=optimise)
         return _units[name]
+
+
+def differentiated(entry: Entry, count: int) -> Entry:
+    """A compiled function whose floats are ``count`` numbers: a value, and derivatives."""
+    unit = entry.unit
+
+    def write(symbols: list[str]) -> tuple[str, list[Any]]:
+        return differentiate(unit.fresh_text(symbols), count), unit.results
+
+    wide = unit_of(f"{unit.name}-d{count}", len(unit.symbols), write)
+    return Entry(wide, entry.k, entry.signature)
+
+
+def differentiated_table(table: Functions, count: int) -> Functions:
+    """A table of functions, each as ``differentiated`` gives it."""
+    return Functions(table.signature, [differentiated(entry, count) for entry in table.entries])
 
 
 class WideArrays:
@@ -102,27 +125,117 @@ class WideArrays:
                 has = array is not None
                 words.append(self._table(array, names, f"{before}{name}.") if has else 0)
                 continue
-            own = before + name in names and type_.item == FLOAT
+            own = self._is_own(before + name, names) and type_.item in (FLOAT, COMPLEX)
             words += [address_of(self.matrix(array) if own else array), *array.shape]
         self._tables.append(np.array(words, dtype=np.int64))
         return address_of(self._tables[-1])
 
+    def _is_own(self, name: str, names: Collection[str]) -> bool:
+        return name in names
+
     def matrix(self, array: Floats) -> Floats:
         """(size, count) view: the items of an array of one scene, for each scene.
 
-        Arrays that lie in one array of one scene do so here.
+        Arrays that lie in one array of one scene do so here. A complex number is two items.
         """
         whole = array if array.base is None else array.base
         if id(whole) not in self._buffers:
-            numbers = np.zeros(whole.size * self._count + ALIGNMENT)
+            numbers = np.zeros(whole.nbytes // 8 * self._count + ALIGNMENT)
             first = -address_of(numbers) // 8 % ALIGNMENT
-            end = first + whole.size * self._count
+            end = first + whole.nbytes // 8 * self._count
             self._buffers[id(whole)] = whole, numbers[first:end].reshape(-1, self._count)
         wide = self._buffers[id(whole)][1]
         first = (address_of(array) - address_of(whole)) // 8 if array.size else 0
-        return wide[first : first + array.size]
+        return wide[first : first + array.nbytes // 8]
 
     def spread(self) -> None:
         """Give each scene the numbers of the one."""
         for whole, wide in self._buffers.values():
             wide[:] = whole.reshape(-1, 1)
+
+
+class DifferentiatedArrays(WideArrays):
+    """A struct of arrays with derivatives: of each number its value and ``count`` - 1 slopes.
+
+    Slopes are zero at first. The numbers themselves stay those of the plain arrays wherever Python
+    reads or changes them, if ``take`` comes before each call of differentiated code, ``give`` after
+    it.
+    """
+
+    def __init__(self, arrays: Arrays, count: int) -> None:
+        """Args: the arrays; numbers for each of theirs."""
+        super().__init__(arrays, count, ())
+        for whole, wide in self._buffers.values():
+            wide[:, 0] = _flat(whole)
+
+    def _is_own(self, name: str, names: Collection[str]) -> bool:
+        return True
+
+    def take(self) -> None:
+        """Take over numbers that Python has changed: their slopes become zero."""
+        for whole, wide in self._buffers.values():
+            flat = _flat(whole)
+            changed = flat.view(np.int64) != np.ascontiguousarray(wide[:, 0]).view(np.int64)
+            wide[changed] = 0.0
+            wide[changed, 0] = flat[changed]
+
+    def give(self) -> None:
+        """Give Python the numbers."""
+        for whole, wide in self._buffers.values():
+            _flat(whole)[:] = wide[:, 0]
+
+    def has(self, array: Floats) -> bool:
+        """True if an array is one of these."""
+        return id(array if array.base is None else array.base) in self._buffers
+
+    def slopes(self, array: Floats) -> Floats:
+        """(size, count - 1) view of the slopes of an array."""
+        return self.matrix(array)[:, 1:]
+
+
+class Differentiation:
+    """Calls of compiled functions with derivatives of all that their arrays hold.
+
+    Attributes:
+        arrays: of each struct that is an argument, by its id.
+        taken: called before each call, where numbers that Python has changed are known.
+    """
+
+    def __init__(self, count: int) -> None:
+        """Args: numbers for each of the arrays' (value and slopes)."""
+        self.count, self.taken = count, lambda: None
+        self.arrays: dict[int, DifferentiatedArrays] = {}
+        self._kept: dict[int, Any] = {}
+        self._tables: dict[int, Functions] = {}
+
+    def call(self, function: Any, *arguments: Any) -> None:
+        """Call a compiled function of structs, tables and integers in its differentiated form."""
+        types = [type_of(argument) for argument in arguments]
+        entry = differentiated(function.compile(types), self.count)
+        wide = [self._wide(argument) for argument in arguments]
+        for arrays in self.arrays.values():
+            arrays.take()
+        self.taken()
+        entry(*wide)
+        for arrays in self.arrays.values():
+            arrays.give()
+
+    def of(self, struct: Arrays) -> DifferentiatedArrays:
+        """The arrays of a struct with their derivatives."""
+        if id(struct) not in self.arrays:
+            self._kept[id(struct)] = struct
+            self.arrays[id(struct)] = DifferentiatedArrays(struct, self.count)
+        return self.arrays[id(struct)]
+
+    def _wide(self, argument: Any) -> Any:
+        if isinstance(argument, Functions):
+            if id(argument) not in self._tables:
+                self._kept[id(argument)] = argument
+                self._tables[id(argument)] = differentiated_table(argument, self.count)
+            return self._tables[id(argument)]
+        return self.of(argument) if isinstance(argument, Arrays) else argument
+
+
+def _flat(array: Floats) -> Floats:
+    flat: Floats = array.reshape(-1).view(np.float64)
+    return flat

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from dap3d_core.kernels import table_lookup
 from dap3d_core.kernels.compiler.trace import trace
-from dap3d_core.kernels.compiler.types import Struct
+from dap3d_core.kernels.compiler.types import FLOAT, Array, Signature, Struct
 from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime import generated_modules, loop_support
 from dap3d_core.kernels.runtime.cache import cache_folder, jit_is_on, names_of
@@ -115,6 +115,28 @@ def build_wide(loop: Loop, count: int) -> Entry:
         return trace(symbol, _module(loop, text, name), array_members())
 
     return Entry(wide_unit(name, count, traced, optimise=True), 0, LOOP)
+
+
+def build_differentiated(loop: Loop, count: int) -> Entry:
+    """The loop with derivatives: of each number its value and ``count`` - 1 slopes.
+
+    In plain Python as well, where nothing else is compiled. It takes t as an array of one number.
+    """
+    from dap3d_core.kernels.compiler.derivatives import differentiate
+    from dap3d_core.kernels.runtime.lanes import unit_of
+
+    text = source_of(loop)
+    name = f"d{count}.{unit_names(loop, text)[1]}"
+
+    def write(symbols: list[str]) -> tuple[str, list[Any]]:
+        traced = trace(symbols[0], _module(loop, text, name), array_members())
+        helpers, define, body = traced.rpartition("define void @")
+        body = body.replace("(double %t, ", "(ptr %t.at, ", 1)
+        body = body.replace("entry:", "entry:\n  %t = load double, ptr %t.at, align 8", 1)
+        return differentiate(helpers + define + body, count), ["None"]
+
+    _, *others = LOOP.arguments
+    return Entry(unit_of(name, 1, write), 0, Signature((Array(FLOAT, 0), *others)))
 
 
 def _module(loop: Loop, text: str, name: str) -> dict[str, Any]:

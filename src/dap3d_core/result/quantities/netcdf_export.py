@@ -169,9 +169,7 @@ def write_netcdf(
         _ = result.evaluator
     with whole_file(path, force) as part, NETCDF:
         try:
-            plain = dataset.assign_attrs(Conventions="dap3d-post")  # not opened as a result
-            encoding = {str(n): {"_FillValue": None} for n in (*plain.data_vars, *plain.coords)}
-            plain.to_netcdf(part, format="NETCDF4", engine="netcdf4", encoding=encoding)
+            _put(dataset, part)
             with netCDF4.Dataset(part, "a") as file:
                 if jacobian:
                     _add_jacobian(file, result)
@@ -180,6 +178,25 @@ def write_netcdf(
             if isinstance(error, ResultError):
                 raise
             raise cannot("write", path, error) from error
+
+
+def write_dataset(dataset: "xarray.Dataset", path: Path, *, force: bool) -> None:
+    """Writes a dataset that is no result to a file, whole or not at all.
+
+    Raises:
+        ResultError: the file cannot be written, or exists and ``force`` is off.
+    """
+    with whole_file(path, force) as part, NETCDF:
+        try:
+            _put(dataset, part)
+        except (OSError, RuntimeError) as error:
+            raise cannot("write", path, error) from error
+
+
+def _put(dataset: "xarray.Dataset", part: Path) -> None:
+    plain = dataset.assign_attrs(Conventions="dap3d-post")  # not opened as a result
+    encoding = {str(n): {"_FillValue": None} for n in (*plain.data_vars, *plain.coords)}
+    plain.to_netcdf(part, format="NETCDF4", engine="netcdf4", encoding=encoding)
 
 
 def _add_jacobian(file: Any, result: "Result") -> None:

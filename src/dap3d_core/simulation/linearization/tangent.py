@@ -5,7 +5,7 @@ Of the constrained equations of body coordinates
     M a = f + D^T lambda        C = 0        D v - nu = 0        D a - gamma = 0
 
 the terms that linearisation, equilibrium and any Newton iteration need. All are exact to rounding:
-the kernels of the types are differentiated by dual numbers (interface/codegen/loop_derivatives.py).
+the loops of the types run in differentiated form (interface/codegen/loop_derivatives.py).
 Reactions have stiffness too: D^T lambda changes its direction where bodies move, without which a
 hanging pendulum has no frequency.
 

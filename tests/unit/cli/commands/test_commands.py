@@ -109,6 +109,15 @@ REFUSED = [
     (("inverse", "pne1"), "Missing argument 'MOTION'"),
     (("modes", "fall.toml", "-n", "0"), "is not in the range x>=1"),
     (("response", "fall.toml", "--input", "a"), "Missing option '--output'"),
+    # sensitivities
+    (("sensitivities", "pne1", "--by", "bodies.stone.mass"), "did you mean 'pen1'"),
+    (("sensitivities", "fall.toml"), "Missing option '--by'"),
+    (("sensitivities", "fall.toml", "--by", "bodies.stnoe.mass"), "did you mean 'bodies.stone"),
+    (
+        ("sensitivities", "fall.toml", "--by", "bodies.stone.mass", "--of", "stnoe.r.z"),
+        "did you mean 'stone.r.z'",
+    ),
+    (("sensitivities", "fall.toml", "--by", "bodies.stone.mass", "-o", "x.docx"), ".nc"),
     # sweeps
     (("sweep",), "Missing argument 'MODEL'"),
     (("sweep", "pne1", *VARY, *KEEP), "did you mean 'pen1'"),

@@ -1,0 +1,173 @@
+"""A run that carries derivatives by parameters: its compiled code in differentiated form."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from dap3d_core.integrators import Integration
+from dap3d_core.integrators.stepping.integration_state import Y
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.lanes import Differentiation
+from dap3d_core.simulation import SimulationError
+from dap3d_core.simulation.events.jumps import Jumps
+from dap3d_core.simulation.run import Run
+from dap3d_core.study.sensitivities.neighbours import (
+    Neighbours,
+    arrays_of,
+    floats_of,
+    total_derivative,
+)
+
+
+class DifferentiatedRun(Run):
+    """A run with its derivatives by some parameters.
+
+    Attributes:
+        neighbours: of each parameter.
+        base: the run at its start, for differences of what Python computes.
+        reported, slopes: (k, width) rows in coordinates of bodies, and (k, width, p) their
+            derivatives, in parts.
+        instants: time of each located event and jump -> (p,) its derivatives.
+    """
+
+    def carry(self, neighbours: Sequence[Neighbours], base: Run, lanes: int) -> None:
+        """Carry derivatives from the start on; lanes: directions that code is compiled for."""
+        self.neighbours, self.base, self._lanes = list(neighbours), base, lanes
+        self.reported: list[Floats] = []
+        self.slopes: list[Floats] = []
+        self.instants: dict[float, Floats] = {}
+        self._stops: Floats = np.zeros((0, lanes))
+
+    def begin(self, integration: Integration) -> None:
+        """As of ``RunState``: the integration is differentiated.
+
+        Raises:
+            SimulationError: it is the second one of the run.
+        """
+        if self.integrations:
+            raise SimulationError(
+                "derivatives end where an integrator hands over to another one; take one alone "
+                "(integrator radau, where the scene is stiff)"
+            )
+        super().begin(integration)
+        self._differentiation = Differentiation(1 + self._lanes)
+        self._differentiation.taken = self._set_instants
+        integration.takes_programs = False
+        integration.call = self._differentiation.call  # type: ignore[method-assign]
+        integration.rows = self._rows  # type: ignore[method-assign]
+        self._seed()
+        integration.compile()
+        if self.jumps is not None:
+            self.jumps.begin = self._jumping(Jumps.begin)  # type: ignore
+            self.jumps.apply = self._jumping(Jumps.apply)  # type: ignore
+
+    def _slopes_of(self, array: Floats) -> Floats:
+        """(size, p) view of the derivatives of an array of the integration."""
+        for struct in self._differentiation.arrays.values():
+            if struct.has(array):
+                return struct.slopes(array)[:, : len(self.neighbours)]
+        raise KeyError("no array of the integration")
+
+    def _seed(self) -> None:
+        """Derivatives of all numbers at the start."""
+        for struct in self.present.loop_arguments:
+            if hasattr(struct, "walk"):
+                self._differentiation.of(struct)
+        arrays = floats_of(self)
+        ends = np.cumsum([array.size for array in arrays.values()])[:-1]
+        self._stops = np.zeros((len(self.present.tstops), len(self.neighbours)))
+        for j, beside in enumerate(self.neighbours):
+            found = beside.derivative(
+                lambda run: finite(np.concatenate([*floats_of(run).values()]))
+            )
+            for array, slope in zip(arrays.values(), np.split(found, ends), strict=True):
+                self._slopes_of(array)[:, j] = slope
+            stops = beside.derivative(lambda run: np.array([t for t, _ in run.present.tstops]))
+            self._stops[:, j] = stops
+
+    def _set_instants(self) -> None:
+        """Where a step ends at a break point of a function, that depends on parameters."""
+        if not self._stops.any():
+            return
+        work, slopes = self.present.work, self._slopes_of(self.present.work.real)
+        places = work.indices("real")
+        for (t, _), slope in zip(self.present.tstops, self._stops, strict=True):
+            near = (np.nextafter(t, -np.inf), t, np.nextafter(t, np.inf))
+            for name in ("t", "t_limit"):
+                if getattr(work, name) in near:
+                    slopes[places[name]] = slope
+
+    def _rows(self) -> Floats:
+        """As ``Integration.rows``; their derivatives are kept."""
+        integration = self.present
+        work, count = integration.work, int(integration.work.row_count)
+        raw = work.rows[:count].copy()
+        slopes = self._slopes_of(work.rows)[: count * work.rows.shape[1]]
+        slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
+        if self.evaluator.formulation.has_own_coordinates and count:
+            slopes = self._derivative(lambda run, rows: run.evaluator.body_rows(rows), raw, slopes)
+        if count:
+            self.slopes.append(slopes)
+            self.reported.append(self.evaluator.body_rows(raw))
+        for row in work.crossings[: integration.crossing_count]:
+            place = int(np.flatnonzero(work.crossings[:, 0] == row[0])[0])
+            self.instants[float(row[0])] = self._slopes_of(work.crossings)[3 * place].copy()
+        return type(integration).rows(integration)
+
+    def _derivative(
+        self, function: Callable[[Run, Floats], Floats], x: Floats, slopes: Floats
+    ) -> Floats:
+        return total_derivative(function, self.neighbours, self.base, x, slopes)
+
+    def _jumping(self, change: Callable[..., None]) -> Callable[[Integration], None]:
+        """A jump of velocities, whose derivatives are those of the law that Python solves."""
+
+        def jump(integration: Integration) -> None:
+            work = integration.work
+            present = [(name, array.copy()) for name, array in arrays_of(self)]
+            of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
+            of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
+            given = np.append(work.state[Y], work.t)
+            system = {
+                name: self._slopes_of(array).copy()
+                for name, array in arrays_of(self)
+                if array.dtype.kind == "f" and not name.startswith("0.") and array.size
+            }
+
+            def after(run: Run, state: Floats) -> Floats:
+                arrays = dict(arrays_of(run))
+                offset, j = self._offset_of(run)
+                for name, array in present:
+                    arrays[name][...] = array
+                    if offset and name in system:
+                        arrays[name] += offset * system[name][:, j].reshape(array.shape)
+                own = run.present.work
+                own.state[Y], own.t = state[:-1], state[-1]
+                jumps = Jumps(run.evaluator)
+                jumps.span = self.jumps.span if self.jumps is not None else None
+                change(jumps, run.present)
+                result: Floats = own.state[Y].copy()
+                return result
+
+            slopes = self._derivative(after, given, np.vstack([of_state, of_time]))
+            change(self.jumps, integration)
+            self.instants[float(work.t)] = of_time
+            for struct in self._differentiation.arrays.values():
+                struct.take()
+            self._slopes_of(work.state)[: work.state.shape[1]] = slopes
+
+        return jump
+
+    def _offset_of(self, run: Run) -> tuple[float, int]:
+        """How far the parameter of a neighbour is from its value, and which one it is."""
+        for j, beside in enumerate(self.neighbours):
+            for offset, other in zip(beside.offsets, beside.runs, strict=True):
+                if other is run and run is not self.base:
+                    return offset, j
+        return 0.0, 0
+
+
+def finite(x: Floats) -> Floats:
+    """Numbers, with zero for those that are not finite: limits that are not set."""
+    numbers: Floats = np.where(np.isfinite(x), x, 0.0)
+    return numbers

@@ -1,0 +1,201 @@
+"""Runs at their starts with other values of one parameter: differences of what Python computes.
+
+Models are made and starts are corrected in Python. Nothing of that is integrated, so that its
+derivatives come from differences of sixth order, whose error is near rounding.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.formulations.coordinates import UnsuitableError
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.array_struct import Arrays
+from dap3d_core.scene import Mistake, SceneError
+from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation.run import Run
+from dap3d_core.simulation.run_state import Callbacks
+from dap3d_core.simulation.settings import settings_of
+from dap3d_core.study.parameters import SceneParameter, all_parameters, with_values
+
+#: Steps of differences, over the size of the parameter: rounding over the step and the sixth power
+#: of the step are both near 1e-14. The last one is for starts that wide changes tear apart.
+STEPS = (1e-2, 1e-3, 1e-4)
+#: Offsets of differences in steps: central, and to either side where a value has a limit.
+OFFSETS = (-3, -2, -1, 1, 2, 3), (0, 1, 2, 3, 4, 5, 6), (0, -1, -2, -3, -4, -5, -6)
+#: A change of a state, over its size, in differences of functions of it.
+CHANGE = 1e-3
+#: What is written before it is read, or counts: without derivatives by parameters.
+WITHOUT = ("rows", "crossings")
+
+
+def weights_of(offsets: tuple[int, ...]) -> Floats:
+    """Weights of values at some offsets in the derivative at 0, of highest order."""
+    powers = np.vander(np.array(offsets, dtype=float), increasing=True).T
+    first: Floats = np.linalg.solve(powers, np.eye(len(offsets))[1])
+    return first
+
+
+def differences(function: Callable[[float], Floats], step: float) -> Floats:
+    """The derivative at 0 of a function, by central differences of sixth order."""
+    offsets = OFFSETS[0]
+    pairs = zip(offsets, weights_of(offsets), strict=True)
+    total: Floats = sum(w * function(k * step) for k, w in pairs) / step
+    return total
+
+
+@attrs.frozen(eq=False)
+class Neighbours:
+    """Runs with other values of one parameter.
+
+    Attributes:
+        parameter: which.
+        runs: each at its start.
+        weights: of what each run has, in the derivative.
+        offsets: how far the parameter is from its value in each.
+    """
+
+    parameter: SceneParameter
+    runs: tuple[Run, ...]
+    weights: tuple[float, ...]
+    offsets: tuple[float, ...]
+
+    def derivative(self, function: Callable[[Run], Any]) -> Any:
+        """The derivative by the parameter of what a function gives of a run."""
+        return sum(w * function(run) for w, run in zip(self.weights, self.runs, strict=True))
+
+
+def run_beside(
+    compiled: CompiledModel,
+    given: dict[str, Any],
+    change: Sequence[tuple[SceneParameter, float]] = (),
+    start: Any = None,
+) -> Run:
+    """A run of a scene with a model of its own, at its start; given: settings; start: a state."""
+    changed = with_values(compiled.scene, [p for p, _ in change], [value for _, value in change])
+    registry = compiled.checked.registry
+    model = CompiledModel(changed, method=compiled.method, registry=registry, like=compiled)
+    settings = settings_of(model, **{**given, "method": compiled.method})
+    run = Run(model, settings, Callbacks(), start=start)
+    run.initialise()
+    return run
+
+
+def neighbours_of(
+    compiled: CompiledModel,
+    parameter: SceneParameter,
+    given: dict[str, Any],
+    base: Run,
+) -> Neighbours:
+    """Neighbours of a run by a parameter.
+
+    Args:
+        compiled: the model of the scene as given.
+        parameter: of its scene.
+        given: settings of the run.
+        base: the run itself, at its start.
+
+    Raises:
+        SceneError: the parameter has no value, or is a whole number.
+        SimulationError: the scene cannot be run near its value, or has another structure there.
+    """
+    _check(parameter)
+    value, why = float(parameter.value or 0.0), ""
+    for offsets in OFFSETS:
+        for step in STEPS:
+            h = step * _size(compiled, parameter)
+            try:
+                runs = tuple(
+                    run_beside(compiled, given, [(parameter, value + k * h)], base.start)
+                    if k
+                    else base
+                    for k in offsets
+                )
+            except (SceneError, SimulationError, UnsuitableError, ValueError) as error:
+                why = " ".join(str(error).split())
+                continue
+            if any(not _are_alike(base, run) for run in runs):
+                why = "the model has another structure there"
+                continue
+            weights = tuple((weights_of(offsets) / h).tolist())
+            return Neighbours(parameter, runs, weights, tuple(k * h for k in offsets))
+    raise SimulationError(
+        f"there is no derivative by {parameter.name} at {value:g}: with values near it, the scene "
+        f"cannot be run as here: {why}"
+    )
+
+
+def _check(parameter: SceneParameter) -> None:
+    if parameter.value is None:
+        what = "the scene leaves this number to its type; give it a value"
+        raise SceneError([Mistake("by", parameter.name, what)])
+    if parameter.whole:
+        what = "this is a whole number, by which there is no derivative"
+        raise SceneError([Mistake("by", parameter.name, what)])
+
+
+def _size(compiled: CompiledModel, parameter: SceneParameter) -> float:
+    """The size of a parameter: of one that is zero, of the vector it belongs to, or 1."""
+    if parameter.value:
+        return abs(parameter.value)
+    same = [p for p in all_parameters(compiled.checked) if p.path == parameter.path]
+    return max((abs(p.value) for p in same if p.value), default=1.0)
+
+
+def arrays_of(run: Run) -> Iterator[tuple[str, Any]]:
+    """Name and array of all that the compiled loop of a run's integration reads and writes."""
+    for k, struct in enumerate(run.present.loop_arguments):
+        if isinstance(struct, Arrays):
+            yield from ((f"{k}.{name}", array) for name, array in struct.walk())
+
+
+def floats_of(run: Run) -> dict[str, Floats]:
+    """Those of them that have derivatives, flat, by name."""
+    return {
+        name: array.reshape(-1).view(np.float64)
+        for name, array in arrays_of(run)
+        if array.dtype.kind in "fc" and array.size and name.rpartition(".")[2] not in WITHOUT
+    }
+
+
+def _are_alike(one: Run, other: Run) -> bool:
+    """True if the arrays of two runs are of the same sizes, and the same steps end at breaks."""
+    shapes = [[(name, array.shape) for name, array in arrays_of(run)] for run in (one, other)]
+    stops = [[jumps for _, jumps in run.present.tstops] for run in (one, other)]
+    return shapes[0] == shapes[1] and stops[0] == stops[1]
+
+
+def change_along(state: Floats, slopes: Floats) -> float:
+    """How far to go along slopes, for differences of functions of a state; 0 where there are none.
+
+    So far that the state changes by ``CHANGE`` of its largest number.
+    """
+    size, speed = (float(np.max(np.abs(x), initial=0.0)) for x in (state, slopes))
+    return CHANGE * max(size, 1e-3) / speed if speed > 0.0 and math.isfinite(speed) else 0.0
+
+
+def total_derivative(
+    function: Callable[[Run, Floats], Floats],
+    beside: Sequence[Neighbours],
+    base: Run,
+    x: Floats,
+    slopes: Floats,
+) -> Floats:
+    """Derivatives (..., p) of what Python computes of a run and of numbers x.
+
+    Args:
+        function: of a run and numbers.
+        beside: neighbours of the run by each parameter; base: the run itself.
+        x: the numbers; slopes: (..., p) their derivatives.
+    """
+    found = []
+    for j, neighbours in enumerate(beside):
+        along = slopes[..., j]
+        total = neighbours.derivative(lambda run: function(run, x))
+        if step := change_along(x, along):
+            total = total + differences(lambda e: function(base, x + e * along), step)  # noqa: B023
+        found.append(total)
+    return np.stack(found, axis=-1)

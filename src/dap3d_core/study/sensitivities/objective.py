@@ -1,0 +1,157 @@
+"""Public function ``objective``: a number of a run as a function of parameters, with its gradient.
+
+f = dap.objective(scene, by=["forces.spring.k"], of="mass.r.x:max")
+scipy.optimize.minimize(f.value_and_gradient, f.x0, jac=True)
+"""
+
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.registry.arguments import checked
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.result import Result, ResultError, UnknownNameError, find
+from dap3d_core.scene import Mistake, Scene, SceneError
+from dap3d_core.simulation import CompiledModel, simulate
+from dap3d_core.simulation.output.check_outputs import probe_of
+from dap3d_core.study.outputs import REDUCTIONS
+from dap3d_core.study.parameters import parameters_named, with_values
+from dap3d_core.study.sensitivities.sensitivities import sensitivities
+
+#: Name of the output that an expression becomes.
+NAME = "objective"
+
+
+def _integral(values: Floats, t: Floats) -> Any:
+    return np.trapezoid(values, t, axis=-1)
+
+
+#: Numbers of a quantity over a run, by their names.
+NUMBERS: dict[str, Callable[[Floats, Floats], Any]] = {
+    **{name: REDUCTIONS[name] for name in ("mean", "max", "min", "end")},
+    "final": REDUCTIONS["end"],
+    "integral": _integral,
+}
+
+
+class Objective:
+    """A number of a run as a function of p parameters.
+
+    Attributes:
+        names: of the parameters.
+        x0: (p,) their values in the scene.
+        runs, gradients: how often the scene was run, and with derivatives.
+    """
+
+    def __init__(
+        self, scene: Scene, by: Sequence[str], of: str, settings: dict[str, Any], allow_code: bool
+    ) -> None:
+        """Args: as of ``objective``.
+
+        Raises:
+            SceneError: an unknown parameter or quantity, with the nearest.
+        """
+        self._scene, self._settings = scene.copy(), settings
+        quantity, colon, number = of.rpartition(":")
+        quantity, number = (quantity, number.strip()) if colon else (of, "final")
+        if number not in NUMBERS:
+            what = f"the number after the colon is one of {', '.join(NUMBERS)}"
+            near = nearest(number, NUMBERS)
+            raise SceneError([Mistake("of", of, what, f"{quantity}:{near}" if near else "")])
+        self._number = NUMBERS[number]
+        self._quantity = self._named(quantity.strip(), of, allow_code)
+        compiled = self._compiled(self._scene, allow_code)
+        self._registry = compiled.checked.registry
+        try:
+            self._parameters = parameters_named(compiled.checked, by)
+        except SceneError as error:
+            raise SceneError(
+                [Mistake("by", m.value, m.what, m.nearest, m.remedy) for m in error.mistakes]
+            ) from None
+        self.names = tuple(by)
+        self.x0 = np.array([float(p.value or 0.0) for p in self._parameters])
+        self.runs = self.gradients = 0
+
+    def __call__(self, x: ArrayLike) -> float:
+        """The value at a point x (p,). Errors as of ``simulate``."""
+        self.runs += 1
+        model = self._compiled(self._at(x))
+        return float(self._of(simulate(model, **self._settings)))
+
+    def gradient(self, x: ArrayLike) -> Floats:
+        """The gradient (p,) at a point x (p,). Errors as of ``sensitivities``."""
+        return self.value_and_gradient(x)[1]
+
+    def value_and_gradient(self, x: ArrayLike) -> tuple[float, Floats]:
+        """Value and gradient at a point x (p,), of one run. Errors as of ``sensitivities``."""
+        self.gradients += 1
+        found = sensitivities(self._compiled(self._at(x)), self.names, **self._settings)
+        return float(self._of(found.result)), found.derivative(self._of)
+
+    def _of(self, result: Result) -> Any:
+        return self._number(result.quantity(self._quantity).values, result.t)
+
+    def _at(self, x: ArrayLike) -> Scene:
+        values = np.asarray(x, dtype=float).reshape(-1)
+        if len(values) != len(self.names):
+            raise ValueError(f"x has {len(values)} numbers for {len(self.names)} parameters")
+        return with_values(self._scene, self._parameters, values.tolist())
+
+    def _compiled(self, scene: Scene, allow_code: bool = False) -> CompiledModel:
+        registry = getattr(self, "_registry", None)
+        method = self._settings.get("method")
+        return CompiledModel(scene, method=method, registry=registry, allow_code=allow_code)
+
+    def _named(self, quantity: str, of: str, allow_code: bool) -> str:
+        """The name of the quantity; of an expression that of an output that it becomes.
+
+        Raises:
+            SceneError: there is no such quantity, and it is no expression either.
+        """
+        compiled = self._compiled(self._scene, allow_code)
+        probe = probe_of(compiled.scene_text, compiled.evaluator)
+        try:
+            components = find(probe, quantity).components
+        except (UnknownNameError, ResultError) as error:
+            if not any(sign in quantity for sign in "+-*/( "):
+                near = getattr(error, "nearest", "")
+                what = str(error.args[0] if error.args else error)
+                raise SceneError([Mistake("of", of, what, near)]) from None
+            self._scene.outputs[NAME] = quantity
+            return NAME
+        if components:
+            what = "this is a vector; name a component"
+            raise SceneError([Mistake("of", of, what, f"{quantity}.{components[0]}")])
+        return quantity
+
+
+@checked
+def objective(
+    scene: Scene | str | os.PathLike[str],
+    by: Sequence[str] | str,
+    of: str,
+    *,
+    allow_code: bool = False,
+    **settings: Any,
+) -> Objective:
+    """A number of a run as a function of parameters, for optimisation with exact gradients.
+
+    Args:
+        scene: a Scene, or what ``load`` takes.
+        by: names of parameters, as of ``sensitivities``.
+        of: ``QUANTITY:NUMBER``: a quantity, or an expression of quantities as in ``[outputs]``;
+            and "final" (without a colon as well), "mean", "max", "min" or "integral" over time.
+        settings: as of ``sensitivities``.
+
+    Raises:
+        SceneError: mistakes of the scene; an unknown parameter or quantity, with the nearest.
+    """
+    from dap3d_core.scene import load
+
+    own = scene if isinstance(scene, Scene) else load(scene)
+    names = [by] if isinstance(by, str) else list(by)
+    return Objective(own, names, of, settings, allow_code)

@@ -1,0 +1,240 @@
+"""Public function ``sensitivities``: a run and its derivatives by parameters of the scene."""
+
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.registry.arguments import checked
+from dap3d_core.result import Result, RunMetadata, find
+from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
+from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation.run import Run
+from dap3d_core.simulation.run_state import Callbacks
+from dap3d_core.simulation.settings import compiled_for, settings_of
+from dap3d_core.simulation.simulate import given_state, start_word
+from dap3d_core.study.parameters import SceneParameter, parameters_named
+from dap3d_core.study.sensitivities.differentiated_run import DifferentiatedRun
+from dap3d_core.study.sensitivities.neighbours import (
+    Neighbours,
+    neighbours_of,
+    run_beside,
+    total_derivative,
+)
+
+if TYPE_CHECKING:
+    import xarray
+
+    from dap3d_core.simulation.initial.start_state import Start
+
+#: Directions of one run that make, with the value, vectors of 2, 4 or 8 numbers.
+FAST = (1, 3, 7)
+#: Motion of each body in data sets.
+OF_BODIES = ("r", "rd", "w")
+
+
+class Sensitivities:
+    """A run and its derivatives by p parameters.
+
+    Attributes:
+        result: of the run, bit for bit that of ``simulate``.
+        parameters: by which it is differentiated.
+        values: (p,) of the parameters, in the scene.
+    """
+
+    def __init__(
+        self,
+        result: Result,
+        runs: Sequence[DifferentiatedRun],
+        parameters: Sequence[SceneParameter],
+    ) -> None:
+        """Args: the result, runs with the derivatives by some parameters each, all of these."""
+        self.result, self.parameters = result, tuple(parameters)
+        self.values = np.array([float(p.value or 0.0) for p in parameters])
+        self._base = runs[0].base
+        self._neighbours: tuple[Neighbours, ...] = sum((tuple(r.neighbours) for r in runs), ())
+        self._rows = np.concatenate(runs[0].reported)
+        parts = [np.concatenate(run.slopes) for run in runs]
+        self._slopes = np.concatenate(parts, axis=-1)
+        self._instants = {
+            t: np.concatenate([run.instants[t] for run in runs]) for t in runs[0].instants
+        }
+        self._known: dict[str, Floats] = {}
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    def of(self, quantity: str) -> Floats:
+        """(nt, p) derivatives of a quantity at the reported instants; of a vector (nt, 3, p).
+
+        Args:
+            quantity: a name as of ``Result.quantity``.
+
+        Raises:
+            UnknownNameError, ResultError: as ``Result.quantity``.
+        """
+        if quantity not in self._known:
+            find(self.result, quantity)
+            self._known[quantity] = self.derivative(lambda result: result.quantity(quantity).values)
+        return self._known[quantity]
+
+    def final(self, quantity: str) -> Floats:
+        """(p,) derivatives of a quantity at the end; of a vector (3, p). Errors as ``of``."""
+        final: Floats = self.of(quantity)[-1]
+        return final
+
+    def derivative(self, function: Callable[[Result], Any]) -> Floats:
+        """Derivatives (..., p) of what a smooth function computes of a result."""
+
+        def of_rows(run: Run, rows: Floats) -> Floats:
+            evaluator, record = run.evaluator, RunMetadata(scene_text=run.compiled.scene_text)
+            whole = evaluator.with_inputs(rows, evaluator.model.input_values)
+            result = Result.of_run(evaluator.model, whole, record, lambda: evaluator)
+            return np.asarray(function(result), dtype=float)
+
+        return total_derivative(of_rows, self._neighbours, self._base, self._rows, self._slopes)
+
+    @property
+    def event_times(self) -> Floats:
+        """(k, p) derivatives of the instants of ``result.events``; NaN of those of scripts."""
+        none = np.full(len(self.parameters), np.nan)
+        found = [self._instants.get(event.t, none) for event in self.result.events]
+        return np.array(found).reshape(-1, len(self.parameters))
+
+    def elasticities(self, quantity: str) -> Floats:
+        """(p,) p/q dq/dp of a scalar quantity q at the end: per cent of it by a per cent of p."""
+        value = float(self.result.quantity(quantity).values[-1])
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.asarray(self.final(quantity) * self.values / value)
+
+    def to_xarray(self, quantities: Sequence[str] = ()) -> "xarray.Dataset":
+        """Quantities over time and their derivatives ``d NAME`` over time and parameter.
+
+        Args:
+            quantities: names; by default the motion of each body and the outputs of the scene.
+        """
+        import xarray
+
+        summary = self.result.summary
+        usual = [f"{body}.{q}" for body in summary.body_names for q in OF_BODIES]
+        variables: dict[str, Any] = {}
+        for name in quantities or [*usual, *self.result.outputs]:
+            values, label, unit = self.result.quantity(name)
+            width = values.shape[1] if values.ndim > 1 else 0
+            dims = ("time", *{0: (), 3: ("axis",)}.get(width, (f"{name}_row",)))
+            about = {"units": unit, "long_name": label}
+            variables[name] = dims, values, about
+            about = {
+                "units": f"{unit} per unit of parameter",
+                "long_name": f"derivative of {label}",
+            }
+            variables[f"d {name}"] = (*dims, "parameter"), self.of(name), about
+        coordinates = {
+            "time": self.result.t,
+            "parameter": list(self.names),
+            "value": ("parameter", self.values),
+            "axis": list("xyz"),
+        }
+        about = {"scene": self.result.scene_text}
+        return xarray.Dataset(variables, coordinates, about)
+
+    @checked
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        quantities: Sequence[str] = (),
+        force: bool = False,
+    ) -> None:
+        """Write ``to_xarray`` to a NetCDF-4 file, whole or not at all.
+
+        Raises:
+            ResultError: the file cannot be written, or exists and ``force`` is off.
+        """
+        from dap3d_core.result.quantities.netcdf_export import write_dataset
+
+        write_dataset(self.to_xarray(quantities), Path(path), force=force)
+
+
+@checked
+def sensitivities(
+    scene: Scene | str | os.PathLike[str] | CompiledModel,
+    by: Sequence[str] | str,
+    *,
+    t_end: float | None = None,
+    dt: float | None = None,
+    method: str | None = None,
+    integrator: str | None = None,
+    rtol: float | None = None,
+    atol: float | None = None,
+    step: float | None = None,
+    correct: bool | None = None,
+    project: bool | None = None,
+    correct_metric: str | None = None,
+    start: "Start | None" = None,
+    allow_code: bool = False,
+    announce: Callable[[str], None] | None = None,
+) -> Sensitivities:
+    """Simulate a scene, with exact derivatives of the run by parameters of the scene.
+
+    The compiled code of the run is differentiated, step by step as the run takes them; instants of
+    located events carry derivatives, chosen lengths of steps do not. What is computed in Python,
+    models, starts and jumps, has differences of sixth order. Details, and where a derivative means
+    little: docs/concepts/sensitivities.md.
+
+    Args:
+        scene: a Scene, what ``load`` takes, or a compiled model; allow_code, announce: as there.
+        by: names of parameters as ``sweep`` varies them: ``bodies.crank.mass``, ``points.A.sPp.x``,
+            ``parameters.length``.
+        t_end, dt, method, integrator, rtol, atol, step: as of ``simulate``; likewise correct,
+            project, correct_metric, start.
+
+    Raises:
+        SceneError, PluginError: as ``simulate``; an unknown parameter, with the nearest.
+        SimulationError: the run stopped; or there is no derivative by a parameter.
+    """
+    if not jit_is_on():
+        raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
+    compiled = compiled_for(scene, method, allow_code, announce, integrator)
+    names = [by] if isinstance(by, str) else list(by)
+    parameters = _parameters(compiled, names)
+    given = dict(t_end=t_end, dt=dt, integrator=integrator, rtol=rtol, atol=atol, step=step,
+                 correct=correct, project=project, correct_metric=correct_metric,
+                 start=start_word(start))  # fmt: skip
+    state = given_state(start, compiled)
+    base = run_beside(compiled, given, (), state)
+    blocks = -(-len(parameters) // FAST[-1])
+    directions = -(-len(parameters) // blocks)
+    lanes = next(count for count in FAST if count >= directions)
+    runs, results = [], []
+    for first in range(0, len(parameters), directions):
+        part = parameters[first : first + directions]
+        beside = [neighbours_of(compiled, parameter, given, base) for parameter in part]
+        with compiled.borrow_evaluator():
+            settings = settings_of(compiled, method=method, **given)
+            run = DifferentiatedRun(compiled, settings, Callbacks(announce=announce), start=state)
+            run.carry(beside, base, lanes)
+            results.append(run.go())
+        runs.append(run)
+    return Sensitivities(results[0], runs, parameters)
+
+
+def _parameters(compiled: CompiledModel, names: Sequence[str]) -> tuple[SceneParameter, ...]:
+    """The parameters of these names.
+
+    Raises:
+        SceneError: there are none, or wrong names, with the nearest.
+    """
+    if not names:
+        what = "name a parameter of the scene, such as bodies.crank.mass"
+        raise SceneError([Mistake("by", MISSING, what)])
+    try:
+        return parameters_named(compiled.checked, names)
+    except SceneError as error:
+        raise SceneError([attrs.evolve(m, key="by") for m in error.mistakes]) from None

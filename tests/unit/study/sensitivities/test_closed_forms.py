@@ -1,0 +1,146 @@
+"""Derivatives of runs against closed forms, to 1e-9 of the largest at rtol 1e-12."""
+
+import numpy as np
+import pytest
+from scipy.special import ellipj, ellipk
+from support.bouncing import bouncing
+
+import dap3d_core as dap
+from dap3d_core.kernels.runtime.cache import jit_is_on
+
+pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
+TIGHT = {"rtol": 1e-12, "atol": 1e-14}
+
+
+def close(found, expected, part=1e-9):
+    """Compare, to a part of the largest of each column."""
+    found, expected = np.broadcast_arrays(found, expected)
+    scale = np.max(np.abs(expected), axis=0)
+    error = np.max(np.abs(found - expected), axis=0) / np.where(scale > 0.0, scale, 1.0)
+    assert np.all(error <= part), error
+
+
+def derivative(function, x, h=1e-3):
+    """Of a closed form, by differences of sixth order: errors some 1e-13."""
+    pairs = zip((1, 2, 3), (45.0, -9.0, 1.0), strict=True)
+    return sum(w * (function(x + k * h) - function(x - k * h)) for k, w in pairs) / (60.0 * h)
+
+
+def oscillator():
+    scene = dap.Scene(name="oscillator")
+    scene.add_body("mass", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(1.5, 0.0, 0.0), r_dot=(0.2, 0.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="mass.O", P_j="ground.O", k=40.0, l0=1.0, c=0.8)
+    return scene
+
+
+def oscillation(t, m, k, c, l0, x0, v0):
+    delta, omega = c / (2.0 * m), np.sqrt(k / m - (c / (2.0 * m)) ** 2)
+    a, b = x0 - l0, (v0 + delta * (x0 - l0)) / omega
+    return l0 + np.exp(-delta * t) * (a * np.cos(omega * t) + b * np.sin(omega * t))
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "adams"])
+def test_an_oscillator(integrator):
+    by = ["bodies.mass.mass", "forces.spring.k", "forces.spring.c", "forces.spring.l0",
+          "bodies.mass.r.x", "bodies.mass.r_dot.x"]  # fmt: skip
+    values = np.array([2.0, 40.0, 0.8, 1.0, 1.5, 0.2])
+    # dopri5 and adams err by some 1e-10 themselves at this tolerance
+    part = 1e-9 if integrator == "dop853" else 1e-8
+    s = dap.sensitivities(oscillator(), by, t_end=2.0, dt=0.1, integrator=integrator, **TIGHT)
+    plain = dap.simulate(oscillator(), t_end=2.0, dt=0.1, integrator=integrator, **TIGHT)
+    assert plain.u.tobytes() == s.result.u.tobytes()
+    assert plain.v_dot.tobytes() == s.result.v_dot.tobytes()
+    assert plain.stats.steps == s.result.stats.steps
+    for j in range(len(by)):
+        expected = derivative(
+            lambda x, j=j: oscillation(s.result.t, *np.where(np.arange(6) == j, x, values)),
+            values[j],
+        )
+        close(s.of("mass.r.x")[:, j], expected, part)
+    np.testing.assert_array_equal(s.final("mass.r.x"), s.of("mass.r.x")[-1])
+    assert s.names == tuple(by)
+
+
+def pendulum(length=0.7):
+    """A weight on a rod of this length, released from 2 rad: all by one parameter."""
+    scene = dap.Scene(name="pendulum")
+    scene.parameters["length"] = length
+    place = ("= length * sin(2.0)", 0.0, "= -length * cos(2.0)")
+    scene.add_body("bob", mass=1.0, Jp=(0.02, 0.02, 0.02), r=place)
+    scene.add_point("pin", body="bob", sPp=("= -length * sin(2.0)", 0.0, "= length * cos(2.0)"))
+    scene.add_joint("rev", "hinge", P_i="pin", P_j="ground.O", a_i="bob.y", a_j="ground.y")
+    scene.add_force("weight", "gravity", gravity=9.81)
+    return scene
+
+
+def swing(t, length, start=2.0):
+    """sin of half the angle of the pendulum."""
+    k = np.sin(0.5 * start)
+    rate = np.sqrt(9.81 * length / (length * length + 0.02))
+    return k * ellipj(ellipk(k * k) - rate * t, k * k)[0]
+
+
+@pytest.mark.parametrize("method", ["standard", "lsq", "joint"])
+def test_a_pendulum_by_its_length(method):
+    """Its period depends on it; points and the start follow it through expressions."""
+    settings = {"t_end": 2.0, "dt": 0.1, "method": method, **TIGHT}
+    s = dap.sensitivities(pendulum(), "parameters.length", **settings)
+    assert dap.simulate(pendulum(), **settings).u.tobytes() == s.result.u.tobytes()
+
+    def height(length):
+        half = swing(s.result.t, length)
+        return -length * (1.0 - 2.0 * half * half)
+
+    close(s.of("bob.r.z")[:, 0], derivative(height, 0.7))
+
+
+def test_a_free_symmetric_top():
+    """Angular velocity in body axes precesses at (C - A) / A times the spin."""
+    scene = dap.Scene(name="top")
+    scene.add_body("top", mass=1.0, Jp=(2.0, 2.0, 3.0), w=(0.5, 0.0, 4.0))
+    by = ["bodies.top.Jp.z", "bodies.top.w.z", "bodies.top.w.x"]
+    s = dap.sensitivities(scene, by, t_end=3.0, dt=0.1, **TIGHT)
+    found = s.derivative(lambda result: result.wp[:, 0, :2])
+    t = s.result.t
+
+    def precession(C, spin, across):
+        angle = (C - 2.0) / 2.0 * spin * t
+        return across * np.stack([np.cos(angle), np.sin(angle)], axis=1)
+
+    values = np.array([3.0, 4.0, 0.5])
+    for j in range(3):
+        expected = derivative(
+            lambda x, j=j: precession(*np.where(np.arange(3) == j, x, values)), values[j]
+        )
+        close(found[..., j], expected)
+
+
+def test_a_bouncing_ball():
+    """Height, and the instant of the bounce, by e, g, height and speed at the start."""
+    scene = bouncing()
+    by = ["forces.floor.e", "forces.gravity.gravity", "bodies.ball.r.z", "bodies.ball.r_dot.z"]
+    scene.bodies["ball"].r_dot = (0.5, 0.0, 1.5)
+    s = dap.sensitivities(scene, by, t_end=1.3, dt=0.05, **TIGHT)
+    plain = dap.simulate(scene, t_end=1.3, dt=0.05, **TIGHT)
+    assert plain.u.tobytes() == s.result.u.tobytes()
+    t = s.result.t
+
+    def bounce(g, z0, v0):
+        return (v0 + np.sqrt(v0 * v0 + 2.0 * g * z0)) / g
+
+    def height(e, g, z0, v0):
+        first, speed = bounce(g, z0, v0), np.sqrt(v0 * v0 + 2.0 * g * z0)
+        after = e * speed * (t - first) - 0.5 * g * (t - first) ** 2
+        return np.where(t < t_bounce, z0 + v0 * t - 0.5 * g * t * t, after)
+
+    values = np.array([0.8, 9.81, 1.0, 1.5])
+    t_bounce = bounce(*values[1:])
+    for j in range(4):
+        expected = derivative(
+            lambda x, j=j: height(*np.where(np.arange(4) == j, x, values)), values[j]
+        )
+        close(s.of("ball.r.z")[:, j], expected)
+        of_time = derivative(
+            lambda x, j=j: bounce(*np.where(np.arange(4) == j, x, values)[1:]), values[j]
+        )
+        assert s.event_times[0, j] == pytest.approx(of_time, rel=1e-9, abs=1e-12)

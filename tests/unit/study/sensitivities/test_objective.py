@@ -1,0 +1,63 @@
+"""Numbers of runs as functions of parameters, with gradients."""
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+import dap3d_core as dap
+from dap3d_core.kernels.runtime.cache import jit_is_on
+
+pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
+SETTINGS = {"t_end": 1.0, "dt": 0.01, "rtol": 1e-11, "atol": 1e-13}
+
+
+def oscillator():
+    scene = dap.Scene(name="oscillator")
+    scene.add_body("mass", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(1.5, 0.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="mass.O", P_j="ground.O", k=40.0, l0=1.0, c=0.8)
+    return scene
+
+
+@pytest.mark.parametrize("number", ["final", "mean", "max", "min", "integral"])
+def test_gradients_are_those_of_differences(number):
+    f = dap.objective(
+        oscillator(), ["forces.spring.k", "forces.spring.c"], f"mass.r.x**2:{number}", **SETTINGS
+    )
+    value, gradient = f.value_and_gradient(f.x0)
+    assert value == f(f.x0)
+    h = 1e-3
+    for k, step in enumerate(np.eye(2) * h):
+        difference = (f(f.x0 + step) - f(f.x0 - step)) / (2.0 * h)
+        # the difference errs by h^2, and by 1e-11 of the runs over h
+        assert gradient[k] == pytest.approx(difference, rel=1e-5, abs=1e-7)
+    assert (f.runs, f.gradients) == (5, 1)
+
+
+def test_an_optimum_that_is_known():
+    """The throw that goes 2 m in 1 s: speed 2 m/s."""
+    scene = dap.Scene(name="stone")
+    scene.add_body("stone", mass=1.0, Jp=(1.0, 1.0, 1.0), r_dot=(1.0, 0.0, 0.0))
+    f = dap.objective(scene, "bodies.stone.r_dot.x", "(stone.r.x - 2)**2", t_end=1.0)
+    found = minimize(f.value_and_gradient, f.x0, jac=True)
+    np.testing.assert_allclose(found.x, 2.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("by", "of", "said"),
+    [
+        ("forces.spring.kk", "mass.r.x", "did you mean 'forces.spring.k'"),
+        ("forces.spring.k", "mas.r.x", "did you mean 'mass.r.x'"),
+        ("forces.spring.k", "mass.r", "did you mean 'mass.r.x'"),
+        ("forces.spring.k", "mass.r.x:maxi", "did you mean 'mass.r.x:max'"),
+        ("forces.spring.k", "mass.r.x + mas.r.x", "mas"),
+    ],
+)
+def test_what_is_refused(by, of, said):
+    with pytest.raises(dap.SceneError, match=said):
+        dap.objective(oscillator(), by, of)
+
+
+def test_a_point_of_another_size():
+    f = dap.objective(oscillator(), "forces.spring.k", "mass.r.x")
+    with pytest.raises(ValueError, match="2 numbers for 1 parameters"):
+        f([1.0, 2.0])

@@ -1,0 +1,146 @@
+"""Derivatives of runs: bits of values, blocks, breaks, data sets, what is refused."""
+
+import numpy as np
+import pytest
+import xarray
+from support.bouncing import swinging
+from support.on_axles import wheel
+
+import dap3d_core as dap
+from dap3d_core.kernels.runtime.cache import jit_is_on
+
+pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
+BY = ["bodies.rod.mass", "forces.gravity.gravity"]
+SHORT = {"t_end": 0.2, "dt": 0.05}
+
+
+def arrays(result):
+    return [array.tobytes() for array in result.arrays.columns()]
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"method": "standard"},
+        {"method": "penalty"},
+        {"method": "lsq"},
+        {"method": "joint"},
+        {"integrator": "dopri5"},
+        {"integrator": "adams"},
+        {"integrator": "radau"},
+        {"integrator": "rk4", "step": 0.001},
+        {"project": False},
+    ],
+    ids=lambda s: "-".join(map(str, s.values())),
+)
+def test_values_are_those_of_the_run_alone_and_derivatives_agree(settings):
+    """All that is reported has the same bits; formulations and integrators find one derivative."""
+    tight = {"rtol": 1e-10, "atol": 1e-12}
+    s = dap.sensitivities("pen2", BY, **SHORT, **settings, **tight)
+    assert arrays(s.result) == arrays(dap.simulate("pen2", **SHORT, **settings, **tight))
+    reference = dap.sensitivities("pen2", BY, **SHORT, rtol=1e-12, atol=1e-14)
+    for quantity in ("cylinder.r.z", "cylinder.rd.z", "energy.kinetic"):
+        scale = np.max(np.abs(reference.of(quantity)))
+        # penalty keeps constraints to some 1e-7 alone
+        part = 1e-5 if settings.get("method") == "penalty" else 1e-7
+        np.testing.assert_allclose(
+            s.of(quantity), reference.of(quantity), rtol=0.0, atol=part * scale
+        )
+
+
+@pytest.mark.parametrize(
+    ("scene", "by"),
+    [
+        (wheel, ["bodies.wheel.mass"]),
+        (lambda: "bodies2", ["forces.spring1.k", "points.A.sPp.x"]),
+        (lambda: "fourbar3", ["points.P2.sPp.y", "functions.motor.coeff.2"]),
+        (lambda: "bicycle", ["parameters.wheelbase"]),
+    ],
+)
+def test_values_of_many_kinds_of_scenes(scene, by):
+    s = dap.sensitivities(scene(), by, **SHORT)
+    assert arrays(s.result) == arrays(dap.simulate(scene(), **SHORT))
+    for body in s.result.summary.body_names:
+        assert np.all(np.isfinite(s.of(f"{body}.r")))
+
+
+def test_more_directions_than_lanes():
+    """Blocks of runs; each direction is what it is alone."""
+    by = [f"bodies.{body}.{field}" for body in ("rod", "cylinder")
+          for field in ("mass", "Jp.x", "Jp.y", "Jp.z", "w.y")]  # fmt: skip
+    s = dap.sensitivities("pen2", by, **SHORT)
+    assert s.of("cylinder.r.z").shape == (5, 10)
+    alone = dap.sensitivities("pen2", by[7], **SHORT).of("cylinder.r.z")[:, 0]
+    np.testing.assert_allclose(s.of("cylinder.r.z")[:, 7], alone, rtol=1e-12, atol=1e-15)
+
+
+def test_a_break_point_that_depends_on_a_parameter():
+    """A push that is switched off: x = v t + ... by the instant where it ends."""
+    scene = dap.Scene(name="pushed")
+    scene.add_body("mass", mass=2.0, Jp=(1.0, 1.0, 1.0))
+    scene.add_function("step", "push", x_start=0.4, x_end=0.7, f_start=6.0, f_end=0.0)
+    scene.add_force("f", "force", body_i="mass", f=(1.0, 0.0, 0.0), function="push")
+    by = ["functions.push.x_start", "functions.push.x_end", "functions.push.f_start"]
+    s = dap.sensitivities(scene, by, t_end=1.0, dt=0.5, rtol=1e-12, atol=1e-14)
+    # velocity: the integral of the push, by symmetry of the step f (x_start + x_end) / 2 over m
+    expected = [6.0 / 2.0 / 2.0, 6.0 / 2.0 / 2.0, 0.55 / 2.0]
+    np.testing.assert_allclose(s.final("mass.rd.x"), expected, rtol=1e-9)
+
+
+def test_data_sets(tmp_path):
+    s = dap.sensitivities("pen2", BY, **SHORT)
+    data = s.to_xarray()
+    np.testing.assert_array_equal(data["d cylinder.r"].values, s.of("cylinder.r"))
+    assert list(data.parameter.values) == BY
+    s.save(tmp_path / "s.nc", ["energy.total"])
+    with xarray.open_dataset(tmp_path / "s.nc", engine="netcdf4") as read:
+        np.testing.assert_array_equal(read["d energy.total"].values, s.of("energy.total"))
+        assert read["energy.total"].attrs["units"] == "J"
+
+
+@pytest.mark.parametrize(
+    ("by", "said"),
+    [
+        ([], "name a parameter"),
+        (["bodies.rood.mass"], "did you mean 'bodies.rod.mass'"),
+        (["bodies.rod.mass", "bodies.rod.mass"], "only once"),
+        (["simulation.step"], "give it a value"),
+    ],
+)
+def test_what_is_refused(by, said):
+    with pytest.raises(dap.SceneError, match=said):
+        dap.sensitivities("pen2", by, **SHORT)
+
+
+def test_the_values_of_a_control_history():
+    """A push by a spline through samples: what one sample does is what it does alone."""
+
+    def pushed(y):
+        scene = dap.Scene(name="pushed")
+        scene.add_body("mass", mass=2.0, Jp=(1.0, 1.0, 1.0))
+        scene.add_function("spline", "push", x=(0.0, 0.3, 0.6, 1.0), y=y)
+        scene.add_force("f", "force", body_i="mass", f=(1.0, 0.0, 0.0), function="push")
+        return scene
+
+    settings = {"t_end": 1.0, "dt": 0.5, "rtol": 1e-12, "atol": 1e-14}
+    s = dap.sensitivities(
+        pushed((1.0, -2.0, 0.5, 0.0)), ["functions.push.y.2", "functions.push.y.3"], **settings
+    )
+    for k, y in enumerate([(0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 1.0, 0.0)]):
+        alone = dap.simulate(pushed(y), **settings).quantity("mass.r.x").values[-1]
+        assert s.final("mass.r.x")[k] == pytest.approx(alone, rel=1e-9)
+
+
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_a_stop_of_an_angle(method):
+    """Jumps in coordinates of bodies and of joints find one derivative."""
+    settings = {"t_end": 1.2, "dt": 0.2, "rtol": 1e-12, "atol": 1e-14, "method": method}
+    s = dap.sensitivities(swinging(), ["forces.stop.e", "bodies.bar.mass"], **settings)
+    assert s.result.events
+    h = 1e-4
+    scenes = [swinging(), swinging()]
+    for scene, sign in zip(scenes, (1.0, -1.0), strict=True):
+        scene.forces["stop"].fields["e"] += sign * h
+    ends = [dap.simulate(scene, **settings).quantity("bar.r.x").values[-1] for scene in scenes]
+    # the difference errs by h^2
+    assert s.final("bar.r.x")[0] == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-6)
