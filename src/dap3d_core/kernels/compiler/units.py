@@ -34,6 +34,7 @@ class Unit:
 
     Attributes:
         symbols: NAME_0, NAME_1, ...: one for each function.
+        write: as given; writes the code anew, for another target.
         results: what ``write`` returned with the code, read back from the object file.
         cost: estimated seconds to optimise it.
     """
@@ -57,7 +58,7 @@ class Unit:
             optimise: compile optimised code at once; for short code.
             ready_name: name among ready-made objects, of which symbols are made as well.
         """
-        self.name = name
+        self.name, self.write = name, write
         symbol = (ready_name or name).replace("-", "_")
         self.symbols = [f"{symbol}_{k}" for k in range(count)]
         self.path = None if folder is None else folder / f"{name}.o"
