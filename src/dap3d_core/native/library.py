@@ -2,6 +2,8 @@
 
 import ctypes
 import os
+import shutil
+import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -49,7 +51,10 @@ class NativeLibrary:
 
     def __init__(self, path: Path) -> None:
         """Args: the file."""
-        library = ctypes.CDLL(str(path.resolve()))
+        # a copy: the loader takes a file that was written anew for the one that it knows
+        folder = tempfile.mkdtemp()
+        library = ctypes.CDLL(str(shutil.copy(path, folder)))
+        shutil.rmtree(folder, ignore_errors=True)  # Windows keeps a file that is loaded
         for name, (result, arguments) in _SIGNATURES.items():
             function = getattr(library, f"dap3d_{name}")
             function.restype, function.argtypes = result, arguments

@@ -21,6 +21,7 @@ from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.trace import NumberArray, Symbol, Tracer
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R, V, W
 from dap3d_core.model.joint_angles import joint_angle_name
+from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
 from dap3d_core.native.prepared import PreparedRun, refusal
 from dap3d_core.result import Result, ResultError, RunMetadata
 from dap3d_core.result.errors import UnknownNameError
@@ -78,6 +79,7 @@ def outputs_of(
     chosen = list(names) if names is not None else list(prepared.compiled.scene.outputs)
     if not chosen and names is None:
         chosen = [f"{body}.{q}" for body in model.body_names for q in OF_BODIES]
+    chosen = [name for name in dict.fromkeys(chosen) if name not in model.input_names]
     result, tracer = _first_row(prepared), Tracer()
     quantities = _Quantities(prepared, result, tracer)
     found: list[Output] = []
@@ -213,8 +215,15 @@ class _Quantities:
             return tuple(_dot(tuple(row[k] for row in axes), part) for k in range(3))
         if attribute in ("rdd", "wd"):
             return self._acceleration(body, 0 if attribute == "rdd" else 3)
-        first, size = {"r": (R, 3), "p": (P, 4), "rd": (V, 3), "w": (W, 3)}[attribute]
-        return self._vector(body, first, size)
+        place, first, size = {"r": (0, R, 3), "p": (3, P, 4), "rd": (0, V, 3), "w": (0, W, 3)}[
+            attribute
+        ]
+        if attribute == "w" or self._prepared.evaluator.formulation.has_own_coordinates:
+            return self._vector(body, first, size)
+        # of the state as it is: that of the arrays is of unit length
+        place += VELOCITIES * (body - 1) if attribute == "rd" else COORDINATES * (body - 1)
+        place += COORDINATES * self._model.body_count if attribute == "rd" else 0
+        return tuple(self._row[place + k] for k in range(size))
 
     def _of_point(self, body: int, local: tuple[float, ...], level: int) -> tuple[Any, ...]:
         """Position, velocity or acceleration of a point fixed in a body."""

@@ -143,7 +143,7 @@ class PreparedRun:
     def _refuse_jumps(self) -> None:
         switches = [s for s in self.evaluator.switches if s.jumps]
         if switches:
-            types = sorted({str(s.group.type_info.name) for s in switches})
+            types = sorted({str(s.group.type_info.type.keyword) for s in switches})
             raise refusal(
                 f"velocities jump at elements of type {', '.join(types)}: that is not exported yet",
                 "model the contact by a force, such as a stiff spring with a damper",
@@ -181,13 +181,13 @@ class PreparedRun:
         evaluator, model = self.evaluator, self.evaluator.model
         size = len(self.run.present.work.state[at.Y]) - 1
         if evaluator.formulation.has_own_coordinates:
-            return [*(f"state.{k + 1}" for k in range(size)), "work"]
+            return [*(f"state.{k + 1}" for k in range(size)), "state.work"]
         axes = ("x", "y", "z")
         poses = [*(f"r.{a}" for a in axes), *(f"p.e{k}" for k in range(4))]
         rates = [*(f"rd.{a}" for a in axes), *(f"wp.{a}" for a in axes)]
         names = [f"state.{b}.{q}" for part in (poses, rates) for b in model.body_names for q in part]
         own = [f"state.{label}" for s in model.element_states for label in s.labels]
-        return [*names, *own, "work"]
+        return [*names, *own, "state.work"]
 
     def constants(self) -> "Iterable[tuple[str, Any, Any]]":
         """Names, arrays and flat indices of what nothing changes in the course of a run."""

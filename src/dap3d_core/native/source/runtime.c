@@ -311,6 +311,8 @@ static int step_freely(dap3d_model *m, double t)
         numbers(m, integrations[k].times)[1] = t;
     integer_of(m)[I_next_report] = 1;
     integer_of(m)[I_row_count] = 0;
+    if (integer_of(m)[I_status] == FINISHED)
+        integer_of(m)[I_status] = RUNNING; /* the last step has reached the end, and reported it */
     if (real_of(m)[R_t] >= t)
         advance_once(m, -1); /* no step */
     while (integer_of(m)[I_row_count] == 0) {
@@ -323,10 +325,9 @@ static int step_freely(dap3d_model *m, double t)
     m->t = row[0];
     m->is_ahead = real_of(m)[R_t] != m->t;
     m->has_row = 0; /* outputs are not known yet */
-    int64_t status = integer_of(m)[I_status];
     if (m->t < t)
         return stopped(m);
-    m->is_over = status == FINISHED;
+    m->is_over = m->t == m->t_end;
     return DAP3D_OK;
 }
 
