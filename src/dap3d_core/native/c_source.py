@@ -16,7 +16,7 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, 
 from dap3d_core.native.outputs import Output
 from dap3d_core.native.prepared import Advance, PreparedRun
 
-KINDS = ("time", "input", "parameter", "output", "state", "derivative")
+KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator")
 
 
 @attrs.frozen
@@ -58,9 +58,13 @@ def variables_of(
     y = prepared.run.present.work.state[at.Y].tolist()
     states = list(enumerate(zip(prepared.state_names, units, y, strict=True)))
     found += [Variable(n, "state", unit, n, k, x) for k, (n, unit, x) in states]
-    return found + [
+    found += [
         Variable(f"der({n})", "derivative", rate_unit(unit), f"derivative of {n}", k)
         for k, (n, unit, _) in states
+    ]
+    switches = range(prepared.run.present.work.switches.shape[1])
+    return found + [
+        Variable(f"switch.{k + 1}", "indicator", "1", f"switch {k + 1}", k) for k in switches
     ]
 
 

@@ -12,11 +12,11 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.native.build import PLATFORMS, own_platform
+from dap3d_core.native.c_source import KINDS
 from dap3d_core.registry.arguments import checked
 from dap3d_core.simulation import SimulationError
 
 OK, ENDED = 0, 1
-_KINDS = ("time", "input", "parameter", "output", "state", "derivative")
 _MODEL, _INT, _DOUBLE, _TEXT = ctypes.c_void_p, ctypes.c_int, ctypes.c_double, ctypes.c_char_p
 #: Functions of dap3d.h: result, arguments.
 _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
@@ -45,7 +45,8 @@ class NativeLibrary:
     """The shared library of an exported model.
 
     Attributes:
-        kinds: name of a variable -> "time", "input", "parameter", "output", "state", "derivative".
+        kinds: name of a variable -> "time", "input", "parameter", "output", "state", "derivative",
+            "indicator".
         units: name of a variable -> its unit.
     """
 
@@ -62,7 +63,7 @@ class NativeLibrary:
         count = range(library.dap3d_count())
         names = [library.dap3d_name(v).decode() for v in count]
         self.references = {name: v for v, name in enumerate(names)}
-        self.kinds = {name: _KINDS[library.dap3d_kind(v)] for v, name in enumerate(names)}
+        self.kinds = {name: KINDS[library.dap3d_kind(v)] for v, name in enumerate(names)}
         self.units = {name: library.dap3d_unit(v).decode() for v, name in enumerate(names)}
 
     def start(self, t_end: float = 0.0) -> "NativeRun":

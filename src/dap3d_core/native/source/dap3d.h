@@ -59,7 +59,8 @@ enum {
 };
 
 /* Kinds of variables. */
-enum { DAP3D_TIME, DAP3D_INPUT, DAP3D_PARAMETER, DAP3D_OUTPUT, DAP3D_STATE, DAP3D_DERIVATIVE };
+enum { DAP3D_TIME, DAP3D_INPUT, DAP3D_PARAMETER, DAP3D_OUTPUT, DAP3D_STATE, DAP3D_DERIVATIVE,
+       DAP3D_INDICATOR };
 
 /* ---------------------------------------------------------------------- instances */
 

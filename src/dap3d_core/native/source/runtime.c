@@ -178,6 +178,12 @@ double dap3d_get(dap3d_model *m, int v)
         call(m, RHS, m->t, m->row + 1, rates, STATES);
         return rates[k];
     }
+    case DAP3D_INDICATOR: {
+        double values[SWITCHES + 1];
+        report(m);
+        call(m, WATCH, m->t, m->row + 1, values, SWITCHES);
+        return values[k];
+    }
     default: return NAN;
     }
 }
