@@ -177,8 +177,9 @@ def link(
     extra = {".dylib": ["-install_name", f"@rpath/{library.name}"]}.get(target.library, [])
     everything = [str(made), *map(str, files)]
     _run([*compiler, "-shared", *strip, *extra, *everything, *math, "-o", str(library)])
+    for imports in library.parent.glob(f"{source.stem}.lib"):  # as zig calls it
+        imports.replace(library.with_suffix(".lib"))
     if archive is not None:
         archive.unlink(missing_ok=True)
-        is_zig = len(compiler) > 1
-        ar = [*compiler[:3], "ar"] if is_zig else ["ar"]
-        _run([*(ar[:2] + ["ziglang", "ar"] if is_zig else ar), "rcs", str(archive), *everything])
+        ar = ["ar"] if len(compiler) == 1 else [sys.executable, "-m", "ziglang", "ar"]
+        _run([*ar, "rcs", str(archive), *everything])
