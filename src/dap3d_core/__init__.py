@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from dap3d_core.exchange import export
-    from dap3d_core.formats.export_model import export_model
     from dap3d_core.formats.import_model import import_matlab, import_model
     from dap3d_core.interface import PluginError
+    from dap3d_core.native.export_model import export_model
+    from dap3d_core.native.library import load_native
     from dap3d_core.plot import animate, plot
     from dap3d_core.registry import load_registry
     from dap3d_core.report import report
@@ -73,7 +74,7 @@ _HOMES = {
     "equilibrium": ("simulation.equilibrium.equilibrium", "equilibrium"),
     "equilibrium_path": ("study.equilibrium_path", "equilibrium_path"),
     "export": ("exchange", "export"),
-    "export_model": ("formats.export_model", "export_model"),
+    "export_model": ("native.export_model", "export_model"),
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("formats.import_model", "import_matlab"),
     "import_model": ("formats.import_model", "import_model"),
@@ -82,6 +83,7 @@ _HOMES = {
     "kinematics": ("simulation.kinematics.kinematics", "kinematics"),
     "linearize": ("simulation.linearization.linearization", "linearize"),
     "load": ("scene", "load"),
+    "load_native": ("native.library", "load_native"),
     "load_registry": ("registry", "load_registry"),
     "modes_over": ("study.modes_over", "modes_over"),
     "objective": ("study.sensitivities.objective", "objective"),
@@ -131,6 +133,7 @@ __all__ = [
     "kinematics",
     "linearize",
     "load",
+    "load_native",
     "load_registry",
     "modes_over",
     "objective",

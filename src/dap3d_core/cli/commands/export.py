@@ -2,9 +2,11 @@
 
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import click
 
+from dap3d_core.cli.commands import export_native as native
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusing
@@ -15,11 +17,12 @@ from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusi
     options.RESULT,
     click.option("-f", "--format", "kind", metavar="NAME",
                  help="vtk, gltf, mat or csv of a result, by default that of the file, or vtk; "
-                 "urdf, mjcf or that of a plugin of a MODEL."),
+                 "urdf, mjcf, c, fmu or that of a plugin of a MODEL."),
     options.output("A file; RESULT, or the name of MODEL, and the suffix by default."),
     options.FPS, options.MODEL_OF_RESULT, options.ALLOW_CODE,
     click.option("--strict", is_flag=True,
                  help="Refuse a MODEL if something would be left out."),
+    *native.OPTIONS.values(),
     options.FORCE, options.JSON, options.QUIET,
 )  # fmt: skip
 def export(
@@ -34,6 +37,7 @@ def export(
     force: bool,
     as_json: bool,
     quiet: bool,
+    **of_native: Any,
 ) -> int:
     """Write a RESULT, or a MODEL, to a file of another program.
 
@@ -42,12 +46,14 @@ def export(
     Octave, csv a column for each component.
 
     urdf and mjcf are models: bodies, joints, loops, and what acts in joints, of a MODEL in the
-    place of RESULT. What they cannot say is refused, or listed.
+    place of RESULT. What they cannot say is refused, or listed. c (a library for C) and fmu (a
+    model for co-simulation and model exchange) run without Python, with the numbers of dap3d run.
 
     \b
     dap3d export pen1.nc --format vtk
     dap3d export pen1.nc -o pen1.glb --fps 60
     dap3d export fourbar4 --format mjcf
+    dap3d export crane -o crane.fmu --platform linux --platform windows
 
     Ctrl-C leaves no file.
     """
@@ -58,6 +64,10 @@ def export(
     from dap3d_core.exchange import check_fps, exporter_of, result_exporters
     from dap3d_core.result import ResultError
 
+    if native.is_native(kind, output):
+        return native.export_native(result, kind, output, strict=strict, force=force,
+                                    allow_code=allow_code, as_json=as_json, **of_native)
+    native.refuse_native(of_native)
     if kind not in (known := result_exporters()) and kind is not None:
         return _export_model(result, kind, output, strict=strict, force=force, as_json=as_json)
     target = output_path(result, output, known[kind or "vtk"].suffix)
@@ -95,9 +105,9 @@ def _export_model(
 
     formats = extensions("exporter")
     if kind not in formats.keywords:
-        near = nearest(kind, formats.keywords)
+        near = nearest(kind, known := [*formats.keywords, "c", "fmu"])
         hint = f"did you mean {near!r}? " if near else ""
-        raise Refused(f"--format {kind}: unknown; {hint}formats: {', '.join(formats.keywords)}")
+        raise Refused(f"--format {kind}: unknown; {hint}formats: {', '.join(known)}")
     scene = dap.load(model)
     name = Path(model).stem if Path(model).is_file() else Path(model).name
     target = Path(output) if output is not None else Path(name + formats.load(kind).suffix)

@@ -30,6 +30,8 @@ CLEAN_EVERY = 50
 ROOM = 32 * 2**20
 #: Optimisation levels.
 UNOPTIMISED, OPTIMISED = 0, 3
+#: Of code that is loaded into this process, and that is linked: relocation and code model.
+RELOCATION, CODE_MODEL = ("static", "pic"), ("jitdefault", "small")
 _lock = threading.RLock()
 #: Execution engines; loaded code stays for the life of the process.
 _engines: list[Any] = []
@@ -96,6 +98,13 @@ def _llvm() -> Any:
     return llvm
 
 
+def initialise_all_targets() -> None:
+    """Let ``compile_ir`` compile for every target that LLVM knows."""
+    llvm = _llvm()
+    llvm.initialize_all_targets()
+    llvm.initialize_all_asmprinters()
+
+
 @cache
 def compiler() -> str:
     """Digest of this compiler's sources."""
@@ -111,22 +120,25 @@ def identity() -> str:
     return f"{llvmlite.__version__} {_llvm().llvm_version_info} {processor()} {compiler()}"
 
 
-def _target_machine(level: int, target: Processor) -> Any:
+def _target_machine(level: int, target: Processor, *, is_linked: bool = False) -> Any:
     return _llvm().Target.from_triple(target.triple).create_target_machine(
-        cpu=target.name, features=target.features, opt=level, reloc="static",
-        codemodel="jitdefault", jit=True,
+        cpu=target.name, features=target.features, opt=level, reloc=RELOCATION[is_linked],
+        codemodel=CODE_MODEL[is_linked], jit=not is_linked,
     )  # fmt: skip
 
 
-def compile_ir(text: str, level: int, target: Processor | None = None) -> bytes:
-    """Object code of a module of LLVM IR.
+def compile_ir(
+    text: str, level: int, target: Processor | None = None, *, is_linked: bool = False
+) -> bytes:
+    """Object code of a module of LLVM IR; ``is_linked``: for the linker of a shared library.
 
     Raises:
         MemoryError: there is too little left.
     """
     _check_room(4 * len(text))
     llvm, target = _llvm(), target or processor()
-    machine, module = _target_machine(level, target), llvm.parse_assembly(text)
+    machine = _target_machine(level, target, is_linked=is_linked)
+    module = llvm.parse_assembly(text)
     module.triple, module.data_layout = target.triple, str(machine.target_data)
     module.verify()
     options = llvm.create_pipeline_tuning_options(speed_level=level)

@@ -35,6 +35,7 @@ class Unit:
 
     Attributes:
         symbols: NAME_0, NAME_1, ...: one for each function.
+        write: as given; writes the code anew, for another target.
         results: what ``write`` returned with the code, read back from the object file.
         cost: estimated seconds to optimise it.
     """
@@ -58,7 +59,7 @@ class Unit:
             optimise: compile optimised code at once; for short code.
             ready_name: name among ready-made objects, of which symbols are made as well.
         """
-        self.name, self._write = name, write
+        self.name, self.write = name, write
         symbol = (ready_name or name).replace("-", "_")
         self.symbols = [f"{symbol}_{k}" for k in range(count)]
         self.path = None if folder is None else folder / f"{name}.o"
@@ -87,7 +88,7 @@ class Unit:
 
     def fresh_text(self, symbols: list[str]) -> str:
         """LLVM IR of the unit under other symbols; also where its code was loaded."""
-        return self._write(symbols)[0]
+        return self.write(symbols)[0]
 
     def register_slot(self, table: Any, index: int, k: int) -> None:
         """Store the address of function k in a table, now and whenever it changes."""

@@ -227,7 +227,7 @@ class SteppedRun:
         raise SimulationError(self._failure, self.result())
 
 
-class _OpenRun(Run):
+class OpenRun(Run):
     """A run with no reports of its own, and mostly without an end."""
 
     def function_notes(self) -> list[str]:
@@ -277,7 +277,7 @@ def start(
                            rtol=rtol, atol=atol, step=step, correct=correct, project=project,
                            correct_metric=correct_metric)  # fmt: skip
     with compiled.borrow_evaluator():
-        run = _OpenRun(compiled, settings, Callbacks(announce=announce))
+        run = OpenRun(compiled, settings, Callbacks(announce=announce))
         return SteppedRun(run, record=record)
 
 

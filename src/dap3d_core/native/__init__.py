@@ -1,0 +1,1 @@
+"""The native floor: models as C libraries and FMUs, which run without Python."""

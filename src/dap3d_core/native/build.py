@@ -1,0 +1,185 @@
+"""Objects and libraries of an exported model, for this and other platforms."""
+
+import importlib.util
+import platform
+import shutil
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import attrs
+
+from dap3d_core.kernels.compiler import objects
+from dap3d_core.kernels.compiler.objects import OPTIMISED, Processor
+from dap3d_core.kernels.compiler.units import Unit
+from dap3d_core.kernels.runtime.cache import cache_folder
+from dap3d_core.native.c_source import symbols_of
+from dap3d_core.native.prepared import refusal
+
+#: Compiler options; nothing is contracted, for the bits of plain arithmetic.
+OPTIONS = ("-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
+#: The extra with the compiler for every platform.
+EXTRA = "pip install 'dap3d[native]'"
+
+
+@attrs.frozen
+class Platform:
+    """A system and a processor that libraries are made for.
+
+    Attributes:
+        name: as a user gives it, such as "linux-x86-64".
+        processor: for LLVM.
+        zig: target of ``zig cc``.
+        library: suffix of a shared library.
+        fmi2, fmi3: its folder among the binaries of an FMU.
+    """
+
+    name: str
+    processor: Processor
+    zig: str
+    library: str
+    fmi2: str
+    fmi3: str
+
+    @property
+    def is_own(self) -> bool:
+        """True if it is that of this machine."""
+        return self.name == own_platform()
+
+
+def _platform(
+    name: str, triple: str, cpu: str, zig: str, library: str, fmi2: str, fmi3: str
+) -> Platform:
+    return Platform(name, Processor(triple, cpu, ""), zig, library, fmi2, fmi3)
+
+
+#: Oldest C library of Linux that libraries need.
+_GLIBC = "2.17"
+PLATFORMS = {
+    one.name: one
+    for one in (
+        _platform("linux-x86-64", "x86_64-unknown-linux-gnu", "x86-64",
+                  f"x86_64-linux-gnu.{_GLIBC}", ".so", "linux64", "x86_64-linux"),
+        _platform("linux-arm64", "aarch64-unknown-linux-gnu", "generic",
+                  f"aarch64-linux-gnu.{_GLIBC}", ".so", "aarch64-linux", "aarch64-linux"),
+        _platform("windows-x86-64", "x86_64-pc-windows-gnu", "x86-64",
+                  "x86_64-windows-gnu", ".dll", "win64", "x86_64-windows"),
+        _platform("windows-arm64", "aarch64-pc-windows-gnu", "generic",
+                  "aarch64-windows-gnu", ".dll", "aarch64-windows", "aarch64-windows"),
+        _platform("macos-x86-64", "x86_64-apple-macosx11.0.0", "x86-64",
+                  "x86_64-macos.11.0", ".dylib", "darwin64", "x86_64-darwin"),
+        _platform("macos-arm64", "arm64-apple-macosx11.0.0", "generic",
+                  "aarch64-macos.11.0", ".dylib", "aarch64-darwin", "aarch64-darwin"),
+    )
+}  # fmt: skip
+#: What a system alone stands for.
+SYSTEMS = {
+    "linux": ("linux-x86-64", "linux-arm64"),
+    "windows": ("windows-x86-64",),
+    "macos": ("macos-x86-64", "macos-arm64"),
+}
+
+
+def own_platform() -> str:
+    """The name of the platform of this machine."""
+    system = {"darwin": "macos", "win32": "windows"}.get(sys.platform, sys.platform)
+    is_arm = platform.machine().lower() in ("arm64", "aarch64")
+    return f"{system}-{'arm64' if is_arm else 'x86-64'}"
+
+
+def platforms_named(names: Sequence[str]) -> list[Platform]:
+    """Platforms by their names or systems; that of this machine where there are none.
+
+    Raises:
+        SceneError: an unknown name; no compiler for it.
+    """
+    found: dict[str, Platform] = {}
+    for name in names or (own_platform(),):
+        keys = SYSTEMS.get(name, (name,))
+        if not set(keys) <= set(PLATFORMS):
+            known = ", ".join([*SYSTEMS, *PLATFORMS])
+            raise refusal(f"there is no platform {name!r}", f"platforms: {known}")
+        found |= {key: PLATFORMS[key] for key in keys}
+    for one in found.values():
+        _compiler(one)
+    return list(found.values())
+
+
+def _compiler(target: Platform) -> list[str]:
+    """The command of a compiler for a platform."""
+    if importlib.util.find_spec("ziglang") is not None:
+        return [sys.executable, "-m", "ziglang", "cc", "-target", target.zig]
+    own = next((c for c in ("cc", "gcc", "clang") if shutil.which(c)), None)
+    if own is None:
+        raise refusal("there is no C compiler", f"{EXTRA} brings one")
+    if not target.is_own:
+        raise refusal(
+            f"the compiler of this machine makes no libraries for {target.name}",
+            f"{EXTRA} brings one that does",
+        )
+    return [own]
+
+
+def _run(command: list[str]) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        words = (done.stderr or done.stdout).strip().splitlines()
+        raise refusal(f"the compiler failed: {' | '.join(words[-6:])} [{' '.join(command[:6])}]")
+
+
+def object_of(unit: Unit, target: Platform) -> bytes:
+    """Object code of a unit for the linker of a platform, from the cache folder if it is there."""
+    folder = cache_folder()
+    path = None if folder is None else folder / f"{unit.name}.{target.name}.o"
+    stored = None if path is None else objects.read_object(path)
+    if stored is not None:
+        return stored[1]
+    symbols = symbols_of(unit)
+    text, _ = unit.write(symbols)
+    code = compiled(text, symbols, target)
+    if path is not None:
+        objects.write_object(path, [], code)
+    return code
+
+
+def compiled(text: str, symbols: Sequence[str], target: Platform) -> bytes:
+    """Object code of LLVM IR; its functions are seen within the library alone."""
+    for symbol in symbols:
+        for head in ("define void", "define double"):
+            text = text.replace(f"{head} @{symbol}(", f"define hidden {head[7:]} @{symbol}(")
+    objects.initialise_all_targets()
+    return objects.compile_ir(text, OPTIMISED, target.processor, is_linked=True)
+
+
+def build_objects(
+    units: Sequence[Unit], outputs: tuple[str, str], target: Platform, folder: Path
+) -> list[Path]:
+    """Object files of units and of the function (LLVM IR, symbol) of outputs, in a folder."""
+    codes = [object_of(unit, target) for unit in units]
+    codes.append(compiled(outputs[0], [outputs[1]], target))
+    files = []
+    for k, code in enumerate(codes):
+        files.append(folder / f"unit{k}.o")
+        files[-1].write_bytes(code)
+    return files
+
+
+def link(
+    source: Path, files: Sequence[Path], target: Platform, library: Path, archive: Path | None
+) -> None:
+    """Compile a C file and link it with objects to a shared library and a static one."""
+    compiler, made = _compiler(target), files[0].parent / f"{source.stem}.o"
+    pic = [] if target.library == ".dll" else ["-fPIC"]
+    _run([*compiler, *OPTIONS, *pic, "-c", str(source), "-o", str(made)])
+    math = [] if target.library == ".dll" else ["-lm"]
+    strip = [] if target.library == ".dylib" else ["-s"]
+    extra = {".dylib": ["-install_name", f"@rpath/{library.name}"]}.get(target.library, [])
+    everything = [str(made), *map(str, files)]
+    _run([*compiler, "-shared", *strip, *extra, *everything, *math, "-o", str(library)])
+    for imports in library.parent.glob(f"{source.stem}.lib"):  # as zig calls it
+        imports.replace(library.with_suffix(".lib"))
+    if archive is not None:
+        archive.unlink(missing_ok=True)
+        ar = ["ar"] if len(compiler) == 1 else [sys.executable, "-m", "ziglang", "ar"]
+        _run([*ar, "rcs", str(archive), *everything])

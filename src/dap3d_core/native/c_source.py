@@ -1,0 +1,242 @@
+"""The C text that belongs to one model: its memory, tables and variables."""
+
+import hashlib
+import re
+from collections.abc import Iterable, Sequence
+from itertools import groupby
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping.integration_state import IntegrationState
+from dap3d_core.kernels.compiler.units import Entry, Unit
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, W
+from dap3d_core.native.outputs import Output
+from dap3d_core.native.prepared import Advance, PreparedRun
+
+KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator")
+
+
+@attrs.frozen
+class Variable:
+    """A variable of an exported model.
+
+    Attributes:
+        name, unit, label: as in results.
+        kind: one of KINDS.
+        first: word of an input, index of others.
+        start: its value at the start.
+        words: of a parameter: words of the memory that it is, each with its sign.
+    """
+
+    name: str
+    kind: str
+    unit: str
+    label: str
+    first: int
+    start: float = 0.0
+    words: tuple[tuple[int, float], ...] = ()
+
+
+def variables_of(
+    prepared: PreparedRun, outputs: Sequence[Output], parameters: Sequence[Variable]
+) -> list[Variable]:
+    """The variables of a model in the order of their references."""
+    evaluator, image = prepared.evaluator, prepared.image
+    model, F = evaluator.model, evaluator.system.F
+    units = [*_state_units(prepared), "J"]
+    found = [Variable("time", "time", "s", "time", 0)]
+    for name, row, value in zip(
+        model.input_names, model.input_rows.tolist(), model.input_values.tolist(), strict=True
+    ):
+        word = image.at(F) + row * F.shape[1]
+        found.append(Variable(name, "input", "1", f"input {name}", word, value))
+    found += parameters
+    found += [Variable(o.name, "output", o.unit, o.label, k) for k, o in enumerate(outputs)]
+    y = prepared.run.present.work.state[at.Y].tolist()
+    states = list(enumerate(zip(prepared.state_names, units, y, strict=True)))
+    found += [Variable(n, "state", unit, n, k, x) for k, (n, unit, x) in states]
+    found += [
+        Variable(f"der({n})", "derivative", rate_unit(unit), f"derivative of {n}", k)
+        for k, (n, unit, _) in states
+    ]
+    switches = range(prepared.run.present.work.switches.shape[1])
+    return found + [
+        Variable(f"switch.{k + 1}", "indicator", "1", f"switch {k + 1}", k) for k in switches
+    ]
+
+
+def rate_unit(unit: str) -> str:
+    """The unit of a rate."""
+    return {"1": "1/s", "m/s": "m/s^2", "rad/s": "rad/s^2"}.get(unit, f"{unit}/s")
+
+
+def _state_units(prepared: PreparedRun) -> list[str]:
+    units = {"r": "m", "p": "1", "v": "m/s", "w": "rad/s", "z": "1"}
+    return [units.get(q, "1") for q in prepared.evaluator.coordinates.quantities]
+
+
+def symbols_of(unit: Unit) -> list[str]:
+    """C names of the functions of a unit in an exported model."""
+    digest = hashlib.sha256(unit.name.encode()).hexdigest()[:16]
+    return [f"dap3d_{digest}_{k}" for k in range(len(unit.symbols))]
+
+
+def symbol_of(entry: Entry) -> str:
+    """The C name of a function."""
+    return symbols_of(entry.unit)[entry.k]
+
+
+def units_of(prepared: PreparedRun) -> list[Unit]:
+    """The units of compiled code that a run calls, each once."""
+    entries = [*prepared.image.functions.values(), *(one.entry for one in prepared.advances)]
+    return list({entry.unit.name: entry.unit for entry in entries}.values())
+
+
+def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
+    """The text of data.h: what runtime.c takes from one model."""
+    image, system = prepared.image, prepared.evaluator.system
+    work = prepared.run.present.work
+    outputs = sum(v.kind == "output" for v in variables)
+    numbers = {
+        "WORDS": len(image.words),
+        "STATES": work.state.shape[1],
+        "ROW": work.rows.shape[1],
+        "CAPACITY": len(work.rows),
+        "OUTPUTS": outputs,
+        "INPUTS": sum(v.kind == "input" for v in variables),
+        "VARIABLES": len(variables),
+        "SWITCHES": work.switches.shape[1],
+        "PROJECTED": len(work.real) - at.PROJECTED,
+        "DRIVES": int(prepared.drives),
+        "INTEGRATIONS": len(prepared.advances),
+        "STOPS": len(prepared.stops),
+        "FUNCTIONS": image.at(prepared.functions),
+        "SYSTEM": image.at(system),
+        "LOOPS": image.at(prepared.evaluator.loops),
+        "BODIES": image.at(system.body),
+        "VALUES": image.at(system.F),
+        "BODY_COUNT": prepared.evaluator.model.body_count,
+        "BODY_WIDTH": BODY_WIDTH,
+        "BODY_V": V,
+        "BODY_W": W,
+        "BODY_A": A,
+        "BODY_MASS": MASS,
+        "BODY_JP": JP,
+    }
+    lines = [f"#define {name} {value}" for name, value in numbers.items()]
+    lines += _enumeration("R", IntegrationState.indices("real"))
+    lines += _enumeration("I", IntegrationState.indices("integer"))
+    lines += _memory(prepared)
+    places = [place for v in variables for place in v.words]
+    lines += _table(
+        "static const struct { int64_t word; double sign; } places[]",
+        (f"{{{word}, {sign:g}}}" for word, sign in places or [(0, 1.0)]),
+    )
+    lines += _table(
+        "static const struct { double t; int jumps; double needs; } stops[]",
+        (f"{{{s.t.hex()}, {int(s.jumps)}, {s.needs.hex()}}}" for s in prepared.stops)
+        if prepared.stops else ["{0.0, 0, 0.0}"],
+    )  # fmt: skip
+    lines += _table(
+        "static const struct { const char *name, *unit; int kind, first, count; } variables[]",
+        _rows_of(variables),
+    )
+    lines += [
+        "void dap3d_outputs(double, const double *, const double *, const double *, double *);"
+    ]
+    text = "\n".join(lines)
+    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
+    return f"#define IDENTITY 0x{digest}ULL\n{text}\n"
+
+
+def _rows_of(variables: Sequence[Variable]) -> list[str]:
+    rows, first = [], 0
+    for v in variables:
+        place = first if v.kind == "parameter" else v.first
+        first += len(v.words)
+        name, unit = c_text(v.name), c_text(v.unit)
+        rows.append(f"{{{name}, {unit}, DAP3D_{v.kind.upper()}, {place}, {len(v.words)}}}")
+    return rows
+
+
+def c_text(text: str) -> str:
+    """A string literal of C; other characters than those of ASCII by their bytes."""
+    escaped = "".join(
+        chr(b) if 32 <= b < 127 and chr(b) not in '"\\?' else f"\\{b:03o}" for b in text.encode()
+    )
+    return f'"{escaped}"'
+
+
+def _enumeration(prefix: str, indices: dict[str, int]) -> list[str]:
+    items = ", ".join(f"{prefix}_{name} = {k}" for name, k in indices.items())
+    return [f"enum {{ {items} }};"]
+
+
+def _table(head: str, rows: Iterable[str]) -> list[str]:
+    return [f"{head} = {{", *(f"    {row}," for row in rows), "};"]
+
+
+def _memory(prepared: PreparedRun) -> list[str]:
+    """Content of the memory without its zeros, and its addresses."""
+    image = prepared.image
+    runs, content = [], []
+    filled = np.flatnonzero(image.words).tolist()
+    for _, group in groupby(enumerate(filled), lambda pair: pair[1] - pair[0]):
+        part = [word for _, word in group]
+        runs.append(f"{{{part[0]}, {len(part)}}}")
+        content += [f"0x{int(image.words[word]) % 2**64:x}ULL" for word in part]
+    rows = [", ".join(content[k : k + 6]) for k in range(0, len(content), 6)]
+    lines = _table("static const uint32_t runs[][2]", runs)
+    lines += _table("static const uint64_t content[]", rows)
+    pairs = sorted(image.addresses.items())
+    lines += _table("static const uint32_t addresses[][2]", (f"{{{a}, {b}}}" for a, b in pairs))
+    functions = {word: symbol_of(entry) for word, entry in sorted(image.functions.items())}
+    lines += [f"void {symbol}(void);" for symbol in dict.fromkeys(functions.values())]
+    codes = (f"{{{word}, {symbol}}}" for word, symbol in functions.items())
+    lines += _table("static const struct { uint32_t word; void (*code)(void); } codes[]", codes)
+    for k, one in enumerate(prepared.advances):
+        lines += _loop(prepared, k, one)
+    rows = [_integration(prepared, k, one) for k, one in enumerate(prepared.advances)]
+    return lines + _table(
+        "static const struct {\n    int64_t real, integer, state, times, rows, sides;\n"
+        "    int implicit, keeps_step;\n    void (*advance)(int64_t *, int64_t);\n} integrations[]",
+        rows,
+    )
+
+
+def _loop(prepared: PreparedRun, k: int, one: Advance) -> list[str]:
+    """The function advance_K, which calls a compiled loop."""
+    symbol = symbol_of(one.entry)
+    types = ", ".join(["void *"] * len(one.arguments))
+    given = ", ".join(f"w + {prepared.image.at(part)}" for part in one.arguments)
+    return [
+        f"void {symbol}({types}, int64_t);",
+        f"static void advance_{k}(int64_t *w, int64_t budget) {{ {symbol}({given}, budget); }}",
+    ]
+
+
+def _integration(prepared: PreparedRun, k: int, one: Advance) -> str:
+    work, place = one.integration.work, prepared.image.at
+    arrays: list[Any] = [work.real, work.integer, work.state, work.times, work.rows]
+    words = [str(place(array)) for array in arrays]
+    words.append(str(place(work.switches[at.SIDE]) if work.switch_count else 0))
+    flags = int(one.integration.implicit), int(one.integration.keeps_step)
+    return f"{{{', '.join(words)}, {flags[0]}, {flags[1]}, advance_{k}}}"
+
+
+def variables_header(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
+    """The text of variables.h: references of the variables."""
+    title = prepared.compiled.scene.description or prepared.compiled.scene.name
+    lines = [f"/* Variables of the model: {title}", "   Units are in brackets. */", "enum {"]
+    used: set[str] = set()
+    for k, v in enumerate(variables):
+        word = re.sub(r"\W+", "_", v.name).strip("_").upper()
+        while word in used:
+            word += "_"
+        used.add(word)
+        note = f"{v.kind}: {v.name} [{v.unit}]".replace("*/", "* /")
+        lines.append(f"    V_{word} = {k}, /* {note} */")
+    return "\n".join([*lines, "};", ""])

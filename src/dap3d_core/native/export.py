@@ -1,0 +1,217 @@
+"""``export_native``: a scene as a C library, or as an FMU."""
+
+import os
+import re
+import shutil
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import attrs
+
+from dap3d_core.native.build import Platform, build_objects, link, platforms_named
+from dap3d_core.native.c_source import (
+    Variable,
+    data_of,
+    units_of,
+    variables_header,
+    variables_of,
+)
+from dap3d_core.native.outputs import SYMBOL, outputs_of
+from dap3d_core.native.prepared import PreparedRun, refusal, tunable_words
+from dap3d_core.registry import Registry
+from dap3d_core.scene import Scene, load
+from dap3d_core.study.parameters import parameters_named, with_values
+
+#: Formats, with the suffix of their files; "c" is a folder.
+NATIVE_FORMATS = {"c": "", "fmu": ".fmu"}
+SOURCE = Path(__file__).parent / "source"
+#: Factors on a parameter by which its places in the memory are found, and summands where it is 0.
+TRIALS = (1.001, 0.9975)
+
+
+@attrs.frozen
+class NativeExport:
+    """The report of an export to C or an FMU.
+
+    Attributes:
+        format: "c" or "fmu".
+        path: the folder or the file.
+        platforms: names of those that there are libraries for.
+        inputs, parameters, outputs: names of the variables.
+        left_out: outputs of the scene that compiled code does not compute.
+        size: bytes of the largest shared library.
+    """
+
+    format: str
+    path: Path
+    platforms: tuple[str, ...]
+    inputs: tuple[str, ...]
+    parameters: tuple[str, ...]
+    outputs: tuple[str, ...]
+    left_out: tuple[str, ...]
+    size: int
+
+
+def export_native(
+    scene: Scene | str | os.PathLike[str],
+    path: str | os.PathLike[str],
+    *,
+    format: str,
+    outputs: Sequence[str] | None = None,
+    parameters: Sequence[str] = (),
+    platforms: Sequence[str] = (),
+    fmi: int = 3,
+    strict: bool = False,
+    force: bool = False,
+    allow_code: bool = False,
+    registry: Registry | None = None,
+    **settings: Any,
+) -> NativeExport:
+    """Write a scene as a C library or an FMU; arguments as of ``export_model``.
+
+    Raises:
+        SceneError: the scene is invalid; something cannot be exported: its name, and why.
+        SimulationError: its run cannot begin.
+        OSError: a file cannot be written, or exists and ``force`` is off.
+    """
+    target = Path(path)
+    if fmi not in (2, 3):
+        raise refusal(f"there is no FMI {fmi}", "FMI 3 and 2 are written")
+    if target.exists() and not force:
+        raise FileExistsError(f"{target} exists; force overwrites it")
+    if target.exists() and target.is_dir() != (format == "c"):
+        what = "a folder" if target.is_dir() else "a file"
+        raise refusal(f"{target} is {what}", "give another path")
+    chosen = platforms_named(platforms)
+    given = scene if isinstance(scene, Scene) else load(scene)
+    options = {"allow_code": allow_code, "registry": registry} | settings
+    prepared = PreparedRun(given, **options)
+    found, text, left_out = outputs_of(prepared, outputs)
+    if strict and left_out:
+        raise refusal(left_out[0], "name the outputs to be exported")
+    tunable = [_parameter(prepared, name, options) for name in parameters]
+    variables = variables_of(prepared, found, tunable)
+    name = re.sub(r"\W+", "_", str(given.name or target.stem)) or "model"
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        (folder / "data.h").write_text(data_of(prepared, variables))
+        for file in SOURCE.iterdir():
+            shutil.copy(file, folder / file.name)
+        model = Exported(prepared, variables, name, folder, (text, SYMBOL))
+        if format == "c":
+            size = _write_folder(model, chosen, target)
+        else:
+            from dap3d_core.native.fmu import write_fmu
+
+            size = write_fmu(model, chosen, target, fmi)
+    names = {
+        kind: tuple(v.name for v in variables if v.kind == kind)
+        for kind in ("input", "parameter", "output")
+    }
+    return NativeExport(
+        format, target, tuple(p.name for p in chosen), names["input"], names["parameter"],
+        names["output"], tuple(left_out), size,
+    )  # fmt: skip
+
+
+@attrs.frozen
+class Exported:
+    """A model on its way into files.
+
+    Attributes:
+        prepared, variables: of the model.
+        name: for files.
+        folder: with the C sources, data.h among them.
+        outputs: LLVM IR and symbol of the function of outputs.
+    """
+
+    prepared: PreparedRun
+    variables: list[Variable]
+    name: str
+    folder: Path
+    outputs: tuple[str, str]
+
+    def link(self, source: str, target: Platform, library: Path, archive: Path | None) -> int:
+        """Make libraries of a C file in the folder; bytes of the shared one."""
+        objects = self.folder / target.name
+        objects.mkdir(exist_ok=True)
+        files = build_objects(units_of(self.prepared), self.outputs, target, objects)
+        library.parent.mkdir(parents=True, exist_ok=True)
+        link(self.folder / source, files, target, library, archive)
+        return library.stat().st_size
+
+
+def _parameter(prepared: PreparedRun, name: str, options: dict[str, Any]) -> Variable:
+    """A parameter as a variable.
+
+    Raises:
+        SceneError: no such number; what depends on it is assembled before the run.
+    """
+    compiled = prepared.compiled
+    (parameter,) = parameters_named(compiled.checked, [name])
+    value = parameter.value
+    if value is None:
+        raise refusal(f"parameter {name} has no number in the scene", "give it one")
+    trials = [value * factor if value else factor for factor in TRIALS]
+    others = [
+        (x, PreparedRun(with_values(compiled.scene, [parameter], [x]), **options)) for x in trials
+    ]
+    words = tunable_words(prepared, others, value)
+    if words is None:
+        raise refusal(
+            f"parameter {name} cannot be set in an exported model: masses, geometry, the start or "
+            "the assembly depend on it, or nothing does",
+            "export a model for each value, or name a stiffness, damping or similar number",
+        )
+    return Variable(
+        name, "parameter", parameter.unit, f"parameter {name}", 0, value, tuple(words.items())
+    )
+
+
+def _write_folder(model: Exported, platforms: Sequence[Platform], target: Path) -> int:
+    """Write the folder of a C library; bytes of the largest shared one."""
+    target.mkdir(parents=True, exist_ok=True)
+    size = 0
+    for one in platforms:
+        folder = target / one.name
+        folder.mkdir(exist_ok=True)
+        archive = folder / f"lib{model.name}.a"
+        library = folder / library_name(model.name, one)
+        size = max(size, model.link("runtime.c", one, library, archive))
+    header = variables_header(model.prepared, model.variables)
+    (target / "variables.h").write_text(header, encoding="utf-8", newline="\n")
+    shutil.copy(SOURCE / "dap3d.h", target / "dap3d.h")
+    words = _words(model, platforms)
+    for file in ("example.c", "CMakeLists.txt", "README.md"):
+        text = (SOURCE / file).read_text(encoding="utf-8")
+        for key, value in words.items():
+            text = text.replace(f"@{key}@", str(value))
+        (target / file).write_text(text, encoding="utf-8", newline="\n")
+    return size
+
+
+def library_name(name: str, target: Platform) -> str:
+    """File name of a shared library."""
+    return f"{'' if target.library == '.dll' else 'lib'}{name}{target.library}"
+
+
+def _words(model: Exported, platforms: Sequence[Platform]) -> dict[str, Any]:
+    from dap3d_core.result.metadata import current_versions
+
+    prepared = model.prepared
+    settings = prepared.run.settings
+    return {
+        "NAME": model.name,
+        "DESCRIPTION": str(prepared.compiled.scene.description or model.name),
+        "VERSION": current_versions()["dap3d"],
+        "PLATFORMS": ", ".join(p.name for p in platforms),
+        "FIRST": platforms[0].name,
+        "OUTPUTS": sum(v.kind == "output" for v in model.variables),
+        "T_END": repr(prepared.t_end),
+        "METHOD": prepared.compiled.method,
+        "INTEGRATOR": settings.integrator,
+        "RTOL": settings.rtol,
+        "ATOL": settings.atol,
+    }

@@ -1,0 +1,177 @@
+"""``load_native``: an exported model seen from Python, for comparison."""
+
+import ctypes
+import os
+import shutil
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.native.build import PLATFORMS, own_platform
+from dap3d_core.native.c_source import KINDS
+from dap3d_core.registry.arguments import checked
+from dap3d_core.simulation import SimulationError
+
+OK, ENDED = 0, 1
+_MODEL, _INT, _DOUBLE, _TEXT = ctypes.c_void_p, ctypes.c_int, ctypes.c_double, ctypes.c_char_p
+#: Functions of dap3d.h: result, arguments.
+_SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
+    "create": (_MODEL, [_DOUBLE]),
+    "free": (None, [_MODEL]),
+    "reset": (None, [_MODEL]),
+    "message": (_TEXT, [_MODEL]),
+    "count": (_INT, []),
+    "name": (_TEXT, [_INT]),
+    "unit": (_TEXT, [_INT]),
+    "kind": (_INT, [_INT]),
+    "set": (_INT, [_MODEL, _INT, _DOUBLE]),
+    "get": (_DOUBLE, [_MODEL, _INT]),
+    "get_all": (_INT, [_MODEL, _MODEL, _INT, _MODEL]),
+    "time": (_DOUBLE, [_MODEL]),
+    "step_to": (_INT, [_MODEL, _DOUBLE]),
+    "state_size": (ctypes.c_size_t, []),
+    "save": (_INT, [_MODEL, _MODEL]),
+    "load": (_INT, [_MODEL, _MODEL]),
+    "state_count": (_INT, []),
+    "derivatives": (_INT, [_MODEL, _DOUBLE, _MODEL, _MODEL]),
+}
+
+
+class NativeLibrary:
+    """The shared library of an exported model.
+
+    Attributes:
+        kinds: name of a variable -> "time", "input", "parameter", "output", "state", "derivative",
+            "indicator".
+        units: name of a variable -> its unit.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Args: the file."""
+        # a copy: the loader takes a file that was written anew for the one that it knows
+        folder = tempfile.mkdtemp()
+        library = ctypes.CDLL(str(shutil.copy(path, folder)))
+        shutil.rmtree(folder, ignore_errors=True)  # Windows keeps a file that is loaded
+        for name, (result, arguments) in _SIGNATURES.items():
+            function = getattr(library, f"dap3d_{name}")
+            function.restype, function.argtypes = result, arguments
+        self.functions: Any = library
+        count = range(library.dap3d_count())
+        names = [library.dap3d_name(v).decode() for v in count]
+        self.references = {name: v for v, name in enumerate(names)}
+        self.kinds = {name: KINDS[library.dap3d_kind(v)] for v, name in enumerate(names)}
+        self.units = {name: library.dap3d_unit(v).decode() for v, name in enumerate(names)}
+
+    def start(self, t_end: float = 0.0) -> "NativeRun":
+        """Begin a run to t_end, s; 0 for one whose end is not known."""
+        return NativeRun(self, t_end)
+
+
+class NativeRun:
+    """A run of an exported model."""
+
+    def __init__(self, library: NativeLibrary, t_end: float) -> None:
+        """Args: the library, and the end of the run, s."""
+        self._library, self._call = library, library.functions
+        self._model = self._call.dap3d_create(float(t_end))
+        if not self._model:
+            raise ValueError(f"t_end is {t_end!r}; it should be a positive number of seconds, or 0")
+
+    def __del__(self) -> None:
+        if getattr(self, "_model", None):
+            self._call.dap3d_free(self._model)
+
+    @property
+    def t(self) -> float:
+        """Time reached, s."""
+        return float(self._call.dap3d_time(self._model))
+
+    def _reference(self, name: str) -> int:
+        if name not in self._library.references:
+            raise KeyError(f"the model has no variable {name!r}")
+        return self._library.references[name]
+
+    def __getitem__(self, name: str) -> float:
+        """The value of a variable."""
+        return float(self._call.dap3d_get(self._model, self._reference(name)))
+
+    def __setitem__(self, name: str, value: float) -> None:
+        """Set an input or a parameter."""
+        if self._call.dap3d_set(self._model, self._reference(name), float(value)) != OK:
+            raise ValueError(self.message)
+
+    def values(self, names: Sequence[str]) -> Floats:
+        """(k,) values of variables."""
+        references = np.array([self._reference(name) for name in names], dtype=np.int32)
+        values = np.zeros(len(references))
+        self._call.dap3d_get_all(
+            self._model, references.ctypes.data, len(references), values.ctypes.data
+        )
+        return values
+
+    @property
+    def message(self) -> str:
+        """Why the last call failed."""
+        return str(self._call.dap3d_message(self._model).decode())
+
+    def step_to(self, t: float) -> bool:
+        """Go on to a time, s; False where the model has ended the run before.
+
+        Raises:
+            SimulationError: the run cannot go on.
+        """
+        result = self._call.dap3d_step_to(self._model, float(t))
+        if result not in (OK, ENDED):
+            raise SimulationError(self.message)
+        return bool(result == OK)
+
+    def save(self) -> bytes:
+        """The state of the run."""
+        state = ctypes.create_string_buffer(self._call.dap3d_state_size())
+        self._call.dap3d_save(self._model, state)
+        return state.raw
+
+    def load(self, state: bytes) -> None:
+        """Continue from a saved state.
+
+        Raises:
+            ValueError: it is of another model.
+        """
+        if len(state) != self._call.dap3d_state_size():
+            raise ValueError("the state is not one of this model")
+        if self._call.dap3d_load(self._model, state) != OK:
+            raise ValueError(self.message)
+
+    def derivatives(self, t: float, y: Floats) -> Floats:
+        """(k,) derivatives of the states y at t."""
+        given = np.ascontiguousarray(y, dtype=float)
+        if given.shape != (self._call.dap3d_state_count(),):
+            raise ValueError(f"y has {given.size} numbers, not {self._call.dap3d_state_count()}")
+        rates = np.zeros(len(given))
+        if self._call.dap3d_derivatives(
+            self._model, float(t), given.ctypes.data, rates.ctypes.data
+        ):
+            raise SimulationError(self.message)
+        return rates
+
+
+@checked
+def load_native(folder: str | os.PathLike[str]) -> NativeLibrary:
+    """Load the shared library of a model that ``export_model`` wrote with ``format="c"``.
+
+    Args:
+        folder: that was written.
+
+    Raises:
+        FileNotFoundError: there is no library for this machine in it.
+    """
+    place, name = Path(folder), own_platform()
+    suffix = PLATFORMS[name].library if name in PLATFORMS else ".so"
+    found = sorted((place / name).glob(f"*{suffix}"))
+    if not found:
+        raise FileNotFoundError(f"{place} has no library for {name}")
+    return NativeLibrary(found[0])

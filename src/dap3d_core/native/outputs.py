@@ -1,0 +1,365 @@
+"""Outputs of an exported model: quantities of a result as compiled code.
+
+They are traced like kernels (kernels/compiler/trace.py), from the arrays of bodies as a report has
+placed them, and the reported row.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.assembly.motion.joint_motion import ROTATION, TRANSLATION
+from dap3d_core.formulations import REPORT
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
+from dap3d_core.integrators.stepping.integration_state import Y
+from dap3d_core.kernels import scalar_math, vectors
+from dap3d_core.kernels.compiler import types as t
+from dap3d_core.kernels.compiler.trace import NumberArray, Symbol, Tracer
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R, V, W
+from dap3d_core.model.joint_angles import joint_angle_name
+from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
+from dap3d_core.native.prepared import PreparedRun, refusal
+from dap3d_core.result import Result, ResultError, RunMetadata
+from dap3d_core.result.errors import UnknownNameError
+from dap3d_core.result.quantities.lookup import find
+from dap3d_core.scene import Mistake, SceneError
+from dap3d_core.scene.expressions.expression import WORDS
+from dap3d_core.simulation.control.state_view import NAMES, conjugate, product
+
+#: Quantities of a body that an export without outputs has.
+OF_BODIES = ("r", "p", "rd", "w")
+SYMBOL = "dap3d_outputs"
+#: t, bodies (n + 1, BODY_WIDTH), the reported row without t, functions (k, 5); the values.
+_FUNCTION = """define hidden void @{symbol}(double %t, ptr %bodies, ptr %row, ptr %F,
+                                ptr %out) nounwind {{
+entry:
+{body}
+  ret void
+}}
+"""
+TURN = 2.0 * math.pi
+
+
+@attrs.frozen
+class Output:
+    """A number that an exported model gives.
+
+    Attributes:
+        name: of the quantity, with its component.
+        unit, label: as of ``Quantity``.
+    """
+
+    name: str
+    unit: str
+    label: str
+
+
+class NotExportedError(Exception):
+    """A quantity that compiled code does not compute; its name."""
+
+
+def outputs_of(
+    prepared: PreparedRun, names: Sequence[str] | None
+) -> tuple[list[Output], str, list[str]]:
+    """Outputs, LLVM IR of the function that computes them, and outputs of the scene left out.
+
+    Args:
+        prepared: the run.
+        names: of quantities; None for the outputs of the scene that can be exported, and where it
+            has none, the motion of its bodies.
+
+    Raises:
+        SceneError: a name is unknown, or what it names cannot be exported.
+    """
+    model = prepared.evaluator.model
+    chosen = list(names) if names is not None else list(prepared.compiled.scene.outputs)
+    if not chosen and names is None:
+        chosen = [f"{body}.{q}" for body in model.body_names for q in OF_BODIES]
+    chosen = [name for name in dict.fromkeys(chosen) if name not in model.input_names]
+    result, tracer = _first_row(prepared), Tracer()
+    quantities = _Quantities(prepared, result, tracer)
+    found: list[Output] = []
+    left_out: list[str] = []
+    values: list[Any] = []
+    for name in chosen:
+        try:
+            quantity = find(result, name)
+            value = quantities.value(name)
+        except (UnknownNameError, ResultError) as error:
+            raise SceneError([Mistake("outputs", name, str(error))]) from error
+        except NotExportedError as error:
+            if names is None:
+                left_out.append(f"outputs.{name}: {error} is computed by Python alone")
+                continue
+            raise refusal(
+                f"output {name}: {error} is computed by Python alone",
+                "name motions of bodies, points and joints, energies, and expressions of these",
+            ) from None
+        ends = [f".{c}" for c in quantity.components] or [""]
+        parts = list(value) if isinstance(value, tuple) else [value]
+        found += [Output(name + end, quantity.unit, quantity.label) for end in ends]
+        values += parts
+    for k, x in enumerate(values):
+        word = tracer.word(x)
+        place = tracer.new(f"getelementptr inbounds double, ptr %out, i64 {k}")
+        tracer.line(f"store double {word}, ptr {place}, align 8")
+    program = tracer.program
+    program.text.append(_FUNCTION.format(symbol=SYMBOL, body="\n".join(tracer.lines)))
+    return found, program.module(), left_out
+
+
+@IGNORE_FLOAT_ERRORS
+def _first_row(prepared: PreparedRun) -> Result:
+    """The result of the start alone, for names, units and components."""
+    evaluator, y = prepared.evaluator, prepared.run.present.work.state[Y]
+    out = np.zeros(evaluator.report_size)
+    evaluator.functions[REPORT](0.0, y, out, evaluator.system, evaluator.loops)
+    row = np.concatenate([[0.0], evaluator.body_state(y), out])[None]
+    record = RunMetadata(scene_text=prepared.compiled.scene_text)
+    return Result.of_run(evaluator.model, evaluator.with_inputs(row), record, lambda: evaluator)
+
+
+class _Quantities:
+    """Quantities as symbols: a number, or a tuple of components."""
+
+    def __init__(self, prepared: PreparedRun, result: Result, tracer: Tracer) -> None:
+        self._tracer, self._result, self._prepared = tracer, result, prepared
+        model = self._model = prepared.evaluator.model
+        self._body = NumberArray(tracer, "%bodies", width=BODY_WIDTH)
+        self._row, self._F = NumberArray(tracer, "%row"), NumberArray(tracer, "%F", width=5)
+        self._t = Symbol(tracer, t.Value(t.FLOAT, ("%t",)))
+        #: Of the report in a row: behind the integrated state.
+        self._report = len(prepared.run.present.work.state[Y])
+        self._layout = model.report_layout
+
+    def value(self, name: str) -> Any:
+        """A quantity by its name in results.
+
+        Raises:
+            NotExportedError: compiled code does not compute it.
+        """
+        model = self._model
+        if name in self._result.outputs:
+            return self._result.outputs[name].fold(self.value, self._call)
+        if name in model.input_names:
+            return self._F[int(model.input_rows[model.input_names.index(name)]), 0]
+        system = self._of_system().get(name)
+        if system is not None:
+            return system()
+        whole, _, component = name.rpartition(".")
+        for owner, attribute in self._parsed(name):
+            return self._of_owner(owner, attribute, name)
+        if whole in self._result.outputs or list(self._parsed(whole)):
+            vector = self.value(whole)
+            if component == "norm" and isinstance(vector, tuple):
+                return scalar_math.sqrt(_dot(vector, vector))
+            columns = find(self._result, whole).components
+            if isinstance(vector, tuple) and component in columns:
+                return vector[columns.index(component)]
+        raise NotExportedError(name)
+
+    def _parsed(self, name: str) -> list[tuple[str, str]]:
+        """The owner and the attribute of a name, where it is a whole quantity of one."""
+        owner, _, attribute = name.rpartition(".")
+        model = self._model
+        known = {*model.body_names, *self._result.summary.point_names, *model.joint_names}
+        return [(owner, attribute)] if owner in known else []
+
+    def _of_owner(self, owner: str, attribute: str, name: str) -> Any:
+        model, summary = self._model, self._result.summary
+        if owner in model.body_names and attribute in _OF_BODY:
+            return self._of_body(1 + model.body_names.index(owner), attribute)
+        if owner in summary.point_index and attribute in _OF_POINT:
+            k = summary.point_index[owner]
+            local = tuple(summary.point_local[k].tolist())
+            return self._of_point(int(summary.point_body[k]), local, _OF_POINT[attribute])
+        if owner in model.joint_names:
+            joint = model.joint_names.index(owner)
+            if attribute == "lambda":
+                first, rows = int(model.joint_start[joint]), int(model.joint_rows[joint])
+                return tuple(self._reported("Lam", first + k) for k in range(rows))
+            found = self._coordinate(owner, joint, attribute)
+            if found is not None:
+                return found
+        raise NotExportedError(name)
+
+    # ---------------------------------------------------------------- bodies, points, the whole
+
+    def _vector(self, body: int, first: int, size: int = 3) -> tuple[Any, ...]:
+        if body == 0:
+            return tuple(1.0 if first == P and k == 0 else 0.0 for k in range(size))
+        return tuple(self._body[body, first + k] for k in range(size))
+
+    def _axes(self, body: int) -> tuple[Any, ...]:
+        """Rows of the rotation matrix of a body."""
+        if body == 0:
+            return (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+        return tuple(self._vector(body, A + 3 * k) for k in range(3))
+
+    def _reported(self, part: str, k: int) -> Any:
+        return self._row[self._report + self._layout[part].start + k]
+
+    def _acceleration(self, body: int, first: int) -> tuple[Any, ...]:
+        if body == 0:
+            return 0.0, 0.0, 0.0
+        return tuple(self._reported("v_dot", 6 * (body - 1) + first + k) for k in range(3))
+
+    def _of_body(self, body: int, attribute: str) -> tuple[Any, ...]:
+        if attribute.startswith("wp"):
+            part = self._vector(body, W) if attribute == "wp" else self._acceleration(body, 3)
+            axes = self._axes(body)
+            return tuple(_dot(tuple(row[k] for row in axes), part) for k in range(3))
+        if attribute in ("rdd", "wd"):
+            return self._acceleration(body, 0 if attribute == "rdd" else 3)
+        place, first, size = {"r": (0, R, 3), "p": (3, P, 4), "rd": (0, V, 3), "w": (0, W, 3)}[
+            attribute
+        ]
+        if attribute == "w" or self._prepared.evaluator.formulation.has_own_coordinates:
+            return self._vector(body, first, size)
+        # of the state as it is: that of the arrays is of unit length
+        place += VELOCITIES * (body - 1) if attribute == "rd" else COORDINATES * (body - 1)
+        place += COORDINATES * self._model.body_count if attribute == "rd" else 0
+        return tuple(self._row[place + k] for k in range(size))
+
+    def _of_point(self, body: int, local: tuple[float, ...], level: int) -> tuple[Any, ...]:
+        """Position, velocity or acceleration of a point fixed in a body."""
+        if body == 0:
+            return local if level == 0 else (0.0, 0.0, 0.0)
+        arm, w = tuple(_dot(row, local) for row in self._axes(body)), self._vector(body, W)
+        if level == 0:
+            return vectors.add(self._vector(body, R), arm)
+        carried = vectors.cross(w, arm)
+        if level == 1:
+            return vectors.add(self._vector(body, V), carried)
+        turned = vectors.cross(self._acceleration(body, 3), arm)
+        moved = vectors.add(self._acceleration(body, 0), turned)
+        return vectors.add(moved, vectors.cross(w, carried))
+
+    def _of_system(self) -> dict[str, Callable[[], Any]]:
+        potential = partial(self._reported, "potential_energy", 0)
+        residuals = {
+            f"constraint.{level}": partial(self._reported, "residuals", k)
+            for k, level in enumerate(("position", "velocity", "acceleration"))
+        }
+        return residuals | {
+            "t": lambda: self._t,
+            "work": lambda: self._row[self._report - 1],
+            "energy.kinetic": self._kinetic,
+            "energy.potential": potential,
+            "energy.total": lambda: self._kinetic() + potential(),
+        }
+
+    def _kinetic(self) -> Any:
+        total: Any = 0.0
+        for body in range(1, 1 + self._model.body_count):
+            v, w = self._vector(body, V), self._of_body(body, "wp")
+            inertia = tuple(_dot(self._vector(body, JP + 3 * k), w) for k in range(3))
+            total = total + 0.5 * (self._body[body, MASS] * _dot(v, v) + _dot(w, inertia))
+        return total
+
+    # ---------------------------------------------------------------- joints
+
+    def _coordinate(self, name: str, joint: int, attribute: str) -> Any:
+        """The coordinate, or its rate, of a joint that has a single one; None for others."""
+        for group in self._model.motions.motions:
+            places = np.flatnonzero(group.joints == joint)
+            if not len(places) or len(group.parts) != 1 or group.parts[0].kind not in NAMES:
+                continue
+            names, rates = NAMES[group.parts[0].kind]
+            motion = group.take(places)
+            i, j = int(motion.body_i[0]), int(motion.body_j[0])
+            axis = tuple(motion.axis(0)[0].tolist())
+            if attribute in names and group.parts[0].kind == TRANSLATION:
+                return self._length(i, j, axis, tuple(motion.start.r[0].tolist()))
+            if attribute in names and group.parts[0].kind == ROTATION:
+                return self._angle(name, i, j, axis, tuple(motion.start.p[0].tolist()))
+            if attribute in rates:
+                now = tuple(_dot(row, axis) for row in self._axes(i))
+                if group.parts[0].kind == ROTATION:
+                    return _dot(now, vectors.sub(self._vector(i, W), self._vector(j, W)))
+                arm = vectors.sub(self._vector(i, R), self._vector(j, R))
+                carried = vectors.cross(self._vector(j, W), arm)
+                moved = vectors.sub(self._vector(i, V), self._vector(j, V))
+                return _dot(vectors.sub(moved, carried), now)
+        return None
+
+    def _length(self, i: int, j: int, axis: Any, start: Any) -> Any:
+        now = tuple(_dot(row, axis) for row in self._axes(i))
+        begin = tuple(_dot(row, start) for row in self._axes(j))
+        arm = vectors.sub(self._vector(i, R), self._vector(j, R))
+        return _dot(vectors.sub(arm, begin), now)
+
+    def _angle(self, name: str, i: int, j: int, axis: Any, start: Any) -> Any:
+        relative = product(conjugate(self._vector(j, P, 4)), self._vector(i, P, 4))
+        gone = product(conjugate(start), relative)
+        q = 2.0 * scalar_math.atan2(_dot(gone[1:], axis), gone[0])
+        names = list(self._model.angle_names)
+        if joint_angle_name(name, 0) not in names:
+            raise NotExportedError(name)
+        counted = self._reported("angles", names.index(joint_angle_name(name, 0)))
+        return q - TURN * self._tracer.rint((q - counted) / TURN)
+
+    # ---------------------------------------------------------------- expressions
+
+    def _call(self, word: str, *given: Any) -> Any:
+        if word in WORDS and WORDS[word].takes_vectors:
+            if word == "cross":
+                return vectors.cross(*given)
+            found = _dot(given[0], given[-1])
+            return scalar_math.sqrt(found) if word == "norm" else found
+        sizes = {len(x) for x in given if isinstance(x, tuple)}
+        if sizes:
+            size = sizes.pop()
+            rows = [x if isinstance(x, tuple) else (x,) * size for x in given]
+            return tuple(self._call(word, *row) for row in zip(*rows, strict=True))
+        truth = _TRUTHS.get(word)
+        if truth is not None:
+            return scalar_math.where(truth(*given), 1.0, 0.0)
+        if word == "where":
+            return scalar_math.where(self._is_true(given[0]), given[1], given[2])
+        if word in ("and", "or", "not"):
+            a, *rest = map(self._is_true, given)
+            both = ~a if not rest else (a & rest[0] if word == "and" else a | rest[0])
+            return scalar_math.where(both, 1.0, 0.0)
+        if word in _OPERATIONS:
+            return _OPERATIONS[word](*given)
+        return getattr(scalar_math, word)(*given)
+
+    def _is_true(self, x: Any) -> Any:
+        if isinstance(x, (int, float)):  # a constant is a condition of its own
+            x = self._t * 0.0 + x
+        return x != 0.0
+
+
+#: Quantities of bodies and points; of these the derivative that they are.
+_OF_BODY = ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd")
+_OF_POINT = {"r": 0, "v": 1, "a": 2, "rP": 0, "rPd": 1, "rPdd": 2}
+_OPERATIONS: dict[str, Callable[..., Any]] = {
+    "+": lambda a, b: a + b,
+    "-": lambda a, b: a - b,
+    "*": lambda a, b: a * b,
+    "/": lambda a, b: a / b,
+    "%": scalar_math.mod,
+    "**": lambda a, b: a**b,
+    "neg": lambda a: -a,
+}
+_TRUTHS: dict[str, Callable[..., Any]] = {
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+    ">": lambda a, b: a > b,
+    ">=": lambda a, b: a >= b,
+    "==": lambda a, b: a == b,
+    "!=": lambda a, b: a != b,
+}
+
+
+def _dot(a: Any, b: Any) -> Any:
+    """Sum of products of components, from the first on."""
+    total = a[0] * b[0]
+    for x, y in zip(a[1:], b[1:], strict=True):
+        total = total + x * y
+    return total

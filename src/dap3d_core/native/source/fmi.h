@@ -1,0 +1,241 @@
+/* What FMI 2.0 and 3.0 have in common: an instance, its log, and events. Declarations follow the
+   Functional Mock-up Interface standard; of its types those are declared that are used. */
+
+#ifndef FMI_H
+#define FMI_H
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define DAP3D_INSIDE
+#include "runtime.c"
+
+#if defined(_WIN32)
+#define FMI_API __declspec(dllexport)
+#else
+#define FMI_API __attribute__((visibility("default")))
+#endif
+
+typedef enum { fmi_ok, fmi_warning, fmi_discard, fmi_error, fmi_fatal } fmi_status;
+
+/* An instance of an FMU. In model exchange t and y are those of the environment. */
+typedef struct {
+    dap3d_model *model;
+    void *environment;
+    void *logger;            /* differs from version to version */
+    char *name;
+    bool logs, is_exchange, is_initialised, is_terminated;
+    bool early_return;       /* of FMI 3: steps may end early */
+    double t_end, moved;
+} fmu;
+
+/* A state that was kept: of the instance, then of the model. */
+typedef struct {
+    uint64_t identity;
+    bool is_initialised, is_terminated;
+    double t_end;
+} fmu_state;
+
+/* Largest change by a projection, for which an integrator of the environment need not stop. */
+#define DRIFT 1e-9
+
+static void fmi_log(fmu *f, fmi_status status, const char *category, const char *words);
+
+static fmi_status fmi_failed(fmu *f, fmi_status status, const char *words)
+{
+    fmi_log(f, status, "logStatusError", words);
+    return status;
+}
+
+static fmu *fmi_create(const char *name, const char *token)
+{
+    if (name == NULL || token == NULL || strcmp(token, FMI_TOKEN) != 0)
+        return NULL;
+    fmu *f = calloc(1, sizeof *f);
+    if (f == NULL)
+        return NULL;
+    f->name = malloc(strlen(name) + 1);
+    f->model = dap3d_create(0.0);
+    if (f->name == NULL || f->model == NULL) {
+        free(f->name);
+        dap3d_free(f->model);
+        free(f);
+        return NULL;
+    }
+    strcpy(f->name, name);
+    return f;
+}
+
+static void fmi_free(fmu *f)
+{
+    if (f == NULL)
+        return;
+    dap3d_free(f->model);
+    free(f->name);
+    free(f);
+}
+
+/* The run ends at a time from here on; inputs and parameters stay as they are. */
+static fmi_status fmi_setup(fmu *f, double start, bool has_stop, double stop)
+{
+    if (start != 0.0)
+        return fmi_failed(f, fmi_error, "the start time of the model is 0");
+    f->model->t_end = has_stop && stop > 0.0 ? stop : HORIZON;
+    for (int k = 0; k < INTEGRATIONS; k++)
+        numbers(f->model, integrations[k].times)[2] = f->model->t_end;
+    return fmi_ok;
+}
+
+static fmi_status fmi_get(fmu *f, const uint32_t *references, size_t count, double *values)
+{
+    for (size_t k = 0; k < count; k++) {
+        if (references[k] >= VARIABLES)
+            return fmi_failed(f, fmi_error, "there is no variable of such a reference");
+        values[k] = dap3d_get(f->model, (int)references[k]);
+    }
+    return fmi_ok;
+}
+
+static fmi_status fmi_set(fmu *f, const uint32_t *references, size_t count, const double *values)
+{
+    for (size_t k = 0; k < count; k++) {
+        if (references[k] < VARIABLES && variables[references[k]].kind == DAP3D_STATE) {
+            double y[STATES];
+            dap3d_states(f->model, y);
+            y[variables[references[k]].first] = values[k];
+            if (dap3d_set_states(f->model, f->model->t, y) != DAP3D_OK)
+                return fmi_failed(f, fmi_error, dap3d_message(f->model));
+        } else if (dap3d_set(f->model, (int)references[k], values[k]) != DAP3D_OK) {
+            return fmi_failed(f, fmi_error, dap3d_message(f->model));
+        }
+    }
+    return fmi_ok;
+}
+
+static fmi_status fmi_reset(fmu *f)
+{
+    begin(f->model, HORIZON);
+    f->is_initialised = f->is_terminated = false;
+    return fmi_ok;
+}
+
+/* One step of co-simulation; *ended where the model has ended the run before. */
+static fmi_status fmi_step(fmu *f, double t, double h, bool *ended)
+{
+    double now = dap3d_time(f->model), end = t + h;
+    *ended = false;
+    if (fabs(t - now) > 1e-9 * fmax(fabs(t), 1e-3))
+        return fmi_failed(f, fmi_error, "the communication point is not where the last step ended");
+    if (!(h > 0.0))
+        return fmi_failed(f, fmi_error, "the communication step size is not positive");
+    int result = dap3d_step_to(f->model, end);
+    if (result == DAP3D_OK)
+        return fmi_ok;
+    if (result == DAP3D_ENDED) {
+        f->is_terminated = *ended = true;
+        fmi_log(f, fmi_warning, "logStatusWarning", dap3d_message(f->model));
+        return fmi_ok;
+    }
+    return fmi_failed(f, fmi_error, dap3d_message(f->model));
+}
+
+/* An event of model exchange: the state onto the constraints. Whether the state has changed. */
+static fmi_status fmi_event(fmu *f, bool *changed)
+{
+    double y[STATES], t = f->model->t;
+    dap3d_states(f->model, y);
+    *changed = false;
+    if (dap3d_project(f->model, t, y, &f->moved) != DAP3D_OK)
+        return fmi_failed(f, fmi_error, dap3d_message(f->model));
+    if (f->moved > 0.0) {
+        *changed = true;
+        return dap3d_set_states(f->model, t, y) == DAP3D_OK ? fmi_ok : fmi_error;
+    }
+    return fmi_ok;
+}
+
+/* A step of the environment is done; whether constraints have drifted so far that an event is due.
+   Turns of angles are counted. */
+static fmi_status fmi_completed(fmu *f, bool *event)
+{
+    double y[STATES];
+    dap3d_states(f->model, y);
+    *event = dap3d_project(f->model, f->model->t, y, &f->moved) == DAP3D_OK && f->moved > DRIFT;
+    return dap3d_set_states(f->model, f->model->t, (double *)y_of(f->model)) == DAP3D_OK ? fmi_ok
+                                                                                       : fmi_error;
+}
+
+/* Time of the environment: no integration follows. */
+static fmi_status fmi_set_time(fmu *f, double t)
+{
+    f->model->t = real_of(f->model)[R_t] = t;
+    f->model->has_row = f->model->is_ahead = 0;
+    return fmi_ok;
+}
+
+static fmi_status fmi_set_states(fmu *f, const double *y, size_t count)
+{
+    if (count != STATES)
+        return fmi_failed(f, fmi_error, "the number of states is another");
+    memcpy(y_of(f->model), y, 8 * STATES);
+    f->model->has_row = f->model->is_ahead = 0;
+    return fmi_ok;
+}
+
+static fmi_status fmi_derivatives(fmu *f, double *rates, size_t count)
+{
+    double y[STATES];
+    if (count != STATES)
+        return fmi_failed(f, fmi_error, "the number of states is another");
+    dap3d_states(f->model, y);
+    if (dap3d_derivatives(f->model, f->model->t, y, rates) != DAP3D_OK)
+        return fmi_failed(f, fmi_discard, dap3d_message(f->model));
+    return fmi_ok;
+}
+
+static fmi_status fmi_indicators(fmu *f, double *values, size_t count)
+{
+    double y[STATES];
+    if (count != SWITCHES)
+        return fmi_failed(f, fmi_error, "the number of event indicators is another");
+    dap3d_states(f->model, y);
+    dap3d_indicators(f->model, f->model->t, y, values);
+    return fmi_ok;
+}
+
+static size_t fmi_state_size(void) { return sizeof(fmu_state) + sizeof(dap3d_model); }
+
+static void fmi_keep(const fmu *f, char *bytes)
+{
+    fmu_state head = {IDENTITY, f->is_initialised, f->is_terminated, f->t_end};
+    memcpy(bytes, &head, sizeof head);
+    dap3d_save(f->model, bytes + sizeof head);
+}
+
+static fmi_status fmi_restore(fmu *f, const char *bytes)
+{
+    fmu_state head;
+    memcpy(&head, bytes, sizeof head);
+    if (head.identity != IDENTITY || dap3d_load(f->model, bytes + sizeof head) != DAP3D_OK)
+        return fmi_failed(f, fmi_error, "the state is not one of this FMU");
+    f->is_initialised = head.is_initialised;
+    f->is_terminated = head.is_terminated;
+    return fmi_ok;
+}
+
+static fmi_status fmi_get_state(const fmu *f, void **state)
+{
+    if (*state == NULL)
+        *state = malloc(fmi_state_size());
+    if (*state == NULL)
+        return fmi_error;
+    fmi_keep(f, *state);
+    return fmi_ok;
+}
+
+#endif

@@ -1,0 +1,311 @@
+/* Functional Mock-up Interface 3.0: co-simulation and model exchange. */
+
+#include "token.h"
+#include "fmi.h"
+
+typedef void *I;
+typedef uint32_t R;
+typedef void (*logger3)(void *, int, const char *, const char *);
+typedef fmi_status S;
+#define F ((fmu *)instance)
+#define UNUSED(x) (void)(x)
+
+static void fmi_log(fmu *f, fmi_status status, const char *category, const char *words)
+{
+    if (f->logger != NULL && (f->logs || status >= fmi_error)) {
+        logger3 log;
+        memcpy(&log, &f->logger, sizeof log);
+        log(f->environment, status, category, words);
+    }
+}
+
+FMI_API const char *fmi3GetVersion(void) { return "3.0"; }
+
+FMI_API S fmi3SetDebugLogging(I instance, bool on, size_t n, const char *const categories[])
+{
+    UNUSED(n), UNUSED(categories);
+    F->logs = on;
+    return fmi_ok;
+}
+
+static I instantiate(const char *name, const char *token, bool logs, void *environment,
+                     logger3 logger, bool is_exchange)
+{
+    fmu *f = fmi_create(name, token);
+    if (f == NULL) {
+        if (logger != NULL)
+            logger(environment, fmi_error, "logStatusError", "the instantiation token is another");
+        return NULL;
+    }
+    memcpy(&f->logger, &logger, sizeof logger);
+    f->environment = environment;
+    f->logs = logs;
+    f->is_exchange = is_exchange;
+    return f;
+}
+
+FMI_API I fmi3InstantiateModelExchange(const char *name, const char *token, const char *path,
+                                       bool visible, bool logs, void *environment, logger3 logger)
+{
+    UNUSED(path), UNUSED(visible);
+    return instantiate(name, token, logs, environment, logger, true);
+}
+
+FMI_API I fmi3InstantiateCoSimulation(const char *name, const char *token, const char *path,
+                                      bool visible, bool logs, bool events, bool early,
+                                      const R required[], size_t n, void *environment,
+                                      logger3 logger, void *intermediate)
+{
+    UNUSED(path), UNUSED(visible), UNUSED(events), UNUSED(required), UNUSED(n),
+        UNUSED(intermediate);
+    fmu *f = instantiate(name, token, logs, environment, logger, false);
+    if (f != NULL)
+        f->early_return = early;
+    return f;
+}
+
+FMI_API I fmi3InstantiateScheduledExecution(const char *name, const char *token, const char *path,
+                                            bool visible, bool logs, void *environment,
+                                            logger3 logger, void *clock, void *lock, void *unlock)
+{
+    UNUSED(name), UNUSED(token), UNUSED(path), UNUSED(visible), UNUSED(logs), UNUSED(clock),
+        UNUSED(lock), UNUSED(unlock);
+    if (logger != NULL)
+        logger(environment, fmi_error, "logStatusError", "there is no scheduled execution");
+    return NULL;
+}
+
+FMI_API void fmi3FreeInstance(I instance) { fmi_free(F); }
+
+FMI_API S fmi3EnterInitializationMode(I instance, bool has_tolerance, double tolerance,
+                                      double start, bool has_stop, double stop)
+{
+    UNUSED(has_tolerance), UNUSED(tolerance);
+    return fmi_setup(F, start, has_stop, stop);
+}
+
+FMI_API S fmi3ExitInitializationMode(I instance)
+{
+    F->is_initialised = true;
+    return fmi_ok;
+}
+
+FMI_API S fmi3EnterEventMode(I instance)
+{
+    UNUSED(instance);
+    return fmi_ok;
+}
+
+FMI_API S fmi3EnterStepMode(I instance)
+{
+    UNUSED(instance);
+    return fmi_ok;
+}
+
+FMI_API S fmi3EnterConfigurationMode(I instance)
+{
+    return fmi_failed(F, fmi_error, "there is no configuration mode");
+}
+
+FMI_API S fmi3ExitConfigurationMode(I instance) { return fmi3EnterConfigurationMode(instance); }
+
+FMI_API S fmi3Terminate(I instance)
+{
+    F->is_terminated = true;
+    return fmi_ok;
+}
+
+FMI_API S fmi3Reset(I instance) { return fmi_reset(F); }
+
+FMI_API S fmi3GetFloat64(I instance, const R r[], size_t n, double v[], size_t nv)
+{
+    return n == nv ? fmi_get(F, r, n, v) : fmi_failed(F, fmi_error, "all variables are scalars");
+}
+
+FMI_API S fmi3SetFloat64(I instance, const R r[], size_t n, const double v[], size_t nv)
+{
+    return n == nv ? fmi_set(F, r, n, v) : fmi_failed(F, fmi_error, "all variables are scalars");
+}
+
+/* There are no variables of other types. */
+#define NONE(name, type)                                                                          \
+    FMI_API S fmi3Get##name(I instance, const R r[], size_t n, type v[], size_t nv)               \
+    {                                                                                             \
+        UNUSED(r), UNUSED(v), UNUSED(nv);                                                         \
+        return n == 0 ? fmi_ok : fmi_failed(F, fmi_error, "there is no variable of such a type"); \
+    }                                                                                             \
+    FMI_API S fmi3Set##name(I instance, const R r[], size_t n, const type v[], size_t nv)         \
+    {                                                                                             \
+        UNUSED(r), UNUSED(v), UNUSED(nv);                                                         \
+        return n == 0 ? fmi_ok : fmi_failed(F, fmi_error, "there is no variable of such a type"); \
+    }
+typedef const char *text;
+NONE(Float32, float)
+NONE(Int8, int8_t)
+NONE(UInt8, uint8_t)
+NONE(Int16, int16_t)
+NONE(UInt16, uint16_t)
+NONE(Int32, int32_t)
+NONE(UInt32, uint32_t)
+NONE(Int64, int64_t)
+NONE(UInt64, uint64_t)
+NONE(Boolean, bool)
+NONE(String, text)
+
+/* Functions of what there is none of; their arguments are not read. */
+#define ABSENT(name, ...)                                                                         \
+    FMI_API S name(I instance, __VA_ARGS__) { return fmi_failed(F, fmi_error, #name ": no such"); }
+#define P const void *
+ABSENT(fmi3GetBinary, P, size_t, P, P, size_t)
+ABSENT(fmi3SetBinary, P, size_t, P, P, size_t)
+ABSENT(fmi3GetClock, P, size_t, P)
+ABSENT(fmi3SetClock, P, size_t, P)
+ABSENT(fmi3GetNumberOfVariableDependencies, R, P)
+ABSENT(fmi3GetVariableDependencies, R, P, P, P, P, size_t)
+ABSENT(fmi3GetDirectionalDerivative, P, size_t, P, size_t, P, size_t, P, size_t)
+ABSENT(fmi3GetAdjointDerivative, P, size_t, P, size_t, P, size_t, P, size_t)
+ABSENT(fmi3GetIntervalDecimal, P, size_t, P, P)
+ABSENT(fmi3GetIntervalFraction, P, size_t, P, P, P)
+ABSENT(fmi3GetShiftDecimal, P, size_t, P)
+ABSENT(fmi3GetShiftFraction, P, size_t, P, P)
+ABSENT(fmi3SetIntervalDecimal, P, size_t, P)
+ABSENT(fmi3SetIntervalFraction, P, size_t, P, P)
+ABSENT(fmi3SetShiftDecimal, P, size_t, P)
+ABSENT(fmi3SetShiftFraction, P, size_t, P, P)
+ABSENT(fmi3GetOutputDerivatives, P, size_t, P, P, size_t)
+ABSENT(fmi3ActivateModelPartition, R, double)
+
+FMI_API S fmi3EvaluateDiscreteStates(I instance)
+{
+    UNUSED(instance);
+    return fmi_ok;
+}
+
+FMI_API S fmi3UpdateDiscreteStates(I instance, bool *again, bool *terminate, bool *nominals,
+                                   bool *states, bool *has_next, double *next)
+{
+    S status = F->is_exchange && F->is_initialised ? fmi_event(F, states)
+                                                   : (*states = false, fmi_ok);
+    *again = *nominals = false;
+    *terminate = F->is_terminated;
+    *next = dap3d_next_event(F->model, F->model->t);
+    *has_next = *next < INFINITY;
+    return status;
+}
+
+/* ---------------------------------------------------------------------- states */
+
+FMI_API S fmi3GetFMUState(I instance, void **state) { return fmi_get_state(F, state); }
+
+FMI_API S fmi3SetFMUState(I instance, void *state) { return fmi_restore(F, state); }
+
+FMI_API S fmi3FreeFMUState(I instance, void **state)
+{
+    UNUSED(instance);
+    if (state != NULL) {
+        free(*state);
+        *state = NULL;
+    }
+    return fmi_ok;
+}
+
+FMI_API S fmi3SerializedFMUStateSize(I instance, void *state, size_t *size)
+{
+    UNUSED(instance), UNUSED(state);
+    *size = fmi_state_size();
+    return fmi_ok;
+}
+
+FMI_API S fmi3SerializeFMUState(I instance, void *state, uint8_t bytes[], size_t size)
+{
+    if (size < fmi_state_size())
+        return fmi_failed(F, fmi_error, "there is too little room for the state");
+    memcpy(bytes, state, fmi_state_size());
+    return fmi_ok;
+}
+
+FMI_API S fmi3DeserializeFMUState(I instance, const uint8_t bytes[], size_t size, void **state)
+{
+    if (size != fmi_state_size())
+        return fmi_failed(F, fmi_error, "the state is not one of this FMU");
+    if (*state == NULL)
+        *state = malloc(size);
+    if (*state == NULL)
+        return fmi_error;
+    memcpy(*state, bytes, size);
+    return fmi_ok;
+}
+
+/* ---------------------------------------------------------------------- model exchange */
+
+FMI_API S fmi3EnterContinuousTimeMode(I instance)
+{
+    UNUSED(instance);
+    return fmi_ok;
+}
+
+FMI_API S fmi3CompletedIntegratorStep(I instance, bool no_set_state, bool *event, bool *terminate)
+{
+    UNUSED(no_set_state);
+    *terminate = false;
+    return fmi_completed(F, event);
+}
+
+FMI_API S fmi3SetTime(I instance, double t) { return fmi_set_time(F, t); }
+
+FMI_API S fmi3SetContinuousStates(I instance, const double y[], size_t n)
+{
+    return fmi_set_states(F, y, n);
+}
+
+FMI_API S fmi3GetContinuousStateDerivatives(I instance, double rates[], size_t n)
+{
+    return fmi_derivatives(F, rates, n);
+}
+
+FMI_API S fmi3GetEventIndicators(I instance, double values[], size_t n)
+{
+    return fmi_indicators(F, values, n);
+}
+
+FMI_API S fmi3GetContinuousStates(I instance, double y[], size_t n)
+{
+    UNUSED(n);
+    dap3d_states(F->model, y);
+    return fmi_ok;
+}
+
+FMI_API S fmi3GetNominalsOfContinuousStates(I instance, double nominals[], size_t n)
+{
+    UNUSED(instance);
+    for (size_t k = 0; k < n; k++)
+        nominals[k] = 1.0;
+    return fmi_ok;
+}
+
+FMI_API S fmi3GetNumberOfEventIndicators(I instance, size_t *n)
+{
+    UNUSED(instance);
+    *n = SWITCHES;
+    return fmi_ok;
+}
+
+FMI_API S fmi3GetNumberOfContinuousStates(I instance, size_t *n)
+{
+    UNUSED(instance);
+    *n = STATES;
+    return fmi_ok;
+}
+
+/* ---------------------------------------------------------------------- co-simulation */
+
+FMI_API S fmi3DoStep(I instance, double t, double h, bool no_set_state, bool *event,
+                     bool *terminate, bool *early, double *last)
+{
+    UNUSED(no_set_state);
+    *event = *early = false;
+    S status = fmi_step(F, t, h, terminate);
+    *last = dap3d_time(F->model);
+    *early = F->early_return && *terminate && *last < t + h;
+    return status;
+}

@@ -1,0 +1,544 @@
+/* The run of a model: time, inputs, outputs, states. What it runs is in data.h: memory of a run as it
+   begins, and compiled functions; the integrators and equations are those that Python runs.
+
+   It does what integrators/stepping/integration.py (break points), integrators/stepping/hold.py
+   (inputs) and simulation/handover.py (stiff scenes) do, in the same order, for the same bits. */
+
+#define DAP3D_BUILD
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include "dap3d.h"
+#include "data.h"
+
+enum { RHS, PROJECT, REPORT, ACCEPTED, WATCH };
+/* Status of an integration (integration_state.py). */
+enum { RUNNING, FINISHED, STEP_FLOOR, NOT_FINITE, PROJECTION_FAILED, SWITCHED, CHATTERED, ENDED,
+       STIFF, JUMPED, STALLED };
+#define HORIZON 1e5
+#define ALIKE 1e-9
+#define LARGEST 1e100
+
+struct dap3d_model {
+    uint64_t identity;
+    double t, t_end;         /* present time; end of the run */
+    double first_h;          /* of a hold: the step that it began with; -1: none has begun */
+    int64_t first_rejected;
+    int64_t which;           /* the integration that the run is in */
+    int64_t is_ahead;        /* steps have gone beyond the present time, which is interpolated */
+    int64_t is_changed;      /* inputs have changed since the last step */
+    int64_t has_row;         /* the row is that of the present time, and so are the outputs */
+    int64_t is_over;
+    char message[160];
+    double row[ROW + 1];     /* t, y and report at the present time */
+    double outputs[OUTPUTS + 1];
+    int64_t w[WORDS];        /* the memory of the run */
+};
+
+typedef void (*function)(double, const double *, int64_t, double *, int64_t, void *, void *);
+
+static double *numbers(dap3d_model *m, int64_t word) { return (double *)(m->w + word); }
+
+static double *real_of(dap3d_model *m) { return numbers(m, integrations[m->which].real); }
+
+static int64_t *integer_of(dap3d_model *m) { return m->w + integrations[m->which].integer; }
+
+static double *y_of(dap3d_model *m) { return numbers(m, integrations[m->which].state); }
+
+static void call(dap3d_model *m, int k, double t, const double *y, double *out, int64_t size)
+{
+    function f = (function)(uintptr_t)m->w[FUNCTIONS + k];
+    f(t, y, STATES, out, size, m->w + SYSTEM, m->w + LOOPS);
+}
+
+/* Fill in the addresses of a run's memory, which has moved. */
+static void place(dap3d_model *m)
+{
+    for (size_t k = 0; k < sizeof addresses / sizeof *addresses; k++)
+        m->w[addresses[k][0]] = (int64_t)(uintptr_t)(m->w + addresses[k][1]);
+    for (size_t k = 0; k < sizeof codes / sizeof *codes; k++)
+        m->w[codes[k].word] = (int64_t)(uintptr_t)codes[k].code;
+}
+
+static int fail(dap3d_model *m, int result, const char *words)
+{
+    snprintf(m->message, sizeof m->message, "%s", words);
+    return result;
+}
+
+/* ---------------------------------------------------------------------- instances */
+
+static void begin(dap3d_model *m, double t_end)
+{
+    const int64_t *next = content;
+    memset(m, 0, sizeof *m);
+    for (size_t k = 0; k < sizeof runs / sizeof *runs; k++, next += runs[k - 1][1])
+        memcpy(m->w + runs[k][0], next, 8 * (size_t)runs[k][1]);
+    place(m);
+    m->identity = IDENTITY;
+    m->t_end = t_end;
+    m->first_h = -1.0;
+    for (int k = 0; k < INTEGRATIONS; k++) {
+        double *times = numbers(m, integrations[k].times);
+        times[0] = 0.0;
+        times[1] = times[2] = t_end;
+        m->w[integrations[k].integer + I_next_report] = 1;
+    }
+}
+
+dap3d_model *dap3d_create(double t_end)
+{
+    if (t_end == 0.0)
+        t_end = HORIZON;
+    if (!(t_end > 0.0 && t_end <= LARGEST))
+        return NULL;
+    dap3d_model *m = malloc(sizeof *m);
+    if (m != NULL)
+        begin(m, t_end);
+    return m;
+}
+
+void dap3d_free(dap3d_model *m) { free(m); }
+
+void dap3d_reset(dap3d_model *m) { begin(m, m->t_end); }
+
+const char *dap3d_message(const dap3d_model *m) { return m->message; }
+
+/* ---------------------------------------------------------------------- variables */
+
+int dap3d_count(void) { return VARIABLES; }
+
+const char *dap3d_name(int v) { return v < 0 || v >= VARIABLES ? NULL : variables[v].name; }
+
+const char *dap3d_unit(int v) { return v < 0 || v >= VARIABLES ? NULL : variables[v].unit; }
+
+int dap3d_kind(int v) { return v < 0 || v >= VARIABLES ? -1 : variables[v].kind; }
+
+int dap3d_find(const char *name)
+{
+    for (int v = 0; name != NULL && v < VARIABLES; v++)
+        if (strcmp(variables[v].name, name) == 0)
+            return v;
+    return -1;
+}
+
+/* The row and the outputs of the present time. */
+static void report(dap3d_model *m)
+{
+    if (m->has_row)
+        return;
+    if (!m->is_ahead)
+        memcpy(m->row + 1, y_of(m), 8 * STATES);
+    m->row[0] = m->t;
+    call(m, REPORT, m->t, m->row + 1, m->row + 1 + STATES, ROW - 1 - STATES);
+    dap3d_outputs(m->t, numbers(m, BODIES), m->row + 1, numbers(m, VALUES), m->outputs);
+    m->has_row = 1;
+}
+
+static int restart_here(dap3d_model *m);
+
+int dap3d_set(dap3d_model *m, int v, double x)
+{
+    int kind = dap3d_kind(v);
+    if ((kind != DAP3D_INPUT && kind != DAP3D_PARAMETER) || !(fabs(x) <= LARGEST))
+        return fail(m, DAP3D_INVALID, "only inputs and parameters are set, to finite numbers");
+    if (kind == DAP3D_INPUT) {
+        double *value = numbers(m, variables[v].first);
+        if (*value != x) {
+            *value = x;
+            m->is_changed = 1;
+            m->has_row = 0;
+        }
+        return DAP3D_OK;
+    }
+    double *value = numbers(m, places[variables[v].first].word);
+    if (*value == places[variables[v].first].sign * x)
+        return DAP3D_OK;
+    int result = m->t > 0.0 ? restart_here(m) : DAP3D_OK;
+    for (int k = 0; k < variables[v].count; k++)
+        *numbers(m, places[variables[v].first + k].word) = places[variables[v].first + k].sign * x;
+    m->has_row = 0;
+    return result;
+}
+
+double dap3d_get(dap3d_model *m, int v)
+{
+    int k = v < 0 || v >= VARIABLES ? 0 : variables[v].first;
+    switch (dap3d_kind(v)) {
+    case DAP3D_TIME: return m->t;
+    case DAP3D_INPUT: return *numbers(m, k);
+    case DAP3D_PARAMETER: return places[k].sign * *numbers(m, places[k].word);
+    case DAP3D_OUTPUT: report(m); return m->outputs[k];
+    case DAP3D_STATE: report(m); return m->row[1 + k];
+    case DAP3D_DERIVATIVE: {
+        double rates[STATES];
+        report(m);
+        call(m, RHS, m->t, m->row + 1, rates, STATES);
+        return rates[k];
+    }
+    case DAP3D_INDICATOR: {
+        double values[SWITCHES + 1];
+        report(m);
+        call(m, WATCH, m->t, m->row + 1, values, SWITCHES);
+        return values[k];
+    }
+    default: return NAN;
+    }
+}
+
+int dap3d_get_all(dap3d_model *m, const int *v, int count, double *values)
+{
+    for (int k = 0; k < count; k++) {
+        if (dap3d_kind(v[k]) < 0)
+            return fail(m, DAP3D_INVALID, "there is no such variable");
+        values[k] = dap3d_get(m, v[k]);
+    }
+    return DAP3D_OK;
+}
+
+/* ---------------------------------------------------------------------- integration */
+
+/* As Integration.restart. */
+static void restart(dap3d_model *m)
+{
+    double *real = real_of(m);
+    int64_t *integer = integer_of(m);
+    real[R_h] = 0.0;
+    real[R_last_error] = 1e-4;
+    real[R_step_limit_at_switch] = INFINITY;
+    integer[I_first_stage_valid] = integer[I_switch_rates_valid] = 0;
+    integer[I_last_rejected] = integer[I_cut_attempts] = 0;
+    memset(m->w + integrations[m->which].sides, 0, 8 * SWITCHES);
+}
+
+/* As Integration.project: the state onto its constraints; whether that went well. */
+static int project(dap3d_model *m)
+{
+    double *real = real_of(m);
+    int64_t *integer = integer_of(m);
+    real[R_projection_moved] = real[R_projection_outcome] = 0.0;
+    integer[I_projection_count]++;
+    call(m, PROJECT, real[R_t], y_of(m), real + R_projection_moved, PROJECTED);
+    if (real[R_projection_outcome] != 1.0)
+        return 1;
+    real[R_t_stop] = real[R_t];
+    integer[I_status] = PROJECTION_FAILED;
+    return 0;
+}
+
+static void advance_once(dap3d_model *m, int64_t budget)
+{
+    integrations[m->which].advance(m->w, budget);
+}
+
+/* As Integration._next_stop: the time that the next step may not go over. */
+static double next_stop(dap3d_model *m)
+{
+    double *real = real_of(m);
+    int64_t *integer = integer_of(m);
+    int adaptive = real[R_fixed_step] == 0.0;
+    for (int k = 0; k < STOPS; k++) {
+        double t = stops[k].t;
+        if (t < real[R_t] || stops[k].needs >= m->t_end)
+            continue;
+        double before = stops[k].jumps && adaptive ? nextafter(t, -INFINITY) : t;
+        if (real[R_t] < before)
+            return before;
+        if (before < t) {
+            real[R_t] = real[R_t_limit] = t;
+            advance_once(m, 0); /* no step: reports what is due at t */
+            if (integer[I_row_count] == CAPACITY || integer[I_status] != RUNNING)
+                return t;
+            real[R_t] = nextafter(t, INFINITY);
+            restart(m);
+            if (!integrations[m->which].implicit && integer[I_projects] && !project(m))
+                return t;
+        }
+    }
+    return INFINITY;
+}
+
+/* As Integration.advance. */
+static void advance(dap3d_model *m, int64_t budget)
+{
+    double *real = real_of(m), requested = real[R_t_limit], stop = next_stop(m);
+    real[R_t_limit] = stop < requested ? stop : requested;
+    advance_once(m, budget);
+    real[R_t_limit] = requested;
+}
+
+/* As hand_over of a scene that has become stiff: the implicit integration goes on. */
+static int hand_over(dap3d_model *m)
+{
+    if (integer_of(m)[I_status] != STIFF || INTEGRATIONS < 2 || m->which != 0)
+        return 0;
+    double *before = real_of(m), *y = y_of(m), *times = numbers(m, integrations[0].times);
+    int64_t next = integer_of(m)[I_next_report];
+    m->which = 1;
+    double *real = real_of(m);
+    int64_t *integer = integer_of(m);
+    memcpy(y_of(m), y, 8 * STATES);
+    memcpy(numbers(m, integrations[1].times), times, 3 * 8);
+    real[R_t] = before[R_t];
+    integer[I_next_report] = next;
+    real[R_t_stiff] = INFINITY;
+    integer[I_status] = RUNNING;
+    real[R_error_across_singularity] = real[R_failed_error_rate] = 0.0;
+    integer[I_near_singular_landings] = integer[I_stalled_steps] = 0;
+    integer[I_stiff_steps] = integer[I_nonstiff_steps] = integer[I_attempt_count] = 0;
+    real[R_t_attempted] = before[R_t];
+    integer[I_stall_start] = integer[I_rhs_count];
+    restart(m);
+    return 1;
+}
+
+/* The run has stopped short of a time. */
+static int stopped(dap3d_model *m)
+{
+    static const char *const words[] = {
+        "", "the run has reached its end", "the error requires a step that time cannot resolve",
+        "rates or a state are not finite", "no state on the constraints was found",
+        "a switch of the model ended the run", "a switch changed its sign again and again", "",
+        "the scene is stiff", "velocities jump", "steps are so short that the run would not end"};
+    int64_t status = integer_of(m)[I_status];
+    double t = status == FINISHED ? real_of(m)[R_t] : real_of(m)[R_t_stop];
+    m->is_over = 1;
+    snprintf(m->message, sizeof m->message, "the run stopped at t = %.9g s: %s", t,
+             words[status >= 0 && status <= STALLED ? status : 0]);
+    return status == SWITCHED || status == FINISHED ? DAP3D_ENDED : DAP3D_ERROR;
+}
+
+/* Integrate beyond a time, and interpolate there: as a run with reports. */
+static int step_freely(dap3d_model *m, double t)
+{
+    for (int k = 0; k < INTEGRATIONS; k++)
+        numbers(m, integrations[k].times)[1] = t;
+    integer_of(m)[I_next_report] = 1;
+    integer_of(m)[I_row_count] = 0;
+    if (integer_of(m)[I_status] == FINISHED)
+        integer_of(m)[I_status] = RUNNING; /* the last step has reached the end, and reported it */
+    if (real_of(m)[R_t] >= t)
+        advance_once(m, -1); /* no step */
+    while (integer_of(m)[I_row_count] == 0) {
+        if (integer_of(m)[I_status] != RUNNING && !hand_over(m))
+            return stopped(m);
+        advance(m, 0);
+    }
+    double *row = numbers(m, integrations[m->which].rows);
+    memcpy(m->row, row, 8 * ROW);
+    m->t = row[0];
+    m->is_ahead = real_of(m)[R_t] != m->t;
+    m->has_row = 0; /* outputs are not known yet */
+    if (m->t < t)
+        return stopped(m);
+    m->is_over = m->t == m->t_end;
+    return DAP3D_OK;
+}
+
+/* ---------------------------------------------------------------------- holds of inputs */
+
+static double kinetic_energy(dap3d_model *m)
+{
+    double total = 0.0, report_of[ROW];
+    call(m, REPORT, real_of(m)[R_t], y_of(m), report_of, ROW - 1 - STATES);
+    for (int b = 1; b <= BODY_COUNT; b++) {
+        const double *x = numbers(m, BODIES) + BODY_WIDTH * b, *v = x + BODY_V, *w = x + BODY_W;
+        const double *A = x + BODY_A, *J = x + BODY_JP;
+        double own[3], sum = x[BODY_MASS] * (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]);
+        for (int k = 0; k < 3; k++)
+            own[k] = A[k] * w[0] + A[k + 3] * w[1] + A[k + 6] * w[2];
+        for (int k = 0; k < 3; k++)
+            sum += own[k] * (J[3 * k] * own[0] + J[3 * k + 1] * own[1] + J[3 * k + 2] * own[2]);
+        total += 0.5 * sum;
+    }
+    return total;
+}
+
+/* As Hold.jump and sampled.jump: inputs have changed. */
+static int jump(dap3d_model *m)
+{
+    double *real = real_of(m), h = real[R_h];
+    int64_t *integer = integer_of(m);
+    if (integrations[m->which].keeps_step && !SWITCHES && real[R_fixed_step] == 0.0) {
+        integer[I_first_stage_valid] = 0;
+        real[R_last_error] = 1e-4;
+    } else {
+        restart(m);
+        integer[I_segment_step] = integer[I_segment_step_count] = 0;
+        if (integrations[m->which].keeps_step)
+            real[R_h] = h;
+    }
+    if (DRIVES) { /* velocities jump with a driver; what that takes is work */
+        double before = kinetic_energy(m);
+        if (!project(m))
+            return stopped(m);
+        y_of(m)[STATES - 1] += kinetic_energy(m) - before;
+    }
+    return DAP3D_OK;
+}
+
+/* As Hold.to: integrate with steps that end at a time. */
+static int hold_to(dap3d_model *m, double end)
+{
+    if (m->is_changed) {
+        int result = jump(m);
+        m->is_changed = 0;
+        if (result != DAP3D_OK)
+            return result;
+    }
+    m->first_h = real_of(m)[R_h];
+    m->first_rejected = integer_of(m)[I_rejected_count];
+    integer_of(m)[I_row_count] = 0;
+    for (;;) {
+        int64_t status = integer_of(m)[I_status];
+        if (real_of(m)[R_t] >= end && (status == RUNNING || status == FINISHED))
+            break;
+        if (status != RUNNING) {
+            if (!hand_over(m))
+                return m->t = real_of(m)[R_t], m->has_row = m->is_ahead = 0, stopped(m);
+            m->first_h = real_of(m)[R_h];
+            m->first_rejected = integer_of(m)[I_rejected_count];
+        }
+        real_of(m)[R_t_limit] = end;
+        advance(m, 1000);
+        real_of(m)[R_t_limit] = INFINITY;
+    }
+    double *real = real_of(m);
+    int64_t *integer = integer_of(m);
+    m->t = end;
+    m->has_row = m->is_ahead = 0;
+    if (integer[I_status] == FINISHED) {
+        m->is_over = 1;
+        return DAP3D_OK;
+    }
+    real[R_t] = end; /* as Hold.land */
+    if (real[R_h] < m->first_h && integer[I_rejected_count] == m->first_rejected)
+        real[R_h] = m->first_h;
+    m->first_h = -1.0;
+    return DAP3D_OK;
+}
+
+double dap3d_time(const dap3d_model *m) { return m->t; }
+
+int dap3d_step_to(dap3d_model *m, double t)
+{
+    m->message[0] = 0;
+    if (!(t > m->t))
+        return t == m->t ? DAP3D_OK
+                         : fail(m, DAP3D_INVALID, "time goes forward only; load a saved state");
+    if (m->is_over) {
+        snprintf(m->message, sizeof m->message, "the run has ended at t = %.9g s", m->t);
+        return DAP3D_ENDED;
+    }
+    if (fabs(t - m->t_end) <= ALIKE * (t - m->t))
+        t = m->t_end;
+    if (t > m->t_end)
+        return fail(m, DAP3D_INVALID, "the time is beyond the end that dap3d_create was given");
+    return INPUTS > 0 ? hold_to(m, t) : step_freely(m, t);
+}
+
+/* ---------------------------------------------------------------------- states of a run */
+
+size_t dap3d_state_size(void) { return sizeof(dap3d_model); }
+
+int dap3d_save(const dap3d_model *m, void *state)
+{
+    memcpy(state, m, sizeof *m);
+    return DAP3D_OK;
+}
+
+int dap3d_load(dap3d_model *m, const void *state)
+{
+    uint64_t identity;
+    memcpy(&identity, state, sizeof identity);
+    if (identity != IDENTITY)
+        return fail(m, DAP3D_INVALID, "the state is not one of this model");
+    memcpy(m, state, sizeof *m);
+    place(m);
+    return DAP3D_OK;
+}
+
+/* ---------------------------------------------------------------------- equations */
+
+int dap3d_state_count(void) { return STATES; }
+
+int dap3d_states(const dap3d_model *model, double *y)
+{
+    dap3d_model *m = (dap3d_model *)model; /* y_of changes nothing */
+    memcpy(y, m->is_ahead ? m->row + 1 : y_of(m), 8 * STATES);
+    return DAP3D_OK;
+}
+
+/* Let steps begin anew at the present time. */
+static int restart_here(dap3d_model *m)
+{
+    if (m->is_ahead)
+        return dap3d_set_states(m, m->t, m->row + 1);
+    restart(m);
+    return DAP3D_OK;
+}
+
+int dap3d_set_states(dap3d_model *m, double t, const double *y)
+{
+    for (int k = 0; k < STATES; k++)
+        if (!(fabs(y[k]) <= LARGEST))
+            return fail(m, DAP3D_INVALID, "a state is not finite");
+    if (!(t >= 0.0 && t <= m->t_end))
+        return fail(m, DAP3D_INVALID, "the time is not one of the run");
+    double *real = real_of(m);
+    memmove(y_of(m), y, 8 * STATES);
+    m->t = real[R_t] = t;
+    m->has_row = m->is_ahead = 0;
+    if (!m->is_over)
+        integer_of(m)[I_status] = RUNNING;
+    integer_of(m)[I_segment_step] = integer_of(m)[I_segment_step_count] = 0;
+    restart(m);
+    if (integer_of(m)[I_calls_accepted]) {
+        double moved = real[R_projection_moved];
+        real[R_projection_moved] = 1.0; /* as count_turns, from the start of a step */
+        call(m, ACCEPTED, t, y_of(m), real + R_projection_moved, PROJECTED);
+        real[R_projection_moved] = moved;
+    }
+    return DAP3D_OK;
+}
+
+int dap3d_derivatives(dap3d_model *m, double t, const double *y, double *rates)
+{
+    call(m, RHS, t, y, rates, STATES);
+    for (int k = 0; k < STATES; k++)
+        if (!(fabs(rates[k]) <= LARGEST))
+            return fail(m, DAP3D_ERROR, "the rates are not finite");
+    return DAP3D_OK;
+}
+
+int dap3d_project(dap3d_model *m, double t, double *y, double *moved)
+{
+    double out[PROJECTED + 1] = {0.0}, before[STATES], largest = 0.0;
+    memcpy(before, y, sizeof before);
+    if (integer_of(m)[I_projects])
+        call(m, PROJECT, t, y, out, PROJECTED);
+    for (int k = 0; k < STATES; k++)
+        largest = fmax(largest, fabs(y[k] - before[k]));
+    if (moved != NULL)
+        *moved = largest;
+    return out[1] == 1.0 ? fail(m, DAP3D_ERROR, "no state on the constraints was found") : DAP3D_OK;
+}
+
+int dap3d_indicator_count(void) { return SWITCHES; }
+
+int dap3d_indicators(dap3d_model *m, double t, const double *y, double *values)
+{
+    if (SWITCHES)
+        call(m, WATCH, t, y, values, SWITCHES);
+    return DAP3D_OK;
+}
+
+double dap3d_next_event(const dap3d_model *m, double t)
+{
+    for (int k = 0; k < STOPS; k++)
+        if (stops[k].jumps && stops[k].t > t && stops[k].needs < m->t_end)
+            return stops[k].t;
+    return INFINITY;
+}

@@ -1,0 +1,128 @@
+"""FMUs: valid, and run by FMPy with the numbers of runs in Python."""
+
+import ctypes
+import zipfile
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from tests.unit.native.test_export import SPRING, _written
+
+import dap3d_core as dap
+from dap3d_core.native.fmu import _in_base_units
+
+fmpy = pytest.importorskip("fmpy")
+VERSIONS = pytest.mark.parametrize("fmi", [3, 2])
+
+
+def written(scene, folder, **options):
+    return dap.export_model(scene, folder / f"{scene.name}.fmu", force=True, **options)
+
+
+@VERSIONS
+def test_it_is_valid_and_a_co_simulation_has_the_bits_of_simulate(tmp_path, fmi):
+    from fmpy.validation import validate_fmu
+
+    scene = dap.load("crane")
+    names = [f"{body}.r" for body in scene.bodies]
+    made = written(scene, tmp_path, fmi=fmi, outputs=[*names, "sway"])
+    assert validate_fmu(str(made.path)) == []
+    result = dap.simulate(scene, t_end=2.0, dt=0.05)
+    rows = fmpy.simulate_fmu(str(made.path), stop_time=2.0, output_interval=0.05,
+                             fmi_type="CoSimulation", output=made.outputs)  # fmt: skip
+    assert rows["time"].tolist() == result.t.tolist()
+    expected = np.hstack([result.quantity(name).values for name in names])
+    assert np.array([[*row][1:-1] for row in rows]).tolist() == expected.tolist()
+    np.testing.assert_allclose(rows["sway"], result.quantity("sway").values, rtol=0, atol=1e-15)
+
+
+@VERSIONS
+def test_model_exchange_by_cvode_gives_the_motion(tmp_path, fmi):
+    scene = dap.load("fourbar3")
+    made = written(scene, tmp_path, fmi=fmi, outputs=["coupler.r"])
+    result = dap.simulate(scene, t_end=0.5, dt=0.05)
+    rows = fmpy.simulate_fmu(str(made.path), stop_time=0.5, output_interval=0.05, solver="CVode",
+                             fmi_type="ModelExchange", relative_tolerance=1e-8)  # fmt: skip
+    for t, r in zip(result.t, result.quantity("coupler.r").values, strict=True):
+        found = [np.interp(t, rows["time"], rows[f"coupler.r.{axis}"]) for axis in "xyz"]
+        # CVode to 1e-8 a step, times of rows to the last digits
+        np.testing.assert_allclose(found, r, rtol=0, atol=1e-6)
+
+
+@VERSIONS
+def test_inputs_and_parameters_are_set(tmp_path, fmi):
+    from fmpy.validation import validate_fmu
+
+    scene = _written(SPRING, tmp_path)
+    made = written(scene, tmp_path, fmi=fmi, parameters=["forces.spring.k"], outputs=["cart.r.x"])
+    assert validate_fmu(str(made.path)) == []
+    times = np.arange(0.0, 2.0, 0.1)
+    signal = np.array(list(zip(times, np.round(np.sin(times), 3), strict=True)),
+                      dtype=[("time", float), ("push", float)])  # fmt: skip
+    rows = fmpy.simulate_fmu(str(made.path), stop_time=2.0, output_interval=0.1, input=signal,
+                             start_values={"forces.spring.k": 30.0}, fmi_type="CoSimulation",
+                             output=["cart.r.x", "push"])  # fmt: skip
+    scene.forces["spring"].fields["k"] = 30.0
+    run = dap.start(scene, t_end=2.0)
+    for k in range(19):
+        push = float(np.interp(run.t, times, signal["push"]))
+        run.step(float(rows["time"][k + 1] - run.t), inputs={"push": push})
+    # FMPy interpolates inputs in another order
+    assert rows["cart.r.x"][19] == pytest.approx(run.state["cart.r.x"], rel=1e-12)
+
+
+@VERSIONS
+def test_a_state_is_kept_and_serialised(tmp_path, fmi):
+    scene = dap.load("pen1")
+    made = written(scene, tmp_path, fmi=fmi)
+    folder = fmpy.extract(str(made.path), str(tmp_path / "unzipped"))
+    description = fmpy.read_model_description(str(made.path))
+    reference = next(v.valueReference for v in description.modelVariables if v.name == "cone.r.z")
+    fmu = fmpy.instantiate_fmu(folder, description, fmi_type="CoSimulation")
+    if fmi == 2:
+        fmu.setupExperiment(startTime=0.0, stopTime=1.0)
+        fmu.enterInitializationMode()
+    else:
+        fmu.enterInitializationMode(startTime=0.0, stopTime=1.0)
+    fmu.exitInitializationMode()
+    get = fmu.getReal if fmi == 2 else fmu.getFloat64
+    keep, put = (fmu.getFMUstate, fmu.setFMUstate) if fmi == 2 else (
+        fmu.getFMUState, fmu.setFMUState)  # fmt: skip
+    fmu.doStep(0.0, 0.3)
+    state = keep()
+    serialise = fmu.serializeFMUstate if fmi == 2 else fmu.serializeFMUState
+    restore = fmu.deSerializeFMUstate if fmi == 2 else fmu.deserializeFMUState
+    data = serialise(state)
+    fmu.doStep(0.3, 0.4)
+    later = get([reference])
+    put(restore(data) if fmi == 2 else state)
+    fmu.doStep(0.3, 0.4)
+    assert get([reference]) == later
+    fmu.reset()
+    assert get([reference])[0] == pytest.approx(dap.compile(scene).model.r[0, 2], abs=1e-9)
+    fmu.terminate()
+    fmu.freeInstance()
+
+
+def test_units_are_products_of_base_units():
+    assert _in_base_units("N m") == (1.0, {"kg": 1, "m": 2, "s": -2})
+    assert _in_base_units("rad/s") == (1.0, {"rad": 1, "s": -1})
+    factor, powers = _in_base_units("deg")
+    assert (factor, powers) == (pytest.approx(np.pi / 180.0), {"rad": 1})
+    assert _in_base_units("parsnip") == (1.0, {"parsnip": 1})
+
+
+def test_a_wrong_token_is_refused(tmp_path):
+    made = written(dap.load("pen1"), tmp_path)
+    with zipfile.ZipFile(made.path) as archive:
+        root = ElementTree.fromstring(archive.read("modelDescription.xml"))
+        name = next(n for n in archive.namelist() if n.startswith("binaries"))
+        archive.extract(name, tmp_path)
+    assert root.get("fmiVersion") == "3.0"
+    create = ctypes.CDLL(str(tmp_path / name)).fmi3InstantiateCoSimulation
+    create.restype = ctypes.c_void_p
+    create.argtypes = [ctypes.c_char_p, ctypes.c_char_p, ctypes.c_char_p, *[ctypes.c_bool] * 4,
+                       ctypes.c_void_p, ctypes.c_size_t, *[ctypes.c_void_p] * 3]  # fmt: skip
+    rest = None, False, False, False, False, None, 0, None, None, None
+    assert create(b"a", b"{other}", *rest) is None
+    assert create(b"a", root.get("instantiationToken").encode(), *rest)

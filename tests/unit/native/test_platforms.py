@@ -1,0 +1,172 @@
+"""Exported libraries by themselves: without Python, in threads, on other platforms."""
+
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.native import build
+from dap3d_core.native.build import own_platform
+
+THREADS = """
+#include <pthread.h>
+#include <stdio.h>
+#include <string.h>
+#include "dap3d.h"
+#define COUNT 100
+static double found[COUNT];
+static void *work(void *first)
+{
+    for (int k = *(int *)first; k < COUNT; k += 8) {
+        dap3d_model *m = dap3d_create(0.5), *other = dap3d_create(0.5);
+        static _Thread_local char state[1 << 20];
+        if (dap3d_state_size() > sizeof state)
+            return NULL;
+        for (int i = 1; i <= 10; i++) {
+            dap3d_step_to(m, i < 10 ? 0.05 * i : 0.5);
+            if (i == 5) {
+                dap3d_save(m, state);
+                dap3d_load(other, state);
+            }
+            if (i > 5)
+                dap3d_step_to(other, i < 10 ? 0.05 * i : 0.5);
+        }
+        found[k] = dap3d_get(m, dap3d_find("cone.r.z"));
+        if (found[k] != dap3d_get(other, dap3d_find("cone.r.z")))
+            found[k] = 0.0;
+        dap3d_free(m);
+        dap3d_free(other);
+    }
+    return NULL;
+}
+int main(void)
+{
+    pthread_t threads[8];
+    int first[8];
+    for (int k = 0; k < 8; k++) {
+        first[k] = k;
+        pthread_create(threads + k, NULL, work, first + k);
+    }
+    for (int k = 0; k < 8; k++)
+        pthread_join(threads[k], NULL);
+    for (int k = 0; k < COUNT; k++)
+        if (found[k] != found[0] || found[k] == 0.0)
+            return 1;
+    printf("%a", found[0]);
+    return 0;
+}
+"""
+
+
+def exported(folder, **options):
+    return dap.export_model("pen1", folder / "out", format="c", force=True, **options)
+
+
+def compiler():
+    found = next((c for c in ("gcc", "cc", "clang") if shutil.which(c)), None)
+    if found is None or not sys.platform.startswith("linux"):
+        pytest.skip("needs a C compiler on Linux")
+    return found
+
+
+def test_a_hundred_runs_in_eight_threads_are_clean_under_sanitizers(tmp_path, monkeypatch):
+    run = dap.load_native(exported(tmp_path).path).start(0.5)
+    for k in range(1, 11):
+        run.step_to(0.05 * k if k < 10 else 0.5)
+    (tmp_path / "threads.c").write_text(THREADS)
+    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
+    options = build.OPTIONS
+    for sanitizer in ("address,undefined", "thread"):
+        # the runtime as well as the program
+        monkeypatch.setattr(build, "OPTIONS", (*options, f"-fsanitize={sanitizer}"))
+        made = exported(tmp_path)
+        archive = made.path / own_platform() / "libpen1.a"
+        program = tmp_path / sanitizer
+        command = [compiler(), "-std=c11", "-g", f"-fsanitize={sanitizer}", "-DDAP3D_STATIC",
+                   f"-I{made.path}", tmp_path / "threads.c", archive, "-lm", "-lpthread",
+                   "-o", program]  # fmt: skip
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode and "cannot find" in done.stderr:
+            pytest.skip("there are no sanitizers")
+        assert not done.returncode, done.stderr
+        ran = subprocess.run([program], capture_output=True, text=True, check=False)
+        if "unexpected memory mapping" in ran.stderr:
+            continue  # the sanitizer does not fit the kernel
+        assert (ran.returncode, ran.stderr) == (0, "")
+        assert float.fromhex(ran.stdout) == run["cone.r.z"]
+
+
+def test_it_runs_in_an_empty_root(tmp_path):
+    made = exported(tmp_path)
+    root = tmp_path / "root"
+    root.mkdir()
+    archive = made.path / own_platform() / "libpen1.a"
+    command = [compiler(), "-static", "-DDAP3D_STATIC", made.path / "example.c", archive, "-lm",
+               "-o", root / "example"]  # fmt: skip
+    if subprocess.run(command, capture_output=True, check=False).returncode:
+        pytest.skip("there is no static C library")
+    inside = ["unshare", "--user", "--map-root-user", "chroot", root, "/example", "0.5", "4"]
+    if shutil.which("unshare") is None:
+        pytest.skip("there is no unshare")
+    done = subprocess.run(inside, capture_output=True, text=True, check=False)
+    if "Operation not permitted" in done.stderr or "unshare failed" in done.stderr:
+        pytest.skip("no namespace of users is allowed")
+    assert done.returncode == 0, done.stderr
+    assert len(done.stdout.splitlines()) == 6
+
+
+def test_the_shared_library_needs_the_c_library_alone(tmp_path):
+    if shutil.which("readelf") is None:
+        pytest.skip("there is no readelf")
+    made = exported(tmp_path)
+    library = made.path / own_platform() / "libpen1.so"
+    listed = subprocess.run(["readelf", "-dW", library], capture_output=True, text=True, check=True)
+    needed = {line.split("[")[1].rstrip("]") for line in listed.stdout.splitlines()
+              if "(NEEDED)" in line}  # fmt: skip
+    assert needed <= {"libc.so.6", "libm.so.6", "ld-linux-x86-64.so.2", "ld-linux-aarch64.so.1"}
+    symbols = subprocess.run(["readelf", "--dyn-syms", "-W", library], capture_output=True,
+                             text=True, check=True)  # fmt: skip
+    own = {words[7] for words in map(str.split, symbols.stdout.splitlines())
+           if len(words) == 8 and words[4] == "GLOBAL" and words[6] != "UND"}  # fmt: skip
+    assert "dap3d_step_to" in own
+    assert all(name.startswith("dap3d_") for name in own)
+    assert "dap3d_outputs" not in own
+    assert made.size < 400_000
+
+
+def test_without_a_compiler_it_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(build.shutil, "which", lambda name: None)
+    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(dap.SceneError, match=r"no C compiler\s+pip install 'dap3d\[native\]'"):
+        exported(tmp_path)
+
+
+def test_the_compiler_of_a_machine_is_for_its_own_platform(tmp_path, monkeypatch):
+    found = compiler()
+    monkeypatch.setattr(build.shutil, "which", lambda name: found)
+    monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(dap.SceneError, match="no libraries for windows-x86-64"):
+        exported(tmp_path, platforms=["windows"])
+    assert exported(tmp_path).platforms == (own_platform(),)
+
+
+@pytest.mark.slow  # the first one makes the C libraries of the systems, some minutes
+@pytest.mark.parametrize(
+    ("platform", "begin"),
+    [
+        ("linux-arm64", b"\x7fELF"),
+        ("windows-x86-64", b"MZ"),
+        ("macos-x86-64", b"\xcf\xfa\xed\xfe"),
+        ("macos-arm64", b"\xcf\xfa\xed\xfe"),
+    ],
+)
+def test_libraries_of_other_platforms_are_linked_here(tmp_path, platform, begin):
+    pytest.importorskip("ziglang")
+    made = exported(tmp_path, platforms=[platform])
+    library = next((made.path / platform).glob("*pen1.[sd][oly]*"))
+    content = library.read_bytes()
+    assert content.startswith(begin)
+    assert b"dap3d_step_to" in content
+    assert (made.path / platform / "libpen1.a").exists()
