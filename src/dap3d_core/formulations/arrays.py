@@ -65,7 +65,7 @@ def build_loops(
 
 def _groups_for(model: Model, kind: str) -> tuple[Group, ...]:
     if kind == "friction":
-        return (*model.friction, *model.forces)
+        return (*model.friction, *model.forces, *model.contacts)
     return (*model.functions, *model.forces, *model.joints)
 
 
@@ -100,7 +100,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         settings=np.array(
             [
                 *(1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0),
-                float(any(group.read for group in model.forces)),
+                float(bool(model.contacts) or any(group.read for group in model.forces)),
             ]
         ),
         friction=np.zeros(
