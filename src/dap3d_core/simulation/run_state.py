@@ -251,7 +251,7 @@ def jumps_of(evaluator: Evaluator) -> "Jumps | None":
     if not any(switch.jumps for switch in evaluator.switches):
         return None
     if evaluator.model.contact_count:
-        from dap3d_core.simulation.contacts.contact_jumps import ContactJumps
+        from dap3d_core.simulation.events.contact_jumps import ContactJumps
 
         return ContactJumps(evaluator)
     from dap3d_core.simulation.events.jumps import Jumps

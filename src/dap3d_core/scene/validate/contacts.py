@@ -18,7 +18,7 @@ from dap3d_core.scene.validate.validated_scene import Instance
 def read_contacts(
     report: Collector, geometry: Geometry, types: Types, functions: Sequence[Instance]
 ) -> list[Instance]:
-    """The contacts of a scene; of one with several points ``NAME.1``, ``NAME.2``, ..."""
+    """The contacts of a scene; of one with several points ``NAME#1``, ``NAME#2``, ..."""
     scene = report.scene
     for name in scene.contacts.keys() & scene.joints.keys():
         what = "is the name of a joint as well; results know both by their names"
@@ -28,7 +28,7 @@ def read_contacts(
     for one in read_elements(report, geometry, "contacts", types, functions, elements):
         count: int = one.type_info.type.points  # type: ignore[attr-defined]
         for k in range(count):
-            name = one.name if count == 1 else f"{one.name}.{k + 1}"
+            name = one.name if count == 1 else f"{one.name}#{k + 1}"
             values = one.values | {"part": float(k)}
             if values["mu_s"] is not None and values["mu_s"] < values["mu"]:
                 what = f"is less than mu = {values['mu']:g}; what slides would stick more than rest"

@@ -11,8 +11,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.simulation.contacts.cone import solve_cone
-from dap3d_core.simulation.contacts.contact_rows import ContactRows, ContactTable
+from dap3d_core.formulations.contacts.cone import solve_cone
+from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
 
 #: Normal speed, m/s of a scene of ordinary size, below which what touches does not approach.
 AT_REST = 1e-9

@@ -12,14 +12,15 @@ from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result import INFORMATION, EventRecord
 from dap3d_core.scene import Mistake, SceneError
-from dap3d_core.simulation.contacts.contact_rows import (
+from dap3d_core.scene.errors import MISSING
+from dap3d_core.formulations.contacts.contact_rows import (
     FRICTION,
     GAP,
     ContactRows,
     ContactTable,
 )
-from dap3d_core.simulation.contacts.impacts import collide
-from dap3d_core.simulation.contacts.modes import JamError, find_modes
+from dap3d_core.formulations.contacts.impacts import collide
+from dap3d_core.formulations.contacts.modes import JamError, find_modes
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps
 
@@ -49,7 +50,7 @@ class ContactJumps(Jumps):
             name = others[0].name(evaluator.model)
             what = "changes velocities by a law of its own, which contacts do not know"
             remedy = "describe what it does by a contact, or take the contacts out"
-            raise SceneError([Mistake(name, None, what, remedy=remedy)])
+            raise SceneError([Mistake(name, MISSING, what, remedy=remedy)])
         self.table = ContactTable(evaluator)
         self._last, self._at_once = -np.inf, 0
 
@@ -63,7 +64,7 @@ class ContactJumps(Jumps):
         gaps = self._gaps(integration)
         mistakes = [
             Mistake(
-                f"contacts.{name}", None, f"its bodies overlap by {-gap:.6g} m at the start",
+                f"contacts.{name}", MISSING, f"its bodies overlap by {-gap:.6g} m at the start",
                 remedy=f"move them apart by that along the normal (a gap of up to "
                 f"{TOUCHING_AT_START * length:g} m counts as touching)",
             )

@@ -4,8 +4,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.simulation.contacts.cone import solve_cone
-from dap3d_core.simulation.contacts.contact_rows import ContactRows, ContactTable
+from dap3d_core.formulations.contacts.cone import solve_cone
+from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
 
 #: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
 #: is zero; part of the largest entry of W below which rows depend on each other.
