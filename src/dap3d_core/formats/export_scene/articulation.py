@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dap3d_core.formats.export_scene.elements import SceneElements, SceneJoint
+from dap3d_core.formats.export_scene.elements import SceneElements, SceneJoint, leave_out
 from dap3d_core.formats.export_scene.forces import add_forces, add_gravity
 from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.formats.export_scene.shapes import geometries_of
@@ -38,6 +38,8 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
         _add_joint(builder, joint, closes=True)
     add_gravity(builder, scene)
     add_forces(builder, scene)
+    for contact in scene.contacts.values():
+        leave_out(remarks, contact, "contacts of other programs yield")
     for body in elements.bodies:
         geometries = geometries_of(builder, scene, body)
         if body == GROUND and geometries:

@@ -10,8 +10,10 @@ from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTa
 #: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
 #: is zero; part of the largest entry of W below which rows depend on each other.
 STILL, ZERO, DEPENDENT = 1e-9, 1e-9, 1e-9
+#: Part of the largest acceleration that may be left where contacts hold.
+HELD = 1e-13
 #: Parts of their cones within which contacts that share what they carry are to stay.
-INSIDE = (0.5, 0.8, 0.95, 0.99, 0.999, 0.9999, 0.999999)
+INSIDE = (0.5, 0.8, *(1.0 - 10.0**-k for k in range(1, 13)))
 
 
 class JamError(ValueError):
@@ -51,27 +53,59 @@ def find_modes(
     Raises:
         JamError: a contact jams.
     """
-    slip = rows.slip
     limit = STILL * max(1.0, table.evaluator.model.length)
-    closed = [c for c in touching if slip[c, 0] < limit]
-    without = [c for c in closed if c not in leaving]
-    if len(without) < len(closed):
-        x, W, b, _ = _solve(table, rows, without, sliding, limit)
-        found = _rates(rows, without, x, closed, W)
+    slip = rows.slip
+    found = Modes(*(np.zeros((table.count, *shape)) for shape in ((), (3,), (3,))))
+    for group in _groups(rows, [c for c in touching if slip[c, 0] < limit]):
+        _put_modes(table, rows, group, sliding, leaving, limit, found)
+    return found
+
+
+def _groups(rows: ContactRows, closed: list[int]) -> list[list[int]]:
+    """Contacts that feel each other's forces, together."""
+    size = np.abs(rows.W).max(initial=0.0)
+    blocks = np.abs(rows.W).reshape(len(rows.W) // 3, 3, -1, 3).max(axis=(1, 3)) > 1e-14 * size
+    left, found = list(closed), []
+    while left:
+        group = [left.pop(0)]
+        for c in group:
+            near = [k for k in left if blocks[c, k]]
+            group += near
+            left = [k for k in left if k not in near]
+        found.append(sorted(group))
+    return found
+
+
+def _put_modes(
+    table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
+    leaving: list[int], limit: float, found: Modes,
+) -> None:  # fmt: skip
+    """Find the modes of one group of contacts."""
+    left = [c for c in leaving if c in closed]
+    if left or any(c in sliding for c in closed):
+        # of contacts that share, one at the end of its cone may only have to carry less
+        if _inside(table, rows, closed, {}, limit) is not None:
+            _put(table, rows, closed, {}, limit, found)
+            return
+    without = [c for c in closed if c not in left]
+    if left and without:
+        x, *_ = _solve(table, rows, without, sliding, limit)
         big = float(np.abs(rows.free).max()) + 1e-300
-        if all(found[c] >= -ZERO * big for c in closed if c in leaving):
-            closed = without
-    return _modes(table, rows, closed, sliding, limit)
+        rates = _rates(rows, without, x, left)
+        closed = without if all(rate >= -ZERO * big for rate in rates) else closed
+    elif left:
+        closed = [c for c in left if rows.free[3 * c] < -ZERO * float(np.abs(rows.free).max())]
+    _put(table, rows, closed, sliding, limit, found)
 
 
 def _rates(
-    rows: ContactRows, contacts: list[int], x: Floats, wanted: list[int], W: Floats
-) -> dict[int, float]:
-    """Accelerations along the normals of contacts, of the forces (x, with friction) of others."""
+    rows: ContactRows, contacts: list[int], x: Floats, wanted: list[int]
+) -> list[float]:
+    """Accelerations along the normals of contacts, by the forces x of others."""
     force = np.zeros(len(rows.G))
     force[rows.rows_of(contacts)] = x
     rates = rows.W @ force + rows.free
-    return {c: float(rates[3 * c]) for c in wanted}
+    return [float(rates[3 * c]) for c in wanted]
 
 
 def _ways(
@@ -115,50 +149,57 @@ def _solve(
     return x, W, a, ways
 
 
-def _modes(
+def _put(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float,
-) -> Modes:  # fmt: skip
-    mode, way, near = np.zeros(table.count), np.zeros((table.count, 3)), np.zeros((table.count, 3))
+    limit: float, found: Modes,
+) -> None:  # fmt: skip
+    """Put the modes of contacts that are closed among those found."""
     if not closed:
-        return Modes(mode, way, near)
+        return
     x, W, a, ways = _solve(table, rows, closed, sliding, limit)
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
-    shares = np.linalg.matrix_rank(W, tol=DEPENDENT * np.abs(W).max()) < len(W)
-    if shares and all(np.abs(a) <= ZERO * big):
-        inner = _inside(table, rows, closed, sliding, limit, big)
-        x = x if inner is None else inner
+    shares = _share(W)
+    inner = _inside(table, rows, closed, sliding, limit)
+    x = x if inner is None else inner
     for k, c in enumerate(closed):
         force, rate, frame = x[3 * k : 3 * k + 3], a[3 * k : 3 * k + 3], rows.frames[c]
         if force[0] <= 0.0 and (rate[0] > ZERO * big or (len(closed) == 1 and rate[0] > -ZERO)):
             continue  # it opens
-        tangents = frame[1:]
         if c in ways:
-            mode[c], way[c] = 1.0, ways[c] @ tangents
+            mode, way = 1.0, ways[c]
         elif table.mu_s[c] == 0.0:
-            mode[c] = 1.0
+            mode, way = 1.0, np.zeros(2)
         elif np.hypot(*rate[1:]) > ZERO * big:
-            direction = rate[1:] if table.mu[c] == 0.0 else -force[1:]
-            size = np.hypot(*direction)
-            direction = direction / size if size > 0.0 else rate[1:] / np.hypot(*rate[1:])
-            mode[c], way[c] = 1.0, direction @ tangents
+            along = -force[1:] if table.mu[c] > 0.0 and np.any(force[1:]) else rate[1:]
+            mode, way = 1.0, along / np.hypot(*along)
         else:
-            mode[c] = 2.0
+            mode, way = 2.0, np.zeros(2)
+        found.mode[c], found.way[c] = mode, way @ frame[1:]
         if shares:
-            near[c] = force @ frame if mode[c] == 2.0 else force[0] * frame[0]
-    return Modes(mode, way, near)
+            found.near[c] = force @ frame if mode == 2.0 else force[0] * frame[0]
+
+
+def _share(W: Floats) -> bool:
+    """True if forces of contacts may change without a change of the motion."""
+    return bool(np.linalg.matrix_rank(W, tol=DEPENDENT * np.abs(W).max()) < len(W))
 
 
 def _inside(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float, big: float,
+    limit: float,
 ) -> Floats | None:  # fmt: skip
-    """Forces well within the cones, of contacts that share what they carry; None: there are none."""
+    """Forces well within the cones of contacts that share what they carry, and hold.
+
+    None where they do not share, or there are none.
+    """
+    big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
     for part in INSIDE:
         try:
-            x, _, a, _ = _solve(table, rows, closed, sliding, limit, part)
+            x, W, a, _ = _solve(table, rows, closed, sliding, limit, part)
         except JamError:
             continue
-        if np.abs(a).max() <= ZERO * big:
+        if not _share(W):
+            return None
+        if np.abs(a).max() <= HELD * big:
             return x
     return None

@@ -10,7 +10,7 @@ from dap3d_core.simulation.equilibrium.notes import assumptions, failure, findin
 from dap3d_core.simulation.equilibrium.search import Outcome, Search, search_equilibrium
 from dap3d_core.simulation.equilibrium.stability import Stability, stability_of
 from dap3d_core.simulation.equilibrium.statics import Statics
-from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.errors import SimulationError, refuse_contacts
 from dap3d_core.simulation.initial.start_state import StartState
 
 #: Singular values of the Jacobian below this part are left out of the least multipliers.
@@ -59,6 +59,7 @@ def find_rest(
     Raises:
         SimulationError: there is none, or none was found; names what gives way.
     """
+    refuse_contacts(evaluator.model, "the search for an equilibrium")
     evaluator.start(0.0, u, angles, states)
     search = search_equilibrium(evaluator, u)
     if evaluator.model.state_count:

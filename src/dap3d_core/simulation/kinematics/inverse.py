@@ -17,7 +17,7 @@ from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.errors import SimulationError, refuse_contacts
 from dap3d_core.simulation.failure.negative_reactions import Pulling
 from dap3d_core.simulation.kinematics.actuators import Actuator, DriverActuator, actuators_of
 from dap3d_core.simulation.kinematics.kinematics import check_output
@@ -90,6 +90,7 @@ def inverse(
     check_output(output, force=force)
     given = read_motion(motion)
     compiled = compiled_exactly(scene, allow_code, announce)
+    refuse_contacts(compiled.model, "inverse dynamics")
     with compiled.borrow_evaluator() as evaluator:
         result = _solved(compiled, evaluator, given, actuators, progress)
     if output is not None:
