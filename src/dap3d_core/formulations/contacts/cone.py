@@ -16,8 +16,9 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 
-#: Sweeps of the first try, and how many tries, each of four times as many.
-SWEEPS, TRIES = 300, 5
+#: Sweeps of the first try after Newton alone, and how many tries, each of four times as many.
+SWEEPS, TRIES = 50, 6
+FIRST = 5
 #: Newton passes, halvings of a step in one, and where it stands at rounding.
 PASSES, CUTS, ROUNDING = 50, 12, 1e-15
 #: Of the scale of the solution: a problem counts as solved.
@@ -26,7 +27,7 @@ _TINY = 1e-300
 
 
 def solve_cone(
-    W: Floats, b: Floats, mu: Any, more: Any = None, start: Floats | None = None
+    W: Floats, b: Floats, mu: Any, more: Any = None, start: Any = None, tries: int = TRIES
 ) -> tuple[Floats, float]:
     """The solution x (3 m,), and the residual of the equations over its size.
 
@@ -35,6 +36,7 @@ def solve_cone(
         mu: (m,) coefficients of friction.
         more: (m,) normal impulses of an earlier phase, which widen the discs.
         start: (3 m,) where to begin.
+        tries: at most; fewer where it is to be known whether there is a solution nearby.
     """
     count = len(b) // 3
     mu, more = np.asarray(mu, dtype=float), np.zeros(count) if more is None else more
@@ -44,8 +46,8 @@ def solve_cone(
         return x, left
     r = 1.0 / np.maximum(np.diag(W).reshape(-1, 3).max(axis=1), _TINY)
     scale = float(np.abs(b / np.maximum(np.diag(W), _TINY)).max()) + _TINY
-    for k in range(TRIES):
-        x = _sweep(W, b, mu, x, r, more, SWEEPS * 4**k)
+    for k in range(tries):
+        x = _sweep(W, b, mu, x, r, more, SWEEPS * 4 ** (k - 1) if k else FIRST)
         x, left = _newton(W, b, mu, x, r, more)
         if left <= SOLVED * scale:
             break

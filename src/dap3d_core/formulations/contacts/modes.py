@@ -1,5 +1,7 @@
 """Which contacts hold, slip and stick from an instant on: the cone problem of the accelerations."""
 
+from typing import Any
+
 import attrs
 import numpy as np
 
@@ -10,10 +12,12 @@ from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTa
 #: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
 #: is zero; part of the largest entry of W below which rows depend on each other.
 STILL, ZERO, DEPENDENT = 1e-9, 1e-9, 1e-9
-#: Part of the largest acceleration that may be left where contacts hold.
-HELD = 1e-13
-#: Parts of their cones within which contacts that share what they carry are to stay.
-INSIDE = (0.5, 0.8, *(1.0 - 10.0**-k for k in range(1, 13)))
+#: Part of the largest acceleration that may be left where contacts hold, by shares alone: their
+#: rows take it, within what the cones leave.
+HELD, OF_REST = 1e-9, 0.05
+#: Parts of their cones within which contacts that share what they carry are to stay, each leaving
+#: half of what the one before leaves: what they carry reaches its limit with so much left, 1e-9.
+INSIDE = tuple(1.0 - 0.5**k for k in range(1, 31))
 
 
 class JamError(ValueError):
@@ -84,8 +88,9 @@ def _put_modes(
     left = [c for c in leaving if c in closed]
     if left or any(c in sliding for c in closed):
         # of contacts that share, one at the end of its cone may only have to carry less
-        if _inside(table, rows, closed, {}, limit) is not None:
-            _put(table, rows, closed, {}, limit, found)
+        inner = _inside(table, rows, closed, {}, limit)
+        if inner is not None:
+            _put(table, rows, closed, {}, limit, found, inner)
             return
     without = [c for c in closed if c not in left]
     if left and without:
@@ -126,7 +131,7 @@ def _ways(
 
 def _solve(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float, part: float = 1.0,
+    limit: float, part: float = 1.0, **more: Any,
 ) -> tuple[Floats, Floats, Floats, dict[int, Floats]]:  # fmt: skip
     """Forces (3 k,) with sliding friction, the matrix, accelerations, and directions of sliding."""
     which = rows.rows_of(closed)
@@ -139,8 +144,8 @@ def _solve(
             mu[k] = 0.0
             if W[3 * k, 3 * k] <= 0.0:
                 raise JamError(table.names[c])
-    x, left = solve_cone(W, b, mu)
-    if left > 1e-6:
+    x, left = solve_cone(W, b, mu, **more)
+    if left > 1e-6 and not more:
         raise JamError(table.names[closed[0]])
     a = W @ x + b
     for k, c in enumerate(closed):
@@ -151,15 +156,16 @@ def _solve(
 
 def _put(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float, found: Modes,
+    limit: float, found: Modes, inner: Floats | None = None,
 ) -> None:  # fmt: skip
-    """Put the modes of contacts that are closed among those found."""
+    """Put the modes of contacts that are closed among those found; inner: of ``_inside``."""
     if not closed:
         return
     x, W, a, ways = _solve(table, rows, closed, sliding, limit)
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
     shares = _share(W)
-    inner = _inside(table, rows, closed, sliding, limit)
+    if inner is None:
+        inner = _inside(table, rows, closed, sliding, limit)
     x = x if inner is None else inner
     for k, c in enumerate(closed):
         force, rate, frame = x[3 * k : 3 * k + 3], a[3 * k : 3 * k + 3], rows.frames[c]
@@ -193,13 +199,16 @@ def _inside(
     None where they do not share, or there are none.
     """
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
-    for part in INSIDE:
-        try:
-            x, W, a, _ = _solve(table, rows, closed, sliding, limit, part)
-        except JamError:
-            continue
+    best, low, high = None, 0, len(INSIDE) - 1
+    while low <= high:  # what one part allows, so does every larger one
+        k = high if best is None else (low + high) // 2
+        x, W, a, _ = _solve(table, rows, closed, sliding, limit, INSIDE[k], start=best, tries=3)
         if not _share(W):
             return None
-        if np.abs(a).max() <= HELD * big:
-            return x
-    return None
+        if np.abs(a).max() <= min(HELD, OF_REST * (1.0 - INSIDE[k])) * big:
+            best, high = x, k - 1
+        elif best is None:
+            return None
+        else:
+            low = k + 1
+    return best
