@@ -47,10 +47,13 @@ class Formulation:
         """Kinds of the group loops that it calls."""
         return (*_ALL, *_OF_JOINTS) if self.needs_joints else _ALL
 
-    def functions(self, *, turns: bool, switches: bool, equations: str = "") -> Any:
+    def functions(
+        self, *, turns: bool, switches: bool, contacts: bool = False, equations: str = ""
+    ) -> Any:
         """Its compiled functions as the list that an integrator takes.
 
-        They are rhs, project, report; accepted where ``turns`` are counted; watch for ``switches``.
+        They are rhs, project, report; accepted where ``turns`` are counted; watch for ``switches``,
+        of ``contacts`` the one that finds multipliers.
 
         equations: the module that has them, where it is not the one of the formulation's name.
         """
@@ -59,7 +62,9 @@ class Formulation:
         if turns or switches:
             if not self.has_own_coordinates:
                 module = import_module("dap3d_core.formulations.common.switching_functions")
-            functions += [module.accepted, module.watch] if switches else [module.accepted]
+            functions.append(module.accepted)
+            if switches:
+                functions.append(module.watch_contacts if contacts else module.watch)
         return step_functions(*functions)
 
     def coordinates(self, evaluator: Any) -> Any:

@@ -32,6 +32,13 @@ class ConstraintRows:
         terms = self.value * x[self.column]
         return np.bincount(self.row, terms, minlength=self.shape[0]).astype(float)
 
+    def first(self, count: int) -> "ConstraintRows":
+        """The first rows alone."""
+        own = self.row < count
+        sides = self.C[:count], self.nu[:count], self.gamma[:count]
+        entries = self.row[own], self.column[own], self.value[own]
+        return ConstraintRows(*sides, *entries, (count, self.shape[1]))
+
     def dense(self) -> Floats:
         """The Jacobian D (rows, 6 n)."""
         D = np.zeros(self.shape)

@@ -310,7 +310,10 @@ class Evaluator:
         """The compiled functions (rhs, project, report, ...) that an integrator takes."""
         turns, switches = self.counts_turns, bool(self.switches)
         equations = self.coordinates.equations if self.formulation.has_own_coordinates else ""
-        return self.formulation.functions(turns=turns, switches=switches, equations=equations)
+        contacts = bool(self.model.contact_count)
+        return self.formulation.functions(
+            turns=turns, switches=switches, contacts=contacts, equations=equations
+        )
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y of a state u (13 n,) and ``states``, in coordinates of bodies."""

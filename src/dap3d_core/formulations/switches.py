@@ -56,7 +56,13 @@ class Switch:
     @property
     def jumps(self) -> bool:
         """True if velocities or states may jump where it changes its sign."""
-        return self.kind == "switch" and not JUMPING.isdisjoint(self.group.type_info.kernels)
+        has_jump = self.is_contact or not JUMPING.isdisjoint(self.group.type_info.kernels)
+        return self.kind == "switch" and has_jump
+
+    @property
+    def is_contact(self) -> bool:
+        """True of contacts, where a mode ends."""
+        return bool(self.group.type_info.type.is_contact)
 
     @property
     def effect(self) -> int:
@@ -74,7 +80,7 @@ class Switch:
             return 0.0
         if self.kind == "switch":
             type_: Any = self.group.type_info.type
-            touches = self.jumps and type_.unilateral and not self.words
+            touches = self.is_contact or (self.jumps and type_.unilateral and not self.words)
             return ROUNDING * self.length if touches else 0.0
         row, numbers = self.group.numbers[self.place], self.group.type_info.layout.numbers
         own = [place for name, place in numbers.items() if is_knots(name)]

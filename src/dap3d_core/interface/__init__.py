@@ -1,5 +1,6 @@
 """The interface of plugins: joints, forces, functions and their fields."""
 
+from dap3d_core.interface.contacts.contact import Contact
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.fields import (
@@ -36,6 +37,7 @@ __all__ = [
     "INTERFACE_VERSION",
     "REQUIRED",
     "Body",
+    "Contact",
     "Force",
     "Function",
     "Joint",

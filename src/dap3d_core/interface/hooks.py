@@ -2,7 +2,8 @@
 
 import pluggy
 
-from dap3d_core.interface.types import Force, Function, Joint
+from dap3d_core.interface.contacts.contact import Contact
+from dap3d_core.interface.types import Force, Function, Joint, TypeBase
 
 PROJECT = "dap3d"
 
@@ -28,11 +29,25 @@ def dap3d_functions() -> list[type[Function]]:
     raise NotImplementedError
 
 
+@hookspec
+def dap3d_contacts() -> list[type[Contact]]:
+    """The contact types of a module: a list of subclasses of ``Contact``."""
+    raise NotImplementedError
+
+
+#: Base class of each kind.
+KINDS: dict[str, type[TypeBase]] = {
+    "joint": Joint,
+    "force": Force,
+    "function": Function,
+    "contact": Contact,
+}
 #: Entry-point group and hook of each kind.
 GROUPS = {
     "joint": ("dap3d.joints", "dap3d_joints"),
     "force": ("dap3d.forces", "dap3d_forces"),
     "function": ("dap3d.functions", "dap3d_functions"),
+    "contact": ("dap3d.contacts", "dap3d_contacts"),
 }
 #: The same of what no type is, whose hooks lie in modules of their own: most scenes need none.
 EXTENSIONS = {

@@ -52,6 +52,8 @@ class TypeBase:
     synonyms: ClassVar[tuple[str, ...]] = ()
     #: True for impulses that drive bodies: check-plugin lets them add kinetic energy.
     gives_energy: ClassVar[bool] = False
+    #: A contact, whose rows hold and let go (interface/contacts).
+    is_contact: ClassVar[bool] = False
     #: States of its own: names, or name -> length (docs/concepts/kernels.md).
     states: ClassVar[tuple[str, ...] | Mapping[str, int | str]] = ()
 
@@ -264,6 +266,3 @@ def acts_on_all(type_: type[TypeBase]) -> int:
 def turns_of(type_: type[TypeBase], body_count: int) -> list[tuple[int, ...]]:
     """The bodies, or pairs of bodies, that such a type acts on in turn, by their indices."""
     return list(combinations(range(1, body_count + 1), acts_on_all(type_)))
-
-
-KINDS: dict[str, type[TypeBase]] = {"joint": Joint, "force": Force, "function": Function}

@@ -61,6 +61,7 @@ class Model:
         input_rows, input_values: (inputs,) their rows of F, and their values at the start of a run.
         point_names, point_body (points,), point_local (points, 3): for rP; animation points last.
         notes: what types warned about.
+        contact_laws: (contacts,) law of impact of each point of contact; they are the last joints.
         motions: of the joints (assembly/motion); joint_angles: those that are counted. None until
             they are looked for.
     """
@@ -93,6 +94,22 @@ class Model:
     input_values: Floats = attrs.field(factory=lambda: np.zeros(0))
     motions: Any = None
     joint_angles: JointAngles | None = None
+    contact_laws: tuple[str, ...] = ()
+
+    @property
+    def contact_count(self) -> int:
+        """Number of points of contacts: they are the last of the joints."""
+        return len(self.contact_laws)
+
+    @property
+    def contacts(self) -> tuple[Group, ...]:
+        """Groups of joints that are contacts."""
+        return tuple(group for group in self.joints if group.type_info.type.is_contact)
+
+    @property
+    def joint_row_count(self) -> int:
+        """Number of rows of joints that are no contacts: the first of all."""
+        return self.row_count - 3 * self.contact_count
 
     @property
     def body_count(self) -> int:
@@ -185,7 +202,9 @@ class Model:
     def iterated_forces(self) -> tuple[str, ...]:
         """Names of forces that depend on multipliers: friction of joints, forces on reactions."""
         groups = (*self.friction, *(group for group in self.forces if group.read))
-        return tuple(self.force_names[k] for group in groups for k in group.members.tolist())
+        names = (self.force_names[k] for group in groups for k in group.members.tolist())
+        first = len(self.joint_names) - self.contact_count
+        return (*names, *self.joint_names[first:])
 
     @property
     def integrated_layout(self) -> Layout:
@@ -301,8 +320,9 @@ def build_model(checked: ValidatedScene) -> Model:
         PluginError: the ``prepare`` of a type failed.
     """
     poses = _Poses(checked)
-    rows = np.array([_rows(j) for j in checked.joints], dtype=np.int64)
-    mask = [_position_mask(j) for j in checked.joints]
+    holding = checked.holding
+    rows = np.array([_rows(j) for j in holding], dtype=np.int64)
+    mask = [_position_mask(j) for j in holding]
     groups = _Groups(checked, poses)
     model = Model(
         body_names=tuple(checked.body_names),
@@ -312,12 +332,12 @@ def build_model(checked: ValidatedScene) -> Model:
         p=checked.p,
         v=checked.r_dot,
         w=checked.w,
-        joint_names=tuple(j.name for j in checked.joints),
+        joint_names=tuple(j.name for j in holding),
         force_names=tuple(f.name for f in checked.forces),
         function_names=tuple(f.name for f in checked.functions),
         joint_rows=rows,
         joint_start=np.concatenate([[0], np.cumsum(rows)]).astype(np.int64),
-        joint_slots=tuple(j.bodies for j in checked.joints),
+        joint_slots=tuple(j.bodies for j in holding),
         position_row=np.array([there for m in mask for there in m], dtype=bool),
         joints=groups.joints,
         forces=groups.forces,
@@ -331,6 +351,7 @@ def build_model(checked: ValidatedScene) -> Model:
         input_names=tuple(checked.inputs),
         input_rows=1 + len(checked.functions) + np.arange(len(checked.inputs)),
         input_values=np.array(list(checked.inputs.values()), dtype=float),
+        contact_laws=tuple(contact.values["law"] for contact in checked.contacts),
     )
     for value in attrs.astuple(model, recurse=False):
         if isinstance(value, np.ndarray):
@@ -345,14 +366,14 @@ class _Groups:
         n = len(checked.body_names)
         kinds = ("joint", "force", "function")
         by_kind = {k: Grouping(k, poses, n, checked.functions) for k in kinds}
-        every = (*checked.joints, *checked.forces)
+        every = (*checked.holding, *checked.forces)
         used = {place - 1 for instance in every for place in instance.functions}
         functions = [(k, f) for k, f in enumerate(checked.functions) if k in used]
         through = [(k, f) for k, f in enumerate(checked.forces) if f.type_info.friction_joint]
         direct = [(k, f) for k, f in enumerate(checked.forces) if not f.type_info.friction_joint]
-        joints = {j.name: (k, j) for k, j in enumerate(checked.joints)}
+        joints = {j.name: (k, j) for k, j in enumerate(checked.holding)}
         names = {
-            "joint": checked.joints,
+            "joint": checked.holding,
             "force": checked.forces,
             "function": checked.functions,
         }

@@ -10,8 +10,7 @@ from importlib.metadata import Distribution, distributions
 from pathlib import Path
 from urllib.parse import unquote
 
-from dap3d_core.interface.hooks import GROUPS
-from dap3d_core.interface.types import KINDS
+from dap3d_core.interface.hooks import GROUPS, KINDS
 from dap3d_core.registry.regular_files import read_regular
 
 #: Maximal size of a file, bytes.

@@ -17,8 +17,8 @@ from dap3d_core.interface import PluginError, hooks
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.interface.hooks import GROUPS
-from dap3d_core.interface.types import KINDS, TypeBase
+from dap3d_core.interface.hooks import GROUPS, KINDS
+from dap3d_core.interface.types import TypeBase
 from dap3d_core.registry.discovery import Source
 from dap3d_core.registry.guard import guard, within
 from dap3d_core.registry.plugin_module import hooks_of

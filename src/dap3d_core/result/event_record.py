@@ -8,6 +8,8 @@ import attrs
 #: A switch that restarted the integration, or ended the run; an event that stopped it, was
 #: recorded, or changed parameters of a force or velocities; a jump of velocities by elements.
 KINDS = ("switch", "end", "stop", "record", "change", "jump")
+#: The same of contacts (docs/concepts/contact.md).
+CONTACT_KINDS = ("touch", "impact", "lift", "slip", "stick", "rest", "jam")
 
 
 def _state(u: Any) -> tuple[float, ...] | None:
@@ -24,7 +26,7 @@ class EventRecord:
         t: s.
         direction: +1 if its function rose through its level, -1 if it fell; of a jump that of the
             first switch, 0 without one.
-        kind: one of ``KINDS``.
+        kind: one of ``KINDS``, or of ``CONTACT_KINDS``.
         u: (13 n) the state, of events and before jumps; None for switches.
         changes: force -> field -> new value of changed parameters.
         u_after: (13 n) the state after a jump of velocities; None for all else.
@@ -35,7 +37,7 @@ class EventRecord:
     name: str
     t: float
     direction: int
-    kind: str = attrs.field(validator=attrs.validators.in_(KINDS))
+    kind: str = attrs.field(validator=attrs.validators.in_(KINDS + CONTACT_KINDS))
     u: tuple[float, ...] | None = attrs.field(default=None, converter=_state)
     changes: Mapping[str, Mapping[str, Any]] = attrs.Factory(dict)
     u_after: tuple[float, ...] | None = attrs.field(default=None, converter=_state)
@@ -45,6 +47,9 @@ class EventRecord:
     @property
     def words(self) -> str:
         """The occurrence in a line."""
+        if self.kind in CONTACT_KINDS:
+            of = f": work {self.work:.6g} J" if self.kind in ("impact", "jam") else ""
+            return f"t = {self.t:.9g} s: {self.kind} of {self.name}{of}"
         what = ", which ended the run" if self.kind in ("end", "stop") else ""
         if self.kind == "change":
             of = [f"{force}.{n} = {_short(x)}" for force, new in self.changes.items()

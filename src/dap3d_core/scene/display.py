@@ -15,6 +15,7 @@ COUNTED = (
     ("functions", "function", "functions"),
     ("inputs", "input", "inputs"),
     ("shapes", "shape", "shapes"),
+    ("contacts", "contact", "contacts"),
 )
 
 

@@ -53,7 +53,7 @@ AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 #: Entries of a rotation matrix below this are rounding, as of a turn of 90 deg.
 ROUNDING = 1e-15
 #: Elements whose type may take something from ground that is not written, and the kind of each.
-KINDS = {"joints": "joint", "forces": "force"}
+KINDS = {"joints": "joint", "forces": "force", "contacts": "contact"}
 #: The field of a constant orientation A_i^T A_j, which is another one where ground is turned.
 RELATIVE = "A_c"
 #: A name in an expression: quoted, or a dotted word.

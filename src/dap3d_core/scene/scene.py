@@ -99,6 +99,23 @@ class Element:
 
 
 @attrs.define
+class Material:
+    """What surfaces do where they touch: its name, and fields of contacts.
+
+    Attributes:
+        name: its name in the scene.
+        mu, mu_s: coefficients of friction of sliding and of sticking.
+        e, law: coefficient of restitution, and of whose law of impact.
+    """
+
+    name: str
+    mu: Any = attrs.field(default=None, converter=plain)
+    mu_s: Any = attrs.field(default=None, converter=plain)
+    e: Any = attrs.field(default=None, converter=plain)
+    law: Any = attrs.field(default=None, converter=plain)
+
+
+@attrs.define
 class Input:
     """A number that is set from outside: its name, its value at the start of a run."""
 
@@ -176,6 +193,8 @@ NAMED: dict[str, type] = {
     "functions": Element,
     "inputs": Input,
     "shapes": Element,
+    "materials": Material,
+    "contacts": Element,
 }
 TABLES = (
     "scene",
@@ -196,8 +215,8 @@ class Scene(SceneDisplay):
     Attributes:
         name, description: for people.
         schema: version of the file format.
-        bodies, points, vectors, vectors2, joints, forces, functions, inputs, shapes: by name, in
-            file order.
+        bodies, points, vectors, vectors2, joints, forces, functions, inputs, shapes, materials,
+            contacts: by name, in file order.
         requires: ranges of versions of the distributions that bring its types, by name.
         parameters: numbers by name, for expressions in place of numbers (text that begins with =).
         outputs: expressions of quantities, by name; or tables of ``value`` and ``unit``.
@@ -220,6 +239,8 @@ class Scene(SceneDisplay):
     functions: dict[str, Element] = attrs.Factory(dict)
     inputs: dict[str, Input] = attrs.Factory(dict)
     shapes: dict[str, Element] = attrs.Factory(dict)
+    materials: dict[str, Material] = attrs.Factory(dict)
+    contacts: dict[str, Element] = attrs.Factory(dict)
     requires: dict[str, Any] = attrs.Factory(dict)
     parameters: dict[str, Any] = attrs.Factory(dict)
     outputs: dict[str, Any] = attrs.Factory(dict)
@@ -333,6 +354,26 @@ class Scene(SceneDisplay):
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
         return self._add_element("functions", type, name, fields)
+
+    def add_material(self, name: str, **fields: Any) -> str:
+        """Add a material, fields that contacts take from it, and return its name.
+
+        Args:
+            name: without dots, not used by another material.
+            fields: mu, mu_s, e, law, as in ``Material``.
+
+        Raises:
+            SceneError: the name is taken or illegal, or a key is unknown.
+        """
+        return self._add("materials", name, fields)
+
+    def add_contact(self, type: str, name: str | None = None, **fields: Any) -> str:
+        """Add a contact of a type (its keyword) and return its name, made from the type if None.
+
+        Raises:
+            SceneError: the name is taken or illegal. Fields are checked with the whole scene.
+        """
+        return self._add_element("contacts", type, name, fields)
 
     def add_input(self, name: str, value: Any = 0.0, **unknown: Any) -> str:
         """Add an input, a number that a controller or a script sets, and return its name.

@@ -346,7 +346,7 @@ class CompiledModel:
             SimulationError: the requested method does not fit the scene.
         """
         method, reason = choose_method(self.model, requested)
-        if requested != "auto" or not self.model.row_count:
+        if requested != "auto" or not self.model.row_count or self.model.contact_count:
             return method, reason
         start = self._start_of_scene()
         if start is None:
@@ -444,6 +444,13 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
     Raises:
         SimulationError: the requested method does not fit the scene.
     """
+    if model.contact_count:
+        if requested in ("auto", "lsq"):
+            return "lsq", "the scene has contacts"
+        raise SimulationError(
+            f"method {requested} does not fit: the scene has contacts, whose rows hold and let go; "
+            "use lsq or auto"
+        )
     constrained = model.row_count > 0
     usual = next(f.name for f in FORMULATIONS.values() if f.needs_joints == constrained)
     if requested == "auto":

@@ -14,6 +14,24 @@ class SimulationError(Exception):
         self.result = result
 
 
+def refuse_contacts(model: Any, what: str) -> None:
+    """Refuse what does not know yet that contacts hold and let go.
+
+    Args:
+        model: of a scene.
+        what: that is asked for, as the subject of a sentence.
+
+    Raises:
+        SimulationError: the scene has contacts.
+    """
+    if model.contact_count:
+        raise SimulationError(
+            f"{what} does not take contacts yet, and the scene has some "
+            f"({model.joint_names[-model.contact_count].partition('#')[0]}): take them out of "
+            "[contacts], or run the scene (simulate), which does"
+        )
+
+
 class RedundantError(SimulationError):
     """The scene has redundant constraints, which the chosen formulation cannot solve."""
 

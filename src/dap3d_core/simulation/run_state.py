@@ -250,6 +250,10 @@ def jumps_of(evaluator: Evaluator) -> "Jumps | None":
     """What changes velocities in a run of a model; None where none of its types does."""
     if not any(switch.jumps for switch in evaluator.switches):
         return None
+    if evaluator.model.contact_count:
+        from dap3d_core.simulation.events.contact_jumps import ContactJumps
+
+        return ContactJumps(evaluator)
     from dap3d_core.simulation.events.jumps import Jumps
 
     return Jumps(evaluator)

@@ -61,6 +61,8 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
         _add_joint(builder, joint, closes=True)
     add_gravity(builder, scene)
     add_forces(builder, scene)
+    for contact in scene.contacts.values():
+        leave_out(remarks, contact, "contacts of other programs yield")
     for body in elements.bodies:
         geometries = geometries_of(builder, scene, body)
         if body == GROUND and geometries:

@@ -22,6 +22,7 @@ from dap3d_core.assembly.turns import (
     measure_all,
     needs_places,
 )
+from dap3d_core.formulations.regularised import accelerate
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 
@@ -72,3 +73,12 @@ def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     place(t, y, system, loops)
     place_of_next[0] = 0.0
     call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, place_of_next)
+
+
+@compiled
+def watch_contacts(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """As ``watch``, where switches of contacts read multipliers."""
+    place_of_next = system.settings[SCRATCH : SCRATCH + 1]
+    accelerate(t, y, system, loops)
+    place_of_next[0] = 0.0
+    call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, system.multipliers)

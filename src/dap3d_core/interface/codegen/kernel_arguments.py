@@ -102,6 +102,9 @@ def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, Kernel
         offer(name, (), "", doc="unknown of the joint", rate=f"x_{name}_dot")
         rate = f"rate of {name}"
         offer(f"{name}_dot", (), "", velocity=True, doc=rate, motion="0.0")
+    if type_.is_contact:
+        lam = f"({''.join(f'-out3[row + {k}], ' for k in range(3))})"
+        offer("lam", (3,), lam, velocity=True, doc="its multipliers", derivable=False)
     for name, (at, shape) in layout.states.items():
         offer(name, shape, _state(at, shape), doc="state of the element", derivable=False)
     return names

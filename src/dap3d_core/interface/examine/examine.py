@@ -476,6 +476,8 @@ def _expected(
     if kernel == "J" and type_.kind == "force":
         count = max(1, size(checked_shape(value)) // (6 * slots))
         return (slots, count, 6), f"a block of rows x 6 for each of {slots} bodies"
+    if kernel in ("gap", "at", "normal"):
+        return ((), "one number") if kernel == "gap" else ((3,), "three numbers")
     if kernel in ("switch", "tension"):
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"

@@ -115,12 +115,15 @@ def weigh_rows(blocks: Integers, D: Floats, part: float, compliance: Floats) -> 
 
 @compiled
 def regularise(nodes: Integers, compliance: Floats, K: Floats) -> None:
-    """Subtract E from the pivots of the joints, between ``assemble`` and ``factor``."""
+    """Subtract E from the pivots of the joints, between ``assemble`` and ``factor``.
+
+    A row that is zero, as those of open contacts are, weighs one: its multiplier is zero.
+    """
     for k in range(nodes.shape[0] - 1):
         m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
         if nodes[k, 3] < 0:
             for r in range(m):
-                K[d + r * (m + 1)] -= compliance[f + r]
+                K[d + r * (m + 1)] -= compliance[f + r] if compliance[f + r] != 0.0 else 1.0
 
 
 @compiled_into

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.result.errors import ResultError
-from dap3d_core.result.event_record import KINDS
+from dap3d_core.result.event_record import CONTACT_KINDS, KINDS
 from dap3d_core.result.model_summary import ModelSummary
 
 #: Arrays up to so many bytes are read whatever the size of the file; larger ones only up to a ratio
@@ -170,8 +170,9 @@ def _is_event(value: Any) -> bool:
         isinstance(value, dict)
         and is_text(value.get("name"))
         and is_number(value.get("t"))
-        and value.get("direction") in ((-1, 0, 1) if value.get("kind") == "jump" else (-1, 1))
-        and value.get("kind") in KINDS
+        and value.get("direction") in (-1, 0, 1)
+        and (value["direction"] != 0 or value.get("kind") in ("jump", *CONTACT_KINDS))
+        and value.get("kind") in KINDS + CONTACT_KINDS
         and all(_is_state(value.get(name)) for name in ("u", "u_after"))
         and is_number(value.get("work", 0.0))
         and all(_are_values(value.get(name, {})) for name in ("changes", "states"))

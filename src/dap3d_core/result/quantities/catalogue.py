@@ -16,6 +16,7 @@ from dap3d_core.result.arrays import AXES, COLUMNS, EULER, Arrays
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.metadata import RunMetadata
 from dap3d_core.result.model_summary import ModelSummary
+from dap3d_core.result.post.contact_output import ContactOutput
 from dap3d_core.result.post.force_output import ForceOutput
 from dap3d_core.result.post.point_motion import Energy, accelerations, point_motion
 from dap3d_core.result.post.reactions import Reaction
@@ -94,6 +95,9 @@ class QuantitySource(Protocol):
 
     def force(self, name: str, /) -> ForceOutput:
         """Output of a force element."""
+
+    def contact(self, name: str, /) -> ContactOutput:
+        """Output of a contact."""
 
 
 class QuantityOwner(NamedTuple):

@@ -22,6 +22,7 @@ from dap3d_core.result.quantities.catalogue import (
     QuantityOwner,
     QuantitySource,
 )
+from dap3d_core.result.quantities.contacts import contact_quantity
 from dap3d_core.scene.coerce import canonical
 
 NORM = "norm"
@@ -46,7 +47,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
             ``JOINT.`` or ``JOINT.SLOT.`` force moment force_body moment_body moment_at_point,
             without a slot on the body of the first; ``JOINT.lambda`` (rows from 1); ``JOINT.`` q1
             q1_dot q2 q2_dot ... angle length angle_rate length_rate; ``JOINT.`` and ``FORCE.``
-            states of their own, their numbers from 1; ``FORCE.`` or ``FORCE.SLOT.`` the actions as
+            states of their own, their numbers from 1; ``CONTACT.`` gap normal friction slip mode;
+            ``FORCE.`` or ``FORCE.SLOT.`` the actions as
             of a joint; ``FORCE.`` length length_rate tension energy; energy.kinetic .potential
             .total; work; ``NAME.actuation`` of actuators of inverse dynamics; constraint.position
             .velocity .acceleration; t; inputs and outputs of the scene.
@@ -68,6 +70,8 @@ def find(result: QuantitySource, name: str) -> Quantity:
     if name in result.summary.input_names:
         column = result.arrays.inputs[:, result.summary.input_names.index(name)]
         return Quantity(name, column, "input", f"input {name}", "1", (), "input")
+    if contact := contact_quantity(result, name):
+        return contact
     for kinds in (NAMED, ("force",)):
         for owner, attribute, component in _parsed(result, name, kinds):
             if owner.kind == "joint" and not component and COORDINATE.fullmatch(attribute):

@@ -473,15 +473,17 @@ def read_elements(
     table: str,
     types: Types,
     functions: Sequence[Instance] = (),
+    elements: Mapping[str, Element] | None = None,
 ) -> list[Instance]:
     """The elements of a table that are without mistakes, in file order.
 
     Args:
         report: takes mistakes and notes; its scene is read.
         geometry: resolves references.
-        table: joints, forces or functions.
+        table: joints, forces, functions or contacts.
         types: loads the types of the scene.
         functions: of the scene, for those that name them.
+        elements: in place of those of the scene's table, by name.
     """
     arguments = arguments_of(functions)
     readers = {
@@ -489,7 +491,7 @@ def read_elements(
         for keyword, type_info in types.of(table).items()
     }
     instances = []
-    for element in getattr(report.scene, table).values():
+    for element in (elements or getattr(report.scene, table)).values():
         reader = readers.get(element.type) if type(element.type) is str else None
         instance = reader.read(element) if reader is not None else None
         if instance is not None:

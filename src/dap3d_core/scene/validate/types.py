@@ -13,7 +13,7 @@ from dap3d_core.scene.validate.coerce_values import Fault, text_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 
 #: Tables of elements, and the kind of type each holds.
-KINDS = {"joints": "joint", "forces": "force", "functions": "function"}
+KINDS = {"joints": "joint", "forces": "force", "functions": "function", "contacts": "contact"}
 
 
 class Types:

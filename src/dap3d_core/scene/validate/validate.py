@@ -49,14 +49,20 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     forces = read_elements(report, geometry, "forces", types, functions)
     _report_twins(report, "joints", joints)
     _report_twins(report, "forces", forces)
+    contacts: list[Instance] = []
+    if scene.contacts:
+        from dap3d_core.scene.validate.contacts import read_contacts
+
+        contacts = read_contacts(report, geometry, types, functions)
     _check_shapes_and_outputs(report, bodies)
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()
 
     types.note_unused_file()
-    _note_loose_bodies(report, bodies, [*joints, *forces])
-    _note_unused_signals(report, [*joints, *forces], functions)
+    acting = [*joints, *forces, *contacts]
+    _note_loose_bodies(report, bodies, acting)
+    _note_unused_signals(report, acting, functions)
     notes = [*report.notes(), *notes_of(scene.simulation), *types.registry.notes]
     return ValidatedScene(
         scene=scene,
@@ -67,6 +73,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
         point_local=geometry.point_local,
         animation_count=geometry.animation_count,
         joints=joints,
+        contacts=contacts,
         forces=forces,
         functions=functions,
         inputs=inputs,

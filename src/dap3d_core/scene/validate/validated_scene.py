@@ -67,7 +67,7 @@ class ValidatedScene:
         point_body: (points,) body index of each.
         point_local: (points, 3) coordinates on that body, m.
         animation_count: number of animation points among the points.
-        joints, forces, functions: in file order.
+        joints, forces, functions, contacts: in file order; of a contact one for each point.
         inputs: value of each input at the start of a run, by name, in file order.
         notes: changes, assumptions and unusual values; none of them stops a run.
     """
@@ -91,6 +91,12 @@ class ValidatedScene:
     functions: list[Instance]
     inputs: dict[str, float]
     notes: list[str]
+    contacts: list[Instance] = attrs.Factory(list)
+
+    @property
+    def holding(self) -> list[Instance]:
+        """All that has constraint rows: joints, then contacts."""
+        return [*self.joints, *self.contacts]
 
 
 def arguments_of(functions: Iterable[Instance]) -> dict[str, int]:

@@ -22,7 +22,7 @@ from dap3d_core.result.post.force_output import ForceLoops, group_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.errors import SimulationError, refuse_contacts
 from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
 from dap3d_core.simulation.kinematics.driver_coordinate import driver_names
 from dap3d_core.simulation.kinematics.kinematics import check_output
@@ -248,6 +248,7 @@ def inverse(
     check_output(output, force=force)
     given = read_motion(motion)
     compiled = compile_exact(scene, allow_code, announce)
+    refuse_contacts(compiled.model, "inverse dynamics")
     with compiled.borrow_evaluator() as evaluator:
         result = _solved(compiled, evaluator, given, actuators, progress)
     if output is not None:

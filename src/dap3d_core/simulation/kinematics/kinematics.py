@@ -18,7 +18,12 @@ from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Mistake, Scene, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.errors import AssemblyError, RedundantError, SimulationError
+from dap3d_core.simulation.errors import (
+    AssemblyError,
+    RedundantError,
+    SimulationError,
+    refuse_contacts,
+)
 from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
 from dap3d_core.simulation.initial_state import InitialState, start_notes
 from dap3d_core.simulation.kinematics.driver_coordinate import (
@@ -84,6 +89,7 @@ def kinematics(
     """
     check_output(output, force=force)
     compiled = compile_exact(scene, allow_code, announce)
+    refuse_contacts(compiled.model, "kinematics")
     coordinate = None
     if over is not None:
         coordinate = _coordinate(over, compiled, t_end, dt)

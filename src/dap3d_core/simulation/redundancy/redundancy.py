@@ -215,9 +215,12 @@ def redundancy_of(evaluator: Evaluator, u: Floats, t: float = 0.0) -> Redundancy
         AssemblyError: a row is not finite there.
     """
     model = evaluator.model
-    if not model.row_count:
+    if not model.joint_row_count:
         return Redundancy(Rank(0, 6 * model.body_count, 0, 0.0, "svd"))
-    rows, gradient = scaled_rows(finite_rows(evaluator, t, u), model.length)
+    found = finite_rows(evaluator, t, u)
+    if model.contact_count:  # what contacts hold, they share by their own law
+        found = found.first(model.joint_row_count)
+    rows, gradient = scaled_rows(found, model.length)
     rank = rank_of(evaluator, rows)
     involved = sorted({k for d in rank.dependencies for k, _ in by_joint(model, d.rows)})
     binding = bindings(evaluator, rows, u, t) if rank.redundant else ()
@@ -241,7 +244,7 @@ def rank_of(evaluator: Evaluator, rows: ConstraintRows) -> Rank:
     opening tilts rows that would depend on each other by as much.
     """
     model, blur = evaluator.model, fit_of(evaluator.model)
-    if model.row_count <= FEW_ROWS:
+    if model.row_count <= FEW_ROWS or model.contact_count:
         return dense_rank(rows.dense(), blur)
     D = evaluator.blocks(rows)
     return sparse_rank(evaluator.plan, D, evaluator.system.row, 6 * model.body_count, blur)

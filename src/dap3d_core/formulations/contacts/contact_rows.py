@@ -1,0 +1,163 @@
+"""The contacts of a model at one state: gaps, rows, forces, as arrays of Python."""
+
+from functools import cached_property
+
+import numpy as np
+
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.interface.codegen.compile_loops import compiled_loop
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
+from dap3d_core.model.rotations import rotation
+from dap3d_core.model.state_layout import split
+
+#: Numbers that the kernel ``tension`` of a contact returns (interface/contacts/rows.py).
+GAP, NORMAL = 0, 1
+FRICTION, SLIP, PLACE = slice(2, 5), slice(5, 8), slice(8, 11)
+WIDTH = 11
+
+
+class ContactTable:
+    """The contacts of a model by their numbers, in the order of the model.
+
+    Attributes:
+        names: of each point of contact.
+        mu, mu_s, e: (m,) coefficients of friction and restitution.
+        newton: (m,) True where the law of impact is Newton's.
+        mode, way, near: (m,), (m, 3), (m, 3) where each has them among the states of elements.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        """Args: the evaluator of the model."""
+        model = evaluator.model
+        self.evaluator, self.count = evaluator, model.contact_count
+        first = len(model.joint_names) - self.count
+        self.names = model.joint_names[first:]
+        self.newton = np.array([law == "newton" for law in model.contact_laws], dtype=bool)
+        self.numbers = {name: np.zeros(self.count) for name in ("mu", "mu_s", "e")}
+        self.mode = np.zeros(self.count, dtype=np.int64)
+        self.switches: Integers = np.zeros((self.count, 2), dtype=np.int64)
+        self._loops = []
+        places = {(s.element, s.name): s.first for s in model.element_states if s.kind == "joint"}
+        for group in model.contacts:
+            which, layout = group.members - first, group.type_info.layout
+            for name, values in self.numbers.items():
+                values[which] = group.numbers[:, layout.numbers[name][0]]
+            self.mode[which] = [places[self.names[k], "mode"] for k in which]
+            q = next(q for q, (kind, g) in enumerate(evaluator.loop_groups)
+                     if g is group and kind == "switch")  # fmt: skip
+            loop = loop_list([compiled_loop(group.type_info, "tension")])
+            self._loops.append((loop, evaluator.system.groups[q], which))
+        self.way = self.mode[:, None] + np.arange(1, 4)
+        self.near = self.mode[:, None] + np.arange(4, 7)
+        self.mu, self.mu_s, self.e = (self.numbers[n] for n in ("mu", "mu_s", "e"))
+        for k, switch in enumerate(evaluator.switches):
+            if switch.is_contact:
+                which = int(switch.group.members[switch.place]) - first
+                self.switches[which, switch.part] = k
+
+    @IGNORE_FLOAT_ERRORS
+    def outputs(self, t: float, u: Floats, Lam: Floats | None = None) -> Floats:
+        """(m, WIDTH) what each contact says of itself at a state u (13 n,), with these multipliers.
+
+        The states of elements are those of the evaluator. Lam: (rows,) in the order of the model.
+        """
+        evaluator, s = self.evaluator, self.evaluator.system
+        evaluator.place(t, u)
+        minus_lambda = np.zeros_like(s.multipliers)
+        if Lam is not None:
+            minus_lambda[s.row] = -Lam
+        arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=s.par, states=s.states)
+        found = np.zeros((self.count, WIDTH))
+        for loop, group, which in self._loops:
+            out = np.zeros(len(which) * WIDTH)
+            call_loop(loop, 0, float(t), arrays, group, out, np.zeros(1), minus_lambda)
+            found[which] = out.reshape(-1, WIDTH)
+        return found
+
+
+class ContactRows:
+    """Rows of all contacts at one state, as if they stuck, with the joints held.
+
+    Attributes:
+        v: (6 n,) velocities; M, inverse: (6 n, 6 n) masses and their inverse, global axes.
+        G: (3 m, 6 n) rows, normal first; gamma: (3 m,) their right-hand sides.
+        frames: (m, 3, 3) normal and tangents.
+        P: (6 n, 6 n) changes of velocity by impulses, with the joints held.
+    """
+
+    @IGNORE_FLOAT_ERRORS
+    def __init__(self, table: ContactTable, t: float, u: Floats) -> None:
+        """Args: the contacts; time and state u (13 n,). States of the evaluator stay."""
+        evaluator, self.t, self.u = table.evaluator, t, u
+        self._table, model = table, evaluator.model
+        self.states = states = evaluator.states
+        stuck = states.copy()
+        stuck[table.mode], stuck[table.near.ravel()] = 2.0, 0.0
+        evaluator.states = stuck
+        rows = evaluator.rows(t, u)
+        evaluator.states = states
+        D, own = rows.dense(), model.joint_row_count
+        self.D, self.G, self.gamma = D[:own], D[own:], rows.gamma[own:]
+        self.C = rows.C[own:].reshape(-1, 3)[:, 0]
+        _, p, v, w = split(u)
+        self.v = np.hstack([v, w]).ravel()
+        n = model.body_count
+        self.M, self.inverse = np.zeros((2, 6 * n, 6 * n))
+        A = rotation(p)
+        for b in range(n):
+            i, k = slice(6 * b, 6 * b + 3), slice(6 * b + 3, 6 * b + 6)
+            self.M[i, i], self.inverse[i, i] = np.eye(3) * model.mass[b], np.eye(3) / model.mass[b]
+            self.M[k, k] = A[b] @ model.Jp[b] @ A[b].T
+            self.inverse[k, k] = A[b] @ np.linalg.inv(model.Jp[b]) @ A[b].T
+        self.P = self.inverse
+        if own:
+            held = self.inverse @ self.D.T
+            self.P = self.inverse - held @ np.linalg.pinv(self.D @ held, rcond=1e-12) @ held.T
+        self.W = self.G @ self.P @ self.G.T
+
+    @cached_property
+    def frames(self) -> Floats:
+        """(m, 3, 3) normal and tangents of each contact, global axes."""
+        blocks = self.G.reshape(-1, 3, len(self.v) // 6, 6)[..., :3]
+        found = np.zeros((len(blocks), 3, 3))
+        slots = self._table.evaluator.model.joint_slots[-len(blocks) :]
+        for k, bodies in enumerate(slots):
+            body, sign = (bodies[0], 1.0) if bodies[0] else (bodies[1], -1.0)
+            found[k] = sign * blocks[k, :, body - 1]
+        return found
+
+    @cached_property
+    def free(self) -> Floats:
+        """(3 m,) rates of slip where all contacts are open, joints held, forces acting."""
+        evaluator, table = self._table.evaluator, self._table
+        apart = self.states.copy()
+        apart[table.mode] = 0.0
+        evaluator.states = apart
+        v_dot = evaluator.report(self.t, self.with_velocities(self.v))[: len(self.v)]
+        evaluator.states = self.states
+        rates: Floats = self.G @ v_dot - self.gamma
+        return rates
+
+    @property
+    def slip(self) -> Floats:
+        """(m, 3) velocity at each contact, in its frame."""
+        found: Floats = (self.G @ self.v).reshape(-1, 3)
+        return found
+
+    def with_velocities(self, v: Floats) -> Floats:
+        """The state u (13 n,) with other velocities."""
+        u = self.u.copy()
+        u[-len(v) :] = v
+        return u
+
+    def kick(self, x: Floats) -> None:
+        """Let impulses (3 m,) act."""
+        self.v = self.v + self.P @ self.G.T @ x
+
+    def rows_of(self, contacts: list[int]) -> Integers:
+        """The rows of some contacts."""
+        rows: Integers = (3 * np.array(contacts, dtype=np.int64)[:, None] + np.arange(3)).ravel()
+        return rows
+
+

@@ -1,0 +1,107 @@
+"""Impacts of the contacts that touch and approach, with friction, the joints held.
+
+By Poisson's law an impact has two phases (Glocker, Set-Valued Force Laws, 2001, ch. 10): impulses
+that stop what approaches, within their cones; then e times their normal parts, and friction within
+the cones of both together. By Newton's the normal velocity becomes -e of what it was. They go in
+rounds: in each what approaches answers, all at once, so that impacts travel through bodies that
+touch, as through Newton's cradle. Where e is zero everywhere one round of all that touch is enough.
+"""
+
+import attrs
+import numpy as np
+
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.formulations.contacts.cone import solve_cone
+from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
+
+#: Normal speed, m/s of a scene of ordinary size, below which what touches does not approach.
+AT_REST = 1e-9
+#: Rounds of one instant; in the last one all that touches stops.
+ROUNDS = 500
+#: Height of a bounce, as a part of the length of the scene, from which on those that would follow
+#: are summed: they end after the geometric series of their times, too near to be told from rest.
+LAST_HEIGHT = 1e-13
+
+
+@attrs.frozen
+class Impact:
+    """What impacts at one instant did.
+
+    Attributes:
+        impulses: (m, 3) in the frames of the contacts.
+        work: J, of all impulses.
+        exchanged: J, sum of the magnitudes of its parts.
+        rest: contact -> s from now on until its bounces end.
+    """
+
+    impulses: Floats
+    work: float
+    exchanged: float
+    rest: dict[int, float]
+
+
+def collide(table: ContactTable, rows: ContactRows, touching: list[int], length: float) -> Impact:
+    """Let the contacts that touch collide until none approaches; velocities of ``rows`` follow."""
+    impulses, rest = np.zeros((table.count, 3)), {}
+    work = exchanged = 0.0
+    e = table.e.copy()
+    for k in range(ROUNDS):
+        slip = rows.slip
+        approach = [c for c in touching if slip[c, 0] < -AT_REST * length]
+        if not approach:
+            break
+        last = k == ROUNDS - 1
+        bounces = np.any(e[touching] > 0.0) and not last
+        taking = approach if bounces else touching
+        of = np.zeros_like(e) if last else e
+        x = _impulses(table, rows, taking, of)
+        short = _last_bounces(table, rows, taking, x, e, length)
+        if short:
+            rest |= short
+            e[list(short)] = 0.0
+            continue
+        parts = x.reshape(-1, 3) * 0.5 * slip[taking]
+        rows.kick(_spread(x, taking, table.count))
+        after = x.reshape(-1, 3) * 0.5 * rows.slip[taking]
+        work += float(np.sum(parts) + np.sum(after))
+        exchanged += float(np.sum(np.abs(parts)) + np.sum(np.abs(after)))
+        impulses[taking] += x.reshape(-1, 3)
+    return Impact(impulses, work, exchanged, rest)
+
+
+def _spread(x: Floats, contacts: list[int], count: int) -> Floats:
+    every = np.zeros((count, 3))
+    every[contacts] = x.reshape(-1, 3)
+    return every.ravel()
+
+
+def _impulses(table: ContactTable, rows: ContactRows, contacts: list[int], e: Floats) -> Floats:
+    """(3 k,) impulses of one round."""
+    which = rows.rows_of(contacts)
+    W, u, mu = rows.W[np.ix_(which, which)], rows.slip[contacts].ravel(), table.mu[contacts]
+    of, newton = e[contacts], table.newton[contacts]
+    b = u.copy()
+    b[::3] += np.where(newton, of, 0.0) * np.minimum(u[::3], 0.0)
+    first, _ = solve_cone(W, b, mu)
+    more = np.where(newton, 0.0, of) * first[::3]
+    if not more.any():
+        return first
+    given = np.kron(more, [1.0, 0.0, 0.0])
+    second, _ = solve_cone(W, u + W @ (first + given), mu, more)
+    return first + second + given
+
+
+def _last_bounces(
+    table: ContactTable, rows: ContactRows, contacts: list[int], x: Floats, e: Floats, length: float
+) -> dict[int, float]:
+    """Contacts whose bounces would be too low from here on -> how long these would take, s."""
+    which = rows.rows_of(contacts)
+    after = (rows.W[np.ix_(which, which)] @ x)[::3] + rows.slip[contacts, 0]
+    found = {}
+    for c, v in zip(contacts, after, strict=True):
+        a = -float(rows.free[3 * c])
+        low = 0.0 < v * v < 2.0 * a * LAST_HEIGHT * length if a > 0.0 else False
+        if e[c] > 0.0 and low and rows.slip[c, 0] < 0.0:
+            # what has come to rest before: the speeds after bounces are v, e v, e^2 v, ...
+            found[c] = 2.0 * float(v) / (a * (1.0 - float(e[c]))) if e[c] < 1.0 else np.inf
+    return {c: t for c, t in found.items() if np.isfinite(t)}

@@ -1,0 +1,214 @@
+"""Which contacts hold, slip and stick from an instant on: the cone problem of the accelerations."""
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.formulations.contacts.cone import solve_cone
+from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
+
+#: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
+#: is zero; part of the largest entry of W below which rows depend on each other.
+STILL, ZERO, DEPENDENT = 1e-9, 1e-9, 1e-9
+#: Part of the largest acceleration that may be left where contacts hold, by shares alone: their
+#: rows take it, within what the cones leave.
+HELD, OF_REST = 1e-9, 0.05
+#: Parts of their cones within which contacts that share what they carry are to stay, each leaving
+#: half of what the one before leaves: what they carry reaches its limit with so much left, 1e-9.
+INSIDE = tuple(1.0 - 0.5**k for k in range(1, 31))
+
+
+class JamError(ValueError):
+    """No mode is consistent: sliding presses its bodies together; names the contact."""
+
+
+@attrs.frozen
+class Modes:
+    """Modes, directions of sliding and shares of all contacts, global axes.
+
+    Attributes:
+        mode: (m,) 0 open, 1 slides, 2 sticks.
+        way: (m, 3) unit vectors of sliding, zero where none is known.
+        near: (m, 3) forces on body i of those that share what they carry.
+    """
+
+    mode: Floats
+    way: Floats
+    near: Floats
+
+
+def find_modes(
+    table: ContactTable,
+    rows: ContactRows,
+    touching: list[int],
+    sliding: dict[int, Floats],
+    leaving: list[int],
+) -> Modes:
+    """The modes at the state of ``rows``.
+
+    Args:
+        table, rows: the contacts, and what they are at this state.
+        touching: contacts of no gap.
+        sliding: contacts at rest that begin to slide -> direction in their frames, (2,).
+        leaving: contacts whose normal force has just vanished: they open where nothing keeps them.
+
+    Raises:
+        JamError: a contact jams.
+    """
+    limit = STILL * max(1.0, table.evaluator.model.length)
+    slip = rows.slip
+    found = Modes(*(np.zeros((table.count, *shape)) for shape in ((), (3,), (3,))))
+    for group in _groups(rows, [c for c in touching if slip[c, 0] < limit]):
+        _put_modes(table, rows, group, sliding, leaving, limit, found)
+    return found
+
+
+def _groups(rows: ContactRows, closed: list[int]) -> list[list[int]]:
+    """Contacts that feel each other's forces, together."""
+    size = np.abs(rows.W).max(initial=0.0)
+    blocks = np.abs(rows.W).reshape(len(rows.W) // 3, 3, -1, 3).max(axis=(1, 3)) > 1e-14 * size
+    left, found = list(closed), []
+    while left:
+        group = [left.pop(0)]
+        for c in group:
+            near = [k for k in left if blocks[c, k]]
+            group += near
+            left = [k for k in left if k not in near]
+        found.append(sorted(group))
+    return found
+
+
+def _put_modes(
+    table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
+    leaving: list[int], limit: float, found: Modes,
+) -> None:  # fmt: skip
+    """Find the modes of one group of contacts."""
+    left = [c for c in leaving if c in closed]
+    if left or any(c in sliding for c in closed):
+        # of contacts that share, one at the end of its cone may only have to carry less
+        inner = _inside(table, rows, closed, {}, limit)
+        if inner is not None:
+            _put(table, rows, closed, {}, limit, found, inner)
+            return
+    without = [c for c in closed if c not in left]
+    if left and without:
+        x, *_ = _solve(table, rows, without, sliding, limit)
+        big = float(np.abs(rows.free).max()) + 1e-300
+        rates = _rates(rows, without, x, left)
+        closed = without if all(rate >= -ZERO * big for rate in rates) else closed
+    elif left:
+        closed = [c for c in left if rows.free[3 * c] < -ZERO * float(np.abs(rows.free).max())]
+    _put(table, rows, closed, sliding, limit, found)
+
+
+def _rates(
+    rows: ContactRows, contacts: list[int], x: Floats, wanted: list[int]
+) -> list[float]:
+    """Accelerations along the normals of contacts, by the forces x of others."""
+    force = np.zeros(len(rows.G))
+    force[rows.rows_of(contacts)] = x
+    rates = rows.W @ force + rows.free
+    return [float(rates[3 * c]) for c in wanted]
+
+
+def _ways(
+    table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
+    limit: float,
+) -> dict[int, Floats]:  # fmt: skip
+    """Directions (2,) of the contacts that slide."""
+    found = {}
+    for c in closed:
+        u = rows.slip[c, 1:]
+        size = float(np.hypot(*u))
+        if size > limit:
+            found[c] = u / size
+        elif c in sliding:
+            found[c] = sliding[c]
+    return found
+
+
+def _solve(
+    table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
+    limit: float, part: float = 1.0, **more: Any,
+) -> tuple[Floats, Floats, Floats, dict[int, Floats]]:  # fmt: skip
+    """Forces (3 k,) with sliding friction, the matrix, accelerations, and directions of sliding."""
+    which = rows.rows_of(closed)
+    W0, b = rows.W[np.ix_(which, which)], rows.free[which]
+    W, mu = W0.copy(), part * table.mu_s[closed]
+    ways = _ways(table, rows, closed, sliding, limit)
+    for k, c in enumerate(closed):
+        if c in ways:
+            W[:, 3 * k] -= table.mu[c] * W0[:, 3 * k + 1 : 3 * k + 3] @ ways[c]
+            mu[k] = 0.0
+            if W[3 * k, 3 * k] <= 0.0:
+                raise JamError(table.names[c])
+    x, left = solve_cone(W, b, mu, **more)
+    if left > 1e-6 and not more:
+        raise JamError(table.names[closed[0]])
+    a = W @ x + b
+    for k, c in enumerate(closed):
+        if c in ways:
+            x[3 * k + 1 : 3 * k + 3] = -table.mu[c] * x[3 * k] * ways[c]
+    return x, W, a, ways
+
+
+def _put(
+    table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
+    limit: float, found: Modes, inner: Floats | None = None,
+) -> None:  # fmt: skip
+    """Put the modes of contacts that are closed among those found; inner: of ``_inside``."""
+    if not closed:
+        return
+    x, W, a, ways = _solve(table, rows, closed, sliding, limit)
+    big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
+    shares = _share(W)
+    if inner is None:
+        inner = _inside(table, rows, closed, sliding, limit)
+    x = x if inner is None else inner
+    for k, c in enumerate(closed):
+        force, rate, frame = x[3 * k : 3 * k + 3], a[3 * k : 3 * k + 3], rows.frames[c]
+        if force[0] <= 0.0 and (rate[0] > ZERO * big or (len(closed) == 1 and rate[0] > -ZERO)):
+            continue  # it opens
+        if c in ways:
+            mode, way = 1.0, ways[c]
+        elif table.mu_s[c] == 0.0:
+            mode, way = 1.0, np.zeros(2)
+        elif np.hypot(*rate[1:]) > ZERO * big:
+            along = -force[1:] if table.mu[c] > 0.0 and np.any(force[1:]) else rate[1:]
+            mode, way = 1.0, along / np.hypot(*along)
+        else:
+            mode, way = 2.0, np.zeros(2)
+        found.mode[c], found.way[c] = mode, way @ frame[1:]
+        if shares:
+            found.near[c] = force @ frame if mode == 2.0 else force[0] * frame[0]
+
+
+def _share(W: Floats) -> bool:
+    """True if forces of contacts may change without a change of the motion."""
+    return bool(np.linalg.matrix_rank(W, tol=DEPENDENT * np.abs(W).max()) < len(W))
+
+
+def _inside(
+    table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
+    limit: float,
+) -> Floats | None:  # fmt: skip
+    """Forces well within the cones of contacts that share what they carry, and hold.
+
+    None where they do not share, or there are none.
+    """
+    big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
+    best, low, high = None, 0, len(INSIDE) - 1
+    while low <= high:  # what one part allows, so does every larger one
+        k = high if best is None else (low + high) // 2
+        x, W, a, _ = _solve(table, rows, closed, sliding, limit, INSIDE[k], start=best, tries=3)
+        if not _share(W):
+            return None
+        if np.abs(a).max() <= min(HELD, OF_REST * (1.0 - INSIDE[k])) * big:
+            best, high = x, k - 1
+        elif best is None:
+            return None
+        else:
+            low = k + 1
+    return best

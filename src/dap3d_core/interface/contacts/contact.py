@@ -1,0 +1,145 @@
+"""The base class of contact types."""
+
+from collections.abc import Callable, Mapping
+from typing import Any, ClassVar
+
+from dap3d_core.interface.codegen.kernel_arguments import parameters
+from dap3d_core.interface.codegen.specialise import bound_kernel
+from dap3d_core.interface.contacts import rates, rows
+from dap3d_core.interface.fields import FieldSpec, choice, number, slot_of
+from dap3d_core.interface.types import Joint
+
+#: What authors define.
+DECLARED = ("gap", "at", "normal")
+#: Fields that a material gives.
+MATERIAL = ("mu", "mu_s", "e", "law")
+#: Values of ``law``.
+LAWS = ("poisson", "newton")
+
+
+class Contact(Joint):
+    """Two bodies, i and j, that may touch at one point, where friction holds or lets slip.
+
+    Subclasses define three pure functions of quantities of the position level:
+
+    * ``gap``     the distance, m, negative where the bodies overlap;
+    * ``at``      the point of contact, global axes;
+    * ``normal``  the unit vector there that points from body j to body i.
+
+    Rows, right-hand sides, slip and friction follow from them: one of the normal, two across it, of
+    the velocity of body i at the point of contact less that of body j. The gap must be such that
+    its rate is that velocity along the normal, as of every distance between smooth surfaces
+    (``dap3d check-plugin`` compares them). Rates of the point and the normal, which move over both
+    bodies, are derived.
+
+    Attributes:
+        points: at how many points the bodies may touch. Each is a contact of its own, whose
+            ``part``, 0 and so on, ``prepare`` reads: it returns what differs between them.
+    """
+
+    kernel_names = (*DECLARED, *Joint.kernel_names, "tension")
+    rows, holonomic = 3, (True, False, False)
+    is_contact: ClassVar[bool] = True
+    points: ClassVar[int] = 1
+
+    def __init_subclass__(cls, **conditions: Any) -> None:
+        if "kernel_names" not in vars(cls):
+            cls.states = {"mode": 1, "way": 3, "near": 3}
+            _add_material(cls)
+            if all(hasattr(cls, name) for name in DECLARED):
+                for name, kernel in _kernels(cls).items():
+                    setattr(cls, name, kernel)
+        super().__init_subclass__(**conditions)
+
+    def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
+        """The coefficient of sticking friction where it is that of sliding."""
+        given: Any = self
+        return {"mu_s": given.mu if given.mu_s is None else given.mu_s}
+
+
+def _add_material(class_: type) -> None:
+    """Give a class the fields of its material, unless it has them."""
+    fields = {
+        "mu": number(0.0, minimum=0.0, doc="coefficient of friction of sliding"),
+        "mu_s": number(None, minimum=0.0, doc="the same of sticking; mu where it is left out"),
+        "e": number(0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution"),
+        "law": choice(LAWS, "poisson", doc="of impacts: whose coefficient e is"),
+        "part": number(0.0, minimum=0.0, whole=True, doc="which of its points; set for each"),
+    }
+    own = dict(vars(class_).get("__annotations__", {}))
+    for name, field in fields.items():
+        if not any(name in vars(base).get("__annotations__", {}) for base in class_.__mro__):
+            setattr(class_, name, field)
+            own[name] = str if name == "law" else float
+    class_.__annotations__ = own
+
+
+def _specs(class_: type) -> dict[str, FieldSpec]:
+    """Declared fields of a class, before attrs has made them, and of its bases."""
+    found: dict[str, FieldSpec] = {}
+    for base in class_.__mro__:
+        made = {a.name: a for a in vars(base).get("__attrs_attrs__", ())}
+        for name, field in {**made, **vars(base)}.items():
+            spec = getattr(field, "metadata", {}).get("dap3d")
+            if spec is not None:
+                found.setdefault(name, spec)
+    return found
+
+
+def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
+    """The kernels of a type of contact, from the three that it declares."""
+    declared = {name: getattr(class_, name) for name in DECLARED}
+    specs = _specs(class_)
+    kinds = {name: spec.kind for name, spec in specs.items()}
+    has_j = any(slot_of(name) == "j" for name in specs)
+    calls, wanted = {}, {}
+    for short, name in {"gap": "gap", "c": "at", "n": "normal"}.items():
+        names = parameters(declared[name])
+        changes = [_rate_name(n, kinds) for n in names]
+        calls[short] = f"{name}__({', '.join(names)})"
+        calls[f"{short}_dot"] = f"rate_of__({name}__, ({_list(names)}), ({_list(changes)}))"
+        wanted[short] = list(names)
+        found = [c.removeprefix("turned__(").split(",")[0] for c in changes]
+        wanted[f"{short}_dot"] = [*names, *(c for c in found if c not in ("None", "1.0"))]
+    if not has_j:
+        calls |= dict.fromkeys(("r_j", "v_j", "w_j"), "(0.0, 0.0, 0.0)")
+    names = {f"{name}__": kernel for name, kernel in declared.items()}
+    every = names | {"rate_of__": rates.rate_of, "turned__": rates.turned}
+
+    def bound(kernel: Callable[..., Any]) -> Any:
+        own = parameters(kernel)
+        given = {n: calls[n] for n in own if n in calls}
+        needed = dict.fromkeys(n for short in given for n in wanted.get(short, ()))
+        return bound_kernel(kernel, given, needed, every)
+
+    return {
+        "C": bound(rows.position),
+        "J": bound(rows.blocks if has_j else rows.block),
+        "gamma": bound(rows.gamma),
+        "friction": bound(rows.friction if has_j else rows.friction_of_one),
+        "switch": bound(rows.switch),
+        "rate": rows.rate,
+        "tension": bound(rows.output),
+    }
+
+
+def _list(words: Any) -> str:
+    return "".join(f"{word}, " for word in words)
+
+
+def _rate_name(name: str, kinds: Mapping[str, str]) -> str:
+    """Expression for the rate of a quantity; None of a constant."""
+    head, _, rest = name.partition("_")
+    if name == "t":
+        return "1.0"
+    if kinds.get(name) in ("vector", "vector2"):
+        return f"{name}_dot"
+    if name in kinds:
+        return "None"
+    if head == "r" and rest:
+        return f"v_{rest}"
+    if head == "A" and rest:
+        return f"turned__(w_{rest}, {name})"
+    if head == "s" and rest or slot_of(name):
+        return f"{name}_dot"
+    return "None"

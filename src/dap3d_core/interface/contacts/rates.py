@@ -1,0 +1,166 @@
+"""Rates of the values of kernels: numbers that carry their derivatives in time with them.
+
+A kernel of positions runs as it is traced, on pairs of a number and its rate (forward-mode
+differentiation; Griewank and Walther, Evaluating Derivatives, 2008, ch. 3), so that what it returns
+has its rate. Branches are those of the values.
+"""
+
+# Kernels take numbers of any kind: floats, and symbols of a trace.
+# mypy: disable-error-code="no-untyped-def, no-untyped-call"
+
+from collections.abc import Callable
+from typing import Any
+
+from dap3d_core.kernels import acos, asin, atan, cos, exp, log, matmul, sin, skew, sqrt, tan, where
+
+
+class _RateFunctions:
+    """The functions of kernels for numbers with rates."""
+
+    def where(self, condition, a, b):
+        """``a`` where the condition holds, else ``b``; tuples item by item."""
+        if isinstance(a, tuple) and isinstance(b, tuple):
+            return tuple(self.where(condition, x, y) for x, y in zip(a, b, strict=True))
+        (v, g), (w, h) = _parts(a), _parts(b)
+        return Rate(where(condition.value, v, w), where(condition.value, g, h))
+
+    def sqrt(self, x):
+        """The square root."""
+        root = sqrt(x.value)
+        return Rate(root, 0.5 * x.rate / root)
+
+    def sin(self, x):
+        """The sine."""
+        return Rate(sin(x.value), cos(x.value) * x.rate)
+
+    def cos(self, x):
+        """The cosine."""
+        return Rate(cos(x.value), -sin(x.value) * x.rate)
+
+    def tan(self, x):
+        """The tangent."""
+        value = tan(x.value)
+        return Rate(value, (1.0 + value * value) * x.rate)
+
+    def atan(self, x):
+        """The angle of a tangent."""
+        return Rate(atan(x.value), x.rate / (1.0 + x.value * x.value))
+
+    def asin(self, x):
+        """The angle of a sine."""
+        return Rate(asin(x.value), x.rate / sqrt(1.0 - x.value * x.value))
+
+    def acos(self, x):
+        """The angle of a cosine."""
+        return Rate(acos(x.value), -x.rate / sqrt(1.0 - x.value * x.value))
+
+    def exp(self, x):
+        """The exponential."""
+        value = exp(x.value)
+        return Rate(value, value * x.rate)
+
+    def log(self, x):
+        """The natural logarithm."""
+        return Rate(log(x.value), x.rate / x.value)
+
+
+class _Condition:
+    """A truth value of a number with a rate."""
+
+    __slots__ = ("value",)
+    tracer = _RateFunctions()
+
+    def __init__(self, value):
+        self.value = value
+
+    def __and__(self, other):
+        return _Condition(self.value & other.value)
+
+    def __or__(self, other):
+        return _Condition(self.value | other.value)
+
+
+class Rate:
+    """A number and its rate."""
+
+    __slots__ = ("rate", "value")
+    __hash__ = None  # type: ignore[assignment]
+    tracer = _RateFunctions()
+
+    def __init__(self, value, rate):
+        self.value, self.rate = value, rate
+
+    def __add__(self, other):
+        v, g = _parts(other)
+        return Rate(self.value + v, self.rate + g)
+
+    def __sub__(self, other):
+        v, g = _parts(other)
+        return Rate(self.value - v, self.rate - g)
+
+    def __rsub__(self, other):
+        v, g = _parts(other)
+        return Rate(v - self.value, g - self.rate)
+
+    def __mul__(self, other):
+        v, g = _parts(other)
+        return Rate(self.value * v, self.rate * v + self.value * g)
+
+    def __truediv__(self, other):
+        v, g = _parts(other)
+        value = self.value / v
+        return Rate(value, (self.rate - value * g) / v)
+
+    def __rtruediv__(self, other):
+        v, g = _parts(other)
+        value = v / self.value
+        return Rate(value, (g - value * self.rate) / self.value)
+
+    __radd__, __rmul__ = __add__, __mul__
+
+    def __neg__(self):
+        return Rate(-self.value, -self.rate)
+
+    def __pow__(self, n):
+        return Rate(self.value**n, n * self.value ** (n - 1) * self.rate)
+
+    def __lt__(self, other):
+        return _Condition(self.value < _parts(other)[0])
+
+    def __le__(self, other):
+        return _Condition(self.value <= _parts(other)[0])
+
+    def __gt__(self, other):
+        return _Condition(self.value > _parts(other)[0])
+
+    def __ge__(self, other):
+        return _Condition(self.value >= _parts(other)[0])
+
+
+def rate_of(
+    function: Callable[..., Any], values: tuple[Any, ...], rates: tuple[Any, ...]
+) -> Any:
+    """The rate of what a function of these values returns; a rate of None: a constant."""
+    return _rates(function(*(_paired(v, g) for v, g in zip(values, rates, strict=True))))
+
+
+def turned(w, A):
+    """The rate of a rotation matrix at an angular velocity w, global axes."""
+    return matmul(skew(w), A)
+
+
+def _paired(value: Any, rate: Any) -> Any:
+    if isinstance(value, tuple):
+        rates = (None,) * len(value) if rate is None else rate
+        return tuple(_paired(v, g) for v, g in zip(value, rates, strict=True))
+    return Rate(value, 0.0 if rate is None else rate)
+
+
+def _rates(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(_rates(v) for v in value)
+    return _parts(value)[1]
+
+
+def _parts(x: Any) -> tuple[Any, Any]:
+    return (x.value, x.rate) if isinstance(x, Rate) else (x, 0.0)

@@ -1,0 +1,173 @@
+"""Kernels of every contact, of its point c and normal n: three rows, which its mode masks.
+
+In mode 1 and 2 the normal row holds, in mode 2 (sticking) the two tangents as well; a masked row is
+zero, and its multiplier too (linear/ldlt/factor.py). Sliding friction is a force that reads the
+multiplier of the normal (formulations/common/friction.py). ``near`` is a force that the contact is
+given besides: of contacts that share what they carry, the one that all cones allow.
+"""
+
+# Kernels take numbers of any kind: floats, and symbols of a trace.
+# mypy: disable-error-code="no-untyped-def, no-untyped-call"
+
+from dap3d_core.kernels import (
+    add,
+    cross,
+    dot,
+    neg,
+    row,
+    scale,
+    sqrt,
+    sub,
+    where,
+)
+
+#: Modes of a contact.
+OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0
+#: Speed, m/s, below which friction points against the direction in which sliding began.
+STILL = 1e-11
+_ZERO = (0.0, 0.0, 0.0)
+
+
+def closed(mode):
+    """True where the normal row holds."""
+    return mode > 0.5
+
+
+def held(mode):
+    """True where the tangents hold as well."""
+    return mode > 1.5
+
+
+def axis(n):
+    """The axis of ground that a normal is farthest from."""
+    x, y, z = (c * c for c in n)
+    first = (x <= y) & (x <= z)
+    return where(first, (1.0, 0.0, 0.0), where(y <= z, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+
+
+def tangents(n):
+    """Two unit vectors across a normal."""
+    a = cross(n, axis(n))
+    first = scale(1.0 / sqrt(dot(a, a)), a)
+    return first, cross(n, first)
+
+
+def tangent_rates(n, n_dot):
+    """Rates of ``tangents``."""
+    a, a_dot = cross(n, axis(n)), cross(n_dot, axis(n))
+    size = sqrt(dot(a, a))
+    first = scale(1.0 / size, a)
+    first_dot = scale(1.0 / size, sub(a_dot, scale(dot(first, a_dot), first)))
+    return first_dot, add(cross(n_dot, first), cross(n, first_dot))
+
+
+def position(gap, mode):
+    """C: the gap of a closed contact."""
+    return where(closed(mode), gap, 0.0)
+
+
+def blocks(c, n, r_i, r_j, mode):
+    """J of both bodies."""
+    first, second = tangents(n)
+    directions = (
+        where(closed(mode), n, _ZERO),
+        where(held(mode), first, _ZERO),
+        where(held(mode), second, _ZERO),
+    )
+    s_i, s_j = sub(c, r_i), sub(c, r_j)
+    return (
+        tuple(row(e, cross(s_i, e)) for e in directions),
+        tuple(row(neg(e), neg(cross(s_j, e))) for e in directions),
+    )
+
+
+def block(c, n, r_i, mode):
+    """J of a contact of one body with ground."""
+    return blocks(c, n, r_i, _ZERO, mode)[0]
+
+
+def slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j):
+    """Velocity at the point of contact of body i less that of body j."""
+    of_i = add(v_i, cross(w_i, sub(c, r_i)))
+    return sub(of_i, add(v_j, cross(w_j, sub(c, r_j))))
+
+
+def gamma(c, c_dot, n, n_dot, r_i, v_i, w_i, r_j, v_j, w_j, mode):
+    """-J_dot v, for a point of contact and a normal that move."""
+    slip = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
+    bent = sub(cross(w_i, sub(c_dot, v_i)), cross(w_j, sub(c_dot, v_j)))
+    first, second = tangents(n)
+    first_dot, second_dot = tangent_rates(n, n_dot)
+    values = tuple(-dot(e_dot, slip) - dot(e, bent)
+                   for e, e_dot in ((n, n_dot), (first, first_dot), (second, second_dot)))  # fmt: skip
+    return (
+        where(closed(mode), values[0], 0.0),
+        where(held(mode), values[1], 0.0),
+        where(held(mode), values[2], 0.0),
+    )
+
+
+def across(vector, n):
+    """The part of a vector across a normal."""
+    return sub(vector, scale(dot(vector, n), n))
+
+
+def direction(slip, n, way):
+    """Unit vector of sliding; through zero it goes on as it was, so that no step sees a jump."""
+    u, w = across(slip, n), across(way, n)
+    size, length = sqrt(dot(u, u)), sqrt(dot(w, w))
+    fast = size > STILL
+    backwards = dot(u, w) < 0.0
+    u = scale(where(backwards, -1.0, 1.0) / where(fast, size, 1.0), u)
+    return where(fast, u, scale(1.0 / where(length > 0.0, length, 1.0), w))
+
+
+def forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):
+    """Normal force, friction on body i (3), both with what ``near`` gives."""
+    first, second = tangents(n)
+    normal = where(closed(mode), lam[0] + dot(near, n), 0.0)
+    slides = scale(-mu * normal, direction(slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j), n, way))
+    sticks = add(add(scale(lam[1], first), scale(lam[2], second)), across(near, n))
+    friction = where(held(mode), sticks, where(closed(mode), slides, _ZERO))
+    return normal, friction
+
+
+def friction(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):
+    """What acts besides the rows: sliding friction, and ``near``."""
+    _, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
+    slides = where(held(mode), across(near, n), tangential)
+    force = add(where(closed(mode), scale(dot(near, n), n), _ZERO),
+                where(closed(mode), slides, _ZERO))  # fmt: skip
+    return (
+        (force, cross(sub(c, r_i), force)),
+        (neg(force), neg(cross(sub(c, r_j), force))),
+    )
+
+
+def friction_of_one(c, n, r_i, v_i, w_i, lam, mu, mode, way, near):
+    """The same of a contact of one body with ground."""
+    return friction(c, n, r_i, v_i, w_i, _ZERO, _ZERO, _ZERO, lam, mu, mode, way, near)[0]
+
+
+def switch(gap, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mu_s, mode, way, near):
+    """What ends a mode where it becomes negative: gap or normal force; slip or the rest of a cone."""
+    normal, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
+    slip = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
+    slides = where(mu > 0.0, dot(slip, across(way, n)), 1.0)
+    sticks = where(mu_s > 0.0, mu_s * normal - sqrt(dot(tangential, tangential)), 1.0)
+    return (
+        where(closed(mode), normal, gap),
+        where(held(mode), sticks, where(closed(mode), slides, 1.0)),
+    )
+
+
+def rate(mode, way, near):
+    """Mode, direction and shares stay between events."""
+    return 0.0, _ZERO, _ZERO
+
+
+def output(gap, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):
+    """Of results: gap, normal force, friction on body i (3), slip (3), point of contact (3)."""
+    normal, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
+    slip = across(slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j), n)
+    return (gap, normal, *tangential, *slip, *c)

@@ -1,0 +1,87 @@
+"""Contacts evaluated at reported states: gap, forces, slip and mode."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import attrs
+import numpy as np
+
+from dap3d_core.model.groups import Floats, Integers
+
+if TYPE_CHECKING:
+    from dap3d_core.formulations.evaluator import Evaluator
+
+#: Separates the name of a contact from the number of one of its points.
+POINT = "#"
+
+
+@attrs.frozen(eq=False)
+class ContactOutput:
+    """Output of a contact at nt instants; of k points, with an axis (nt, k) before components.
+
+    Attributes:
+        gap: (nt,) m, distance of the bodies, zero where they touch.
+        normal_force: (nt,) N, not negative.
+        friction: (nt, 3) N, on body i, global axes.
+        slip: (nt, 3) m/s, velocity of body i less that of body j at the point of contact, across
+            the normal, global axes.
+        mode: (nt,) 0 open, 1 slides, 2 sticks.
+        at: (nt, 3) m, the point of contact, global axes.
+    """
+
+    gap: Floats
+    normal_force: Floats
+    friction: Floats
+    slip: Floats
+    mode: Integers
+    at: Floats
+
+
+def contact_names(state_names: Sequence[str]) -> dict[str, list[str]]:
+    """Contacts of a result, each with the names of its points, from the names of its states."""
+    found: dict[str, list[str]] = {}
+    known = set(state_names)
+    for label in state_names:
+        kind, name, *state = label.split(".")
+        if kind == "joints" and state == ["mode"] and f"joints.{name}.near.1" in known:
+            found.setdefault(name.partition(POINT)[0], []).append(name)
+    return found
+
+
+def contact_outputs(
+    evaluator: "Evaluator", t: Floats, u: Floats, Lam: Floats, states: Floats, inputs: Floats
+) -> dict[str, ContactOutput]:
+    """Outputs of all points of contacts of a model, by their names.
+
+    Args:
+        evaluator: evaluates the model.
+        t, u, Lam, states, inputs: (nt,) s, (nt, 13 n), (nt, m), (nt, s), (nt, k) of a result.
+    """
+    from dap3d_core.formulations.contacts import contact_rows as rows
+
+    table = rows.ContactTable(evaluator)
+    values = np.zeros((len(t), table.count, rows.WIDTH))
+    with evaluator.held_inputs():
+        before = evaluator.states
+        for k, time in enumerate(t):
+            evaluator.states = states[k]
+            evaluator.set_inputs(inputs[k])
+            values[k] = table.outputs(float(time), u[k], Lam[k])
+        evaluator.states = before
+    modes = states[:, table.mode].astype(np.int64)
+    return {
+        name: ContactOutput(
+            gap=values[:, k, rows.GAP], normal_force=values[:, k, rows.NORMAL],
+            friction=values[:, k, rows.FRICTION], slip=values[:, k, rows.SLIP],
+            mode=modes[:, k], at=values[:, k, rows.PLACE],
+        )
+        for k, name in enumerate(table.names)
+    }  # fmt: skip
+
+
+def together(outputs: Sequence[ContactOutput]) -> ContactOutput:
+    """The output of a contact with several points; of one that of the point."""
+    if len(outputs) == 1:
+        return outputs[0]
+    columns = zip(*(attrs.astuple(one, recurse=False) for one in outputs), strict=True)
+    return ContactOutput(*(np.stack(column, axis=1) for column in columns))

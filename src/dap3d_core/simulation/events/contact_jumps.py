@@ -1,0 +1,217 @@
+"""Contacts in the course of a run: what happens where one of their switches ends a mode."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.formulations import RHS
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.integrators import Integration, Status
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.result import INFORMATION, EventRecord
+from dap3d_core.scene import Mistake, SceneError
+from dap3d_core.scene.errors import MISSING
+from dap3d_core.formulations.contacts.contact_rows import (
+    FRICTION,
+    GAP,
+    ContactRows,
+    ContactTable,
+)
+from dap3d_core.formulations.contacts.impacts import collide
+from dap3d_core.formulations.contacts.modes import JamError, find_modes
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps
+
+#: Gaps, m of a scene of ordinary size, below which bodies touch: in a run, and where it begins.
+TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
+#: Slip, m/s, that is stopped where it goes through zero.
+STOPPED = 1e-6
+#: Ends of modes at one instant.
+MOST_AT_ONCE = 200
+#: Records of changes from one mode to another.
+CHANGES = {(0, 1): "touch", (0, 2): "touch", (1, 0): "lift", (2, 0): "lift", (1, 2): "stick",
+           (2, 1): "slip"}  # fmt: skip
+
+
+class ContactJumps(Jumps):
+    """Changes velocities and modes of contacts where the integrations of a run stop for it."""
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        """Args: the evaluator of the run.
+
+        Raises:
+            SceneError: elements of the scene change velocities by laws of their own.
+        """
+        super().__init__(evaluator)
+        others = [s for s in evaluator.switches if s.jumps and not s.is_contact]
+        if others:
+            name = others[0].name(evaluator.model)
+            what = "changes velocities by a law of its own, which contacts do not know"
+            remedy = "describe what it does by a contact, or take the contacts out"
+            raise SceneError([Mistake(name, MISSING, what, remedy=remedy)])
+        self.table = ContactTable(evaluator)
+        self._last, self._at_once = -np.inf, 0
+
+    def begin(self, integration: Integration) -> None:
+        """Find the modes at the start; what touches and approaches collides there.
+
+        Raises:
+            SceneError: bodies overlap.
+        """
+        length = self._evaluator.model.length
+        gaps = self._gaps(integration)
+        mistakes = [
+            Mistake(
+                f"contacts.{name}", MISSING, f"its bodies overlap by {-gap:.6g} m at the start",
+                remedy=f"move them apart by that along the normal (a gap of up to "
+                f"{TOUCHING_AT_START * length:g} m counts as touching)",
+            )
+            for name, gap in zip(self.table.names, gaps, strict=True)
+            if gap < -TOUCHING_AT_START * length
+        ]  # fmt: skip
+        if mistakes:
+            raise SceneError(mistakes)
+        self._resolve(integration, [], TOUCHING_AT_START * length)
+
+    def apply(self, integration: Integration) -> None:
+        """Go on behind the end of a mode."""
+        work = integration.work
+        crossed = work.switches[at.CROSSED].copy()
+        work.switches[at.CROSSED] = 0.0
+        work.status = Status.RUNNING
+        which = [(c, part) for c, pair in enumerate(self.table.switches.tolist())
+                 for part, k in enumerate(pair) if crossed[k] != 0.0]  # fmt: skip
+        t, span = integration.t, self._span_of(integration)
+        self._at_once = self._at_once + 1 if t - self._last <= 1e-15 * span else 0
+        self._last = t
+        if self._at_once > MOST_AT_ONCE:
+            names = ", ".join(dict.fromkeys(self.table.names[c] for c, _ in which))
+            raise SimulationError(
+                f"the run stopped at t = {t:.9g} s: the modes of {names} change without end there"
+            )
+        self._resolve(integration, which, TOUCHING * self._evaluator.model.length)
+
+    def notes(self, integration: Integration) -> list[str]:
+        """A note where more happened than is kept."""
+        if self.count <= MOST_RECORDS:
+            return []
+        return [f"{INFORMATION}contacts changed {self.count} times; the first {MOST_RECORDS} "
+                "changes are kept"]  # fmt: skip
+
+    def set_state(
+        self,
+        integration: Integration,
+        bodies: Mapping[int, Floats],
+        states: Mapping[int, Floats],
+        title: str,
+    ) -> tuple[Floats, float]:
+        """Refused: what contacts make of it is not known yet."""
+        raise SimulationError(
+            f"the run stopped at t = {integration.t:.9g} s: event {title} sets velocities or "
+            "states, which a scene with contacts does not take yet; apply a force instead"
+        )
+
+    def _gaps(self, integration: Integration) -> Floats:
+        u = self._state_of(integration)
+        gaps: Floats = self.table.outputs(integration.t, u)[:, GAP]
+        return gaps
+
+    @IGNORE_FLOAT_ERRORS
+    def _resolve(
+        self, integration: Integration, ended: list[tuple[int, int]], touching: float
+    ) -> None:
+        """Velocities and modes at the present state.
+
+        Args:
+            integration: of the run.
+            ended: contacts with which of their switches has changed its sign.
+            touching: gap, m, below which contacts touch.
+        """
+        evaluator, table, t = self._evaluator, self.table, integration.t
+        u = self._state_of(integration)
+        before = evaluator.states[table.mode].copy()
+        outputs = self._outputs(t, u)
+        rows = ContactRows(table, t, u)
+        closed = [c for c in range(table.count)
+                  if before[c] > 0.5 or outputs[c, GAP] < touching or (c, 0) in ended]  # fmt: skip
+        sliding, leaving = self._what_ended(rows, outputs, before, ended)
+        impact = collide(table, rows, closed, evaluator.model.length)
+        try:
+            modes = find_modes(table, rows, closed, sliding, leaving)
+        except JamError as error:
+            raise SimulationError(
+                f"the run stopped at t = {t:.9g} s: contact {error} jams: its friction presses "
+                "the bodies together by more than it lets them give way, and no motion with "
+                "Coulomb's law goes on from here"
+            ) from error
+        states = evaluator.states.copy()
+        states[table.mode], states[table.way], states[table.near] = (
+            modes.mode, modes.way, modes.near
+        )  # fmt: skip
+        self.lose |= abs(impact.work) > LOSSLESS * impact.exchanged
+        self._go_on(integration, u, rows, states, impact.work)
+        after = rows.with_velocities(rows.v)
+        for c in np.flatnonzero(np.abs(impact.impulses[:, 0]) > 0.0).tolist():
+            own = float(impact.work) if np.count_nonzero(impact.impulses[:, 0]) == 1 else 0.0
+            self._note(c, t, "impact", u, after, own)
+        for c, seconds in impact.rest.items():
+            self._note(c, t + seconds, "rest", u, after)
+        for c, (old, new) in enumerate(zip(before.astype(int), modes.mode.astype(int), strict=True)):
+            if kind := CHANGES.get((int(old), int(new)), ""):
+                self._note(c, t, kind, u, after)
+
+    def _outputs(self, t: float, u: Floats) -> Floats:
+        evaluator = self._evaluator
+        report = evaluator.report(t, u)
+        return self.table.outputs(t, u, report[evaluator.model.report_layout["Lam"]])
+
+    def _what_ended(
+        self, rows: ContactRows, outputs: Floats, before: Floats, ended: list[tuple[int, int]]
+    ) -> tuple[dict[int, Floats], list[int]]:
+        """Contacts that begin to slide, with directions, and those whose normal force vanishes."""
+        sliding: dict[int, Floats] = {}
+        leaving = [c for c, part in ended if part == 0 and before[c] > 0.5]
+        for c, part in ended:
+            if part == 0:
+                continue
+            if before[c] > 1.5:
+                force = rows.frames[c, 1:] @ outputs[c, FRICTION]
+                size = float(np.hypot(*force))
+                if size > 0.0:
+                    sliding[c] = -force / size
+            elif float(np.hypot(*rows.slip[c, 1:])) < STOPPED * self._evaluator.model.length:
+                self._stop(rows, c)
+        return sliding, leaving
+
+    @staticmethod
+    def _stop(rows: ContactRows, c: int) -> None:
+        """Stop the slip of a contact, rounding of zero, without a change of its normal velocity."""
+        which = rows.rows_of([c])
+        W, u = rows.W[np.ix_(which, which)], rows.slip[c].copy()
+        u[0] = 0.0
+        x = np.zeros(len(rows.G))
+        x[which] = np.linalg.lstsq(W, -u, rcond=1e-12)[0]
+        rows.kick(x)
+
+    def _go_on(
+        self, integration: Integration, u: Floats, rows: ContactRows, states: Floats, work: float
+    ) -> None:
+        """Make velocities and states those behind the instant."""
+        evaluator, work_state = self._evaluator, integration.work
+        dv = rows.v - u[-len(rows.v) :]
+        y = evaluator.coordinates.with_jump(integration.y, dv, states, work)
+        work_state.state[at.Y] = y
+        integration.restart()
+        evaluator.states = states
+        work_state.switches[at.SIDE][self.table.switches.ravel()] = 1.0
+        evaluator.functions[RHS](
+            integration.t, y, np.zeros_like(y), evaluator.system, evaluator.loops
+        )
+
+    def _note(self, c: int, t: float, kind: str, u: Floats, after: Any, work: float = 0.0) -> None:
+        name = self.table.names[c]
+        self._record(
+            EventRecord(name=name, t=t, direction=0, kind=kind, u=u, u_after=after, work=work)
+        )

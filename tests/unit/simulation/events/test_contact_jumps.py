@@ -1,0 +1,152 @@
+"""Contacts of a run: what is refused, what goes on elsewhere, what a result keeps."""
+
+import numpy as np
+import pytest
+from support.ended import leave, shorten_chunks
+from support.results import same_bits
+
+import dap3d_core as dap
+
+
+def bouncing(e=0.5, mu=0.3, height=0.2, **more):
+    scene = dap.Scene(name="bouncing")
+    scene.add_material("rubber", mu=mu, e=e)
+    r = [0.0, 0.0, 0.1 + height]
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=r, r_dot=[1.0, 0.0, 0.0])
+    scene.add_force("weight", "g")
+    fields = {"P_i": "ball.O", "radius": 0.1, "material": "rubber"} | more
+    scene.add_contact("ball_plane", "floor", **fields)
+    scene.simulation.t_end, scene.simulation.dt = 1.0, 0.1
+    return scene
+
+
+def test_bodies_that_overlap_are_refused_with_depth_and_remedy():
+    with pytest.raises(dap.SceneError, match=r"floor.*overlap by 0\.01 m.*\n.*move them apart"):
+        dap.simulate(bouncing(height=-0.01))
+
+
+@pytest.mark.parametrize(
+    ("what", "call"),
+    [
+        ("integrator radau", lambda s: dap.simulate(s, integrator="radau")),
+        ("equilibrium", dap.equilibrium),
+        ("linearisation", dap.linearize),
+        ("kinematics", lambda s: dap.kinematics(s, t_end=1.0)),
+        ("method joint", lambda s: dap.simulate(s, method="joint")),
+        ("method standard", lambda s: dap.simulate(s, method="standard")),
+    ],
+)
+def test_what_does_not_know_contacts_says_so(what, call):
+    with pytest.raises(dap.SimulationError, match=f"{what}.*contacts"):
+        call(bouncing())
+
+
+def test_inverse_dynamics_refuses_contacts():
+    scene = bouncing()
+    result = dap.simulate(scene)
+    with pytest.raises(dap.SimulationError, match="inverse dynamics.*contacts"):
+        dap.inverse(scene, result, actuators=["g"])
+
+
+def test_elements_with_jumps_of_their_own_are_refused_beside_contacts():
+    scene = bouncing()
+    scene.add_body("other", mass=1.0, Jp=[1.0] * 3, r=[5.0, 0.0, 0.0])
+    fields = {"P_i": "other.O", "P_j": "ground.O", "a_j": "ground.x", "e": 0.5, "k": 1e3}
+    scene.add_force("plane_stop", "bumper", **fields)
+    with pytest.raises(dap.SceneError, match="bumper.*law of its own"):
+        dap.simulate(scene)
+
+
+def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path, monkeypatch):
+    shorten_chunks(monkeypatch)
+    settings = {"t_end": 1.0, "dt": 0.01, "integrator": "dop853"}
+    whole = dap.simulate(bouncing(), **settings)
+    again = dap.resume(leave(bouncing(), tmp_path, 0.3, **settings))
+    assert same_bits(again, whole)
+    assert [(e.kind, e.t) for e in again.events] == [(e.kind, e.t) for e in whole.events]
+
+
+def test_a_run_step_by_step_meets_the_same_contacts():
+    scene = bouncing()
+    whole, run = dap.simulate(scene, dt=0.1), dap.start(scene)
+    for _ in range(10):
+        run.step(0.1)
+    assert run.result().r[-1] == pytest.approx(whole.r[-1], abs=1e-9)
+    assert [e.kind for e in run.result().events] == [e.kind for e in whole.events]
+
+
+def test_a_result_keeps_contacts_in_a_file(tmp_path):
+    result = dap.simulate(bouncing())
+    result.save(tmp_path / "run.nc")
+    other = dap.open(tmp_path / "run.nc")
+    assert other.events == result.events
+    for name in ("floor.gap", "floor.normal", "floor.friction", "floor.slip.x", "floor.mode"):
+        np.testing.assert_array_equal(other.quantity(name).values, result.quantity(name).values)
+    with pytest.raises(Exception, match="is a contact: its forces are those of"):
+        result.reaction("floor")
+    with pytest.raises(Exception, match=r"there is no contact 'flor'"):
+        result.contact("flor")
+    with pytest.raises(Exception, match=r"no quantity 'floor.gp'"):
+        result.quantity("floor.gp")
+
+
+
+
+def test_a_contact_takes_fields_of_its_material_unless_it_gives_them(tmp_path):
+    scene = bouncing(mu=0.0)
+    scene.save(tmp_path / "scene.toml")
+    loaded = dap.load(tmp_path / "scene.toml")
+    assert loaded == scene
+    own = bouncing(mu=0.0)
+    own.contacts["floor"].fields["e"] = 1.0
+    kept = dap.simulate(own, t_end=1.0)
+    assert kept.ledger["energy"].value < 1e-12
+    assert all(e.work == pytest.approx(0.0, abs=1e-12) for e in kept.events)
+
+
+@pytest.mark.parametrize(
+    ("fields", "words"),
+    [
+        ({"material": "rubbr"}, r"there is no material 'rubbr'"),
+        ({"mu_s": 0.1}, r"mu_s = 0.1: is less than mu = 0.3"),
+        ({"e": 1.5}, r"e = 1.5"),
+        ({"law": "newtons"}, r"law = \"newtons\".*newton"),
+        ({"radiu": 0.2}, r"radiu.*unknown key.*did you mean 'radius'"),
+    ],
+)
+def test_mistakes_in_contacts_are_reported(fields, words):
+    with pytest.raises(dap.SceneError, match=words):
+        dap.simulate(bouncing(**fields))
+
+
+def test_a_contact_and_a_joint_of_one_name_are_refused():
+    scene = bouncing()
+    scene.add_joint("sph", "floor", P_i="ball.O", P_j="ground.O")
+    with pytest.raises(dap.SceneError, match="is the name of a joint as well"):
+        dap.simulate(scene)
+
+
+def test_newtons_law_reverses_the_normal_velocity():
+    result = dap.simulate(bouncing(law="newton", mu=0.0), t_end=0.3, rtol=1e-12, atol=1e-14)
+    impact = result.events[0]
+    assert impact.u_after[9] == pytest.approx(-0.5 * impact.u[9], rel=1e-12)
+
+
+def test_a_box_that_falls_on_its_face_comes_to_rest_on_four_corners():
+    scene = dap.Scene(name="box")
+    scene.add_body("box", mass=1.0, Jp=[0.01] * 3, r=[0.0, 0.0, 0.25])
+    scene.add_force("weight", "g")
+    scene.add_contact("box_plane", "floor", P_i="box.O", size=[0.4, 0.3, 0.1], mu=0.5)
+    result = dap.simulate(scene, t_end=1.0, dt=0.1)
+    assert result.r[-1, 0] == pytest.approx([0.0, 0.0, 0.05], abs=1e-12)
+    contact = result.contact("floor")
+    assert contact.gap.shape == (11, 8)
+    assert contact.normal_force[-1].sum() == pytest.approx(9.81, rel=1e-9)
+    assert sorted(contact.mode[-1]) == [0, 0, 0, 0, 2, 2, 2, 2]
+    assert result.contact("floor#1").gap == pytest.approx(contact.gap[:, 0])
+
+
+def test_a_sweep_runs_contacts_one_by_one():
+    scene = bouncing()
+    found = dap.sweep(scene, {"contacts.floor.e": [0.0, 0.9]}, outputs=["ball.r.z"])
+    assert found is not None

@@ -1,0 +1,236 @@
+"""Contacts against closed forms: instants to 1e-9 s and states to 1e-9 at rtol 1e-12.
+
+What is found lies some decades nearer (1e-13 typically); rounding of instants, of forces of 1e1 N
+and the height of the last bounces (1e-13 m) bound it from below.
+"""
+
+import dap3d_core as dap
+import numpy as np
+import pytest
+
+G = 9.81
+TOLERANCE = 1e-9
+INTEGRATORS = ("dop853", "adams", "dopri5")
+TIGHT = {"rtol": 1e-12, "atol": 1e-14}
+
+
+def times(result, kind, name=""):
+    """Instants of events of a kind."""
+    return [e.t for e in result.events if e.kind == kind and e.name.startswith(name)]
+
+
+def ball(radius=0.1, height=0.0, v=0.0, **contact):
+    """A solid ball above a floor."""
+    scene = dap.Scene(name="ball")
+    r = [0.0, 0.0, radius + height]
+    Jp = [0.4 * 2.0 * radius**2] * 3
+    scene.add_body("ball", mass=2.0, Jp=Jp, r=r, r_dot=[v, 0.0, 0.0])
+    scene.add_force("weight", "g")
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=radius, **contact)
+    return scene
+
+
+def spring_block(x, mu, k):
+    """A block of 1 kg on a floor, pulled by a spring to x = 0 at the height of its centre."""
+    scene = dap.Scene(name="block on a spring")
+    scene.add_body("block", mass=1.0, Jp=[0.01] * 3, r=[x, 0.0, 0.05])
+    scene.add_force("weight", "g")
+    scene.add_point("A", "ground", [-1.0, 0.0, 0.05])
+    scene.add_force("ptp", "spring", P_i="block.O", P_j="A", k=k, l0=1.0)
+    scene.add_contact("box_plane", "floor", P_i="block.O", size=[0.1, 0.1, 0.1], mu=mu)
+    return scene
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_ball_bounces_to_rest_at_the_end_of_the_series(integrator):
+    e, h = 0.8, 1.0
+    result = dap.simulate(ball(height=h, e=e), t_end=6.0, dt=0.5, integrator=integrator, **TIGHT)
+    first = np.sqrt(2.0 * h / G)
+    assert times(result, "impact")[0] == pytest.approx(first, abs=TOLERANCE)
+    second = first * (1.0 + 2.0 * e)
+    assert times(result, "impact")[1] == pytest.approx(second, abs=TOLERANCE)
+    assert times(result, "rest") == pytest.approx([first * (1.0 + e) / (1.0 - e)], abs=TOLERANCE)
+    assert result.r[-1, 0] == pytest.approx([0.0, 0.0, 0.1], abs=1e-12)
+    assert np.max(np.abs(result.rd[-1])) < 1e-12
+    assert result.contact("floor").mode[-1] == 1
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_ball_slides_then_rolls_with_five_sevenths_of_its_speed(integrator):
+    v, mu = 3.0, 0.3
+    result = dap.simulate(ball(v=v, mu=mu), t_end=2.0, dt=0.1, integrator=integrator, **TIGHT)
+    t = 2.0 / 7.0 * v / (mu * G)
+    assert times(result, "stick") == pytest.approx([t], abs=TOLERANCE)
+    assert result.rd[-1, 0, 0] == pytest.approx(5.0 / 7.0 * v, abs=TOLERANCE)
+    x = v * t - 0.5 * mu * G * t**2 + 5.0 / 7.0 * v * (2.0 - t)
+    assert result.r[-1, 0, 0] == pytest.approx(x, abs=TOLERANCE)
+    contact = result.contact("floor")
+    assert contact.normal_force == pytest.approx(2.0 * G, abs=TOLERANCE)
+    slides = result.t < t
+    assert contact.friction[slides, 0] == pytest.approx(-mu * 2.0 * G, abs=TOLERANCE)
+    assert contact.friction[~slides, 0] == pytest.approx(0.0, abs=TOLERANCE)
+    assert contact.slip[slides, 0] == pytest.approx(v - 3.5 * mu * G * result.t[slides], abs=1e-9)
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_coulomb_oscillator_stops_where_its_spring_no_longer_overcomes_friction(integrator):
+    mu, k, x = 0.2, 100.0, 0.1
+    result = dap.simulate(
+        spring_block(x, mu, k), t_end=3.0, dt=0.25, integrator=integrator, **TIGHT
+    )
+    limit, swings = mu * G / k, 0
+    while abs(x) > limit:
+        x, swings = -(x - 2.0 * limit * np.sign(x)), swings + 1
+    assert times(result, "stick", "floor")[-1] == pytest.approx(
+        swings * np.pi / np.sqrt(k), abs=TOLERANCE
+    )
+    assert result.r[-1, 0, 0] == pytest.approx(x, abs=TOLERANCE)
+    assert np.max(np.abs(result.rd[-1])) < 1e-15
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+@pytest.mark.parametrize("part", [0.99, 1.01])
+def test_a_block_near_its_stick_limit_stays_or_moves(part):
+    mu, k = 0.4, 100.0
+    limit = mu * G / k
+    result = dap.simulate(spring_block(part * limit, mu, k), t_end=10.0, dt=1.0, **TIGHT)
+    moved = 0.0 if part < 1.0 else -2.0 * limit * (part - 1.0)
+    assert result.r[-1, 0, 0] - part * limit == pytest.approx(moved, abs=1e-12)
+    assert np.max(np.abs(result.rd[-1])) < 1e-15
+
+
+@pytest.mark.parametrize("part", [0.95, 0.999])
+def test_a_box_on_four_corners_does_not_creep_on_a_slope(part):
+    angle, h = 0.4, 0.05
+    c, s = np.cos(angle), np.sin(angle)
+    scene = dap.Scene(name="slope")
+    scene.add_vector("n", "ground", [-s, 0.0, c])
+    p = [np.cos(angle / 2.0), 0.0, -np.sin(angle / 2.0), 0.0]
+    scene.add_body("box", mass=1.0, Jp=[0.002, 0.003, 0.004], r=[-s * h, 0.0, c * h], p=p)
+    scene.add_force("weight", "g")
+    mu = np.tan(angle) / part
+    size = [0.3, 0.2, 2.0 * h]
+    scene.add_contact("box_plane", "floor", P_i="box.O", size=size, a_j="n", mu=mu)
+    result = dap.simulate(scene, t_end=1000.0, dt=100.0)
+    assert np.max(np.abs(result.r - result.r[0])) < 1e-14
+    assert np.max(np.abs(result.p - result.p[0])) < 1e-14
+    contact = result.contact("floor")
+    friction = np.linalg.norm(contact.friction, axis=2)
+    assert np.all(friction <= mu * contact.normal_force + 1e-9)  # each corner, in its cone
+    assert contact.normal_force.sum(axis=1) == pytest.approx(c * G, rel=1e-9)
+
+
+@pytest.mark.parametrize("integrator", INTEGRATORS)
+def test_a_ladder_leaves_its_wall_at_two_thirds_of_its_height(integrator):
+    length, mass, angle = 2.0, 3.0, 1.0
+    J = mass * length**2 / 12.0
+    scene = dap.Scene(name="ladder")
+    half = 0.5 * length
+    p = [np.cos(angle / 2.0), 0.0, np.sin(angle / 2.0), 0.0]
+    r = [half * np.cos(angle), 0.0, half * np.sin(angle)]
+    scene.add_body("ladder", mass=mass, Jp=[0.01 * J, J, J], r=r, p=p)
+    scene.add_point("foot", "ladder", [half, 0.0, 0.0])
+    scene.add_point("top", "ladder", [-half, 0.0, 0.0])
+    scene.add_force("weight", "g")
+    scene.add_contact("ball_plane", "floor", P_i="foot")
+    scene.add_contact("ball_plane", "wall", P_i="top", a_j="ground.x")
+    result = dap.simulate(scene, t_end=0.7, dt=0.05, integrator=integrator, **TIGHT)
+    lift = next(e for e in result.events if e.kind == "lift")
+    assert lift.name == "wall"
+    assert lift.u[2] / half == pytest.approx(2.0 / 3.0 * np.sin(angle), abs=TOLERANCE)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01])
+def test_newtons_cradle_passes_the_speed_on_to_the_last_ball(gap):
+    radius = 0.05
+    scene = dap.Scene(name="cradle")
+    for k in range(4):
+        x = k * (2.0 * radius + gap) - (0.0 if k else 0.1)
+        v = [0.0 if k else 2.0, 0.0, 0.0]
+        scene.add_body(f"b{k}", mass=1.0, Jp=[0.001] * 3, r=[x, 0.0, 0.0], r_dot=v)
+    for k in range(3):
+        ends = {"P_i": f"b{k}.O", "P_j": f"b{k + 1}.O"}
+        scene.add_contact("ball_ball", f"c{k}", **ends, radius_i=radius, radius_j=radius, e=1.0)
+    result = dap.simulate(scene, t_end=0.2, dt=0.05, **TIGHT)
+    assert result.rd[-1, :, 0] == pytest.approx([0.0, 0.0, 0.0, 2.0], abs=1e-12)
+    assert len(times(result, "impact")) == 3
+
+
+def test_a_ball_leaves_a_sphere_at_two_thirds_of_the_height():
+    """Without friction it slides off where cos = 2/3 (1 + v0^2 / (2 g R)), R to its centre."""
+    big, small, v = 1.0, 0.1, 0.2
+    scene = dap.Scene(name="sphere")
+    R = big + small
+    r_dot = [v, 0.0, 0.0]
+    scene.add_body("ball", mass=1.0, Jp=[0.004] * 3, r=[0.0, 0.0, R], r_dot=r_dot)
+    scene.add_force("weight", "g")
+    ends = {"P_i": "ball.O", "P_j": "ground.O", "radius_i": small, "radius_j": big}
+    scene.add_contact("ball_ball", "top", **ends)
+    result = dap.simulate(scene, t_end=1.5, dt=0.1, **TIGHT)
+    lift = next(e for e in result.events if e.kind == "lift")
+    cosine = 2.0 / 3.0 * (1.0 + v**2 / (2.0 * G * R))
+    assert lift.u[2] / R == pytest.approx(cosine, abs=TOLERANCE)
+
+
+def test_a_ball_bounces_obliquely_by_poissons_law():
+    """Friction that reaches its cone in both phases: mu (1 + e) v_n; else rolling at once."""
+    v, h, e, mu = 2.0, 0.5, 0.5, 0.1
+    result = dap.simulate(ball(height=h, v=v, e=e, mu=mu), t_end=0.4, dt=0.01, **TIGHT)
+    impact = next(e for e in result.events if e.kind == "impact")
+    normal = np.sqrt(2.0 * G * h)
+    after = np.array(impact.u_after)
+    assert after[9] == pytest.approx(e * normal, abs=TOLERANCE)
+    assert after[7] == pytest.approx(v - mu * (1.0 + e) * normal, abs=TOLERANCE)
+    assert after[11] == pytest.approx(2.5 * mu * (1.0 + e) * normal / 0.1, rel=TOLERANCE)
+    assert impact.work < 0.0
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+def test_a_block_slips_where_its_load_passes_what_holds_and_is_then_slowed_by_less():
+    """Load c t: it slips at mu_s m g / c, with acceleration (c t - mu m g) / m from then on."""
+    mu, mu_s, c = 0.2, 0.3, 5.0
+    scene = dap.Scene(name="pulled")
+    scene.add_body("block", mass=1.0, Jp=[0.01] * 3, r=[0.0, 0.0, 0.05])
+    scene.add_force("weight", "g")
+    scene.add_function("a", "rises", coeff=[0.0, c, 0.0])
+    scene.add_force("f", "pull", body_i="block", f=[1.0, 0.0, 0.0], function="rises")
+    size = [0.3, 0.3, 0.1]
+    scene.add_contact("box_plane", "floor", P_i="block.O", size=size, mu=mu, mu_s=mu_s)
+    result = dap.simulate(scene, t_end=1.5, dt=0.05, **TIGHT)
+    start = mu_s * G / c
+    assert set(np.round(times(result, "slip", "floor"), 9)) == {round(start, 9)}
+    t = result.t[result.t > start]
+    v = 0.5 * c * (t**2 - start**2) - mu * G * (t - start)
+    assert result.rd[result.t > start, 0, 0] == pytest.approx(v, abs=TOLERANCE)
+    assert np.max(np.abs(result.rd[result.t < start])) < 1e-15
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+def test_a_hinged_rod_rebounds_from_the_floor_with_its_hinge_held():
+    """It falls from the horizontal: w^2 = 3 g sin a / L on the floor, and -e w behind it."""
+    length, mass, e, height = 1.0, 2.0, 0.5, 0.5
+    J = mass * length**2 / 12.0
+    scene = dap.Scene(name="rod")
+    scene.add_body("rod", mass=mass, Jp=[0.001, J, J], r=[0.5 * length, 0.0, height])
+    scene.add_point("end", "rod", [-0.5 * length, 0.0, 0.0])
+    scene.add_point("tip", "rod", [0.5 * length, 0.0, 0.0])
+    scene.add_point("hinge", "ground", [0.0, 0.0, height])
+    scene.add_joint("rev", "J1", P_i="end", P_j="hinge", a_i="rod.y", a_j="ground.y")
+    scene.add_force("weight", "g")
+    scene.add_contact("ball_plane", "floor", P_i="tip", e=e)
+    result = dap.simulate(scene, t_end=0.7, dt=0.05, **TIGHT)
+    impact = next(e for e in result.events if e.kind == "impact")
+    w = np.sqrt(3.0 * G * height / length**2)
+    assert impact.u[11] == pytest.approx(w, abs=TOLERANCE)
+    assert impact.u_after[11] == pytest.approx(-e * w, abs=TOLERANCE)
+    assert impact.work == pytest.approx(-mass * length**2 / 6.0 * w**2 * (1 - e**2), abs=1e-9)
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+def test_at_usual_tolerances_instants_and_states_are_right_to_a_millionth():
+    v, mu = 3.0, 0.3
+    result = dap.simulate(ball(v=v, mu=mu), t_end=2.0, dt=0.1)
+    assert times(result, "stick") == pytest.approx([2.0 / 7.0 * v / (mu * G)], abs=1e-6)
+    assert result.rd[-1, 0, 0] == pytest.approx(5.0 / 7.0 * v, abs=1e-6)
