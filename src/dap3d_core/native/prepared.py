@@ -185,7 +185,9 @@ class PreparedRun:
         axes = ("x", "y", "z")
         poses = [*(f"r.{a}" for a in axes), *(f"p.e{k}" for k in range(4))]
         rates = [*(f"rd.{a}" for a in axes), *(f"wp.{a}" for a in axes)]
-        names = [f"state.{b}.{q}" for part in (poses, rates) for b in model.body_names for q in part]
+        names = [
+            f"state.{b}.{q}" for part in (poses, rates) for b in model.body_names for q in part
+        ]
         own = [f"state.{label}" for s in model.element_states for label in s.labels]
         return [*names, *own, "state.work"]
 

@@ -65,8 +65,16 @@ def export(
     from dap3d_core.result import ResultError
 
     if native.is_native(kind, output):
-        return native.export_native(result, kind, output, strict=strict, force=force,
-                                    allow_code=allow_code, as_json=as_json, **of_native)
+        return native.export_native(
+            result,
+            kind,
+            output,
+            strict=strict,
+            force=force,
+            allow_code=allow_code,
+            as_json=as_json,
+            **of_native,
+        )
     native.refuse_native(of_native)
     if kind not in (known := result_exporters()) and kind is not None:
         return _export_model(result, kind, output, strict=strict, force=force, as_json=as_json)

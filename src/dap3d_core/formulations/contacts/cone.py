@@ -89,9 +89,7 @@ def _sweep(
     return x
 
 
-def _slopes(
-    W: Floats, x: Floats, u: Floats, mu: Floats, r: Floats, more: Floats
-) -> Floats:
+def _slopes(W: Floats, x: Floats, u: Floats, mu: Floats, r: Floats, more: Floats) -> Floats:
     """A generalised derivative of the residual."""
     unit = np.eye(len(x))
     dF = unit.copy()

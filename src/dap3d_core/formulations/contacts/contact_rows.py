@@ -159,5 +159,3 @@ class ContactRows:
         """The rows of some contacts."""
         rows: Integers = (3 * np.array(contacts, dtype=np.int64)[:, None] + np.arange(3)).ravel()
         return rows
-
-

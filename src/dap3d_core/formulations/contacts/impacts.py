@@ -10,9 +10,9 @@ touch, as through Newton's cradle. Where e is zero everywhere one round of all t
 import attrs
 import numpy as np
 
-from dap3d_core.kernels.array_types import Floats
 from dap3d_core.formulations.contacts.cone import solve_cone
 from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
+from dap3d_core.kernels.array_types import Floats
 
 #: Normal speed, m/s of a scene of ordinary size, below which what touches does not approach.
 AT_REST = 1e-9

@@ -5,9 +5,9 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.kernels.array_types import Floats
 from dap3d_core.formulations.contacts.cone import solve_cone
 from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
+from dap3d_core.kernels.array_types import Floats
 
 #: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
 #: is zero; part of the largest entry of W below which rows depend on each other.
@@ -103,9 +103,7 @@ def _put_modes(
     _put(table, rows, closed, sliding, limit, found)
 
 
-def _rates(
-    rows: ContactRows, contacts: list[int], x: Floats, wanted: list[int]
-) -> list[float]:
+def _rates(rows: ContactRows, contacts: list[int], x: Floats, wanted: list[int]) -> list[float]:
     """Accelerations along the normals of contacts, by the forces x of others."""
     force = np.zeros(len(rows.G))
     force[rows.rows_of(contacts)] = x

@@ -10,6 +10,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import attrs
+
 from dap3d_core.formulations import PROJECT, RHS, WATCH
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.background import optimiser
@@ -77,7 +78,6 @@ class ChangeOver:
 
         What else it does changes no number of the scene but inputs.
         """
-
         work = integration.work
 
         def counts() -> tuple[int, int]:
@@ -172,7 +172,9 @@ class ChangeOver:
         if stored is None:
             if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
                 return
-            text, written = scene_program.write_programs(evaluator, name, *(record.anew or start()), self._varied)
+            text, written = scene_program.write_programs(
+                evaluator, name, *(record.anew or start()), self._varied
+            )
             if BESIDE and path is not None and optimiser.request(text, written, path):
                 record.is_requested = True
                 return

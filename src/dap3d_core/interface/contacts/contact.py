@@ -140,6 +140,6 @@ def _rate_name(name: str, kinds: Mapping[str, str]) -> str:
         return f"v_{rest}"
     if head == "A" and rest:
         return f"turned__(w_{rest}, {name})"
-    if head == "s" and rest or slot_of(name):
+    if (head == "s" and rest) or slot_of(name):
         return f"{name}_dot"
     return "None"

@@ -220,7 +220,7 @@ def sensitivities(
             settings = settings_of(compiled, method=method, **given)
             run = DifferentiatedRun(compiled, settings, Callbacks(announce=announce), start=state)
             run.carry(beside, base, lanes)
-            results.append(run.go())
+            results.append(run.execute())
         runs.append(run)
     return Sensitivities(results[0], runs, parameters)
 

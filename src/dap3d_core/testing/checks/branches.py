@@ -14,10 +14,10 @@ import numpy as np
 
 from dap3d_core.interface.derive.derive import missing
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.kernels.dual_numbers import comparisons
 from dap3d_core.testing.checks.compare import Comparison, body_words
 from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.samples.complex_step import Stepped
+from dap3d_core.testing.samples.many_numbers import comparisons
 from dap3d_core.testing.samples.random_state import BODIES, Direction, State
 from dap3d_core.testing.samples.sampled_type import UNDEFINED, Sample, SampledType
 

@@ -23,10 +23,10 @@ from dap3d_core.interface.examine.examine import ATTEMPTS, prepared, set_ends
 from dap3d_core.interface.examine.random_values import numbers, random_field
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.kernels.dual_numbers import Dual
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_modules import build, source_of
 from dap3d_core.testing.samples.complex_step import STEP, Stepped
+from dap3d_core.testing.samples.many_numbers import Many
 from dap3d_core.testing.samples.random_state import BODIES, State
 
 #: The loop of each kernel; J of a force is computed with its impulse.
@@ -109,10 +109,10 @@ class Kernels:
     def value_at_all(
         self, name: str, element: RandomElement, states: Sequence[State]
     ) -> NDArray[Any]:
-        """The same of dual numbers without derivatives, of all states at once."""
+        """The same of numbers of many instances, of all states at once."""
         count = len(self.type_info.layout.slots) + 1
         parts = [(x.body()[:count], x.table(), x.own) for x in states]
-        t = Dual(np.array([[x.t] for x in states]))
+        t = Many(np.array([[x.t] for x in states]))
         return self._run(name, element, t, *map(_of_all, zip(*parts, strict=True)))
 
     def state_rate(self, element: RandomElement, state: State, along: Any) -> Floats:
@@ -237,11 +237,11 @@ class _Plain:
 
 
 def _of_all(values: Sequence[Floats]) -> NDArray[Any]:
-    """Arrays of one shape as one of dual numbers, (states, 1) each."""
+    """Arrays of one shape as one of numbers of many instances, (states, 1) each."""
     all_values = np.array(values)
     numbers = np.empty(all_values.shape[1:], object)
     for index in np.ndindex(numbers.shape):
-        numbers[index] = Dual(all_values[(slice(None), *index)][:, None])
+        numbers[index] = Many(all_values[(slice(None), *index)][:, None])
     return numbers
 
 

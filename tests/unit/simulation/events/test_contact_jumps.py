@@ -90,8 +90,6 @@ def test_a_result_keeps_contacts_in_a_file(tmp_path):
         result.quantity("floor.gp")
 
 
-
-
 def test_a_contact_takes_fields_of_its_material_unless_it_gives_them(tmp_path):
     scene = bouncing(mu=0.0)
     scene.save(tmp_path / "scene.toml")
