@@ -60,8 +60,10 @@ verify: $(VENV)/.installed-docs  ## the slow verification alone
 verify-long: $(VENV)/.installed-docs  ## verification that takes longest, for a release
 	@$(PYTHON) -m pytest -n auto --dist loadfile -m long
 
+# What reads text alone runs no kernel.
+NO_KERNELS := $(addprefix --ignore=tests/unit/,docs matlab registry scene/files scene/validate)
 unit-nojit: $(VENV)/.installed-test  ## quick unit tests with kernels as plain Python
-	@DAP3D_PLAIN=1 $(PYTHON) -m pytest -n auto -m "not slow" tests/unit
+	@DAP3D_PLAIN=1 $(PYTHON) -m pytest -n auto -m "not slow" tests/unit $(NO_KERNELS)
 
 coverage: $(VENV)/.installed-test  ## the same, and what part of the sources they run
 	@DAP3D_PLAIN=1 $(PYTHON) -m pytest -n auto -m "not slow" --cov --cov-report=term tests/unit
