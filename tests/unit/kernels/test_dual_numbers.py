@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from dap3d_core import kernels as k
-from dap3d_core.kernels.dual_numbers import Dual
+from dap3d_core.kernels.dual_numbers import Dual, comparisons
 
 #: Points where all functions below are smooth, in the domain of each.
 X = np.array([[0.11], [0.42], [0.73]])
@@ -66,3 +66,12 @@ def test_a_branch_on_a_number_is_refused():
     """A kernel that branches by ``if`` is told what to write."""
     with pytest.raises(TypeError, match=r"use where\(condition, a, b\)"):
         FUNCTIONS["sum"](Dual(X)) and 1.0
+
+
+def test_comparisons_by_order_are_recorded():
+    """In their order, of all instances; equality is none, and what comes later is left out."""
+    x = Dual(X)
+    with comparisons() as found:
+        k.where((x > 0.5) | (x == 0.5), k.maximum(x, 0.3), 1.0 - x)
+    assert (x < 1.0).value.all()
+    assert [one.ravel().tolist() for one in found] == [[False, False, True], [False, True, True]]
