@@ -9,6 +9,7 @@ import pytest
 from support import mechanisms, problems, trees
 from support.bouncing import bouncing, swinging
 from support.ended import EndedError, ended_at, leave, shorten_chunks
+from support.levels import quickly
 from support.on_axles import driven, stone, wheel
 from support.results import same_bits
 from support.state_types import stated
@@ -78,6 +79,12 @@ CASES = {
 }
 #: Tried in plain Python as well; the others take long there and keep no more than these.
 SHORT_IN_PYTHON = ("dop853", "a function's breaks", "joint", "events", "jumps")
+#: What each kind of integrator, formulation and event keeps; the others keep these together.
+QUICK = {
+    "dop853", "adams", "radau", "penalty", "lsq", "a singular pose", "within a crossing of radau",
+    "turns and friction", "joint", "joint, loops", "stiff", "a function's breaks",
+    "states of elements", "states, radau", "events", "jumps", "joint by auto", "jumps by events",
+}  # fmt: skip
 
 
 def settings_of(settings):
@@ -93,7 +100,9 @@ def short_chunks(monkeypatch):
     monkeypatch.setattr("dap3d_core.simulation.compiled_model.MANY_BODIES", 16)
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", quickly(sorted(CASES, key=lambda case: case not in QUICK), len(QUICK))
+)
 def test_a_resumed_run_is_that_of_one_that_was_not_ended(case, tmp_path):
     """Ended twice, and twice gone on with: arrays, counts and events are the same."""
     if case not in SHORT_IN_PYTHON and not jit_is_on():

@@ -139,13 +139,12 @@ def test_calls_of_a_short_run_have_the_bits_of_plain_python():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("level", ["O3", pytest.param("O0", marks=pytest.mark.long)])
-def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python(level):
+def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python():
     """Unoptimised, and optimised for this processor; functions not called are listed.
 
     Without FMA: `make no-fma`.
     """
-    count, different, missing = repeated(RUNS, MORE, levels=[level])
+    count, different, missing = repeated(RUNS, MORE, levels=["O0", "O3"])
     assert count > 4000
     assert different == []
     assert set(missing) == NOT_CALLED
