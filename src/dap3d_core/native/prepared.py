@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import attrs
@@ -79,7 +80,7 @@ class Advance:
         function: Any = {RungeKutta: advance, AdamsIntegration: advance_adams}.get(
             type(integration)
         )
-        given = (integration.work, *integration._arguments)
+        given: tuple[Any, ...] = (integration.work, *integration._arguments)
         if isinstance(integration, RadauIntegration):
             _, system, loops = integration._arguments
             function = advance_radau
@@ -162,11 +163,7 @@ class PreparedRun:
         breaks = sorted({
             float(t) for k in used for t in breaks_of(checked.functions[k]) if 0.0 < t < HORIZON
         })  # fmt: skip
-        between = [
-            Stop(a + part * (b - a), False, b)
-            for a, b in zip(breaks, breaks[1:], strict=False)
-            for part in SEEN
-        ]
+        between = [Stop(a + part * (b - a), False, b) for a, b in pairwise(breaks) for part in SEEN]
         found = [*(Stop(t, True, t) for t in breaks), *between]
         return sorted(found, key=lambda stop: (stop.t, stop.jumps))
 
@@ -185,7 +182,9 @@ class PreparedRun:
         axes = ("x", "y", "z")
         poses = [*(f"r.{a}" for a in axes), *(f"p.e{k}" for k in range(4))]
         rates = [*(f"rd.{a}" for a in axes), *(f"wp.{a}" for a in axes)]
-        names = [f"state.{b}.{q}" for part in (poses, rates) for b in model.body_names for q in part]
+        names = [
+            f"state.{b}.{q}" for part in (poses, rates) for b in model.body_names for q in part
+        ]
         own = [f"state.{label}" for s in model.element_states for label in s.labels]
         return [*names, *own, "state.work"]
 
