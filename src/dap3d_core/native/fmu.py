@@ -193,5 +193,5 @@ def _page(model: Exported) -> bytes:
         row = SubElement(table, "tr")
         for text in (v.name, v.kind, v.unit, v.label):
             SubElement(row, "td").text = text
-    text: bytes = tostring(root, encoding="UTF-8", method="html")
-    return text
+    page: bytes = tostring(root, encoding="UTF-8", method="html")
+    return page
