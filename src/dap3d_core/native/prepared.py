@@ -116,7 +116,7 @@ class PreparedRun:
             SimulationError: the run cannot begin.
         """
         if not jit_is_on():
-            raise refusal("nothing is compiled where DAP3D_JIT is 0", "unset it")
+            raise refusal("nothing is compiled where DAP3D_PLAIN is 1", "unset it")
         method, integrator = settings.get("method"), settings.get("integrator")
         if registry is not None and not isinstance(scene, CompiledModel):
             scene = CompiledModel(scene, method=method, allow_code=allow_code, registry=registry)
