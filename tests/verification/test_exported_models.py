@@ -23,7 +23,11 @@ def test_a_shipped_model_has_the_bits_of_simulate(tmp_path, model, integrator):
     t_end = min(1.0, float(scene.simulation.t_end or 1.0))
     step = 1e-3 if integrator == "rk4" else None
     try:
-        assert differences(scene, tmp_path, t_end, integrator=integrator, step=step)
-    except dap.SimulationError:  # dop853 takes such a run across, in Python alone
-        notes = dap.simulate(scene, t_end=t_end, integrator=integrator).notes
-        assert any("radau met a singular pose" in note for note in notes)
+        notes = dap.simulate(scene, t_end=t_end, integrator=integrator, step=step).notes
+    except dap.SimulationError:
+        pytest.skip("the run stops")
+    if any("radau met a singular pose" in note for note in notes):  # Python alone crosses it
+        with pytest.raises(dap.SimulationError, match="the run stopped at"):
+            differences(scene, tmp_path, t_end, integrator=integrator, step=step)
+        return
+    assert differences(scene, tmp_path, t_end, integrator=integrator, step=step)
