@@ -114,7 +114,7 @@ MESSAGES = {
     "nothing for a path": (lambda: dap.open(None), "path should be text or a path, not None"),
     "a list for a name": (
         lambda: dap.export_model("pen1", format=["urdf"]),
-        r"format should be text, not \['urdf'\]",
+        r"format should be text or None, not \['urdf'\]",
     ),
     "a truth value for a number": (
         lambda: dap.linearize("pen1", t=True),

@@ -8,10 +8,11 @@ from dap3d_site.markdown import code, directive, page
 SECTIONS = {
     "Scenes": (
         ("load", "shipped_models", "Scene", "include", "import_matlab", "import_model",
-         "export_model"),
+         "export_model", "load_native"),
         ("scene.Simulation", "scene.Body", "scene.Animation", "scene.Mistake",
          "dap3d_matlab.files.report.ImportReport", "formats.import_model.ImportReport",
-         "formats.export_model.ExportReport"),
+         "formats.export_model.ExportReport", "native.export.NativeExport",
+         "native.library.NativeLibrary", "native.library.NativeRun"),
     ),
     "Runs": (
         ("simulate", "compile", "Event", "Controller", "start", "resume", "rerun"),

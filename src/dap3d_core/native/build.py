@@ -65,8 +65,6 @@ PLATFORMS = {
                   f"aarch64-linux-gnu.{_GLIBC}", ".so", "aarch64-linux", "aarch64-linux"),
         _platform("windows-x86-64", "x86_64-pc-windows-gnu", "x86-64",
                   "x86_64-windows-gnu", ".dll", "win64", "x86_64-windows"),
-        _platform("windows-arm64", "aarch64-pc-windows-gnu", "generic",
-                  "aarch64-windows-gnu", ".dll", "aarch64-windows", "aarch64-windows"),
         _platform("macos-x86-64", "x86_64-apple-macosx11.0.0", "x86-64",
                   "x86_64-macos.11.0", ".dylib", "darwin64", "x86_64-darwin"),
         _platform("macos-arm64", "arm64-apple-macosx11.0.0", "generic",

@@ -10,14 +10,10 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.native.build import Platform, build_objects, link, platforms_named
-from dap3d_core.native.c_source import (
-    Variable,
-    data_of,
-    units_of,
-    variables_header,
-    variables_of,
-)
+from dap3d_core.native.build import Platform, platforms_named
+from dap3d_core.native.c_source import Variable, data_of, variables_header, variables_of
+from dap3d_core.native.exported import Exported
+from dap3d_core.native.fmu import write_fmu
 from dap3d_core.native.outputs import SYMBOL, outputs_of
 from dap3d_core.native.prepared import PreparedRun, refusal, tunable_words
 from dap3d_core.registry import Registry
@@ -94,18 +90,8 @@ def export_native(
     tunable = [_parameter(prepared, name, options) for name in parameters]
     variables = variables_of(prepared, found, tunable)
     name = re.sub(r"\W+", "_", str(given.name or target.stem)) or "model"
-    with tempfile.TemporaryDirectory() as scratch:
-        folder = Path(scratch)
-        (folder / "data.h").write_text(data_of(prepared, variables))
-        for file in SOURCE.iterdir():
-            shutil.copy(file, folder / file.name)
-        model = Exported(prepared, variables, name, folder, (text, SYMBOL))
-        if format == "c":
-            size = _write_folder(model, chosen, target)
-        else:
-            from dap3d_core.native.fmu import write_fmu
-
-            size = write_fmu(model, chosen, target, fmi)
+    model = Exported(prepared, variables, name, (text, SYMBOL))
+    size = _write(model, chosen, target, fmi if format == "fmu" else 0)
     names = {
         kind: tuple(v.name for v in variables if v.kind == kind)
         for kind in ("input", "parameter", "output")
@@ -116,31 +102,16 @@ def export_native(
     )  # fmt: skip
 
 
-@attrs.frozen
-class Exported:
-    """A model on its way into files.
-
-    Attributes:
-        prepared, variables: of the model.
-        name: for files.
-        folder: with the C sources, data.h among them.
-        outputs: LLVM IR and symbol of the function of outputs.
-    """
-
-    prepared: PreparedRun
-    variables: list[Variable]
-    name: str
-    folder: Path
-    outputs: tuple[str, str]
-
-    def link(self, source: str, target: Platform, library: Path, archive: Path | None) -> int:
-        """Make libraries of a C file in the folder; bytes of the shared one."""
-        objects = self.folder / target.name
-        objects.mkdir(exist_ok=True)
-        files = build_objects(units_of(self.prepared), self.outputs, target, objects)
-        library.parent.mkdir(parents=True, exist_ok=True)
-        link(self.folder / source, files, target, library, archive)
-        return library.stat().st_size
+def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: int) -> int:
+    """Write an FMU of a version, or for 0 a folder; bytes of the largest library."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        (folder / "data.h").write_text(data_of(model.prepared, model.variables))
+        for file in SOURCE.iterdir():
+            shutil.copy(file, folder / file.name)
+        if fmi:
+            return write_fmu(model, platforms, target, fmi, folder)
+        return _write_folder(model, platforms, target, folder)
 
 
 def _parameter(prepared: PreparedRun, name: str, options: dict[str, Any]) -> Variable:
@@ -170,7 +141,9 @@ def _parameter(prepared: PreparedRun, name: str, options: dict[str, Any]) -> Var
     )
 
 
-def _write_folder(model: Exported, platforms: Sequence[Platform], target: Path) -> int:
+def _write_folder(
+    model: Exported, platforms: Sequence[Platform], target: Path, sources: Path
+) -> int:
     """Write the folder of a C library; bytes of the largest shared one."""
     target.mkdir(parents=True, exist_ok=True)
     size = 0
@@ -179,7 +152,7 @@ def _write_folder(model: Exported, platforms: Sequence[Platform], target: Path) 
         folder.mkdir(exist_ok=True)
         archive = folder / f"lib{model.name}.a"
         library = folder / library_name(model.name, one)
-        size = max(size, model.link("runtime.c", one, library, archive))
+        size = max(size, model.link(sources / "runtime.c", one, library, archive))
     header = variables_header(model.prepared, model.variables)
     (target / "variables.h").write_text(header, encoding="utf-8", newline="\n")
     shutil.copy(SOURCE / "dap3d.h", target / "dap3d.h")

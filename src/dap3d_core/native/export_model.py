@@ -39,21 +39,17 @@ def export_model(
 
     Args:
         scene: the scene; or its name, folder or file.
-        path: the file, of "c" a folder. None writes none, of formats of text. Files of meshes are
-            named from its folder, and without it from that of the scene.
-        format: "fmu", "c" (header, libraries and an example), or the keyword of an exporter, such
-            as "urdf". By default that of the path's suffix.
+        path: the file, of "c" a folder; None writes none, of formats of text. Files of meshes are
+            named from its folder, or that of the scene.
+        format: "fmu", "c" (header, libraries, an example) or the keyword of an exporter, such as
+            "urdf"; by default that of the path's suffix.
         outputs: of "fmu" and "c": names of quantities; by default the outputs of the scene, or
             where it has none the motion of its bodies.
-        parameters: of these: numbers that may be set, such as "forces.spring.k".
-        platforms: of these: "linux", "windows", "macos", or with a processor "linux-arm64"; by
-            default that of this machine.
-        fmi: version of an FMU, 3 or 2.
-        t_end, method, integrator, rtol, atol, step: of these: settings as of ``simulate``.
-        strict: refuse a scene of which something would be left out.
-        force: overwrites what exists.
-        allow_code: whether types of the model's own may be loaded.
-        registry: the installed types; by default all.
+        parameters: numbers that may be set, such as "forces.spring.k".
+        platforms: "linux", "windows", "macos", "linux-arm64" ...; by default this one.
+        fmi: version of an FMU, 3 or 2. t_end, ..., step: settings as of ``simulate``.
+        strict, force: refuse a scene of which something would be left out; overwrite what exists.
+        allow_code, registry: as of ``compile``.
 
     Raises:
         SceneError: the scene is invalid, or cannot be exported so: what, and why.
@@ -64,8 +60,8 @@ def export_model(
     kind = format or Path("" if path is None else path).suffix.lstrip(".") or "c"
     of_native: dict[str, Any] = {"outputs": outputs, "parameters": parameters,
                                  "platforms": platforms}  # fmt: skip
-    settings = {"t_end": t_end, "method": method, "integrator": integrator, "rtol": rtol,
-                "atol": atol, "step": step}  # fmt: skip
+    settings: dict[str, Any] = {"t_end": t_end, "method": method, "integrator": integrator,
+                                "rtol": rtol, "atol": atol, "step": step}  # fmt: skip
     if kind not in NATIVE_FORMATS:
         for name, value in (of_native | settings).items():
             if value is not None:

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from dap3d_core.native.build import Platform
 from dap3d_core.native.c_source import Variable, c_text
-from dap3d_core.native.export import Exported
+from dap3d_core.native.exported import Exported
 from dap3d_core.result.metadata import current_versions
 from dap3d_core.scene.expressions.units import Number, Unit, constant, unit_of
 
@@ -32,16 +32,21 @@ ROLES = {
 STAMP = (1980, 1, 1, 0, 0, 0)
 
 
-def write_fmu(model: Exported, platforms: Sequence[Platform], target: Path, fmi: int) -> int:
-    """Write an FMU of version 2 or 3; bytes of its largest library."""
-    digest = hashlib.sha256((model.folder / "data.h").read_bytes()).hexdigest()
+def write_fmu(
+    model: Exported, platforms: Sequence[Platform], target: Path, fmi: int, sources: Path
+) -> int:
+    """Write an FMU of version 2 or 3; bytes of its largest library.
+
+    sources: folder with the C sources and data.h.
+    """
+    digest = hashlib.sha256((sources / "data.h").read_bytes()).hexdigest()
     token = f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"
-    (model.folder / "token.h").write_text(f"#define FMI_TOKEN {c_text(token)}\n")
+    (sources / "token.h").write_text(f"#define FMI_TOKEN {c_text(token)}\n")
     files: dict[str, bytes] = {}
     size = 0
     for one in platforms:
-        library = model.folder / "binaries" / one.name / f"{model.name}{one.library}"
-        size = max(size, model.link(f"fmi{fmi}.c", one, library, None))
+        library = sources / "binaries" / one.name / f"{model.name}{one.library}"
+        size = max(size, model.link(sources / f"fmi{fmi}.c", one, library, None))
         folder = one.fmi2 if fmi == 2 else one.fmi3
         files[f"binaries/{folder}/{library.name}"] = library.read_bytes()
     description = description_of(model, token, fmi)
@@ -92,7 +97,8 @@ def description_of(model: Exported, token: str, fmi: int) -> bytes:
         _variable(variables, k, v, first, fmi)
     _structure(SubElement(root, "ModelStructure"), model.variables, fmi)
     indent(root)
-    return tostring(root, encoding="UTF-8", xml_declaration=True)
+    text: bytes = tostring(root, encoding="UTF-8", xml_declaration=True)
+    return text
 
 
 def _capabilities(root: Element, name: str, fmi: int) -> None:
@@ -187,4 +193,5 @@ def _page(model: Exported) -> bytes:
         row = SubElement(table, "tr")
         for text in (v.name, v.kind, v.unit, v.label):
             SubElement(row, "td").text = text
-    return tostring(root, encoding="UTF-8", method="html")
+    page: bytes = tostring(root, encoding="UTF-8", method="html")
+    return page

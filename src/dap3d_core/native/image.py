@@ -36,7 +36,8 @@ class Image:
         self._blocks = self._merged()
         size = sum(end - start for start, end in self._blocks) // WORD
         self._first: dict[int, int] = {}
-        for one in (*self._structs.values(), *self._tables.values()):
+        parts_of: list[Any] = [*self._structs.values(), *self._tables.values()]
+        for one in parts_of:
             self._first[one.address] = size
             size += len(one._table if isinstance(one, Arrays) else one.addresses)
         self.words: Integers = np.zeros(size, dtype=np.int64)

@@ -225,7 +225,7 @@ class _Quantities:
         place += COORDINATES * self._model.body_count if attribute == "rd" else 0
         return tuple(self._row[place + k] for k in range(size))
 
-    def _of_point(self, body: int, local: tuple[float, ...], level: int) -> tuple[Any, ...]:
+    def _of_point(self, body: int, local: tuple[float, ...], level: int) -> Any:
         """Position, velocity or acceleration of a point fixed in a body."""
         if body == 0:
             return local if level == 0 else (0.0, 0.0, 0.0)

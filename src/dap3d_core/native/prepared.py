@@ -3,6 +3,7 @@
 import os
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import attrs
@@ -79,7 +80,7 @@ class Advance:
         function: Any = {RungeKutta: advance, AdamsIntegration: advance_adams}.get(
             type(integration)
         )
-        given = (integration.work, *integration._arguments)
+        given: tuple[Any, ...] = (integration.work, *integration._arguments)
         if isinstance(integration, RadauIntegration):
             _, system, loops = integration._arguments
             function = advance_radau
@@ -115,7 +116,7 @@ class PreparedRun:
             SimulationError: the run cannot begin.
         """
         if not jit_is_on():
-            raise refusal("nothing is compiled where DAP3D_JIT is 0", "unset it")
+            raise refusal("nothing is compiled where DAP3D_PLAIN is 1", "unset it")
         method, integrator = settings.get("method"), settings.get("integrator")
         if registry is not None and not isinstance(scene, CompiledModel):
             scene = CompiledModel(scene, method=method, allow_code=allow_code, registry=registry)
@@ -162,11 +163,7 @@ class PreparedRun:
         breaks = sorted({
             float(t) for k in used for t in breaks_of(checked.functions[k]) if 0.0 < t < HORIZON
         })  # fmt: skip
-        between = [
-            Stop(a + part * (b - a), False, b)
-            for a, b in zip(breaks, breaks[1:], strict=False)
-            for part in SEEN
-        ]
+        between = [Stop(a + part * (b - a), False, b) for a, b in pairwise(breaks) for part in SEEN]
         found = [*(Stop(t, True, t) for t in breaks), *between]
         return sorted(found, key=lambda stop: (stop.t, stop.jumps))
 

@@ -57,6 +57,24 @@ def export(
 
     Ctrl-C leaves no file.
     """
+    from dap3d_core.exchange import result_exporters
+
+    if native.is_native(kind, output):
+        return native.export_native(result, kind, output, strict=strict, force=force,
+                                    allow_code=allow_code, as_json=as_json,
+                                    **of_native)  # fmt: skip
+    native.refuse_native(of_native)
+    if kind is not None and kind not in result_exporters():
+        return _export_model(result, kind, output, strict=strict, force=force, as_json=as_json)
+    return _export_result(result, kind, output, fps=fps, model=model, allow_code=allow_code,
+                          force=force, as_json=as_json, quiet=quiet)  # fmt: skip
+
+
+def _export_result(
+    result: str, kind: str | None, output: str | None, *, fps: float | None, model: str | None,
+    allow_code: bool, force: bool, as_json: bool, quiet: bool,
+) -> int:  # fmt: skip
+    """Write a result by an exporter of a plugin."""
     from dap3d_core import export as write
     from dap3d_core.cli.console.console import count, show_written, stderr
     from dap3d_core.cli.console.progress import counting
@@ -64,21 +82,7 @@ def export(
     from dap3d_core.exchange import check_fps, exporter_of, result_exporters
     from dap3d_core.result import ResultError
 
-    if native.is_native(kind, output):
-        return native.export_native(
-            result,
-            kind,
-            output,
-            strict=strict,
-            force=force,
-            allow_code=allow_code,
-            as_json=as_json,
-            **of_native,
-        )
-    native.refuse_native(of_native)
-    if kind not in (known := result_exporters()) and kind is not None:
-        return _export_model(result, kind, output, strict=strict, force=force, as_json=as_json)
-    target = output_path(result, output, known[kind or "vtk"].suffix)
+    target = output_path(result, output, result_exporters()[kind or "vtk"].suffix)
     opened = open_result(result, model=model, allow_code=allow_code)
     refuse_all(
         partial(exporter_of, target, kind),

@@ -1,0 +1,37 @@
+"""``dap3d export MODEL``: C libraries and FMUs."""
+
+import json
+import shutil
+import zipfile
+
+import pytest
+
+from dap3d_core.cli import main
+from dap3d_core.kernels.runtime.cache import jit_is_on
+
+pytestmark = pytest.mark.skipif(
+    not (jit_is_on() and (shutil.which("cc") or shutil.which("gcc"))), reason="no C compiler"
+)
+
+
+def test_a_model_is_written_as_a_folder_and_not_over_another(tmp_path, capfd, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    words = ["export", "pen1", "--format", "c", "-o", "made", "--quantity", "cone.r"]
+    assert main(words) == 0
+    assert "made written: 3 outputs" in capfd.readouterr().out
+    names = {path.name for path in (tmp_path / "made").iterdir()}
+    assert {"dap3d.h", "variables.h", "example.c", "CMakeLists.txt", "README.md"} < names
+    assert main(words) == 2
+    assert "--force overwrites it" in capfd.readouterr().err
+    assert main([*words, "--force"]) == 0
+
+
+@pytest.mark.parametrize("fmi", ["3", "2"])
+def test_an_fmu_is_chosen_by_its_suffix(tmp_path, capfd, fmi):
+    target = tmp_path / "pen1.fmu"
+    assert main(["export", "pen1", "-o", str(target), "--fmi", fmi, "--json"]) == 0
+    found = json.loads(capfd.readouterr().out)
+    assert (found["format"], found["file"]) == ("fmu", str(target))
+    assert "cone.r.z" in found["outputs"]
+    with zipfile.ZipFile(target) as archive:
+        assert f'fmiVersion="{fmi}.0"' in archive.read("modelDescription.xml").decode()
