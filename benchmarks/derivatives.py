@@ -74,9 +74,7 @@ def _rows(name, n, t_end, method):
             times[count].append(with_slopes(count))
     base = statistics.median(times[0])
     for count in DIRECTIONS:
-        ratio = statistics.median(
-            t / a for t, a in zip(times[count], times[0], strict=True)
-        )
+        ratio = statistics.median(t / a for t, a in zip(times[count], times[0], strict=True))
         yield {
             "name": f"{name} {n}" if n else name,
             "derivatives": count,
@@ -96,7 +94,9 @@ def _timed(integration, first):
 
 def report(rows):
     """Print the table."""
-    print(f"{'scene':12} {'derivatives':>11} {'run, ms':>9} {'over a run':>10} {'first run, s':>12}")
+    print(
+        f"{'scene':12} {'derivatives':>11} {'run, ms':>9} {'over a run':>10} {'first run, s':>12}"
+    )
     for row in rows:
         print(
             f"{row['name']:12} {row['derivatives']:11d} {row['run_ms']:9.2f} "

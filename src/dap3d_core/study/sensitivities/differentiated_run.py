@@ -1,6 +1,7 @@
 """A run that carries derivatives by parameters: its compiled code in differentiated form."""
 
 from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 
@@ -30,13 +31,14 @@ class DifferentiatedRun(Run):
         instants: time of each located event and jump -> (p,) its derivatives.
     """
 
-    def carry(self, neighbours: Sequence[Neighbours], base: Run, lanes: int) -> None:
+    def carry(self, neighbours: Sequence[Neighbours], base: Run, lanes: int) -> Self:
         """Carry derivatives from the start on; lanes: directions that code is compiled for."""
         self.neighbours, self.base, self._lanes = list(neighbours), base, lanes
         self.reported: list[Floats] = []
         self.slopes: list[Floats] = []
         self.instants: dict[float, Floats] = {}
         self._stops: Floats = np.zeros((0, lanes))
+        return self
 
     def begin(self, integration: Integration) -> None:
         """As of ``RunState``: the integration is differentiated.
