@@ -274,22 +274,26 @@ def made_at(text, signatures, levels):
 
 def call_differentiated(entry, arguments):
     """Call a function whose numbers carry derivatives, drawn at random for those of its structs."""
-    carried, words = Differentiation(COUNT), []
+    carried = Differentiation(COUNT)
     holder = carried.wide(Holder(numbers=np.zeros(1)))
     rng = np.random.default_rng(0)
-    for value, type_ in zip(arguments, entry.signature.arguments, strict=True):
+
+    def words_of(value, type_):
+        if isinstance(value, tuple):
+            return [w for x, t in zip(value, type_.items, strict=True) for w in words_of(x, t)]
         if isinstance(value, np.ndarray):
             own = value.dtype.kind in "fc"
             if own and value.size:
                 slopes = holder.slopes(value)
                 slopes[:] = rng.standard_normal(slopes.shape)
-            address = holder.matrix(value) if own else value
-            words += [address_of(address), *value.shape[: type_.ndim]]
-        elif isinstance(value, Arrays):
-            words.append(carried.wide(value).address)
-        elif type_.words:  # None has none
-            words.append(value.address if isinstance(value, Functions) else value)
-    entry._run(*words)
+            address = address_of(holder.matrix(value) if own else value)
+            return [address, *value.shape[: type_.ndim]]
+        if isinstance(value, Arrays):
+            return [carried.wide(value).address]
+        return [getattr(value, "address", value)] if type_.words else []  # None has none
+
+    pairs = zip(arguments, entry.signature.arguments, strict=True)
+    entry._run(*(word for value, type_ in pairs for word in words_of(value, type_)))
     holder.give()
 
 
