@@ -239,7 +239,9 @@ def differences(calls, levels=None):
             return Functions(table.signature, list(made))
 
         for function, before, after, result in calls:
-            symbol, _, variable = wrappers[function, tuple(map(kind, before))]
+            symbol, signature, variable = wrappers[function, tuple(map(kind, before))]
+            if level == DIFFERENTIATED and any(map(has_vectors, signature.arguments)):
+                continue
             numbers = np.array(numbers_of(result), dtype=complex)
             given, out = copied(before, {}), np.zeros(numbers.size, dtype=complex)
             taken = [given[k] for k in variable]
@@ -261,6 +263,11 @@ def differences(calls, levels=None):
 def is_by_array(value, type_):
     """Whether a number is to be given as an array."""
     return isinstance(type_, Array) and not isinstance(value, np.ndarray)
+
+
+def has_vectors(type_):
+    """Whether C calls would have to take vectors: for numbers in a tuple."""
+    return isinstance(type_, Tuple) and any(w == "double" for w in type_.words)
 
 
 def made_at(text, signatures, levels):
