@@ -1,4 +1,4 @@
-"""Runs with derivatives over runs alone, for 3, 7 and 8 derivatives; and compiling them.
+"""Runs with derivatives over runs alone, for 3, 7 and 15 derivatives; and compiling them.
 
 CPU time of the compiled loop, optimised code on both sides, the median of several rounds in turn.
 Directions are of the initial state, drawn at random; what Python does at the start is left out.
@@ -15,7 +15,7 @@ import dap3d_core as dap
 from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.study.sensitivities.neighbours import arrays_of, run_beside
 
-ROUNDS, DIRECTIONS = 9, (3, 7, 8)
+ROUNDS, DIRECTIONS = 9, (3, 7, 15)
 #: Model or joint of a chain, bodies of that, end of a run, method.
 CASES = (
     ("bodies2", 0, 5.0, "auto"),
@@ -43,8 +43,7 @@ def _rows(name, n, t_end, method):
     for count in DIRECTIONS:
         carried = Differentiation(1 + count)
         for struct in integration.loop_arguments:
-            if hasattr(struct, "walk"):
-                carried.of(struct)
+            carried.wide(struct)
         ways[count] = carried
 
     def alone():
@@ -55,7 +54,7 @@ def _rows(name, n, t_end, method):
         carried = ways[count]
         integration.call = carried.call
         state = integration.work.state
-        slopes = carried.of(integration.work).slopes(state)
+        slopes = carried.slopes(state)
         slopes[:] = 0.0
         slopes[: state.shape[1]] = rng.standard_normal((state.shape[1], count))
         return _timed(integration, first)

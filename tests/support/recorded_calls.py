@@ -9,14 +9,17 @@ import importlib
 import os
 import pkgutil
 import sys
+from typing import Any
 
 import attrs
 import numpy as np
 
+from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.compiler.types import (
     COMPLEX,
+    DTYPES,
     FLOAT,
     INT,
     NOTHING,
@@ -27,17 +30,22 @@ from dap3d_core.kernels.compiler.types import (
     Table,
     Tuple,
 )
-from dap3d_core.kernels.compiler.units import Functions, type_of
+from dap3d_core.kernels.compiler.units import Functions, address_of, type_of
 from dap3d_core.kernels.runtime import cache
 from dap3d_core.kernels.runtime.array_struct import Arrays, pointer
 from dap3d_core.kernels.runtime.cache import Compiled
 from dap3d_core.kernels.runtime.function_lists import LOOP
+from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.kernels.runtime.loop_modules import array_members
 from dap3d_core.kernels.runtime.source_digest import COMPILED_LAYERS
 from support.at_all_levels import all_made_of, function_of, made_of, same_bits
 
 #: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.
 CALLS = {1, 2, 7, 40, 200}
+#: Numbers that wrappers take as an array of one: C calls take no complex ones, and no vectors.
+BY_ARRAY = (COMPLEX, FLOAT)
+#: The level of code with derivatives, beside those of ``targets``; numbers for each.
+DIFFERENTIATED, COUNT = "differentiated", 3
 
 
 class PlainTable(list):
@@ -153,7 +161,7 @@ def wrapper_of(function, types):
     """A function of the same arguments that writes the results of a function into an array."""
     _, result = Program().function(function, types)
     names = ", ".join(f"a{k}" for k in range(len(types)))
-    given = ", ".join(f"a{k}[0]" if t == COMPLEX else f"a{k}" for k, t in enumerate(types))
+    given = ", ".join(f"a{k}[0]" if t in BY_ARRAY else f"a{k}" for k, t in enumerate(types))
     lines = [f"def f({names}, out):", f"    r = target({given})", "    k = 0"]
     if result == NOTHING:
         lines[1:] = [f"    target({given})"]
@@ -191,7 +199,7 @@ def exported(program, function, before, index):
     except CompileError:  # put into its callers with constants, and needs some of them
         types = [Known(v) if t == INT else t for v, t in zip(before, types, strict=True)]
         wrapper = wrapper_of(function, types)
-    types = [Array(COMPLEX, 1) if t == COMPLEX else t for t in types]  # C calls take no complex
+    types = [Array(t, 1) if t in BY_ARRAY else t for t in types]
     symbol = f"recorded_{index}"
     program.export(wrapper, (*types, Array(COMPLEX, 1)), symbol)
     variable = [k for k, t in enumerate(types) if not is_constant(t)]
@@ -220,9 +228,10 @@ def differences(calls, levels=None):
                         item, table.signature.arguments, items[item]
                     )
                 elif not isinstance(item, Compiled) and id(item) not in items:
-                    items[id(item)] = item, made_of(loop_text(item), "loop", LOOP, levels)
+                    made = made_at(loop_text(item), {"loop": LOOP}, levels)
+                    items[id(item)] = item, {level: e["loop"] for level, e in made.items()}
     found = set()
-    for level, entries in all_made_of(program.module(), signatures, levels).items():
+    for level, entries in made_at(program.module(), signatures, levels).items():
 
         def compiled_table(table, level=level, entries=entries):
             made = (entries[items[f]] if isinstance(f, Compiled) else items[id(f)][1][level]
@@ -230,18 +239,76 @@ def differences(calls, levels=None):
             return Functions(table.signature, list(made))
 
         for function, before, after, result in calls:
-            symbol, _, variable = wrappers[function, tuple(map(kind, before))]
+            symbol, signature, variable = wrappers[function, tuple(map(kind, before))]
+            if level == DIFFERENTIATED and any(map(has_vectors, signature.arguments)):
+                continue
             numbers = np.array(numbers_of(result), dtype=complex)
             given, out = copied(before, {}), np.zeros(numbers.size, dtype=complex)
             taken = [given[k] for k in variable]
-            taken = [np.array([v]) if isinstance(v, complex) else v for v in taken]
+            by_array = zip(taken, entries[symbol].signature.arguments, strict=False)
+            taken = [np.array([v], dtype=DTYPES[t.item]) if is_by_array(v, t) else v
+                     for v, t in by_array]  # fmt: skip
             taken = [compiled_table(v) if isinstance(v, PlainTable) else v for v in taken]
-            entries[symbol](*taken, out)
+            if level == DIFFERENTIATED:
+                call_differentiated(entries[symbol], [*taken, out])
+            else:
+                entries[symbol](*taken, out)
             pairs = [(numbers, out)]
             pairs += zip(arrays_in(after), arrays_in(given), strict=True)
             if not all(same_numbers(one, other) for one, other in pairs):
                 found.add(f"{function.__module__}.{function.__name__} at {level}")
     return sorted(found)
+
+
+def is_by_array(value, type_):
+    """Whether a number is to be given as an array."""
+    return isinstance(type_, Array) and not isinstance(value, np.ndarray)
+
+
+def has_vectors(type_):
+    """Whether C calls would have to take vectors: for numbers in a tuple."""
+    return isinstance(type_, Tuple) and any(w == "double" for w in type_.words)
+
+
+def made_at(text, signatures, levels):
+    """As ``all_made_of``, with derivatives where that level is asked for."""
+    plain = None if levels is None else [level for level in levels if level != DIFFERENTIATED]
+    made = all_made_of(text, signatures, plain) if plain is None or plain else {}
+    if levels is not None and DIFFERENTIATED in levels:
+        made[DIFFERENTIATED] = all_made_of(differentiate(text, COUNT), signatures, ["O0"])["O0"]
+    return made
+
+
+def call_differentiated(entry, arguments):
+    """Call a function whose numbers carry derivatives, drawn at random for those of its structs."""
+    carried = Differentiation(COUNT)
+    holder = carried.wide(Holder(numbers=np.zeros(1)))
+    rng = np.random.default_rng(0)
+
+    def words_of(value, type_):
+        if isinstance(value, tuple):
+            return [w for x, t in zip(value, type_.items, strict=True) for w in words_of(x, t)]
+        if isinstance(value, np.ndarray):
+            own = value.dtype.kind in "fc"
+            if own and value.size:
+                slopes = holder.slopes(value)
+                slopes[:] = rng.standard_normal(slopes.shape)
+            address = address_of(holder.matrix(value) if own else value)
+            return [address, *value.shape[: type_.ndim]]
+        if isinstance(value, Arrays):
+            return [carried.wide(value).address]
+        return [getattr(value, "address", value)] if type_.words else []  # None has none
+
+    pairs = zip(arguments, entry.signature.arguments, strict=True)
+    entry._run(*(word for value, type_ in pairs for word in words_of(value, type_)))
+    holder.give()
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class Holder(Arrays):
+    """A struct whose buffers others share."""
+
+    numbers: Any
 
 
 def kind(value):

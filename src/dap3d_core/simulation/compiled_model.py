@@ -94,6 +94,8 @@ class CompiledModel:
         compile_time: seconds that checking, modelling and compiling took.
     """
 
+    _of_bodies: "CompiledModel | None" = None
+
     def __init__(
         self,
         scene: Scene | str | os.PathLike[str],
@@ -125,7 +127,6 @@ class CompiledModel:
             check_simulation(settings, self.model.body_names)
         #: The requested method, perhaps "auto".
         self.requested_method = requested = method or str(scene.simulation.method)
-        self._of_bodies: CompiledModel | None = None
         self._like = like
         usual = takes_joint_coordinates(str(scene.simulation.integrator))
         self._may_choose_joint = usual if joint is None else joint

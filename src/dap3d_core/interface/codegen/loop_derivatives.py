@@ -96,6 +96,18 @@ class _Instances:
         sign = -1.0 if name == "multipliers" else 1.0  # -lambda is read
         self.seeds.append((name, at, np.full(at.shape, sign)))
 
+    def seed_reading(self, bodies: Sequence[int], rows: dict[int, int]) -> None:
+        """Differentiate by the motion of bodies, and by the multipliers of rows, behind columns."""
+        body = self._arrays["body"]
+        for column in bodies:
+            slopes = _by_motion(body[self.idx[:, column]])
+            self.part("body", column)
+            self.seeds += [("body", self.at["body", column], slope) for slope in slopes]
+        for column, count in rows.items():
+            self.part("multipliers", column, count)
+            for k in range(count):
+                self.seed("multipliers", self.at["multipliers", column][:, k])
+
     def outputs(self, column: int, length: int, shift: int = 0, of: int = 1) -> Integers:
         """(m, length) places behind an index, from here on the instance's own."""
         self.idx[:, column] = length * (of * np.arange(len(self.idx)) + shift)
@@ -169,14 +181,7 @@ def differentiate_loop(
     places = [*range(slots), *range(first, first + len(layout.others))]
     places += body_columns(type_info) if read else []
     own = _Instances(arrays, idx, multipliers)
-    for column in places:
-        own.part("body", column)
-        slopes = _by_motion(arrays.body[idx[:, column]])
-        own.seeds += [("body", own.at["body", column], slope) for slope in slopes]
-    for column, rows in read.items():
-        own.part("multipliers", column, rows)
-        for k in range(rows):
-            own.seed("multipliers", own.at["multipliers", column][:, k])
+    own.seed_reading(places, read)
     for k in numbers:
         own.seed("par", p0 + layout.par_width * np.arange(count) + k)
     for column in dict.fromkeys(slots + field for field, _ in functions):

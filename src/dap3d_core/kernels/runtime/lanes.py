@@ -26,6 +26,8 @@ from dap3d_core.kernels.runtime.source_digest import origin
 
 #: Numbers at whose multiples arrays begin: those of a register of the widest vectors.
 ALIGNMENT = 8
+#: Of each array that owns its memory: itself, and the numbers of all lanes.
+Buffers = dict[int, tuple[Floats, Floats]]
 _units: dict[str, Unit] = {}
 _making = threading.Lock()
 
@@ -105,15 +107,22 @@ class WideArrays:
         address: of its table.
     """
 
-    def __init__(self, arrays: Arrays, count: int, names: Collection[str]) -> None:
+    def __init__(
+        self,
+        arrays: Arrays,
+        count: int,
+        names: Collection[str],
+        buffers: Buffers | None = None,
+    ) -> None:
         """Args:
         arrays: of one scene.
         count: scenes.
         names: arrays of floats that each scene has for itself, those of further structs behind a
             dot. Wide code may read no other.
+        buffers: of other structs, which may share memory with this one.
         """
         self.type, self._count = arrays.type_of(), count
-        self._buffers: dict[int, tuple[Floats, Floats]] = {}
+        self._buffers: Buffers = {} if buffers is None else buffers
         self._tables: list[Any] = []
         self.address = self._table(arrays, names, "")
 
@@ -162,11 +171,18 @@ class DifferentiatedArrays(WideArrays):
     it.
     """
 
-    def __init__(self, arrays: Arrays, count: int) -> None:
-        """Args: the arrays; numbers for each of theirs."""
-        super().__init__(arrays, count, ())
-        for whole, wide in self._buffers.values():
+    def __init__(self, arrays: Arrays, count: int, buffers: Buffers | None = None) -> None:
+        """Args: the arrays; numbers for each of theirs; those of other structs, to be shared."""
+        super().__init__(arrays, count, (), buffers)
+
+    def matrix(self, array: Floats) -> Floats:
+        """As of ``WideArrays``; with the numbers of the array, where it is new."""
+        known = len(self._buffers)
+        matrix = super().matrix(array)
+        if len(self._buffers) > known:
+            whole, wide = list(self._buffers.values())[-1]
             wide[:, 0] = _flat(whole)
+        return matrix
 
     def _is_own(self, name: str, names: Collection[str]) -> bool:
         return True
@@ -184,10 +200,6 @@ class DifferentiatedArrays(WideArrays):
         for whole, wide in self._buffers.values():
             _flat(whole)[:] = wide[:, 0]
 
-    def has(self, array: Floats) -> bool:
-        """True if an array is one of these."""
-        return id(array if array.base is None else array.base) in self._buffers
-
     def slopes(self, array: Floats) -> Floats:
         """(size, count - 1) view of the slopes of an array."""
         return self.matrix(array)[:, 1:]
@@ -197,43 +209,51 @@ class Differentiation:
     """Calls of compiled functions with derivatives of all that their arrays hold.
 
     Attributes:
-        arrays: of each struct that is an argument, by its id.
         taken: called before each call, where numbers that Python has changed are known.
     """
 
     def __init__(self, count: int) -> None:
         """Args: numbers for each of the arrays' (value and slopes)."""
         self.count, self.taken = count, lambda: None
-        self.arrays: dict[int, DifferentiatedArrays] = {}
-        self._kept: dict[int, Any] = {}
-        self._tables: dict[int, Functions] = {}
+        self._buffers: Buffers = {}
+        self._wide: dict[int, tuple[Any, Any]] = {}
 
     def call(self, function: Any, *arguments: Any) -> None:
         """Call a compiled function of structs, tables and integers in its differentiated form."""
         types = [type_of(argument) for argument in arguments]
         entry = differentiated(function.compile(types), self.count)
-        wide = [self._wide(argument) for argument in arguments]
-        for arrays in self.arrays.values():
-            arrays.take()
+        wide = [self.wide(argument) for argument in arguments]
+        self.take()
         self.taken()
         entry(*wide)
-        for arrays in self.arrays.values():
-            arrays.give()
+        self._any.give()
 
-    def of(self, struct: Arrays) -> DifferentiatedArrays:
-        """The arrays of a struct with their derivatives."""
-        if id(struct) not in self.arrays:
-            self._kept[id(struct)] = struct
-            self.arrays[id(struct)] = DifferentiatedArrays(struct, self.count)
-        return self.arrays[id(struct)]
+    def take(self) -> None:
+        """As of ``DifferentiatedArrays``, for all of them."""
+        self._any.take()
 
-    def _wide(self, argument: Any) -> Any:
-        if isinstance(argument, Functions):
-            if id(argument) not in self._tables:
-                self._kept[id(argument)] = argument
-                self._tables[id(argument)] = differentiated_table(argument, self.count)
-            return self._tables[id(argument)]
-        return self.of(argument) if isinstance(argument, Arrays) else argument
+    def slopes(self, array: Floats) -> Floats:
+        """(size, count - 1) view of the slopes of an array."""
+        return self._any.slopes(array)
+
+    @property
+    def _any(self) -> DifferentiatedArrays:
+        """One of the structs: all share their buffers."""
+        pairs = self._wide.values()
+        return next(wide for _, wide in pairs if isinstance(wide, DifferentiatedArrays))
+
+    def wide(self, argument: Any) -> Any:
+        """An argument of a function in the form that differentiated code takes."""
+        if not isinstance(argument, (Functions, Arrays)):
+            return argument
+        if id(argument) not in self._wide:
+            wide: Any = (
+                DifferentiatedArrays(argument, self.count, self._buffers)
+                if isinstance(argument, Arrays)
+                else differentiated_table(argument, self.count)
+            )
+            self._wide[id(argument)] = argument, wide
+        return self._wide[id(argument)][1]
 
 
 def _flat(array: Floats) -> Floats:

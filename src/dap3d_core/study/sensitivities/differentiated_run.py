@@ -1,6 +1,7 @@
 """A run that carries derivatives by parameters: its compiled code in differentiated form."""
 
 from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 
@@ -30,13 +31,14 @@ class DifferentiatedRun(Run):
         instants: time of each located event and jump -> (p,) its derivatives.
     """
 
-    def carry(self, neighbours: Sequence[Neighbours], base: Run, lanes: int) -> None:
+    def carry(self, neighbours: Sequence[Neighbours], base: Run, lanes: int) -> Self:
         """Carry derivatives from the start on; lanes: directions that code is compiled for."""
         self.neighbours, self.base, self._lanes = list(neighbours), base, lanes
         self.reported: list[Floats] = []
         self.slopes: list[Floats] = []
         self.instants: dict[float, Floats] = {}
         self._stops: Floats = np.zeros((0, lanes))
+        return self
 
     def begin(self, integration: Integration) -> None:
         """As of ``RunState``: the integration is differentiated.
@@ -63,16 +65,12 @@ class DifferentiatedRun(Run):
 
     def _slopes_of(self, array: Floats) -> Floats:
         """(size, p) view of the derivatives of an array of the integration."""
-        for struct in self._differentiation.arrays.values():
-            if struct.has(array):
-                return struct.slopes(array)[:, : len(self.neighbours)]
-        raise KeyError("no array of the integration")
+        return self._differentiation.slopes(array)[:, : len(self.neighbours)]
 
     def _seed(self) -> None:
         """Derivatives of all numbers at the start."""
-        for struct in self.present.loop_arguments:
-            if hasattr(struct, "walk"):
-                self._differentiation.of(struct)
+        for argument in self.present.loop_arguments:
+            self._differentiation.wide(argument)
         arrays = floats_of(self)
         ends = np.cumsum([array.size for array in arrays.values()])[:-1]
         self._stops = np.zeros((len(self.present.tstops), len(self.neighbours)))
@@ -152,8 +150,7 @@ class DifferentiatedRun(Run):
             slopes = self._derivative(after, given, np.vstack([of_state, of_time]))
             change(self.jumps, integration)
             self.instants[float(work.t)] = of_time
-            for struct in self._differentiation.arrays.values():
-                struct.take()
+            self._differentiation.take()
             self._slopes_of(work.state)[: work.state.shape[1]] = slopes
 
         return jump

@@ -81,6 +81,8 @@ def run_beside(
     settings = settings_of(model, **{**given, "method": compiled.method})
     run = Run(model, settings, Callbacks(), start=start)
     run.initialise()
+    if run.present.work.projects and not settings.correct and not run.present.project():
+        raise SimulationError("the start cannot be brought onto its constraints")
     return run
 
 

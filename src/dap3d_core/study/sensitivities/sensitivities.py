@@ -202,8 +202,7 @@ def sensitivities(
     if not jit_is_on():
         raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
     compiled = compiled_for(scene, method, allow_code, announce, integrator)
-    names = [by] if isinstance(by, str) else list(by)
-    parameters = _parameters(compiled, names)
+    parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
     given = dict(t_end=t_end, dt=dt, integrator=integrator, rtol=rtol, atol=atol, step=step,
                  correct=correct, project=project, correct_metric=correct_metric,
                  start=start_word(start))  # fmt: skip
@@ -219,8 +218,7 @@ def sensitivities(
         with compiled.borrow_evaluator():
             settings = settings_of(compiled, method=method, **given)
             run = DifferentiatedRun(compiled, settings, Callbacks(announce=announce), start=state)
-            run.carry(beside, base, lanes)
-            results.append(run.execute())
+            results.append(run.carry(beside, base, lanes).execute())
         runs.append(run)
     return Sensitivities(results[0], runs, parameters)
 

@@ -133,7 +133,8 @@ def repeated(runs, more="", levels=None):
 
 
 def test_calls_of_a_short_run_have_the_bits_of_plain_python():
-    count, different, _ = repeated(QUICK, levels=["O0"])
+    """Also where their numbers carry derivatives."""
+    count, different, _ = repeated(QUICK, levels=["O0", "differentiated"])
     assert count > 100
     assert different == []
 
@@ -148,6 +149,21 @@ def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python():
     assert count > 4000
     assert different == []
     assert set(missing) == NOT_CALLED
+
+
+@pytest.mark.slow
+def test_calls_have_the_same_bits_where_their_numbers_carry_derivatives():
+    """Functions of all formulations and integrators; complex numbers of radau as well.
+
+    Where a switch crosses, Newton steps for derivatives leave other numbers in rows of scratch.
+    """
+    count, different, _ = repeated(RUNS, levels=["differentiated"])
+    assert count > 2000
+    crossing = "dap3d_core.integrators.stepping.event_location."
+    assert {name.split()[0].removeprefix(crossing) for name in different} <= {
+        "bisect_crossing",
+        "differentiated_crossing",
+    }
 
 
 def test_types_of_one_shape_are_different_types():

@@ -144,3 +144,21 @@ def test_a_stop_of_an_angle(method):
     ends = [dap.simulate(scene, **settings).quantity("bar.r.x").values[-1] for scene in scenes]
     # the difference errs by h^2
     assert s.final("bar.r.x")[0] == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-6)
+
+
+def test_a_start_that_a_parameter_takes_off_the_constraints():
+    """Its derivatives are brought onto them as its values would be, whether it is corrected or not.
+
+    The model's start is on the constraints, where projections find nothing to do.
+    """
+    by, settings = ["points.P3.sPp.y"], SHORT | {"rtol": 1e-10, "atol": 1e-12}
+    given = [{"method": "standard"}, {"method": "lsq"}, {"integrator": "radau"}]
+    corrected = dap.sensitivities("pen2", by, correct=True, **settings)
+    scale = np.max(np.abs(corrected.of("cylinder.r.z")))
+    for how in given:
+        s = dap.sensitivities("pen2", by, correct=False, **how, **settings)
+        # the two corrections differ: unit metric, and that of the masses
+        np.testing.assert_allclose(
+            s.of("cylinder.r.z"), corrected.of("cylinder.r.z"), rtol=0.0, atol=1e-4 * scale
+        )
+        assert np.max(np.abs(s.of("constraint.position"))) < 1e-8
