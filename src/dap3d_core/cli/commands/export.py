@@ -55,12 +55,12 @@ def export(
     from dap3d_core.cli.console.console import count, show_written, stderr
     from dap3d_core.cli.console.progress import counting
     from dap3d_core.cli.framework.paths import open_result, output_path, refuse_all, writable
-    from dap3d_core.exchange import check_fps, exporter_of, result_exporters
+    from dap3d_core.exchange import check_fps, exporter_of, result_exporters, suffix_of
     from dap3d_core.result import ResultError
 
-    if kind not in (known := result_exporters()) and kind is not None:
+    if kind is not None and kind not in result_exporters():
         return _export_model(result, kind, output, strict=strict, force=force, as_json=as_json)
-    target = output_path(result, output, known[kind or "vtk"].suffix)
+    target = output_path(result, output, suffix_of(kind or "vtk"))
     opened = open_result(result, model=model, allow_code=allow_code)
     refuse_all(
         partial(exporter_of, target, kind),
