@@ -150,7 +150,7 @@ def test_a_keyword_that_is_taken_is_refused_and_may_be_forced(refuse, dap3d):
         ("importer", "urdf", "there is an importer 'urdf' already, from distribution dap3d"),
         ("integrator", "auto", "dap3d itself has the integrator 'auto'"),
         ("shape", "box", "dap3d itself has the shape 'box'"),
-        ("exporter", "vtk", "dap3d itself has the exporter 'vtk'"),
+        ("exporter", "vtk", "there is an exporter 'vtk' already, from distribution dap3d"),
     ],
 )
 def test_names_of_extensions_that_are_taken_are_refused(refuse, kind, taken, words):

@@ -13,7 +13,7 @@ from support import double_pendulum, problems
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import Note
 
 sys.path.append(str(REPOSITORY / "benchmarks"))
 
@@ -80,7 +80,7 @@ def test_the_note_on_a_lost_motion_is_a_warning():
     """With the time, in the notes that --strict does not let pass; the field says the same."""
     result = simulated(12.0, 1e-6)
     (note,) = [note for note in result.notes if "beyond 0.001 of the size" in note]
-    assert not note.startswith(INFORMATION)
+    assert Note(note).is_warning
     assert f"from t = {result.error.meaningless_from:.6g} s on" in note
 
 

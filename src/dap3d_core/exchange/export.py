@@ -86,11 +86,22 @@ def result_exporters() -> dict[str, ResultExporter]:
     return found
 
 
+def suffix_of(format: str) -> str:
+    """The suffix of a format's files.
+
+    Raises:
+        PluginError: its exporter cannot be loaded.
+    """
+    return str(extensions("exporter").load(format).suffix)
+
+
 def exporter_of(target: Path, format: str | None) -> ResultExporter:
     """The exporter for a path; a ValueError where there is none, or the suffix names another."""
     known = result_exporters()
     named = {one.suffix: one for one in known.values()}.get(target.suffix.lower())
     if format is not None and format not in known:
+        if format in extensions("exporter").keywords:
+            suffix_of(format)  # says why it cannot be loaded, if that is it
         raise ValueError(f"{format!r} is no format; one of {', '.join(known)}")
     exporter = named if format is None else known[format]
     if exporter is None:

@@ -210,7 +210,7 @@ def _read_folder(
 
 def _folder_importer(folder: Path, wanted: str | None) -> FolderImporter | None:
     """The importer of a folder, as wanted or by a file in it; None where it is one of files."""
-    if wanted is None and not folder.is_dir():
+    if wanted is None and not os.path.isdir(folder):
         return None
     formats = extensions("importer")
     for keyword in formats.first if wanted is None else [wanted]:
@@ -220,7 +220,9 @@ def _folder_importer(folder: Path, wanted: str | None) -> FolderImporter | None:
             if wanted is not None:
                 raise
             continue
-        if isinstance(importer, FolderImporter) and (wanted or (folder / importer.marker).exists()):
+        if isinstance(importer, FolderImporter) and (
+            wanted or os.path.exists(folder / importer.marker)
+        ):
             return importer
     return None
 

@@ -4,7 +4,8 @@ from dap3d_core.result.errors import Computed, ResultError, UnknownNameError
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.atomic_write import check_target
 from dap3d_core.result.file.write import ResultWriter
-from dap3d_core.result.metadata import INFORMATION, RunMetadata, RunStatistics, current_versions
+from dap3d_core.result.metadata import RunMetadata, RunStatistics, current_versions
+from dap3d_core.result.note import Note, information
 from dap3d_core.result.open import open_result
 from dap3d_core.result.post.global_error import ErrorEstimate, estimated_error
 from dap3d_core.result.post.ledger import Entry
@@ -15,12 +16,12 @@ from dap3d_core.result.quantities.lookup import find, names_of
 from dap3d_core.result.result import Result
 
 __all__ = [
-    "INFORMATION",
     "Computed",
     "Energy",
     "Entry",
     "ErrorEstimate",
     "EventRecord",
+    "Note",
     "Quantity",
     "Reaction",
     "RunMetadata",
@@ -33,6 +34,7 @@ __all__ = [
     "current_versions",
     "estimated_error",
     "find",
+    "information",
     "names_of",
     "open_result",
 ]

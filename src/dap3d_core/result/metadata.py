@@ -10,13 +10,12 @@ from typing import Any
 import attrs
 
 from dap3d_core.result.event_record import EventRecord
+from dap3d_core.result.note import Note
 from dap3d_core.scene import SceneError, tables_of
 from dap3d_core.scene.scene import FIXED_STEP
 
 #: How a run can have ended.
 STATUSES = ("done", "interrupted", "stopped")
-#: How a note begins that changes nothing of what was requested: no warning to ``--strict``.
-INFORMATION = "for information: "
 #: Stands in a file that is still being written, or whose writer was killed.
 RUNNING = "running"
 
@@ -56,8 +55,8 @@ def current_versions() -> dict[str, str]:
     return dict(_installed())
 
 
-def _words(words: Iterable[str]) -> tuple[str, ...]:
-    return tuple(words)
+def _notes(lines: Iterable[str]) -> tuple[Note, ...]:
+    return tuple(map(Note, lines))
 
 
 def _occurrences(found: Iterable[EventRecord]) -> tuple[EventRecord, ...]:
@@ -102,7 +101,7 @@ class RunMetadata:
     status: str = attrs.field(default="done", validator=attrs.validators.in_((*STATUSES, RUNNING)))
     method: str = ""
     integrator: str = ""
-    notes: tuple[str, ...] = attrs.field(default=(), converter=_words)
+    notes: tuple[Note, ...] = attrs.field(default=(), converter=_notes)
     settings: dict[str, Any] = attrs.field(factory=dict, converter=_plain)
     stats: RunStatistics = attrs.Factory(RunStatistics)
     events: tuple[EventRecord, ...] = attrs.field(default=(), converter=_occurrences)

@@ -18,6 +18,7 @@ from dap3d_core.result.errors import ResultError, UnknownNameError, unknown
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.metadata import RunMetadata, RunStatistics
 from dap3d_core.result.model_summary import ModelSummary, summary_of
+from dap3d_core.result.note import Note
 from dap3d_core.result.post.contact_output import (
     POINT,
     ContactOutput,
@@ -219,7 +220,7 @@ class Result(ResultDisplay):
         return self.record.integrator
 
     @property
-    def notes(self) -> list[str]:
+    def notes(self) -> list[Note]:
         """Choices, changes and warnings of the run, in order."""
         return list(self.record.notes)
 

@@ -23,7 +23,7 @@ from dap3d_core.kernels.runtime.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.registry import PluginError, Registry, load_registry
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import information
 from dap3d_core.scene import (
     Scene,
     SceneError,
@@ -143,8 +143,8 @@ class CompiledModel:
             *self.model.notes,
             *notes_on_drivers(self.checked),
             *notes_on_laws(self.checked),
-            *(f"{INFORMATION}{note}" for note in self.evaluator.coordinates.notes),
-            *(f"{INFORMATION}{note}" for note in cache_notes()),
+            *(information(f"{note}") for note in self.evaluator.coordinates.notes),
+            *(information(f"{note}") for note in cache_notes()),
         ]
         self._redundancy: Redundancy | None = None
         if scene.outputs:

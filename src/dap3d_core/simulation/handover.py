@@ -15,7 +15,7 @@ from dap3d_core.integrators import EXPLICIT, IMPLICIT, Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.singular_poses import NOW, RATE, forget_measures
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import information
 from dap3d_core.simulation.run_state import RunState
 
 WHY_STIFF = "motions that have died away limit the steps, not the error of those that go on"
@@ -95,7 +95,7 @@ def take_over(integration: Integration, before: Integration) -> None:
 def change_note(t: float) -> str:
     """Note on where integrator auto has gone on with the implicit one."""
     until = f"{EXPLICIT.name} until t = {t:.6g} s"
-    return f"{INFORMATION}integrator auto: {until}, then {IMPLICIT.name}: {WHY_STIFF}"
+    return information(f"integrator auto: {until}, then {IMPLICIT.name}: {WHY_STIFF}")
 
 
 def stiffness_notes(
@@ -107,8 +107,10 @@ def stiffness_notes(
         return []
     used = EXPLICIT.name if integrator == "auto" else integrator
     return [
-        f"{INFORMATION}the scene is stiff from t = {t:.6g} s on: {WHY_STIFF}. {used} takes small "
-        f"steps for that; {IMPLICIT.name}, or auto, takes fewer"
+        information(
+            f"the scene is stiff from t = {t:.6g} s on: {WHY_STIFF}. {used} takes small "
+            f"steps for that; {IMPLICIT.name}, or auto, takes fewer"
+        )
         + (", with method standard" if formulation.has_own_coordinates else "")
     ]
 
@@ -181,8 +183,10 @@ def crossing_notes(crossed: Sequence[float]) -> list[str]:
         return []
     often = "once" if len(crossed) == 1 else f"{len(crossed)} times"
     return [
-        f"{INFORMATION}{IMPLICIT.name} met a singular pose {often} (first at "
-        f"t = {crossed[0]:.6g} s), where {EXPLICIT.name} took the run across"
+        information(
+            f"{IMPLICIT.name} met a singular pose {often} (first at "
+            f"t = {crossed[0]:.6g} s), where {EXPLICIT.name} took the run across"
+        )
     ]
 
 

@@ -9,7 +9,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface import PluginError
 from dap3d_core.model import Model
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import INFORMATION, Result, ResultError
+from dap3d_core.result import Result, ResultError, information
 from dap3d_core.result import open_result as open_file
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -62,7 +62,7 @@ def open_result(
     result = open_file(path, rebuild)
     known = result.record.types  # read by ``rebuild``, which is called later
     if known is None:
-        notes = (*result.notes, f"{INFORMATION}{NOT_RECORDED}")
+        notes = (*result.notes, information(f"{NOT_RECORDED}"))
         result.record = attrs.evolve(result.record, notes=notes)
     return result
 

@@ -17,7 +17,7 @@ from dap3d_core.interface import PluginError
 from dap3d_core.kernels.runtime.source_digest import driver_digest
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import INFORMATION, Result, current_versions
+from dap3d_core.result import Result, current_versions, information
 from dap3d_core.result.file.validate import are_texts
 from dap3d_core.scene import SceneError, Simulation, check_simulation, load, parse
 from dap3d_core.simulation.checkpoint.file import Checkpoint, path_of, read_checkpoint
@@ -315,7 +315,7 @@ class ResumedRun:
     def _notes(self, t: float) -> list[str]:
         """Notes on the time of resumption, and on digits that may differ."""
         header = self._found.header
-        notes = [f"{INFORMATION}resumed from a checkpoint at t = {t:.9g} s"]
+        notes: list[str] = [information(f"resumed from a checkpoint at t = {t:.9g} s")]
         here = current_versions()
         other = [
             f"{name} {number} (here {here.get(name)})"

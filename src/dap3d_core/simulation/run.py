@@ -14,7 +14,7 @@ from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.integrators.stepping.singular_poses import begin_singular
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.result import INFORMATION, Computed, Result, ResultError
+from dap3d_core.result import Computed, Result, ResultError, information
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.errors import RedundantError, SimulationError, refuse_contacts
 from dap3d_core.simulation.handover import (
@@ -344,4 +344,4 @@ class Run(RunState):
         ratio = self.compiled.joint_cost
         if ratio is None or ratio >= WORTHWHILE:
             return []
-        return [INFORMATION + in_joint_coordinates(ratio)]
+        return [information(in_joint_coordinates(ratio))]

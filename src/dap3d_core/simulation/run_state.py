@@ -11,7 +11,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import Integration, StepCounts
-from dap3d_core.result import INFORMATION, EventRecord, RunMetadata, RunStatistics
+from dap3d_core.result import EventRecord, RunMetadata, RunStatistics, information
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, check_every
@@ -106,7 +106,7 @@ class RunState:
         self.notes.append(f"method {compiled.method}: {compiled.reason}")
         if settings.step is None:
             self.notes += [
-                INFORMATION + note for note in atol_notes(settings.atol, atol, self.evaluator)
+                information(note) for note in atol_notes(settings.atol, atol, self.evaluator)
             ]
         self.started = self.compile_time = 0.0
         self.rank = 0

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.model.groups import Floats
-from dap3d_core.result import INFORMATION, Computed, Result
+from dap3d_core.result import Computed, Result
+from dap3d_core.result.note import warnings_of
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
 from dap3d_core.study.outputs import Reduction
@@ -142,7 +143,7 @@ class Ensemble:
     def _note(self, result: Result) -> str:
         """The warnings of a run that the scene as given does not have."""
         known = {*self.compiled.notes, f"method {self.compiled.method}: {self.compiled.reason}"}
-        own = [n for n in result.notes if not n.startswith((INFORMATION, "method "))]
+        own = [n for n in warnings_of(result.notes) if not n.startswith("method ")]
         return "; ".join(note for note in own if note not in known)
 
 

@@ -14,7 +14,7 @@ from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import split
 from dap3d_core.registry import load_registry
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import INFORMATION, Quantity
+from dap3d_core.result import Quantity, information
 from dap3d_core.result.arrays import AXES, EULER
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.scene import Mistake, Scene, SceneError, ValidatedScene, check, load
@@ -278,8 +278,10 @@ def _path_notes(path: EquilibriumPath, numbers: Floats) -> list[str]:
 def _end_notes(path: EquilibriumPath, numbers: Floats, name: str, last: str) -> list[str]:
     if path.end == "returned":
         return [
-            f"{INFORMATION}the path turns before {name} = {numbers[-1]:g}, and ends at {last} "
-            "again; values that begin beyond it follow the path further"
+            information(
+                f"the path turns before {name} = {numbers[-1]:g}, and ends at {last} "
+                "again; values that begin beyond it follow the path further"
+            )
         ]
     if path.end == "stuck":
         return [

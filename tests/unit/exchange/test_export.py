@@ -293,3 +293,17 @@ def test_a_package_brings_a_format_of_results(install, result, tmp_path):
     assert [float(one) for one in made.path.read_text().split()] == result.t.tolist()
     with pytest.raises(dap.PluginError, match=r"instants is a format of results"):
         dap.export_model("pen1", format="instants")
+
+
+def test_a_format_that_two_packages_bring_says_so(install, result, tmp_path):
+    text = (
+        "from dap3d_core.interface.formats import hookimpl\n"
+        "interface_version = 1\n"
+        "@hookimpl\n"
+        "def dap3d_exporters():\n"
+        "    return []\n"
+    )
+    install("parts", text, "vtk", "dap3d.exporters")
+    with pytest.raises(dap.PluginError, match="vtk"):
+        dap.export(result, tmp_path / "a.vtkhdf", format="vtk")
+    assert dap.export(result, tmp_path / "a.csv").format == "csv"

@@ -79,10 +79,10 @@ def _export_result(
     from dap3d_core.cli.console.console import count, show_written, stderr
     from dap3d_core.cli.console.progress import counting
     from dap3d_core.cli.framework.paths import open_result, output_path, refuse_all, writable
-    from dap3d_core.exchange import check_fps, exporter_of, result_exporters
+    from dap3d_core.exchange import check_fps, exporter_of, suffix_of
     from dap3d_core.result import ResultError
 
-    target = output_path(result, output, result_exporters()[kind or "vtk"].suffix)
+    target = output_path(result, output, suffix_of(kind or "vtk"))
     opened = open_result(result, model=model, allow_code=allow_code)
     refuse_all(
         partial(exporter_of, target, kind),

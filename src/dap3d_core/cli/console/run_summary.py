@@ -91,9 +91,9 @@ def _split_notes(data: dict[str, Any]) -> tuple[str, list[str]]:
 
 def _warnings(data: dict[str, Any]) -> list[str]:
     """The notes that report a change of the request; others are information."""
-    from dap3d_core.result import INFORMATION
+    from dap3d_core.result.note import warnings_of
 
-    return [n for n in _split_notes(data)[1] if not n.startswith(INFORMATION)]
+    return list(warnings_of(_split_notes(data)[1]))
 
 
 def _violations(data: dict[str, Any]) -> list[str]:

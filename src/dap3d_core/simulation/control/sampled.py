@@ -13,7 +13,7 @@ from dap3d_core.integrators.stepping.hold import Hold
 from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import by_body
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import information
 from dap3d_core.result.file.validate import is_number
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.controller import Controller, checked_controllers
@@ -77,8 +77,10 @@ class SampledControl:
                 found.append(f"{about}, and the run ends at {self._t_end:g} s: at t = 0 alone")
             elif one.every > dt * (1.0 + ALIKE):
                 found.append(
-                    f"{INFORMATION}{about}, less often than results are reported (every {dt:g} s): "
-                    "its inputs are the same for several of them"
+                    information(
+                        f"{about}, less often than results are reported (every {dt:g} s): "
+                        "its inputs are the same for several of them"
+                    )
                 )
         return found
 

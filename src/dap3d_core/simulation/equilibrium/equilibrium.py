@@ -11,7 +11,7 @@ from dap3d_core.model.joint_angles import JOINT_ANGLES
 from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import split
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import information
 from dap3d_core.result.errors import unknown
 from dap3d_core.result.post.reactions import Reaction, reactions
 from dap3d_core.scene import Scene, check
@@ -82,7 +82,7 @@ class Equilibrium:
         """The state, for a run to start from."""
         model = self.compiled.model
         angles = dict(zip(model.angle_names, self.angles.tolist(), strict=True))
-        note = f"{INFORMATION}the start is an equilibrium"
+        note = information("the start is an equilibrium")
         names = [name for state in model.element_states for name in state.labels]
         states = dict(zip(names, self.states.tolist(), strict=True))
         return NamedState(str(self.compiled.scene.name) or "the equilibrium", model.body_names,

@@ -12,7 +12,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group, Model
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.registry.suggestions import some
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import information
 from dap3d_core.simulation.equilibrium.search import Outcome, Search, search_equilibrium
 from dap3d_core.simulation.equilibrium.stability import Stability, stability_of
 from dap3d_core.simulation.equilibrium.states_at_rest import (
@@ -141,7 +141,7 @@ def start_at_rest(evaluator: Evaluator, u: Floats) -> StartState:
     """
     rest = find_rest(evaluator, u)
     steps = rest.search.steps
-    note = f"{INFORMATION}the run starts at an equilibrium, found in {steps} steps"
+    note = information(f"the run starts at an equilibrium, found in {steps} steps")
     return StartState(rest.u, rest.angles, (note, *rest.notes), states=rest.states)
 
 
@@ -195,7 +195,7 @@ def findings(search: Search, stability: Stability, model: Model) -> Iterator[str
             "move a body off it to see where the scene comes to rest"
         )
     elif search.started_balanced:
-        yield f"{INFORMATION}the start is an equilibrium"
+        yield information("the start is an equilibrium")
     if search.left:
         yield (
             "an unstable equilibrium lay on the way and was left to one of two sides that are "
@@ -206,13 +206,17 @@ def findings(search: Search, stability: Stability, model: Model) -> Iterator[str
         moves = describe_motion(model, stability.indifferent[0])
         others = f" and {count - 1} more" if count > 1 else ""
         yield (
-            f"{INFORMATION}indifferent: nothing drives or holds a freedom of {moves}{others}; "
-            "it is where the start has it"
+            information(
+                f"indifferent: nothing drives or holds a freedom of {moves}{others}; "
+                "it is where the start has it"
+            )
         )
     if not stability.is_symmetric:
         yield (
-            f"{INFORMATION}forces without a potential act: stability is that of small motions, "
-            "with masses and dampers"
+            information(
+                "forces without a potential act: stability is that of small motions, "
+                "with masses and dampers"
+            )
         )
 
 
@@ -226,15 +230,15 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
     """
     model = evaluator.model
     if np.any(velocities_of(start)):
-        yield f"{INFORMATION}velocities of the start are left out"
+        yield information("velocities of the start are left out")
     timed = [name for group in model.forces for name in _of_time(group, model)]
     if timed:
         listed = some(timed, MOST_NAMES)
-        yield f"{INFORMATION}forces that depend on time are those at t = 0: {listed}"
+        yield information(f"forces that depend on time are those at t = 0: {listed}")
     driven = model.row_owners(np.flatnonzero(rows.nu))
     if driven:
         listed = some(driven, MOST_NAMES)
-        yield f"{INFORMATION}drivers are at rest at their initial values: {listed}"
+        yield information(f"drivers are at rest at their initial values: {listed}")
     if model.friction:
         yield (
             "friction is left out: with it the scene can rest at other poses near this one as well"
@@ -242,8 +246,10 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
     rolling = model.row_owners(np.flatnonzero(~model.position_row & (rows.nu == 0.0)))
     if rolling:
         yield (
-            f"{INFORMATION}rolling joints constrain displacements as they do velocities: "
-            f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
+            information(
+                f"rolling joints constrain displacements as they do velocities: "
+                f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
+            )
         )
 
 

@@ -15,7 +15,7 @@ from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import velocities_of
-from dap3d_core.result import INFORMATION, EventRecord
+from dap3d_core.result import EventRecord, information
 from dap3d_core.result.file.validate import are_events, is_number
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
@@ -98,7 +98,7 @@ class Jumps:
         evaluator, notes = self._evaluator, []
         if self.count > MOST_RECORDS:
             notes.append(
-                f"{INFORMATION}there were {self.count} jumps; the first {MOST_RECORDS} are kept"
+                information(f"there were {self.count} jumps; the first {MOST_RECORDS} are kept")
             )
         values = np.zeros(len(evaluator.switches))
         with np.errstate(all="ignore"):  # as compiled code does

@@ -7,7 +7,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.kernels import lookup, where
 from dap3d_core.kernels.runtime.source_digest import reached
 from dap3d_core.model.knots import breaks_are_told
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import information
 from dap3d_core.scene import ValidatedScene
 
 #: Words of kernels that choose between formulas.
@@ -47,8 +47,10 @@ def _branching(by_type: dict[Any, list[str]], type_info: dict[Any, TypeInfo]) ->
             continue
         more = f" and {len(names) - 1} more" if len(names) > 1 else ""
         yield (
-            f"{INFORMATION}{type_.kind}s.{names[0]}{more} ({type_.keyword}): its law has branches "
-            "and its type no switch: steps go across them, and may pass over a short one"
+            information(
+                f"{type_.kind}s.{names[0]}{more} ({type_.keyword}): its law has branches "
+                "and its type no switch: steps go across them, and may pass over a short one"
+            )
         )
 
 

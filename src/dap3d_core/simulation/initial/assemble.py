@@ -17,7 +17,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import split, state_layout, velocities_of
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import Note, information
 from dap3d_core.scene import Body, Scene
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.least_change import displaced, finite_rows, least_change
@@ -126,15 +126,17 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
 
     No more than rounding, or velocities that the scene leaves open, is for information.
     """
-    notes = []
+    notes: list[str] = []
     position, velocity = initial.violation
     tolerance = TOLERANCE * evaluator.model.length
     if position > tolerance:
-        mark = INFORMATION if position <= ROUNDING * evaluator.model.size else ""
+        note = information if position <= ROUNDING * evaluator.model.size else Note
         notes.append(
-            f"{mark}initial positions corrected in {initial.passes} passes: "
-            f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
-            f"bodies moved by up to {initial.moved:.2g} m and {initial.turned:.2g} rad"
+            note(
+                f"initial positions corrected in {initial.passes} passes: "
+                f"|C| {position:.2g} -> {initial.residual[0]:.2g}; "
+                f"bodies moved by up to {initial.moved:.2g} m and {initial.turned:.2g} rad"
+            )
         )
     if initial.branch:
         notes.append(
@@ -154,10 +156,12 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
             body.r_dot is usual.r_dot.default and body.w is usual.w.default
             for body in scene.bodies.values()
         )
-        mark = INFORMATION if open_ or velocity <= ROUNDING * speed else ""
+        note = information if open_ or velocity <= ROUNDING * speed else Note
         notes.append(
-            f"{mark}initial velocities corrected: "
-            f"|D v - nu| {velocity:.2g} -> {initial.residual[1]:.2g}"
+            note(
+                "initial velocities corrected: "
+                f"|D v - nu| {velocity:.2g} -> {initial.residual[1]:.2g}"
+            )
         )
     return notes
 

@@ -8,7 +8,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import Model
 from dap3d_core.model.knots import breaks_of
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import information
 from dap3d_core.scene import Instance, Simulation, ValidatedScene
 
 #: Instants of a run at which functions are looked at, besides those near their breaks.
@@ -70,8 +70,10 @@ class Breakpoints:
                 )
             elif 0.5 * LEAST_PER_PERIOD * dt > period:
                 found.append(
-                    f"{INFORMATION}{about}, and results stand {dt:g} s apart, which do not show it "
-                    f"(aliasing); a dt of at most {period / 4.0:.2g} s does"
+                    information(
+                        f"{about}, and results stand {dt:g} s apart, which do not show it "
+                        f"(aliasing); a dt of at most {period / 4.0:.2g} s does"
+                    )
                 )
         return found
 

@@ -2,7 +2,7 @@
 
 from collections import Counter
 
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import information
 from dap3d_core.scene import Instance, ValidatedScene
 
 
@@ -29,9 +29,11 @@ def notes_on_drivers(checked: ValidatedScene) -> list[str]:
     ends = [tuple(sorted({top(body) for body in driver.bodies})) for driver in drivers]
     count = Counter(ends)
     return [
-        f"{INFORMATION}joints.{driver.name}: no other joint connects "
-        f"{' and '.join(names[body] for body in driver.bodies)}; a driver prescribes one freedom "
-        "and leaves the others as they are"
+        information(
+            f"joints.{driver.name}: no other joint connects "
+            f"{' and '.join(names[body] for body in driver.bodies)}; a driver prescribes one "
+            "freedom and leaves the others as they are"
+        )
         for driver, parts in zip(drivers, ends, strict=True)
         if len(parts) > 1 and count[parts] == 1
     ]

@@ -14,7 +14,7 @@ from dap3d_core.model.joint_angles import JOINT_ANGLES
 from dap3d_core.model.rotations import angular_velocities, euler_rates
 from dap3d_core.model.state_layout import join, split
 from dap3d_core.registry.suggestions import nearest, some
-from dap3d_core.result import INFORMATION, Result
+from dap3d_core.result import Result, information
 from dap3d_core.scene import Mistake, SceneError, parse
 from dap3d_core.scene import check as validate
 
@@ -168,14 +168,16 @@ def _state_of_result(
         raise _mistake(title, "the result holds no instant: nothing can start from it")
     before, after, fraction = _interval(result, t)
     time = float(result.t[before] + fraction * (result.t[after] - result.t[before]))
-    notes = [f"{INFORMATION}the start is the state of {title} at t = {time:.9g} s; the run begins "
-             "at t = 0, and so do functions of time"]  # fmt: skip
+    notes = [information(f"the start is the state of {title} at t = {time:.9g} s; the run begins "
+             "at t = 0, and so do functions of time")]  # fmt: skip
     if before != after:
         _refuse_jumps(result, before, after)
         _refuse_turns(result, before, after)
         notes.append(
-            f"{INFORMATION}the start was interpolated between the reported instants "
-            f"{result.t[before]:.9g} s and {result.t[after]:.9g} s of the result"
+            information(
+                f"the start was interpolated between the reported instants "
+                f"{result.t[before]:.9g} s and {result.t[after]:.9g} s of the result"
+            )
         )
     angles: dict[str, float] = {}
     if with_angles and result.summary.angle_count:

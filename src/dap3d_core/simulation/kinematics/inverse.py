@@ -14,7 +14,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Group
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.result import INFORMATION, Result, RunMetadata, RunStatistics
+from dap3d_core.result import Result, RunMetadata, RunStatistics, information
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.model_summary import summary_of
@@ -402,13 +402,16 @@ def _actuation(free: Floats, wrenches: Floats, side: Floats) -> tuple[Floats, in
 
 def _notes(evaluator: Evaluator, actuators: list[Actuator], forces: _Forces) -> list[str]:
     """Redundant actuators, and forces that none produces, in words."""
-    notes, names = [], ", ".join(actuator.name for actuator in actuators)
+    notes: list[str] = []
+    names = ", ".join(actuator.name for actuator in actuators)
     surplus = len(actuators) - forces.rank - int(forces.idle.sum())
     drivers = [a.name for a in actuators if isinstance(a, DriverActuator)]
     if drivers:
         notes.append(
-            f"{INFORMATION}{', '.join(drivers)} prescribe{'s' * (len(drivers) == 1)} nothing here: "
-            "the motion is the one given, and the driver's actuation is the force that it takes"
+            information(
+                f"{', '.join(drivers)} prescribe{'s' * (len(drivers) == 1)} nothing here: "
+                "the motion is the one given, and the driver's actuation is the force that it takes"
+            )
         )
     if forces.idle.any():
         idle = ", ".join(

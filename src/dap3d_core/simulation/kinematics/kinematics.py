@@ -11,7 +11,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import INFORMATION, Computed, Result, RunMetadata, RunStatistics
+from dap3d_core.result import Computed, Result, RunMetadata, RunStatistics, information
 from dap3d_core.result.arrays import arrays_of
 from dap3d_core.result.file.atomic_write import check_target, check_utf8
 from dap3d_core.result.model_summary import summary_of
@@ -287,7 +287,7 @@ class _Kinematics:
                 "those of least |lambda|)"
             )
             lines = redundancy.describe_reactions()
-            self.notes += [f"{INFORMATION}{line}" for line in lines]
+            self.notes += [information(f"{line}") for line in lines]
         return start
 
     def _freedoms(self, start: InitialState) -> str:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import INFORMATION, Result
+from dap3d_core.result import Result, information
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, eigenvalues_of
@@ -67,8 +67,10 @@ class Linearization:
         self.notes = [*point.notes, *self._inputs.notes]
         if self._is_large:
             self.notes.append(
-                f"{INFORMATION}{point.model.body_count} bodies: only the {self._mode_count} "
-                "lowest modes are computed, and stability is about them"
+                information(
+                    f"{point.model.body_count} bodies: only the {self._mode_count} "
+                    "lowest modes are computed, and stability is about them"
+                )
             )
         if self.outputs:
             _ = self._outputs  # unknown names are errors here

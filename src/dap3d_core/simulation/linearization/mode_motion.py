@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import join, split, velocities_of
-from dap3d_core.result import INFORMATION, Result, RunMetadata
+from dap3d_core.result import Result, RunMetadata, information
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import correct_initial
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
@@ -67,8 +67,8 @@ def mode_motion(
                 u = correct_initial(evaluator, u, point.t).u
             report = evaluator.report(point.t, u)
             rows.append(np.concatenate([[t], evaluator.integrated(u), report]))
-    note = (
-        f"{INFORMATION}mode {mode + 1} of a linearisation, eigenvalue {eigenvalues[mode]:.6g}: "
+    note = information(
+        f"mode {mode + 1} of a linearisation, eigenvalue {eigenvalues[mode]:.6g}: "
         "displacements along a mode shape, joints closed; no simulation"
     )
     record = RunMetadata(scene_text=point.compiled.scene_text, method=point.compiled.method,

@@ -16,7 +16,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import dense_rank
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import join
-from dap3d_core.result import INFORMATION, Result
+from dap3d_core.result import Result, information
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError, refuse_contacts
@@ -119,8 +119,10 @@ def operating_point(
         largest = frames.Omega[np.argmax(np.linalg.norm(frames.Omega, axis=1))]
         words = ", ".join(f"{w:.6g}" for w in largest)
         notes.append(
-            f"{INFORMATION}steady motion: the equations are written in axes that turn at "
-            f"({words}) rad/s, in which their coefficients are constant"
+            information(
+                f"steady motion: the equations are written in axes that turn at "
+                f"({words}) rad/s, in which their coefficients are constant"
+            )
         )
     if rated := _rates_on_reactions(model):
         raise SimulationError(

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from dap3d_core.result import INFORMATION, Computed, Result, estimated_error
+from dap3d_core.result import Computed, Note, Result, estimated_error, information
 from dap3d_core.result.post.global_error import MEANINGLESS
 from dap3d_core.scene import SceneError, Simulation
 from dap3d_core.scene.validate.settings import SMALLEST_RTOL
@@ -98,7 +98,7 @@ def add_error(
         BaseException: whatever ends the second run from outside (Ctrl-C, an exception of
             ``progress``); it carries the first result as ``.result``.
     """
-    none = f"{INFORMATION if quick else ''}its error was not estimated"
+    none = (information if quick else Note)("its error was not estimated")
     too_long = f"{none}: that takes longer than {QUICK_SECONDS:g} s"
     finer_settings = tightened(settings)
     if finer_settings is None:
@@ -126,7 +126,7 @@ def add_error(
         return
     steps = second.stats.steps
     result.arrays = result.arrays.with_error(estimated_error(result.u, second.u, steps))
-    note = f"{INFORMATION}its error is estimated by a second run at {words} ({steps:,} steps)"
+    note = information(f"its error is estimated by a second run at {words} ({steps:,} steps)")
     _amend(result, output, note, *_divergence_note(result))
 
 

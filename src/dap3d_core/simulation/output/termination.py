@@ -9,7 +9,7 @@ from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping.event_location import CHATTER
 from dap3d_core.integrators.stepping.integration_state import LOGGED
 from dap3d_core.model.state_layout import u_from_y
-from dap3d_core.result import INFORMATION, EventRecord
+from dap3d_core.result import EventRecord, information
 from dap3d_core.simulation.failure.diagnosis import AHEAD, fastest_body, find_offender
 from dap3d_core.simulation.failure.stall import describe_stall
 from dap3d_core.simulation.redundancy.contradictory_joints import find_contradiction
@@ -24,7 +24,7 @@ REASONS = {
 
 def accuracy_warnings(evaluator: Evaluator) -> list[str]:
     """Notes on what was computed less surely than all else."""
-    notes = []
+    notes: list[str] = []
     if (count := evaluator.friction_failure_count) and evaluator.model.friction:
         notes.append(
             f"friction: the multipliers did not settle in {PASSES} passes, {count} times, "
@@ -110,11 +110,11 @@ def occurrences(
 
 def event_notes(runs: Sequence[Integration], events: Sequence[EventRecord]) -> list[str]:
     """Notes on what happened: an event that stopped the run, more crossings than are kept."""
-    notes = [f"{INFORMATION}the run was stopped by an event, {event.words}"
+    notes: list[str] = [information(f"the run was stopped by an event, {event.words}")
              for event in events if event.kind == "stop"]  # fmt: skip
     if (count := sum(run.crossing_count for run in runs)) > LOGGED:
         notes.append(
-            f"{INFORMATION}switches changed their sign {count} times; the first {LOGGED} are kept"
+            information(f"switches changed their sign {count} times; the first {LOGGED} are kept")
         )
     return notes
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.result import INFORMATION
+from dap3d_core.result.note import warnings_of
 from dap3d_core.scene import SceneError
 from dap3d_core.simulation import AssemblyError
 from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
@@ -184,7 +184,7 @@ class BatchRunner:
                 turned=float(turned[j]),
             )
             messages = correction_notes(initial, evaluator, self._compiled.scene)
-            notes[index[j]] = "; ".join(m for m in messages if not m.startswith(INFORMATION))
+            notes[index[j]] = "; ".join(warnings_of(messages))
 
     def _has_compiled_correction(self) -> bool:
         """True if compiled code can correct a start: independent rows, metric "unit"."""

@@ -9,7 +9,7 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.model.groups import Floats
-from dap3d_core.result import INFORMATION
+from dap3d_core.result.note import warnings_of
 from dap3d_core.scene import SceneError, ValidatedScene, check
 from dap3d_core.simulation import AssemblyError, CompiledModel
 from dap3d_core.simulation.initial.assemble import model_size
@@ -90,7 +90,7 @@ class ModelRebuilder:
         if undefined_directions(checked.scene, model, start.u, model_size(evaluator)):
             return None
         notes = start_notes(start, evaluator, checked.scene)
-        warnings = tuple(note for note in notes if not note.startswith(INFORMATION))
+        warnings = tuple(warnings_of(notes))
         y0 = evaluator.coordinates.start(start.u)  # before the numbers: they hold its reference
         if self._structure_of(evaluator) != self._structure:
             return None

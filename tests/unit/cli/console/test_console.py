@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dap3d_core.cli.console.console import clean, count, plain, seconds, size, stdout
+from dap3d_core.cli.console.console import clean, count, json_value, seconds, size, stdout
 
 
 def test_control_characters_do_not_reach_the_terminal():
@@ -11,9 +11,9 @@ def test_control_characters_do_not_reach_the_terminal():
 
 def test_json_data_have_only_types_of_json():
     data = {"a": np.array([1.0, np.nan]), 2: (float("inf"), np.int64(3)), "p": {1}}
-    assert plain(data) == {"a": [1.0, None], "2": [None, 3], "p": [1]}
+    assert json_value(data) == {"a": [1.0, None], "2": [None, 3], "p": [1]}
     too_long_in_decimal = 16**5000 - 1
-    assert plain(too_long_in_decimal) == "0x" + "f" * 5000
+    assert json_value(too_long_in_decimal) == "0x" + "f" * 5000
 
 
 def test_numbers_for_people():

@@ -6,7 +6,7 @@ from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.result import INFORMATION
+from dap3d_core.result import Note
 
 
 def turntable(**function):
@@ -53,7 +53,7 @@ def test_a_quick_change_in_a_long_rest_is_not_missed(integrator, function):
     turned = compiled.evaluator.function_values(10.0)[0, 0]
     assert turned == pytest.approx(function.get("f_end", 1.0), abs=1e-12)
     assert angle(result) == pytest.approx(turned, abs=1e-5)
-    assert any("aliasing" in note and note.startswith(INFORMATION) for note in result.notes)
+    assert any("aliasing" in note and not Note(note).is_warning for note in result.notes)
 
 
 def test_events_are_found_beside_breaks():
@@ -83,7 +83,7 @@ def test_what_fixed_steps_cannot_resolve_is_noted():
     (note,) = [n for n in result.notes if "functions.f" in n]
     assert "less than 4 steps of 0.01 s" in note
     assert "at most 0.00031 s" in note  # a twentieth of 2 pi / frequency
-    assert not note.startswith(INFORMATION)
+    assert Note(note).is_warning
 
 
 @long_in_plain_python
@@ -91,7 +91,7 @@ def test_a_change_within_roundings_of_the_run_is_noted():
     result = dap.simulate(turntable(type="b", x_start=1.0, x_end=1.0 + 1e-10), t_end=10.0)
     (note,) = [n for n in result.notes if "functions.f" in n]
     assert "too little for the steps of a run of 10 s" in note
-    assert not note.startswith(INFORMATION)
+    assert Note(note).is_warning
     assert angle(result) == pytest.approx(1.0, abs=5e-6)  # eps / 1e-10, twice
 
 
