@@ -10,6 +10,7 @@ import time
 from typing import TYPE_CHECKING, Any
 
 import attrs
+
 from dap3d_core.formulations import PROJECT, RHS, WATCH
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.background import optimiser
@@ -72,12 +73,11 @@ class ChangeOver:
         self._key = evaluator.method, model.body_count, model.row_count, len(evaluator.loop_groups)
         self._is_open = jit_is_on() and 0 < model.body_count <= MOST_BODIES
 
-    def during(self, integration: Any, run: "Callable[[], None]") -> None:
+    def during(self, integration: Any, run: "Callable[[], object]") -> None:
         """Advance an integration, which ``run`` does, by programs where there are some.
 
         What else it does changes no number of the scene but inputs.
         """
-
         work = integration.work
 
         def counts() -> tuple[int, int]:
@@ -91,7 +91,7 @@ class ChangeOver:
 
     def call(
         self,
-        run: "Callable[[], None]",
+        run: "Callable[[], object]",
         addresses: "Integers",
         start: "Start",
         counts: "Callable[[], tuple[int, int]]",
@@ -172,7 +172,9 @@ class ChangeOver:
         if stored is None:
             if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
                 return
-            text, written = scene_program.write_programs(evaluator, name, *(record.anew or start()), self._varied)
+            text, written = scene_program.write_programs(
+                evaluator, name, *(record.anew or start()), self._varied
+            )
             if BESIDE and path is not None and optimiser.request(text, written, path):
                 record.is_requested = True
                 return

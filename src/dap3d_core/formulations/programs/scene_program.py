@@ -104,9 +104,7 @@ def reads_rates(evaluator: Evaluator) -> bool:
     return evaluator.formulation.needs_joints and evaluator.length_count > 0
 
 
-def results(
-    evaluator: Evaluator, k: int, t_now: Any, y: Any, outcome: Any, struct: Any
-) -> Any:
+def results(evaluator: Evaluator, k: int, t_now: Any, y: Any, outcome: Any, struct: Any) -> Any:
     """What function k of an evaluator gives for symbols; a projection changes y, too.
 
     outcome: of a projection, which is behind the right-hand side of its state.

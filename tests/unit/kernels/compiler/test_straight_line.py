@@ -68,10 +68,15 @@ def test_zeros_and_ones_fold_and_equal_expressions_are_one():
     assert traced(lambda a, b, c, d: (a * 0.0, 3.0 - 3.0))[1] == (0.0, 0.0)
 
 
+def signed_products(a, b, c, d):
+    """Two products in words, one in numbers."""
+    return a * b - (-b) * a, (-a) * b + c, 0.0 - (0.0 - a), a - a
+
+
 def signed(a, b, c, d):
     """Expressions that differ in signs and order alone."""
     return (
-        a * b - (-b) * a, (-a) * b + c, -(-a), a - a, -c - a * b, c / -b, -0.5 * c + d, 0.5 * c - d,
+        *signed_products(a, b, c, d), -c - a * b, c / -b, -0.5 * c + d, 0.5 * c - d,
         abs(-a) + max(-b, 0.25),
     )  # fmt: skip
 
@@ -79,7 +84,7 @@ def signed(a, b, c, d):
 def test_signs_and_order_make_no_further_operations():
     """Products are computed once, and signs go into sums and differences."""
     tracer, results = traced(
-        lambda a, b, c, d: (a * b - (-b) * a, (-a) * b + c, -(-a), a - a)
+        lambda a, b, c, d: (a * b - (-b) * a, (-a) * b + c, 0.0 - (0.0 - a), a - a)
     )
     for k, x in enumerate(results):
         tracer.store("%out", k, x)
