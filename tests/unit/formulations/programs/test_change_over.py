@@ -73,7 +73,8 @@ def test_controllers_run_by_programs(at_once):
         return [dap.Controller(every=0.02, update=lambda t, state: {"push": np.sin(9.0 * t)})]
 
     result = dap.simulate(scene, controllers=controllers(), **SETTINGS)
-    assert programs(at_once)[RHS].failures() == 0
+    [record] = at_once.values()  # short steps may need no projection: then they are made anew
+    assert record.programs or record.anew is not None
     assert_same(result, general(scene, controllers=controllers()))
     assert np.max(np.abs(result.r - general(scene).r)) > 1e-6
 
