@@ -4,8 +4,8 @@
 
 heyoka gets the least equations there are: quaternion and omega' of a body about a fixed point, the
 angle of a rod. Euler's equations are its input, and it compiles Taylor series of these very
-equations. dap3d gets the scene, and runs by its programs. Ratios of CPU times of the thread to reach an error at the end, the
-least of several rounds in turn; errors against references.json.
+equations. dap3d gets the scene, and runs by its programs. Ratios of CPU times of the thread to
+reach an error at the end, the least of several rounds in turn; errors against references.json.
 """
 
 import math

@@ -23,7 +23,7 @@ def in_body_axes(s: Floats, x: float, y: float, z: float) -> tuple[float, float,
 
 @compiled_into
 def gyroscopic_moment(s: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
-    """The moment w' x J' w' of angular velocity (x, y, z), both in body axes.
+    """The moment w' x J' w' of an angular velocity w' = (x, y, z), all in body axes.
 
     By differences of the moments of inertia: of a sphere it is zero to the last digit.
     """

@@ -73,7 +73,7 @@ class ChangeOver:
         self._key = evaluator.method, model.body_count, model.row_count, len(evaluator.loop_groups)
         self._is_open = jit_is_on() and 0 < model.body_count <= MOST_BODIES
 
-    def during(self, integration: Any, run: "Callable[[], None]") -> None:
+    def during(self, integration: Any, run: "Callable[[], object]") -> None:
         """Advance an integration, which ``run`` does, by programs where there are some.
 
         What else it does changes no number of the scene but inputs.
@@ -91,7 +91,7 @@ class ChangeOver:
 
     def call(
         self,
-        run: "Callable[[], None]",
+        run: "Callable[[], object]",
         addresses: "Integers",
         start: "Start",
         counts: "Callable[[], tuple[int, int]]",

@@ -18,7 +18,8 @@ from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.result import INFORMATION, EventRecord
+from dap3d_core.result import EventRecord
+from dap3d_core.result.note import information
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.scene.errors import MISSING
 from dap3d_core.simulation.errors import SimulationError
@@ -97,8 +98,8 @@ class ContactJumps(Jumps):
         """A note where more happened than is kept."""
         if self.count <= MOST_RECORDS:
             return []
-        return [f"{INFORMATION}contacts changed {self.count} times; the first {MOST_RECORDS} "
-                "changes are kept"]  # fmt: skip
+        words = f"contacts changed {self.count} times; the first {MOST_RECORDS} changes are kept"
+        return [information(words)]
 
     def set_state(
         self,

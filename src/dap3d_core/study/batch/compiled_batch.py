@@ -201,6 +201,8 @@ class CompiledBatch:
         )
         problem = (self.evaluator.functions, _drives(), self._begin)
         system, loops = self.evaluator.system, self.evaluator.loops
+        if count:  # constants of programs are numbers of these points, whatever was loaded last
+            driver.set_numbers(points, 0, system)
         programs = self._programs_for(points.table, points.places)
 
         def run(call: Callable[[], Any], *, needs_programs: bool = False) -> None:

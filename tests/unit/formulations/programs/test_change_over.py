@@ -57,6 +57,28 @@ def test_bits_are_those_of_general_code(model, method, at_once):
     assert set(found) in ({RHS}, {RHS, PROJECT, BEHIND})
 
 
+def test_switches_have_programs(at_once):
+    """A tricycle watches whether its disks lie."""
+    assert_same(dap.simulate("tri", **SETTINGS), general("tri"))
+    assert set(programs(at_once)) == {RHS, PROJECT, BEHIND, WATCH}
+
+
+def test_controllers_run_by_programs(at_once):
+    """They change inputs alone, which programs load."""
+    scene = dap.load("pen1")
+    scene.add_input("push", value=0.0)
+    scene.add_force("np", "pushed", body_i="cone", np=(1.0, 0.0, 0.0), input="push")
+
+    def controllers():
+        return [dap.Controller(every=0.02, update=lambda t, state: {"push": np.sin(9.0 * t)})]
+
+    result = dap.simulate(scene, controllers=controllers(), **SETTINGS)
+    [record] = at_once.values()  # short steps may need no projection: then they are made anew
+    assert record.programs or record.anew is not None
+    assert_same(result, general(scene, controllers=controllers()))
+    assert np.max(np.abs(result.r - general(scene).r)) > 1e-6
+
+
 @pytest.mark.parametrize("record", [None, change_over.Record()])
 def test_a_call_that_needs_programs_is_not_made_without_them(record, monkeypatch):
     """Also where another thread has just given them up."""

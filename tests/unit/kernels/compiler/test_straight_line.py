@@ -68,6 +68,40 @@ def test_zeros_and_ones_fold_and_equal_expressions_are_one():
     assert traced(lambda a, b, c, d: (a * 0.0, 3.0 - 3.0))[1] == (0.0, 0.0)
 
 
+def signed_products(a, b, c, d):
+    """Two products in words, one in numbers."""
+    return a * b - (-b) * a, (-a) * b + c, 0.0 - (0.0 - a), a - a
+
+
+def signed(a, b, c, d):
+    """Expressions that differ in signs and order alone."""
+    return (
+        *signed_products(a, b, c, d), -c - a * b, c / -b, -0.5 * c + d, 0.5 * c - d,
+        abs(-a) + max(-b, 0.25),
+    )  # fmt: skip
+
+
+def test_signs_and_order_make_no_further_operations():
+    """Products are computed once, and signs go into sums and differences."""
+    tracer, results = traced(
+        lambda a, b, c, d: (a * b - (-b) * a, (-a) * b + c, 0.0 - (0.0 - a), a - a)
+    )
+    for k, x in enumerate(results):
+        tracer.store("%out", k, x)
+    lines = tracer.taken_lines()
+    assert [lines.count(word) for word in ("fmul", "fadd", "fsub", "fneg")] == [1, 1, 1, 0]
+    assert results[3] == 0.0
+
+
+def test_signed_numbers_have_the_bits_of_python():
+    """But for the sign of a zero."""
+    run, rng = compiled(signed), np.random.default_rng(2)
+    for numbers in [[0.0, 1.0, -0.0, 0.0], *rng.normal(size=(50, 4)).tolist()]:
+        holds, out = run(*numbers)
+        if holds:
+            assert out.tolist() == [float(x) for x in signed(*map(np.float64, numbers))]
+
+
 def test_integers_are_numbers():
     """As of ``sum``, which begins with the integer 0."""
     run = compiled(lambda a, b, c, d: (sum([a, b]), 2 * a, 1 - b, 3 / a))

@@ -9,8 +9,10 @@ from unit.study.batch.test_batch import DONE, ensemble, path_of, singly
 from unit.study.batch.test_batch import pendulum as ball_pendulum
 
 import dap3d_core as dap
+from dap3d_core.assembly.metric import METRIC_CONSTANTS
 from dap3d_core.formulations.programs import change_over, scene_program
 from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.kernels.runtime.loop_support import JP
 from dap3d_core.study import Ensemble
 from dap3d_core.study.batch import compiled_batch
 from dap3d_core.study.batch import lanes as study_lanes
@@ -286,3 +288,17 @@ def test_lanes_made_between_points_leave_the_numbers_of_the_scene():
     before = evaluator.system.tree.constants.copy()
     assert isinstance(runner.compiled_batch._lanes_for(), LaneBatch)
     assert np.array_equal(evaluator.system.tree.constants, before)
+
+
+def test_numbers_that_another_point_left_are_no_constants():
+    """Inertias are, of a body whose mass differs alone: those of the points that are run."""
+    points = np.linspace(1.0, 2.0, 9)[:, None]
+    of, other = (swinging("bodies.bob.mass", method="standard") for _ in range(2))
+    batch = of._runner().compiled_batch
+    batch.evaluator.system.body[1, JP : JP + 9] *= 3.0
+    batch.evaluator.system.metric[1, :METRIC_CONSTANTS] *= 3.0
+    found, expected = of.run(points), other.run(points)
+    assert sum(RUN) == 2 * len(points)
+    assert len(batch._varied) < METRIC_CONSTANTS
+    for name, values in expected.values.items():
+        assert np.array_equal(found.values[name], values)

@@ -1,0 +1,37 @@
+"""Vectors of one body in its own axes."""
+
+import numpy as np
+import pytest
+
+from dap3d_core.assembly.metric import gyroscopic_moment
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP
+
+
+@compiled
+def store_moment(s, w, out):
+    """``gyroscopic_moment``, which is put into its callers."""
+    out[0], out[1], out[2] = gyroscopic_moment(s, w[0], w[1], w[2])
+
+
+def moment(J, w):
+    """Of a body with this inertia."""
+    s, out = np.zeros(BODY_WIDTH), np.zeros(3)
+    s[JP : JP + 9] = np.ravel(J)
+    store_moment(s, np.array(w), out)
+    return out
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_gyroscopic_moment_is_that_of_its_definition(seed):
+    """To some roundings of its largest term."""
+    rng = np.random.default_rng(seed)
+    J, w = rng.normal(size=(3, 3)), rng.normal(size=3)
+    J = J @ J.T + np.eye(3)
+    size = np.linalg.norm(J) * (w @ w)
+    assert np.allclose(moment(J, w), np.cross(w, J @ w), rtol=0.0, atol=1e-15 * size)
+
+
+def test_that_of_a_sphere_is_zero():
+    """To the last digit, whatever its size and angular velocity."""
+    assert not moment(0.3 * np.eye(3), (0.1, -7.3, 1e5)).any()
