@@ -9,7 +9,7 @@ interface_version = 1
 class BallBall(Contact):
     """The ball about P_i at that about P_j; with ``inside`` in a hollow one about P_j.
 
-        gap = |r_Pi - r_Pj| - radius_i - radius_j,   inside: radius_j - radius_i - |r_Pi - r_Pj|
+    gap = |r_Pi - r_Pj| - radius_i - radius_j,   inside: radius_j - radius_i - |r_Pi - r_Pj|
     """
 
     keyword = "ball_ball"

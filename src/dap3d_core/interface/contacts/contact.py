@@ -37,7 +37,9 @@ class Contact(Joint):
             ``part``, 0 and so on, ``prepare`` reads: it returns what differs between them.
     """
 
-    kernel_names = (*DECLARED, *Joint.kernel_names, "tension")
+    kernel_names: ClassVar[tuple[str, ...]] = (  # type: ignore[assignment]
+        *DECLARED, *Joint.kernel_names, "tension"
+    )  # fmt: skip
     rows, holonomic = 3, (True, False, False)
     is_contact: ClassVar[bool] = True
     points: ClassVar[int] = 1
@@ -103,8 +105,8 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         wanted[f"{short}_dot"] = [*names, *(c for c in found if c not in ("None", "1.0"))]
     if not has_j:
         calls |= dict.fromkeys(("r_j", "v_j", "w_j"), "(0.0, 0.0, 0.0)")
-    names = {f"{name}__": kernel for name, kernel in declared.items()}
-    every = names | {"rate_of__": rates.rate_of, "turned__": rates.turned}
+    kernels = {f"{name}__": kernel for name, kernel in declared.items()}
+    every = kernels | {"rate_of__": rates.rate_of, "turned__": rates.turned}
 
     def bound(kernel: Callable[..., Any]) -> Any:
         own = parameters(kernel)
@@ -140,6 +142,6 @@ def _rate_name(name: str, kinds: Mapping[str, str]) -> str:
         return f"v_{rest}"
     if head == "A" and rest:
         return f"turned__(w_{rest}, {name})"
-    if head == "s" and rest or slot_of(name):
+    if (head == "s" and rest) or slot_of(name):
         return f"{name}_dot"
     return "None"

@@ -137,9 +137,7 @@ class Rate:
         return _Condition(self.value >= _parts(other)[0])
 
 
-def rate_of(
-    function: Callable[..., Any], values: tuple[Any, ...], rates: tuple[Any, ...]
-) -> Any:
+def rate_of(function: Callable[..., Any], values: tuple[Any, ...], rates: tuple[Any, ...]) -> Any:
     """The rate of what a function of these values returns; a rate of None: a constant."""
     return _rates(function(*(_paired(v, g) for v, g in zip(values, rates, strict=True))))
 

@@ -476,8 +476,6 @@ def _expected(
     if kernel == "J" and type_.kind == "force":
         count = max(1, size(checked_shape(value)) // (6 * slots))
         return (slots, count, 6), f"a block of rows x 6 for each of {slots} bodies"
-    if kernel in ("gap", "at", "normal"):
-        return ((), "one number") if kernel == "gap" else ((3,), "three numbers")
     if kernel in ("switch", "tension"):
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"
@@ -486,8 +484,8 @@ def _expected(
     if issubclass(type_, Function):
         shape, words = VALUES[type_.arguments]
         return shape if isinstance(value, (tuple, list)) else (), words
-    if not issubclass(type_, Joint):
-        return (), "one number"
+    if not issubclass(type_, Joint) or kernel in ("gap", "at", "normal"):  # of contacts
+        return ((3,), "3 numbers") if kernel in ("at", "normal") else ((), "one number")
     if kernel == "G":
         n, k = len(type_.position_rows()), len(unknown_names(type_))
         return (n, k), f"{n} rows of the derivatives of C by its {k} unknowns"

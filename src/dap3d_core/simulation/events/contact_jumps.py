@@ -6,13 +6,6 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.formulations import RHS
-from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.integrators import Integration, Status
-from dap3d_core.integrators.stepping import integration_state as at
-from dap3d_core.kernels.array_types import Floats
-from dap3d_core.result import INFORMATION, EventRecord
-from dap3d_core.scene import Mistake, SceneError
-from dap3d_core.scene.errors import MISSING
 from dap3d_core.formulations.contacts.contact_rows import (
     FRICTION,
     GAP,
@@ -21,6 +14,13 @@ from dap3d_core.formulations.contacts.contact_rows import (
 )
 from dap3d_core.formulations.contacts.impacts import collide
 from dap3d_core.formulations.contacts.modes import JamError, find_modes
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.integrators import Integration, Status
+from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.result import INFORMATION, EventRecord
+from dap3d_core.scene import Mistake, SceneError
+from dap3d_core.scene.errors import MISSING
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps
 
@@ -158,7 +158,9 @@ class ContactJumps(Jumps):
             self._note(c, t, "impact", u, after, own)
         for c, seconds in impact.rest.items():
             self._note(c, t + seconds, "rest", u, after)
-        for c, (old, new) in enumerate(zip(before.astype(int), modes.mode.astype(int), strict=True)):
+        for c, (old, new) in enumerate(
+            zip(before.astype(int), modes.mode.astype(int), strict=True)
+        ):
             if kind := CHANGES.get((int(old), int(new)), ""):
                 self._note(c, t, kind, u, after)
 
@@ -189,10 +191,10 @@ class ContactJumps(Jumps):
     def _stop(rows: ContactRows, c: int) -> None:
         """Stop the slip of a contact, rounding of zero, without a change of its normal velocity."""
         which = rows.rows_of([c])
-        W, u = rows.W[np.ix_(which, which)], rows.slip[c].copy()
+        A, u = rows.W[np.ix_(which, which)], rows.slip[c].copy()
         u[0] = 0.0
         x = np.zeros(len(rows.G))
-        x[which] = np.linalg.lstsq(W, -u, rcond=1e-12)[0]
+        x[which] = np.linalg.lstsq(A, -u, rcond=1e-12)[0]
         rows.kick(x)
 
     def _go_on(

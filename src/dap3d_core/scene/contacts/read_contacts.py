@@ -1,4 +1,4 @@
-"""Reads contacts: with the fields of their materials, one instance for each point that may touch."""
+"""Reads contacts, with fields of their materials: one instance for each point that may touch."""
 
 from collections.abc import Sequence
 from typing import Any
