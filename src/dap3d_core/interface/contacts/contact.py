@@ -42,6 +42,7 @@ class Contact(Joint):
     )  # fmt: skip
     rows, holonomic = 3, (True, False, False)
     is_contact: ClassVar[bool] = True
+    declared: ClassVar[tuple[str, ...]] = DECLARED
     points: ClassVar[int] = 1
 
     def __init_subclass__(cls, **conditions: Any) -> None:

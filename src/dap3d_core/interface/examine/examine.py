@@ -99,6 +99,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     derived = tuple(n for n in lacking if n in kernels)  # nu is left out where it is zero
     for kernel_name in (*derived, *(name for name in JUMP_KINDS if name in kernels)):
         call(kernel_name)
+    kernels = {name: k for name, k in kernels.items() if name not in type_.declared}
     outputs |= _bounds(type_)
     _check_jumps(type_, outputs, len(layout.slots))
     functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
