@@ -14,7 +14,7 @@ MATERIAL = ("mu", "mu_s", "e", "law")
 LAWS = ("poisson", "newton")
 _ZERO = (0.0, 0.0, 0.0)
 #: Fields that a run knows best: which point it is, and the initial values of its states.
-HIDDEN: Mapping[str, Any] = {
+HIDDEN: dict[str, Any] = {
     "part": 0.0, "mode_0": 0.0, "way_0": _ZERO, "near_0": _ZERO,
     "mode_atol": 0.0, "way_atol": 0.0, "near_atol": 0.0,
 }  # fmt: skip
