@@ -51,6 +51,13 @@ class ContactJumps(Jumps):
             what = "changes velocities by a law of its own, which contacts do not know"
             remedy = "describe what it does by a contact, or take the contacts out"
             raise SceneError([Mistake(name, MISSING, what, remedy=remedy)])
+        model = evaluator.model
+        if readers := model.iterated_forces[: -model.contact_count]:
+            what = (
+                "depends on reactions in joints, and the modes of contacts are found without that"
+            )
+            remedy = "take it out, or the contacts; friction of its own a contact has (mu)"
+            raise SceneError([Mistake(f"forces.{readers[0]}", MISSING, what, remedy=remedy)])
         self.table = ContactTable(evaluator)
         self._last, self._at_once = -np.inf, 0
 

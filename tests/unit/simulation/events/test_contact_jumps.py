@@ -57,6 +57,14 @@ def test_elements_with_jumps_of_their_own_are_refused_beside_contacts():
         dap.simulate(scene)
 
 
+def test_friction_of_joints_is_refused_beside_contacts():
+    scene = bouncing()
+    scene.add_joint("tran", "rail", P_i="ball.O", P_j="ground.O", a_j="ground.z")
+    scene.add_force("friction", "rubs", joint="rail", mu=0.1, v_tol=0.01)
+    with pytest.raises(dap.SceneError, match=r"rubs.*depends on reactions in joints"):
+        dap.simulate(scene)
+
+
 def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path, monkeypatch):
     shorten_chunks(monkeypatch)
     settings = {"t_end": 1.0, "dt": 0.01, "integrator": "dop853"}
