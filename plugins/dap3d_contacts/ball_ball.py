@@ -13,6 +13,7 @@ class BallBall(Contact):
     """
 
     keyword = "ball_ball"
+    example = {"P_j": '"rod.O"', "radius_i": "0.1", "radius_j": "0.1"}
     P_i: Point = point(doc="centre of a ball")
     radius_i: float = number(unit="m", minimum=0.0, doc="of the ball about P_i")
     P_j: Point = point(doc="centre of the other")

@@ -21,6 +21,7 @@ class CapsulePlane(Contact):
     """
 
     keyword, points = "capsule_plane", 2
+    example = {"radius": "0.0"}
     P_i: Point = point(doc="centre of one end")
     Q_i: Point = point(doc="centre of the other")
     radius: float = number(unit="m", minimum=0.0, doc="of the capsule")
