@@ -1,5 +1,8 @@
 """Two balls, or a ball in a hollow one."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from dap3d_core.interface import Contact, Point, choice, hookimpl, number, point
 from dap3d_core.kernels import dot, scale, sqrt, sub
 
@@ -13,6 +16,7 @@ class BallBall(Contact):
     """
 
     keyword = "ball_ball"
+    example: ClassVar[Mapping[str, str]] = {"P_j": '"rod.O"', "radius_i": "0.1", "radius_j": "0.1"}
     P_i: Point = point(doc="centre of a ball")
     radius_i: float = number(unit="m", minimum=0.0, doc="of the ball about P_i")
     P_j: Point = point(doc="centre of the other")

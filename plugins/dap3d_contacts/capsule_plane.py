@@ -1,5 +1,8 @@
 """A capsule at a plane."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from dap3d_core.interface import Contact, Point, Vector, hookimpl, number, point, vector
 from dap3d_core.kernels import dot, scale, sub, where
 
@@ -21,6 +24,7 @@ class CapsulePlane(Contact):
     """
 
     keyword, points = "capsule_plane", 2
+    example: ClassVar[Mapping[str, str]] = {"radius": "0.0"}
     P_i: Point = point(doc="centre of one end")
     Q_i: Point = point(doc="centre of the other")
     radius: float = number(unit="m", minimum=0.0, doc="of the capsule")

@@ -4,9 +4,10 @@ What is found lies some decades nearer (1e-13 typically); rounding of instants, 
 and the height of the last bounces (1e-13 m) bound it from below.
 """
 
-import dap3d_core as dap
 import numpy as np
 import pytest
+
+import dap3d_core as dap
 
 G = 9.81
 TOLERANCE = 1e-9

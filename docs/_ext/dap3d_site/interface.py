@@ -13,7 +13,7 @@ MAKERS = ("body", "point", "vector", "vector2", "number", "numbers", "vec3", "ma
           "points", "vectors", "bodies")  # fmt: skip
 #: Annotations of fields: the class of what a scene names there is not seen by the author.
 ANNOTATIONS = ("Body", "Point", "Vector", "Vector2")
-CLASSES = ("Joint", "Force", "Function")
+CLASSES = ("Joint", "Force", "Function", "Contact")
 #: Words of kernels by subject.
 WORDS = {
     "Vectors": ("add", "sub", "neg", "scale", "dot", "cross", "norm2", "rotate"),
@@ -49,7 +49,7 @@ WORDS = {
 
 def pages() -> Iterator[tuple[str, str]]:
     """The pages of the interface of types: (path, text)."""
-    yield "reference/interface.md", page("Joint, Force, Function", *_classes())
+    yield "reference/interface.md", page("Joint, Force, Function, Contact", *_classes())
     yield "reference/fields.md", page("Fields and names", *_fields())
     yield "reference/hooks.md", page("Hooks and entry points", *_hooks())
     yield "reference/kernel-words.md", page("Words of kernels", *_words())

@@ -17,6 +17,8 @@ ABOUT = {
     "`scene.add_force(KEYWORD, NAME, ...)` in a script.",
     "function": "A function of one variable, for drivers and springs: `[functions.NAME]` in a "
     "scene, `scene.add_function(KEYWORD, NAME, ...)` in a script.",
+    "contact": "Surfaces that may touch: `[contacts.NAME]` in a scene, "
+    "`scene.add_contact(KEYWORD, NAME, ...)` in a script.",
 }
 DESCRIBED = "The same in a terminal: `dap3d describe KEYWORD`."
 

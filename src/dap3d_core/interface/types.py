@@ -54,6 +54,8 @@ class TypeBase:
     gives_energy: ClassVar[bool] = False
     #: A contact, whose rows hold and let go (interface/contacts).
     is_contact: ClassVar[bool] = False
+    #: Functions of which kernels are made, and no loop calls.
+    declared: ClassVar[tuple[str, ...]] = ()
     #: States of its own: names, or name -> length (docs/concepts/kernels.md).
     states: ClassVar[tuple[str, ...] | Mapping[str, int | str]] = ()
 

@@ -48,8 +48,8 @@ class EventRecord:
     def words(self) -> str:
         """The occurrence in a line."""
         if self.kind in CONTACT_KINDS:
-            of = f": work {self.work:.6g} J" if self.kind in ("impact", "jam") else ""
-            return f"t = {self.t:.9g} s: {self.kind} of {self.name}{of}"
+            work = f": work {self.work:.6g} J" if self.kind in ("impact", "jam") else ""
+            return f"t = {self.t:.9g} s: {self.kind} of {self.name}{work}"
         what = ", which ended the run" if self.kind in ("end", "stop") else ""
         if self.kind == "change":
             of = [f"{force}.{n} = {_short(x)}" for force, new in self.changes.items()

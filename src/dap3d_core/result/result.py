@@ -13,19 +13,14 @@ from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import read_only
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result.arrays import Arrays, arrays_of
+from dap3d_core.result.contacts import ResultContacts
 from dap3d_core.result.display import ResultDisplay
 from dap3d_core.result.errors import ResultError, UnknownNameError, unknown
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.metadata import RunMetadata, RunStatistics
 from dap3d_core.result.model_summary import ModelSummary, summary_of
 from dap3d_core.result.note import Note
-from dap3d_core.result.post.contact_output import (
-    POINT,
-    ContactOutput,
-    contact_names,
-    contact_outputs,
-    together,
-)
+from dap3d_core.result.post.contact_output import POINT
 from dap3d_core.result.post.force_output import ForceOutput, force_output
 from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of
 from dap3d_core.result.post.ledger import Entry, ledger_of
@@ -76,7 +71,7 @@ def _motion(array: str) -> cached_property[Floats]:
     return cached_property(values)
 
 
-class Result(ResultDisplay):
+class Result(ResultDisplay, ResultContacts):
     """Result of a run: n bodies, m constraint rows, nP points at nt instants.
 
     Stored are t, u, v_dot, Lam, work and the potential energy; the other arrays of the manual's
@@ -411,42 +406,6 @@ class Result(ResultDisplay):
                 None if actuation is None else np.array(actuation), self._states(), self.inputs,
             )  # fmt: skip
         return self._forces[name]
-
-    # ------------------------------------------------------------------ contacts
-
-    @cached_property
-    def contacts(self) -> tuple[str, ...]:
-        """Names of the contacts, in the order of the scene."""
-        return tuple(contact_names(self.summary.state_names))
-
-    @checked
-    def contact(self, name: str) -> ContactOutput:
-        """A contact, evaluated at the reported states.
-
-        Args:
-            name: of a contact; of one with several points, ``NAME#1`` is the first alone.
-
-        Returns:
-            ``.gap`` (nt,) m, ``.normal_force`` (nt,) N, ``.friction`` (nt, 3) N on body i, ``.slip``
-            (nt, 3) m/s, ``.mode`` (nt,) 0 open, 1 slides, 2 sticks, ``.at`` (nt, 3) m, global axes;
-            of k points (nt, k) and (nt, k, 3).
-
-        Raises:
-            UnknownNameError: there is no such contact; names the nearest.
-            ResultError: as ``model``.
-        """
-        name, names = canonical(name), contact_names(self.summary.state_names)
-        points = names.get(name) or [p for every in names.values() for p in every if p == name]
-        if not points:
-            raise unknown("contact", name, tuple(names))
-        return together([self._contacts[point] for point in points])
-
-    @cached_property
-    def _contacts(self) -> dict[str, ContactOutput]:
-        arrays = self.arrays
-        return contact_outputs(
-            self.evaluator, self.t, self.u, self.Lam, arrays.states, arrays.inputs
-        )
 
     def _angles(self) -> Floats | None:
         """(nt, k) angles with counted turns; None if an older file lacks them."""

@@ -11,6 +11,7 @@ import attrs
 
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import plain, with_identifiers
+from dap3d_core.scene.contacts.tables import ContactTables, Material
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Key, Mistake, MistakeList, SceneError
 
@@ -96,23 +97,6 @@ class Element:
     name: str
     type: Any = None
     fields: dict[str, Any] = attrs.Factory(dict)
-
-
-@attrs.define
-class Material:
-    """What surfaces do where they touch: its name, and fields of contacts.
-
-    Attributes:
-        name: its name in the scene.
-        mu, mu_s: coefficients of friction of sliding and of sticking.
-        e, law: coefficient of restitution, and of whose law of impact.
-    """
-
-    name: str
-    mu: Any = attrs.field(default=None, converter=plain)
-    mu_s: Any = attrs.field(default=None, converter=plain)
-    e: Any = attrs.field(default=None, converter=plain)
-    law: Any = attrs.field(default=None, converter=plain)
 
 
 @attrs.define
@@ -209,7 +193,7 @@ TABLES = (
 
 
 @attrs.define(repr=False)
-class Scene(SceneDisplay):
+class Scene(SceneDisplay, ContactTables):
     """A mechanism and the settings of its simulation, as the user described them.
 
     Attributes:
@@ -354,26 +338,6 @@ class Scene(SceneDisplay):
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
         """
         return self._add_element("functions", type, name, fields)
-
-    def add_material(self, name: str, **fields: Any) -> str:
-        """Add a material, fields that contacts take from it, and return its name.
-
-        Args:
-            name: without dots, not used by another material.
-            fields: mu, mu_s, e, law, as in ``Material``.
-
-        Raises:
-            SceneError: the name is taken or illegal, or a key is unknown.
-        """
-        return self._add("materials", name, fields)
-
-    def add_contact(self, type: str, name: str | None = None, **fields: Any) -> str:
-        """Add a contact of a type (its keyword) and return its name, made from the type if None.
-
-        Raises:
-            SceneError: the name is taken or illegal. Fields are checked with the whole scene.
-        """
-        return self._add_element("contacts", type, name, fields)
 
     def add_input(self, name: str, value: Any = 0.0, **unknown: Any) -> str:
         """Add an input, a number that a controller or a script sets, and return its name.

@@ -195,6 +195,20 @@ def test_a_run_needs_no_analysis_and_no_other_start(tmp_path):
     assert not {m for m in found if m.startswith(others)}
 
 
+def test_a_run_without_contacts_knows_nothing_of_them():
+    """No module of theirs, no other function of the formulation; with one they are there."""
+    script = (
+        "import dap3d_core as dap\nscene = dap.load('bodies2')\n{}dap.simulate(scene, t_end=0.1)\n"
+    )
+    floor = "scene.add_contact('ball_plane', P_i='upper.O', P_j='ground.O', a_j='ground.z')\n"
+    for more, has_contacts in (("", False), (floor, True)):
+        found = set(run(f"{script.format(more)}\n{MODULES}").splitlines()[-1].split())
+        own = {m for m in found if m.startswith("dap3d_core.formulations.contacts")}
+        assert bool(own) == has_contacts
+        assert ("dap3d_core.simulation.events.contact_jumps" in found) == has_contacts
+        assert ("dap3d_core.interface.contacts.rows" in found) == has_contacts
+
+
 def test_a_run_without_jumps_knows_nothing_of_them():
     """Neither modules nor loops, nor functions of the formulation; with jumps they are there."""
     script = (

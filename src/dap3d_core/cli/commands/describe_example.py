@@ -96,7 +96,8 @@ class _Example:
         for field, spec in specs.items():
             if spec.kind == "body" and not spec.required and spec.default:
                 owners[field.rpartition("_")[2]] = spec.default
-        lines = [f"[{type_.kind}s.{name}]", f'type = "{type_.keyword}"']
+        kind = "contact" if type_.is_contact else type_.kind
+        lines = [f"[{kind}s.{name}]", f'type = "{type_.keyword}"']
         for field, spec in specs.items():
             own = type_.example.get(field)
             for body in PLACES if own else ():

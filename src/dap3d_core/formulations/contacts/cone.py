@@ -1,4 +1,4 @@
-"""Coulomb's law as a complementarity problem: u = W x + b, contact by contact (normal, t1, t2),
+"""Coulomb's law as a complementarity problem: u = A x + b, contact by contact (normal, t1, t2),
 
     0 <= x_N  _|_  u_N >= 0,    |x_T| <= mu x_N,    u_T = -kappa x_T, kappa >= 0, on the rim
 
@@ -27,12 +27,12 @@ _TINY = 1e-300
 
 
 def solve_cone(
-    W: Floats, b: Floats, mu: Any, more: Any = None, start: Any = None, tries: int = TRIES
+    A: Floats, b: Floats, mu: Any, more: Any = None, start: Any = None, tries: int = TRIES
 ) -> tuple[Floats, float]:
     """The solution x (3 m,), and the residual of the equations over its size.
 
     Args:
-        W, b: (3 m, 3 m), (3 m,) of u = W x + b.
+        A, b: (3 m, 3 m), (3 m,) of u = A x + b.
         mu: (m,) coefficients of friction.
         more: (m,) normal impulses of an earlier phase, which widen the discs.
         start: (3 m,) where to begin.
@@ -44,11 +44,11 @@ def solve_cone(
     left = 0.0
     if not count:
         return x, left
-    r = 1.0 / np.maximum(np.diag(W).reshape(-1, 3).max(axis=1), _TINY)
-    scale = float(np.abs(b / np.maximum(np.diag(W), _TINY)).max()) + _TINY
+    r = 1.0 / np.maximum(np.diag(A).reshape(-1, 3).max(axis=1), _TINY)
+    scale = float(np.abs(b / np.maximum(np.diag(A), _TINY)).max()) + _TINY
     for k in range(tries):
-        x = _sweep(W, b, mu, x, r, more, SWEEPS * 4 ** (k - 1) if k else FIRST)
-        x, left = _newton(W, b, mu, x, r, more)
+        x = _sweep(A, b, mu, x, r, more, SWEEPS * 4 ** (k - 1) if k else FIRST)
+        x, left = _newton(A, b, mu, x, r, more)
         if left <= SOLVED * scale:
             break
     return x, left / scale
@@ -71,16 +71,16 @@ def _residual(x: Floats, u: Floats, mu: Floats, r: Floats, more: Floats) -> Floa
 
 
 def _sweep(
-    W: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats, sweeps: int
+    A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats, sweeps: int
 ) -> Floats:
     """Projected Gauss-Seidel."""
     for _ in range(sweeps):
         change = 0.0
         for c in range(len(mu)):
             k = slice(3 * c, 3 * c + 3)
-            u, old = W[k] @ x + b[k], x[k].copy()
-            x[3 * c] = max(0.0, x[3 * c] - u[0] / max(W[3 * c, 3 * c], _TINY))
-            u += W[k, 3 * c] * (x[3 * c] - old[0])
+            u, old = A[k] @ x + b[k], x[k].copy()
+            x[3 * c] = max(0.0, x[3 * c] - u[0] / max(A[3 * c, 3 * c], _TINY))
+            u += A[k, 3 * c] * (x[3 * c] - old[0])
             radius = np.array(mu[c] * max(x[3 * c] + more[c], 0.0))
             x[3 * c + 1 : 3 * c + 3] = _project(x[3 * c + 1 : 3 * c + 3] - r[c] * u[1:], radius)
             change = max(change, float(np.abs(x[k] - old).max()))
@@ -89,42 +89,42 @@ def _sweep(
     return x
 
 
-def _slopes(W: Floats, x: Floats, u: Floats, mu: Floats, r: Floats, more: Floats) -> Floats:
+def _slopes(A: Floats, x: Floats, u: Floats, mu: Floats, r: Floats, more: Floats) -> Floats:
     """A generalised derivative of the residual."""
     unit = np.eye(len(x))
-    dF = unit.copy()
+    found = unit.copy()
     for c in range(len(mu)):
         k = 3 * c
         if x[k] - r[c] * u[k] > 0.0:
-            dF[k] = r[c] * W[k]
+            found[k] = r[c] * A[k]
         t = slice(k + 1, k + 3)
-        z, dz = x[t] - r[c] * u[t], unit[t] - r[c] * W[t]
+        z, dz = x[t] - r[c] * u[t], unit[t] - r[c] * A[t]
         size, radius = float(np.hypot(*z)), mu[c] * max(x[k] + more[c], 0.0)
         if size <= radius:
-            dF[t] -= dz
+            found[t] -= dz
         elif size > 0.0:
             d = z / size
-            dF[t] -= radius / size * (np.eye(2) - np.outer(d, d)) @ dz
+            found[t] -= radius / size * (np.eye(2) - np.outer(d, d)) @ dz
             if x[k] + more[c] > 0.0:
-                dF[t] -= mu[c] * np.outer(d, unit[k])
-    return dF
+                found[t] -= mu[c] * np.outer(d, unit[k])
+    return found
 
 
 def _newton(
-    W: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats
+    A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats
 ) -> tuple[Floats, float]:
     """Semismooth Newton with a line search; x and its residual."""
-    best = float(np.abs(_residual(x, W @ x + b, mu, r, more)).max())
-    least = float(np.abs(b / np.maximum(np.diag(W), _TINY)).max())
+    best = float(np.abs(_residual(x, A @ x + b, mu, r, more)).max())
+    least = float(np.abs(b / np.maximum(np.diag(A), _TINY)).max())
     for _ in range(PASSES):
         if best <= ROUNDING * (float(np.abs(x).max()) + least + _TINY):
             break
-        u = W @ x + b
+        u = A @ x + b
         F = _residual(x, u, mu, r, more)
-        step = np.linalg.lstsq(_slopes(W, x, u, mu, r, more), -F, rcond=1e-13)[0]
+        step = np.linalg.lstsq(_slopes(A, x, u, mu, r, more), -F, rcond=1e-13)[0]
         for cut in range(CUTS):
             new = x + step * 0.5**cut
-            size = float(np.abs(_residual(new, W @ new + b, mu, r, more)).max())
+            size = float(np.abs(_residual(new, A @ new + b, mu, r, more)).max())
             if size < best:
                 x, best = new, size
                 break

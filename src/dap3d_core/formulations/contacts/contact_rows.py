@@ -48,13 +48,13 @@ class ContactTable:
                      if g is group and kind == "switch")  # fmt: skip
             loop = loop_list([compiled_loop(group.type_info, "tension")])
             self._loops.append((loop, evaluator.system.groups[q], which))
-        self.way = self.mode[:, None] + np.arange(1, 4)
-        self.near = self.mode[:, None] + np.arange(4, 7)
+        self.way: Integers = self.mode[:, None] + np.arange(1, 4)
+        self.near: Integers = self.mode[:, None] + np.arange(4, 7)
         self.mu, self.mu_s, self.e = (self.numbers[n] for n in ("mu", "mu_s", "e"))
         for k, switch in enumerate(evaluator.switches):
             if switch.is_contact:
-                which = int(switch.group.members[switch.place]) - first
-                self.switches[which, switch.part] = k
+                place = int(switch.group.members[switch.place]) - first
+                self.switches[place, switch.part] = k
 
     @IGNORE_FLOAT_ERRORS
     def outputs(self, t: float, u: Floats, Lam: Floats | None = None) -> Floats:

@@ -42,7 +42,7 @@ class Impact:
 
 def collide(table: ContactTable, rows: ContactRows, touching: list[int], length: float) -> Impact:
     """Let the contacts that touch collide until none approaches; velocities of ``rows`` follow."""
-    impulses, rest = np.zeros((table.count, 3)), {}
+    impulses, rest = np.zeros((table.count, 3)), dict[int, float]()
     work = exchanged = 0.0
     e = table.e.copy()
     for k in range(ROUNDS):
@@ -78,16 +78,16 @@ def _spread(x: Floats, contacts: list[int], count: int) -> Floats:
 def _impulses(table: ContactTable, rows: ContactRows, contacts: list[int], e: Floats) -> Floats:
     """(3 k,) impulses of one round."""
     which = rows.rows_of(contacts)
-    W, u, mu = rows.W[np.ix_(which, which)], rows.slip[contacts].ravel(), table.mu[contacts]
+    A, u, mu = rows.W[np.ix_(which, which)], rows.slip[contacts].ravel(), table.mu[contacts]
     of, newton = e[contacts], table.newton[contacts]
     b = u.copy()
     b[::3] += np.where(newton, of, 0.0) * np.minimum(u[::3], 0.0)
-    first, _ = solve_cone(W, b, mu)
+    first, _ = solve_cone(A, b, mu)
     more = np.where(newton, 0.0, of) * first[::3]
     if not more.any():
         return first
     given = np.kron(more, [1.0, 0.0, 0.0])
-    second, _ = solve_cone(W, u + W @ (first + given), mu, more)
+    second, _ = solve_cone(A, u + A @ (first + given), mu, more)
     return first + second + given
 
 

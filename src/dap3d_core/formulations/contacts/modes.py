@@ -10,7 +10,7 @@ from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTa
 from dap3d_core.kernels.array_types import Floats
 
 #: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
-#: is zero; part of the largest entry of W below which rows depend on each other.
+#: is zero; part of the largest entry of A below which rows depend on each other.
 STILL, ZERO, DEPENDENT = 1e-9, 1e-9, 1e-9
 #: Part of the largest acceleration that may be left where contacts hold, by shares alone: their
 #: rows take it, within what the cones leave.
@@ -133,23 +133,23 @@ def _solve(
 ) -> tuple[Floats, Floats, Floats, dict[int, Floats]]:  # fmt: skip
     """Forces (3 k,) with sliding friction, the matrix, accelerations, and directions of sliding."""
     which = rows.rows_of(closed)
-    W0, b = rows.W[np.ix_(which, which)], rows.free[which]
-    W, mu = W0.copy(), part * table.mu_s[closed]
+    full, b = rows.W[np.ix_(which, which)], rows.free[which]
+    A, mu = full.copy(), part * table.mu_s[closed]
     ways = _ways(table, rows, closed, sliding, limit)
     for k, c in enumerate(closed):
         if c in ways:
-            W[:, 3 * k] -= table.mu[c] * W0[:, 3 * k + 1 : 3 * k + 3] @ ways[c]
+            A[:, 3 * k] -= table.mu[c] * full[:, 3 * k + 1 : 3 * k + 3] @ ways[c]
             mu[k] = 0.0
-            if W[3 * k, 3 * k] <= 0.0:
+            if A[3 * k, 3 * k] <= 0.0:
                 raise JamError(table.names[c])
-    x, left = solve_cone(W, b, mu, **more)
+    x, left = solve_cone(A, b, mu, **more)
     if left > 1e-6 and not more:
         raise JamError(table.names[closed[0]])
-    a = W @ x + b
+    a = A @ x + b
     for k, c in enumerate(closed):
         if c in ways:
             x[3 * k + 1 : 3 * k + 3] = -table.mu[c] * x[3 * k] * ways[c]
-    return x, W, a, ways
+    return x, A, a, ways
 
 
 def _put(
@@ -159,9 +159,9 @@ def _put(
     """Put the modes of contacts that are closed among those found; inner: of ``_inside``."""
     if not closed:
         return
-    x, W, a, ways = _solve(table, rows, closed, sliding, limit)
+    x, A, a, ways = _solve(table, rows, closed, sliding, limit)
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
-    shares = _share(W)
+    shares = _share(A)
     if inner is None:
         inner = _inside(table, rows, closed, sliding, limit)
     x = x if inner is None else inner
@@ -183,9 +183,9 @@ def _put(
             found.near[c] = force @ frame if mode == 2.0 else force[0] * frame[0]
 
 
-def _share(W: Floats) -> bool:
+def _share(A: Floats) -> bool:
     """True if forces of contacts may change without a change of the motion."""
-    return bool(np.linalg.matrix_rank(W, tol=DEPENDENT * np.abs(W).max()) < len(W))
+    return bool(np.linalg.matrix_rank(A, tol=DEPENDENT * np.abs(A).max()) < len(A))
 
 
 def _inside(
@@ -200,8 +200,8 @@ def _inside(
     best, low, high = None, 0, len(INSIDE) - 1
     while low <= high:  # what one part allows, so does every larger one
         k = high if best is None else (low + high) // 2
-        x, W, a, _ = _solve(table, rows, closed, sliding, limit, INSIDE[k], start=best, tries=3)
-        if not _share(W):
+        x, A, a, _ = _solve(table, rows, closed, sliding, limit, INSIDE[k], start=best, tries=3)
+        if not _share(A):
             return None
         if np.abs(a).max() <= min(HELD, OF_REST * (1.0 - INSIDE[k])) * big:
             best, high = x, k - 1

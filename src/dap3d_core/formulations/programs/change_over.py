@@ -71,7 +71,8 @@ class ChangeOver:
         self._parts: list[tuple[Floats, Integers]] = []
         self._constants = b""
         self._key = evaluator.method, model.body_count, model.row_count, len(evaluator.loop_groups)
-        self._is_open = jit_is_on() and 0 < model.body_count <= MOST_BODIES
+        takes_one = not model.contact_count  # their friction is solved for, in passes
+        self._is_open = jit_is_on() and takes_one and 0 < model.body_count <= MOST_BODIES
 
     def during(self, integration: Any, run: "Callable[[], object]") -> None:
         """Advance an integration, which ``run`` does, by programs where there are some.

@@ -3,10 +3,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
-from dap3d_core.interface.codegen.kernel_arguments import parameters
-from dap3d_core.interface.codegen.specialise import bound_kernel
-from dap3d_core.interface.contacts import rates, rows
-from dap3d_core.interface.fields import FieldSpec, choice, number, slot_of
+from dap3d_core.interface.fields import FieldSpec, choice, field_of, number, slot_of
 from dap3d_core.interface.types import Joint
 
 #: What authors define.
@@ -15,6 +12,12 @@ DECLARED = ("gap", "at", "normal")
 MATERIAL = ("mu", "mu_s", "e", "law")
 #: Values of ``law``.
 LAWS = ("poisson", "newton")
+_ZERO = (0.0, 0.0, 0.0)
+#: Fields that a run knows best: which point it is, and the initial values of its states.
+HIDDEN: dict[str, Any] = {
+    "part": 0.0, "mode_0": 0.0, "way_0": _ZERO, "near_0": _ZERO,
+    "mode_atol": 0.0, "way_atol": 0.0, "near_atol": 0.0,
+}  # fmt: skip
 
 
 class Contact(Joint):
@@ -37,9 +40,12 @@ class Contact(Joint):
             ``part``, 0 and so on, ``prepare`` reads: it returns what differs between them.
     """
 
-    kernel_names = (*DECLARED, *Joint.kernel_names, "tension")
+    kernel_names: ClassVar[tuple[str, ...]] = (  # type: ignore[assignment]
+        *DECLARED, *Joint.kernel_names, "tension"
+    )  # fmt: skip
     rows, holonomic = 3, (True, False, False)
     is_contact: ClassVar[bool] = True
+    declared: ClassVar[tuple[str, ...]] = DECLARED
     points: ClassVar[int] = 1
 
     def __init_subclass__(cls, **conditions: Any) -> None:
@@ -57,6 +63,11 @@ class Contact(Joint):
         return {"mu_s": given.mu if given.mu_s is None else given.mu_s}
 
 
+def hidden(value: Any) -> Any:
+    """A field that no scene gives."""
+    return field_of(FieldSpec("vec3" if isinstance(value, tuple) else "number", value, given=False))
+
+
 def _add_material(class_: type) -> None:
     """Give a class the fields of its material, unless it has them."""
     fields = {
@@ -64,13 +75,13 @@ def _add_material(class_: type) -> None:
         "mu_s": number(None, minimum=0.0, doc="the same of sticking; mu where it is left out"),
         "e": number(0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution"),
         "law": choice(LAWS, "poisson", doc="of impacts: whose coefficient e is"),
-        "part": number(0.0, minimum=0.0, whole=True, doc="which of its points; set for each"),
     }
+    fields |= {name: hidden(value) for name, value in HIDDEN.items()}
     own = dict(vars(class_).get("__annotations__", {}))
     for name, field in fields.items():
         if not any(name in vars(base).get("__annotations__", {}) for base in class_.__mro__):
             setattr(class_, name, field)
-            own[name] = str if name == "law" else float
+            own[name] = Any
     class_.__annotations__ = own
 
 
@@ -88,6 +99,11 @@ def _specs(class_: type) -> dict[str, FieldSpec]:
 
 def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     """The kernels of a type of contact, from the three that it declares."""
+    # imported here: finding types by keyword does not need kernels
+    from dap3d_core.interface.codegen.kernel_arguments import parameters
+    from dap3d_core.interface.codegen.specialise import bound_kernel
+    from dap3d_core.interface.contacts import rates, rows
+
     declared = {name: getattr(class_, name) for name in DECLARED}
     specs = _specs(class_)
     kinds = {name: spec.kind for name, spec in specs.items()}
@@ -103,8 +119,8 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         wanted[f"{short}_dot"] = [*names, *(c for c in found if c not in ("None", "1.0"))]
     if not has_j:
         calls |= dict.fromkeys(("r_j", "v_j", "w_j"), "(0.0, 0.0, 0.0)")
-    names = {f"{name}__": kernel for name, kernel in declared.items()}
-    every = names | {"rate_of__": rates.rate_of, "turned__": rates.turned}
+    kernels = {f"{name}__": kernel for name, kernel in declared.items()}
+    every = kernels | {"rate_of__": rates.rate_of, "turned__": rates.turned}
 
     def bound(kernel: Callable[..., Any]) -> Any:
         own = parameters(kernel)

@@ -98,8 +98,8 @@ def gamma(c, c_dot, n, n_dot, r_i, v_i, w_i, r_j, v_j, w_j, mode):
     bent = sub(cross(w_i, sub(c_dot, v_i)), cross(w_j, sub(c_dot, v_j)))
     first, second = tangents(n)
     first_dot, second_dot = tangent_rates(n, n_dot)
-    values = tuple(-dot(e_dot, slip) - dot(e, bent)
-                   for e, e_dot in ((n, n_dot), (first, first_dot), (second, second_dot)))  # fmt: skip
+    pairs = (n, n_dot), (first, first_dot), (second, second_dot)
+    values = tuple(-dot(e_dot, slip) - dot(e, bent) for e, e_dot in pairs)
     return (
         where(closed(mode), values[0], 0.0),
         where(held(mode), values[1], 0.0),
@@ -150,7 +150,7 @@ def friction_of_one(c, n, r_i, v_i, w_i, lam, mu, mode, way, near):
 
 
 def switch(gap, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mu_s, mode, way, near):
-    """What ends a mode where it becomes negative: gap or normal force; slip or the rest of a cone."""
+    """What ends a mode where it is negative: gap or normal force; slip or the rest of a cone."""
     normal, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
     slip = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
     slides = where(mu > 0.0, dot(slip, across(way, n)), 1.0)

@@ -99,6 +99,7 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     derived = tuple(n for n in lacking if n in kernels)  # nu is left out where it is zero
     for kernel_name in (*derived, *(name for name in JUMP_KINDS if name in kernels)):
         call(kernel_name)
+    kernels = {name: k for name, k in kernels.items() if name not in type_.declared}
     outputs |= _bounds(type_)
     _check_jumps(type_, outputs, len(layout.slots))
     functions = tuple(n for n, s in specs_of(type_).items() if s.kind == "function" and s.argument)
@@ -476,8 +477,6 @@ def _expected(
     if kernel == "J" and type_.kind == "force":
         count = max(1, size(checked_shape(value)) // (6 * slots))
         return (slots, count, 6), f"a block of rows x 6 for each of {slots} bodies"
-    if kernel in ("gap", "at", "normal"):
-        return ((), "one number") if kernel == "gap" else ((3,), "three numbers")
     if kernel in ("switch", "tension"):
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"
@@ -486,8 +485,8 @@ def _expected(
     if issubclass(type_, Function):
         shape, words = VALUES[type_.arguments]
         return shape if isinstance(value, (tuple, list)) else (), words
-    if not issubclass(type_, Joint):
-        return (), "one number"
+    if not issubclass(type_, Joint) or kernel in ("gap", "at", "normal"):  # of contacts
+        return ((3,), "3 numbers") if kernel in ("at", "normal") else ((), "one number")
     if kernel == "G":
         n, k = len(type_.position_rows()), len(unknown_names(type_))
         return (n, k), f"{n} rows of the derivatives of C by its {k} unknowns"

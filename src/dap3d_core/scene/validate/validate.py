@@ -49,11 +49,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     forces = read_elements(report, geometry, "forces", types, functions)
     _report_twins(report, "joints", joints)
     _report_twins(report, "forces", forces)
-    contacts: list[Instance] = []
-    if scene.contacts:
-        from dap3d_core.scene.validate.contacts import read_contacts
-
-        contacts = read_contacts(report, geometry, types, functions)
+    contacts = _read_contacts(report, geometry, types, functions)
     _check_shapes_and_outputs(report, bodies)
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
@@ -109,6 +105,16 @@ def _read_signals(
 
         functions = combine_functions(report, functions)
     return inputs, functions
+
+
+def _read_contacts(
+    report: Collector, geometry: "Geometry", types: "Types", functions: list[Instance]
+) -> list[Instance]:
+    if not report.scene.contacts:
+        return []
+    from dap3d_core.scene.contacts.read_contacts import read_contacts
+
+    return read_contacts(report, geometry, types, functions)
 
 
 def _check_requires(report: Collector) -> str:

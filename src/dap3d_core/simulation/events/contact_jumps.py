@@ -52,6 +52,13 @@ class ContactJumps(Jumps):
             what = "changes velocities by a law of its own, which contacts do not know"
             remedy = "describe what it does by a contact, or take the contacts out"
             raise SceneError([Mistake(name, MISSING, what, remedy=remedy)])
+        model = evaluator.model
+        if readers := model.iterated_forces[: -model.contact_count]:
+            what = (
+                "depends on reactions in joints, and the modes of contacts are found without that"
+            )
+            remedy = "take it out, or the contacts; friction of its own a contact has (mu)"
+            raise SceneError([Mistake(f"forces.{readers[0]}", MISSING, what, remedy=remedy)])
         self.table = ContactTable(evaluator)
         self._last, self._at_once = -np.inf, 0
 
@@ -192,10 +199,10 @@ class ContactJumps(Jumps):
     def _stop(rows: ContactRows, c: int) -> None:
         """Stop the slip of a contact, rounding of zero, without a change of its normal velocity."""
         which = rows.rows_of([c])
-        W, u = rows.W[np.ix_(which, which)], rows.slip[c].copy()
+        A, u = rows.W[np.ix_(which, which)], rows.slip[c].copy()
         u[0] = 0.0
         x = np.zeros(len(rows.G))
-        x[which] = np.linalg.lstsq(W, -u, rcond=1e-12)[0]
+        x[which] = np.linalg.lstsq(A, -u, rcond=1e-12)[0]
         rows.kick(x)
 
     def _go_on(

@@ -14,6 +14,7 @@ from dap3d_core.interface.codegen.reactions import with_sample_reactions
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
 from dap3d_core.interface.codegen.terms import bind_terms
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.interface.contacts.rows import STICKS
 from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
@@ -220,7 +221,10 @@ class SampledType:
                     unknowns = np.array([numbers(rng, 2) for _ in range(count)])
                     state = attrs.evolve(state, unknowns=unknowns)
                 if layout.states:
-                    state = attrs.evolve(state, own=np.array(numbers(rng, layout.state_width)))
+                    own = np.array(numbers(rng, layout.state_width))
+                    if self.type.is_contact:  # it sticks, so that all of its rows hold
+                        own = np.array([STICKS, *own[1:4], 0.0, 0.0, 0.0])
+                    state = attrs.evolve(state, own=own)
                 sample = Sample(self.kernels, element, state, grounded,
                                 f"pose {k + 1} off the manifold", self.seed)  # fmt: skip
                 if sample.is_good:

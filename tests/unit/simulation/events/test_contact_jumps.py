@@ -44,7 +44,7 @@ def test_what_does_not_know_contacts_says_so(what, call):
 def test_inverse_dynamics_refuses_contacts():
     scene = bouncing()
     result = dap.simulate(scene)
-    with pytest.raises(dap.SimulationError, match="inverse dynamics.*contacts"):
+    with pytest.raises(dap.SimulationError, match=r"inverse dynamics.*contacts"):
         dap.inverse(scene, result, actuators=["g"])
 
 
@@ -53,7 +53,15 @@ def test_elements_with_jumps_of_their_own_are_refused_beside_contacts():
     scene.add_body("other", mass=1.0, Jp=[1.0] * 3, r=[5.0, 0.0, 0.0])
     fields = {"P_i": "other.O", "P_j": "ground.O", "a_j": "ground.x", "e": 0.5, "k": 1e3}
     scene.add_force("plane_stop", "bumper", **fields)
-    with pytest.raises(dap.SceneError, match="bumper.*law of its own"):
+    with pytest.raises(dap.SceneError, match=r"bumper.*law of its own"):
+        dap.simulate(scene)
+
+
+def test_friction_of_joints_is_refused_beside_contacts():
+    scene = bouncing()
+    scene.add_joint("tran", "rail", P_i="ball.O", P_j="ground.O", a_j="ground.z")
+    scene.add_force("friction", "rubs", joint="rail", mu=0.1, v_tol=0.01)
+    with pytest.raises(dap.SceneError, match=r"rubs.*depends on reactions in joints"):
         dap.simulate(scene)
 
 

@@ -1,11 +1,11 @@
-"""Reads contacts: with the fields of their materials, one instance for each point that may touch."""
+"""Reads contacts, with fields of their materials: one instance for each point that may touch."""
 
 from collections.abc import Sequence
 from typing import Any
 
 import attrs
 
-from dap3d_core.interface.contacts.contact import MATERIAL
+from dap3d_core.interface.contacts.contact import HIDDEN, MATERIAL
 from dap3d_core.scene.errors import MISSING
 from dap3d_core.scene.scene import Element
 from dap3d_core.scene.validate.elements import read_elements
@@ -29,7 +29,7 @@ def read_contacts(
         count: int = one.type_info.type.points  # type: ignore[attr-defined]
         for k in range(count):
             name = one.name if count == 1 else f"{one.name}#{k + 1}"
-            values = one.values | {"part": float(k)}
+            values = one.values | HIDDEN | {"part": float(k)}
             if values["mu_s"] is not None and values["mu_s"] < values["mu"]:
                 what = f"is less than mu = {values['mu']:g}; what slides would stick more than rest"
                 report.add(("contacts", one.name, "mu_s"), values["mu_s"], what)

@@ -1,0 +1,1 @@
+"""Contacts of a scene and their materials."""

@@ -1,0 +1,37 @@
+"""The cone problem against what the complementarity conditions say, and a closed form."""
+
+import numpy as np
+import pytest
+
+from dap3d_core.formulations.contacts.cone import solve_cone
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_solution_fulfils_the_law_of_coulomb(seed):
+    rng = np.random.default_rng(seed)
+    count = int(rng.integers(1, 5))
+    G = rng.normal(size=(3 * count, 3 * count + 2))
+    A, b, mu = G @ G.T, rng.normal(size=3 * count), rng.uniform(0.0, 0.8, count)
+    x, left = solve_cone(A, b, mu)
+    assert left < 1e-10
+    u, X = (A @ x + b).reshape(-1, 3), x.reshape(-1, 3)
+    size = np.abs(b).max() * 1e-8
+    assert np.all(X[:, 0] >= -size)
+    assert np.all(u[:, 0] >= -size)
+    assert np.abs(X[:, 0] * u[:, 0]).max() < size * max(1.0, np.abs(X).max())
+    friction, limit = np.hypot(X[:, 1], X[:, 2]), mu * X[:, 0]
+    assert np.all(friction <= limit + size)
+    inside = friction < limit - 1e-6
+    assert np.all(np.abs(u[inside, 1:]) < size)
+    power = np.sum(X[:, 1:] * u[:, 1:], axis=1)  # opposite where it slides
+    speed = np.hypot(u[:, 1], u[:, 2])
+    assert power == pytest.approx(-friction * speed, abs=size * max(1.0, np.abs(X).max()))
+
+
+def test_a_block_slides_by_what_friction_leaves():
+    mass, mu, pull, weight = 2.0, 0.3, 10.0, 19.62
+    b = np.array([-weight, pull, 0.0]) / mass
+    x, _ = solve_cone(np.eye(3) / mass, b, [mu])
+    assert x == pytest.approx([weight, -mu * weight, 0.0], rel=1e-14)
+    x, _ = solve_cone(np.eye(3) / mass, b, [0.6])
+    assert x == pytest.approx([weight, -pull, 0.0], rel=1e-14)

@@ -1,0 +1,86 @@
+"""Contact types: what is derived from gap, point and normal, checked as check-plugin does."""
+
+import math
+
+import pytest
+
+from dap3d_core.interface import Contact, PluginError, Point, examine, number, point
+from dap3d_core.interface.contacts.rates import rate_of
+from dap3d_core.kernels import acos, asin, atan, cos, exp, log, scale, sin, sqrt, tan, where
+from dap3d_core.registry import load_registry
+from dap3d_core.testing.kit import checks_for
+
+
+@pytest.mark.parametrize("keyword", ["ball_ball", "ball_plane", "box_plane", "capsule_plane"])
+def test_rows_of_the_standard_types_are_exact_derivatives(keyword):
+    """Rate of the gap and normal velocity, J, gamma of a moving point, friction, compiled code."""
+    failed = [str(outcome) for check in checks_for(load_registry().get("contact", keyword))
+              if not (outcome := check.run()).ok]  # fmt: skip
+    assert not failed
+
+
+class Pipe(Contact):
+    keyword = "pipe"
+    P_i: Point = point()
+    bore: float = number(positive=True)
+
+    def gap(r_P_i, bore):
+        return bore - sqrt(r_P_i[1] * r_P_i[1] + r_P_i[2] * r_P_i[2])
+
+    def at(r_P_i, bore):
+        size = sqrt(r_P_i[1] * r_P_i[1] + r_P_i[2] * r_P_i[2])
+        return (r_P_i[0], bore / size * r_P_i[1], bore / size * r_P_i[2])
+
+    def normal(r_P_i):
+        size = sqrt(r_P_i[1] * r_P_i[1] + r_P_i[2] * r_P_i[2])
+        return scale(-1.0 / size, (0.0, r_P_i[1], r_P_i[2]))
+
+
+def test_a_type_of_ones_own_on_one_body():
+    failed = [str(outcome) for check in checks_for(Pipe) if not (outcome := check.run()).ok]
+    assert not failed
+
+
+def test_a_gap_whose_rate_is_not_the_normal_velocity_is_found():
+    class Wrong(Pipe):
+        keyword = "wrong"
+
+        def gap(r_P_i, bore):
+            return 2.0 * (bore - sqrt(r_P_i[1] * r_P_i[1] + r_P_i[2] * r_P_i[2]))
+
+    outcomes = {check.name: check.run() for check in checks_for(Wrong)}
+    assert not outcomes["J"].ok
+
+
+def test_a_velocity_in_a_gap_is_refused():
+    class Fast(Pipe):
+        keyword = "fast"
+
+        def gap(v_P_i):
+            return v_P_i[0]
+
+    with pytest.raises(PluginError, match=r"Fast\.gap asks for v_P_i, a quantity of the velocity"):
+        examine(Fast)
+
+
+@pytest.mark.parametrize(
+    ("function", "slope"),
+    [
+        (sqrt, lambda x: 0.5 / math.sqrt(x)),
+        (sin, math.cos),
+        (cos, lambda x: -math.sin(x)),
+        (tan, lambda x: 1.0 / math.cos(x) ** 2),
+        (atan, lambda x: 1.0 / (1.0 + x * x)),
+        (asin, lambda x: 1.0 / math.sqrt(1.0 - x * x)),
+        (acos, lambda x: -1.0 / math.sqrt(1.0 - x * x)),
+        (exp, math.exp),
+        (log, lambda x: 1.0 / x),
+        (lambda x: x**3, lambda x: 3.0 * x * x),
+        (lambda x: 2.0 - 1.0 / (1.0 + x), lambda x: 1.0 / (1.0 + x) ** 2),
+        (lambda x: where(x > 0.2, x * x, -x), lambda x: 2.0 * x),
+    ],
+)
+def test_rates_of_functions(function, slope):
+    x, rate = 0.3, 2.0
+    assert rate_of(function, (x,), (rate,)) == pytest.approx(rate * slope(x), rel=1e-14)
+    assert rate_of(function, (x,), (None,)) == 0.0
