@@ -147,9 +147,11 @@ class CompiledBatch:
         """Time and state where branches of programs are decided."""
         return self.integration.t, self.integration.trial
 
-    def _programs_for(self, table: Floats, places: Integers) -> ChangeOver:
+    def _programs_for(self, points: driver.Points) -> ChangeOver:
         """Programs of the scene in which numbers that differ from point to point are loaded."""
-        differ = places[np.any(table != self._numbers[places], axis=0)]
+        if len(points.table):  # their constants are those of a point, whatever was loaded last
+            driver.set_numbers(points, 0, self.evaluator.system)
+        differ = points.places[np.any(points.table != self._numbers[points.places], axis=0)]
         self._varied = np.union1d(self._varied, differ)
         key = id(self.evaluator.system), self._varied.tobytes()
         if self._programs is None or self._programs[0] != key:
@@ -201,9 +203,7 @@ class CompiledBatch:
         )
         problem = (self.evaluator.functions, _drives(), self._begin)
         system, loops = self.evaluator.system, self.evaluator.loops
-        if count:  # constants of programs are numbers of these points, whatever was loaded last
-            driver.set_numbers(points, 0, system)
-        programs = self._programs_for(points.table, points.places)
+        programs = self._programs_for(points)
 
         def run(call: Callable[[], Any], *, needs_programs: bool = False) -> None:
             with np.errstate(all="ignore"):  # as compiled code does
