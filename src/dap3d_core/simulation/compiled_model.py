@@ -17,11 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import cache_notes
 from dap3d_core.model import Model, ModelError, build_model
-from dap3d_core.registry import PluginError, Registry, load_registry
+from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import information
 from dap3d_core.scene import (
@@ -34,7 +33,12 @@ from dap3d_core.scene import (
     mistake_at,
 )
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
-from dap3d_core.simulation.explain import MANY_BODIES, explain
+from dap3d_core.simulation.explain import (
+    MANY_BODIES,
+    choose_method,
+    explain,
+    takes_joint_coordinates,
+)
 from dap3d_core.simulation.failure.diagnosis import find_offender
 from dap3d_core.simulation.failure.narrow_forces import notes_on_laws
 from dap3d_core.simulation.initial.breakpoints import Breakpoints
@@ -428,42 +432,6 @@ class CompiledModel:
         cost = self.joint_cost if is_left_out and self.model.row_count else None
         method = f"{self.method}, because {self.reason}"
         return explain(self.checked, self.evaluator, method, cost, u, redundancy)
-
-
-def takes_joint_coordinates(integrator: str) -> bool:
-    """True if an integrator takes method ``joint``; "auto" does not, which may go on with radau."""
-    try:
-        found = integrator_named(integrator)
-    except PluginError:  # whoever runs it says so
-        return False
-    return integrator != "auto" and not found.needs_body_coordinates
-
-
-def choose_method(model: Model, requested: str) -> tuple[str, str]:
-    """The formulation for a model, as far as its number of rows decides, and the reason in words.
-
-    Raises:
-        SimulationError: the requested method does not fit the scene.
-    """
-    if model.contact_count:
-        if requested in ("auto", "lsq"):
-            return "lsq", "the scene has contacts"
-        raise SimulationError(
-            f"method {requested} does not fit: the scene has contacts, whose rows hold and let go; "
-            "use lsq or auto"
-        )
-    constrained = model.row_count > 0
-    usual = next(f.name for f in FORMULATIONS.values() if f.needs_joints == constrained)
-    if requested == "auto":
-        return usual, f"the scene has {'' if constrained else 'no '}joints"
-    if FORMULATIONS[requested].needs_joints == constrained:
-        return requested, "asked for"
-    if not constrained:
-        return usual, f"asked for {requested}, but the scene has no joints"
-    raise SimulationError(
-        f"method {requested} does not fit: the scene has {len(model.joint_names)} joints with "
-        f"{model.row_count} rows; use {usual} or auto"
-    )
 
 
 def _modelled(checked: ValidatedScene) -> Model:

@@ -1,16 +1,20 @@
-"""Text on what is modelled, and on what is left out and why."""
+"""The method that fits a model; text on what is modelled, and on what is left out and why."""
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.programs.change_over import MOST_BODIES
+from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import STATE, VELOCITIES
+from dap3d_core.registry import PluginError
 from dap3d_core.registry.suggestions import some
 from dap3d_core.scene import Instance, Scene, ValidatedScene
+from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.redundancy.redundancy import Redundancy
 
@@ -26,6 +30,42 @@ PROGRAM = (
     "one of the scene's own, once general code has run for a while; describe --source counts its "
     "operations"
 )
+
+
+def takes_joint_coordinates(integrator: str) -> bool:
+    """True if an integrator takes method ``joint``; "auto" does not, which may go on with radau."""
+    try:
+        found = integrator_named(integrator)
+    except PluginError:  # whoever runs it says so
+        return False
+    return integrator != "auto" and not found.needs_body_coordinates
+
+
+def choose_method(model: Model, requested: str) -> tuple[str, str]:
+    """The formulation for a model, as far as its number of rows decides, and the reason in words.
+
+    Raises:
+        SimulationError: the requested method does not fit the scene.
+    """
+    if model.contact_count:
+        if requested in ("auto", "lsq"):
+            return "lsq", "the scene has contacts"
+        raise SimulationError(
+            f"method {requested} does not fit: the scene has contacts, whose rows hold and let go; "
+            "use lsq or auto"
+        )
+    constrained = model.row_count > 0
+    usual = next(f.name for f in FORMULATIONS.values() if f.needs_joints == constrained)
+    if requested == "auto":
+        return usual, f"the scene has {'' if constrained else 'no '}joints"
+    if FORMULATIONS[requested].needs_joints == constrained:
+        return requested, "asked for"
+    if not constrained:
+        return usual, f"asked for {requested}, but the scene has no joints"
+    raise SimulationError(
+        f"method {requested} does not fit: the scene has {len(model.joint_names)} joints with "
+        f"{model.row_count} rows; use {usual} or auto"
+    )
 
 
 def explain(

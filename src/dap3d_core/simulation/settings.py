@@ -23,8 +23,9 @@ from dap3d_core.scene import (
     check_simulation,
 )
 from dap3d_core.scene.validate.settings import notes_of
-from dap3d_core.simulation.compiled_model import CompiledModel, takes_joint_coordinates
+from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.explain import takes_joint_coordinates
 from dap3d_core.simulation.initial.tolerances import atol_vector, kinds_of, resolved_atol
 
 
