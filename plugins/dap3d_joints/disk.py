@@ -158,7 +158,8 @@ def axis(A):
 def contact(A, radius):
     """t, n and s."""
     eta, sigma = axis(A)
-    n = (eta[0] / sigma, eta[1] / sigma, 0.0)
+    level = where(sigma > 0.0, sigma, 1.0)  # lying flat it ends the run, with finite numbers
+    n = (eta[0] / level, eta[1] / level, 0.0)
     c = radius * eta[2]
     return (-n[1], n[0], 0.0), n, (c * n[0], c * n[1], -radius * sigma)
 
@@ -168,9 +169,10 @@ def contact_rate(A, w, radius):
     eta, sigma = axis(A)
     t, n, _ = contact(A, radius)
     eta_dot = cross(w, eta)
-    turn, c, c_dot = dot(t, eta_dot) / sigma, eta[2], eta_dot[2]
+    up = where(sigma > 0.0, sigma, 1.0)
+    turn, c, c_dot = dot(t, eta_dot) / up, eta[2], eta_dot[2]
     level = add(scale(c_dot, n), scale(c * turn, t))
-    return turn, scale(radius, add(level, (0.0, 0.0, c * c_dot / sigma)))
+    return turn, scale(radius, add(level, (0.0, 0.0, c * c_dot / up)))
 
 
 def pressed(load):

@@ -314,6 +314,8 @@ def test_a_callback_may_evaluate_and_run_the_model(compiled, integrator):
     """Rates, rank, reactions and whole runs of the same model in the middle of a run: neither the
     run nor what is asked for beside it differs from the same alone."""
     settings = {"t_end": 0.4, "dt": 0.1, "integrator": integrator}
+    # Numbers of events need dense output, whose stages may change last digits of a projection.
+    settings["events"] = [dap.Event(lambda t, s: 1.0)]
     alone = dap.simulate(compiled, **settings)
     u = alone.u[-1]
     rates, force = compiled.rhs(0.3, u), alone.reaction("hinge")["i"].force
@@ -321,7 +323,7 @@ def test_a_callback_may_evaluate_and_run_the_model(compiled, integrator):
 
     def meddle(t, state):
         if len(seen) < 5:
-            inner = dap.simulate(compiled, **settings, events=[dap.Event(lambda t, s: 1.0)])
+            inner = dap.simulate(compiled, **settings)
             assert_same_run(inner, alone)
             assert np.array_equal(inner.reaction("hinge")["i"].force, force)
             assert np.array_equal(compiled.rhs(0.3, u), rates)
@@ -329,7 +331,7 @@ def test_a_callback_may_evaluate_and_run_the_model(compiled, integrator):
             seen.append(state["spring.tension"])
         return 1.0
 
-    assert_same_run(dap.simulate(compiled, **settings, events=[dap.Event(meddle)]), alone)
+    assert_same_run(dap.simulate(compiled, **settings | {"events": [dap.Event(meddle)]}), alone)
     assert len(seen) == 5
     assert_same_run(dap.simulate(compiled, **settings), alone)
 

@@ -26,7 +26,7 @@ def test_the_command_prints_poses_and_reactions(dap3d, folder):
     found = json.loads(again.stdout)
     expected = dap.equilibrium(at_rest.toggle(1.2))
     assert found["stable"] is True
-    assert found["steps"] == 0
+    assert found["steps"] <= 1
     assert found["bodies"]["slider"]["r"] == pytest.approx(expected.r[2], abs=1e-15)
     force = found["reactions"]["J1"]["on"]["i"]["force"]
     assert force == pytest.approx(expected.reaction("J1")["i"].force, abs=1e-11)

@@ -24,12 +24,13 @@ def swing():
 
 
 def test_two_runs_in_a_row_are_one(swing):
-    """The second starts where the first ends; both are exact to their tolerance."""
+    """The second starts where the first ends; both are exact to their tolerance. Angular velocities
+    go to body axes and back, two rotations of 2.6 rad/s: six roundings of each term."""
     scene, first = swing
     whole = dap.simulate(scene, **SHORT | {"t_end": 0.8})
     second = dap.simulate(scene, start=first, **SHORT)
     assert second.t[0] == 0.0
-    assert second.u[0] == pytest.approx(first.u[-1], abs=1e-15)
+    assert second.u[0] == pytest.approx(first.u[-1], abs=4e-15)
     assert second.u[-1] == pytest.approx(whole.u[-1], abs=1e-8)
     assert any("t = 0.4 s" in note for note in second.notes)
 
@@ -124,11 +125,12 @@ def test_a_result_of_another_scene_is_refused_with_the_nearest_names(swing):
 
 
 def test_a_run_started_at_rest_stays_there_and_can_be_repeated():
-    """By the setting of the scene; the record holds it."""
+    """By the setting of the scene; the record holds it. Lengths of the rod from 0.8 to 1.4 give
+    drifts of 3e-14 to 2e-13, as the last digits of the pose have it."""
     scene = at_rest.toggle(1.2)
     scene.simulation.start = "equilibrium"
     result = dap.simulate(scene, **SHORT)
-    assert np.max(np.abs(result.u - result.u[0])) < 1e-13
+    assert np.max(np.abs(result.u - result.u[0])) < 1e-12
     assert result.settings["start"] == "equilibrium"
     assert dap.rerun(result).equal
     by_hand = dap.simulate(at_rest.toggle(1.2), start=dap.equilibrium(at_rest.toggle(1.2)), **SHORT)
