@@ -17,8 +17,8 @@ from dap3d_core.native.fmu import write_fmu
 from dap3d_core.native.outputs import SYMBOL, outputs_of
 from dap3d_core.native.prepared import PreparedRun, refusal, tunable_words
 from dap3d_core.registry import Registry
-from dap3d_core.scene import Scene, load
-from dap3d_core.study.parameters import parameters_named, with_values
+from dap3d_core.scene import Scene, SceneError, load
+from dap3d_core.study.parameters import SceneParameter, parameters_named, with_values
 
 #: Formats, with the suffix of their files; "c" is a folder.
 NATIVE_FORMATS = {"c": "", "fmu": ".fmu"}
@@ -87,8 +87,8 @@ def export_native(
     found, text, left_out = outputs_of(prepared, outputs)
     if strict and left_out:
         raise refusal(left_out[0], "name the outputs to be exported")
-    tunable = [_parameter(prepared, name, options) for name in parameters]
-    variables = variables_of(prepared, found, tunable)
+    variables = variables_of(prepared, found, _tunable(prepared, parameters, options))
+    _refuse_shared(variables)
     name = re.sub(r"\W+", "_", str(given.name or target.stem)) or "model"
     model = Exported(prepared, variables, name, (text, SYMBOL))
     size = _write(model, chosen, target, fmi if format == "fmu" else 0)
@@ -114,14 +114,49 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
         return _write_folder(model, platforms, target, folder)
 
 
-def _parameter(prepared: PreparedRun, name: str, options: dict[str, Any]) -> Variable:
+def _tunable(
+    prepared: PreparedRun, names: Sequence[str], options: dict[str, Any]
+) -> list[Variable]:
+    """Parameters as variables.
+
+    Raises:
+        SceneError: no such number, or one that is named twice; one that cannot be set.
+    """
+    try:
+        parameters = parameters_named(prepared.compiled.checked, names)
+    except SceneError as error:
+        raise SceneError([attrs.evolve(m, key="parameters") for m in error.mistakes]) from None
+    return [_parameter(prepared, parameter, options) for parameter in parameters]
+
+
+def _refuse_shared(variables: Sequence[Variable]) -> None:
+    """Refuse two variables of one name, or that set one number of the memory.
+
+    Raises:
+        SceneError: there are such: their names.
+    """
+    names = [variable.name for variable in variables]
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        what = f"two variables have the name {twice[0]}"
+        raise refusal(what, "names of inputs, outputs and parameters have to differ")
+    known: dict[int, str] = {}
+    for variable in variables:
+        inputs = [variable.first] if variable.kind == "input" else []
+        for word in (*inputs, *(word for word, _ in variable.words)):
+            if (other := known.setdefault(word, variable.name)) != variable.name:
+                what = f"{other} and {variable.name} set the same number of the model"
+                raise refusal(what, "leave one of them out")
+
+
+def _parameter(
+    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any]
+) -> Variable:
     """A parameter as a variable.
 
     Raises:
-        SceneError: no such number; what depends on it is assembled before the run.
+        SceneError: what depends on it is assembled before the run.
     """
-    compiled = prepared.compiled
-    (parameter,) = parameters_named(compiled.checked, [name])
+    compiled, name = prepared.compiled, parameter.name
     value = parameter.value
     if value is None:
         raise refusal(f"parameter {name} has no number in the scene", "give it one")
@@ -129,6 +164,12 @@ def _parameter(prepared: PreparedRun, name: str, options: dict[str, Any]) -> Var
     others = [
         (x, PreparedRun(with_values(compiled.scene, [parameter], [x]), **options)) for x in trials
     ]
+    if any(one.stops != prepared.stops for _, one in others):
+        raise refusal(
+            f"parameter {name} cannot be set in an exported model: it moves a break point of a "
+            "function, where steps end",
+            "export a model for each value",
+        )
     words = tunable_words(prepared, others, value)
     if words is None:
         raise refusal(

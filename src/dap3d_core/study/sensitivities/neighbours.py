@@ -16,6 +16,8 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation.initial.assemble import correct_initial
+from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import settings_of
@@ -45,6 +47,20 @@ def differences(function: Callable[[float], Floats], step: float) -> Floats:
     pairs = zip(offsets, weights_of(offsets), strict=True)
     total: Floats = sum(w * function(k * step) for k, w in pairs) / step
     return total
+
+
+class RunBeside(Run):
+    """A run for differences: its start is corrected as far as rounding allows, not to 1e-10."""
+
+    def _start(self) -> InitialState:
+        start = super()._start()
+        if start.initial is None:
+            return start
+        names = self.evaluator.model.body_names
+        hold = [names.index(name) + 1 for name in self.settings.hold]
+        metric = str(self.settings.correct_metric)
+        exact = correct_initial(self.evaluator, start.u, hold=hold, metric=metric, tolerance=0.0)
+        return attrs.evolve(start, u=exact.u)
 
 
 @attrs.frozen(eq=False)
@@ -79,7 +95,7 @@ def run_beside(
     registry = compiled.checked.registry
     model = CompiledModel(changed, method=compiled.method, registry=registry, like=compiled)
     settings = settings_of(model, **{**given, "method": compiled.method})
-    run = Run(model, settings, Callbacks(), start=start)
+    run = RunBeside(model, settings, Callbacks(), start=start)
     run.initialise()
     if run.present.work.projects and not settings.correct and not run.present.project():
         raise SimulationError("the start cannot be brought onto its constraints")

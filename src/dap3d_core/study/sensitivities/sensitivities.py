@@ -14,6 +14,7 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, RunMetadata, find
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation.errors import refuse_contacts
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import compiled_for, settings_of
@@ -197,11 +198,13 @@ def sensitivities(
 
     Raises:
         SceneError, PluginError: as ``simulate``; an unknown parameter, with the nearest.
-        SimulationError: the run stopped; or there is no derivative by a parameter.
+        SimulationError: the run stopped; there is no derivative by a parameter; or the scene has
+            contacts.
     """
     if not jit_is_on():
         raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
     compiled = compiled_for(scene, method, allow_code, announce, integrator)
+    refuse_contacts(compiled.model, "a run with derivatives")
     parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
     given = dict(t_end=t_end, dt=dt, integrator=integrator, rtol=rtol, atol=atol, step=step,
                  correct=correct, project=project, correct_metric=correct_metric,
