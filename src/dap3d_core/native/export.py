@@ -157,6 +157,11 @@ def _parameter(
         SceneError: what depends on it is assembled before the run.
     """
     compiled, name = prepared.compiled, parameter.name
+    if parameter.table == "inputs":
+        raise refusal(
+            f"{name} is the start of an input, which exported models have as a variable",
+            f"set {parameter.path[1]} in its place",
+        )
     value = parameter.value
     if value is None:
         raise refusal(f"parameter {name} has no number in the scene", "give it one")

@@ -50,7 +50,13 @@ def differences(function: Callable[[float], Floats], step: float) -> Floats:
 
 
 class RunBeside(Run):
-    """A run for differences: its start is corrected as far as rounding allows, not to 1e-10."""
+    """A run for differences: its start is corrected as far as rounding allows, not to 1e-10.
+
+    Attributes:
+        is_brought_back: it is not corrected, and was off the constraints.
+    """
+
+    is_brought_back = False
 
     def _start(self) -> InitialState:
         start = super()._start()
@@ -97,8 +103,10 @@ def run_beside(
     settings = settings_of(model, **{**given, "method": compiled.method})
     run = RunBeside(model, settings, Callbacks(), start=start)
     run.initialise()
-    if run.present.work.projects and not settings.correct and not run.present.project():
-        raise SimulationError("the start cannot be brought onto its constraints")
+    if run.present.work.projects and not settings.correct:
+        if not run.present.project():
+            raise SimulationError("the start cannot be brought onto its constraints")
+        run.is_brought_back = bool(run.present.work.projection_moved)
     return run
 
 

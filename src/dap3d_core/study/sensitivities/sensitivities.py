@@ -11,10 +11,12 @@ import numpy as np
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.registry.arguments import checked
+from dap3d_core.registry.suggestions import some
 from dap3d_core.result import Result, RunMetadata, find
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError
 from dap3d_core.simulation.errors import refuse_contacts
+from dap3d_core.simulation.failure.narrow_forces import notes_on_derivatives
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import compiled_for, settings_of
@@ -23,6 +25,7 @@ from dap3d_core.study.parameters import SceneParameter, parameters_named
 from dap3d_core.study.sensitivities.differentiated_run import DifferentiatedRun
 from dap3d_core.study.sensitivities.neighbours import (
     Neighbours,
+    RunBeside,
     neighbours_of,
     run_beside,
     total_derivative,
@@ -223,7 +226,26 @@ def sensitivities(
             run = DifferentiatedRun(compiled, settings, Callbacks(announce=announce), start=state)
             results.append(run.carry(beside, base, lanes).execute())
         runs.append(run)
+    for note in (*notes_on_derivatives(compiled.checked), *_start_notes(runs)):
+        results[0].note(note)
     return Sensitivities(results[0], runs, parameters)
+
+
+def _start_notes(runs: Sequence[DifferentiatedRun]) -> list[str]:
+    """A note where an uncorrected start leaves its constraints with a parameter."""
+    found = [
+        beside.parameter.name
+        for run in runs
+        for beside in run.neighbours
+        if any(isinstance(one, RunBeside) and one.is_brought_back for one in beside.runs)
+    ]
+    if not found:
+        return []
+    return [
+        f"derivatives: the start leaves its constraints with {some(found, 6)} and is not corrected: "
+        "they are those of a start that is brought onto the constraints (switch correct on for "
+        "runs that do so)"
+    ]
 
 
 def _parameters(compiled: CompiledModel, names: Sequence[str]) -> tuple[SceneParameter, ...]:
