@@ -10,7 +10,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.native.build import Platform, platforms_named
+from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
 from dap3d_core.native.c_source import Variable, data_of, variables_header, variables_of
 from dap3d_core.native.exported import Exported
 from dap3d_core.native.fmu import write_fmu
@@ -80,6 +80,8 @@ def export_native(
     if target.exists() and target.is_dir() != (format == "c"):
         what = "a folder" if target.is_dir() else "a file"
         raise refusal(f"{target} is {what}", "give another path")
+    if format == "c" and target.is_dir() and any(target.iterdir()) and not _is_export(target):
+        raise refusal(f"{target} is a folder with files of others", "give another path")
     chosen = platforms_named(platforms)
     given = scene if isinstance(scene, Scene) else load(scene)
     options = {"allow_code": allow_code, "registry": registry} | settings
@@ -102,6 +104,11 @@ def export_native(
     )  # fmt: skip
 
 
+def _is_export(folder: Path) -> bool:
+    """True if an export wrote a folder, which another may write over."""
+    return (folder / "dap3d.h").is_file() and (folder / "variables.h").is_file()
+
+
 def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: int) -> int:
     """Write an FMU of a version, or for 0 a folder; bytes of the largest library."""
     with tempfile.TemporaryDirectory() as scratch:
@@ -111,7 +118,13 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
             shutil.copy(file, folder / file.name)
         if fmi:
             return write_fmu(model, platforms, target, fmi, folder)
-        return _write_folder(model, platforms, target, folder)
+        made = folder / "made"
+        size = _write_folder(model, platforms, made, folder)
+        # libraries of what was there before would be loaded for the new ones
+        for name in PLATFORMS:
+            shutil.rmtree(target / name, ignore_errors=True)
+        shutil.copytree(made, target, dirs_exist_ok=True)
+        return size
 
 
 def _tunable(

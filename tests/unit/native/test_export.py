@@ -286,3 +286,20 @@ def test_contacts_are_refused(tmp_path):
     scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
     with pytest.raises(dap.SimulationError, match="export does not take contacts yet"):
         dap.export_model(scene, tmp_path / "ball.fmu", format="fmu")
+
+
+def test_a_folder_of_another_model(tmp_path):
+    """Its libraries go; what a user has put there stays. A folder of others is left alone."""
+    first, second = dap.load("fourbar2"), dap.load("pen1")
+    made = dap.export_model(first, tmp_path / "out", format="c", outputs=["crank.r"])
+    (made.path / "main.c").write_text("int main() {}")
+    with pytest.raises(FileExistsError):
+        dap.export_model(second, tmp_path / "out", format="c")
+    dap.export_model(second, tmp_path / "out", format="c", outputs=["cone.r"], force=True)
+    assert "cone.r.x" in dap.load_native(made.path).references
+    assert (made.path / "main.c").exists()
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "README.md").write_text("mine")
+    with pytest.raises(dap.SceneError, match="files of others"):
+        dap.export_model(second, tmp_path / "mine", format="c", force=True)
+    assert (tmp_path / "mine" / "README.md").read_text() == "mine"

@@ -45,8 +45,14 @@ def differences(function: Callable[[float], Floats], step: float) -> Floats:
     """The derivative at 0 of a function, by central differences of sixth order."""
     offsets = OFFSETS[0]
     pairs = zip(offsets, weights_of(offsets), strict=True)
-    total: Floats = sum(w * function(k * step) for k, w in pairs) / step
+    total: Floats = weighted([(w, function(k * step)) for k, w in pairs]) / step
     return total
+
+
+def weighted(pairs: Sequence[tuple[float, Any]]) -> Any:
+    """The sum of weights times values, whose weights add up to zero: exactly 0 of equal values."""
+    _, first = pairs[0]
+    return sum(w * (value - first) for w, value in pairs[1:])
 
 
 class RunBeside(Run):
@@ -87,7 +93,8 @@ class Neighbours:
 
     def derivative(self, function: Callable[[Run], Any]) -> Any:
         """The derivative by the parameter of what a function gives of a run."""
-        return sum(w * function(run) for w, run in zip(self.weights, self.runs, strict=True))
+        pairs = zip(self.weights, self.runs, strict=True)
+        return weighted([(w, function(run)) for w, run in pairs])
 
 
 def run_beside(
@@ -157,6 +164,9 @@ def neighbours_of(
 def _check(parameter: SceneParameter) -> None:
     if parameter.value is None:
         what = "the scene leaves this number to its type; give it a value"
+        raise SceneError([Mistake("by", parameter.name, what)])
+    if parameter.table == "simulation" and parameter.path[-1] != "t_end":
+        what = "this says how a run is computed; a run has derivatives by what it computes alone"
         raise SceneError([Mistake("by", parameter.name, what)])
     if parameter.whole:
         what = "this is a whole number, by which there is no derivative"

@@ -12,7 +12,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.suggestions import some
-from dap3d_core.result import Result, RunMetadata, find
+from dap3d_core.result import Result, ResultError, RunMetadata, find
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError
 from dap3d_core.simulation.errors import refuse_contacts
@@ -113,11 +113,18 @@ class Sensitivities:
         return np.array(found).reshape(-1, len(self.parameters))
 
     def elasticities(self, quantity: str) -> Floats:
-        """(p,) p/q dq/dp of a scalar quantity q at the end: per cent of it by a per cent of p."""
+        """(p,) p/q dq/dp of a scalar quantity q at the end: per cent of it by a per cent of p.
+
+        Raises:
+            ResultError: the quantity is a vector. Others as ``of``.
+        """
+        if components := find(self.result, quantity).components:
+            raise ResultError(f"{quantity} is a vector; take {quantity}.{components[0]}")
         value = float(self.result.quantity(quantity).values[-1])
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.final(quantity) * self.values / value)
 
+    @checked
     def to_xarray(self, quantities: Sequence[str] = ()) -> "xarray.Dataset":
         """Quantities over time and their derivatives ``d NAME`` over time and parameter.
 
@@ -248,6 +255,12 @@ def _start_notes(runs: Sequence[DifferentiatedRun]) -> list[str]:
     ]
 
 
+def no_names() -> SceneError:
+    """The error that no parameters are named."""
+    what = "name a parameter of the scene, such as bodies.crank.mass"
+    return SceneError([Mistake("by", MISSING, what)])
+
+
 def _parameters(compiled: CompiledModel, names: Sequence[str]) -> tuple[SceneParameter, ...]:
     """The parameters of these names.
 
@@ -255,8 +268,7 @@ def _parameters(compiled: CompiledModel, names: Sequence[str]) -> tuple[ScenePar
         SceneError: there are none, or wrong names, with the nearest.
     """
     if not names:
-        what = "name a parameter of the scene, such as bodies.crank.mass"
-        raise SceneError([Mistake("by", MISSING, what)])
+        raise no_names()
     try:
         return parameters_named(compiled.checked, names)
     except SceneError as error:
