@@ -91,7 +91,8 @@ def export_native(
         raise refusal(left_out[0], "name the outputs to be exported")
     variables = variables_of(prepared, found, _tunable(prepared, parameters, options))
     _refuse_shared(variables)
-    name = re.sub(r"\W+", "_", str(given.name or target.stem)) or "model"
+    name = re.sub(r"\W+", "_", str(given.name or target.stem), flags=re.ASCII) or "model"
+    name = f"_{name}" if name[0].isdigit() else name  # an identifier of C
     model = Exported(prepared, variables, name, (text, SYMBOL))
     size = _write(model, chosen, target, fmi if format == "fmu" else 0)
     names = {

@@ -303,3 +303,11 @@ def test_a_folder_of_another_model(tmp_path):
     with pytest.raises(dap.SceneError, match="files of others"):
         dap.export_model(second, tmp_path / "mine", format="c", force=True)
     assert (tmp_path / "mine" / "README.md").read_text() == "mine"
+
+
+def test_a_name_that_is_no_identifier(tmp_path):
+    scene = _written(SPRING, tmp_path)
+    scene.name = "4 größen"
+    made = dap.export_model(scene, tmp_path / "out", format="c")
+    (library,) = (made.path / own_platform()).glob("*.a")
+    assert library.name == "lib_4_gr_en.a"
