@@ -1,1 +1,1 @@
-"""The native floor: models as C libraries and FMUs, which run without Python."""
+"""The native layer: models as C libraries and FMUs, which run without Python."""

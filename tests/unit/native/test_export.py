@@ -276,7 +276,9 @@ def test_what_would_be_said_wrongly_is_refused(tmp_path, given, said):
 
 
 def test_an_output_that_is_named_twice_is_one(tmp_path):
-    made = dap.export_model(_written(SPRING, tmp_path), tmp_path / "out", format="c", outputs=["cart.r", "cart.r.x"])
+    made = dap.export_model(
+        _written(SPRING, tmp_path), tmp_path / "out", format="c", outputs=["cart.r", "cart.r.x"]
+    )
     assert made.outputs == ("cart.r.x", "cart.r.y", "cart.r.z")
 
 

@@ -88,7 +88,7 @@ def correct_initial(
     t: float = 0.0,
     hold: Collection[int] = (),
     metric: str = "unit",
-    tolerance: float = TOLERANCE,
+    tolerance: float | None = None,
 ) -> Initial:
     """Correct positions by Newton's method, velocities by a linear step, each by the least change.
 
@@ -100,7 +100,7 @@ def correct_initial(
         t: time, s.
         hold: bodies, from 1, that the position stage leaves where they are.
         metric: "unit" or "mass", see the head of this file.
-        tolerance: of the position residual; 0 for as near as rounding allows.
+        tolerance: of the position residual, of 1 m; TOLERANCE by default.
 
     Raises:
         AssemblyError: the position residual does not vanish; the message has that of each joint.
@@ -170,7 +170,7 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
 
 def correct_positions(
     evaluator: Evaluator, u: Floats, t: float, held: Integers, metric: str = "unit",
-    leaves: int = 0, tolerance: float = TOLERANCE,
+    leaves: int = 0, tolerance: float | None = None,
 ) -> tuple[Floats, int]:  # fmt: skip
     """The position stage of ``correct_initial``: the state with other r and p, and the passes.
 
@@ -183,11 +183,12 @@ def correct_positions(
     size, limit, before = evaluator.model.size, 1.0, np.inf
     length, weight = evaluator.model.length, weights_of(evaluator)
     fit = length * fit_of(evaluator.model)
+    closed = length * (TOLERANCE if tolerance is None else tolerance)
     for passes in range(MOST_PASSES + 1):
         rows = finite_rows(evaluator, t, u)
         worst = _largest(weight * rows.C)
-        stands = worst > 0.5 * before and worst <= fit
-        if worst <= tolerance * length or stands:
+        stands = worst > 0.5 * before and worst <= max(fit, TOLERANCE * length)
+        if worst <= closed or stands:
             return u, passes
         before = worst
         if passes == MOST_PASSES:

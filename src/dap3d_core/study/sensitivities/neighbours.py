@@ -30,6 +30,8 @@ STEPS = (1e-2, 1e-3, 1e-4)
 OFFSETS = (-3, -2, -1, 1, 2, 3), (0, 1, 2, 3, 4, 5, 6), (0, -1, -2, -3, -4, -5, -6)
 #: A change of a state, over its size, in differences of functions of it.
 CHANGE = 1e-3
+#: Residual of corrected starts: of rounding.
+EXACT = 1e-15
 #: What is written before it is read, or counts: without derivatives by parameters.
 WITHOUT = ("rows", "crossings")
 
@@ -71,7 +73,7 @@ class RunBeside(Run):
         names = self.evaluator.model.body_names
         hold = [names.index(name) + 1 for name in self.settings.hold]
         metric = str(self.settings.correct_metric)
-        exact = correct_initial(self.evaluator, start.u, hold=hold, metric=metric, tolerance=0.0)
+        exact = correct_initial(self.evaluator, start.u, hold=hold, metric=metric, tolerance=EXACT)
         return attrs.evolve(start, u=exact.u)
 
 

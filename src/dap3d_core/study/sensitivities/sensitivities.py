@@ -208,8 +208,7 @@ def sensitivities(
 
     Raises:
         SceneError, PluginError: as ``simulate``; an unknown parameter, with the nearest.
-        SimulationError: the run stopped; there is no derivative by a parameter; or the scene has
-            contacts.
+        SimulationError: the run stopped; no derivative by a parameter; the scene has contacts.
     """
     if not jit_is_on():
         raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
@@ -233,13 +232,14 @@ def sensitivities(
             run = DifferentiatedRun(compiled, settings, Callbacks(announce=announce), start=state)
             results.append(run.carry(beside, base, lanes).execute())
         runs.append(run)
-    for note in (*notes_on_derivatives(compiled.checked), *_start_notes(runs)):
+    for note in _notes(compiled, runs):
         results[0].note(note)
     return Sensitivities(results[0], runs, parameters)
 
 
-def _start_notes(runs: Sequence[DifferentiatedRun]) -> list[str]:
-    """A note where an uncorrected start leaves its constraints with a parameter."""
+def _notes(compiled: CompiledModel, runs: Sequence[DifferentiatedRun]) -> list[str]:
+    """Notes on laws, and where an uncorrected start leaves its constraints with a parameter."""
+    of_laws = notes_on_derivatives(compiled.checked)
     found = [
         beside.parameter.name
         for run in runs
@@ -247,11 +247,12 @@ def _start_notes(runs: Sequence[DifferentiatedRun]) -> list[str]:
         if any(isinstance(one, RunBeside) and one.is_brought_back for one in beside.runs)
     ]
     if not found:
-        return []
+        return of_laws
     return [
-        f"derivatives: the start leaves its constraints with {some(found, 6)} and is not corrected: "
-        "they are those of a start that is brought onto the constraints (switch correct on for "
-        "runs that do so)"
+        *of_laws,
+        f"derivatives: the start leaves its constraints with {some(found, 6)} and is not "
+        "corrected: they are those of a start that is brought onto the constraints (switch correct "
+        "on for runs that do so)",
     ]
 
 

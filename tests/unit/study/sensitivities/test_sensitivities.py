@@ -219,3 +219,9 @@ def test_a_vector_has_no_elasticity():
         s.elasticities("cylinder.r")
     with pytest.raises(TypeError, match="quantities should be a list of names"):
         s.to_xarray("cylinder.r")
+
+
+def test_starts_without_a_residual_are_left():
+    """Of an arm whose joints fit to the last digit; a pass would only move rounding about."""
+    s = dap.sensitivities("two_link_arm", "bodies.lower.mass", t_end=0.02, dt=0.01)
+    assert np.all(np.isfinite(s.of("lower.r")))
