@@ -220,9 +220,7 @@ def sensitivities(
                  start=start_word(start))  # fmt: skip
     state = given_state(start, compiled)
     base = run_beside(compiled, given, (), state)
-    blocks = -(-len(parameters) // FAST[-1])
-    directions = -(-len(parameters) // blocks)
-    lanes = next(count for count in FAST if count >= directions)
+    directions, lanes = _directions(len(parameters))
     runs, results = [], []
     for first in range(0, len(parameters), directions):
         part = parameters[first : first + directions]
@@ -235,6 +233,13 @@ def sensitivities(
     for note in _notes(compiled, runs):
         results[0].note(note)
     return Sensitivities(results[0], runs, parameters)
+
+
+def _directions(count: int) -> tuple[int, int]:
+    """Directions of a run, for so many parameters in blocks of one size; and of its code."""
+    blocks = -(-count // FAST[-1])
+    directions = -(-count // blocks)
+    return directions, next(lanes for lanes in FAST if lanes >= directions)
 
 
 def _notes(compiled: CompiledModel, runs: Sequence[DifferentiatedRun]) -> list[str]:
