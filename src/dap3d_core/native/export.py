@@ -10,15 +10,15 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.native.build import Platform, platforms_named
+from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
 from dap3d_core.native.c_source import Variable, data_of, variables_header, variables_of
 from dap3d_core.native.exported import Exported
 from dap3d_core.native.fmu import write_fmu
 from dap3d_core.native.outputs import SYMBOL, outputs_of
 from dap3d_core.native.prepared import PreparedRun, refusal, tunable_words
 from dap3d_core.registry import Registry
-from dap3d_core.scene import Scene, load
-from dap3d_core.study.parameters import parameters_named, with_values
+from dap3d_core.scene import Scene, SceneError, load
+from dap3d_core.study.parameters import SceneParameter, parameters_named, with_values
 
 #: Formats, with the suffix of their files; "c" is a folder.
 NATIVE_FORMATS = {"c": "", "fmu": ".fmu"}
@@ -80,6 +80,8 @@ def export_native(
     if target.exists() and target.is_dir() != (format == "c"):
         what = "a folder" if target.is_dir() else "a file"
         raise refusal(f"{target} is {what}", "give another path")
+    if format == "c" and target.is_dir() and any(target.iterdir()) and not _is_export(target):
+        raise refusal(f"{target} is a folder with files of others", "give another path")
     chosen = platforms_named(platforms)
     given = scene if isinstance(scene, Scene) else load(scene)
     options = {"allow_code": allow_code, "registry": registry} | settings
@@ -87,9 +89,10 @@ def export_native(
     found, text, left_out = outputs_of(prepared, outputs)
     if strict and left_out:
         raise refusal(left_out[0], "name the outputs to be exported")
-    tunable = [_parameter(prepared, name, options) for name in parameters]
-    variables = variables_of(prepared, found, tunable)
-    name = re.sub(r"\W+", "_", str(given.name or target.stem)) or "model"
+    variables = variables_of(prepared, found, _tunable(prepared, parameters, options))
+    _refuse_shared(variables)
+    name = re.sub(r"\W+", "_", str(given.name or target.stem), flags=re.ASCII) or "model"
+    name = f"_{name}" if name[0].isdigit() else name  # an identifier of C
     model = Exported(prepared, variables, name, (text, SYMBOL))
     size = _write(model, chosen, target, fmi if format == "fmu" else 0)
     names = {
@@ -102,6 +105,11 @@ def export_native(
     )  # fmt: skip
 
 
+def _is_export(folder: Path) -> bool:
+    """True if an export wrote a folder, which another may write over."""
+    return (folder / "dap3d.h").is_file() and (folder / "variables.h").is_file()
+
+
 def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: int) -> int:
     """Write an FMU of a version, or for 0 a folder; bytes of the largest library."""
     with tempfile.TemporaryDirectory() as scratch:
@@ -111,17 +119,63 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
             shutil.copy(file, folder / file.name)
         if fmi:
             return write_fmu(model, platforms, target, fmi, folder)
-        return _write_folder(model, platforms, target, folder)
+        made = folder / "made"
+        size = _write_folder(model, platforms, made, folder)
+        # libraries of what was there before would be loaded for the new ones
+        for name in PLATFORMS:
+            shutil.rmtree(target / name, ignore_errors=True)
+        shutil.copytree(made, target, dirs_exist_ok=True)
+        return size
 
 
-def _parameter(prepared: PreparedRun, name: str, options: dict[str, Any]) -> Variable:
+def _tunable(
+    prepared: PreparedRun, names: Sequence[str], options: dict[str, Any]
+) -> list[Variable]:
+    """Parameters as variables.
+
+    Raises:
+        SceneError: no such number, or one that is named twice; one that cannot be set.
+    """
+    try:
+        parameters = parameters_named(prepared.compiled.checked, names)
+    except SceneError as error:
+        raise SceneError([attrs.evolve(m, key="parameters") for m in error.mistakes]) from None
+    return [_parameter(prepared, parameter, options) for parameter in parameters]
+
+
+def _refuse_shared(variables: Sequence[Variable]) -> None:
+    """Refuse two variables of one name, or that set one number of the memory.
+
+    Raises:
+        SceneError: there are such: their names.
+    """
+    names = [variable.name for variable in variables]
+    if twice := [name for name in dict.fromkeys(names) if names.count(name) > 1]:
+        what = f"two variables have the name {twice[0]}"
+        raise refusal(what, "names of inputs, outputs and parameters have to differ")
+    known: dict[int, str] = {}
+    for variable in variables:
+        inputs = [variable.first] if variable.kind == "input" else []
+        for word in (*inputs, *(word for word, _ in variable.words)):
+            if (other := known.setdefault(word, variable.name)) != variable.name:
+                what = f"{other} and {variable.name} set the same number of the model"
+                raise refusal(what, "leave one of them out")
+
+
+def _parameter(
+    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any]
+) -> Variable:
     """A parameter as a variable.
 
     Raises:
-        SceneError: no such number; what depends on it is assembled before the run.
+        SceneError: what depends on it is assembled before the run.
     """
-    compiled = prepared.compiled
-    (parameter,) = parameters_named(compiled.checked, [name])
+    compiled, name = prepared.compiled, parameter.name
+    if parameter.table == "inputs":
+        raise refusal(
+            f"{name} is the start of an input, which exported models have as a variable",
+            f"set {parameter.path[1]} in its place",
+        )
     value = parameter.value
     if value is None:
         raise refusal(f"parameter {name} has no number in the scene", "give it one")
@@ -129,6 +183,12 @@ def _parameter(prepared: PreparedRun, name: str, options: dict[str, Any]) -> Var
     others = [
         (x, PreparedRun(with_values(compiled.scene, [parameter], [x]), **options)) for x in trials
     ]
+    if any(one.stops != prepared.stops for _, one in others):
+        raise refusal(
+            f"parameter {name} cannot be set in an exported model: it moves a break point of a "
+            "function, where steps end",
+            "export a model for each value",
+        )
     words = tunable_words(prepared, others, value)
     if words is None:
         raise refusal(

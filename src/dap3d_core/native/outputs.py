@@ -101,8 +101,10 @@ def outputs_of(
             ) from None
         ends = [f".{c}" for c in quantity.components] or [""]
         parts = list(value) if isinstance(value, tuple) else [value]
-        found += [Output(name + end, quantity.unit, quantity.label) for end in ends]
-        values += parts
+        for end, part in zip(ends, parts, strict=True):
+            if name + end not in [output.name for output in found]:
+                found.append(Output(name + end, quantity.unit, quantity.label))
+                values.append(part)
     for k, x in enumerate(values):
         word = tracer.word(x)
         place = tracer.new(f"getelementptr inbounds double, ptr %out, i64 {k}")

@@ -27,6 +27,7 @@ from dap3d_core.registry import Registry
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
+from dap3d_core.simulation.errors import refuse_contacts
 from dap3d_core.simulation.initial.breakpoints import SEEN
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import compiled_for, settings_of
@@ -121,8 +122,10 @@ class PreparedRun:
         if registry is not None and not isinstance(scene, CompiledModel):
             scene = CompiledModel(scene, method=method, allow_code=allow_code, registry=registry)
         compiled = compiled_for(scene, method, allow_code, None, integrator)
-        t_end = settings.pop("t_end", None) or compiled.scene.simulation.t_end or USUAL_END
-        self.t_end = float(t_end)
+        given = settings.pop("t_end", None)
+        if given is not None and not given > 0.0:
+            raise refusal(f"t_end = {given:g} leaves no time to run", "give a later end")
+        self.t_end = float(given or compiled.scene.simulation.t_end or USUAL_END)
         # three reporting times: the start, where the run is to be reported next, and the end
         chosen = settings_of(compiled, t_end=self.t_end, dt=0.5 * self.t_end, **settings)
         with compiled.borrow_evaluator():
@@ -142,6 +145,7 @@ class PreparedRun:
         self.image = Image(*(part for one in self.advances for part in one.arguments))
 
     def _refuse_jumps(self) -> None:
+        refuse_contacts(self.evaluator.model, "export")
         switches = [s for s in self.evaluator.switches if s.jumps]
         if switches:
             types = sorted({str(s.group.type_info.type.keyword) for s in switches})

@@ -252,3 +252,64 @@ def test_the_example_compiles_without_a_warning_and_runs(tmp_path):
     last = [float(word) for word in rows[-1].split(",")]
     assert len(rows) == 11
     assert last == [0.5, *run.values(["cone.r.x", "energy.total"])]
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        ({"parameters": ["forces.spring.k", "forces.spring.k"]}, "only once"),
+        ({"parameters": ["forces.spring.kk"]}, 'parameters = "forces.spring.kk"'),
+        ({"parameters": ["parameters.stiffness", "forces.spring.k"]}, "set the same number"),
+        ({"parameters": ["inputs.push.value"]}, "set push in its place"),
+        ({"parameters": ["functions.push.x_end"]}, "moves a break point"),
+        ({"t_end": 0.0}, "no time to run"),
+        ({"t_end": -1.0}, "no time to run"),
+    ],
+)
+def test_what_would_be_said_wrongly_is_refused(tmp_path, given, said):
+    scene = _written(SPRING, tmp_path)
+    scene.add_function("step", "push", x_start=0.4, x_end=0.7, f_start=6.0, f_end=0.0)
+    scene.add_force("f", "pushed", body_i="cart", f=(1.0, 0.0, 0.0), function="push")
+    with pytest.raises(dap.SceneError, match=said):
+        dap.export_model(scene, tmp_path / "out", format="c", **given)
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_output_that_is_named_twice_is_one(tmp_path):
+    made = dap.export_model(
+        _written(SPRING, tmp_path), tmp_path / "out", format="c", outputs=["cart.r", "cart.r.x"]
+    )
+    assert made.outputs == ("cart.r.x", "cart.r.y", "cart.r.z")
+
+
+def test_contacts_are_refused(tmp_path):
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
+    with pytest.raises(dap.SimulationError, match="export does not take contacts yet"):
+        dap.export_model(scene, tmp_path / "ball.fmu", format="fmu")
+
+
+def test_a_folder_of_another_model(tmp_path):
+    """Its libraries go; what a user has put there stays. A folder of others is left alone."""
+    first, second = dap.load("fourbar2"), dap.load("pen1")
+    made = dap.export_model(first, tmp_path / "out", format="c", outputs=["crank.r"])
+    (made.path / "main.c").write_text("int main() {}")
+    with pytest.raises(FileExistsError):
+        dap.export_model(second, tmp_path / "out", format="c")
+    dap.export_model(second, tmp_path / "out", format="c", outputs=["cone.r"], force=True)
+    assert "cone.r.x" in dap.load_native(made.path).references
+    assert (made.path / "main.c").exists()
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "README.md").write_text("mine")
+    with pytest.raises(dap.SceneError, match="files of others"):
+        dap.export_model(second, tmp_path / "mine", format="c", force=True)
+    assert (tmp_path / "mine" / "README.md").read_text() == "mine"
+
+
+def test_a_name_that_is_no_identifier(tmp_path):
+    scene = _written(SPRING, tmp_path)
+    scene.name = "4 größen"
+    made = dap.export_model(scene, tmp_path / "out", format="c")
+    (library,) = (made.path / own_platform()).glob("*.a")
+    assert library.name == "lib_4_gr_en.a"

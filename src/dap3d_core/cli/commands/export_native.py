@@ -59,11 +59,14 @@ def export_native(
     """Write a model as a C library or an FMU."""
     import dap3d_core as dap
     from dap3d_core.cli.console.console import count, print_json, stdout
+    from dap3d_core.cli.framework.paths import writable
 
     kind = kind or "fmu"
     name = Path(model).stem if Path(model).is_file() else Path(model).name
     target = Path(output if output is not None else name + (".fmu" if kind == "fmu" else ""))
     scene = dap.load(model)
+    if kind == "fmu" or not target.exists():
+        writable(target, force=force, sources=(scene.path,))
     try:
         made: Any = dap.export_model(
             scene, target, format=kind, outputs=list(quantities) or None,

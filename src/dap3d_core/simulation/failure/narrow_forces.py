@@ -1,6 +1,6 @@
 """Laws that steps may pass over, because their types do not say where they change."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from dap3d_core.interface.codegen.type_info import TypeInfo
@@ -12,8 +12,11 @@ from dap3d_core.scene import ValidatedScene
 
 #: Words of kernels that choose between formulas.
 CHOOSING = (where, lookup)
-#: Kernels that make the law of a force.
+#: Kernels that make the law of a force, and those of its states.
 LAWS = ("wrench", "energy")
+STATES = ("rate",)
+#: Python's own words for a number with a corner.
+CORNERS = ("abs", "min", "max")
 
 
 def notes_on_laws(checked: ValidatedScene) -> list[str]:
@@ -40,25 +43,45 @@ def notes_on_laws(checked: ValidatedScene) -> list[str]:
     return [*found, *_branching(by_type, type_info)]
 
 
+def notes_on_derivatives(checked: ValidatedScene) -> list[str]:
+    """Laws with branches or corners at which no step ends: what derivatives of a run are there."""
+    by_type: dict[Any, list[str]] = {}
+    for element in checked.forces:
+        info = element.type_info
+        if "switch" not in info.kernels and _chooses(info, (*LAWS, *STATES), CORNERS):
+            by_type.setdefault(info.type, []).append(element.name)
+    return [
+        f"derivatives: {type_.kind}s.{names[0]}{_more(names)} ({type_.keyword}) has a law with "
+        "branches or corners and no switch: where the motion passes a jump of it, they are wrong "
+        "from there on; at a corner they are good to a part of a thousand or so, whatever the "
+        "tolerance"
+        for type_, names in by_type.items()
+    ]
+
+
+def _more(names: list[str]) -> str:
+    return f" and {len(names) - 1} more" if len(names) > 1 else ""
+
+
 def _branching(by_type: dict[Any, list[str]], type_info: dict[Any, TypeInfo]) -> Iterator[str]:
     for type_, names in by_type.items():
         kernels = type_info[type_].kernels
         if "switch" in kernels or not _chooses(type_info[type_]):
             continue
-        more = f" and {len(names) - 1} more" if len(names) > 1 else ""
         yield (
             information(
-                f"{type_.kind}s.{names[0]}{more} ({type_.keyword}): its law has branches "
+                f"{type_.kind}s.{names[0]}{_more(names)} ({type_.keyword}): its law has branches "
                 "and its type no switch: steps go across them, and may pass over a short one"
             )
         )
 
 
-def _chooses(type_info: TypeInfo) -> bool:
-    """True if a law of a type chooses between formulas."""
-    laws = [type_info.kernels[name] for name in LAWS if name in type_info.kernels]
+def _chooses(type_info: TypeInfo, names: Sequence[str] = LAWS, corners: Sequence[str] = ()) -> bool:
+    """True if a law of a type chooses between formulas, or calls one of Python's with a corner."""
+    laws = [type_info.kernels[name] for name in names if name in type_info.kernels]
     return any(
-        word in (plain.__globals__.get(name) for name in plain.__code__.co_names)
+        plain.__globals__.get(name) is word or name in corners
         for plain in reached(*laws)[0]
+        for name in plain.__code__.co_names
         for word in CHOOSING
     )

@@ -88,6 +88,7 @@ def correct_initial(
     t: float = 0.0,
     hold: Collection[int] = (),
     metric: str = "unit",
+    tolerance: float | None = None,
 ) -> Initial:
     """Correct positions by Newton's method, velocities by a linear step, each by the least change.
 
@@ -99,6 +100,7 @@ def correct_initial(
         t: time, s.
         hold: bodies, from 1, that the position stage leaves where they are.
         metric: "unit" or "mass", see the head of this file.
+        tolerance: of the position residual, of 1 m; TOLERANCE by default.
 
     Raises:
         AssemblyError: the position residual does not vanish; the message has that of each joint.
@@ -108,7 +110,7 @@ def correct_initial(
         return Initial(u, before, before, 0, 0.0, 0.0)
     start = u
     held = np.array(sorted(hold), dtype=np.int64)
-    u, passes = correct_positions(evaluator, u, t, held, metric, leaves=MOST_LEFT)
+    u, passes = correct_positions(evaluator, u, t, held, metric, MOST_LEFT, tolerance)
     branch = rotations(evaluator.model, start, u) if passes > MOST_PASSES else ""
     rows = finite_rows(evaluator, t, u)
     residual = rows.product(velocities_of(u)) - rows.nu
@@ -167,8 +169,9 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
 
 
 def correct_positions(
-    evaluator: Evaluator, u: Floats, t: float, held: Integers, metric: str = "unit", leaves: int = 0
-) -> tuple[Floats, int]:
+    evaluator: Evaluator, u: Floats, t: float, held: Integers, metric: str = "unit",
+    leaves: int = 0, tolerance: float | None = None,
+) -> tuple[Floats, int]:  # fmt: skip
     """The position stage of ``correct_initial``: the state with other r and p, and the passes.
 
     leaves: how many singular poses it may leave, on one of several branches; passes are then more
@@ -180,11 +183,12 @@ def correct_positions(
     size, limit, before = evaluator.model.size, 1.0, np.inf
     length, weight = evaluator.model.length, weights_of(evaluator)
     fit = length * fit_of(evaluator.model)
+    closed = length * (TOLERANCE if tolerance is None else tolerance)
     for passes in range(MOST_PASSES + 1):
         rows = finite_rows(evaluator, t, u)
         worst = _largest(weight * rows.C)
-        stands = worst > 0.5 * before and worst <= fit
-        if worst <= TOLERANCE * length or stands:
+        stands = worst > 0.5 * before and worst <= max(fit, TOLERANCE * length)
+        if worst <= closed or stands:
             return u, passes
         before = worst
         if passes == MOST_PASSES:

@@ -16,6 +16,8 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation.initial.assemble import correct_initial
+from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import settings_of
@@ -28,6 +30,8 @@ STEPS = (1e-2, 1e-3, 1e-4)
 OFFSETS = (-3, -2, -1, 1, 2, 3), (0, 1, 2, 3, 4, 5, 6), (0, -1, -2, -3, -4, -5, -6)
 #: A change of a state, over its size, in differences of functions of it.
 CHANGE = 1e-3
+#: Residual of corrected starts: of rounding.
+EXACT = 1e-15
 #: What is written before it is read, or counts: without derivatives by parameters.
 WITHOUT = ("rows", "crossings")
 
@@ -43,8 +47,34 @@ def differences(function: Callable[[float], Floats], step: float) -> Floats:
     """The derivative at 0 of a function, by central differences of sixth order."""
     offsets = OFFSETS[0]
     pairs = zip(offsets, weights_of(offsets), strict=True)
-    total: Floats = sum(w * function(k * step) for k, w in pairs) / step
+    total: Floats = weighted([(w, function(k * step)) for k, w in pairs]) / step
     return total
+
+
+def weighted(pairs: Sequence[tuple[float, Any]]) -> Any:
+    """The sum of weights times values, whose weights add up to zero: exactly 0 of equal values."""
+    _, first = pairs[0]
+    return sum(w * (value - first) for w, value in pairs[1:])
+
+
+class RunBeside(Run):
+    """A run for differences: its start is corrected as far as rounding allows, not to 1e-10.
+
+    Attributes:
+        is_brought_back: it is not corrected, and was off the constraints.
+    """
+
+    is_brought_back = False
+
+    def _start(self) -> InitialState:
+        start = super()._start()
+        if start.initial is None:
+            return start
+        names = self.evaluator.model.body_names
+        hold = [names.index(name) + 1 for name in self.settings.hold]
+        metric = str(self.settings.correct_metric)
+        exact = correct_initial(self.evaluator, start.u, hold=hold, metric=metric, tolerance=EXACT)
+        return attrs.evolve(start, u=exact.u)
 
 
 @attrs.frozen(eq=False)
@@ -65,7 +95,8 @@ class Neighbours:
 
     def derivative(self, function: Callable[[Run], Any]) -> Any:
         """The derivative by the parameter of what a function gives of a run."""
-        return sum(w * function(run) for w, run in zip(self.weights, self.runs, strict=True))
+        pairs = zip(self.weights, self.runs, strict=True)
+        return weighted([(w, function(run)) for w, run in pairs])
 
 
 def run_beside(
@@ -79,10 +110,12 @@ def run_beside(
     registry = compiled.checked.registry
     model = CompiledModel(changed, method=compiled.method, registry=registry, like=compiled)
     settings = settings_of(model, **{**given, "method": compiled.method})
-    run = Run(model, settings, Callbacks(), start=start)
+    run = RunBeside(model, settings, Callbacks(), start=start)
     run.initialise()
-    if run.present.work.projects and not settings.correct and not run.present.project():
-        raise SimulationError("the start cannot be brought onto its constraints")
+    if run.present.work.projects and not settings.correct:
+        if not run.present.project():
+            raise SimulationError("the start cannot be brought onto its constraints")
+        run.is_brought_back = bool(run.present.work.projection_moved)
     return run
 
 
@@ -133,6 +166,9 @@ def neighbours_of(
 def _check(parameter: SceneParameter) -> None:
     if parameter.value is None:
         what = "the scene leaves this number to its type; give it a value"
+        raise SceneError([Mistake("by", parameter.name, what)])
+    if parameter.table == "simulation" and parameter.path[-1] != "t_end":
+        what = "this says how a run is computed; a run has derivatives by what it computes alone"
         raise SceneError([Mistake("by", parameter.name, what)])
     if parameter.whole:
         what = "this is a whole number, by which there is no derivative"

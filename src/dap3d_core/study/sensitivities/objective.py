@@ -4,6 +4,7 @@ f = dap.objective(scene, by=["forces.spring.k"], of="mass.r.x:max")
 scipy.optimize.minimize(f.value_and_gradient, f.x0, jac=True)
 """
 
+import inspect
 import os
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -20,8 +21,10 @@ from dap3d_core.simulation import CompiledModel, simulate
 from dap3d_core.simulation.output.check_outputs import probe_of
 from dap3d_core.study.outputs import REDUCTIONS
 from dap3d_core.study.parameters import parameters_named, with_values
-from dap3d_core.study.sensitivities.sensitivities import sensitivities
+from dap3d_core.study.sensitivities.sensitivities import no_names, sensitivities
 
+#: Arguments of ``sensitivities`` that are no settings.
+OWN = ("scene", "by", "allow_code", "announce")
 #: Name of the output that an expression becomes.
 NAME = "objective"
 
@@ -121,8 +124,16 @@ class Objective:
                 near = getattr(error, "nearest", "")
                 what = str(error.args[0] if error.args else error)
                 raise SceneError([Mistake("of", of, what, near)]) from None
-            self._scene.outputs[NAME] = quantity
-            return NAME
+            name = NAME
+            while name in self._scene.outputs:
+                name += "_"
+            self._scene.outputs[name] = quantity
+            compiled = self._compiled(self._scene, allow_code)
+            components = find(probe_of(compiled.scene_text, compiled.evaluator), name).components
+            if components:
+                what = "this is a vector; take its norm, or a component of what it is made of"
+                raise SceneError([Mistake("of", of, what)]) from None
+            return name
         if components:
             what = "this is a vector; name a component"
             raise SceneError([Mistake("of", of, what, f"{quantity}.{components[0]}")])
@@ -154,4 +165,12 @@ def objective(
 
     own = scene if isinstance(scene, Scene) else load(scene)
     names = [by] if isinstance(by, str) else list(by)
+    known = [name for name in inspect.signature(sensitivities).parameters if name not in OWN]
+    for name in settings:
+        if name not in known:
+            near = nearest(name, known)
+            hint = f"did you mean {near!r}? " if near else ""
+            raise TypeError(f"objective takes no {name}; {hint}settings: {', '.join(known)}")
+    if not names:
+        raise no_names()
     return Objective(own, names, of, settings, allow_code)

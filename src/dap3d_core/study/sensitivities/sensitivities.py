@@ -11,9 +11,12 @@ import numpy as np
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result import Result, RunMetadata, find
+from dap3d_core.registry.suggestions import some
+from dap3d_core.result import Result, ResultError, RunMetadata, find
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation.errors import refuse_contacts
+from dap3d_core.simulation.failure.narrow_forces import notes_on_derivatives
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import compiled_for, settings_of
@@ -22,6 +25,7 @@ from dap3d_core.study.parameters import SceneParameter, parameters_named
 from dap3d_core.study.sensitivities.differentiated_run import DifferentiatedRun
 from dap3d_core.study.sensitivities.neighbours import (
     Neighbours,
+    RunBeside,
     neighbours_of,
     run_beside,
     total_derivative,
@@ -109,11 +113,18 @@ class Sensitivities:
         return np.array(found).reshape(-1, len(self.parameters))
 
     def elasticities(self, quantity: str) -> Floats:
-        """(p,) p/q dq/dp of a scalar quantity q at the end: per cent of it by a per cent of p."""
+        """(p,) p/q dq/dp of a scalar quantity q at the end: per cent of it by a per cent of p.
+
+        Raises:
+            ResultError: the quantity is a vector. Others as ``of``.
+        """
+        if components := find(self.result, quantity).components:
+            raise ResultError(f"{quantity} is a vector; take {quantity}.{components[0]}")
         value = float(self.result.quantity(quantity).values[-1])
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.asarray(self.final(quantity) * self.values / value)
 
+    @checked
     def to_xarray(self, quantities: Sequence[str] = ()) -> "xarray.Dataset":
         """Quantities over time and their derivatives ``d NAME`` over time and parameter.
 
@@ -197,20 +208,19 @@ def sensitivities(
 
     Raises:
         SceneError, PluginError: as ``simulate``; an unknown parameter, with the nearest.
-        SimulationError: the run stopped; or there is no derivative by a parameter.
+        SimulationError: the run stopped; no derivative by a parameter; the scene has contacts.
     """
     if not jit_is_on():
         raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
     compiled = compiled_for(scene, method, allow_code, announce, integrator)
+    refuse_contacts(compiled.model, "a run with derivatives")
     parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
     given = dict(t_end=t_end, dt=dt, integrator=integrator, rtol=rtol, atol=atol, step=step,
                  correct=correct, project=project, correct_metric=correct_metric,
                  start=start_word(start))  # fmt: skip
     state = given_state(start, compiled)
     base = run_beside(compiled, given, (), state)
-    blocks = -(-len(parameters) // FAST[-1])
-    directions = -(-len(parameters) // blocks)
-    lanes = next(count for count in FAST if count >= directions)
+    directions, lanes = _directions(len(parameters))
     runs, results = [], []
     for first in range(0, len(parameters), directions):
         part = parameters[first : first + directions]
@@ -220,7 +230,41 @@ def sensitivities(
             run = DifferentiatedRun(compiled, settings, Callbacks(announce=announce), start=state)
             results.append(run.carry(beside, base, lanes).execute())
         runs.append(run)
+    for note in _notes(compiled, runs):
+        results[0].note(note)
     return Sensitivities(results[0], runs, parameters)
+
+
+def _directions(count: int) -> tuple[int, int]:
+    """Directions of a run, for so many parameters in blocks of one size; and of its code."""
+    blocks = -(-count // FAST[-1])
+    directions = -(-count // blocks)
+    return directions, next(lanes for lanes in FAST if lanes >= directions)
+
+
+def _notes(compiled: CompiledModel, runs: Sequence[DifferentiatedRun]) -> list[str]:
+    """Notes on laws, and where an uncorrected start leaves its constraints with a parameter."""
+    of_laws = notes_on_derivatives(compiled.checked)
+    found = [
+        beside.parameter.name
+        for run in runs
+        for beside in run.neighbours
+        if any(isinstance(one, RunBeside) and one.is_brought_back for one in beside.runs)
+    ]
+    if not found:
+        return of_laws
+    return [
+        *of_laws,
+        f"derivatives: the start leaves its constraints with {some(found, 6)} and is not "
+        "corrected: they are those of a start that is brought onto the constraints (switch correct "
+        "on for runs that do so)",
+    ]
+
+
+def no_names() -> SceneError:
+    """The error that no parameters are named."""
+    what = "name a parameter of the scene, such as bodies.crank.mass"
+    return SceneError([Mistake("by", MISSING, what)])
 
 
 def _parameters(compiled: CompiledModel, names: Sequence[str]) -> tuple[SceneParameter, ...]:
@@ -230,8 +274,7 @@ def _parameters(compiled: CompiledModel, names: Sequence[str]) -> tuple[ScenePar
         SceneError: there are none, or wrong names, with the nearest.
     """
     if not names:
-        what = "name a parameter of the scene, such as bodies.crank.mass"
-        raise SceneError([Mistake("by", MISSING, what)])
+        raise no_names()
     try:
         return parameters_named(compiled.checked, names)
     except SceneError as error:

@@ -50,6 +50,8 @@ def test_an_optimum_that_is_known():
         ("forces.spring.k", "mass.r", "did you mean 'mass.r.x'"),
         ("forces.spring.k", "mass.r.x:maxi", "did you mean 'mass.r.x:max'"),
         ("forces.spring.k", "mass.r.x + mas.r.x", "mas"),
+        ("forces.spring.k", "2 * mass.r : max", "this is a vector"),
+        ([], "mass.r.x", "name a parameter"),
     ],
 )
 def test_what_is_refused(by, of, said):
@@ -61,3 +63,16 @@ def test_a_point_of_another_size():
     f = dap.objective(oscillator(), "forces.spring.k", "mass.r.x")
     with pytest.raises(ValueError, match="2 numbers for 1 parameters"):
         f([1.0, 2.0])
+
+
+def test_a_setting_that_is_none():
+    with pytest.raises(TypeError, match="takes no tend; did you mean 't_end'"):
+        dap.objective(oscillator(), "forces.spring.k", "mass.r.x", tend=1.0)
+
+
+def test_an_output_of_the_name_of_the_objective():
+    scene = oscillator()
+    scene.outputs["objective"] = "mass.r.x + 1"
+    f = dap.objective(scene, "forces.spring.k", "2 * objective", **SETTINGS)
+    g = dap.objective(scene, "forces.spring.k", "mass.r.x", **SETTINGS)
+    assert f(f.x0) == pytest.approx(2.0 * g(g.x0) + 2.0, rel=1e-14)

@@ -8,6 +8,7 @@ from support.on_axles import wheel
 
 import dap3d_core as dap
 from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.result import ResultError
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 BY = ["bodies.rod.mass", "forces.gravity.gravity"]
@@ -105,6 +106,7 @@ def test_data_sets(tmp_path):
         (["bodies.rood.mass"], "did you mean 'bodies.rod.mass'"),
         (["bodies.rod.mass", "bodies.rod.mass"], "only once"),
         (["simulation.step"], "give it a value"),
+        (["simulation.rtol"], "says how a run is computed"),
     ],
 )
 def test_what_is_refused(by, said):
@@ -162,3 +164,64 @@ def test_a_start_that_a_parameter_takes_off_the_constraints():
             s.of("cylinder.r.z"), corrected.of("cylinder.r.z"), rtol=0.0, atol=1e-4 * scale
         )
         assert np.max(np.abs(s.of("constraint.position"))) < 1e-8
+
+
+def test_contacts_are_refused():
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
+    with pytest.raises(dap.SimulationError, match="derivatives does not take contacts yet"):
+        dap.sensitivities(scene, "bodies.ball.r.z", **SHORT)
+
+
+def test_what_nothing_reads_has_derivatives_of_zero():
+    """No rounding either, whose part of a quantity would look like a derivative."""
+    scene = dap.load("pen2")
+    scene.parameters["unread"] = 2.0
+    s = dap.sensitivities(scene, ["parameters.unread", "bodies.rod.mass"], **SHORT)
+    assert not np.any(s.of("cylinder.r")[..., 0])
+    assert not np.any(s.of("cylinder.r")[0, :, 1])
+
+
+def test_the_end_of_a_run():
+    s = dap.sensitivities("pen2", "simulation.t_end")
+    speed = s.result.quantity("cylinder.rd.z").values[-1]
+    assert s.final("cylinder.r.z")[0] == pytest.approx(speed, rel=1e-9)
+
+
+def test_corrected_starts_are_exact():
+    """The lever lies in the plane of a mechanism, across which it changes in second order alone."""
+    by = "points.lever.sPp.z"
+    s = dap.sensitivities("wiper", by, t_end=0.02, dt=0.01, rtol=1e-10, atol=1e-12)
+    # starts to 1e-10 gave 2e-7
+    assert np.max(np.abs(s.of("rocker.w"))) < 1e-9
+
+
+def test_what_derivatives_mean_is_noted():
+    def notes(scene, by):
+        found = dap.sensitivities(scene, by, t_end=0.02, dt=0.01).result.notes
+        return [note for note in found if note.startswith("derivatives: ")]
+
+    assert not notes("pen2", "bodies.rod.mass")
+    (note,) = notes("pen2", ["bodies.rod.mass", "points.P4.sPp.y"])
+    assert "leaves its constraints with points.P4.sPp.y and is not corrected" in note
+    scene = dap.Scene(name="bristles")
+    scene.add_body("cart", mass=2.0, Jp=(1.0, 1.0, 1.0), r_dot=(1.0, 0.0, 0.0))
+    scene.add_force("lugre", "rub", P_i="cart.O", a_j="ground.x", f_n=20.0, mu_c=0.3, mu_s=0.5,
+                    v_s=0.05, sigma_0=2e4, sigma_1=50.0, sigma_2=1.0)  # fmt: skip
+    (note,) = notes(scene, "forces.rub.mu_c")
+    assert "forces.rub (lugre) has a law with branches or corners and no switch" in note
+
+
+def test_a_vector_has_no_elasticity():
+    s = dap.sensitivities("pen2", "bodies.rod.mass", **SHORT)
+    with pytest.raises(ResultError, match=r"take cylinder\.r\.x"):
+        s.elasticities("cylinder.r")
+    with pytest.raises(TypeError, match="quantities should be a list of names"):
+        s.to_xarray("cylinder.r")
+
+
+def test_starts_without_a_residual_are_left():
+    """Of an arm whose joints fit to the last digit; a pass would only move rounding about."""
+    s = dap.sensitivities("two_link_arm", "bodies.lower.mass", t_end=0.02, dt=0.01)
+    assert np.all(np.isfinite(s.of("lower.r")))
