@@ -10,6 +10,7 @@ from dap3d_core.formulations import RHS
 from dap3d_core.formulations.contacts.contact_rows import (
     FRICTION,
     GAP,
+    SLIP,
     ContactRows,
     ContactTable,
 )
@@ -35,6 +36,8 @@ TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
 STOPPED = 1e-6
 #: Ends of modes within this part of the run: what changes more often than that never comes to an end.
 MOST_CHANGES, WITHIN = 500, 1e-6
+#: So many steps within this part of the run are too many: it would not come to an end.
+MOST_STEPS, SLOW = 10_000, 1e-5
 #: Records of changes from one mode to another.
 CHANGES = {(0, 1): "touch", (0, 2): "touch", (1, 0): "lift", (2, 0): "lift", (1, 2): "stick",
            (2, 1): "slip"}  # fmt: skip
@@ -64,6 +67,7 @@ class ContactJumps(Jumps):
             remedy = "take it out, or the contacts; friction of its own a contact has (mu)"
             raise SceneError([Mistake(f"forces.{readers[0]}", MISSING, what, remedy=remedy)])
         self.table = ContactTable(evaluator)
+        self._stood = (0, -np.inf)
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
 
     def begin(self, integration: Integration) -> None:
@@ -98,6 +102,25 @@ class ContactJumps(Jumps):
         work.switches[at.COUNT][self.table.switches.ravel()] = 0.0  # it is counted here
         self._refuse_endless(integration, [self.table.names[c] for c, _ in which])
         self._resolve(integration, which, TOUCHING * self._evaluator.model.length)
+
+    def follow(self, integration: Integration) -> None:
+        """SimulationError where steps have become too short for the run to come to an end."""
+        steps, t = integration.statistics.steps, integration.t
+        (before, since), span = self._stood, self._span_of(integration)
+        if t - since > SLOW * span or steps < before:
+            self._stood = (steps, t)
+        elif steps - before > MOST_STEPS:
+            u, modes = self._state_of(integration), self._evaluator.states[self.table.mode]
+            slip = np.linalg.norm(self._outputs(t, u)[:, SLIP], axis=1)
+            sliding = np.where(modes == 1.0, slip, np.inf)
+            names = [self.table.names[c] for c in np.flatnonzero(modes > 0.5)]
+            slowest = f"the slowest slip is {sliding.min():.2g} m/s; " if np.any(modes == 1.0) else ""
+            raise SimulationError(
+                f"the run stopped at t = {t:.9g} s: {steps - before} steps brought it on by "
+                f"{t - since:.2g} s, with contacts {', '.join(names)} closed; {slowest}slip that "
+                "turns while it is next to nothing asks for steps as short. A larger mu_s, above "
+                "mu, lets it begin at once; or end the run by an event before"
+            )
 
     def _refuse_endless(self, integration: Integration, names: list[str]) -> None:
         """SimulationError where changes of contacts follow each other ever faster."""
