@@ -120,8 +120,9 @@ def direction(slip, n, way):
     """
     u, w = across(slip, n), across(way, n)
     square, length = dot(u, u), sqrt(dot(w, w))
-    kept = STILL**3 / (STILL * STILL + square) / where(length > 0.0, length, 1.0)
-    u = add(scale(where(dot(u, w) < 0.0, -1.0, 1.0), u), scale(kept, w))
+    w = scale(1.0 / where(length > 0.0, length, 1.0), w)
+    back = where(dot(u, w) < 0.0, dot(u, w), 0.0)
+    u = add(u, scale(STILL**3 / (STILL * STILL + square) - 2.0 * back, w))
     size = sqrt(dot(u, u))
     return scale(1.0 / where(size > 0.0, size, 1.0), u)
 
