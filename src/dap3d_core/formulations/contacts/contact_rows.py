@@ -163,7 +163,8 @@ class ContactRows:
         It brings ``values`` (m,), gaps or their rates, of held contacts to zero, and of others that
         would be less than zero by more than a slack.
         """
-        N, active, x = self.G[::3], list(held), np.zeros(0)
+        N, active = self.G[::3], list(held)
+        x: Floats = np.zeros(0)
         W = self.W[::3, ::3]
         for _ in range(len(others) + 1):
             x = np.linalg.lstsq(W[np.ix_(active, active)], -values[active], rcond=1e-12)[0]

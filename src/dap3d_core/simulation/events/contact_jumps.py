@@ -114,7 +114,9 @@ class ContactJumps(Jumps):
             slip = np.linalg.norm(self._outputs(t, u)[:, SLIP], axis=1)
             sliding = np.where(modes == 1.0, slip, np.inf)
             names = [self.table.names[c] for c in np.flatnonzero(modes > 0.5)]
-            slowest = f"the slowest slip is {sliding.min():.2g} m/s; " if np.any(modes == 1.0) else ""
+            slowest = (
+                f"the slowest slip is {sliding.min():.2g} m/s; " if np.any(modes == 1.0) else ""
+            )
             raise SimulationError(
                 f"the run stopped at t = {t:.9g} s: {steps - before} steps brought it on by "
                 f"{t - since:.2g} s, with contacts {', '.join(names)} closed; {slowest}slip that "
