@@ -164,11 +164,11 @@ class ContactRows:
         would be less than zero by more than a slack.
         """
         N, active = self.G[::3], list(held)
-        x: Floats = np.zeros(0)
-        W = self.W[::3, ::3]
+        normal, x = self.W[::3, ::3], np.zeros(0)
         for _ in range(len(others) + 1):
-            x = np.linalg.lstsq(W[np.ix_(active, active)], -values[active], rcond=1e-12)[0]
-            moved = values + W[:, active] @ x
+            block = normal[np.ix_(active, active)]
+            x = np.asarray(np.linalg.lstsq(block, -values[active], rcond=1e-12)[0])
+            moved = values + normal[:, active] @ x
             below = [c for c in others if c not in active and moved[c] < -slack]
             if not below:
                 break

@@ -34,7 +34,7 @@ from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps
 TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
 #: Slip, m/s, that is stopped where it goes through zero.
 STOPPED = 1e-6
-#: Ends of modes within this part of the run: what changes more often than that never comes to an end.
+#: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 500, 1e-6
 #: So many steps within this part of the run are too many: it would not come to an end.
 MOST_STEPS, SLOW = 10_000, 1e-5
