@@ -73,8 +73,8 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
 def _stop_low_rocking(rows: ContactRows, touching: list[int], length: float) -> None:
     """Hold what would be back from a height too low to tell from rest, as of rocking."""
     v, a = rows.slip[:, 0], -rows.free[::3]
-    low = [c for c in touching
-           if v[c] > AT_REST * length and v[c] ** 2 < 2.0 * a[c] * LAST_HEIGHT * length]  # fmt: skip
+    limit = 2.0 * LAST_HEIGHT * length * a
+    low = [c for c in touching if v[c] > AT_REST * length and v[c] ** 2 < limit[c]]
     if low:
         rows.v = rows.v + rows.lifted(v, low, [c for c in touching if c not in low])
 
