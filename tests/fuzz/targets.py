@@ -7,6 +7,8 @@ from hypothesis import HealthCheck, Phase, given, seed, settings
 from hypothesis.strategies import SearchStrategy
 
 from fuzz.acceptable import check_any_scene, check_good_scene
+from fuzz.contacts import check_contacts
+from fuzz.contacts import numbers as numbers_of_contacts
 from fuzz.damage import damaged_scenes
 from fuzz.expressions import check_expression, expressions
 from fuzz.matlab import check_model, damaged_models
@@ -74,5 +76,6 @@ TARGETS = {
         Target("expressions", expressions(), check_expression, ".txt"),
         Target("commands", command_lines(), check_command, ".json"),
         Target("programs", sources(), check_program, ".py"),
+        Target("contacts", numbers_of_contacts(), check_contacts, ".txt"),
     )
 }

@@ -65,6 +65,8 @@ class Formulation:
             functions.append(module.accepted)
             if switches:
                 functions.append(module.watch_contacts if contacts else module.watch)
+            if contacts:
+                functions[0] = module.contact_rates
         return step_functions(*functions)
 
     def coordinates(self, evaluator: Any) -> Any:

@@ -107,6 +107,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         friction=np.zeros(
             memory_size(n + 1, plan.row_size, plan.matrix_size) if model.iterated_forces else 0
         ),
+        watched=np.full(2 + model.integrated_layout["work"].stop if model.contacts else 0, np.nan),
         idx=idx,
         groups=groups,
         kinds=starts,

@@ -15,7 +15,8 @@ def store_reference_pivots(evaluator: Evaluator, t: float, u: ArrayLike) -> None
     """Store the pivots at a state u (13 n,): below POOR of it a pose is near a singular one.
 
     Relative to the start, because masses of very different size make small pivots, too. Rows that
-    depend on others from the start are not watched.
+    depend on others from the start are not watched, and none where there are contacts: those that
+    close make other pivots, and corners on a plane depend on each other.
     """
     formulation, system = evaluator.formulation, evaluator.system
     if not formulation.needs_joints or not evaluator.model.row_count:
@@ -24,6 +25,8 @@ def store_reference_pivots(evaluator: Evaluator, t: float, u: ArrayLike) -> None
         return
     evaluator.place(t, u)
     system.smallest[:] = 0.0
+    if evaluator.model.contact_count:
+        return
     found = pivots(evaluator, t)
     if formulation.accepts_redundant:
         found[found < REDUNDANT * system.compliance[system.row]] = 0.0

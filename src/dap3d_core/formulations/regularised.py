@@ -27,6 +27,8 @@ MORE_SOLVES, FALLING = 12, 0.5
 #: see this part of what is taken away; else e is smaller, by so much at a time, to a least one.
 LEAST_PART, LEAST_SOLVES = 1e-4, 50
 SEEN, SMALLER, SMALLEST = 1e-11, 1e-2, 1e-4
+#: Passes end where what is left is this part of the multipliers: no digit of them reads it.
+NOTHING = 1e-20
 
 
 @compiled
@@ -88,6 +90,7 @@ def least_multipliers(system: System) -> None:
 def take_seen(system: System, n: Floats, w: Floats, e: float) -> float:
     """Take from n what D^T sees, as far as weights e w do; the largest change of the last pass."""
     x, before, change = system.multipliers, np.inf, np.inf
+    nothing = NOTHING * largest(system.total)
     for k in range(n.shape[0]):
         system.compliance[k] = e * w[k]
     assemble(system.targets, system.contributions, system.D, system.K)
@@ -103,7 +106,7 @@ def take_seen(system: System, n: Floats, w: Floats, e: float) -> float:
             x[k] = -x[k] if w[k] != 0.0 else 0.0  # else a hub's place
             change = max(change, abs(x[k] - n[k]))
             n[k] = x[k]
-        if not change < 0.5 * before:
+        if not change < 0.5 * before or change <= nothing:
             break
         before = change
     return change

@@ -16,6 +16,9 @@ JUMPING = frozenset(("impulse", "reset"))
 #: Bodies that touch are apart, or not, by the rounding of their positions: this part of the length
 #: of the scene is some of them.
 ROUNDING = 32.0 * float(np.finfo(float).eps)
+#: Slip, m/s of a scene of that size, and the rest of a cone, N, that are rounding of contacts that
+#: begin to slip, or to stick.
+STILL = 1e-11
 #: The part of the narrowest range between two knots that counts as at the knot.
 NEAR_KNOT = 1e-6
 
@@ -80,6 +83,8 @@ class Switch:
             return 0.0
         if self.kind == "switch":
             type_: Any = self.group.type_info.type
+            if self.is_contact and self.part == 1:
+                return STILL * self.length
             touches = self.is_contact or (self.jumps and type_.unilateral and not self.words)
             return ROUNDING * self.length if touches else 0.0
         row, numbers = self.group.numbers[self.place], self.group.type_info.layout.numbers

@@ -288,6 +288,7 @@ class Run(RunState):
 
     def _let_jump(self, jumps: "Jumps", integration: Integration) -> None:
         """Where the integration stopped for it, let velocities jump, and events take notice."""
+        jumps.follow(integration)
         if integration.status is not Status.JUMPED:
             return
         jumps.apply(integration)

@@ -22,8 +22,8 @@ from dap3d_core.interface.hooks import EXTENSIONS, GROUPS
 KEYWORD = re.compile(r"[A-Za-z0-9]([A-Za-z0-9._-]*[A-Za-z0-9])?", re.ASCII)
 LONGEST = 60
 #: Names that the modules import: a class of such a name is named after its kind too.
-IMPORTED = ("Actuator", "Articulation", "Counter", "Exporter", "Force", "FormatError", "Frame",
-            "Function", "Importer", "Inertial", "Joint", "Link", "Path", "Place", "Point",
+IMPORTED = ("Actuator", "Articulation", "Contact", "Counter", "Exporter", "Force", "FormatError",
+            "Frame", "Function", "Importer", "Inertial", "Joint", "Link", "Path", "Place", "Point",
             "Remarks", "ShapeKind", "Vector")  # fmt: skip
 #: Modules of dap3d itself.
 OWN = "dap3d_core"
@@ -44,7 +44,7 @@ OWN = "dap3d_core"
 def new_plugin(
     name: str, *, kind: str, output: str | None, author: str | None, force: bool, as_json: bool
 ) -> int:
-    """Write a package that brings a type of a joint, a force or a function.
+    """Write a package that brings a type of a joint, a force, a function or a contact.
 
     Or an integrator, an importer or exporter of models, a kind of shape: --kind says which.
 

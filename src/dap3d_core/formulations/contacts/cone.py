@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: Sweeps of the first try after Newton alone, and how many tries, each of four times as many.
 SWEEPS, TRIES = 50, 6
@@ -23,7 +24,7 @@ FIRST = 5
 PASSES, CUTS, ROUNDING = 50, 12, 1e-15
 #: Of the scale of the solution: a problem counts as solved.
 SOLVED = 1e-12
-_TINY = 1e-300
+TINY = 1e-300
 
 
 def solve_cone(
@@ -44,10 +45,10 @@ def solve_cone(
     left = 0.0
     if not count:
         return x, left
-    r = 1.0 / np.maximum(np.diag(A).reshape(-1, 3).max(axis=1), _TINY)
-    scale = float(np.abs(b / np.maximum(np.diag(A), _TINY)).max()) + _TINY
+    r = 1.0 / np.maximum(np.diag(A).reshape(-1, 3).max(axis=1), TINY)
+    scale = float(np.abs(b / np.maximum(np.diag(A), TINY)).max()) + TINY
     for k in range(tries):
-        x = _sweep(A, b, mu, x, r, more, SWEEPS * 4 ** (k - 1) if k else FIRST)
+        sweep(A, b, mu, x, r, more, SWEEPS * 4 ** (k - 1) if k else FIRST)
         x, left = _newton(A, b, mu, x, r, more)
         if left <= SOLVED * scale:
             break
@@ -70,23 +71,34 @@ def _residual(x: Floats, u: Floats, mu: Floats, r: Floats, more: Floats) -> Floa
     return F.ravel()
 
 
-def _sweep(
+@compiled
+def sweep(
     A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats, sweeps: int
-) -> Floats:
-    """Projected Gauss-Seidel."""
+) -> None:
+    """Projected Gauss-Seidel, in place."""
+    size = x.shape[0]
     for _ in range(sweeps):
-        change = 0.0
-        for c in range(len(mu)):
-            k = slice(3 * c, 3 * c + 3)
-            u, old = A[k] @ x + b[k], x[k].copy()
-            x[3 * c] = max(0.0, x[3 * c] - u[0] / max(A[3 * c, 3 * c], _TINY))
-            u += A[k, 3 * c] * (x[3 * c] - old[0])
-            radius = np.array(mu[c] * max(x[3 * c] + more[c], 0.0))
-            x[3 * c + 1 : 3 * c + 3] = _project(x[3 * c + 1 : 3 * c + 3] - r[c] * u[1:], radius)
-            change = max(change, float(np.abs(x[k] - old).max()))
-        if change <= ROUNDING * (float(np.abs(x).max()) + _TINY):
+        change = largest = 0.0
+        for c in range(mu.shape[0]):
+            k = 3 * c
+            u0, u1, u2 = b[k], b[k + 1], b[k + 2]
+            for q in range(size):
+                u0 += A[k, q] * x[q]
+                u1 += A[k + 1, q] * x[q]
+                u2 += A[k + 2, q] * x[q]
+            n = max(0.0, x[k] - u0 / max(A[k, k], TINY))
+            u1 += A[k + 1, k] * (n - x[k])
+            u2 += A[k + 2, k] * (n - x[k])
+            z1, z2 = x[k + 1] - r[c] * u1, x[k + 2] - r[c] * u2
+            radius, length = mu[c] * max(n + more[c], 0.0), np.sqrt(z1 * z1 + z2 * z2)
+            factor = radius / length if length > radius else 1.0
+            z1, z2 = factor * z1, factor * z2
+            change = max(change, abs(n - x[k]), abs(z1 - x[k + 1]), abs(z2 - x[k + 2]))
+            x[k], x[k + 1], x[k + 2] = n, z1, z2
+        for q in range(size):
+            largest = max(largest, abs(x[q]))
+        if change <= ROUNDING * (largest + TINY):
             break
-    return x
 
 
 def _slopes(A: Floats, x: Floats, u: Floats, mu: Floats, r: Floats, more: Floats) -> Floats:
@@ -115,9 +127,9 @@ def _newton(
 ) -> tuple[Floats, float]:
     """Semismooth Newton with a line search; x and its residual."""
     best = float(np.abs(_residual(x, A @ x + b, mu, r, more)).max())
-    least = float(np.abs(b / np.maximum(np.diag(A), _TINY)).max())
+    least = float(np.abs(b / np.maximum(np.diag(A), TINY)).max())
     for _ in range(PASSES):
-        if best <= ROUNDING * (float(np.abs(x).max()) + least + _TINY):
+        if best <= ROUNDING * (float(np.abs(x).max()) + least + TINY):
             break
         u = A @ x + b
         F = _residual(x, u, mu, r, more)

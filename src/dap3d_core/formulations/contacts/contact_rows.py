@@ -155,6 +155,27 @@ class ContactRows:
         """Let impulses (3 m,) act."""
         self.v = self.v + self.P @ self.G.T @ x
 
+    def lifted(
+        self, values: Floats, held: list[int], others: list[int], slack: float = 0.0
+    ) -> Floats:
+        """(6 n,) least change of positions, or velocities, with the joints held.
+
+        It brings ``values`` (m,), gaps or their rates, of held contacts to zero, and of others that
+        would be less than zero by more than a slack.
+        """
+        N, active = self.G[::3], list(held)
+        normal, x = self.W[::3, ::3], np.zeros(0)
+        for _ in range(len(others) + 1):
+            block = normal[np.ix_(active, active)]
+            x = np.asarray(np.linalg.lstsq(block, -values[active], rcond=1e-12)[0])
+            moved = values + normal[:, active] @ x
+            below = [c for c in others if c not in active and moved[c] < -slack]
+            if not below:
+                break
+            active += below
+        found: Floats = self.P @ N[active].T @ x
+        return found
+
     def rows_of(self, contacts: list[int]) -> Integers:
         """The rows of some contacts."""
         rows: Integers = (3 * np.array(contacts, dtype=np.int64)[:, None] + np.arange(3)).ravel()

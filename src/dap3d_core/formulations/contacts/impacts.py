@@ -66,7 +66,17 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
         work += float(np.sum(parts) + np.sum(after))
         exchanged += float(np.sum(np.abs(parts)) + np.sum(np.abs(after)))
         impulses[taking] += x.reshape(-1, 3)
+    _stop_low_rocking(rows, touching, length)
     return Impact(impulses, work, exchanged, rest)
+
+
+def _stop_low_rocking(rows: ContactRows, touching: list[int], length: float) -> None:
+    """Hold what would be back from a height too low to tell from rest, as of rocking."""
+    v, a = rows.slip[:, 0], -rows.free[::3]
+    limit = 2.0 * LAST_HEIGHT * length * a
+    low = [c for c in touching if v[c] > AT_REST * length and v[c] ** 2 < limit[c]]
+    if low:
+        rows.v = rows.v + rows.lifted(v, low, [c for c in touching if c not in low])
 
 
 def _spread(x: Floats, contacts: list[int], count: int) -> Floats:

@@ -18,6 +18,9 @@ HELD, OF_REST = 1e-9, 0.05
 #: Parts of their cones within which contacts that share what they carry are to stay, each leaving
 #: half of what the one before leaves: what they carry reaches its limit with so much left, 1e-9.
 INSIDE = tuple(1.0 - 0.5**k for k in range(1, 31))
+#: Part of its cone in which friction of contacts that share stays where they begin to slip: what it
+#: leaves shows which of them do, and where to.
+LOOSE = 1.0 - 1e-6
 
 
 class JamError(ValueError):
@@ -92,6 +95,11 @@ def _put_modes(
         if inner is not None:
             _put(table, rows, closed, {}, limit, found, inner)
             return
+        which = rows.rows_of(closed)
+        if not left and _share(rows.W[np.ix_(which, which)]):
+            # what each of them carried was a choice, and so is the direction of it
+            _put(table, rows, closed, {}, limit, found, loose=True)
+            return
     without = [c for c in closed if c not in left]
     if left and without:
         x, *_ = _solve(table, rows, without, sliding, limit)
@@ -129,12 +137,12 @@ def _ways(
 
 def _solve(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float, part: float = 1.0, **more: Any,
+    limit: float, part: float = 1.0, *, loose: bool = False, **more: Any,
 ) -> tuple[Floats, Floats, Floats, dict[int, Floats]]:  # fmt: skip
     """Forces (3 k,) with sliding friction, the matrix, accelerations, and directions of sliding."""
     which = rows.rows_of(closed)
     full, b = rows.W[np.ix_(which, which)], rows.free[which]
-    A, mu = full.copy(), part * table.mu_s[closed]
+    A, mu = full.copy(), LOOSE * table.mu[closed] if loose else part * table.mu_s[closed]
     ways = _ways(table, rows, closed, sliding, limit)
     for k, c in enumerate(closed):
         if c in ways:
@@ -154,15 +162,18 @@ def _solve(
 
 def _put(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float, found: Modes, inner: Floats | None = None,
+    limit: float, found: Modes, inner: Floats | None = None, *, loose: bool = False,
 ) -> None:  # fmt: skip
-    """Put the modes of contacts that are closed among those found; inner: of ``_inside``."""
+    """Put the modes of contacts that are closed among those found; inner: of ``_inside``.
+
+    loose: those that share begin to slip.
+    """
     if not closed:
         return
-    x, A, a, ways = _solve(table, rows, closed, sliding, limit)
+    x, A, a, ways = _solve(table, rows, closed, sliding, limit, loose=loose)
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
     shares = _share(A)
-    if inner is None:
+    if inner is None and not loose:
         inner = _inside(table, rows, closed, sliding, limit)
     x = x if inner is None else inner
     for k, c in enumerate(closed):

@@ -24,7 +24,7 @@ from dap3d_core.kernels import (
 #: Modes of a contact.
 OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0
 #: Speed, m/s, below which friction points against the direction in which sliding began.
-STILL = 1e-11
+STILL = 1e-8
 _ZERO = (0.0, 0.0, 0.0)
 
 
@@ -113,13 +113,18 @@ def across(vector, n):
 
 
 def direction(slip, n, way):
-    """Unit vector of sliding; through zero it goes on as it was, so that no step sees a jump."""
+    """Unit vector of sliding; through zero it goes on as it was, so that no step sees a jump.
+
+    Of slow slip that in which sliding began has a part, of (STILL / |u|)^3 soon: slip that turns
+    while it is next to nothing would ask for steps as short as that.
+    """
     u, w = across(slip, n), across(way, n)
-    size, length = sqrt(dot(u, u)), sqrt(dot(w, w))
-    fast = size > STILL
-    backwards = dot(u, w) < 0.0
-    u = scale(where(backwards, -1.0, 1.0) / where(fast, size, 1.0), u)
-    return where(fast, u, scale(1.0 / where(length > 0.0, length, 1.0), w))
+    square, length = dot(u, u), sqrt(dot(w, w))
+    w = scale(1.0 / where(length > 0.0, length, 1.0), w)
+    back = where(dot(u, w) < 0.0, dot(u, w), 0.0)
+    u = add(u, scale(STILL**3 / (STILL * STILL + square) - 2.0 * back, w))
+    size = sqrt(dot(u, u))
+    return scale(1.0 / where(size > 0.0, size, 1.0), u)
 
 
 def forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):

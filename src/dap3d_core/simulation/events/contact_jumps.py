@@ -1,5 +1,6 @@
 """Contacts in the course of a run: what happens where one of their switches ends a mode."""
 
+from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
@@ -9,15 +10,19 @@ from dap3d_core.formulations import RHS
 from dap3d_core.formulations.contacts.contact_rows import (
     FRICTION,
     GAP,
+    SLIP,
     ContactRows,
     ContactTable,
 )
 from dap3d_core.formulations.contacts.impacts import collide
 from dap3d_core.formulations.contacts.modes import JamError, find_modes
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.formulations.switches import ROUNDING
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model.rotations import euler_rates
+from dap3d_core.model.state_layout import split
 from dap3d_core.result import EventRecord
 from dap3d_core.result.note import information
 from dap3d_core.scene import Mistake, SceneError
@@ -29,8 +34,10 @@ from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps
 TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
 #: Slip, m/s, that is stopped where it goes through zero.
 STOPPED = 1e-6
-#: Ends of modes at one instant.
-MOST_AT_ONCE = 200
+#: Ends of modes within this part of the run: what changes more often comes to no end.
+MOST_CHANGES, WITHIN = 500, 1e-6
+#: So many steps within this part of the run are too many: it would not come to an end.
+MOST_STEPS, SLOW = 10_000, 1e-5
 #: Records of changes from one mode to another.
 CHANGES = {(0, 1): "touch", (0, 2): "touch", (1, 0): "lift", (2, 0): "lift", (1, 2): "stick",
            (2, 1): "slip"}  # fmt: skip
@@ -60,7 +67,8 @@ class ContactJumps(Jumps):
             remedy = "take it out, or the contacts; friction of its own a contact has (mu)"
             raise SceneError([Mistake(f"forces.{readers[0]}", MISSING, what, remedy=remedy)])
         self.table = ContactTable(evaluator)
-        self._last, self._at_once = -np.inf, 0
+        self._stood = (0, -np.inf)
+        self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
 
     def begin(self, integration: Integration) -> None:
         """Find the modes at the start; what touches and approaches collides there.
@@ -91,15 +99,44 @@ class ContactJumps(Jumps):
         work.status = Status.RUNNING
         which = [(c, part) for c, pair in enumerate(self.table.switches.tolist())
                  for part, k in enumerate(pair) if crossed[k] != 0.0]  # fmt: skip
-        t, span = integration.t, self._span_of(integration)
-        self._at_once = self._at_once + 1 if t - self._last <= 1e-15 * span else 0
-        self._last = t
-        if self._at_once > MOST_AT_ONCE:
-            names = ", ".join(dict.fromkeys(self.table.names[c] for c, _ in which))
-            raise SimulationError(
-                f"the run stopped at t = {t:.9g} s: the modes of {names} change without end there"
-            )
+        work.switches[at.COUNT][self.table.switches.ravel()] = 0.0  # it is counted here
+        self._refuse_endless(integration, [self.table.names[c] for c, _ in which])
         self._resolve(integration, which, TOUCHING * self._evaluator.model.length)
+
+    def follow(self, integration: Integration) -> None:
+        """SimulationError where steps have become too short for the run to come to an end."""
+        steps, t = integration.statistics.steps, integration.t
+        (before, since), span = self._stood, self._span_of(integration)
+        if t - since > SLOW * span or steps < before:
+            self._stood = (steps, t)
+        elif steps - before > MOST_STEPS:
+            u, modes = self._state_of(integration), self._evaluator.states[self.table.mode]
+            slip = np.linalg.norm(self._outputs(t, u)[:, SLIP], axis=1)
+            sliding = np.where(modes == 1.0, slip, np.inf)
+            names = [self.table.names[c] for c in np.flatnonzero(modes > 0.5)]
+            slowest = (
+                f"the slowest slip is {sliding.min():.2g} m/s; " if np.any(modes == 1.0) else ""
+            )
+            raise SimulationError(
+                f"the run stopped at t = {t:.9g} s: {steps - before} steps brought it on by "
+                f"{t - since:.2g} s, with contacts {', '.join(names)} closed; {slowest}slip that "
+                "turns while it is next to nothing asks for steps as short. A larger mu_s, above "
+                "mu, lets it begin at once; or end the run by an event before"
+            )
+
+    def _refuse_endless(self, integration: Integration, names: list[str]) -> None:
+        """SimulationError where changes of contacts follow each other ever faster."""
+        latest, t = self._latest, integration.t
+        latest.append((t, ", ".join(names)))
+        passed = t - latest[0][0]
+        if len(latest) < MOST_CHANGES or passed > WITHIN * self._span_of(integration):
+            return
+        every = sorted({name for _, some in latest for name in some.split(", ")})
+        raise SimulationError(
+            f"the run stopped at t = {t:.9g} s: contacts {', '.join(every)} changed "
+            f"{MOST_CHANGES} times within {passed:.2g} s, ever faster. Smaller e of these contacts "
+            "ends bounces sooner (e = 0: at once); or end the run by an event before"
+        )
 
     def notes(self, integration: Integration) -> list[str]:
         """A note where more happened than is kept."""
@@ -154,12 +191,17 @@ class ContactJumps(Jumps):
                 "the bodies together by more than it lets them give way, and no motion with "
                 "Coulomb's law goes on from here"
             ) from error
+        held = [c for c in closed if modes.mode[c] > 0.5]
+        others = [c for c in closed if modes.mode[c] < 0.5]
+        rows.v += rows.lifted(rows.slip[:, 0], held, others)
+        gaps = np.where(np.abs(outputs[:, GAP]) < touching, outputs[:, GAP], 0.0)
+        moved = rows.lifted(gaps, held, others, 2.0 * ROUNDING * evaluator.model.length)
         states = evaluator.states.copy()
         states[table.mode], states[table.way], states[table.near] = (
             modes.mode, modes.way, modes.near
         )  # fmt: skip
         self.lose |= abs(impact.work) > LOSSLESS * impact.exchanged
-        self._go_on(integration, u, rows, states, impact.work)
+        self._go_on(integration, u, rows, moved, states, impact.work)
         after = rows.with_velocities(rows.v)
         for c in np.flatnonzero(np.abs(impact.impulses[:, 0]) > 0.0).tolist():
             own = float(impact.work) if np.count_nonzero(impact.impulses[:, 0]) == 1 else 0.0
@@ -206,12 +248,17 @@ class ContactJumps(Jumps):
         rows.kick(x)
 
     def _go_on(
-        self, integration: Integration, u: Floats, rows: ContactRows, states: Floats, work: float
-    ) -> None:
-        """Make velocities and states those behind the instant."""
+        self, integration: Integration, u: Floats, rows: ContactRows, moved: Floats, states: Floats,
+        work: float,
+    ) -> None:  # fmt: skip
+        """Make positions (by rounding), velocities and states those behind the instant."""
         evaluator, work_state = self._evaluator, integration.work
         dv = rows.v - u[-len(rows.v) :]
         y = evaluator.coordinates.with_jump(integration.y, dv, states, work)
+        r, p, *_ = split(evaluator.bodies_of(y))
+        parts = moved.reshape(-1, 2, 3)
+        r += parts[:, 0]
+        p += euler_rates(p, parts[:, 1])
         work_state.state[at.Y] = y
         integration.restart()
         evaluator.states = states

@@ -93,6 +93,9 @@ class Jumps:
         work.status = Status.RUNNING
         self._jump(integration, crossing, sides)
 
+    def follow(self, integration: Integration) -> None:
+        """Take note of how far an integration has come."""
+
     def notes(self, integration: Integration) -> list[str]:
         """Notes at the end of a run: more jumps than are kept, bodies that passed a stop."""
         evaluator, notes = self._evaluator, []

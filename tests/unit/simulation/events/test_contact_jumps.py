@@ -6,6 +6,7 @@ from support.ended import leave, shorten_chunks
 from support.results import same_bits
 
 import dap3d_core as dap
+from dap3d_core.simulation.events import contact_jumps
 
 
 def bouncing(e=0.5, mu=0.3, height=0.2, **more):
@@ -156,3 +157,49 @@ def test_a_sweep_runs_contacts_one_by_one():
     scene = bouncing()
     found = dap.sweep(scene, {"contacts.floor.e": [0.0, 0.9]}, outputs=["ball.r.z"])
     assert found is not None
+
+
+def sliding_box(mu=0.3):
+    scene = dap.Scene(name="box")
+    motion = {"r_dot": [2.0, 0.3, 0.0], "w": [0.0, 0.0, 5.0]}
+    scene.add_body("box", mass=1.0, Jp=[0.01, 0.012, 0.015], r=[0.0, 0.0, 0.05], **motion)
+    scene.add_force("weight", "g")
+    scene.add_contact("box_plane", "floor", P_i="box.O", size=[0.4, 0.3, 0.1], mu=mu)
+    return scene
+
+
+def test_a_box_that_slides_and_turns_takes_few_steps():
+    """Corners on a plane depend on each other, which makes no pose singular."""
+    result = dap.simulate(sliding_box(), t_end=1.0, dt=0.1)
+    assert result.stats.steps + result.stats.rejected < 200
+    assert [e.kind for e in result.events] == ["touch"] * 4 + ["stick"] * 4
+    assert np.max(np.abs(result.rd[-1])) < 1e-9
+
+
+def test_a_box_rocks_to_rest():
+    """Each rebound of its edges is lower; those too low to be told from rest are left out."""
+    scene = sliding_box(mu=0.0)
+    c, s = np.cos(0.05), np.sin(0.05)
+    scene.bodies["box"].p, scene.bodies["box"].w = [c, s, 0.0, 0.0], [0.0, 0.0, 0.0]
+    scene.bodies["box"].r = [0.0, 0.0, 0.05 * np.cos(0.1) + 0.15 * np.sin(0.1)]
+    result = dap.simulate(scene, t_end=2.0, dt=0.1)
+    assert sorted(result.contact("floor").mode[-1]) == [0, 0, 0, 0, 1, 1, 1, 1]
+    assert result.r[-1, 0, 2] == pytest.approx(0.05, abs=1e-12)
+    assert np.min(result.contact("floor").gap) > -1e-12
+
+
+def test_changes_without_end_stop_the_run_and_name_the_contact(monkeypatch):
+    monkeypatch.setattr(contact_jumps, "MOST_CHANGES", 5)
+    monkeypatch.setattr(contact_jumps, "WITHIN", 1.0)
+    with pytest.raises(dap.SimulationError, match=r"contacts floor changed 5 times") as caught:
+        dap.simulate(bouncing(e=0.8), t_end=5.0)
+    assert caught.value.result.t[-1] > 0.0
+
+
+def test_steps_that_lead_nowhere_stop_the_run_and_name_the_contact(monkeypatch):
+    shorten_chunks(monkeypatch)
+    monkeypatch.setattr(contact_jumps, "MOST_STEPS", 5)
+    monkeypatch.setattr(contact_jumps, "SLOW", 1.0)
+    with pytest.raises(dap.SimulationError, match=r"contacts floor#1, .* closed; the slowest") as c:
+        dap.simulate(sliding_box(), t_end=1.0, dt=0.1)
+    assert c.value.result is not None
