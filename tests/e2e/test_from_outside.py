@@ -52,6 +52,7 @@ def the_wheels_hold_what_they_should_and_no_more(outside):
         "dap3d_formats",
         "dap3d_matlab",
         "dap3d_results",
+        "dap3d_contacts",
     }
     assert {n for n in names["dap3d"] if "dist-info" not in n} == own
     assert {n for n in names["dap3d_example"] if "dist-info" not in n} == {"dap3d_example"}
@@ -164,7 +165,7 @@ BROKEN = {
         "No module named 'no_such",
     ),
     "wrong-hook": ({"hook": "dap3d_force"}, "broken", "unknown hook 'dap3d_force'"),
-    "weight": ({}, "duplicate", "distribution dap3d 0.1.0"),
+    "weight": ({}, "duplicate", "distribution dap3d 0.2.0"),
     "old-version": ({"version": "0"}, "broken", "written for interface version 0"),
     "not-compiled": ({"formula": "float('{}'.format(k))"}, "broken", "cannot be compiled"),
 }
