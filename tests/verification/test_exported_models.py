@@ -14,10 +14,16 @@ pytestmark = [
 INTEGRATORS = ["dop853", "dopri5", "rk4", "adams", "radau", "auto"]
 #: Models with types of their own.
 OWN = {"ball1"}
+MODELS = sorted(set(dap.shipped_models()) - OWN)
+#: Every third model with one integrator; the long verification has all pairs.
+SOME = {(model, INTEGRATORS[k % 6]) for k, model in enumerate(MODELS[::3])}
+PAIRS = [
+    pytest.param(*pair, marks=() if pair in SOME else pytest.mark.long)
+    for pair in ((model, integrator) for model in MODELS for integrator in INTEGRATORS)
+]
 
 
-@pytest.mark.parametrize("integrator", INTEGRATORS)
-@pytest.mark.parametrize("model", sorted(set(dap.shipped_models()) - OWN))
+@pytest.mark.parametrize(("model", "integrator"), PAIRS)
 def test_a_shipped_model_has_the_bits_of_simulate(tmp_path, model, integrator):
     scene = dap.load(model)
     t_end = min(1.0, float(scene.simulation.t_end or 1.0))
