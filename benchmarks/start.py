@@ -17,7 +17,8 @@ from pathlib import Path
 from support.outside import Outside, build
 from support.process import REPOSITORY, environment
 
-from dap3d_core.kernels.compiler import objects, ready
+from dap3d_core.kernels.compiler import objects
+from dap3d_core.kernels.runtime import ready
 
 #: The model, and how often each case is run.
 MODEL, REPEATS = "fourbar3", 5
