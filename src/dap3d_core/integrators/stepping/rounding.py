@@ -123,14 +123,14 @@ def record_failure(work: Any, error: float, h: float, again: bool) -> None:
 
 @compiled
 def change_digits(y: Floats, sample: int, argument: Floats) -> None:
-    """The state y with the last digits of each component changed, by -2 to 2, into ``argument``.
+    """The state y with the last digit of each component up or down, into ``argument``.
 
     Without order, so that what cancels at y does not cancel here: a moment about a thin axis is the
     rounding of a sum that is zero, one of few values, and often the same as at y.
     """
     for i in range(y.size):
-        digits = (i * i + 3 * i * sample + 2 * sample + i) % 5 - 2
-        argument[i] = y[i] * (1.0 + digits * DIGIT)
+        up = (i * i + 3 * i * sample + 2 * sample + i) % 5 < 3
+        argument[i] = y[i] * (1.0 + DIGIT) if up else y[i] * (1.0 - DIGIT)
 
 
 @compiled

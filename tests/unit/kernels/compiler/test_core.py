@@ -73,13 +73,13 @@ recorder.record(points, pendulum, {"bodies.bob.mass": (1.0, 3.0)}, "bob.w", meth
 in_joint_coordinates = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.w"], method="joint")
 recorder.record(in_joint_coordinates.run, [[1.0], [3.0]])
 recorder.record(dap.simulate, "pen1", t_end=0.1, dt=0.1, rtol=1e-13, atol=1e-15)
-from dap3d_core.linear.ordering import elimination_order, nested_dissection, supernodes
+from dap3d_core.linear.ordering import elimination_order, supernodes
 from support.graphs import Case, check_solution
 from support.nets import plate_net
-usual = elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS
-elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS = 0, 4, 0.3
+usual = elimination_order.WIDE, elimination_order.LEAF, supernodes.ZEROS
+elimination_order.WIDE, elimination_order.LEAF, supernodes.ZEROS = 0, 4, 0.3
 recorder.record(lambda: check_solution(Case(plate_net(8), np.random.default_rng(1))))
-elimination_order.WIDE, nested_dissection.LEAF, supernodes.ZEROS = usual
+elimination_order.WIDE, elimination_order.LEAF, supernodes.ZEROS = usual
 from support.state_types import REGISTRY, stated, steered
 recorder.record(dap.simulate, dap.compile(steered(), registry=REGISTRY), t_end=0.1, dt=0.1,
                 integrator="radau")
