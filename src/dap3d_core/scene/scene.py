@@ -199,8 +199,8 @@ class Scene(SceneDisplay, ContactTables):
     Attributes:
         name, description: for people.
         schema: version of the file format.
-        bodies, points, vectors, vectors2, joints, forces, functions, inputs: by name, in file order.
-        shapes, materials, contacts: the same.
+        bodies, points, vectors, vectors2, joints, forces, functions: by name, in file order.
+        inputs, shapes, materials, contacts: the same.
         requires: ranges of versions of the distributions that bring its types, by name.
         parameters: numbers by name, for expressions in place of numbers (text that begins with =).
         outputs: expressions of quantities, by name; or tables of ``value`` and ``unit``.
