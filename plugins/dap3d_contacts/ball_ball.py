@@ -4,9 +4,17 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from dap3d_core.interface import Contact, Point, choice, hookimpl, number, point
-from dap3d_core.kernels import dot, scale, sqrt, sub
+from dap3d_core.kernels import dot, scale, sqrt, sub, where
 
 interface_version = 1
+
+
+def outwards(r_P_i, r_P_j):
+    """The unit vector from P_j to P_i; z where they coincide, as of a ball in a hollow one."""
+    d = sub(r_P_i, r_P_j)
+    apart = dot(d, d) > 0.0
+    d = where(apart, d, (0.0, 0.0, 1.0))
+    return scale(1.0 / sqrt(dot(d, d)), d)
 
 
 class BallBall(Contact):
@@ -28,12 +36,10 @@ class BallBall(Contact):
         return side * (sqrt(dot(d, d)) - radius_j) - radius_i
 
     def at(r_P_i, r_P_j, radius_i, side):
-        d = sub(r_P_i, r_P_j)
-        return sub(r_P_i, scale(side * radius_i / sqrt(dot(d, d)), d))
+        return sub(r_P_i, scale(side * radius_i, outwards(r_P_i, r_P_j)))
 
     def normal(r_P_i, r_P_j, side):
-        d = sub(r_P_i, r_P_j)
-        return scale(side / sqrt(dot(d, d)), d)
+        return scale(side, outwards(r_P_i, r_P_j))
 
     def prepare(self, bodies):
         """The sign of the normal: outwards, or inwards."""

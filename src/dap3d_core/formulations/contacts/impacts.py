@@ -29,13 +29,13 @@ class Impact:
 
     Attributes:
         impulses: (m, 3) in the frames of the contacts.
-        work: J, of all impulses.
+        work: (m,) J, of the impulses of each contact.
         exchanged: J, sum of the magnitudes of its parts.
         rest: contact -> s from now on until its bounces end.
     """
 
     impulses: Floats
-    work: float
+    work: Floats
     exchanged: float
     rest: dict[int, float]
 
@@ -43,7 +43,7 @@ class Impact:
 def collide(table: ContactTable, rows: ContactRows, touching: list[int], length: float) -> Impact:
     """Let the contacts that touch collide until none approaches; velocities of ``rows`` follow."""
     impulses, rest = np.zeros((table.count, 3)), dict[int, float]()
-    work = exchanged = 0.0
+    work, exchanged = np.zeros(table.count), 0.0
     e = table.e.copy()
     for k in range(ROUNDS):
         slip = rows.slip
@@ -63,7 +63,7 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
         parts = x.reshape(-1, 3) * 0.5 * slip[taking]
         rows.kick(_spread(x, taking, table.count))
         after = x.reshape(-1, 3) * 0.5 * rows.slip[taking]
-        work += float(np.sum(parts) + np.sum(after))
+        work[taking] += np.sum(parts + after, axis=1)
         exchanged += float(np.sum(np.abs(parts)) + np.sum(np.abs(after)))
         impulses[taking] += x.reshape(-1, 3)
     _stop_low_rocking(rows, touching, length)

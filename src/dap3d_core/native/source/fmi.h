@@ -238,4 +238,33 @@ static fmi_status fmi_get_state(const fmu *f, void **state)
     return fmi_ok;
 }
 
+static fmi_status fmi_free_state(void **state)
+{
+    if (state != NULL) {
+        free(*state);
+        *state = NULL;
+    }
+    return fmi_ok;
+}
+
+static fmi_status fmi_write_state(fmu *f, const void *state, void *bytes, size_t size)
+{
+    if (size < fmi_state_size())
+        return fmi_failed(f, fmi_error, "there is too little room for the state");
+    memcpy(bytes, state, fmi_state_size());
+    return fmi_ok;
+}
+
+static fmi_status fmi_read_state(fmu *f, const void *bytes, size_t size, void **state)
+{
+    if (size != fmi_state_size())
+        return fmi_failed(f, fmi_error, "the state is not one of this FMU");
+    if (*state == NULL)
+        *state = malloc(size);
+    if (*state == NULL)
+        return fmi_error;
+    memcpy(*state, bytes, size);
+    return fmi_ok;
+}
+
 #endif

@@ -132,11 +132,7 @@ FMI_API S fmi2SetFMUstate(I instance, void *state) { return fmi_restore(F, state
 FMI_API S fmi2FreeFMUstate(I instance, void **state)
 {
     UNUSED(instance);
-    if (state != NULL) {
-        free(*state);
-        *state = NULL;
-    }
-    return fmi_ok;
+    return fmi_free_state(state);
 }
 
 FMI_API S fmi2SerializedFMUstateSize(I instance, void *state, size_t *size)
@@ -148,22 +144,12 @@ FMI_API S fmi2SerializedFMUstateSize(I instance, void *state, size_t *size)
 
 FMI_API S fmi2SerializeFMUstate(I instance, void *state, char bytes[], size_t size)
 {
-    if (size < fmi_state_size())
-        return fmi_failed(F, fmi_error, "there is too little room for the state");
-    memcpy(bytes, state, fmi_state_size());
-    return fmi_ok;
+    return fmi_write_state(F, state, bytes, size);
 }
 
 FMI_API S fmi2DeSerializeFMUstate(I instance, const char bytes[], size_t size, void **state)
 {
-    if (size != fmi_state_size())
-        return fmi_failed(F, fmi_error, "the state is not one of this FMU");
-    if (*state == NULL)
-        *state = malloc(size);
-    if (*state == NULL)
-        return fmi_error;
-    memcpy(*state, bytes, size);
-    return fmi_ok;
+    return fmi_read_state(F, bytes, size, state);
 }
 
 /* ---------------------------------------------------------------------- model exchange */

@@ -202,11 +202,7 @@ FMI_API S fmi3SetFMUState(I instance, void *state) { return fmi_restore(F, state
 FMI_API S fmi3FreeFMUState(I instance, void **state)
 {
     UNUSED(instance);
-    if (state != NULL) {
-        free(*state);
-        *state = NULL;
-    }
-    return fmi_ok;
+    return fmi_free_state(state);
 }
 
 FMI_API S fmi3SerializedFMUStateSize(I instance, void *state, size_t *size)
@@ -218,22 +214,12 @@ FMI_API S fmi3SerializedFMUStateSize(I instance, void *state, size_t *size)
 
 FMI_API S fmi3SerializeFMUState(I instance, void *state, uint8_t bytes[], size_t size)
 {
-    if (size < fmi_state_size())
-        return fmi_failed(F, fmi_error, "there is too little room for the state");
-    memcpy(bytes, state, fmi_state_size());
-    return fmi_ok;
+    return fmi_write_state(F, state, bytes, size);
 }
 
 FMI_API S fmi3DeserializeFMUState(I instance, const uint8_t bytes[], size_t size, void **state)
 {
-    if (size != fmi_state_size())
-        return fmi_failed(F, fmi_error, "the state is not one of this FMU");
-    if (*state == NULL)
-        *state = malloc(size);
-    if (*state == NULL)
-        return fmi_error;
-    memcpy(*state, bytes, size);
-    return fmi_ok;
+    return fmi_read_state(F, bytes, size, state);
 }
 
 /* ---------------------------------------------------------------------- model exchange */

@@ -1,7 +1,7 @@
 """Contacts evaluated at reported states: gap, forces, slip and mode."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -68,7 +68,8 @@ def contact_outputs(
             evaluator.set_inputs(inputs[k])
             values[k] = table.outputs(float(time), u[k], Lam[k])
         evaluator.states = before
-    modes = states[:, table.mode].astype(np.int64)
+    modes: Any = states[:, table.mode]  # unknown at an instant of which the poses are known alone
+    modes = modes.astype(np.int64) if np.isfinite(modes).all() else modes
     return {
         name: ContactOutput(
             gap=values[:, k, rows.GAP], normal_force=values[:, k, rows.NORMAL],

@@ -1,6 +1,6 @@
 """Interpolation between instants of a run: a cubic, within parts between jumps of velocities."""
 
-from itertools import pairwise
+from itertools import groupby, pairwise
 
 import numpy as np
 
@@ -25,14 +25,16 @@ def smooth_parts(result: Result) -> list[Result]:
     the very instant has been taken after it, and is left out. Of these two
     the states are known; accelerations and what else was evaluated at reports are NaN.
     """
-    jumps = [event for event in result.events if event.u_after is not None]
-    if not jumps:
+    # Records of one instant, as of the corners of a box, are one jump.
+    events = [event for event in result.events if event.u_after is not None]
+    if not events:
         return [result]
+    jumps = {t: list(group) for t, group in groupby(events, lambda event: event.t)}
     rows: list[Arrays | None] = [None]
-    for event in jumps:
-        rows += [_row(result, event.t, state) for state in (event.u, event.u_after)]
+    for t, group in jumps.items():
+        rows += [_row(result, t, state) for state in (group[0].u, group[-1].u_after)]
     rows.append(None)
-    ends = [-np.inf, *(event.t for event in jumps), np.inf]
+    ends = [-np.inf, *jumps, np.inf]
     parts = []
     for (begin, end), first, last in zip(pairwise(ends), rows[::2], rows[1::2], strict=True):
         start = 0 if first is None else int(np.searchsorted(result.t, begin, side="right"))

@@ -200,19 +200,19 @@ class ContactJumps(Jumps):
         states[table.mode], states[table.way], states[table.near] = (
             modes.mode, modes.way, modes.near
         )  # fmt: skip
-        self.lose |= abs(impact.work) > LOSSLESS * impact.exchanged
-        self._go_on(integration, u, rows, moved, states, impact.work)
+        work = float(np.sum(impact.work))
+        self.lose |= abs(work) > LOSSLESS * impact.exchanged
+        self._go_on(integration, u, rows, moved, states, work)
         after = rows.with_velocities(rows.v)
         for c in np.flatnonzero(np.abs(impact.impulses[:, 0]) > 0.0).tolist():
-            own = float(impact.work) if np.count_nonzero(impact.impulses[:, 0]) == 1 else 0.0
-            self._note(c, t, "impact", u, after, own)
+            self._note(c, t, "impact", u, after, float(impact.work[c]))
         for c, seconds in impact.rest.items():
-            self._note(c, t + seconds, "rest", u, after)
+            self._note(c, t + seconds, "rest")
         for c, (old, new) in enumerate(
             zip(before.astype(int), modes.mode.astype(int), strict=True)
         ):
             if kind := CHANGES.get((int(old), int(new)), ""):
-                self._note(c, t, kind, u, after)
+                self._note(c, t, kind, u)
 
     def _outputs(self, t: float, u: Floats) -> Floats:
         evaluator = self._evaluator
@@ -267,7 +267,9 @@ class ContactJumps(Jumps):
             integration.t, y, np.zeros_like(y), evaluator.system, evaluator.loops
         )
 
-    def _note(self, c: int, t: float, kind: str, u: Floats, after: Any, work: float = 0.0) -> None:
+    def _note(
+        self, c: int, t: float, kind: str, u: Any = None, after: Any = None, work: float = 0.0
+    ) -> None:
         name = self.table.names[c]
         self._record(
             EventRecord(name=name, t=t, direction=0, kind=kind, u=u, u_after=after, work=work)

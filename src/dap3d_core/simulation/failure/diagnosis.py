@@ -63,7 +63,8 @@ def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
             if fault := _fault_of(evaluator, q, k, kind, group, t):
                 kind = "rate" if _fault(s.rates) else kind  # a wrench computes both
                 name = _name(evaluator, kind, group, k)
-                return f"{_title(kind)} {name} (type {group.keyword}) is {fault}"
+                title = "contact" if group.type_info.type.is_contact else _title(kind)
+                return f"{title} {name} (type {group.keyword}) is {fault}"
     return (
         _without_direction(evaluator, t, y)
         or _singular(evaluator, t)

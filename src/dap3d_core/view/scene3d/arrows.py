@@ -59,7 +59,7 @@ def _scale(lengths: list[Floats], size: float) -> float:
 
 def _reactions(result: Result, elements: Elements) -> Iterator[dict[str, Any]]:
     every = result.reactions() if elements.joints else {}
-    for joint in elements.joints:
+    for joint in (one for one in elements.joints if one.name in every):  # contacts have none
         slot, reaction = next(iter(every[joint.name].items()))
         yield from _pair("reactions", joint, slot, reaction)
 

@@ -13,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.at_all_levels import function_of, made_of, programs, same_bits
+from support.structs import Inner, Numbers
 
 from dap3d_core.kernels import scalar_math
 from dap3d_core.kernels.compiler.derivatives import differentiate
@@ -25,25 +26,6 @@ from dap3d_core.kernels.runtime.lanes import DifferentiatedArrays, differentiate
 from dap3d_core.kernels.scalar_math import is_differentiated, with_slopes
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
-
-
-@attrs.frozen(eq=False, kw_only=True, slots=False)
-class Inner(Arrays):
-    """A struct within a struct."""
-
-    types = {"table": MATRIX}  # noqa: RUF012
-    table: Any
-
-
-@attrs.frozen(eq=False, kw_only=True, slots=False)
-class Numbers(Arrays):
-    """What the functions below read and write."""
-
-    types = {"order": INTEGERS, "inner": Inner.type_of()}  # noqa: RUF012
-    x: Any
-    out: Any
-    order: Any
-    inner: Any
 
 
 @compiled

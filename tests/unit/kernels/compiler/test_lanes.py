@@ -1,39 +1,19 @@
 """Functions of the subset for several scenes at once: each lane has the bits of its scene alone."""
 
 import math
-from typing import Any
 
-import attrs
 import numpy as np
 import pytest
+from support.structs import Inner, Numbers
 
 from dap3d_core.kernels.compiler import lanes
 from dap3d_core.kernels.compiler.types import CompileError
-from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, Arrays, pointer
+from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 from dap3d_core.kernels.runtime.lanes import WideArrays, wide_function
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 COUNT = 4
-
-
-@attrs.frozen(eq=False, kw_only=True, slots=False)
-class Inner(Arrays):
-    """A struct within a struct."""
-
-    types = {"table": MATRIX}  # noqa: RUF012
-    table: Any
-
-
-@attrs.frozen(eq=False, kw_only=True, slots=False)
-class Numbers(Arrays):
-    """What the functions below read and write."""
-
-    types = {"order": INTEGERS, "inner": Inner.type_of()}  # noqa: RUF012
-    x: Any
-    out: Any
-    order: Any
-    inner: Any
 
 
 @compiled

@@ -203,3 +203,46 @@ def test_steps_that_lead_nowhere_stop_the_run_and_name_the_contact(monkeypatch):
     with pytest.raises(dap.SimulationError, match=r"contacts floor#1, .* closed; the slowest") as c:
         dap.simulate(sliding_box(), t_end=1.0, dt=0.1)
     assert c.value.result is not None
+
+
+def thrown_box():
+    scene = dap.Scene(name="thrown")
+    scene.add_material("rubber", mu=0.3, e=0.2)
+    scene.add_body("box", mass=2.0, Jp=[0.01, 0.02, 0.03], r=[0, 0, 0.3], r_dot=[2, 0, 0])
+    scene.add_force("weight", "g")
+    fields = {"P_i": "box.O", "size": [0.2, 0.2, 0.2], "material": "rubber"}
+    scene.add_contact("box_plane", "floor", **fields)
+    return dap.simulate(scene, t_end=0.5, dt=0.05)
+
+
+def test_corners_that_strike_together_share_the_work_of_one_jump(tmp_path, recwarn):
+    """What all of them do is the change of the kinetic energy; figures and pages have one jump."""
+    result = thrown_box()
+    impacts = [event for event in result.events if event.kind == "impact"]
+    first = [event for event in impacts if event.t == impacts[0].t]
+    assert len(first) == 4
+    assert all(event.work < 0.0 for event in first)
+    (v, w), (v_after, w_after) = (
+        (np.array(u[7:10]), np.array(u[10:13])) for u in (first[0].u, first[0].u_after)
+    )
+    J = np.array([0.01, 0.02, 0.03])  # the box has not turned before
+    energy, after = (v @ v + w @ (J * w) / 2.0, v_after @ v_after + w_after @ (J * w_after) / 2.0)
+    assert sum(event.work for event in first) == pytest.approx(after - energy, rel=1e-12)
+    moved = [event.kind for event in result.events if event.u_after is not None]
+    assert set(moved) == {"impact"}  # nothing else jumps
+    quantities = ["box.rd.z", "floor.mode", "floor#1.friction.x"]
+    dap.plot(result, *quantities).save(tmp_path / "a.svg")
+    dap.view(result).save(tmp_path / "a.html")
+    assert not recwarn.list
+
+
+def test_a_ball_may_start_in_the_middle_of_a_hollow_one():
+    """Where the normal has no direction; it strikes after sqrt(2 h / g)."""
+    scene = dap.Scene(name="hollow")
+    scene.add_body("ball", mass=1.0, Jp=[0.004] * 3)
+    scene.add_force("weight", "g")
+    ends = {"P_i": "ball.O", "P_j": "ground.O", "radius_i": 0.1, "radius_j": 1.0}
+    scene.add_contact("ball_ball", "shell", inside=True, **ends)
+    result = dap.simulate(scene, t_end=1.0, dt=0.5)
+    assert result.events[0].t == pytest.approx(np.sqrt(2.0 * 0.9 / 9.81), rel=1e-12)
+    assert result.r[-1, 0] == pytest.approx([0.0, 0.0, -0.9], abs=1e-12)
