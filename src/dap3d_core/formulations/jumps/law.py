@@ -27,7 +27,7 @@ from dap3d_core.model.state_layout import velocities_of
 #: Rounds of one instant.
 ROUNDS = 1000
 #: A change of a rate is rounding below this part of what the velocities of its bodies make of it.
-ROUNDING = 1e-13
+RATE_ROUNDING = 1e-13
 
 
 class ImpossibleJumpError(ValueError):
@@ -138,7 +138,7 @@ class _Rounds:
     def beyond_rounding(self, rows: JumpRows) -> JumpRows:
         """The rows with a change that is no rounding of the velocities of their bodies."""
         size = np.abs(rows.G[:, 6:]) @ self.fastest
-        return _some(rows, np.abs(rows.change) > ROUNDING * size)
+        return _some(rows, np.abs(rows.change) > RATE_ROUNDING * size)
 
     def meet(self, P: Floats, rows: JumpRows, names: list[str]) -> bool:
         """Let impulses P (6 n + 6,) act, and the rows change their rates as they ask for.

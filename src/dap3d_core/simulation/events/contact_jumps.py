@@ -17,7 +17,7 @@ from dap3d_core.formulations.contacts.contact_rows import (
 from dap3d_core.formulations.contacts.impacts import collide
 from dap3d_core.formulations.contacts.modes import JamError, find_modes
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.formulations.switches import ROUNDING
+from dap3d_core.formulations.switches import POSITION_ROUNDING
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats
@@ -195,7 +195,7 @@ class ContactJumps(Jumps):
         others = [c for c in closed if modes.mode[c] < 0.5]
         rows.v += rows.lifted(rows.slip[:, 0], held, others)
         gaps = np.where(np.abs(outputs[:, GAP]) < touching, outputs[:, GAP], 0.0)
-        moved = rows.lifted(gaps, held, others, 2.0 * ROUNDING * evaluator.model.length)
+        moved = rows.lifted(gaps, held, others, 2.0 * POSITION_ROUNDING * evaluator.model.length)
         states = evaluator.states.copy()
         states[table.mode], states[table.way], states[table.near] = (
             modes.mode, modes.way, modes.near
