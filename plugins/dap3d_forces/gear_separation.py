@@ -1,5 +1,8 @@
 """Separating force of rigid teeth, by their pressure angle."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from dap3d_core.interface import (
     Force,
     Point,
@@ -34,6 +37,11 @@ class GearSeparation(Force):
 
     keyword = "gear_separation"
     synonyms = ("pressure-angle", "separating-force")
+    example: ClassVar[Mapping[str, str]] = {
+        "P_i": '"crank.O"',
+        "P_j": '"rod.O"',
+        "a_i": '"crank.y"',
+    }
     mesh: str = joint(rows=1, doc="the joint gear of the two wheels")
     joint_i: str = joint_fields(P_i="P", a_i="a", doc="hinge of wheel i")
     joint_j: str = joint_fields(P_j="P", doc="hinge of wheel j")

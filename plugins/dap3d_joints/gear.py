@@ -69,7 +69,7 @@ class Gear(Joint):
     """
 
     keyword, rows = "gear", 1
-    synonyms = ("gears", "gearpair", "spur", "bevel")
+    synonyms = ("gears", "gearpair", "spur", "bevel", "spur-gear", "bevel-gear")
     symbol = "link"
     example: ClassVar[Mapping[str, str]] = {
         "P_i": '"crank.O"',
