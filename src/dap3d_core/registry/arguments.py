@@ -38,7 +38,8 @@ _READERS = {"Result": "dap.open", "Scene": "dap.load", "CompiledModel": "dap.com
 def checked(function: Function) -> Function:
     """Decorator of a public function: refuses arguments of kinds that its annotations exclude.
 
-    Numbers of numpy become Python's; text and truth values are no numbers, and text is no list.
+    Numbers of numpy become Python's; text and truth values are no numbers, and text is no list. In
+    place of several names one list of them may be given.
     ``SETTINGS`` are left to the function, and annotations that are known to type checkers alone.
     """
     signature = _with_settings(inspect.signature(function))
@@ -54,8 +55,11 @@ def checked(function: Function) -> Function:
             return function(*args, **kwargs)  # Python's own message names the function
         given = bound.arguments
         for name in given:
-            value = given[name] = _python_number(given[name])
             parameter = signature.parameters[name]
+            if parameter.kind is parameter.VAR_POSITIONAL:
+                given[name] = _several(name, parameter.annotation, given[name])
+                continue
+            value = given[name] = _python_number(given[name])
             if value is parameter.default:
                 continue
             if name not in kinds:
@@ -98,6 +102,18 @@ def require(name: str, kind: Any, value: Any) -> None:
     """
     if not _fits(kind, value):
         raise TypeError(_fault(name, kind, value))
+
+
+def _several(name: str, kind: Any, values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Names one by one, or as one list of them."""
+    if kind not in (str, "str"):
+        return values
+    if len(values) == 1 and _is_list(values[0]):
+        values = tuple(values[0])
+    for value in values:
+        if not isinstance(value, str):
+            raise TypeError(f"the argument {name} should be names, not {_shown(value)}")
+    return values
 
 
 def _annotation(function: Callable[..., Any], parameter: inspect.Parameter) -> Any:
