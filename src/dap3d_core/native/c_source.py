@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.formulations.jumps.jump_arrays import CROSSING, SIDE, JumpArrays
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.kernels.compiler.units import Entry, Unit
@@ -91,7 +92,8 @@ def symbol_of(entry: Entry) -> str:
 
 def units_of(prepared: PreparedRun) -> list[Unit]:
     """The units of compiled code that a run calls, each once."""
-    entries = [*prepared.image.functions.values(), *(one.entry for one in prepared.advances)]
+    own = [*prepared.advances, *([prepared.jumps] if prepared.jumps else [])]
+    entries = [*prepared.image.functions.values(), *(one.entry for one in own)]
     return list({entry.unit.name: entry.unit for entry in entries}.values())
 
 
@@ -129,7 +131,10 @@ def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
     lines = [f"#define {name} {value}" for name, value in numbers.items()]
     lines += _enumeration("R", IntegrationState.indices("real"))
     lines += _enumeration("I", IntegrationState.indices("integer"))
+    lines += _enumeration("J", JumpArrays.indices("real"))
+    lines += _enumeration("JI", JumpArrays.indices("integer"))
     lines += _memory(prepared)
+    lines += _jumps(prepared)
     places = [place for v in variables for place in v.words]
     lines += _table(
         "static const struct { int64_t word; double sign; } places[]",
@@ -215,6 +220,33 @@ def _loop(prepared: PreparedRun, k: int, one: Advance) -> list[str]:
     return [
         f"void {symbol}({types}, int64_t);",
         f"static void advance_{k}(int64_t *w, int64_t budget) {{ {symbol}({given}, budget); }}",
+    ]
+
+
+def _jumps(prepared: PreparedRun) -> list[str]:
+    """The function jump_law, and where its arrays are; nothing where velocities do not jump."""
+    law, place = prepared.jumps, prepared.image.at
+    if law is None:
+        return ["#define JUMPS 0"]
+    symbol, j = symbol_of(law.entry), law.arguments[0]
+    types = ", ".join(["void *"] * len(law.arguments))
+    given = ", ".join(f"w + {place(part)}" for part in law.arguments)
+    numbers = {
+        "JUMPS": 1,
+        "JUMP_REAL": place(j.real),
+        "JUMP_INTEGER": place(j.integer),
+        "JUMP_Y": place(j.y),
+        "JUMP_SIDES": place(j.switches[SIDE]),
+        "JUMP_CROSSING": place(j.switches[CROSSING]),
+        "JUMP_ACTING": place(j.acting),
+        "ELEMENTS": j.acting.size,
+        "DOES_JUMP": place(j.jumps),
+        "CROSSED_BEHIND_SIDES": (at.CROSSED - at.SIDE) * len(j.jumps),
+    }
+    return [
+        *(f"#define {name} {value}" for name, value in numbers.items()),
+        f"void {symbol}(double, {types});",
+        f"static void jump_law(double t, int64_t *w) {{ {symbol}(t, {given}); }}",
     ]
 
 

@@ -10,6 +10,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.jumps.law import JumpLaw
+from dap3d_core.formulations.jumps.rounds import jump
 from dap3d_core.integrators import IMPLICIT, Integration
 from dap3d_core.integrators.adams.integration import AdamsIntegration
 from dap3d_core.integrators.adams.step import advance_adams
@@ -18,7 +20,7 @@ from dap3d_core.integrators.radau.step import advance as advance_radau
 from dap3d_core.integrators.runge_kutta.integration import RungeKutta
 from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.integrators.stepping import integration_state as at
-from dap3d_core.kernels.compiler.types import INT
+from dap3d_core.kernels.compiler.types import FLOAT, INT
 from dap3d_core.kernels.compiler.units import Entry, type_of
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.model.knots import breaks_of
@@ -28,6 +30,7 @@ from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
 from dap3d_core.simulation.errors import refuse_contacts
+from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
 from dap3d_core.simulation.initial.breakpoints import SEEN
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import compiled_for, settings_of
@@ -92,6 +95,43 @@ class Advance:
         return cls(integration, function.compile([*map(type_of, given), INT]), given)
 
 
+@attrs.frozen(eq=False)
+class JumpCode:
+    """The law of jumps (formulations/jumps/rounds.py).
+
+    Attributes:
+        entry, arguments: as of ``Advance``, behind the time; the first are its arrays.
+    """
+
+    entry: Entry
+    arguments: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, evaluator: Evaluator) -> "JumpCode":
+        """The law of a model.
+
+        Raises:
+            SceneError: it cannot be exported.
+        """
+        if evaluator.formulation.has_own_coordinates:
+            raise refusal(
+                f"velocities jump, which exported models of method {evaluator.method} do not",
+                "export it by method standard or lsq",
+            )
+        law = JumpLaw(evaluator)
+        contact = UncarriedContact(evaluator, law)
+        if contact.is_bare.any():  # Python sees contact that stays, and ends the run
+            switch = evaluator.switches[int(np.argmax(contact.is_bare))]
+            raise refusal(
+                f"velocities jump at {switch.name(evaluator.model)}, whose type carries nothing "
+                "where contact stays: runs of Python alone notice that",
+                "give the type a wrench, as ptp_stop and its like have",
+            )
+        given = law.arguments(law.arrays)
+        function: Any = jump
+        return cls(function.compile([FLOAT, *map(type_of, given)]), given)
+
+
 class PreparedRun:
     """A run as it begins: corrected, with its integrations and their memory.
 
@@ -99,6 +139,7 @@ class PreparedRun:
         compiled, evaluator: the model.
         t_end: s, by default.
         advances: the integration that it begins with; for "auto" the implicit one as well.
+        jumps: the law of jumps; None where velocities do not.
         image: their memory.
     """
 
@@ -142,17 +183,14 @@ class PreparedRun:
                 second.compile()
                 integrations.append(second)
         self.advances = [Advance.of(one) for one in integrations]
-        self.image = Image(*(part for one in self.advances for part in one.arguments))
+        parts = [part for one in self.advances for part in one.arguments]
+        self.image = Image(*parts, *(() if self.jumps is None else self.jumps.arguments))
 
     def _refuse_jumps(self) -> None:
         refuse_contacts(self.evaluator.model, "export")
-        switches = [s for s in self.evaluator.switches if s.jumps]
-        if switches:
-            types = sorted({str(s.group.type_info.type.keyword) for s in switches})
-            raise refusal(
-                f"velocities jump at elements of type {', '.join(types)}: that is not exported yet",
-                "model the contact by a force, such as a stiff spring with a damper",
-            )
+        self.jumps: JumpCode | None = None
+        if any(s.jumps for s in self.evaluator.switches):
+            self.jumps = JumpCode.of(self.evaluator)
 
     @property
     def functions(self) -> Any:

@@ -214,13 +214,6 @@ def test_what_cannot_be_exported_is_refused_by_name(tmp_path, options, said):
         exported(_written(SPRING, tmp_path), tmp_path, **options)
 
 
-def test_velocities_that_jump_are_refused(tmp_path):
-    scene = _written(SPRING, tmp_path)
-    scene.add_force("plane_stop", "floor", P_i="cart.O", a_j="ground.x", k=1e4, e=0.5)
-    with pytest.raises(dap.SceneError, match="plane_stop"):
-        exported(scene, tmp_path)
-
-
 def test_steps_that_make_no_sense_are_refused(tmp_path):
     _, library = exported(dap.load("pen1"), tmp_path)
     run = library.start(1.0)

@@ -148,6 +148,11 @@ DAP3D_API int dap3d_project(dap3d_model *model, double t, double *y, double *mov
 DAP3D_API int dap3d_indicator_count(void);
 DAP3D_API int dap3d_indicators(dap3d_model *model, double t, const double *y, double *values);
 
+/* Handle an event at the present time and state, as at the start of a run, and where an indicator
+   has changed its sign: velocities jump, if the model has such elements, and the state is brought
+   onto the constraints. *changed is 1 where the states are others then. */
+DAP3D_API int dap3d_event(dap3d_model *model, int *changed);
+
 /* The first time after t at which a function of time takes another form; infinite if none does. */
 DAP3D_API double dap3d_next_event(const dap3d_model *model, double t);
 

@@ -2,7 +2,8 @@
    begins, and compiled functions; the integrators and equations are those that Python runs.
 
    It does what integrators/stepping/integration.py (break points), integrators/stepping/hold.py
-   (inputs) and simulation/handover.py (stiff scenes) do, in the same order, for the same bits. */
+   (inputs), simulation/handover.py (stiff scenes) and simulation/events/jumps.py (velocities that
+   jump) do, in the same order, for the same bits. */
 
 #define DAP3D_BUILD
 #include <math.h>
@@ -24,14 +25,17 @@ enum { RUNNING, FINISHED, STEP_FLOOR, NOT_FINITE, PROJECTION_FAILED, SWITCHED, C
 struct dap3d_model {
     uint64_t identity;
     double t, t_end;         /* present time; end of the run */
+    double span;             /* s, by which times of jumps are judged */
     double first_h;          /* of a hold: the step that it began with; -1: none has begun */
     int64_t first_rejected;
     int64_t which;           /* the integration that the run is in */
     int64_t is_ahead;        /* steps have gone beyond the present time, which is interpolated */
     int64_t is_changed;      /* inputs have changed since the last step */
+    int64_t has_begun;       /* what touches at the start has jumped */
     int64_t has_row;         /* the row is that of the present time, and so are the outputs */
     int64_t is_over;
     char message[160];
+    double sides[SWITCHES + 1]; /* of indicators, for integrators of others */
     double row[ROW + 1];     /* t, y and report at the present time */
     double outputs[OUTPUTS + 1];
     int64_t w[WORDS];        /* the memory of the run */
@@ -80,6 +84,7 @@ static void begin(dap3d_model *m, double t_end)
     m->identity = IDENTITY;
     m->t_end = t_end;
     m->first_h = -1.0;
+    m->span = t_end;
     for (int k = 0; k < INTEGRATIONS; k++) {
         double *times = numbers(m, integrations[k].times);
         times[0] = 0.0;
@@ -124,9 +129,12 @@ int dap3d_find(const char *name)
     return -1;
 }
 
+static void start(dap3d_model *m);
+
 /* The row and the outputs of the present time. */
 static void report(dap3d_model *m)
 {
+    start(m);
     if (m->has_row)
         return;
     if (!m->is_ahead)
@@ -145,6 +153,7 @@ int dap3d_set(dap3d_model *m, int v, double x)
     if ((kind != DAP3D_INPUT && kind != DAP3D_PARAMETER) || !(fabs(x) <= LARGEST))
         return fail(m, DAP3D_INVALID, "only inputs and parameters are set, to finite numbers");
     if (kind == DAP3D_INPUT) {
+        start(m);
         double *value = numbers(m, variables[v].first);
         if (*value != x) {
             *value = x;
@@ -294,6 +303,94 @@ static int hand_over(dap3d_model *m)
     return 1;
 }
 
+/* ---------------------------------------------------------------------- jumps */
+
+#if JUMPS
+/* As Jumps._set_sides: sides of the switches after a jump; of one that goes back, where it goes. */
+static void set_sides(dap3d_model *m)
+{
+    double *real = real_of(m), *y = y_of(m), *sides = numbers(m, integrations[m->which].sides);
+    double span = fmax(m->span, fabs(real[R_t])), h = 1e-8 * span, t = real[R_t], one = 1.0;
+    double slope[STATES], later[STATES], values[SWITCHES + 1], ahead[SWITCHES + 1];
+    call(m, RHS, t, y, slope, STATES);
+    call(m, WATCH, t, y, values, SWITCHES);
+    for (int k = 0; k < STATES; k++)
+        later[k] = y[k] + h * slope[k];
+    call(m, WATCH, t + h, later, ahead, SWITCHES);
+    for (int k = 0; k < SWITCHES; k++) {
+        double rate = (ahead[k] - values[k]) / h;
+        int at_once = fabs(values[k]) <= 1e-10 * span * fabs(rate);
+        double side = at_once ? (rate > 0.0) - (rate < 0.0) : numbers(m, JUMP_SIDES)[k];
+        sides[k] = m->w[DOES_JUMP + k] ? side : 0.0;
+    }
+    if (integer_of(m)[I_calls_accepted])
+        call(m, ACCEPTED, t, y, &one, 1);
+}
+
+/* As Jumps._jump: velocities jump at the present state; whether that went well, and *acted. */
+static int let_jump(dap3d_model *m, const double *crossing, const double *sides, int *acted)
+{
+    double *j = numbers(m, JUMP_REAL);
+    *acted = 0;
+    memcpy(numbers(m, JUMP_CROSSING), crossing, 8 * SWITCHES);
+    memset(numbers(m, JUMP_SIDES), 0, 8 * SWITCHES);
+    if (sides != NULL)
+        memcpy(numbers(m, JUMP_SIDES), sides, 8 * SWITCHES);
+    memcpy(numbers(m, JUMP_Y), y_of(m), 8 * STATES);
+    j[J_soon] = 1e-13 * fmax(m->span, fabs(real_of(m)[R_t]));
+    m->w[JUMP_INTEGER + JI_has_sides] = sides != NULL;
+    m->w[JUMP_INTEGER + JI_given_count] = m->w[JUMP_INTEGER + JI_follows] = 0;
+    jump_law(real_of(m)[R_t], m->w);
+    if (m->w[JUMP_INTEGER + JI_missed] != -1)
+        return 0;
+    for (int k = 0; k < ELEMENTS; k++)
+        *acted |= m->w[JUMP_ACTING + k] != 0;
+    if (*acted) {
+        memcpy(y_of(m), numbers(m, JUMP_Y), 8 * STATES);
+        restart(m);
+        set_sides(m);
+    }
+    return 1;
+}
+
+#endif
+
+/* Let what touches and approaches at the start of a run jump there, once. */
+static void start(dap3d_model *m)
+{
+    if (m->has_begun)
+        return;
+    m->has_begun = 1;
+#if JUMPS
+    double none[SWITCHES + 1] = {0.0};
+    int acted;
+    if (!let_jump(m, none, NULL, &acted)) {
+        integer_of(m)[I_status] = JUMPED;
+        real_of(m)[R_t_stop] = real_of(m)[R_t];
+    }
+#endif
+}
+
+/* As Jumps.apply, where an integration has stopped for it; whether it goes on. */
+static int apply_jump(dap3d_model *m)
+{
+#if JUMPS
+    if (integer_of(m)[I_status] == JUMPED) {
+        double *sides = numbers(m, integrations[m->which].sides), crossing[SWITCHES], before[SWITCHES];
+        int acted;
+        memcpy(before, sides, sizeof before);
+        memcpy(crossing, sides + CROSSED_BEHIND_SIDES, sizeof crossing);
+        memset(sides + CROSSED_BEHIND_SIDES, 0, sizeof crossing);
+        if (let_jump(m, crossing, before, &acted)) {
+            integer_of(m)[I_status] = RUNNING;
+            return 1;
+        }
+        real_of(m)[R_t_stop] = real_of(m)[R_t];
+    }
+#endif
+    return hand_over(m);
+}
+
 /* The run has stopped short of a time. */
 static int stopped(dap3d_model *m)
 {
@@ -301,7 +398,7 @@ static int stopped(dap3d_model *m)
         "", "the run has reached its end", "the error requires a step that time cannot resolve",
         "rates or a state are not finite", "no state on the constraints was found",
         "a switch of the model ended the run", "a switch changed its sign again and again", "",
-        "the scene is stiff", "velocities jump", "steps are so short that the run would not end"};
+        "the scene is stiff", "joints hold a velocity that is to jump", "steps are so short that the run would not end"};
     int64_t status = integer_of(m)[I_status];
     double t = status == FINISHED ? real_of(m)[R_t] : real_of(m)[R_t_stop];
     m->is_over = 1;
@@ -319,10 +416,12 @@ static int step_freely(dap3d_model *m, double t)
     integer_of(m)[I_row_count] = 0;
     if (integer_of(m)[I_status] == FINISHED)
         integer_of(m)[I_status] = RUNNING; /* the last step has reached the end, and reported it */
+    if (integer_of(m)[I_status] == JUMPED && !apply_jump(m))
+        return stopped(m);
     if (real_of(m)[R_t] >= t)
         advance_once(m, -1); /* no step */
     while (integer_of(m)[I_row_count] == 0) {
-        if (integer_of(m)[I_status] != RUNNING && !hand_over(m))
+        if (integer_of(m)[I_status] != RUNNING && !apply_jump(m))
             return stopped(m);
         advance(m, 0);
     }
@@ -396,6 +495,8 @@ static int hold_to(dap3d_model *m, double end)
         if (real_of(m)[R_t] >= end && (status == RUNNING || status == FINISHED))
             break;
         if (status != RUNNING) {
+            if (status == JUMPED && apply_jump(m))
+                continue;
             if (!hand_over(m))
                 return m->t = real_of(m)[R_t], m->has_row = m->is_ahead = 0, stopped(m);
             m->first_h = real_of(m)[R_h];
@@ -436,6 +537,9 @@ int dap3d_step_to(dap3d_model *m, double t)
         t = m->t_end;
     if (t > m->t_end)
         return fail(m, DAP3D_INVALID, "the time is beyond the end that dap3d_create was given");
+    start(m);
+    if (INPUTS > 0) /* its end is open: a usual number of such steps */
+        m->span = fmin(1000.0 * (t - m->t), m->t_end);
     return INPUTS > 0 ? hold_to(m, t) : step_freely(m, t);
 }
 
@@ -466,7 +570,8 @@ int dap3d_state_count(void) { return STATES; }
 
 int dap3d_states(const dap3d_model *model, double *y)
 {
-    dap3d_model *m = (dap3d_model *)model; /* y_of changes nothing */
+    dap3d_model *m = (dap3d_model *)model; /* which begins where it has not */
+    start(m);
     memcpy(y, m->is_ahead ? m->row + 1 : y_of(m), 8 * STATES);
     return DAP3D_OK;
 }
@@ -524,6 +629,37 @@ int dap3d_project(dap3d_model *m, double t, double *y, double *moved)
     if (moved != NULL)
         *moved = largest;
     return out[1] == 1.0 ? fail(m, DAP3D_ERROR, "no state on the constraints was found") : DAP3D_OK;
+}
+
+int dap3d_event(dap3d_model *m, int *changed)
+{
+    double y[STATES], moved;
+    dap3d_states(m, y);
+    if (dap3d_project(m, m->t, y, &moved) != DAP3D_OK)
+        return DAP3D_ERROR;
+    *changed = moved > 0.0;
+    if (moved > 0.0 && dap3d_set_states(m, m->t, y) != DAP3D_OK)
+        return DAP3D_ERROR;
+#if JUMPS
+    double values[SWITCHES], crossing[SWITCHES];
+    int acted, crosses = 0;
+    dap3d_indicators(m, m->t, y, values);
+    for (int k = 0; k < SWITCHES; k++) {
+        double side = (values[k] > 0.0) - (values[k] < 0.0);
+        crossing[k] = m->w[DOES_JUMP + k] && side * m->sides[k] < 0.0 ? side : 0.0;
+        m->sides[k] = crossing[k] != 0.0 || m->sides[k] == 0.0 ? side : m->sides[k];
+        crosses |= crossing[k] != 0.0;
+    }
+    if (crosses) {
+        if (!let_jump(m, crossing, m->sides, &acted))
+            return fail(m, DAP3D_ERROR, "joints hold a velocity that is to jump");
+        if (acted)
+            memcpy(m->sides, numbers(m, integrations[m->which].sides), sizeof values);
+        m->has_row = 0;
+        *changed |= acted;
+    }
+#endif
+    return DAP3D_OK;
 }
 
 int dap3d_indicator_count(void) { return SWITCHES; }
