@@ -9,6 +9,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.metric import METRIC_WIDTH
 from dap3d_core.formulations.jumps.jump_arrays import CROSSING, SIDE, JumpArrays
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
@@ -16,8 +17,11 @@ from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, W
 from dap3d_core.native.outputs import Output
 from dap3d_core.native.prepared import Advance, PreparedRun
+from dap3d_core.study.batch import initial_state
 
-KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator")
+KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator", "fixed")
+#: Of these those that are parameters: set at any time, and before a run begins.
+PARAMETERS = ("parameter", "fixed")
 
 
 @attrs.frozen
@@ -27,7 +31,7 @@ class Variable:
     Attributes:
         name, unit, label: as in results.
         kind: one of KINDS.
-        first: word of an input, index of others.
+        first: word of an input; of a parameter 1 where the start depends on it; index of others.
         start: its value at the start.
         words: of a parameter: words of the memory that it is, each with its sign.
     """
@@ -135,6 +139,7 @@ def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
     lines += _enumeration("JI", JumpArrays.indices("integer"))
     lines += _memory(prepared)
     lines += _jumps(prepared)
+    lines += _start(prepared, variables)
     places = [place for v in variables for place in v.words]
     lines += _table(
         "static const struct { int64_t word; double sign; } places[]",
@@ -160,7 +165,7 @@ def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
 def _rows_of(variables: Sequence[Variable]) -> list[str]:
     rows, first = [], 0
     for v in variables:
-        place = first if v.kind == "parameter" else v.first
+        place = first if v.kind in PARAMETERS else v.first
         first += len(v.words)
         name, unit = c_text(v.name), c_text(v.unit)
         rows.append(f"{{{name}, {unit}, DAP3D_{v.kind.upper()}, {place}, {len(v.words)}}}")
@@ -248,6 +253,35 @@ def _jumps(prepared: PreparedRun) -> list[str]:
         f"void {symbol}(double, {types});",
         f"static void jump_law(double t, int64_t *w) {{ {symbol}(t, {given}); }}",
     ]
+
+
+def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
+    """Where the start is found anew for parameters that it depends on, if there are any."""
+    fixed = [v for v in variables if v.kind == "fixed"]
+    if not fixed or prepared.start is None:
+        return ["#define FIXED 0"]
+    start, system, place = prepared.start, prepared.evaluator.system, prepared.image.at
+    body = place(system.body)
+    owned = {(w - body) // BODY_WIDTH for v in fixed for w, _ in v.words
+             if 0 <= w - body < system.body.size}  # fmt: skip
+    numbers = {
+        "FIXED": 1,
+        "ASSEMBLES": int(start.assembles),
+        "GIVEN": place(start.arrays.given),
+        "UNIT": place(start.arrays.unit),
+        "STARTING": place(start.arrays.starting),
+        "STARTING_SIZE": len(start.arrays.starting),
+        "START_OPEN": initial_state.OPEN,
+        "START_PIVOT": initial_state.LEAST_PIVOT,
+        "BEGIN": place(start.functions),
+        "METRIC": place(system.metric),
+        "METRIC_WIDTH": METRIC_WIDTH,
+        "ELEMENT_STATES": len(prepared.evaluator.model.initial_states),
+    }
+    lines = [f"#define {name} {value}" for name, value in numbers.items()]
+    lines += _table("static const int heavy[]", map(str, sorted(owned) or [0]))
+    moving = [str(k) for k, v in enumerate(variables) if v.kind == "fixed" and v.first]
+    return [*lines, *_table("static const int moving[]", moving or ["-1"])]
 
 
 def _integration(prepared: PreparedRun, k: int, one: Advance) -> str:

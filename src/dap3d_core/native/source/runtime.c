@@ -31,6 +31,7 @@ struct dap3d_model {
     int64_t which;           /* the integration that the run is in */
     int64_t is_ahead;        /* steps have gone beyond the present time, which is interpolated */
     int64_t is_changed;      /* inputs have changed since the last step */
+    int64_t is_other;        /* 1: parameters that the start depends on are set; 2: it moves */
     int64_t has_begun;       /* what touches at the start has jumped */
     int64_t has_row;         /* the row is that of the present time, and so are the outputs */
     int64_t is_over;
@@ -119,6 +120,12 @@ const char *dap3d_name(int v) { return v < 0 || v >= VARIABLES ? NULL : variable
 
 const char *dap3d_unit(int v) { return v < 0 || v >= VARIABLES ? NULL : variables[v].unit; }
 
+static int is_parameter(int v)
+{
+    int kind = v < 0 || v >= VARIABLES ? -1 : variables[v].kind;
+    return kind == DAP3D_PARAMETER || kind == DAP3D_FIXED;
+}
+
 int dap3d_kind(int v) { return v < 0 || v >= VARIABLES ? -1 : variables[v].kind; }
 
 int dap3d_find(const char *name)
@@ -147,10 +154,40 @@ static void report(dap3d_model *m)
 
 static int restart_here(dap3d_model *m);
 
+static void place_parameter(dap3d_model *m, int v, double x)
+{
+    for (int k = 0; k < variables[v].count; k++)
+        *numbers(m, places[variables[v].first + k].word) = places[variables[v].first + k].sign * x;
+}
+
+#if FIXED
+/* Set a parameter on which the start depends: the run begins anew, with all that has been set. */
+static int set_fixed(dap3d_model *m, int v, double x)
+{
+    double values[VARIABLES];
+    if (m->t > 0.0 || integer_of(m)[I_step_count] > 0)
+        return fail(m, DAP3D_INVALID, "this parameter is set before a run begins");
+    for (int k = 0; k < VARIABLES; k++)
+        values[k] = variables[k].kind == DAP3D_INPUT || is_parameter(k) ? dap3d_get(m, k) : 0.0;
+    int64_t is_other = m->is_other;
+    begin(m, m->t_end);
+    values[v] = x;
+    for (int k = 0; k < VARIABLES; k++)
+        if (is_parameter(k))
+            place_parameter(m, k, values[k]);
+        else if (variables[k].kind == DAP3D_INPUT)
+            *numbers(m, variables[k].first) = values[k];
+    m->is_other = is_other | 1;
+    for (size_t k = 0; k < sizeof moving / sizeof *moving; k++)
+        m->is_other |= v == moving[k] ? 2 : 0;
+    return DAP3D_OK;
+}
+#endif
+
 int dap3d_set(dap3d_model *m, int v, double x)
 {
     int kind = dap3d_kind(v);
-    if ((kind != DAP3D_INPUT && kind != DAP3D_PARAMETER) || !(fabs(x) <= LARGEST))
+    if ((kind != DAP3D_INPUT && !is_parameter(v)) || !(fabs(x) <= LARGEST))
         return fail(m, DAP3D_INVALID, "only inputs and parameters are set, to finite numbers");
     if (kind == DAP3D_INPUT) {
         start(m);
@@ -165,9 +202,12 @@ int dap3d_set(dap3d_model *m, int v, double x)
     double *value = numbers(m, places[variables[v].first].word);
     if (*value == places[variables[v].first].sign * x)
         return DAP3D_OK;
+#if FIXED
+    if (kind == DAP3D_FIXED)
+        return set_fixed(m, v, x);
+#endif
     int result = m->t > 0.0 ? restart_here(m) : DAP3D_OK;
-    for (int k = 0; k < variables[v].count; k++)
-        *numbers(m, places[variables[v].first + k].word) = places[variables[v].first + k].sign * x;
+    place_parameter(m, v, x);
     m->has_row = 0;
     return result;
 }
@@ -178,6 +218,7 @@ double dap3d_get(dap3d_model *m, int v)
     switch (dap3d_kind(v)) {
     case DAP3D_TIME: return m->t;
     case DAP3D_INPUT: return *numbers(m, k);
+    case DAP3D_FIXED:
     case DAP3D_PARAMETER: return places[k].sign * *numbers(m, places[k].word);
     case DAP3D_OUTPUT: report(m); return m->outputs[k];
     case DAP3D_STATE: report(m); return m->row[1 + k];
@@ -355,12 +396,89 @@ static int let_jump(dap3d_model *m, const double *crossing, const double *sides,
 
 #endif
 
-/* Let what touches and approaches at the start of a run jump there, once. */
+#if FIXED
+static void table_call(dap3d_model *m, int64_t word, double t, double *y, double *out, int64_t size)
+{
+    function f = (function)(uintptr_t)m->w[word];
+    f(t, y, STATES, out, size, m->w + SYSTEM, m->w + LOOPS);
+}
+
+/* The metric of a body, of its mass and inertia: 1/sqrt(m), and U = L^-T with J' = L L^T. */
+static void weigh(dap3d_model *m, int b)
+{
+    const double *x = numbers(m, BODIES) + BODY_WIDTH * b, *J = x + BODY_JP;
+    double *k = numbers(m, METRIC) + METRIC_WIDTH * b;
+    double a = sqrt(J[0]), c = J[3] / a, d = J[6] / a, e = sqrt(J[4] - c * c);
+    double f = (J[7] - d * c) / e, g = sqrt(J[8] - d * d - f * f);
+    k[0] = 1.0 / sqrt(x[BODY_MASS]);
+    k[1] = 1.0 / a, k[4] = 1.0 / e, k[6] = 1.0 / g;
+    k[2] = 0.0 - c * k[1] * k[4];
+    k[5] = 0.0 - f * k[4] * k[6];
+    k[3] = 0.0 - (d * k[1] + f * k[2]) * k[6];
+}
+
+/* The state that the scene gives. */
+static void take_given(dap3d_model *m, double *y)
+{
+    const double *u = numbers(m, GIVEN), *v = u + 7 * BODY_COUNT;
+    double *rates = y + 7 * BODY_COUNT;
+    memcpy(y, u, 8 * 13 * BODY_COUNT);
+    memcpy(y + 13 * BODY_COUNT, u + 13 * BODY_COUNT, 8 * ELEMENT_STATES);
+    for (int b = 0; b < BODY_COUNT; b++) { /* w' = A^T w */
+        const double *e = u + 7 * b + 3, *w = v + 6 * b + 3;
+        double *own = rates + 6 * b + 3, c[3], d[3], *p = own;
+        c[0] = e[2] * w[2] - e[3] * w[1];
+        c[1] = e[3] * w[0] - e[1] * w[2];
+        c[2] = e[1] * w[1] - e[2] * w[0];
+        d[0] = e[2] * c[2] - e[3] * c[1];
+        d[1] = e[3] * c[0] - e[1] * c[2];
+        d[2] = e[1] * c[1] - e[2] * c[0];
+        for (int k = 0; k < 3; k++)
+            p[k] = w[k] - 2.0 * e[0] * c[k] + 2.0 * d[k];
+    }
+}
+
+/* The start with the parameters that it depends on; whether there is one. */
+static int find_start(dap3d_model *m)
+{
+    double *y = y_of(m), *k = numbers(m, METRIC), kept[7 * (BODY_COUNT + 1)], none[1] = {0.0};
+    if (m->is_other & 2)
+        take_given(m, y);
+    if ((m->is_other & 2) && ASSEMBLES) {
+        double *out = numbers(m, STARTING);
+        for (int b = 1; b <= BODY_COUNT; b++) {
+            memcpy(kept + 7 * b, k + METRIC_WIDTH * b, 8 * 7);
+            memcpy(k + METRIC_WIDTH * b, numbers(m, UNIT), 8 * 7);
+        }
+        table_call(m, BEGIN + 1, 0.0, y, out, STARTING_SIZE);
+        for (int b = 1; b <= BODY_COUNT; b++)
+            memcpy(k + METRIC_WIDTH * b, kept + 7 * b, 8 * 7);
+        if (out[START_OPEN] != 0.0 || !(out[START_PIVOT] > 1e-10))
+            return 0;
+    }
+    for (size_t n = 0; n < sizeof heavy / sizeof *heavy; n++)
+        if (heavy[n] > 0)
+            weigh(m, heavy[n]);
+    table_call(m, BEGIN, 0.0, y, none, 0);
+    for (int n = 1; n < INTEGRATIONS; n++)
+        memcpy(numbers(m, integrations[n].state), y, 8 * STATES);
+    return 1;
+}
+#endif
+
+/* Find the start, and let what touches and approaches jump there, once. */
 static void start(dap3d_model *m)
 {
     if (m->has_begun)
         return;
     m->has_begun = 1;
+#if FIXED
+    if (m->is_other && !find_start(m)) {
+        integer_of(m)[I_status] = PROJECTION_FAILED;
+        real_of(m)[R_t_stop] = 0.0;
+        return;
+    }
+#endif
 #if JUMPS
     double none[SWITCHES + 1] = {0.0};
     int acted;
