@@ -15,6 +15,7 @@ from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, W
+from dap3d_core.native.elements import Elements
 from dap3d_core.native.outputs import Output
 from dap3d_core.native.prepared import Advance, PreparedRun
 from dap3d_core.study.batch import initial_state
@@ -101,7 +102,7 @@ def units_of(prepared: PreparedRun) -> list[Unit]:
     return list({entry.unit.name: entry.unit for entry in entries}.values())
 
 
-def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
+def data_of(prepared: PreparedRun, variables: Sequence[Variable], elements: Elements) -> str:
     """The text of data.h: what runtime.c takes from one model."""
     image, system = prepared.image, prepared.evaluator.system
     work = prepared.run.present.work
@@ -140,6 +141,7 @@ def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
     lines += _memory(prepared)
     lines += _jumps(prepared)
     lines += _start(prepared, variables)
+    lines += _elements(prepared, elements)
     places = [place for v in variables for place in v.words]
     lines += _table(
         "static const struct { int64_t word; double sign; } places[]",
@@ -155,7 +157,8 @@ def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
         _rows_of(variables),
     )
     lines += [
-        "void dap3d_outputs(double, const double *, const double *, const double *, double *);"
+        "void dap3d_outputs(double, const double *, const double *, const double *, "
+        "const double *, double *);"
     ]
     text = "\n".join(lines)
     digest = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -253,6 +256,33 @@ def _jumps(prepared: PreparedRun) -> list[str]:
         f"void {symbol}(double, {types});",
         f"static void jump_law(double t, int64_t *w) {{ {symbol}(t, {given}); }}",
     ]
+
+
+def _elements(prepared: PreparedRun, elements: Elements) -> list[str]:
+    """Calls of loops for outputs."""
+    if not elements.calls or elements.arrays is None:
+        return ["#define CALLS 0", "#define VALUES_OF_ELEMENTS 0"]
+    system, place, arrays = prepared.evaluator.system, prepared.image.at, elements.arrays
+    values, layout = place(arrays.values), prepared.evaluator.model.report_layout["Lam"]
+    others = {None: place(arrays.minus), -1: place(arrays.counter)}
+    rows = [
+        [place(c.table) + c.q, place(c.arrays), *c.group, values + c.first, c.size,
+         *(others[m] if m in others else values + int(m or 0) for m in c.more)]
+        for c in elements.calls
+    ]  # fmt: skip
+    numbers = {
+        "CALLS": len(rows),
+        "VALUES_OF_ELEMENTS": values,
+        "MINUS_LAMBDA": place(arrays.minus),
+        "COUNTER": place(arrays.counter),
+        "MULTIPLIERS": layout.stop - layout.start,
+        "MULTIPLIER": 1 + prepared.run.present.work.state.shape[1] + layout.start,
+        "ROW_OF": place(system.row) if layout.stop > layout.start else 0,
+    }
+    lines = [f"#define {name} {value}" for name, value in numbers.items()]
+    head = ("static const struct { int64_t code, arrays, i0, p0, out, size, second, third; } "
+            "calls[]")  # fmt: skip
+    return [*lines, *_table(head, (f"{{{', '.join(map(str, row))}}}" for row in rows))]
 
 
 def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:

@@ -14,7 +14,7 @@ from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
 from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_header, variables_of
 from dap3d_core.native.exported import Exported
 from dap3d_core.native.fmu import write_fmu
-from dap3d_core.native.outputs import SYMBOL, outputs_of
+from dap3d_core.native.outputs import Outputs, outputs_of
 from dap3d_core.native.parameters import places_of
 from dap3d_core.native.prepared import PreparedRun, refusal
 from dap3d_core.registry import Registry
@@ -85,14 +85,16 @@ def export_native(
     given = scene if isinstance(scene, Scene) else load(scene)
     options = {"allow_code": allow_code, "registry": registry} | settings
     prepared = PreparedRun(given, **options)
-    found, text, left_out = outputs_of(prepared, outputs)
+    given_outputs = outputs_of(prepared, outputs)
+    left_out = given_outputs.left_out
     if strict and left_out:
         raise refusal(left_out[0], "name the outputs to be exported")
-    variables = variables_of(prepared, found, _tunable(prepared, parameters, options))
+    chosen_parameters = _parameters(prepared, parameters, options, given_outputs)
+    variables = variables_of(prepared, given_outputs.found, chosen_parameters)
     _refuse_shared(variables)
     name = re.sub(r"\W+", "_", str(given.name or target.stem), flags=re.ASCII) or "model"
     name = f"_{name}" if name[0].isdigit() else name  # an identifier of C
-    model = Exported(prepared, variables, name, (text, SYMBOL))
+    model = Exported(prepared, variables, name, given_outputs)
     size = _write(model, chosen, target, fmi if format == "fmu" else 0)
     kinds = {"input": ("input",), "parameter": PARAMETERS, "output": ("output",)}
     names = {k: tuple(v.name for v in variables if v.kind in of) for k, of in kinds.items()}
@@ -111,7 +113,7 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
     """Write an FMU of a version, or for 0 a folder; bytes of the largest library."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        (folder / "data.h").write_text(data_of(model.prepared, model.variables))
+        (folder / "data.h").write_text(data_of(model.prepared, model.variables, model.outputs.elements))
         for file in SOURCE.iterdir():
             shutil.copy(file, folder / file.name)
         if fmi:
@@ -125,8 +127,8 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
         return size
 
 
-def _tunable(
-    prepared: PreparedRun, names: Sequence[str], options: dict[str, Any]
+def _parameters(
+    prepared: PreparedRun, names: Sequence[str], options: dict[str, Any], outputs: Outputs
 ) -> list[Variable]:
     """Parameters as variables.
 
@@ -137,7 +139,7 @@ def _tunable(
         parameters = parameters_named(prepared.compiled.checked, names)
     except SceneError as error:
         raise SceneError([attrs.evolve(m, key="parameters") for m in error.mistakes]) from None
-    return [_parameter(prepared, parameter, options) for parameter in parameters]
+    return [_parameter(prepared, parameter, options, outputs) for parameter in parameters]
 
 
 def _refuse_shared(variables: Sequence[Variable]) -> None:
@@ -160,7 +162,7 @@ def _refuse_shared(variables: Sequence[Variable]) -> None:
 
 
 def _parameter(
-    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any]
+    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any], outputs: Outputs
 ) -> Variable:
     """A parameter as a variable.
 
@@ -173,7 +175,7 @@ def _parameter(
             f"{name} is the start of an input, which exported models have as a variable",
             f"set {parameter.path[1]} in its place",
         )
-    places = places_of(prepared, parameter, options)
+    places = places_of(prepared, parameter, options, outputs)
     kind = "fixed" if places.is_fixed else "parameter"
     return Variable(
         name, kind, parameter.unit, f"parameter {name}", int(places.moves_start),

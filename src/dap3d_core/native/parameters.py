@@ -14,6 +14,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.native.outputs import Outputs, outputs_of
 from dap3d_core.native.prepared import PreparedRun, refusal
 from dap3d_core.scene import SceneError
 from dap3d_core.study.batch import initial_state
@@ -43,9 +44,9 @@ class Places:
 
 
 def places_of(
-    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any]
+    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any], outputs: Outputs
 ) -> Places:
-    """Where a parameter of a scene is in the memory of its run.
+    """Where a parameter of a scene is in the memory of its run, which has these outputs.
 
     Raises:
         SceneError: more depends on it than compiled code finds at the start.
@@ -68,6 +69,12 @@ def places_of(
             f"parameter {name} cannot be set in an exported model: it moves a break point of a "
             "function, where steps end",
             "export a model for each value",
+        )
+    if any(outputs_of(one, outputs.names).text != outputs.text for one in others):
+        raise refusal(
+            f"parameter {name} cannot be set in an exported model: outputs depend on it that read "
+            "it as it is in the scene, such as places of points",
+            "leave these outputs out, or export a model for each value",
         )
     words, moved = _words(prepared, others, value, trials)
     if words is None:

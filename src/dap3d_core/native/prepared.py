@@ -201,7 +201,6 @@ class PreparedRun:
         advances: the integration that it begins with; for "auto" the implicit one as well.
         jumps: the law of jumps; None where velocities do not.
         start: how it starts; None where Python alone finds that.
-        image: their memory.
     """
 
     def __init__(
@@ -246,10 +245,16 @@ class PreparedRun:
         self.advances = [Advance.of(one) for one in integrations]
         is_singular = run.singular is not None
         self.start = None if is_singular else StartCode.of(self.evaluator, run.settings)
+        #: Arrays and tables besides: of outputs.
+        self.more: list[Any] = []
+
+    @cached_property
+    def image(self) -> Image:
+        """The memory of the run, once all that it needs is known."""
         parts = [part for one in self.advances for part in one.arguments]
         parts += [] if self.jumps is None else [*self.jumps.arguments]
         parts += [] if self.start is None else [self.start.arrays, self.start.functions]
-        self.image = Image(*parts)
+        return Image(*parts, *self.more)
 
     def _refuse_jumps(self) -> None:
         refuse_contacts(self.evaluator.model, "export")

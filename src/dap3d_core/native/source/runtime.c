@@ -136,6 +136,25 @@ int dap3d_find(const char *name)
     return -1;
 }
 
+#if CALLS
+/* Let the loops of elements that outputs are of run at the bodies as reported. */
+static void call_elements(dap3d_model *m)
+{
+    typedef void (*loop)(double, void *, int64_t, int64_t, int64_t, double *, double *, double *);
+    for (int k = 0; k < MULTIPLIERS; k++)
+        numbers(m, MINUS_LAMBDA)[m->w[ROW_OF + k]] = -m->row[MULTIPLIER + k];
+    for (int k = 0; k < CALLS; k++) {
+        loop code = (loop)(uintptr_t)m->w[calls[k].code];
+        memset(m->w + calls[k].out, 0, 8 * (size_t)calls[k].size);
+        m->w[COUNTER] = 0;
+        code(m->t, m->w + calls[k].arrays, calls[k].i0, calls[k].p0, 1, numbers(m, calls[k].out),
+             numbers(m, calls[k].second), numbers(m, calls[k].third));
+    }
+}
+#else
+static void call_elements(dap3d_model *m) { (void)m; }
+#endif
+
 static void start(dap3d_model *m);
 
 /* The row and the outputs of the present time. */
@@ -148,7 +167,9 @@ static void report(dap3d_model *m)
         memcpy(m->row + 1, y_of(m), 8 * STATES);
     m->row[0] = m->t;
     call(m, REPORT, m->t, m->row + 1, m->row + 1 + STATES, ROW - 1 - STATES);
-    dap3d_outputs(m->t, numbers(m, BODIES), m->row + 1, numbers(m, VALUES), m->outputs);
+    call_elements(m);
+    dap3d_outputs(m->t, numbers(m, BODIES), m->row + 1, numbers(m, VALUES),
+                  numbers(m, VALUES_OF_ELEMENTS), m->outputs);
     m->has_row = 1;
 }
 
