@@ -71,9 +71,8 @@ class UncarriedContact:
         evaluator = self._evaluator
         states, crossing = evaluator.states, np.zeros(len(evaluator.switches))
         crossing[k] = -1.0
-        u = evaluator.hold(evaluator.body_state(y))
         try:
-            jump = self._law.jump(t, u, crossing, crossing, 0.0)
+            jump = self._law.jump(t, evaluator.body_state(y), crossing, crossing, 0.0)
         except ImpossibleJumpError:
             return False
         finally:
