@@ -118,7 +118,7 @@ NOT_CALLED = {
         "study.batch.lanes": "set_lane load next_step run_lanes exchange_kept take_stages "
         "take_rates watch_stages",
         # of scenes with contacts, which have closed forms: verification/test_contacts.py
-        "formulations.contacts.cone": "sweep",
+        "formulations.contacts.cone": "residual_of sweep",
         "formulations.contacts.equations": (
             "accelerate add_columns add_friction force_of friction_of_one has_settled invert "
             "largest_given project report rhs watch"
