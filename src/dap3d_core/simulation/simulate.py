@@ -44,6 +44,8 @@ def simulate(
     events: Sequence[Event] = (),
     watch: Callable[[RunProgress], None] | None = None,
     controllers: "Sequence[Controller]" = (),
+    contact: str | None = None,
+    contact_step: float | None = None,
 ) -> Result:
     """Simulate a scene from t = 0 to t_end; settings left out are those of its [simulation].
 
@@ -58,6 +60,7 @@ def simulate(
         start: "scene", "equilibrium", a result (its end), (result, time) or an ``Equilibrium``.
         progress, watch: called each 0.1 s or so, as progress(t, t_end), with a ``RunProgress``.
         events, controllers: see ``Event`` and ``Controller``.
+        contact, contact_step: "events", "stepping" or "auto"; step of the latter, s.
         output, force: file to write, ``OUTPUT.part`` meanwhile; whether over an existing one.
         estimate_error: estimate ``result.error`` by a second, finer run; "quick": if within 1 s.
         checkpoint: seconds between checkpoints, for ``resume``; inf: one where the run is ended.
@@ -70,7 +73,8 @@ def simulate(
     compiled = compiled_for(scene, method, allow_code, announce, integrator)
     settings = settings_of(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
                          rtol=rtol, atol=atol, step=step, correct=correct, project=project,
-                         correct_metric=correct_metric, start=start_word(start))  # fmt: skip
+                         correct_metric=correct_metric, start=start_word(start), contact=contact,
+                         contact_step=contact_step)  # fmt: skip
     check_checkpoint(checkpoint, output)
     with compiled.borrow_evaluator():
         run = Run(compiled, settings, Callbacks(announce=announce, progress=progress, watch=watch),

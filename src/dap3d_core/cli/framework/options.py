@@ -102,6 +102,11 @@ SETTING_OPTIONS = {
     "start": click.option(
         "--start", type=click.Choice(["scene", "equilibrium"]), default=None,
         help="Start from the scene's initial conditions, or where they come to rest."),
+    "contact": click.option(
+        "--contact", type=click.Choice(["auto", "events", "stepping"]), default=None,
+        help="Follow contacts by events, exact, or by stepping, for any number of them."),
+    "contact_step": click.option("--contact-step", type=float, metavar="S",
+                                 help="Step of --contact stepping in s; 1e-3 by default."),
     "project": click.option("--project/--no-project", default=None,
                             help="Project every step onto the constraints."),
 }  # fmt: skip

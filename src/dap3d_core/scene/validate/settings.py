@@ -6,6 +6,7 @@ from typing import Any
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.errors import MISSING, Key, MistakeList
 from dap3d_core.scene.scene import (
+    CONTACT_ENGINES,
     FIXED_STEP,
     HEADER_KEYS,
     INTEGRATORS,
@@ -85,6 +86,8 @@ _READERS: dict[str, Callable[[Any], Any]] = {
     "correct": truth_of,
     "project": truth_of,
     "start": lambda v: word_of(v, STARTS),
+    "contact": lambda v: word_of(v, CONTACT_ENGINES),
+    "contact_step": _time,
     "correct_metric": lambda v: word_of(v, CORRECT_METRICS),
     "alpha": _positive,
     "Omega": _positive,
