@@ -270,6 +270,8 @@ class _Part:
         scene.included |= files | ({self.name: file} if file else {})
         scene.faults += [self._fault(key, mistake) for key, mistake in self.part.faults]
         scene.notes += [f"{self.name}: {note}" for note in self.part.notes]
+        if self.part.collisions is not None:
+            scene.notes.append(f"{self.name}: [collisions] left out; that of the whole scene holds")
         if self._left_out:
             scene.notes.append(
                 f"{self.name}: {', '.join(self._left_out)} left out, which names no part of the "
@@ -338,6 +340,8 @@ class _Part:
             fields["points"] = tuple(map(put.position, fields["points"]))
         if "axis" in known:
             fields["axis"] = put.direction(fields.get("axis", AXES["z"]))
+        if "normal" in known:
+            fields["normal"] = put.direction(fields.get("normal", AXES["z"]))
         if "p" in known and not isinstance(p := put.orientation(fields), Fault):
             fields["p"] = p
 

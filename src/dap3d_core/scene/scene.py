@@ -4,6 +4,7 @@ Values are stored as plain Python (arrays and lists become tuples); ``check`` va
 """
 
 from functools import cache
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import attrs
 
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import plain, with_identifiers
-from dap3d_core.scene.contacts.tables import ContactTables, Material
+from dap3d_core.scene.contacts.tables import Collisions, ContactTables, Material
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Key, Mistake, MistakeList, SceneError
 from dap3d_core.settings import SETTINGS
@@ -132,6 +133,8 @@ class Simulation:
     hold: Any = attrs.field(default=SETTINGS["hold"].default, converter=plain)
     correct_metric: Any = attrs.field(default=SETTINGS["correct_metric"].default, converter=plain)
     start: Any = attrs.field(default=SETTINGS["start"].default, converter=plain)
+    contact: Any = attrs.field(default=SETTINGS["contact"].default, converter=plain)
+    contact_step: Any = attrs.field(default=SETTINGS["contact_step"].default, converter=plain)
     alpha: Any = attrs.field(default=SETTINGS["alpha"].default, converter=plain)
     Omega: Any = attrs.field(default=SETTINGS["Omega"].default, converter=plain)
     mu: Any = attrs.field(default=SETTINGS["mu"].default, converter=plain)
@@ -140,7 +143,12 @@ class Simulation:
 @cache
 def keys_of(class_: type) -> frozenset[str]:
     """The keys that a table of the scene file may hold, given the class it becomes."""
-    return frozenset(a.name for a in attrs.fields(class_)) - {"name"}
+    return frozenset(a.name.rstrip("_") for a in attrs.fields(class_)) - {"name"}
+
+
+def entry_of(class_: type, name: str, fields: dict[str, Any]) -> Any:
+    """An entry of a table; a key that is a word of Python has an underscore in its class."""
+    return class_(name, **{f"{k}_" if iskeyword(k) else k: v for k, v in fields.items()})
 
 
 HEADER_KEYS = frozenset({"name", "description", "schema"})
@@ -165,6 +173,7 @@ TABLES = (
     "parameters",
     *NAMED,
     "outputs",
+    "collisions",
     "animation",
     "simulation",
 )
@@ -182,6 +191,7 @@ class Scene(SceneDisplay, ContactTables):
         requires: ranges of versions of the distributions that bring its types, by name.
         parameters: numbers by name, for expressions in place of numbers (text that begins with =).
         outputs: expressions of quantities, by name; or tables of ``value`` and ``unit``.
+        collisions: which shapes that collide meet each other; None where the scene says nothing.
         animation, simulation: points to draw; settings of a run.
         path: the file this was read from, or None.
         faults: mistakes found in reading (unknown keys, wrong tables); ``check`` reports them.
@@ -206,6 +216,7 @@ class Scene(SceneDisplay, ContactTables):
     requires: dict[str, Any] = attrs.Factory(dict)
     parameters: dict[str, Any] = attrs.Factory(dict)
     outputs: dict[str, Any] = attrs.Factory(dict)
+    collisions: Collisions | None = None
     animation: Animation = attrs.Factory(Animation)
     simulation: Simulation = attrs.Factory(Simulation)
     path: Path | None = attrs.field(default=None, eq=False)
@@ -330,7 +341,9 @@ class Scene(SceneDisplay, ContactTables):
         return self._add("inputs", name, {"value": value} | unknown)
 
     def add_shape(self, type: str, name: str | None = None, **fields: Any) -> str:
-        """Add a shape that is drawn (box, sphere, cylinder, cone, disk, line, mesh); its name.
+        """Add a shape (box, sphere, capsule, cylinder, plane, cone, disk, line, mesh); its name.
+
+        It is drawn; with ``collides=True`` one of the first five meets others that do.
 
         Raises:
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
@@ -409,13 +422,13 @@ class Scene(SceneDisplay, ContactTables):
 
     def _add(self, table: str, name: str, fields: dict[str, Any]) -> str:
         named, class_ = getattr(self, table), NAMED[table]
-        name, fields = plain(name), plain(fields)
+        name, fields = plain(name), {k.rstrip("_"): plain(v) for k, v in fields.items()}
         self._check_name(table, named, name)
         if not fields.keys() <= keys_of(class_):
             mistakes = MistakeList()
             mistakes.add_unknown_keys((table, name), fields, keys_of(class_))
             mistakes.raise_mistakes()
-        named[name] = class_(name, **{k: v for k, v in fields.items() if v is not None})
+        named[name] = entry_of(class_, name, {k: v for k, v in fields.items() if v is not None})
         return name
 
     def _add_element(self, table: str, type_: Any, name: str | None, fields: dict[str, Any]) -> str:
