@@ -193,6 +193,7 @@ def test_ctrl_c_while_options_are_parsed_is_an_interruption(monkeypatch, capfd):
 linux = pytest.mark.skipif(not Path("/proc").exists(), reason="limits as Linux has them")
 
 
+@pytest.mark.every(5)
 @linux
 @pytest.mark.parametrize("limit", [150_000, 200_000, 250_000, 300_000, 350_000])
 def test_a_limit_on_memory_is_named(scene_file, limit):

@@ -30,6 +30,7 @@ def test_every_target_is_tried():
     assert COUNTS.keys() == TARGETS.keys()
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", COUNTS)
 def test_some_inputs(name):
     TARGETS[name].run(0, COUNTS[name][0], derandomize=True)

@@ -19,6 +19,7 @@ def arrays(result):
     return [array.tobytes() for array in result.arrays.columns()]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "settings",
     [
@@ -49,6 +50,7 @@ def test_values_are_those_of_the_run_alone_and_derivatives_agree(settings):
         )
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("scene", "by"),
     [
