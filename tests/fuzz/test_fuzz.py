@@ -22,7 +22,7 @@ COUNTS = {
     "expressions": (20, 250),
     "commands": (3, 15),
     "programs": (3, 20),
-    "contacts": (1, 25),
+    "contacts": (1, 10),
 }
 
 
