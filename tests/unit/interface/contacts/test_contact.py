@@ -11,6 +11,7 @@ from dap3d_core.registry import load_registry
 from dap3d_core.testing.kit import checks_for
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("keyword", ["ball_ball", "ball_box", "ball_cylinder", "ball_plane", "box_plane", "capsule_plane",
      "cylinder_plane"])
 def test_rows_of_the_standard_types_are_exact_derivatives(keyword):
