@@ -1,4 +1,4 @@
-"""A vibrating incline, grooves and boxes: tasks of engineers, said with the types that there are."""
+"""A vibrating incline, grooves and boxes: tasks of engineers, said with standard types."""
 
 import numpy as np
 import pytest
