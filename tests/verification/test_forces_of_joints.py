@@ -155,5 +155,5 @@ def test_a_hinge_is_stopped_and_rubs_by_name():
 def test_half_of_what_an_angle_is_measured_by_is_refused(fields):
     scene = hinge(0.3, 2.0)
     scene.add_force("rot_sda", "spring", k=1.0, **fields)
-    with pytest.raises(dap.SceneError, match="give joint, or v_i and v_j|axis: is required"):
+    with pytest.raises(dap.SceneError, match=r"give joint, or v_i and v_j|axis: is required"):
         dap.compile(scene)

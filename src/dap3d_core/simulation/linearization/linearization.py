@@ -201,9 +201,7 @@ class Linearization:
         try:
             import control
         except ImportError as error:
-            raise ImportError(
-                "to_control needs python-control: pip install 'dap3d[control]'"
-            ) from error
+            raise ImportError("to_control needs python-control: pip install control") from error
         states = [f"xi{k + 1}" for k in range(self.coordinate_count)]
         own = len(self.element_states)
         states += [f"eta{k + 1}" for k in range(self.state_count - len(states) - own)]
