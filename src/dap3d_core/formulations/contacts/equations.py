@@ -174,7 +174,11 @@ def force_of(t: float, c: int, force: Floats, out: Floats, system: System, loops
 @compiled
 def friction_of_one(t: float, c: int, own: Floats, system: System, loops: Any) -> None:
     """Scaled friction of contact c by a normal force of one alone, and its power, into ``own``."""
-    size, states, near = system.acceleration.shape[0], system.states, system.contacts[c, STATE] + NEAR
+    size, states, near = (
+        system.acceleration.shape[0],
+        system.states,
+        system.contacts[c, STATE] + NEAR,
+    )
     given = states[near], states[near + 1], states[near + 2]
     states[near] = states[near + 1] = states[near + 2] = 0.0
     zero(own)

@@ -202,7 +202,7 @@ class ContactJumps(Jumps):
             ) from error
         held = [c for c in closed if modes.mode[c] > 0.5]
         others = [c for c in closed if modes.mode[c] < 0.5]
-        rows.v += rows.lifted(rows.slip[:, 0], held, others)
+        rows.change(rows.lifted(rows.slip[:, 0], held, others))
         gaps = np.where(np.abs(outputs[:, GAP]) < touching, outputs[:, GAP], 0.0)
         moved = rows.lifted(gaps, held, others, 2.0 * POSITION_ROUNDING * evaluator.model.length)
         states = evaluator.states.copy()
