@@ -151,11 +151,11 @@ def compiled(text: str, symbols: Sequence[str], target: Platform) -> bytes:
 
 
 def build_objects(
-    units: Sequence[Unit], outputs: tuple[str, str], target: Platform, folder: Path
+    units: Sequence[Unit], texts: Sequence[tuple[str, str]], target: Platform, folder: Path
 ) -> list[Path]:
-    """Object files of units and of the function (LLVM IR, symbol) of outputs, in a folder."""
+    """Object files of units and of further functions (LLVM IR, symbol), in a folder."""
     codes = [object_of(unit, target) for unit in units]
-    codes.append(compiled(outputs[0], [outputs[1]], target))
+    codes += [compiled(text, [symbol], target) for text, symbol in texts]
     files = []
     for k, code in enumerate(codes):
         files.append(folder / f"unit{k}.o")

@@ -12,6 +12,7 @@ import attrs
 
 from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
 from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_header, variables_of
+from dap3d_core.native.directions import Directions
 from dap3d_core.native.exported import Exported
 from dap3d_core.native.fmu import write_fmu
 from dap3d_core.native.outputs import Outputs, outputs_of
@@ -89,12 +90,13 @@ def export_native(
     left_out = given_outputs.left_out
     if strict and left_out:
         raise refusal(left_out[0], "name the outputs to be exported")
+    directions = Directions.of(prepared, given_outputs)
     chosen_parameters = _parameters(prepared, parameters, options, given_outputs)
     variables = variables_of(prepared, given_outputs.found, chosen_parameters)
     _refuse_shared(variables)
     name = re.sub(r"\W+", "_", str(given.name or target.stem), flags=re.ASCII) or "model"
     name = f"_{name}" if name[0].isdigit() else name  # an identifier of C
-    model = Exported(prepared, variables, name, given_outputs)
+    model = Exported(prepared, variables, name, given_outputs, directions)
     size = _write(model, chosen, target, fmi if format == "fmu" else 0)
     kinds = {"input": ("input",), "parameter": PARAMETERS, "output": ("output",)}
     names = {k: tuple(v.name for v in variables if v.kind in of) for k, of in kinds.items()}
@@ -113,7 +115,8 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
     """Write an FMU of a version, or for 0 a folder; bytes of the largest library."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        (folder / "data.h").write_text(data_of(model.prepared, model.variables, model.outputs.elements))
+        given = model.prepared, model.variables, model.outputs.elements, model.directions
+        (folder / "data.h").write_text(data_of(*given))
         for file in SOURCE.iterdir():
             shutil.copy(file, folder / file.name)
         if fmi:
