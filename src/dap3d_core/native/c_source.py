@@ -15,10 +15,10 @@ from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, W
-from dap3d_core.native.directions import Directions
-from dap3d_core.native.elements import Elements
-from dap3d_core.native.outputs import Output
-from dap3d_core.native.prepared import Advance, PreparedRun
+from dap3d_core.native.run.directions import Directions, PairEntry, PairUnit
+from dap3d_core.native.run.elements import Elements
+from dap3d_core.native.run.outputs import Output
+from dap3d_core.native.run.prepared import Advance, PreparedRun
 from dap3d_core.study.batch import initial_state
 
 KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator", "fixed")
@@ -85,20 +85,21 @@ def _state_units(prepared: PreparedRun) -> list[str]:
     return [units.get(q, "1") for q in prepared.evaluator.coordinates.quantities]
 
 
-def symbols_of(unit: Unit) -> list[str]:
+def symbols_of(unit: Unit | PairUnit) -> list[str]:
     """C names of the functions of a unit in an exported model."""
     digest = hashlib.sha256(unit.name.encode()).hexdigest()[:16]
     return [f"dap3d_{digest}_{k}" for k in range(len(unit.symbols))]
 
 
-def symbol_of(entry: Entry) -> str:
+def symbol_of(entry: Entry | PairEntry) -> str:
     """The C name of a function."""
     return symbols_of(entry.unit)[entry.k]
 
 
-def units_of(prepared: PreparedRun, directions: Directions | None) -> list[Unit]:
+def units_of(prepared: PreparedRun, directions: Directions | None) -> list[Unit | PairUnit]:
     """The units of compiled code that a run calls, each once."""
-    entries = [*prepared.image.functions.values(), *(one.entry for one in prepared.advances)]
+    entries: list[Entry | PairEntry] = list(prepared.image.functions.values())
+    entries += [one.entry for one in prepared.advances]
     entries += [prepared.jumps.entry] if prepared.jumps else []
     entries += directions.entries if directions else []
     return list({entry.unit.name: entry.unit for entry in entries}.values())
@@ -322,17 +323,17 @@ def _directions(
     four = "void *, void *, void *, void *"
     given = [arrays, prepared.functions, evaluator.system, evaluator.loops]
     for name, entry in (("rates", directions.rates), ("report", directions.report)):
-        words = ", ".join(f"x + {2 * place(part)}" for part in given)
-        lines += [f"void {symbol_of(entry)}({four});",
-                  f"static void {name}_along(double *x) {{ {symbol_of(entry)}({words}); }}"]  # fmt: skip
+        words, symbol = ", ".join(f"x + {2 * place(part)}" for part in given), symbol_of(entry)
+        lines.append(f"void {symbol}({four});")
+        lines.append(f"static void {name}_along(double *x) {{ {symbol}({words}); }}")
     lines.append("static void elements_along(double *x)\n{\n    (void)x;")
-    for call, entry in zip(elements.calls, directions.elements, strict=True):
-        words = [f"x + {2 * place(part)}"
-                 for part in (arrays, elements.arrays, call.table, call.arrays)]  # fmt: skip
+    for call, one in zip(elements.calls, directions.elements, strict=True):
+        parts = arrays, elements.arrays, call.table, call.arrays
         more = [call.q, *call.group, call.first, *call.more]
-        lines.append(f"    void {symbol_of(entry)}({four}, {', '.join(['int64_t'] * 6)});")
-        lines.append(f"    {symbol_of(entry)}({', '.join([*words, *map(str, more)])});")
-    return [*lines, "}", f"void {directions.symbol}(double *, double *, double *, double *, double *);"]
+        all_words = [*(f"x + {2 * place(part)}" for part in parts), *map(str, more)]
+        lines.append(f"    void {symbol_of(one)}({four}, {', '.join(['int64_t'] * 6)});")
+        lines.append(f"    {symbol_of(one)}({', '.join(all_words)});")
+    return [*lines, "}", f"void {directions.symbol}({', '.join(['double *'] * 5)});"]
 
 
 def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:

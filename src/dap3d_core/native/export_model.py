@@ -8,7 +8,7 @@ from typing import Any
 from dap3d_core.formats.export_model import ExportReport
 from dap3d_core.formats.export_model import export_model as export_text
 from dap3d_core.native.export import NATIVE_FORMATS, NativeExport, export_native
-from dap3d_core.native.prepared import refusal
+from dap3d_core.native.run.prepared import refusal
 from dap3d_core.registry import Registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene import Scene

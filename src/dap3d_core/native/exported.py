@@ -6,9 +6,9 @@ import attrs
 
 from dap3d_core.native.build import Platform, build_objects, link
 from dap3d_core.native.c_source import Variable, units_of
-from dap3d_core.native.directions import Directions
-from dap3d_core.native.outputs import SYMBOL, Outputs
-from dap3d_core.native.prepared import PreparedRun
+from dap3d_core.native.run.directions import Directions
+from dap3d_core.native.run.outputs import SYMBOL, Outputs
+from dap3d_core.native.run.prepared import PreparedRun
 
 
 @attrs.frozen

@@ -149,13 +149,13 @@ def test_directional_derivatives(tmp_path, fmi):
 
 
 def test_event_mode_and_early_return(tmp_path):
-    """A function that takes another form at 0.4 s: a step to 1 s ends there, and the next one not."""
+    """A function that takes another form at 0.4 s and 0.7 s: a step to 1 s ends there."""
     scene = _written(SPRING, tmp_path)
     scene.add_function("step", "push", x_start=0.4, x_end=0.7, f_start=6.0, f_end=0.0)
     scene.add_force("f", "pushed", body_i="cart", f=(1.0, 0.0, 0.0), function="push")
     made = written(scene, tmp_path, outputs=["cart.r.x"])
     fmu, _ = begun(made, tmp_path, 3, eventModeUsed=True, earlyReturnAllowed=True)
-    needs, states, nominals, *_, next_event = fmu.updateDiscreteStates()
+    needs, *_, next_event = fmu.updateDiscreteStates()
     assert (needs, next_event) == (False, 0.4)
     fmu.enterStepMode()
     assert fmu.doStep(0.0, 0.3) == (False, False, False, 0.3)

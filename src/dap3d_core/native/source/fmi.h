@@ -216,7 +216,7 @@ static fmi_status fmi_indicators(fmu *f, double *values, size_t count)
     return fmi_ok;
 }
 
-static size_t fmi_state_size(void) { return sizeof(fmu_state) + sizeof(dap3d_model); }
+static size_t fmi_state_size(void) { return sizeof(fmu_state) + dap3d_state_size(); }
 
 static void fmi_keep(const fmu *f, char *bytes)
 {

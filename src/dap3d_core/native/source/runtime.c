@@ -42,10 +42,8 @@ struct dap3d_model {
     double sides[SWITCHES + 1]; /* of indicators, for integrators of others */
     double row[ROW + 1];     /* t, y and report at the present time */
     double outputs[OUTPUTS + 1];
-    int64_t w[WORDS];        /* the memory of the run */
-#if DIRECTIONS
-    double wide[2 * WORDS];  /* the same with slopes, for directional derivatives */
-#endif
+    int64_t w[WORDS];        /* the memory of the run: the state of it ends here */
+    double wide[DIRECTIONS ? 2 * WORDS : 1]; /* the same with slopes, for directional derivatives */
 };
 
 typedef void (*function)(double, const double *, int64_t, double *, int64_t, void *, void *);
@@ -716,11 +714,11 @@ int dap3d_step_to(dap3d_model *m, double t)
 
 /* ---------------------------------------------------------------------- states of a run */
 
-size_t dap3d_state_size(void) { return sizeof(dap3d_model); }
+size_t dap3d_state_size(void) { return offsetof(dap3d_model, wide); }
 
 int dap3d_save(const dap3d_model *m, void *state)
 {
-    memcpy(state, m, sizeof *m);
+    memcpy(state, m, dap3d_state_size());
     return DAP3D_OK;
 }
 
@@ -730,7 +728,7 @@ int dap3d_load(dap3d_model *m, const void *state)
     memcpy(&identity, state, sizeof identity);
     if (identity != IDENTITY)
         return fail(m, DAP3D_INVALID, "the state is not one of this model");
-    memcpy(m, state, sizeof *m);
+    memcpy(m, state, dap3d_state_size());
     place(m);
     return DAP3D_OK;
 }

@@ -1,4 +1,4 @@
-"""Directional derivatives: those of differences, of outputs and rates by states, inputs, numbers."""
+"""Directional derivatives, against differences and closed forms."""
 
 import numpy as np
 import pytest

@@ -22,8 +22,8 @@ from dap3d_core.kernels.compiler.trace import NumberArray, Tracer
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R, V, W
 from dap3d_core.model.joint_angles import joint_angle_name
 from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
-from dap3d_core.native.elements import Element, Elements
-from dap3d_core.native.prepared import PreparedRun, refusal
+from dap3d_core.native.run.elements import Element, Elements
+from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.result import Result, ResultError, RunMetadata
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.quantities.catalogue import ACTIONS
@@ -238,9 +238,7 @@ class _Quantities:
         """D^T lambda on the body of a slot: force and moment."""
         Lam, place = self._multipliers(joint), element.place(slot)
         first = element.first + 6 * len(Lam) * place
-        column = [
-            tuple(self._values[first + 6 * r + v] for r in range(len(Lam))) for v in range(6)
-        ]
+        column = [tuple(self._values[first + 6 * r + v] for r in range(len(Lam))) for v in range(6)]
         return tuple(_dot(rows, Lam) for rows in column)
 
     def _wrench(self, element: Element, slot: str) -> tuple[Any, ...]:

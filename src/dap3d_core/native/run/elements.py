@@ -14,7 +14,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, loop_list
 from dap3d_core.model.groups import Group
-from dap3d_core.native.prepared import PreparedRun
+from dap3d_core.native.run.prepared import PreparedRun
 from dap3d_core.result.post.force_output import group_of
 
 
@@ -22,7 +22,7 @@ from dap3d_core.result.post.force_output import group_of
 class ElementArrays(Arrays):
     """What loops of elements write."""
 
-    values: Floats  # of all calls, one behind the other; -lambda in the order of the solver; scratch
+    values: Floats  # -lambda in the order of the solver, scratch; then of all calls
 
 
 @attrs.frozen(eq=False)
@@ -121,8 +121,8 @@ class Elements:
         evaluator, s = self._evaluator, self._evaluator.system
         joint = evaluator.model.joint_names.index(name)
         for q, (kind, group) in enumerate(evaluator.loop_groups):
-            places = np.flatnonzero(group.members == joint) if kind == "acceleration" else ()
-            if not len(places):
+            places = np.flatnonzero(group.members == joint)
+            if kind != "acceleration" or not places.size:
                 continue
             index, rows = int(places[0]), int(evaluator.model.joint_rows[joint])
             slots, width = len(group.type_info.layout.slots), stride(group.type_info)

@@ -1,8 +1,8 @@
 """Directional derivatives of an exported model, by the code of its run in differentiated form.
 
 Each number of the memory becomes a value and one slope (kernels/compiler/derivatives.py). So there
-is a second memory, of pairs: word k of the first is words 2 k and 2 k + 1 of it. Tables of addresses
-stand where those of the first would; integers are read from the first.
+is a second memory, of pairs: word k of the first is words 2 k and 2 k + 1 of it. Tables of
+addresses stand where those of the first would; integers are read from the first.
 """
 
 from collections.abc import Sequence
@@ -15,13 +15,12 @@ from dap3d_core.formulations import REPORT, RHS
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.compiler.types import INT, CompileError
-from dap3d_core.kernels.compiler.units import Entry, type_of
+from dap3d_core.kernels.compiler.units import Entry, Unit, type_of
 from dap3d_core.kernels.runtime.array_struct import Arrays, pointer
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.runtime.lanes import differentiated
-from dap3d_core.native.image import Image
-from dap3d_core.native.outputs import SYMBOL, Outputs
-from dap3d_core.native.prepared import PreparedRun
+from dap3d_core.native.run.image import Image
+from dap3d_core.native.run.outputs import SYMBOL, Outputs
+from dap3d_core.native.run.prepared import PreparedRun
 
 #: A number and its slope.
 PAIR = 2
@@ -61,6 +60,36 @@ def element_along(
     loop, v = loops[q], values.values
     one, two, three = v[first:], v[second:], v[third:]
     loop(place.row[0], arrays, i0, p0, 1, pointer(one), pointer(two), pointer(three))
+
+
+class PairUnit:
+    """A unit in differentiated form, which is written for the linker and not loaded here.
+
+    Attributes:
+        name, symbols: as of ``Unit``.
+    """
+
+    def __init__(self, unit: Unit) -> None:
+        """Args: the unit."""
+        self._unit = unit
+        self.name, self.symbols = f"{unit.name}-d{PAIR}", unit.symbols
+
+    def write(self, symbols: list[str]) -> tuple[str, list[Any]]:
+        """As of ``Unit``."""
+        return differentiate(self._unit.fresh_text(symbols), PAIR), []
+
+
+@attrs.frozen(eq=False)
+class PairEntry:
+    """A function of such a unit, by its number."""
+
+    unit: PairUnit
+    k: int
+
+    @classmethod
+    def of(cls, entry: Entry) -> "PairEntry":
+        """The differentiated form of a function."""
+        return cls(PairUnit(entry.unit), entry.k)
 
 
 class Directions:
@@ -108,22 +137,22 @@ class Directions:
             return None
 
     @property
-    def entries(self) -> list[Entry]:
+    def entries(self) -> list[PairEntry]:
         """All functions that are called."""
         return [self.rates, self.report, *self.elements, *self.codes.values()]
 
     @property
-    def codes(self) -> dict[int, Entry]:
+    def codes(self) -> dict[int, PairEntry]:
         """Word of the second memory -> function whose address stands there."""
         image = self._prepared.image
         return {
-            PAIR * image.at(table) + k: differentiated(entry, PAIR)
+            PAIR * image.at(table) + k: PairEntry.of(entry)
             for table in self._tables
             for k, entry in enumerate(table.entries)
         }
 
     def tables(self) -> tuple[list[tuple[int, int, int]], list[tuple[int, int]]]:
-        """Addresses in the second memory (word, word that it is of, which memory: 1 or 2), shapes."""
+        """Addresses in the second memory (word, what it points to: word, memory 1 or 2), shapes."""
         image, arrays = self._prepared.image, self._elements.arrays
         roots: Sequence[Any] = [
             self.arrays, self._prepared.evaluator.system,
@@ -136,9 +165,9 @@ class Directions:
         return addresses, shapes
 
 
-def _pair(function: Any, given: Sequence[Any], integers: int = 0) -> Entry:
+def _pair(function: Any, given: Sequence[Any], integers: int = 0) -> PairEntry:
     types = [*map(type_of, given), *[INT] * integers]
-    return differentiated(function.compile(types), PAIR)
+    return PairEntry.of(function.compile(types))
 
 
 def _add(
