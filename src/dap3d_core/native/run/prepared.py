@@ -26,7 +26,7 @@ from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.model.knots import breaks_of
 from dap3d_core.model.state_layout import y_from_u
-from dap3d_core.native.image import Image
+from dap3d_core.native.run.image import Image
 from dap3d_core.registry import Registry
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
