@@ -5,12 +5,12 @@ import math
 import pytest
 
 import dap3d_core as dap
+from dap3d_contacts.box_box import BoxBox, part_of
 from dap3d_core.interface import Contact, PluginError, Point, examine, number, point
 from dap3d_core.interface.contacts.rates import rate_of
 from dap3d_core.kernels import acos, asin, atan, cos, exp, log, scale, sin, sqrt, tan, where
 from dap3d_core.registry import load_registry
 from dap3d_core.testing.kit import checks_for
-from dap3d_contacts.box_box import BoxBox, part_of
 
 
 @pytest.mark.every(4)
