@@ -10,7 +10,7 @@ from dap3d_core.formats.export_model import export_model as export_text
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import ResultExporter
 from dap3d_core.native.export import NATIVE_FORMATS, NativeExport, export_native
-from dap3d_core.native.prepared import refusal
+from dap3d_core.native.run.prepared import refusal
 from dap3d_core.registry import Registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.extensions import extensions

@@ -25,6 +25,7 @@ def described(keyword, *options, width=80):
     return done.output
 
 
+@pytest.mark.every(6)
 @long_in_plain_python
 @each
 def test_the_example_of_every_type_runs(kind, keyword, tmp_path):
@@ -39,6 +40,7 @@ def test_the_example_of_every_type_runs(kind, keyword, tmp_path):
     assert keyword in {element["type"] for element in used}
 
 
+@pytest.mark.every(6)
 @each
 def test_every_type_is_described(kind, keyword):
     """Fields with unit, default and meaning, in 60 columns; the docstring; where it is; in JSON."""
