@@ -14,6 +14,7 @@ from dap3d_core.scene.coerce import plain, with_identifiers
 from dap3d_core.scene.contacts.tables import ContactTables, Material
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Key, Mistake, MistakeList, SceneError
+from dap3d_core.settings import SETTINGS
 
 #: The newest version of the scene file that this program reads.
 SCHEMA = 1
@@ -21,14 +22,6 @@ SCHEMA = 1
 SCENE_FILE, PLUGIN_FILE = "scene.toml", "plugin.py"
 #: The body that is always there.
 GROUND = "ground"
-
-#: Values of ``method`` and ``integrator``: "auto", and names of formulations and integrators.
-METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq", "joint")
-INTEGRATORS = ("auto", "dopri5", "dop853", "adams", "rk4", "radau")
-#: Values of ``start``: the initial conditions of the scene, or where it comes to rest.
-STARTS = ("scene", "equilibrium")
-#: Integrators without an error estimate, which need a step; integrators that take none.
-FIXED_STEP, NO_STEP = ("rk4",), ("adams",)
 
 ZERO = (0.0, 0.0, 0.0)
 NO_TURN = (1.0, 0.0, 0.0, 0.0)
@@ -125,38 +118,23 @@ class Animation:
 
 @attrs.define
 class Simulation:
-    """Settings of a run.
+    """Settings of a run: what each is, its default and what is allowed stand in ``SETTINGS``."""
 
-    Attributes:
-        t_end: final time, s; None where the scene leaves it open.
-        dt: reporting step, s; None where the scene leaves it open.
-        method: formulation, or "auto".
-        integrator: method of integration.
-        rtol, atol: relative and absolute tolerance of a step; atol of all, or by quantity.
-        step: step of an integrator with fixed steps, s, or None.
-        correct: initial positions and velocities are corrected to satisfy the constraints.
-        project: states are projected on the constraints during the run.
-        hold: names of bodies that the correction does not move.
-        start: "scene" or "equilibrium", where a run starts.
-        correct_metric: "unit" or "mass", the norm of the least correction.
-        alpha, Omega, mu: parameters of the penalty formulation.
-    """
-
-    t_end: Any = attrs.field(default=None, converter=plain)
-    dt: Any = attrs.field(default=None, converter=plain)
-    method: Any = attrs.field(default="auto", converter=plain)
-    integrator: Any = attrs.field(default="dop853", converter=plain)
-    rtol: Any = attrs.field(default=1e-8, converter=plain)
-    atol: Any = attrs.field(default=None, converter=plain)
-    step: Any = attrs.field(default=None, converter=plain)
-    correct: Any = attrs.field(default=True, converter=plain)
-    project: Any = attrs.field(default=True, converter=plain)
-    hold: Any = attrs.field(default=(), converter=plain)
-    correct_metric: Any = attrs.field(default="unit", converter=plain)
-    start: Any = attrs.field(default="scene", converter=plain)
-    alpha: Any = attrs.field(default=1e7, converter=plain)
-    Omega: Any = attrs.field(default=10.0, converter=plain)
-    mu: Any = attrs.field(default=1.0, converter=plain)
+    t_end: Any = attrs.field(default=SETTINGS["t_end"].default, converter=plain)
+    dt: Any = attrs.field(default=SETTINGS["dt"].default, converter=plain)
+    method: Any = attrs.field(default=SETTINGS["method"].default, converter=plain)
+    integrator: Any = attrs.field(default=SETTINGS["integrator"].default, converter=plain)
+    rtol: Any = attrs.field(default=SETTINGS["rtol"].default, converter=plain)
+    atol: Any = attrs.field(default=SETTINGS["atol"].default, converter=plain)
+    step: Any = attrs.field(default=SETTINGS["step"].default, converter=plain)
+    correct: Any = attrs.field(default=SETTINGS["correct"].default, converter=plain)
+    project: Any = attrs.field(default=SETTINGS["project"].default, converter=plain)
+    hold: Any = attrs.field(default=SETTINGS["hold"].default, converter=plain)
+    correct_metric: Any = attrs.field(default=SETTINGS["correct_metric"].default, converter=plain)
+    start: Any = attrs.field(default=SETTINGS["start"].default, converter=plain)
+    alpha: Any = attrs.field(default=SETTINGS["alpha"].default, converter=plain)
+    Omega: Any = attrs.field(default=SETTINGS["Omega"].default, converter=plain)
+    mu: Any = attrs.field(default=SETTINGS["mu"].default, converter=plain)
 
 
 @cache

@@ -14,7 +14,7 @@ from dap3d_core.model.state_layout import split
 #: Numbers that the kernel ``tension`` of a contact returns (interface/contacts/rows.py).
 GAP, NORMAL = 0, 1
 FRICTION, SLIP, PLACE = slice(2, 5), slice(5, 8), slice(8, 11)
-WIDTH = 11
+REACH, WIDTH = 11, 12
 
 
 class ContactTable:

@@ -29,7 +29,7 @@ MANY_BODIES = 150
 #: Modes of such scenes by default.
 FEW_MODES = 10
 #: A real part below this part of the magnitude, or of the largest terms, is zero but for rounding.
-ROUNDING = 1e-9, 1e-12
+REAL_PART_ROUNDING = 1e-9, 1e-12
 #: Eigenvalues within this part of i Omega are drifts of free bodies, seen from axes that turn.
 DRIFT = 1e-5
 
@@ -325,7 +325,7 @@ class Linearization:
         values = self.eigenvalues
         for rate in self._point.frames.drift:  # a double eigenvalue, which rounding splits
             values = values[np.abs(np.abs(values.imag) - rate) + np.abs(values.real) > DRIFT * rate]
-        own, all_of_them = ROUNDING
+        own, all_of_them = REAL_PART_ROUNDING
         equations = self._point.equations
         size = max(float(np.sqrt(abs(equations.K).max())), float(abs(equations.C).max()))
         return bool(np.all(values.real <= own * np.abs(values) + all_of_them * size))

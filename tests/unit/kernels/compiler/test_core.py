@@ -119,7 +119,15 @@ NOT_CALLED = {
         "take_rates watch_stages",
         # of scenes with contacts, which have closed forms: verification/test_contacts.py
         "formulations.common.switching_functions": "contact_rates watch_contacts",
-        "formulations.contacts.cone": "sweep",
+        # of jumps with closed forms: formulations/jumps/test_law.py, simulation/events/test_jumps.py
+        "formulations.jumps.multipliers": "rotate",
+        "formulations.jumps.rounds": "kick has_crossed stop",
+        "formulations.jumps.held_joints": "place_alone solve_free",
+        "formulations.contacts.cone": "residual_of sweep",
+        "formulations.contacts.equations": (
+            "accelerate add_columns add_friction force_of friction_of_one has_settled invert "
+            "largest_given project report rhs watch"
+        ),
         # of runs with derivatives: study/sensitivities compares their values with those without
         "integrators.stepping.integration": "project_here",
     }.items()
