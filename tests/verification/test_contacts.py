@@ -11,7 +11,7 @@ import dap3d_core as dap
 
 G = 9.81
 TOLERANCE = 1e-9
-INTEGRATORS = ("dop853", "adams", "dopri5")
+INTEGRATORS = ("dop853", "adams", "dopri5", "radau")
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}
 
 

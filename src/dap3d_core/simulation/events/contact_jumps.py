@@ -120,8 +120,8 @@ class ContactJumps(Jumps):
             raise SimulationError(
                 f"the run stopped at t = {t:.9g} s: {steps - before} steps brought it on by "
                 f"{t - since:.2g} s, with contacts {', '.join(names)} closed; {slowest}slip that "
-                "turns while it is next to nothing asks for steps as short. A larger mu_s, above "
-                "mu, lets it begin at once; or end the run by an event before"
+                "turns while it is next to nothing asks for steps as short. Integrator radau may "
+                "pass; a larger mu_s, above mu, lets it begin at once; or end the run by an event"
             )
 
     def _refuse_endless(self, integration: Integration, names: list[str]) -> None:
