@@ -19,6 +19,7 @@ import calls
 import contact
 import derivatives
 import derived
+import elements
 import extension
 import hard
 import hard.chaos
@@ -97,6 +98,7 @@ def main():
         "kernels": kernels.measure,
         "derivatives": derivatives.measure,
         "derived": derived.measure,
+        "elements": elements.measure,
         "extension": extension.measure,
         "states": states.measure,
         "call": calls.call,

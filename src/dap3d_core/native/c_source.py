@@ -9,14 +9,20 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.metric import METRIC_WIDTH
+from dap3d_core.formulations.jumps.jump_arrays import CROSSING, SIDE, JumpArrays
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, W
+from dap3d_core.native.elements import Elements
 from dap3d_core.native.outputs import Output
 from dap3d_core.native.prepared import Advance, PreparedRun
+from dap3d_core.study.batch import initial_state
 
-KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator")
+KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator", "fixed")
+#: Of these those that are parameters: set at any time, and before a run begins.
+PARAMETERS = ("parameter", "fixed")
 
 
 @attrs.frozen
@@ -26,7 +32,7 @@ class Variable:
     Attributes:
         name, unit, label: as in results.
         kind: one of KINDS.
-        first: word of an input, index of others.
+        first: word of an input; of a parameter 1 where the start depends on it; index of others.
         start: its value at the start.
         words: of a parameter: words of the memory that it is, each with its sign.
     """
@@ -91,11 +97,12 @@ def symbol_of(entry: Entry) -> str:
 
 def units_of(prepared: PreparedRun) -> list[Unit]:
     """The units of compiled code that a run calls, each once."""
-    entries = [*prepared.image.functions.values(), *(one.entry for one in prepared.advances)]
+    own = [*prepared.advances, *([prepared.jumps] if prepared.jumps else [])]
+    entries = [*prepared.image.functions.values(), *(one.entry for one in own)]
     return list({entry.unit.name: entry.unit for entry in entries}.values())
 
 
-def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
+def data_of(prepared: PreparedRun, variables: Sequence[Variable], elements: Elements) -> str:
     """The text of data.h: what runtime.c takes from one model."""
     image, system = prepared.image, prepared.evaluator.system
     work = prepared.run.present.work
@@ -129,7 +136,12 @@ def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
     lines = [f"#define {name} {value}" for name, value in numbers.items()]
     lines += _enumeration("R", IntegrationState.indices("real"))
     lines += _enumeration("I", IntegrationState.indices("integer"))
+    lines += _enumeration("J", JumpArrays.indices("real"))
+    lines += _enumeration("JI", JumpArrays.indices("integer"))
     lines += _memory(prepared)
+    lines += _jumps(prepared)
+    lines += _start(prepared, variables)
+    lines += _elements(prepared, elements)
     places = [place for v in variables for place in v.words]
     lines += _table(
         "static const struct { int64_t word; double sign; } places[]",
@@ -145,7 +157,8 @@ def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
         _rows_of(variables),
     )
     lines += [
-        "void dap3d_outputs(double, const double *, const double *, const double *, double *);"
+        "void dap3d_outputs(double, const double *, const double *, const double *, "
+        "const double *, double *);"
     ]
     text = "\n".join(lines)
     digest = hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -155,7 +168,7 @@ def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
 def _rows_of(variables: Sequence[Variable]) -> list[str]:
     rows, first = [], 0
     for v in variables:
-        place = first if v.kind == "parameter" else v.first
+        place = first if v.kind in PARAMETERS else v.first
         first += len(v.words)
         name, unit = c_text(v.name), c_text(v.unit)
         rows.append(f"{{{name}, {unit}, DAP3D_{v.kind.upper()}, {place}, {len(v.words)}}}")
@@ -216,6 +229,89 @@ def _loop(prepared: PreparedRun, k: int, one: Advance) -> list[str]:
         f"void {symbol}({types}, int64_t);",
         f"static void advance_{k}(int64_t *w, int64_t budget) {{ {symbol}({given}, budget); }}",
     ]
+
+
+def _jumps(prepared: PreparedRun) -> list[str]:
+    """The function jump_law, and where its arrays are; nothing where velocities do not jump."""
+    law, place = prepared.jumps, prepared.image.at
+    if law is None:
+        return ["#define JUMPS 0"]
+    symbol, j = symbol_of(law.entry), law.arguments[0]
+    types = ", ".join(["void *"] * len(law.arguments))
+    given = ", ".join(f"w + {place(part)}" for part in law.arguments)
+    numbers = {
+        "JUMPS": 1,
+        "JUMP_REAL": place(j.real),
+        "JUMP_INTEGER": place(j.integer),
+        "JUMP_Y": place(j.y),
+        "JUMP_SIDES": place(j.switches[SIDE]),
+        "JUMP_CROSSING": place(j.switches[CROSSING]),
+        "JUMP_ACTING": place(j.acting),
+        "ELEMENTS": j.acting.size,
+        "DOES_JUMP": place(j.jumps),
+        "CROSSED_BEHIND_SIDES": (at.CROSSED - at.SIDE) * len(j.jumps),
+    }
+    return [
+        *(f"#define {name} {value}" for name, value in numbers.items()),
+        f"void {symbol}(double, {types});",
+        f"static void jump_law(double t, int64_t *w) {{ {symbol}(t, {given}); }}",
+    ]
+
+
+def _elements(prepared: PreparedRun, elements: Elements) -> list[str]:
+    """Calls of loops for outputs."""
+    if not elements.calls or elements.arrays is None:
+        return ["#define CALLS 0", "#define VALUES_OF_ELEMENTS 0"]
+    system, place, arrays = prepared.evaluator.system, prepared.image.at, elements.arrays
+    values, layout = place(arrays.values), prepared.evaluator.model.report_layout["Lam"]
+    others = {None: place(arrays.minus), -1: place(arrays.counter)}
+    rows = [
+        [place(c.table) + c.q, place(c.arrays), *c.group, values + c.first, c.size,
+         *(others[m] if m in others else values + int(m or 0) for m in c.more)]
+        for c in elements.calls
+    ]  # fmt: skip
+    numbers = {
+        "CALLS": len(rows),
+        "VALUES_OF_ELEMENTS": values,
+        "MINUS_LAMBDA": place(arrays.minus),
+        "COUNTER": place(arrays.counter),
+        "MULTIPLIERS": layout.stop - layout.start,
+        "MULTIPLIER": 1 + prepared.run.present.work.state.shape[1] + layout.start,
+        "ROW_OF": place(system.row) if layout.stop > layout.start else 0,
+    }
+    lines = [f"#define {name} {value}" for name, value in numbers.items()]
+    head = ("static const struct { int64_t code, arrays, i0, p0, out, size, second, third; } "
+            "calls[]")  # fmt: skip
+    return [*lines, *_table(head, (f"{{{', '.join(map(str, row))}}}" for row in rows))]
+
+
+def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
+    """Where the start is found anew for parameters that it depends on, if there are any."""
+    fixed = [v for v in variables if v.kind == "fixed"]
+    if not fixed or prepared.start is None:
+        return ["#define FIXED 0"]
+    start, system, place = prepared.start, prepared.evaluator.system, prepared.image.at
+    body = place(system.body)
+    owned = {(w - body) // BODY_WIDTH for v in fixed for w, _ in v.words
+             if 0 <= w - body < system.body.size}  # fmt: skip
+    numbers = {
+        "FIXED": 1,
+        "ASSEMBLES": int(start.assembles),
+        "GIVEN": place(start.arrays.given),
+        "UNIT": place(start.arrays.unit),
+        "STARTING": place(start.arrays.starting),
+        "STARTING_SIZE": len(start.arrays.starting),
+        "START_OPEN": initial_state.OPEN,
+        "START_PIVOT": initial_state.LEAST_PIVOT,
+        "BEGIN": place(start.functions),
+        "METRIC": place(system.metric),
+        "METRIC_WIDTH": METRIC_WIDTH,
+        "ELEMENT_STATES": len(prepared.evaluator.model.initial_states),
+    }
+    lines = [f"#define {name} {value}" for name, value in numbers.items()]
+    lines += _table("static const int heavy[]", map(str, sorted(owned) or [0]))
+    moving = [str(k) for k, v in enumerate(variables) if v.kind == "fixed" and v.first]
+    return [*lines, *_table("static const int moving[]", moving or ["-1"])]
 
 
 def _integration(prepared: PreparedRun, k: int, one: Advance) -> str:

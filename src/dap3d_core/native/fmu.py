@@ -23,6 +23,7 @@ ROLES = {
     "time": ("independent", "continuous", ""),
     "input": ("input", "continuous", ""),
     "parameter": ("parameter", "tunable", "exact"),
+    "fixed": ("parameter", "fixed", "exact"),
     "output": ("output", "continuous", "calculated"),
     "state": ("local", "continuous", "exact"),
     "derivative": ("local", "continuous", "calculated"),
@@ -145,7 +146,7 @@ def _variable(parent: Element, k: int, v: Variable, first: dict[str, int], fmi: 
     if initial:
         common["initial"] = initial
     own = {} if v.unit in ("", "1", "SI") else {"unit": v.unit}
-    if v.kind in ("input", "parameter", "state"):
+    if v.kind in ("input", "parameter", "fixed", "state"):
         own["start"] = repr(float(v.start))
     if v.kind == "derivative":
         own["derivative"] = str(first["state"] + v.first + (1 if fmi == 2 else 0))

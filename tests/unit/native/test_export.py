@@ -72,12 +72,14 @@ def differences(scene, folder, t_end, count=20, **settings):
     return np.array_equal(np.array(rows), expected)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("integrator", ["dop853", "dopri5", "rk4", "adams", "radau", "auto"])
 def test_a_run_has_the_bits_of_simulate(tmp_path, integrator):
     step = 1e-3 if integrator == "rk4" else None
     assert differences(dap.load("pen1"), tmp_path, 0.5, integrator=integrator, step=step)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("model", ["tri", "fourbar2", "bodies2"])
 def test_so_have_runs_with_break_points_angles_and_no_joints(tmp_path, model):
     t_end = 3.5 if model == "tri" else 0.5
@@ -201,9 +203,9 @@ def test_derivatives_are_those_of_the_equations(tmp_path):
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"outputs": ["track.force"]}, "track.force is computed by Python alone"),
+        ({"outputs": ["cart.roll"]}, "cart.roll is computed by Python alone"),
         ({"outputs": ["cart.q"]}, "cart"),
-        ({"parameters": ["bodies.cart.mass"]}, "cannot be set in an exported model"),
+        ({"parameters": ["bodies.cart.p.e0"]}, "cannot be set in an exported model"),
         ({"parameters": ["bodies.cat.mass"]}, "did you mean"),
         ({"platforms": ["plan9"]}, "platforms: linux, windows, macos"),
         ({"fmi": 1}, "FMI 3 and 2"),
@@ -212,13 +214,6 @@ def test_derivatives_are_those_of_the_equations(tmp_path):
 def test_what_cannot_be_exported_is_refused_by_name(tmp_path, options, said):
     with pytest.raises(dap.SceneError, match=said):
         exported(_written(SPRING, tmp_path), tmp_path, **options)
-
-
-def test_velocities_that_jump_are_refused(tmp_path):
-    scene = _written(SPRING, tmp_path)
-    scene.add_force("plane_stop", "floor", P_i="cart.O", a_j="ground.x", k=1e4, e=0.5)
-    with pytest.raises(dap.SceneError, match="plane_stop"):
-        exported(scene, tmp_path)
 
 
 def test_steps_that_make_no_sense_are_refused(tmp_path):

@@ -21,7 +21,7 @@ from dap3d_core.kernels.runtime.cache import compiled
 SWEEPS, TRIES = 50, 6
 FIRST = 5
 #: Newton passes, halvings of a step in one, and where it stands at rounding.
-PASSES, CUTS, ROUNDING = 50, 12, 1e-15
+PASSES, CUTS, RESIDUAL_ROUNDING = 50, 12, 1e-15
 #: Of the scale of the solution: a problem counts as solved.
 SOLVED = 1e-12
 TINY = 1e-300
@@ -111,7 +111,7 @@ def sweep(
             x[k], x[k + 1], x[k + 2] = n, z1, z2
         for q in range(size):
             largest = max(largest, abs(x[q]))
-        if change <= ROUNDING * (largest + TINY):
+        if change <= RESIDUAL_ROUNDING * (largest + TINY):
             break
 
 
@@ -124,7 +124,7 @@ def _newton(
     residual_of(A, b, mu, x, r, more, F, none)
     best = float(np.abs(F).max())
     for _ in range(PASSES):
-        if best <= ROUNDING * (float(np.abs(x).max()) + least + TINY):
+        if best <= RESIDUAL_ROUNDING * (float(np.abs(x).max()) + least + TINY):
             break
         residual_of(A, b, mu, x, r, more, F, S)
         step = np.linalg.lstsq(S, -F, rcond=1e-13)[0]

@@ -15,7 +15,7 @@ from dap3d_core.model.state_layout import split
 #: Numbers that the kernel ``tension`` of a contact returns (interface/contacts/rows.py).
 GAP, NORMAL = 0, 1
 FRICTION, SLIP, PLACE = slice(2, 5), slice(5, 8), slice(8, 11)
-WIDTH = 11
+REACH, FORCE, WIDTH = 11, slice(12, 15), 15
 
 
 class ContactTable:

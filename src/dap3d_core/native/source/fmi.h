@@ -85,7 +85,7 @@ static fmi_status fmi_setup(fmu *f, double start, bool has_stop, double stop)
 {
     if (start != 0.0)
         return fmi_failed(f, fmi_error, "the start time of the model is 0");
-    f->model->t_end = has_stop && stop > 0.0 ? stop : HORIZON;
+    f->model->t_end = f->model->span = has_stop && stop > 0.0 ? stop : HORIZON;
     for (int k = 0; k < INTEGRATIONS; k++)
         numbers(f->model, integrations[k].times)[2] = f->model->t_end;
     return fmi_ok;
@@ -144,18 +144,13 @@ static fmi_status fmi_step(fmu *f, double t, double h, bool *ended)
     return fmi_failed(f, fmi_error, dap3d_message(f->model));
 }
 
-/* An event of model exchange: the state onto the constraints. Whether the state has changed. */
+/* An event of model exchange. Whether the state has changed. */
 static fmi_status fmi_event(fmu *f, bool *changed)
 {
-    double y[STATES], t = f->model->t;
-    dap3d_states(f->model, y);
-    *changed = false;
-    if (dap3d_project(f->model, t, y, &f->moved) != DAP3D_OK)
+    int moved = 0;
+    if (dap3d_event(f->model, &moved) != DAP3D_OK)
         return fmi_failed(f, fmi_error, dap3d_message(f->model));
-    if (f->moved > 0.0) {
-        *changed = true;
-        return dap3d_set_states(f->model, t, y) == DAP3D_OK ? fmi_ok : fmi_error;
-    }
+    *changed = moved != 0;
     return fmi_ok;
 }
 

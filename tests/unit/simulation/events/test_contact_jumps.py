@@ -117,6 +117,7 @@ def test_a_contact_takes_fields_of_its_material_unless_it_gives_them(tmp_path):
         ({"mu_s": 0.1}, r"mu_s = 0.1: is less than mu = 0.3"),
         ({"e": 1.5}, r"e = 1.5"),
         ({"law": "newtons"}, r"law = \"newtons\".*newton"),
+        ({"materail": "rubber"}, r"materail.*unknown key.*did you mean 'material'"),
         ({"radiu": 0.2}, r"radiu.*unknown key.*did you mean 'radius'"),
     ],
 )
