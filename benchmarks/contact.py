@@ -31,9 +31,11 @@ def closed_forms():
         given = TIGHT | {"integrator": integrator}
         e, first = 0.8, np.sqrt(2.0 / G)
         result = dap.simulate(ball(height=1.0, e=e), t_end=6.0, dt=0.5, **given)
-        yield f"bouncing to rest, {integrator}", abs(
-            times(result, "rest")[0] - first * (1.0 + e) / (1.0 - e)
-        ), "s"
+        yield (
+            f"bouncing to rest, {integrator}",
+            abs(times(result, "rest")[0] - first * (1.0 + e) / (1.0 - e)),
+            "s",
+        )
         result = dap.simulate(ball(v=3.0, mu=0.3), t_end=2.0, dt=0.5, **given)
         off = times(result, "stick")[0] - 2.0 / 7.0 * 3.0 / (0.3 * G)
         yield f"sliding to rolling, {integrator}", abs(off), "s"

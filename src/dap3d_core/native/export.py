@@ -113,7 +113,9 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
     """Write an FMU of a version, or for 0 a folder; bytes of the largest library."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        (folder / "data.h").write_text(data_of(model.prepared, model.variables, model.outputs.elements))
+        (folder / "data.h").write_text(
+            data_of(model.prepared, model.variables, model.outputs.elements)
+        )
         for file in SOURCE.iterdir():
             shutil.copy(file, folder / file.name)
         if fmi:

@@ -239,9 +239,7 @@ class _Quantities:
         """D^T lambda on the body of a slot: force and moment."""
         Lam, place = self._multipliers(joint), element.place(slot)
         first = element.first + 6 * len(Lam) * place
-        column = [
-            tuple(self._values[first + 6 * r + v] for r in range(len(Lam))) for v in range(6)
-        ]
+        column = [tuple(self._values[first + 6 * r + v] for r in range(len(Lam))) for v in range(6)]
         return tuple(_dot(rows, Lam) for rows in column)
 
     def _wrench(self, element: Element, slot: str) -> tuple[Any, ...]:
