@@ -7,13 +7,13 @@ import time
 
 import numpy as np
 from right_hand_side import repeat
-from verification.test_contacts import G, TIGHT, ball, spring_block, times
+from timing import wait_for_good_code
+from verification.test_contacts import TIGHT, G, ball, spring_block, times
 
 import dap3d_core as dap
 from dap3d_core.formulations.contacts.contact_rows import ContactTable
 from dap3d_core.simulation import CompiledModel
 from dap3d_core.simulation.events.contact_jumps import ContactJumps
-from timing import wait_for_good_code
 
 LONG = 1000.0
 ROUNDS = 15

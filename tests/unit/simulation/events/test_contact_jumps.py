@@ -162,6 +162,10 @@ def test_a_sweep_runs_contacts_one_by_one():
     scene = bouncing()
     found = dap.sweep(scene, {"contacts.floor.e": [0.0, 0.9]}, outputs=["ball.r.z"])
     assert found is not None
+    of_several_points = {"contacts.floor.mu": [0.1, 0.3]}
+    box = sliding_box()
+    box.simulation.t_end = box.simulation.dt = 0.1
+    assert dap.sweep(box, of_several_points, outputs=["box.r.x"]) is not None
 
 
 def sliding_box(mu=0.3):
