@@ -222,9 +222,7 @@ def call_element(t: float, e: int, q: int, system: System, loops: Any, tangent: 
 
 
 @compiled
-def set_product(
-    keep: float, a: Floats, i: int, b: Floats, j: int, out: Floats, o: int
-) -> None:
+def set_product(keep: float, a: Floats, i: int, b: Floats, j: int, out: Floats, o: int) -> None:
     """Value and slopes of keep * out[o] + a[i] b[j], into out[o]."""
     x, y = a[i], b[j]
     out[o] = keep * out[o] + x * y

@@ -16,7 +16,6 @@ from dap3d_core.result import Result, ResultError, RunMetadata, find
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.settings import RunSettings
 from dap3d_core.simulation import CompiledModel, SimulationError
-from dap3d_core.simulation.errors import refuse_contacts
 from dap3d_core.simulation.failure.narrow_forces import notes_on_derivatives
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
@@ -200,12 +199,11 @@ def sensitivities(
 
     Raises:
         SceneError, PluginError: as ``simulate``; an unknown parameter, with the nearest.
-        SimulationError: the run stopped; no derivative by a parameter; the scene has contacts.
+        SimulationError: the run stopped; no derivative by a parameter.
     """
     if not jit_is_on():
         raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
     compiled = compiled_for(scene, allow_code, announce, **settings)
-    refuse_contacts(compiled.model, "a run with derivatives")
     parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
     given: dict[str, Any] = {**settings, "start": start_word(start)}
     method = given.pop("method", None)

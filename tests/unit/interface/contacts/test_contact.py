@@ -13,12 +13,8 @@ from dap3d_core.registry import load_registry
 from dap3d_core.testing.kit import checks_for
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize(
-    "keyword",
-    ["ball_ball", "ball_box", "ball_cylinder", "ball_plane", "box_box", "box_plane",
-     "capsule_plane", "cylinder_plane"],
-)  # fmt: skip
+@pytest.mark.every(7)
+@pytest.mark.parametrize("keyword", load_registry().keywords("contact"))
 def test_rows_of_the_standard_types_are_exact_derivatives(keyword):
     """Rate of the gap and normal velocity, J, gamma of a moving point, friction, compiled code."""
     failed = [str(outcome) for check in checks_for(load_registry().get("contact", keyword))
