@@ -18,6 +18,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 import calls
 import derivatives
 import derived
+import elements
 import extension
 import hard
 import hard.chaos
@@ -96,6 +97,7 @@ def main():
         "kernels": kernels.measure,
         "derivatives": derivatives.measure,
         "derived": derived.measure,
+        "elements": elements.measure,
         "extension": extension.measure,
         "states": states.measure,
         "call": calls.call,

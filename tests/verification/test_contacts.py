@@ -189,6 +189,7 @@ def test_a_ball_bounces_obliquely_by_poissons_law():
     assert result.ledger["energy"].value < TOLERANCE
 
 
+@pytest.mark.slow  # its corners solve their friction in a hundred passes each
 def test_a_block_slips_where_its_load_passes_what_holds_and_is_then_slowed_by_less():
     """Load c t: it slips at mu_s m g / c, with acceleration (c t - mu m g) / m from then on."""
     mu, mu_s, c = 0.2, 0.3, 5.0

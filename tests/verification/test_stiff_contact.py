@@ -13,7 +13,7 @@ import dap3d_core as dap
 
 G = 9.81
 #: Steps a second of motion at most.
-STEPS_A_SECOND = 2000
+STEPS_A_SECOND = 1000
 
 
 def run(scene, t_end, integrator, **settings):

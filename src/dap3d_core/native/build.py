@@ -20,8 +20,8 @@ from dap3d_core.native.run.prepared import refusal
 
 #: Compiler options; nothing is contracted, for the bits of plain arithmetic.
 OPTIONS = ("-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
-#: The extra with the compiler for every platform.
-EXTRA = "pip install 'dap3d[native]'"
+#: The compiler for every platform.
+COMPILER = "pip install ziglang"
 
 
 @attrs.frozen
@@ -111,11 +111,11 @@ def _compiler(target: Platform) -> list[str]:
         return [sys.executable, "-m", "ziglang", "cc", "-target", target.zig]
     own = next((c for c in ("cc", "gcc", "clang") if shutil.which(c)), None)
     if own is None:
-        raise refusal("there is no C compiler", f"{EXTRA} brings one")
+        raise refusal("there is no C compiler", f"{COMPILER} brings one")
     if not target.is_own:
         raise refusal(
             f"the compiler of this machine makes no libraries for {target.name}",
-            f"{EXTRA} brings one that does",
+            f"{COMPILER} brings one that does",
         )
     return [own]
 

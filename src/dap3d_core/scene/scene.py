@@ -4,6 +4,7 @@ Values are stored as plain Python (arrays and lists become tuples); ``check`` va
 """
 
 from functools import cache
+from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,10 @@ import attrs
 
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import plain, with_identifiers
-from dap3d_core.scene.contacts.tables import ContactTables, Material
+from dap3d_core.scene.contacts.tables import Collisions, ContactTables, Material
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Key, Mistake, MistakeList, SceneError
+from dap3d_core.settings import SETTINGS
 
 #: The newest version of the scene file that this program reads.
 SCHEMA = 1
@@ -21,14 +23,6 @@ SCHEMA = 1
 SCENE_FILE, PLUGIN_FILE = "scene.toml", "plugin.py"
 #: The body that is always there.
 GROUND = "ground"
-
-#: Values of ``method`` and ``integrator``: "auto", and names of formulations and integrators.
-METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq", "joint")
-INTEGRATORS = ("auto", "dopri5", "dop853", "adams", "rk4", "radau")
-#: Values of ``start``: the initial conditions of the scene, or where it comes to rest.
-STARTS = ("scene", "equilibrium")
-#: Integrators without an error estimate, which need a step; integrators that take none.
-FIXED_STEP, NO_STEP = ("rk4",), ("adams",)
 
 ZERO = (0.0, 0.0, 0.0)
 NO_TURN = (1.0, 0.0, 0.0, 0.0)
@@ -125,44 +119,36 @@ class Animation:
 
 @attrs.define
 class Simulation:
-    """Settings of a run.
+    """Settings of a run: what each is, its default and what is allowed stand in ``SETTINGS``."""
 
-    Attributes:
-        t_end: final time, s; None where the scene leaves it open.
-        dt: reporting step, s; None where the scene leaves it open.
-        method: formulation, or "auto".
-        integrator: method of integration.
-        rtol, atol: relative and absolute tolerance of a step; atol of all, or by quantity.
-        step: step of an integrator with fixed steps, s, or None.
-        correct: initial positions and velocities are corrected to satisfy the constraints.
-        project: states are projected on the constraints during the run.
-        hold: names of bodies that the correction does not move.
-        start: "scene" or "equilibrium", where a run starts.
-        correct_metric: "unit" or "mass", the norm of the least correction.
-        alpha, Omega, mu: parameters of the penalty formulation.
-    """
-
-    t_end: Any = attrs.field(default=None, converter=plain)
-    dt: Any = attrs.field(default=None, converter=plain)
-    method: Any = attrs.field(default="auto", converter=plain)
-    integrator: Any = attrs.field(default="dop853", converter=plain)
-    rtol: Any = attrs.field(default=1e-8, converter=plain)
-    atol: Any = attrs.field(default=None, converter=plain)
-    step: Any = attrs.field(default=None, converter=plain)
-    correct: Any = attrs.field(default=True, converter=plain)
-    project: Any = attrs.field(default=True, converter=plain)
-    hold: Any = attrs.field(default=(), converter=plain)
-    correct_metric: Any = attrs.field(default="unit", converter=plain)
-    start: Any = attrs.field(default="scene", converter=plain)
-    alpha: Any = attrs.field(default=1e7, converter=plain)
-    Omega: Any = attrs.field(default=10.0, converter=plain)
-    mu: Any = attrs.field(default=1.0, converter=plain)
+    t_end: Any = attrs.field(default=SETTINGS["t_end"].default, converter=plain)
+    dt: Any = attrs.field(default=SETTINGS["dt"].default, converter=plain)
+    method: Any = attrs.field(default=SETTINGS["method"].default, converter=plain)
+    integrator: Any = attrs.field(default=SETTINGS["integrator"].default, converter=plain)
+    rtol: Any = attrs.field(default=SETTINGS["rtol"].default, converter=plain)
+    atol: Any = attrs.field(default=SETTINGS["atol"].default, converter=plain)
+    step: Any = attrs.field(default=SETTINGS["step"].default, converter=plain)
+    correct: Any = attrs.field(default=SETTINGS["correct"].default, converter=plain)
+    project: Any = attrs.field(default=SETTINGS["project"].default, converter=plain)
+    hold: Any = attrs.field(default=SETTINGS["hold"].default, converter=plain)
+    correct_metric: Any = attrs.field(default=SETTINGS["correct_metric"].default, converter=plain)
+    start: Any = attrs.field(default=SETTINGS["start"].default, converter=plain)
+    contact: Any = attrs.field(default=SETTINGS["contact"].default, converter=plain)
+    contact_step: Any = attrs.field(default=SETTINGS["contact_step"].default, converter=plain)
+    alpha: Any = attrs.field(default=SETTINGS["alpha"].default, converter=plain)
+    Omega: Any = attrs.field(default=SETTINGS["Omega"].default, converter=plain)
+    mu: Any = attrs.field(default=SETTINGS["mu"].default, converter=plain)
 
 
 @cache
 def keys_of(class_: type) -> frozenset[str]:
     """The keys that a table of the scene file may hold, given the class it becomes."""
-    return frozenset(a.name for a in attrs.fields(class_)) - {"name"}
+    return frozenset(a.name.rstrip("_") for a in attrs.fields(class_)) - {"name"}
+
+
+def entry_of(class_: type, name: str, fields: dict[str, Any]) -> Any:
+    """An entry of a table; a key that is a word of Python has an underscore in its class."""
+    return class_(name, **{f"{k}_" if iskeyword(k) else k: v for k, v in fields.items()})
 
 
 HEADER_KEYS = frozenset({"name", "description", "schema"})
@@ -187,6 +173,7 @@ TABLES = (
     "parameters",
     *NAMED,
     "outputs",
+    "collisions",
     "animation",
     "simulation",
 )
@@ -204,6 +191,7 @@ class Scene(SceneDisplay, ContactTables):
         requires: ranges of versions of the distributions that bring its types, by name.
         parameters: numbers by name, for expressions in place of numbers (text that begins with =).
         outputs: expressions of quantities, by name; or tables of ``value`` and ``unit``.
+        collisions: which shapes that collide meet each other; None where the scene says nothing.
         animation, simulation: points to draw; settings of a run.
         path: the file this was read from, or None.
         faults: mistakes found in reading (unknown keys, wrong tables); ``check`` reports them.
@@ -228,6 +216,7 @@ class Scene(SceneDisplay, ContactTables):
     requires: dict[str, Any] = attrs.Factory(dict)
     parameters: dict[str, Any] = attrs.Factory(dict)
     outputs: dict[str, Any] = attrs.Factory(dict)
+    collisions: Collisions | None = None
     animation: Animation = attrs.Factory(Animation)
     simulation: Simulation = attrs.Factory(Simulation)
     path: Path | None = attrs.field(default=None, eq=False)
@@ -352,7 +341,9 @@ class Scene(SceneDisplay, ContactTables):
         return self._add("inputs", name, {"value": value} | unknown)
 
     def add_shape(self, type: str, name: str | None = None, **fields: Any) -> str:
-        """Add a shape that is drawn (box, sphere, cylinder, cone, disk, line, mesh); its name.
+        """Add a shape (box, sphere, capsule, cylinder, plane, cone, disk, line, mesh); its name.
+
+        It is drawn; with ``collides=True`` one of the first five meets others that do.
 
         Raises:
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.
@@ -431,13 +422,13 @@ class Scene(SceneDisplay, ContactTables):
 
     def _add(self, table: str, name: str, fields: dict[str, Any]) -> str:
         named, class_ = getattr(self, table), NAMED[table]
-        name, fields = plain(name), plain(fields)
+        name, fields = plain(name), {k.rstrip("_"): plain(v) for k, v in fields.items()}
         self._check_name(table, named, name)
         if not fields.keys() <= keys_of(class_):
             mistakes = MistakeList()
             mistakes.add_unknown_keys((table, name), fields, keys_of(class_))
             mistakes.raise_mistakes()
-        named[name] = class_(name, **{k: v for k, v in fields.items() if v is not None})
+        named[name] = entry_of(class_, name, {k: v for k, v in fields.items() if v is not None})
         return name
 
     def _add_element(self, table: str, type_: Any, name: str | None, fields: dict[str, Any]) -> str:

@@ -13,7 +13,7 @@ from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Instance, Mistake, Scene, SceneError, Simulation, ValidatedScene
 from dap3d_core.scene.coerce import canonical
 from dap3d_core.scene.scene import NAMED, Element
-from dap3d_core.scene.validate.settings import OPEN
+from dap3d_core.settings import SETTINGS
 
 AXES = ("x", "y", "z")
 EULER_PARAMETERS = ("e0", "e1", "e2", "e3")
@@ -271,7 +271,7 @@ def _fields(checked: ValidatedScene, path: tuple[str, ...]) -> Iterator[_Field]:
         is_given = value is not None
         if not is_given and table == "bodies":
             value = BODY_DEFAULTS.get(name)
-        is_open = value is None and table == "simulation" and name in OPEN
+        is_open = value is None and table == "simulation" and SETTINGS[name].default is None
         if _is_numeric(value) or is_open:
             yield _Field((*path, name), value, UNITS.get(name, "1"), is_given=is_given)
 

@@ -76,7 +76,7 @@ def _stop_low_rocking(rows: ContactRows, touching: list[int], length: float) -> 
     limit = 2.0 * LAST_HEIGHT * length * a
     low = [c for c in touching if v[c] > AT_REST * length and v[c] ** 2 < limit[c]]
     if low:
-        rows.v = rows.v + rows.lifted(v, low, [c for c in touching if c not in low])
+        rows.change(rows.lifted(v, low, [c for c in touching if c not in low]))
 
 
 def _spread(x: Floats, contacts: list[int], count: int) -> Floats:

@@ -47,7 +47,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: A change of a rate is rounding below this part of what the velocities of its bodies make of it.
-ROUNDING = 1e-13
+RATE_ROUNDING = 1e-13
 
 
 @compiled
@@ -222,7 +222,7 @@ def add_row(j: JumpArrays, k: int, pushes: int) -> None:
     q, size = j.row_count, 0.0
     for c in range(6, j.P.shape[0]):
         size += abs(j.G[q, c]) * j.v[FASTEST, c - 6]
-    if abs(j.G[q, j.P.shape[0]]) > ROUNDING * size:
+    if abs(j.G[q, j.P.shape[0]]) > RATE_ROUNDING * size:
         j.which[q], j.pushes[q] = k, pushes
         j.row_count = q + 1
 

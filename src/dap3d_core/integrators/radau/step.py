@@ -9,11 +9,12 @@ RADAU5.
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 from dap3d_core.assembly.arrays import System
-from dap3d_core.formulations.stabilized_index2.jacobian import BENT, Tangent
+from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND, Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau.convergence import is_at_rounding, newton_limit
 from dap3d_core.integrators.radau.dense_output import prepare_dense
@@ -91,13 +92,13 @@ def advance(
     while may_step(work, dense_state, limit, project, report, system, loops):
         steps, rejected = work.step_count, work.rejected_count
         if work.first_stage_valid == 0:
-            tangent.fine[0] = 0.0
+            tangent.bends[0] = 0.0
             start(work, rhs, project, system, loops)
         else:
             step(work, parts, (project, accepted, watch), system, loops, tangent, matrix)
             h = work.factored_step
             if work.rounding_state != 0 and h > 0.0 and can_measure(work, rejected):
-                measure = parts[5]
+                measure = parts[0][4]
                 measure(work.t, h, work, system, loops, tangent, matrix)
                 bound_stage_noise(h, work, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
@@ -139,8 +140,8 @@ def step(
     matrix: StageMatrix,
 ) -> None:
     """Try one step: accept it, reject it, or stop the run; functions: project, accepted, watch."""
-    (project, accepted, watch), find_work = functions, parts[6]
-    estimate_error, find_slope = parts[3], parts[4]
+    (project, accepted, watch), steps = functions, parts[0]
+    estimate_error, find_slope, find_work = steps[2], steps[3], steps[5]
     state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
     end = t1 = end_of_step(work)
     longest = h = t1 - t
@@ -219,12 +220,12 @@ def search(
     if shorter > 0.0 and work.convergence_rate < HOPELESS:  # once more, with the tangent at the end
         work.tangent_needed = 1
         shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
-    if shorter > 0.0 and tangent.fine[0] == BENT:  # the prediction may lie beyond the bend
+    if shorter > 0.0 and tangent.bends[0] == BENT:  # the prediction may lie beyond the bend
         predict(h, work, False)
         work.tangent_needed = 1
         shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
     if shorter != 0.0 and work.tangent_is_current != 0:
-        tangent.fine[0] = max(tangent.fine[0], 1.0)
+        tangent.bends[0] = max(tangent.bends[0], MAY_BEND)
     return shorter
 
 
@@ -240,10 +241,13 @@ def iterate(
     matrix: StageMatrix,
 ) -> float:
     """Find the stages from their present values, with a new tangent if needed; as find_stages."""
-    find_tangent, factorise_both, find_stages = parts[0], parts[1], parts[2]
+    steps, tangents = parts
+    factorise_both, find_stages, find_tangent = steps[0], steps[1], tangents[0]
     wrong = 0.0
     if work.tangent_needed != 0:
-        wrong = find_tangent(t, h, work, system, loops, tangent, matrix)
+        work.tangent_step = h
+        find_tangent(work, system, loops, tangent, matrix)
+        wrong = 0.0 if work.tangent_is_current != 0 else math.nan
     if wrong == 0.0 and not abs(h - work.factored_step) <= SAME_STEP * h:
         wrong = factorise_both(t, h, work, system, loops, tangent, matrix)
     if wrong == 0.0:

@@ -222,7 +222,7 @@ class PreparedRun:
         method, integrator = settings.get("method"), settings.get("integrator")
         if registry is not None and not isinstance(scene, CompiledModel):
             scene = CompiledModel(scene, method=method, allow_code=allow_code, registry=registry)
-        compiled = compiled_for(scene, method, allow_code, None, integrator)
+        compiled = compiled_for(scene, allow_code, method=method, integrator=integrator)
         given = settings.pop("t_end", None)
         if given is not None and not given > 0.0:
             raise refusal(f"t_end = {given:g} leaves no time to run", "give a later end")

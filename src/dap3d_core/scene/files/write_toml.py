@@ -35,6 +35,8 @@ def to_toml(scene: Scene) -> str:
         for name, entry in getattr(scene, table).items():
             lines += _table(f"{table}.{_key(name)}", _fields(entry))
     lines += _table("outputs", scene.outputs.items(), needed=False)
+    if scene.collisions is not None:
+        lines += _table("collisions", _fields(scene.collisions))
     if scene.animation.points or scene.animation.limits is not None:
         lines += _animation(scene)
     lines += _table("simulation", _fields(scene.simulation), needed=False)
@@ -83,7 +85,7 @@ def _fields(entry: Any) -> Iterator[tuple[str, Any]]:
             continue
         if type(value) is bool and value == field.default:
             continue
-        yield field.name, value
+        yield field.name.rstrip("_"), value
 
 
 def _animation(scene: Scene) -> list[str]:

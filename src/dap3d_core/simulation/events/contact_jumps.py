@@ -10,6 +10,8 @@ from dap3d_core.formulations import RHS
 from dap3d_core.formulations.contacts.contact_rows import (
     FRICTION,
     GAP,
+    NORMAL,
+    REACH,
     SLIP,
     ContactRows,
     ContactTable,
@@ -17,9 +19,10 @@ from dap3d_core.formulations.contacts.contact_rows import (
 from dap3d_core.formulations.contacts.impacts import collide
 from dap3d_core.formulations.contacts.modes import JamError, find_modes
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.formulations.switches import ROUNDING
+from dap3d_core.formulations.switches import POSITION_ROUNDING
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.interface.contacts.rows import APART
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.model.state_layout import split
@@ -160,7 +163,8 @@ class ContactJumps(Jumps):
 
     def _gaps(self, integration: Integration) -> Floats:
         u = self._state_of(integration)
-        gaps: Floats = self.table.outputs(integration.t, u)[:, GAP]
+        outputs = self.table.outputs(integration.t, u)
+        gaps: Floats = np.where(outputs[:, REACH] < 0.0, APART, outputs[:, GAP])
         return gaps
 
     @IGNORE_FLOAT_ERRORS
@@ -179,8 +183,13 @@ class ContactJumps(Jumps):
         before = evaluator.states[table.mode].copy()
         outputs = self._outputs(t, u)
         rows = ContactRows(table, t, u)
-        closed = [c for c in range(table.count)
-                  if before[c] > 0.5 or outputs[c, GAP] < touching or (c, 0) in ended]  # fmt: skip
+        # of those that hold what ends is the force, or the reach of their surfaces
+        beyond = {c for c, part in ended
+                  if part == 0 and before[c] > 0.5 and outputs[c, REACH] < outputs[c, NORMAL]}
+        ended = [(c, part) for c, part in ended if c not in beyond]
+        near = (outputs[:, GAP] < touching) & (outputs[:, REACH] >= 0.0)
+        closed = [c for c in range(table.count) if c not in beyond
+                  and (before[c] > 0.5 or near[c] or (c, 0) in ended)]  # fmt: skip
         sliding, leaving = self._what_ended(rows, outputs, before, ended)
         impact = collide(table, rows, closed, evaluator.model.length)
         try:
@@ -193,9 +202,9 @@ class ContactJumps(Jumps):
             ) from error
         held = [c for c in closed if modes.mode[c] > 0.5]
         others = [c for c in closed if modes.mode[c] < 0.5]
-        rows.v += rows.lifted(rows.slip[:, 0], held, others)
+        rows.change(rows.lifted(rows.slip[:, 0], held, others))
         gaps = np.where(np.abs(outputs[:, GAP]) < touching, outputs[:, GAP], 0.0)
-        moved = rows.lifted(gaps, held, others, 2.0 * ROUNDING * evaluator.model.length)
+        moved = rows.lifted(gaps, held, others, 2.0 * POSITION_ROUNDING * evaluator.model.length)
         states = evaluator.states.copy()
         states[table.mode], states[table.way], states[table.near] = (
             modes.mode, modes.way, modes.near

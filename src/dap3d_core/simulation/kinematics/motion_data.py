@@ -37,7 +37,7 @@ MOST_PASSES, SETTLED = 50, 1e-12
 #: Slopes of quantities are computed anew behind a larger change.
 SLOPES_ANEW = 1e-2
 #: Changes no longer shrink below this: rounding.
-ROUNDING = 1e-8
+LEAST_CHANGE = 1e-8
 #: No pass turns a body by more, or moves it by more of the model.
 MOST_CHANGE = 0.5
 #: Motions that move the data by less than this part of the others are not seen by them.
@@ -155,7 +155,7 @@ def _on_rows(
         rows = ChosenRows(evaluator, t, u, chosen)
         change = rows.least(rows.rows.C)
         size = max_speed(evaluator, change)
-        if size <= SETTLED or (size <= ROUNDING and size > 0.5 * before):
+        if size <= SETTLED or (size <= LEAST_CHANGE and size > 0.5 * before):
             break
         u, before = displaced(u, -change), size
     else:
@@ -220,7 +220,7 @@ class _Fit:
             if not np.isfinite(size):
                 break
             u = displaced(u, min(1.0, MOST_CHANGE / max(size, 1e-300)) * change)
-            if size <= SETTLED or (size <= ROUNDING and size > 0.5 * before):
+            if size <= SETTLED or (size <= LEAST_CHANGE and size > 0.5 * before):
                 found = np.abs(self._gap(target, self._values(np.array([t]), u[None])[:, 0]))
                 for label, gap in zip(self._labels, found, strict=True):
                     if np.isfinite(gap):

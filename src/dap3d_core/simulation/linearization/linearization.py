@@ -29,7 +29,7 @@ MANY_BODIES = 150
 #: Modes of such scenes by default.
 FEW_MODES = 10
 #: A real part below this part of the magnitude, or of the largest terms, is zero but for rounding.
-ROUNDING = 1e-9, 1e-12
+REAL_PART_ROUNDING = 1e-9, 1e-12
 #: Eigenvalues within this part of i Omega are drifts of free bodies, seen from axes that turn.
 DRIFT = 1e-5
 
@@ -201,9 +201,7 @@ class Linearization:
         try:
             import control
         except ImportError as error:
-            raise ImportError(
-                "to_control needs python-control: pip install 'dap3d[control]'"
-            ) from error
+            raise ImportError("to_control needs python-control: pip install control") from error
         states = [f"xi{k + 1}" for k in range(self.coordinate_count)]
         own = len(self.element_states)
         states += [f"eta{k + 1}" for k in range(self.state_count - len(states) - own)]
@@ -325,7 +323,7 @@ class Linearization:
         values = self.eigenvalues
         for rate in self._point.frames.drift:  # a double eigenvalue, which rounding splits
             values = values[np.abs(np.abs(values.imag) - rate) + np.abs(values.real) > DRIFT * rate]
-        own, all_of_them = ROUNDING
+        own, all_of_them = REAL_PART_ROUNDING
         equations = self._point.equations
         size = max(float(np.sqrt(abs(equations.K).max())), float(abs(equations.C).max()))
         return bool(np.all(values.real <= own * np.abs(values) + all_of_them * size))

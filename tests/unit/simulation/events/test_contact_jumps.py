@@ -118,6 +118,7 @@ def test_a_contact_takes_fields_of_its_material_unless_it_gives_them(tmp_path):
         ({"mu_s": 0.1}, r"mu_s = 0.1: is less than mu = 0.3"),
         ({"e": 1.5}, r"e = 1.5"),
         ({"law": "newtons"}, r"law = \"newtons\".*newton"),
+        ({"materail": "rubber"}, r"materail.*unknown key.*did you mean 'material'"),
         ({"radiu": 0.2}, r"radiu.*unknown key.*did you mean 'radius'"),
     ],
 )
@@ -246,3 +247,17 @@ def test_a_ball_may_start_in_the_middle_of_a_hollow_one():
     result = dap.simulate(scene, t_end=1.0, dt=0.5)
     assert result.events[0].t == pytest.approx(np.sqrt(2.0 * 0.9 / 9.81), rel=1e-12)
     assert result.r[-1, 0] == pytest.approx([0.0, 0.0, -0.9], abs=1e-12)
+
+
+def test_a_box_that_falls_flat_sticks_where_it_lands():
+    """Modes behind an impact follow from the velocities behind it: it has stopped turning."""
+    scene, tilt = sliding_box(mu=1.0), 0.3
+    body, c, s = scene.bodies["box"], np.cos(tilt), np.sin(tilt)
+    body.p = [np.cos(tilt / 2.0), 0.0, np.sin(tilt / 2.0), 0.0]
+    body.r, body.r_dot, body.w = [0.0, 0.0, 0.05 * c + 0.2 * s], [0.0] * 3, [0.0] * 3
+    result = dap.simulate(scene, t_end=1.0, dt=0.1)
+    lands = max(event.t for event in result.events if event.kind == "impact")
+    assert max(event.t for event in result.events) == lands
+    assert sorted(result.contact("floor").mode[-1]) == [0, 0, 0, 0, 2, 2, 2, 2]
+    assert np.max(np.abs(result.rd[-1])) < 1e-14  # it does not creep
+    assert result.stats.steps < 300
