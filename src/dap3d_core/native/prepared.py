@@ -83,10 +83,7 @@ class Advance:
         )
         given: tuple[Any, ...] = (integration.work, *integration._arguments)
         if isinstance(integration, RadauIntegration):
-            _, system, loops = integration._arguments
-            function = advance_radau
-            given = (integration.work, integration.functions, integration._parts, system, loops,
-                     integration.tangent, integration.matrix)  # fmt: skip
+            function, given = advance_radau, integration.loop_arguments
         elif function is None:
             raise refusal(f"integrator {integration.name} cannot be exported")
         return cls(integration, function.compile([*map(type_of, given), INT]), given)
