@@ -139,7 +139,8 @@ class PreparedRun:
                 second.compile()
                 integrations.append(second)
         self.advances = [Advance.of(one) for one in integrations]
-        self.image = Image(*(part for one in self.advances for part in one.arguments))
+        parts = (part for one in self.advances for part in one.arguments)
+        self.image = Image(self.evaluator.loops, *parts)
 
     def _refuse_jumps(self) -> None:
         refuse_contacts(self.evaluator.model, "export")

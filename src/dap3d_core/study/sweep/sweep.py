@@ -48,6 +48,7 @@ def sweep(
     correct_metric: str | None = None,
     start: str | None = None,
     allow_code: bool = False,
+    gradients: bool = False,
     threads: int | None = None,
     client: Any = None,
     output: str | os.PathLike[str] | None = None,
@@ -68,6 +69,7 @@ def sweep(
         sample, design, seed: number (without: a grid), "lhs", "random", "sobol" or "halton", seed.
         t_end, dt, method, integrator, rtol, atol, step: as of ``simulate``; likewise correct,
             project, correct_metric, start (a word), allow_code; announce as of ``compile``.
+        gradients: True for exact derivatives ``d OUTPUT`` by what varies, along ``parameter``.
         threads, client: points at once; a ``distributed.Client`` whose workers run them.
         output, force, resume: file to write; overwrite it; continue with ``OUTPUT.part``.
         progress: called as progress(done, total).
@@ -83,6 +85,7 @@ def sweep(
                     step=step, start=start, correct=correct, project=project,
                     correct_metric=correct_metric)  # fmt: skip
     study, plan = _read(scene, vary, outputs, (sample, design, seed), settings, allow_code)
+    study = attrs.evolve(study, gradients=gradients)
     runner = _Runner(threads, client, progress, announce, force=force, resume=resume)
     return runner.run(study, plan, output)
 
@@ -127,7 +130,7 @@ def _ensemble(study: Study, announce: Callable[[str], None] | None) -> Ensemble:
         mistakes = error.mistakes
     if all(mistake.key == "vary" for mistake in mistakes):
         try:
-            Ensemble(attrs.evolve(study, names=()))
+            Ensemble(attrs.evolve(study, names=(), gradients=False))
         except SceneError as error:
             mistakes = (*mistakes, *error.mistakes)
     raise SceneError(mistakes)
@@ -168,6 +171,7 @@ def _check_space(ensemble: Ensemble, plan: Design, output: str | os.PathLike[str
     """Refuse what fits neither into memory nor on the disk."""
     series = [o for o in ensemble.outputs if o.reduction == "series"]
     width = 8 * (len(ensemble.outputs) + len(series) * (len(ensemble.times) - 1))
+    width *= 1 + len(plan.varied) * ensemble.study.gradients
     # in addition status and note; in memory the points, three times while they are drawn
     width += 1 + (NOTE if output is not None else 8 + 3 * 8 * len(plan.varied))
     check_room_of_points(plan.size, width, output)
