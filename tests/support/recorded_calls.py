@@ -38,7 +38,7 @@ from dap3d_core.kernels.runtime.function_lists import LOOP
 from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.kernels.runtime.loop_modules import array_members
 from dap3d_core.kernels.runtime.source_digest import COMPILED_LAYERS
-from support.at_all_levels import all_made_of, function_of, same_bits
+from support.at_all_levels import all_made_of, function_of, same_bits, targets
 
 #: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.
 CALLS = {1, 2, 7, 40, 200}

@@ -152,7 +152,7 @@ def layout_of(ensemble: Ensemble, design: Design, points: Floats) -> SweepLayout
 
 def _of_derivative(about_output: dict[str, Any]) -> dict[str, Any]:
     """Attributes of the derivatives of an output."""
-    unit, label = about_output["units"], about_output["long_name"]
+    unit, label = about_output.get("units", "1"), about_output["long_name"]
     return about(f"{unit} per unit of parameter", f"derivative of {label}")
 
 
@@ -162,7 +162,7 @@ def _attributes(
     scene = ensemble.compiled.scene
     varied = [{"name": v.name, "spec": v.spec} for v in design.varied]
     outputs = [
-        {"name": v.name, "label": v.about["long_name"], "unit": v.about["units"]}
+        {"name": v.name, "label": v.about["long_name"], "unit": v.about.get("units", "")}
         for v in variables
     ]
     found: dict[str, Any] = {
