@@ -156,7 +156,9 @@ def test_a_stop_of_an_angle(method):
 
 
 @pytest.mark.every(3)
-@pytest.mark.parametrize("how", [{"method": "standard"}, {"method": "lsq"}, {"integrator": "radau"}])
+@pytest.mark.parametrize(
+    "how", [{"method": "standard"}, {"method": "lsq"}, {"integrator": "radau"}]
+)
 def test_a_start_that_a_parameter_takes_off_the_constraints(how):
     """Its derivatives are brought onto them as its values would be, whether it is corrected or not.
 
