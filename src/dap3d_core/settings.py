@@ -9,9 +9,9 @@ from typing import Any, NamedTuple, TypedDict
 
 #: Values of ``method`` and ``integrator``: "auto", and names of formulations and integrators.
 METHODS = ("auto", "unconstrained", "standard", "penalty", "lsq", "joint")
-INTEGRATORS = ("auto", "dopri5", "dop853", "adams", "rk4", "radau")
+INTEGRATORS = ("auto", "dopri5", "dop853", "adams", "rk4", "radau", "moreau")
 #: Integrators without an error estimate, which need a step; integrators that take none.
-FIXED_STEP, NO_STEP = ("rk4",), ("adams",)
+FIXED_STEP, NO_STEP = ("rk4", "moreau"), ("adams",)
 #: Relative tolerances below are beyond double precision.
 SMALLEST_RTOL = 1e-14
 
@@ -70,6 +70,10 @@ SETTINGS = {
         Setting("start", "word", "scene",
                 "start from the scene's initial conditions, or where they come to rest",
                 ("scene", "equilibrium")),
+        Setting("contact", "word", "auto",
+                "follow contacts by events, exact, or by stepping, for any number of them",
+                ("auto", "events", "stepping")),
+        Setting("contact_step", "time", 1e-3, "step of contact stepping, s"),
         Setting("alpha", "number", 1e7, "factor of penalty forces", on_command_line=False),
         Setting("Omega", "number", 10.0, "natural frequency of method penalty, rad/s",
                 on_command_line=False),
@@ -89,6 +93,8 @@ class StepSettings(TypedDict, total=False):
     correct: bool | None
     project: bool | None
     correct_metric: str | None
+    contact: str | None
+    contact_step: float | None
 
 
 class RunSettings(StepSettings, total=False):

@@ -131,3 +131,61 @@ def test_a_standing_cylinder_tips_where_a_push_passes_its_rim(part):
         J = 0.05 + mass * (a**2 + h**2)
         angle = 0.5 * (F * h - mass * G * a) / J * 0.05**2
         assert result.p[1, 0, 2] * 2.0 == pytest.approx(angle, rel=1e-2)
+
+
+def stack(offset=0.0, yaw=0.0, mu=0.5):
+    """A cube of 1 kg on another, on a floor."""
+    scene = dap.Scene(name="stack")
+    scene.add_force("weight", "g")
+    size = [0.1, 0.1, 0.1]
+    for k in range(2):
+        r, rpy = [offset * k, 0.0, 0.05 + 0.1 * k], [0.0, 0.0, yaw * k]
+        scene.add_body(f"b{k}", mass=1.0, Jp=[0.01 / 6.0] * 3, r=r, rpy=rpy)
+    scene.add_contact("box_plane", "floor", P_i="b0.O", size=size, mu=mu)
+    ends = {"P_i": "b1.O", "P_j": "b0.O", "size_i": size, "size_j": size}
+    scene.add_contact("box_box", "upper", **ends, mu=mu)
+    return scene
+
+
+@pytest.mark.parametrize(("offset", "yaw"), [(0.0, 0.0), (0.0499, 0.0), (0.01, 0.5)])
+def test_a_box_rests_on_another_while_its_centre_is_above_it(offset, yaw):
+    result = dap.simulate(stack(offset, yaw), t_end=100.0, dt=50.0)
+    assert np.max(np.abs(result.r - result.r[0])) < 1e-14
+    assert np.max(np.abs(result.p - result.p[0])) < 1e-14
+    assert result.contact("upper").normal_force.sum(axis=1) == pytest.approx(G, rel=1e-9)
+
+
+def test_a_box_tips_over_the_edge_of_another_where_its_centre_is_beyond():
+    """J about the edge w_dot = m g x, x = 1e-4 m: the angle x m g / (2 J) t^2 at first."""
+    result = dap.simulate(stack(0.0501), t_end=0.02, dt=0.01, **TIGHT)
+    J = 0.01 / 6.0 + 0.05**2 + 1e-4**2
+    growth = np.sqrt(G * 0.05 / J)  # of the inverted pendulum, whose centre begins above the edge
+    angle = 1e-4 / 0.05 * (np.cosh(growth * result.t[1:]) - 1.0)
+    assert 2.0 * result.p[1:, 1, 2] == pytest.approx(angle, rel=1e-5)
+
+
+def test_a_box_slides_on_another_that_sticks():
+    scene, mu, F = stack(mu=0.2), 0.2, 3.0
+    scene.add_force("f", "push", body_i="b1", f=[F, 0.0, 0.0])
+    result = dap.simulate(scene, t_end=0.15, dt=0.05, **TIGHT)
+    assert result.r[:, 1, 0] == pytest.approx(0.5 * (F - mu * G) * result.t**2, abs=TOLERANCE)
+    assert np.max(np.abs(result.r[:, 0] - result.r[0, 0])) < 1e-14
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+def test_edges_of_crossed_boxes_bounce():
+    e, h, drop = 0.5, 0.1, 0.2
+    scene = dap.Scene(name="crossed")
+    r = [0.0, 0.0, 2.0 * h * np.sqrt(2.0) + drop]
+    scene.add_body("b", mass=1.0, Jp=[0.01, 0.02, 0.03], r=r, rpy=[np.pi / 4.0, 0.0, 0.0])
+    scene.add_body("t", mass=1.0, Jp=[0.01, 0.02, 0.03], rpy=[0.0, np.pi / 4.0, 0.0])
+    scene.add_joint("weld", "stand", body_i="t", body_j="ground")
+    scene.add_force("weight", "g")
+    sizes = {"size_i": [1.0, 2.0 * h, 2.0 * h], "size_j": [2.0 * h, 1.0, 2.0 * h]}
+    scene.add_contact("box_box", "c", P_i="b.O", P_j="t.O", **sizes, e=e)
+    result = dap.simulate(scene, t_end=0.25, dt=0.05, **TIGHT)
+    impact = first(result, "impact")
+    assert impact.t == pytest.approx(np.sqrt(2.0 * drop / G), abs=TOLERANCE)
+    after = np.array(impact.u_after).reshape(2, -1)
+    assert e * np.sqrt(2.0 * G * drop) == pytest.approx(np.max(after), abs=TOLERANCE)
+    assert int(impact.name.split("#")[1]) > 16  # a pair of edges, not a corner

@@ -20,14 +20,14 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import MISSING, Key, MistakeList, dotted
 from dap3d_core.scene.expressions.expression import fault_of_word
-from dap3d_core.scene.scene import (
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import (
     GROUND,
     NAMED,
     NO_TURN,
     ZERO,
     Element,
     Point,
-    Scene,
     Vector,
     fault_of_name,
 )
@@ -270,6 +270,8 @@ class _Part:
         scene.included |= files | ({self.name: file} if file else {})
         scene.faults += [self._fault(key, mistake) for key, mistake in self.part.faults]
         scene.notes += [f"{self.name}: {note}" for note in self.part.notes]
+        if self.part.collisions is not None:
+            scene.notes.append(f"{self.name}: [collisions] left out; that of the whole scene holds")
         if self._left_out:
             scene.notes.append(
                 f"{self.name}: {', '.join(self._left_out)} left out, which names no part of the "
@@ -338,6 +340,8 @@ class _Part:
             fields["points"] = tuple(map(put.position, fields["points"]))
         if "axis" in known:
             fields["axis"] = put.direction(fields.get("axis", AXES["z"]))
+        if "normal" in known:
+            fields["normal"] = put.direction(fields.get("normal", AXES["z"]))
         if "p" in known and not isinstance(p := put.orientation(fields), Fault):
             fields["p"] = p
 

@@ -50,6 +50,7 @@ def simulate(
         start: "scene", "equilibrium", a result (its end), (result, time) or an ``Equilibrium``.
         progress, watch: called each 0.1 s or so, as progress(t, t_end), with a ``RunProgress``.
         events, controllers: see ``Event`` and ``Controller``.
+        contact, contact_step: "events", "stepping" or "auto"; step of the latter, s.
         output, force: file to write, ``OUTPUT.part`` meanwhile; whether over an existing one.
         estimate_error: estimate ``result.error`` by a second, finer run; "quick": if within 1 s.
         checkpoint: seconds between checkpoints, for ``resume``; inf: one where the run is ended.

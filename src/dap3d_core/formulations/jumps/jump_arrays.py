@@ -9,8 +9,8 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, row_count
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
 from dap3d_core.kernels.compiler.types import FLOAT, Array
+from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
 from dap3d_core.model import Group
 
 #: Columns of ``rows``: place of the change among the numbers of the loops, of the first entry of
@@ -154,6 +154,7 @@ class JumpElements:
 
     def _add_impulses(self, group: Group, first: int, own: Integers) -> None:
         info, tables = group.type_info, self._tables
+        type_: Any = info.type
         slots = len(info.layout.slots)
         rows = row_count(info.outputs, slots) if info.type.kind == "force" else 0
         count = len(info.outputs["impulse"])
@@ -162,7 +163,7 @@ class JumpElements:
             body, place = len(tables["bodies"]), self._numbers
             tables["bodies"] += group.bodies[k].tolist()
             for r in range(rows):
-                pushes = int(r in info.type.unilateral)
+                pushes = int(r in type_.unilateral)
                 one = int(own[k, r]) if own.shape[1] == rows else -1
                 tables["rows"].append([place + r, place + count + 6 * r, 6 * rows, slots, body,
                                        first + k, r, pushes, *switch, one])  # fmt: skip

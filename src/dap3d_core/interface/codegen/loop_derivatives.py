@@ -128,7 +128,7 @@ class _Instances:
             for lane, (name, at, slopes) in enumerate(self.seeds[first : first + AT_ONCE], 1):
                 numbers = outs[1] if name == "multipliers" else wide.matrix(self._arrays[name])
                 numbers[at, lane] = slopes
-            entry(np.array([t] + [0.0] * AT_ONCE), wide, 0, p0, len(self.idx), *outs)
+            entry(t, wide, 0, p0, len(self.idx), *outs)
             parts.append([*outs, wide.matrix(arrays.rates)])
         return [
             np.hstack([part[k] if part is parts[0] else part[k][:, 1:] for part in parts])[

@@ -178,7 +178,10 @@ def rate(mode, way, near):
 
 
 def output(gap, reach, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):
-    """Of results: gap, normal force, friction on body i (3), slip (3), point of contact (3), reach."""
+    """Of results: gap, normal force, friction on body i (3), slip (3), point of contact (3), reach,
+    force on body i (3).
+    """
     normal, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
     slip = across(slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j), n)
-    return (gap, normal, *tangential, *slip, *c, reach)
+    force = add(scale(normal, n), tangential)
+    return (gap, normal, *tangential, *slip, *c, reach, *force)

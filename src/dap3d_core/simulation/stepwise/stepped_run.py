@@ -62,7 +62,7 @@ class SteppedRun:
         self.compiled, self._run = run.compiled, run
         evaluator = self._evaluator = run.evaluator = run.compiled.new_evaluator()
         run.initialise()
-        run.jumps = jumps_of(evaluator)
+        run.jumps = jumps_of(evaluator, run.settings)
         if run.jumps is not None:
             run.jumps.begin(run.present)
         self.state = StateView(run.compiled, evaluator)

@@ -173,14 +173,6 @@ def test_a_start_that_a_parameter_takes_off_the_constraints(how):
     assert np.max(np.abs(s.of("constraint.position"))) < 1e-8
 
 
-def test_contacts_are_refused():
-    scene = dap.Scene(name="ball")
-    scene.add_body("ball", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
-    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
-    with pytest.raises(dap.SimulationError, match="derivatives does not take contacts yet"):
-        dap.sensitivities(scene, "bodies.ball.r.z", **SHORT)
-
-
 def test_what_nothing_reads_has_derivatives_of_zero():
     """No rounding either, whose part of a quantity would look like a derivative."""
     scene = dap.load("pen2")
