@@ -17,9 +17,12 @@ from dap3d_core.scene import check as checked
 from dap3d_core.simulation.linearization.tangent import tangent_matrices
 
 REGISTRY = load_registry()
-#: Forces on the reaction of a joint need that joint; they have tests of their own below.
-ON_JOINTS = ("friction", "gear_separation")
-FORCES = [case for case in cases(REGISTRY, "force") if case[0] not in ON_JOINTS]
+#: Those that read reactions need a joint; of friction see below.
+FORCES = [
+    (keyword, values)
+    for keyword, values in cases(REGISTRY, "force")
+    if all(s.kind != "joint" for s in specs_of(REGISTRY.get("force", keyword).type).values())
+]
 JOINTS = cases(REGISTRY, "joint")
 #: Sixth-order central differences: abscissae, weights.
 STENCIL = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))
