@@ -222,9 +222,7 @@ def call_element(t: float, e: int, q: int, system: System, loops: Any, tangent: 
 
 
 @compiled
-def set_product(
-    keep: float, a: Floats, i: int, b: Floats, j: int, out: Floats, o: int
-) -> None:
+def set_product(keep: float, a: Floats, i: int, b: Floats, j: int, out: Floats, o: int) -> None:
     """Value and slopes of keep * out[o] + a[i] b[j], into out[o]."""
     x, y = a[i], b[j]
     out[o] = keep * out[o] + x * y
@@ -285,8 +283,8 @@ def bridge_bends(
 ) -> None:  # fmt: skip
     """Secants across bends into ``out``, where its slopes by a level of body b are zero.
 
-    The shortest step that sees the bend is taken: that is as long as the bend is away. A jump, which
-    every step sees, has none.
+    The shortest step that sees the bend is taken: that is as long as the bend is away. A jump,
+    which every step sees, has none.
     """
     out, kept, ahead = tangent.out, tangent.kept, tangent.ahead
     s, body = tangent.wide.body[b], system.body[b]
