@@ -48,7 +48,7 @@ from dap3d_core.integrators.stepping.vector_ops import scaled_largest
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.lu.factor import factor_lu, solve_lu
 
-ROUNDING = 2.220446049250313e-16
+EPSILON = 2.220446049250313e-16
 #: Iterations at most; more where the step is fixed, for a shorter one is no choice there.
 MOST, MOST_FIXED = 10, 40
 #: Slow iterations that a fixed step, or multipliers on their way, are left.
@@ -283,7 +283,7 @@ def find_stages(
     """
     limit = newton_limit(work)
     stale = abs(h - work.factored_step) / h  # factors of another step converge at this rate
-    work.convergence_factor = max(max(work.convergence_factor, ROUNDING) ** 0.8, stale)
+    work.convergence_factor = max(max(work.convergence_factor, EPSILON) ** 0.8, stale)
     before = ratio = ratio_before = states = multipliers = 1.0
     fixed = work.fixed_step != 0.0
     most = MOST_FIXED if fixed else MOST
@@ -321,7 +321,7 @@ def find_stages(
             if done < most and left >= 1.0 and not patient:
                 excess = max(1e-4, min(20.0, left))
                 return 0.8 * excess ** (-1.0 / (3.0 + most - done))
-        before = max(change, ROUNDING)
+        before = max(change, EPSILON)
         states, multipliers = work.state_change, work.multiplier_change
         factor = work.convergence_factor
         if done > 1 and (work.has_last_step == 0 or least > 1):  # the first rate may be that of

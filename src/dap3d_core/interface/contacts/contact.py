@@ -8,6 +8,8 @@ from dap3d_core.interface.types import Joint
 
 #: What authors define.
 DECLARED = ("gap", "at", "normal")
+#: What they may define besides.
+OPTIONAL = ("reach",)
 #: Fields that a material gives.
 MATERIAL = ("mu", "mu_s", "e", "law")
 #: Values of ``law``.
@@ -29,6 +31,10 @@ class Contact(Joint):
     * ``at``      the point of contact, global axes;
     * ``normal``  the unit vector there that points from body j to body i.
 
+    A fourth is for surfaces that end, as edges do: ``reach``, not negative while the point of
+    contact is on both of them. Where it becomes negative the contact opens, whatever its force, and
+    beyond it nothing touches.
+
     Rows, right-hand sides, slip and friction follow from them: one of the normal, two across it, of
     the velocity of body i at the point of contact less that of body j. The gap must be such that
     its rate is that velocity along the normal, as of every distance between smooth surfaces
@@ -41,11 +47,11 @@ class Contact(Joint):
     """
 
     kernel_names: ClassVar[tuple[str, ...]] = (  # type: ignore[assignment]
-        *DECLARED, *Joint.kernel_names, "tension"
+        *DECLARED, *OPTIONAL, *Joint.kernel_names, "tension"
     )  # fmt: skip
     rows, holonomic = 3, (True, False, False)
     is_contact: ClassVar[bool] = True
-    declared: ClassVar[tuple[str, ...]] = DECLARED
+    declared: ClassVar[tuple[str, ...]] = (*DECLARED, *OPTIONAL)
     points: ClassVar[int] = 1
 
     def __init_subclass__(cls, **conditions: Any) -> None:
@@ -104,7 +110,8 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     from dap3d_core.interface.codegen.specialise import bound_kernel
     from dap3d_core.interface.contacts import rates, rows
 
-    declared = {name: getattr(class_, name) for name in DECLARED}
+    names_of = [*DECLARED, *(n for n in OPTIONAL if getattr(class_, n, None) is not None)]
+    declared = {name: getattr(class_, name) for name in names_of}
     specs = _specs(class_)
     kinds = {name: spec.kind for name, spec in specs.items()}
     has_j = any(slot_of(name) == "j" for name in specs)
@@ -117,6 +124,11 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         wanted[short] = list(names)
         found = [c.removeprefix("turned__(").split(",")[0] for c in changes]
         wanted[f"{short}_dot"] = [*names, *(c for c in found if c not in ("None", "1.0"))]
+    if "reach" in declared:
+        wanted["reach"] = list(parameters(declared["reach"]))
+        calls["reach"] = f"reach__({', '.join(wanted['reach'])})"
+    else:
+        calls["reach"] = "1.0"
     if not has_j:
         calls |= dict.fromkeys(("r_j", "v_j", "w_j"), "(0.0, 0.0, 0.0)")
     kernels = {f"{name}__": kernel for name, kernel in declared.items()}

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 POINT, TIME = "point", "time"
 #: Values that reach so far, greatest over least, lie on a log scale when their logarithmic steps
 #: differ by less than this, relative.
-FAR, EVEN = 10.0, 1e-6
+LOG_SCALE_RATIO, EVEN = 10.0, 1e-6
 #: Names that an error lists.
 LISTED = 12
 #: Status of a point with a result: outputs of other points are not drawn as values.
@@ -144,7 +144,7 @@ class Table:
             return bool(np.all(values > 0.0))
         if self.sampled or name == TIME or len(values) < 3 or np.any(values <= 0.0):
             return False
-        if values[-1] < FAR * values[0]:
+        if values[-1] < LOG_SCALE_RATIO * values[0]:
             return False
         steps = np.diff(np.log(values))
         return bool(np.ptp(steps) <= EVEN * np.abs(steps).max())

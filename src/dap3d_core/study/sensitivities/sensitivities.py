@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import attrs
 import numpy as np
@@ -14,8 +14,8 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.suggestions import some
 from dap3d_core.result import Result, ResultError, RunMetadata, find
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
+from dap3d_core.settings import RunSettings
 from dap3d_core.simulation import CompiledModel, SimulationError
-from dap3d_core.simulation.errors import refuse_contacts
 from dap3d_core.simulation.failure.narrow_forces import notes_on_derivatives
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
@@ -178,19 +178,10 @@ def sensitivities(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     by: Sequence[str] | str,
     *,
-    t_end: float | None = None,
-    dt: float | None = None,
-    method: str | None = None,
-    integrator: str | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    step: float | None = None,
-    correct: bool | None = None,
-    project: bool | None = None,
-    correct_metric: str | None = None,
     start: "Start | None" = None,
     allow_code: bool = False,
     announce: Callable[[str], None] | None = None,
+    **settings: Unpack[RunSettings],
 ) -> Sensitivities:
     """Simulate a scene, with exact derivatives of the run by parameters of the scene.
 
@@ -208,14 +199,13 @@ def sensitivities(
 
     Raises:
         SceneError, PluginError: as ``simulate``; an unknown parameter, with the nearest.
-        SimulationError: the run stopped; no derivative by a parameter; the scene has contacts.
+        SimulationError: the run stopped; no derivative by a parameter.
     """
-    compiled = compiled_for(scene, method, allow_code, announce, integrator)
+    compiled = compiled_for(scene, allow_code, announce, **settings)
     parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
     check_differentiable(compiled, parameters, "a run with derivatives", "by")
-    given = dict(t_end=t_end, dt=dt, integrator=integrator, rtol=rtol, atol=atol, step=step,
-                 correct=correct, project=project, correct_metric=correct_metric,
-                 start=start_word(start))  # fmt: skip
+    given: dict[str, Any] = {**settings, "start": start_word(start)}
+    method = given.pop("method", None)
     state = given_state(start, compiled)
     base = run_beside(compiled, given, (), state)
     directions, lanes = _directions(len(parameters))
@@ -224,8 +214,8 @@ def sensitivities(
         part = parameters[first : first + directions]
         beside = [neighbours_of(compiled, parameter, given, base) for parameter in part]
         with compiled.borrow_evaluator():
-            settings = settings_of(compiled, method=method, **given)
-            run = DifferentiatedRun(compiled, settings, Callbacks(announce=announce), start=state)
+            simulation = settings_of(compiled, method=method, **given)
+            run = DifferentiatedRun(compiled, simulation, Callbacks(announce=announce), start=state)
             results.append(run.carry(beside, base, lanes).execute())
         runs.append(run)
     for note in _notes(compiled, runs):
@@ -250,7 +240,6 @@ def check_differentiable(
     """
     if not jit_is_on():
         raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
-    refuse_contacts(compiled.model, what)
     mistakes = [Mistake(key, p.name, why) for p in parameters if (why := no_derivative(p))]
     if mistakes:
         raise SceneError(mistakes)

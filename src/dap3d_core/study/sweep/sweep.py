@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import attrs
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Computed, ResultError
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
+from dap3d_core.settings import RunSettings
 from dap3d_core.simulation.output.free_space import check_room_of_points
 from dap3d_core.study.design import Design, design_of
 from dap3d_core.study.ensemble import Ensemble
@@ -36,16 +37,6 @@ def sweep(
     sample: int | None = None,
     design: str = "lhs",
     seed: int = 0,
-    t_end: float | None = None,
-    dt: float | None = None,
-    method: str | None = None,
-    integrator: str | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    step: float | None = None,
-    correct: bool | None = None,
-    project: bool | None = None,
-    correct_metric: str | None = None,
     start: str | None = None,
     allow_code: bool = False,
     gradients: bool = False,
@@ -56,6 +47,7 @@ def sweep(
     resume: bool = False,
     progress: Callable[[int, int], None] | None = None,
     announce: Callable[[str], None] | None = None,
+    **settings: Unpack[RunSettings],
 ) -> "xarray.Dataset":
     """Run a scene at many points, combinations of values of its parameters (docs/how-to/sweeps.md).
 
@@ -79,10 +71,8 @@ def sweep(
         SceneError, PluginError, SimulationError, ResultError: nothing can be run or stored; what
             ends it later (Ctrl-C, say) has the points so far as ``.result``.
     """
-    settings = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
-                    step=step, start=start, correct=correct, project=project,
-                    correct_metric=correct_metric)  # fmt: skip
-    study, plan = _read(scene, vary, outputs, (sample, design, seed), settings, allow_code)
+    given = {**settings, "start": start}
+    study, plan = _read(scene, vary, outputs, (sample, design, seed), given, allow_code)
     study = attrs.evolve(study, gradients=gradients)
     runner = _Runner(threads, client, progress, announce, force=force, resume=resume)
     return runner.run(study, plan, output)

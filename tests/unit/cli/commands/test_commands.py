@@ -282,7 +282,7 @@ def test_an_absolute_tolerance_of_zero_is_noted(call):
 
 @pytest.mark.parametrize(
     ("package", "extra", "words"),
-    [("tree_sitter", "dap3d[matlab]", ("import-matlab", "sub"))],
+    [("tree_sitter", "pip install tree-sitter tree-sitter-matlab", ("import-matlab", "sub"))],
 )
 def test_a_missing_package_is_told_with_its_extra(call, folder, monkeypatch, package, extra, words):
     (folder / "sub" / "inBodies.m").write_text("B1 = Body_struct;\n")

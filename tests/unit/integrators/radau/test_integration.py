@@ -64,6 +64,7 @@ def integration(scene, times=(0.0, 1.0), method=None, **settings):
                             report_size=evaluator.report_size, **settings)  # fmt: skip
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("scene", [sprung, disk, problems.pendulum], ids=lambda f: f.__name__)
 @pytest.mark.parametrize("h", [1.0, 1e-2])
 def test_tangent_is_that_of_all_equations(scene, h):
