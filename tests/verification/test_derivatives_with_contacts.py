@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from verification.test_contacts import G, TIGHT, ball
+from verification.test_contacts import TIGHT, G, ball
 
 import dap3d_core as dap
 
