@@ -177,7 +177,7 @@ def _refuse_unknown_modes(evaluator: Evaluator, t: float, u: Floats, states: Flo
     k = int(np.argmin(gaps))
     if gaps[k] < AT_SWITCH * evaluator.model.length:
         raise SimulationError(
-            f"linearisation of a scene with contacts that touch ({table.names[k]}) takes their modes "
+            f"linearisation of a scene with contacts that touch ({table.names[k]}) takes modes "
             "from a run: linearize(scene, at=result, t=...)"
         )
 

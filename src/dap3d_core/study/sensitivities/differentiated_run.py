@@ -10,7 +10,6 @@ from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.simulation import SimulationError
-from dap3d_core.simulation.events.jumps import Jumps
 from dap3d_core.simulation.run import Run
 from dap3d_core.study.sensitivities.neighbours import (
     Neighbours,
@@ -120,7 +119,6 @@ class DifferentiatedRun(Run):
 
     def _jumping(self, change: Callable[..., None]) -> Callable[[Integration], None]:
         """A jump of velocities, whose derivatives are those of the law that Python solves."""
-
         of = self.jumps
         assert of is not None
 
