@@ -157,3 +157,20 @@ def test_half_of_what_an_angle_is_measured_by_is_refused(fields):
     scene.add_force("rot_sda", "spring", k=1.0, **fields)
     with pytest.raises(dap.SceneError, match=r"give joint, or v_i and v_j|axis: is required"):
         dap.compile(scene)
+
+
+@pytest.mark.parametrize("theta_0", [0.0, "90 deg"])
+def test_a_force_over_the_angle_of_a_hinge(theta_0):
+    """Of a wheel that turns evenly, over several turns: m x.. = k (w t + theta_0)."""
+    scene, k, spin, m = hinge(0.3, 20.0), 0.7, 20.0, 3.0
+    scene.add_body("block", mass=m, Jp=(0.1, 0.1, 0.1), r=(1.0, 0.0, 0.0))
+    scene.add_joint("tran", "slide", P_i="block.O", P_j="ground.O", a_j="ground.x")
+    scene.add_function("a", "gas", coeff=(0.0, k, 0.0))
+    scene.add_force("angle_force", "push", joint="slide", hinge="axle", function="gas",
+                    theta_0=theta_0)  # fmt: skip
+    result = dap.simulate(scene, t_end=1.0, dt=0.1, **TIGHT)
+    t, first = result.t, 0.0 if theta_0 == 0.0 else np.pi / 2.0
+    expected = 1.0 + k / m * (spin * t**3 / 6.0 + first * t**2 / 2.0)
+    np.testing.assert_allclose(result.r[:, 1, 0], expected, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(result.w[:, 0, 2], spin, rtol=0, atol=1e-10)
+    assert result.ledger["energy"].ok

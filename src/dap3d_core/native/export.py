@@ -10,13 +10,15 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
 from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_header, variables_of
 from dap3d_core.native.exported import Exported
 from dap3d_core.native.fmu import write_fmu
-from dap3d_core.native.outputs import Outputs, outputs_of
-from dap3d_core.native.parameters import places_of
-from dap3d_core.native.prepared import PreparedRun, refusal
+from dap3d_core.native.run.directions import Directions
+from dap3d_core.native.run.outputs import Outputs, outputs_of
+from dap3d_core.native.run.parameters import places_of
+from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.registry import Registry
 from dap3d_core.scene import Scene, SceneError, load
 from dap3d_core.study.parameters import SceneParameter, parameters_named
@@ -24,6 +26,8 @@ from dap3d_core.study.parameters import SceneParameter, parameters_named
 #: Formats, with the suffix of their files; "c" is a folder.
 NATIVE_FORMATS = {"c": "", "fmu": ".fmu"}
 SOURCE = Path(__file__).parent / "source"
+#: Files of it with words of the model.
+WRITTEN = ("example.c", "example.rs", "example.m", "CMakeLists.txt", "README.md")
 
 
 @attrs.frozen
@@ -89,13 +93,18 @@ def export_native(
     left_out = given_outputs.left_out
     if strict and left_out:
         raise refusal(left_out[0], "name the outputs to be exported")
+    directions = Directions.of(prepared, given_outputs)
     chosen_parameters = _parameters(prepared, parameters, options, given_outputs)
     variables = variables_of(prepared, given_outputs.found, chosen_parameters)
     _refuse_shared(variables)
     name = re.sub(r"\W+", "_", str(given.name or target.stem), flags=re.ASCII) or "model"
     name = f"_{name}" if name[0].isdigit() else name  # an identifier of C
-    model = Exported(prepared, variables, name, given_outputs)
-    size = _write(model, chosen, target, fmi if format == "fmu" else 0)
+    model = Exported(prepared, variables, name, given_outputs, directions)
+    version = fmi if format == "fmu" else 0
+    try:
+        size = _write(model, chosen, target, version)
+    except CompileError:  # a function without a derivative
+        size = _write(attrs.evolve(model, directions=None), chosen, target, version)
     kinds = {"input": ("input",), "parameter": PARAMETERS, "output": ("output",)}
     names = {k: tuple(v.name for v in variables if v.kind in of) for k, of in kinds.items()}
     return NativeExport(
@@ -113,9 +122,8 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
     """Write an FMU of a version, or for 0 a folder; bytes of the largest library."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        (folder / "data.h").write_text(
-            data_of(model.prepared, model.variables, model.outputs.elements)
-        )
+        given = model.prepared, model.variables, model.outputs.elements, model.directions
+        (folder / "data.h").write_text(data_of(*given))
         for file in SOURCE.iterdir():
             shutil.copy(file, folder / file.name)
         if fmi:
@@ -201,7 +209,7 @@ def _write_folder(
     (target / "variables.h").write_text(header, encoding="utf-8", newline="\n")
     shutil.copy(SOURCE / "dap3d.h", target / "dap3d.h")
     words = _words(model, platforms)
-    for file in ("example.c", "CMakeLists.txt", "README.md"):
+    for file in WRITTEN:
         text = (SOURCE / file).read_text(encoding="utf-8")
         for key, value in words.items():
             text = text.replace(f"@{key}@", str(value))
@@ -225,6 +233,7 @@ def _words(model: Exported, platforms: Sequence[Platform]) -> dict[str, Any]:
         "VERSION": current_versions()["dap3d"],
         "PLATFORMS": ", ".join(p.name for p in platforms),
         "FIRST": platforms[0].name,
+        "LIBRARY": library_name(model.name, platforms[0]),
         "OUTPUTS": sum(v.kind == "output" for v in model.variables),
         "T_END": repr(prepared.t_end),
         "METHOD": prepared.compiled.method,

@@ -12,7 +12,7 @@ from dap3d_core.interface.fields import specs_of
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Instance, Mistake, Scene, SceneError, Simulation, ValidatedScene
 from dap3d_core.scene.coerce import canonical
-from dap3d_core.scene.scene import NAMED, Element
+from dap3d_core.scene.tables import NAMED, Element
 from dap3d_core.settings import SETTINGS
 
 AXES = ("x", "y", "z")

@@ -13,6 +13,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
+    from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
     from dap3d_core.interface.codegen.type_info import TypeInfo
     from dap3d_core.registry import Registry
 
@@ -133,15 +134,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
             for name, spec in specs_of(type_).items()
             if spec.given
         ],
-        "names": [
-            {
-                "name": argument.name,
-                "shape": list(argument.shape),
-                "level": "velocity" if argument.velocity else "position",
-                "doc": argument.doc,
-            }
-            for argument in type_info.names.values()
-        ],
+        "names": list(map(_name_data, type_info.names.values())),
         "variants": [
             {"with": dict(conditions), "class": e.type.__name__, **_class_data(e)}
             for conditions, e in type_info.variants
@@ -154,6 +147,16 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
             else {}
         ),
         **({"arguments": type_.arguments} if kind == "function" else {}),
+    }
+
+
+def _name_data(argument: "KernelArgument") -> dict[str, Any]:
+    """A name that kernels may use."""
+    return {
+        "name": argument.name,
+        "shape": list(argument.shape),
+        "level": "velocity" if argument.velocity else "position",
+        "doc": argument.doc,
     }
 
 

@@ -154,6 +154,7 @@ class JumpElements:
 
     def _add_impulses(self, group: Group, first: int, own: Integers) -> None:
         info, tables = group.type_info, self._tables
+        type_: Any = info.type
         slots = len(info.layout.slots)
         rows = row_count(info.outputs, slots) if info.type.kind == "force" else 0
         count = len(info.outputs["impulse"])
@@ -162,7 +163,7 @@ class JumpElements:
             body, place = len(tables["bodies"]), self._numbers
             tables["bodies"] += group.bodies[k].tolist()
             for r in range(rows):
-                pushes = int(r in info.type.unilateral)
+                pushes = int(r in type_.unilateral)
                 one = int(own[k, r]) if own.shape[1] == rows else -1
                 tables["rows"].append([place + r, place + count + 6 * r, 6 * rows, slots, body,
                                        first + k, r, pushes, *switch, one])  # fmt: skip

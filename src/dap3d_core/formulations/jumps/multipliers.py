@@ -67,12 +67,26 @@ def find_impulses(
             pulls = 1
     if pulls == 0:
         return
+    seek_active(m, A, x, pushes, acts, space, ZERO * largest)
+    for k in range(m):
+        acts[k] = 1 - pushes[k] if x[2, k] <= 0.0 else 1
+    least_solution(m, A, x[0], acts, x[1], space)
+    for k in range(m):
+        if (pushes[k] != 0) & (x[1, k] < 0.0):
+            x[1, k] = 0.0
+
+
+@compiled
+def seek_active(
+    m: int, A: Floats, x: Floats, pushes: Integers, acts: Integers, space: Floats, least: float
+) -> None:
+    """The rows that act, into row 2 of x their impulses; no rate below ``least`` is missing."""
     for k in range(m):
         acts[k] = 1 - pushes[k]
         x[2, k] = 0.0
     least_solution(m, A, x[0], acts, x[2], space)
     for _ in range(10 * m):
-        best, rate = -1, ZERO * largest
+        best, rate = -1, least
         for k in range(m):
             if acts[k] == 0:
                 missing = x[0, k]
@@ -96,12 +110,6 @@ def find_impulses(
             if last < 0:
                 break
             acts[last], x[2, last] = 0, 0.0
-    for k in range(m):
-        acts[k] = 1 - pushes[k] if x[2, k] <= 0.0 else 1
-    least_solution(m, A, x[0], acts, x[1], space)
-    for k in range(m):
-        if (pushes[k] != 0) & (x[1, k] < 0.0):
-            x[1, k] = 0.0
 
 
 @compiled

@@ -117,7 +117,7 @@ def newton(rows: Rows, x: Floats, y: Floats, tolerance: float) -> tuple[Floats, 
     for _ in range(ROUNDS):
         if best[2] <= tolerance:
             break
-        v = _round(rows, v, x, y, weight, INNER * max(tolerance, min(best[2], 1e-3)))
+        v = _round(rows, v, x, y, weight, INNER * max(0.1 * tolerance, min(best[2], 1e-3)))
         x, y = _impulses(rows, v, x, y, weight)
         left = rows.residual(x, y)
         if left > HELPS * best[2]:

@@ -16,7 +16,7 @@ NEAR, SWEEPS = 1e-4, 200
 #: Sweeps at most, where Newton's method does not end.
 MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
-FEW, ROUNDING = 100, 4e-15
+FEW, ROUNDING = 100, 1e-14
 
 
 class Problem:

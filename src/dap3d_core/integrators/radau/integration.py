@@ -250,7 +250,7 @@ class RadauIntegration(Integration):
     def loop_arguments(self) -> tuple[Any, ...]:
         """As ``Integration.loop_arguments``."""
         evaluator = self.evaluator
-        return (self.work, evaluator.functions, self._parts, evaluator.system, self.own_loops,
+        return (self.work, evaluator.functions, *self._parts, evaluator.system, self.own_loops,
                 self.tangent, self.matrix)  # fmt: skip
 
     def _project(self) -> bool:

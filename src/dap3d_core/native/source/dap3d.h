@@ -140,6 +140,14 @@ DAP3D_API int dap3d_set_states(dap3d_model *model, double t, const double *y);
 /* Their derivatives at t and y. DAP3D_ERROR if they are not finite. */
 DAP3D_API int dap3d_derivatives(dap3d_model *model, double t, const double *y, double *rates);
 
+/* Derivatives of unknowns (outputs, derivatives) at the present time and state along a direction: by
+   knowns (states, inputs, tunable parameters, time), each times its seed. They are exact to rounding,
+   as is the code that is differentiated; where a function bends, those of the side that is computed.
+   DAP3D_INVALID for variables of other kinds, and of models without derivatives. */
+DAP3D_API int dap3d_directional(dap3d_model *model, const int *unknowns, int count,
+                                const int *knowns, int known_count, const double *seed,
+                                double *result);
+
 /* Bring y at t onto the constraints, from near them. On return *moved (if not NULL) is the largest
    change of a state. */
 DAP3D_API int dap3d_project(dap3d_model *model, double t, double *y, double *moved);

@@ -31,15 +31,19 @@ struct dap3d_model {
     int64_t which;           /* the integration that the run is in */
     int64_t is_ahead;        /* steps have gone beyond the present time, which is interpolated */
     int64_t is_changed;      /* inputs have changed since the last step */
+    int64_t jump_count;
     int64_t is_other;        /* 1: parameters that the start depends on are set; 2: it moves */
     int64_t has_begun;       /* what touches at the start has jumped */
     int64_t has_row;         /* the row is that of the present time, and so are the outputs */
     int64_t is_over;
+    int (*between)(void *, double, double *); /* called at ends of steps, while one is going on */
+    void *who;
     char message[160];
     double sides[SWITCHES + 1]; /* of indicators, for integrators of others */
     double row[ROW + 1];     /* t, y and report at the present time */
     double outputs[OUTPUTS + 1];
-    int64_t w[WORDS];        /* the memory of the run */
+    int64_t w[WORDS];        /* the memory of the run: the state of it ends here */
+    double wide[DIRECTIONS ? 2 * WORDS : 1]; /* the same with slopes, for directional derivatives */
 };
 
 typedef void (*function)(double, const double *, int64_t, double *, int64_t, void *, void *);
@@ -144,11 +148,12 @@ static void call_elements(dap3d_model *m)
     for (int k = 0; k < MULTIPLIERS; k++)
         numbers(m, MINUS_LAMBDA)[m->w[ROW_OF + k]] = -m->row[MULTIPLIER + k];
     for (int k = 0; k < CALLS; k++) {
-        loop code = (loop)(uintptr_t)m->w[calls[k].code];
-        memset(m->w + calls[k].out, 0, 8 * (size_t)calls[k].size);
+        double *x = numbers(m, VALUES_OF_ELEMENTS);
+        loop code = (loop)(uintptr_t)m->w[calls[k].table + calls[k].q];
+        memset(x + calls[k].out, 0, 8 * (size_t)calls[k].size);
         m->w[COUNTER] = 0;
-        code(m->t, m->w + calls[k].arrays, calls[k].i0, calls[k].p0, 1, numbers(m, calls[k].out),
-             numbers(m, calls[k].second), numbers(m, calls[k].third));
+        code(m->t, m->w + calls[k].arrays, calls[k].i0, calls[k].p0, 1, x + calls[k].out,
+             x + calls[k].second, x + calls[k].third);
     }
 }
 #else
@@ -168,7 +173,7 @@ static void report(dap3d_model *m)
     m->row[0] = m->t;
     call(m, REPORT, m->t, m->row + 1, m->row + 1 + STATES, ROW - 1 - STATES);
     call_elements(m);
-    dap3d_outputs(m->t, numbers(m, BODIES), m->row + 1, numbers(m, VALUES),
+    dap3d_outputs(numbers(m, BODIES), m->row + 1, numbers(m, VALUES),
                   numbers(m, VALUES_OF_ELEMENTS), m->outputs);
     m->has_row = 1;
 }
@@ -517,6 +522,7 @@ static int apply_jump(dap3d_model *m)
     if (integer_of(m)[I_status] == JUMPED) {
         double *sides = numbers(m, integrations[m->which].sides), crossing[SWITCHES], before[SWITCHES];
         int acted;
+        m->jump_count++;
         memcpy(before, sides, sizeof before);
         memcpy(crossing, sides + CROSSED_BEHIND_SIDES, sizeof crossing);
         memset(sides + CROSSED_BEHIND_SIDES, 0, sizeof crossing);
@@ -546,6 +552,16 @@ static int stopped(dap3d_model *m)
     return status == SWITCHED || status == FINISHED ? DAP3D_ENDED : DAP3D_ERROR;
 }
 
+/* At the end of a step, before that of a call: whether the call ends here; *end may become earlier. */
+static int pauses(dap3d_model *m, double *end)
+{
+    if (m->between == NULL || real_of(m)[R_t] >= *end || integer_of(m)[I_status] != RUNNING)
+        return 0;
+    m->t = real_of(m)[R_t];
+    m->has_row = m->is_ahead = 0;
+    return m->between(m->who, m->t, end);
+}
+
 /* Integrate beyond a time, and interpolate there: as a run with reports. */
 static int step_freely(dap3d_model *m, double t)
 {
@@ -563,6 +579,9 @@ static int step_freely(dap3d_model *m, double t)
         if (integer_of(m)[I_status] != RUNNING && !apply_jump(m))
             return stopped(m);
         advance(m, 0);
+        if (integer_of(m)[I_row_count] == 0 && pauses(m, &t))
+            return DAP3D_OK;
+        numbers(m, integrations[m->which].times)[1] = t;
     }
     double *row = numbers(m, integrations[m->which].rows);
     memcpy(m->row, row, 8 * ROW);
@@ -642,8 +661,10 @@ static int hold_to(dap3d_model *m, double end)
             m->first_rejected = integer_of(m)[I_rejected_count];
         }
         real_of(m)[R_t_limit] = end;
-        advance(m, 1000);
+        advance(m, m->between == NULL ? 1000 : 0);
         real_of(m)[R_t_limit] = INFINITY;
+        if (pauses(m, &end))
+            end = real_of(m)[R_t];
     }
     double *real = real_of(m);
     int64_t *integer = integer_of(m);
@@ -661,6 +682,15 @@ static int hold_to(dap3d_model *m, double end)
 }
 
 double dap3d_time(const dap3d_model *m) { return m->t; }
+
+/* Crossings of switches so far, those where velocities jump included. */
+static int64_t crossings(dap3d_model *m)
+{
+    int64_t count = m->jump_count;
+    for (int k = 0; k < INTEGRATIONS; k++)
+        count += m->w[integrations[k].integer + I_crossing_count];
+    return count;
+}
 
 int dap3d_step_to(dap3d_model *m, double t)
 {
@@ -684,11 +714,11 @@ int dap3d_step_to(dap3d_model *m, double t)
 
 /* ---------------------------------------------------------------------- states of a run */
 
-size_t dap3d_state_size(void) { return sizeof(dap3d_model); }
+size_t dap3d_state_size(void) { return offsetof(dap3d_model, wide); }
 
 int dap3d_save(const dap3d_model *m, void *state)
 {
-    memcpy(state, m, sizeof *m);
+    memcpy(state, m, dap3d_state_size());
     return DAP3D_OK;
 }
 
@@ -698,7 +728,7 @@ int dap3d_load(dap3d_model *m, const void *state)
     memcpy(&identity, state, sizeof identity);
     if (identity != IDENTITY)
         return fail(m, DAP3D_INVALID, "the state is not one of this model");
-    memcpy(m, state, sizeof *m);
+    memcpy(m, state, dap3d_state_size());
     place(m);
     return DAP3D_OK;
 }
@@ -755,6 +785,84 @@ int dap3d_derivatives(dap3d_model *m, double t, const double *y, double *rates)
         if (!(fabs(rates[k]) <= LARGEST))
             return fail(m, DAP3D_ERROR, "the rates are not finite");
     return DAP3D_OK;
+}
+
+#if DIRECTIONS
+/* The memory with slopes zero. */
+static void widen(dap3d_model *m)
+{
+    for (int k = 0; k < WORDS; k++) {
+        m->wide[2 * k] = numbers(m, 0)[k];
+        m->wide[2 * k + 1] = 0.0;
+    }
+    int64_t *x = (int64_t *)m->wide;
+    for (size_t k = 0; k < sizeof wide_addresses / sizeof *wide_addresses; k++) {
+        const uint32_t *a = wide_addresses[k];
+        x[a[0]] = (int64_t)(uintptr_t)(a[2] == 2 ? (void *)(m->wide + a[1]) : (void *)(m->w + a[1]));
+    }
+    for (size_t k = 0; k < sizeof wide_shapes / sizeof *wide_shapes; k++)
+        x[wide_shapes[k][0]] = wide_shapes[k][1];
+    for (size_t k = 0; k < sizeof wide_codes / sizeof *wide_codes; k++)
+        x[wide_codes[k].word] = (int64_t)(uintptr_t)wide_codes[k].code;
+}
+#endif
+
+int dap3d_directional(dap3d_model *m, const int *unknowns, int count, const int *knowns, int given,
+                      const double *seed, double *result)
+{
+#if DIRECTIONS
+    double *x = m->wide, *row = x + 2 * ALONG_ROW;
+    report(m);
+    widen(m);
+    for (int k = 0; k < ROW; k++)
+        row[2 * k] = m->row[k], row[2 * k + 1] = 0.0;
+    for (int k = 0; k < given; k++) {
+        int v = knowns[k], first = v < 0 || v >= VARIABLES ? 0 : variables[v].first;
+        switch (dap3d_kind(v)) {
+        case DAP3D_TIME: row[1] += seed[k]; break;
+        case DAP3D_STATE: row[2 * (1 + first) + 1] += seed[k]; break;
+        case DAP3D_INPUT: x[2 * first + 1] += seed[k]; break;
+        case DAP3D_PARAMETER:
+            for (int n = 0; n < variables[v].count; n++)
+                x[2 * places[first + n].word + 1] += places[first + n].sign * seed[k];
+            break;
+        default: return fail(m, DAP3D_INVALID, "there is no derivative by such a variable");
+        }
+    }
+    int needs = 0;
+    for (int k = 0; k < count; k++)
+        needs |= dap3d_kind(unknowns[k]) == DAP3D_OUTPUT ? 2 : 1;
+    if (needs & 1)
+        rates_along(x);
+    if (needs & 2) {
+        report_along(x);
+#if CALLS
+        double *values = x + 2 * VALUES_OF_ELEMENTS;
+        memset(values, 0, 16 * (size_t)(COUNTER - VALUES_OF_ELEMENTS + 1));
+        for (int k = 0; k < MULTIPLIERS; k++)
+            for (int c = 0; c < 2; c++)
+                x[2 * (MINUS_LAMBDA + m->w[ROW_OF + k]) + c] = -row[2 * (MULTIPLIER + k) + c];
+        for (int k = 0; k < CALLS; k++)
+            memset(values + 2 * calls[k].out, 0, 16 * (size_t)calls[k].size);
+#endif
+        elements_along(x);
+        dap3d_outputs_along(x + 2 * BODIES, row + 2, x + 2 * VALUES, x + 2 * VALUES_OF_ELEMENTS,
+                            x + 2 * ALONG_OUT);
+    }
+    for (int k = 0; k < count; k++) {
+        int v = unknowns[k], first = v < 0 || v >= VARIABLES ? 0 : variables[v].first;
+        switch (dap3d_kind(v)) {
+        case DAP3D_OUTPUT: result[k] = x[2 * (ALONG_OUT + first) + 1]; break;
+        case DAP3D_DERIVATIVE: result[k] = x[2 * (ALONG_RATES + first) + 1]; break;
+        case DAP3D_STATE: result[k] = row[2 * (1 + first) + 1]; break;
+        default: return fail(m, DAP3D_INVALID, "there is no derivative of such a variable");
+        }
+    }
+    return DAP3D_OK;
+#else
+    (void)unknowns, (void)count, (void)knowns, (void)given, (void)seed, (void)result;
+    return fail(m, DAP3D_INVALID, "the model calls a function without a derivative");
+#endif
 }
 
 int dap3d_project(dap3d_model *m, double t, double *y, double *moved)

@@ -201,10 +201,9 @@ def sensitivities(
         SceneError, PluginError: as ``simulate``; an unknown parameter, with the nearest.
         SimulationError: the run stopped; no derivative by a parameter.
     """
-    if not jit_is_on():
-        raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
     compiled = compiled_for(scene, allow_code, announce, **settings)
     parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
+    check_differentiable(compiled, parameters, "a run with derivatives", "by")
     given: dict[str, Any] = {**settings, "start": start_word(start)}
     method = given.pop("method", None)
     state = given_state(start, compiled)
@@ -222,6 +221,37 @@ def sensitivities(
     for note in _notes(compiled, runs):
         results[0].note(note)
     return Sensitivities(results[0], runs, parameters)
+
+
+def check_differentiable(
+    compiled: CompiledModel, parameters: Sequence[SceneParameter], what: str, key: str
+) -> None:
+    """Refuse scenes and parameters without derivatives.
+
+    Args:
+        compiled: the model.
+        parameters: by which to differentiate.
+        what: is to be done, in words.
+        key: the argument that names the parameters.
+
+    Raises:
+        SceneError: a parameter has no derivative.
+        SimulationError: the scene has none, or nothing is compiled.
+    """
+    if not jit_is_on():
+        raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
+    mistakes = [Mistake(key, p.name, why) for p in parameters if (why := no_derivative(p))]
+    if mistakes:
+        raise SceneError(mistakes)
+
+
+def no_derivative(parameter: SceneParameter) -> str:
+    """Why there is no derivative by a parameter, "" where there may be one."""
+    if parameter.table == "simulation" and parameter.path[-1] != "t_end":
+        return "this says how a run is computed; a run has derivatives by what it computes alone"
+    if parameter.whole:
+        return "this is a whole number, by which there is no derivative"
+    return ""
 
 
 def _directions(count: int) -> tuple[int, int]:

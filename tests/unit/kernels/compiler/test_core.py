@@ -119,7 +119,7 @@ NOT_CALLED = {
         "take_rates watch_stages",
         # of scenes with contacts, which have closed forms: verification/test_contacts.py
         "formulations.common.switching_functions": "contact_rates watch_contacts",
-        # of jumps with closed forms: formulations/jumps/test_law.py, simulation/events/test_jumps.py
+        # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate",
         "formulations.jumps.rounds": "kick has_crossed stop",
         "formulations.jumps.held_joints": "place_alone solve_free",

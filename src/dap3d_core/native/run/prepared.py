@@ -26,7 +26,7 @@ from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.model.knots import breaks_of
 from dap3d_core.model.state_layout import y_from_u
-from dap3d_core.native.image import Image
+from dap3d_core.native.run.image import Image
 from dap3d_core.registry import Registry
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -92,10 +92,7 @@ class Advance:
         )
         given: tuple[Any, ...] = (integration.work, *integration._arguments)
         if isinstance(integration, RadauIntegration):
-            _, system, loops = integration._arguments
-            function = advance_radau
-            given = (integration.work, integration.functions, integration._parts, system, loops,
-                     integration.tangent, integration.matrix)  # fmt: skip
+            function, given = advance_radau, integration.loop_arguments
         elif function is None:
             raise refusal(f"integrator {integration.name} cannot be exported")
         return cls(integration, function.compile([*map(type_of, given), INT]), given)
@@ -254,7 +251,7 @@ class PreparedRun:
         parts = [part for one in self.advances for part in one.arguments]
         parts += [] if self.jumps is None else [*self.jumps.arguments]
         parts += [] if self.start is None else [self.start.arrays, self.start.functions]
-        return Image(*parts, *self.more)
+        return Image(self.evaluator.loops, *parts, *self.more)
 
     def _refuse_jumps(self) -> None:
         refuse_contacts(self.evaluator.model, "export")

@@ -18,13 +18,12 @@ from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.interface.fields import SLOTS, specs_of
 from dap3d_core.kernels import scalar_math, vectors
-from dap3d_core.kernels.compiler import types as t
-from dap3d_core.kernels.compiler.trace import NumberArray, Symbol, Tracer
+from dap3d_core.kernels.compiler.trace import NumberArray, Tracer
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R, V, W
 from dap3d_core.model.joint_angles import joint_angle_name
 from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
-from dap3d_core.native.elements import Element, Elements
-from dap3d_core.native.prepared import PreparedRun, refusal
+from dap3d_core.native.run.elements import Element, Elements
+from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.result import Result, ResultError, RunMetadata
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.quantities.catalogue import ACTIONS
@@ -36,9 +35,9 @@ from dap3d_core.simulation.control.state_view import NAMES, conjugate, product
 #: Quantities of a body that an export without outputs has.
 OF_BODIES = ("r", "p", "rd", "w")
 SYMBOL = "dap3d_outputs"
-#: t, bodies (n + 1, BODY_WIDTH), the reported row without t, functions (k, 5), what loops of elements
+#: Bodies (n + 1, BODY_WIDTH), the reported row behind t, functions (k, 5), what loops of elements
 #: have found; the values.
-_FUNCTION = """define hidden void @{symbol}(double %t, ptr %bodies, ptr %row, ptr %F,
+_FUNCTION = """define hidden void @{symbol}(ptr %bodies, ptr %row, ptr %F,
                                 ptr %elements, ptr %out) nounwind {{
 entry:
 {body}
@@ -159,7 +158,7 @@ class _Quantities:
         model = self._model = prepared.evaluator.model
         self._body = NumberArray(tracer, "%bodies", width=BODY_WIDTH)
         self._row, self._F = NumberArray(tracer, "%row"), NumberArray(tracer, "%F", width=5)
-        self._t = Symbol(tracer, t.Value(t.FLOAT, ("%t",)))
+        self._t = self._row[-1]
         #: Of the report in a row: behind the integrated state.
         self._report = len(prepared.run.present.work.state[Y])
         self._layout = model.report_layout

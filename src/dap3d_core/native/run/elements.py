@@ -14,7 +14,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, loop_list
 from dap3d_core.model.groups import Group
-from dap3d_core.native.prepared import PreparedRun
+from dap3d_core.native.run.prepared import PreparedRun
 from dap3d_core.result.post.force_output import group_of
 
 
@@ -22,9 +22,7 @@ from dap3d_core.result.post.force_output import group_of
 class ElementArrays(Arrays):
     """What loops of elements write."""
 
-    values: Floats  # of all calls, one behind the other
-    minus: Floats  # (rows,) -lambda, in the order of the solver
-    counter: Floats  # scratch
+    values: Floats  # -lambda in the order of the solver, scratch; then of all calls
 
 
 @attrs.frozen(eq=False)
@@ -36,7 +34,7 @@ class Call:
         arrays: that it reads.
         group: first integer, first number.
         first, size: what it writes of the values.
-        more: the other two outputs, as offsets in the values; None: -lambda; -1: a counter.
+        more: the other two outputs, as offsets in the values.
     """
 
     table: Any
@@ -45,7 +43,7 @@ class Call:
     group: tuple[int, int]
     first: int
     size: int
-    more: tuple[int | None, int | None]
+    more: tuple[int, int]
 
 
 @attrs.frozen(eq=False)
@@ -83,9 +81,11 @@ class Elements:
         self._evaluator = prepared.evaluator
         self.calls: list[Call] = []
         self._known: dict[tuple[str, str], Element | None] = {}
-        self._size = 0
+        #: Offsets of -lambda, and of scratch.
+        self.minus, self.counter = 0, prepared.evaluator.system.multipliers.size
+        self._size = self.counter + 1
         #: Made by ``finish``.
-        self.arrays: ElementArrays | None = None
+        self.arrays = ElementArrays(values=np.zeros(1))
 
     def joint(self, name: str) -> Element | None:
         """A joint; None where the formulation has no loop of its rows."""
@@ -97,10 +97,7 @@ class Elements:
 
     def finish(self) -> list[Any]:
         """Arrays and tables that the calls need."""
-        rows = self._evaluator.system.multipliers.size
-        self.arrays = ElementArrays(
-            values=np.zeros(max(1, self._size)), minus=np.zeros(max(1, rows)), counter=np.zeros(1)
-        )
+        self.arrays = ElementArrays(values=np.zeros(self._size))
         parts = [part for call in self.calls for part in (call.table, call.arrays)]
         return [self.arrays, *parts] if self.calls else []
 
@@ -124,8 +121,8 @@ class Elements:
         evaluator, s = self._evaluator, self._evaluator.system
         joint = evaluator.model.joint_names.index(name)
         for q, (kind, group) in enumerate(evaluator.loop_groups):
-            places = np.flatnonzero(group.members == joint) if kind == "acceleration" else ()
-            if not len(places):
+            places = np.flatnonzero(group.members == joint)
+            if kind != "acceleration" or not places.size:
                 continue
             index, rows = int(places[0]), int(evaluator.model.joint_rows[joint])
             slots, width = len(group.type_info.layout.slots), stride(group.type_info)
@@ -150,7 +147,7 @@ class Elements:
         law = "wrench" if "wrench" in loops else "friction"
         first = self._take(s.force.size)
         place = self._place(loops[law], group, index)
-        given = (None, None) if group.read or law == "friction" else (first, first)
+        given = (self.minus,) * 2 if group.read or law == "friction" else (first, first)
         self.calls.append(Call(evaluator.loops, loops[law], s, place, first, s.force.size, given))
         energy = tension = -1
         if "energy" in loops:
@@ -160,5 +157,5 @@ class Elements:
         if paths := group.type_info.outputs.get("tension", ()):
             tension = self._take(len(paths))
             table = loop_list([compiled_loop(group.type_info, "tension")])
-            self.calls.append(Call(table, 0, s, place, tension, len(paths), (-1, -1)))
+            self.calls.append(Call(table, 0, s, place, tension, len(paths), (self.counter,) * 2))
         return Element(group, index, first, energy, tension)

@@ -14,8 +14,8 @@ import numpy as np
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.native.outputs import Outputs, outputs_of
-from dap3d_core.native.prepared import PreparedRun, refusal
+from dap3d_core.native.run.outputs import Outputs, outputs_of
+from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.scene import SceneError
 from dap3d_core.study.batch import initial_state
 from dap3d_core.study.parameters import SceneParameter, with_values
