@@ -185,8 +185,11 @@ class ContactJumps(Jumps):
         outputs = self._outputs(t, u)
         rows = ContactRows(table, t, u)
         # of those that hold what ends is the force, or the reach of their surfaces
-        beyond = {c for c, part in ended
-                  if part == 0 and before[c] > 0.5 and outputs[c, REACH] < outputs[c, NORMAL]}
+        beyond = {
+            c
+            for c, part in ended
+            if part == 0 and before[c] > 0.5 and outputs[c, REACH] < outputs[c, NORMAL]
+        }
         ended = [(c, part) for c, part in ended if c not in beyond]
         near = (outputs[:, GAP] < touching) & (outputs[:, REACH] >= 0.0)
         closed = [c for c in range(table.count) if c not in beyond
