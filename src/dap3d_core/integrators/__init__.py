@@ -46,6 +46,12 @@ def _radau(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integra
     return RadauIntegration(evaluator, y0, times, **options)
 
 
+def _moreau(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
+    from dap3d_core.integrators.moreau.integration import MoreauIntegration
+
+    return MoreauIntegration(evaluator, y0, times, **options)
+
+
 def _placed_steps(evaluator: Evaluator) -> dict[str, Any]:
     """Options of explicit integrators for singular poses and the counting of turns."""
     return {"length_count": evaluator.length_count, "watched": evaluator.watched}
@@ -64,6 +70,7 @@ class Integrator:
         leaves_singular: it can start at a singular pose.
         requires: why it needs a formulation that is exact; "" where it does not.
         needs_body_coordinates: its equations are those of body coordinates.
+        steps_contacts: contacts are followed by impulses over its steps, not by events.
     """
 
     name: str
@@ -73,6 +80,7 @@ class Integrator:
     leaves_singular: bool = False
     requires: str = ""
     needs_body_coordinates: bool = False
+    steps_contacts: bool = False
 
 
 #: By name.
@@ -86,9 +94,15 @@ INTEGRATORS = {
         Integrator(
             "radau", _radau, requires="the constraints themselves", needs_body_coordinates=True
         ),
+        Integrator(
+            "moreau", _moreau, adaptive=False, requires="the constraints themselves",
+            needs_body_coordinates=True, steps_contacts=True,
+        ),
     )
-}
+}  # fmt: skip
 
+#: That of ``contact = "stepping"``.
+STEPPING = next(i for i in INTEGRATORS.values() if i.steps_contacts)
 #: Integrator "auto" begins with the first, and continues with the second where a scene is stiff.
 EXPLICIT, IMPLICIT = INTEGRATORS["dop853"], INTEGRATORS["radau"]
 
@@ -101,6 +115,7 @@ __all__ = [
     "Integration",
     "Integrator",
     "RungeKutta",
+    "STEPPING",
     "StepCounts",
     "Status",
     "Tableau",

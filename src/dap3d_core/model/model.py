@@ -27,6 +27,7 @@ from dap3d_core.model.state_layout import (
     state_layout,
 )
 from dap3d_core.scene import Instance, ValidatedScene
+from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
 
 if TYPE_CHECKING:
     from dap3d_core.model.element_states import ElementState
@@ -62,6 +63,7 @@ class Model:
         point_names, point_body (points,), point_local (points, 3): for rP; animation points last.
         notes: what types warned about.
         contact_laws: (contacts,) law of impact of each point of contact; they are the last joints.
+        collisions: the shapes that collide; None where there are none.
         motions: of the joints (assembly/motion); joint_angles: those that are counted. None until
             they are looked for.
     """
@@ -95,6 +97,7 @@ class Model:
     motions: Any = None
     joint_angles: JointAngles | None = None
     contact_laws: tuple[str, ...] = ()
+    collisions: CollisionShapes | None = None
 
     @property
     def contact_count(self) -> int:
@@ -351,6 +354,7 @@ def build_model(checked: ValidatedScene) -> Model:
         input_names=tuple(checked.inputs),
         input_rows=1 + len(checked.functions) + np.arange(len(checked.inputs)),
         input_values=np.array(list(checked.inputs.values()), dtype=float),
+        collisions=checked.collisions,
         contact_laws=tuple(contact.values["law"] for contact in checked.contacts),
     )
     for value in attrs.astuple(model, recurse=False):

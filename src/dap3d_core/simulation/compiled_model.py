@@ -133,6 +133,7 @@ class CompiledModel:
         self.requested_method = requested = method or str(scene.simulation.method)
         self._like = like
         usual = takes_joint_coordinates(str(scene.simulation.integrator))
+        usual = usual and self.model.collisions is None
         self._may_choose_joint = usual if joint is None else joint
         self._breakpoints: dict[float, Breakpoints] = {}
         self._starts: dict[tuple[bool, tuple[str, ...], str], InitialState] = {}

@@ -30,6 +30,12 @@ def refuse_contacts(model: Any, what: str) -> None:
             f"({model.joint_names[-model.contact_count].partition('#')[0]}): take them out of "
             "[contacts], or run the scene (simulate), which does"
         )
+    if model.collisions is not None:
+        raise SimulationError(
+            f"{what} does not take shapes that collide yet, and the scene has some "
+            f"({model.collisions.names[0]}): leave collides = true out, or run the scene "
+            "(simulate), which does"
+        )
 
 
 class RedundantError(SimulationError):

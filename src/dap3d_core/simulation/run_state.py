@@ -11,8 +11,9 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import Integration, StepCounts
+from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.result import EventRecord, RunMetadata, RunStatistics, information
-from dap3d_core.scene import Mistake, SceneError, Simulation
+from dap3d_core.scene import MISSING, Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, check_every
 from dap3d_core.simulation.events.locate import EventLocator
@@ -119,7 +120,8 @@ class RunState:
         self.event_locator = EventLocator(compiled, events) if events else None
         if self.event_locator is not None:
             check_every(self.event_locator.events, self.t_end)
-        self.jumps, self.programs = jumps_of(self.evaluator), ChangeOver(self.evaluator)
+        self.jumps = jumps_of(self.evaluator, self.settings)
+        self.programs = ChangeOver(self.evaluator)
         if self.event_locator is not None:
             self.event_locator.jumps = self.jumps
         self.control: SampledControl | None = None
@@ -246,9 +248,21 @@ class RunState:
         return {"rate_noise": {"v": v, "w": w}}
 
 
-def jumps_of(evaluator: Evaluator) -> "Jumps | None":
-    """What changes velocities in a run of a model; None where none of its types does."""
-    if not any(switch.jumps for switch in evaluator.switches):
+def jumps_of(evaluator: Evaluator, settings: Simulation) -> "Jumps | None":
+    """What changes velocities in a run of a model; None where none of its types does.
+
+    Raises:
+        SceneError: elements change velocities by laws that steps of contacts do not know.
+    """
+    jumping = [switch for switch in evaluator.switches if switch.jumps]
+    if not jumping:
+        return None
+    if integrator_named(settings.integrator).steps_contacts:
+        others = [switch.name(evaluator.model) for switch in jumping if not switch.is_contact]
+        if others:
+            what = "changes velocities by a law of its own, which steps of contacts do not know"
+            remedy = "describe what it does by a contact, or take the contacts out"
+            raise SceneError([Mistake(others[0], MISSING, what, remedy=remedy)])
         return None
     if evaluator.model.contact_count:
         from dap3d_core.simulation.events.contact_jumps import ContactJumps

@@ -10,23 +10,21 @@ import numpy as np
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.switches import effects_of
-from dap3d_core.integrators import EXPLICIT, Integrator
+from dap3d_core.integrators import EXPLICIT, STEPPING, Integrator
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.scene import (
-    METHODS,
-    MISSING,
-    Mistake,
-    Scene,
-    SceneError,
-    Simulation,
-    check_simulation,
-)
+from dap3d_core.model import Model
+from dap3d_core.result.note import information
+from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
 from dap3d_core.scene.validate.settings import notes_of
+from dap3d_core.settings import METHODS
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.explain import takes_joint_coordinates
 from dap3d_core.simulation.initial.tolerances import atol_vector, kinds_of, resolved_atol
+
+#: Points of declared contacts up to which "auto" follows them by events.
+MOST_BY_EVENTS = 30
 
 
 def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:
@@ -38,24 +36,60 @@ def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:
     given = {k: v for k, v in asked.items() if v is not None}
     settings = attrs.evolve(compiled.scene.simulation, **given)
     check_simulation(settings, compiled.model.body_names)
-    return settings
+    return _with_contact_engine(compiled, settings)
+
+
+def _with_contact_engine(compiled: CompiledModel, settings: Simulation) -> Simulation:
+    """The settings with the integrator that steps contacts, where that is chosen.
+
+    Raises:
+        SceneError: events are to follow shapes that collide.
+    """
+    model = compiled.model
+    if integrator_named(settings.integrator).steps_contacts:
+        return settings
+    if model.collisions is not None and settings.contact == "events":
+        what = "shapes that collide are followed by stepping, and not by events"
+        remedy = "leave it out, or declare the pairs that touch in [contacts]"
+        raise SceneError([Mistake("contact", "events", what, remedy=remedy)])
+    if not contact_engine_reason(model, settings.contact):
+        return settings
+    return attrs.evolve(settings, integrator=STEPPING.name, step=settings.contact_step)
+
+
+def contact_engine_reason(model: Model, contact: str) -> str:
+    """Why contacts are followed by stepping; "" where they are not, or there are none."""
+    if contact == "stepping" and (model.contact_count or model.collisions is not None):
+        return "asked for"
+    if contact == "auto" and model.collisions is not None:
+        return f"{len(model.collisions.names)} shapes may meet anywhere"
+    if contact == "auto" and model.contact_count > MOST_BY_EVENTS:
+        return f"there are {model.contact_count} points of contact, more than {MOST_BY_EVENTS}"
+    return ""
 
 
 def settings_notes(compiled: CompiledModel, settings: Simulation) -> list[str]:
     """Warnings on odd settings of a run that its scene does not have."""
-    return [note for note in notes_of(settings) if note not in compiled.notes]
+    notes = [note for note in notes_of(settings) if note not in compiled.notes]
+    if integrator_named(settings.integrator).steps_contacts:
+        why = contact_engine_reason(compiled.model, settings.contact) or "asked for"
+        words = f"contacts by stepping, h = {settings.step:g} s: {why}; errors are of order h"
+        notes.append(information(words))
+    return notes
 
 
 def compiled_for(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
-    method: str | None,
     allow_code: bool,
-    announce: Callable[[str], None] | None,
+    announce: Callable[[str], None] | None = None,
+    *,
+    method: str | None = None,
     integrator: str | None = None,
+    **_: Any,
 ) -> CompiledModel:
     """The compiled model of a scene; one that was compiled before must have the requested method.
 
-    integrator: that of the runs; the scene's when left out.
+    method, integrator: those of the runs; the scene's when left out. Other settings make no odds.
 
     Raises:
         SceneError: there is no such method.

@@ -2,11 +2,12 @@
 
 import os
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene
+from dap3d_core.settings import RunSettings
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.output.monitor import RunProgress
@@ -23,27 +24,18 @@ if TYPE_CHECKING:
 def simulate(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     *,
-    t_end: float | None = None,
-    dt: float | None = None,
-    method: str | None = None,
-    integrator: str | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    step: float | None = None,
-    correct: bool | None = None,
-    project: bool | None = None,
     progress: Progress | None = None,
     allow_code: bool = False,
     announce: Callable[[str], None] | None = None,
     output: str | os.PathLike[str] | None = None,
     force: bool = False,
-    correct_metric: str | None = None,
     start: "Start | None" = None,
     estimate_error: bool | str = False,
     checkpoint: float | None = None,
     events: Sequence[Event] = (),
     watch: Callable[[RunProgress], None] | None = None,
     controllers: "Sequence[Controller]" = (),
+    **settings: Unpack[RunSettings],
 ) -> Result:
     """Simulate a scene from t = 0 to t_end; settings left out are those of its [simulation].
 
@@ -58,6 +50,7 @@ def simulate(
         start: "scene", "equilibrium", a result (its end), (result, time) or an ``Equilibrium``.
         progress, watch: called each 0.1 s or so, as progress(t, t_end), with a ``RunProgress``.
         events, controllers: see ``Event`` and ``Controller``.
+        contact, contact_step: "events", "stepping" or "auto"; step of the latter, s.
         output, force: file to write, ``OUTPUT.part`` meanwhile; whether over an existing one.
         estimate_error: estimate ``result.error`` by a second, finer run; "quick": if within 1 s.
         checkpoint: seconds between checkpoints, for ``resume``; inf: one where the run is ended.
@@ -67,14 +60,13 @@ def simulate(
         SimulationError (RedundantError, AssemblyError): the run stopped, or could not begin. What
             ends it (Ctrl-C, say) has what was computed as ``.result``.
     """
-    compiled = compiled_for(scene, method, allow_code, announce, integrator)
-    settings = settings_of(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
-                         rtol=rtol, atol=atol, step=step, correct=correct, project=project,
-                         correct_metric=correct_metric, start=start_word(start))  # fmt: skip
+    compiled = compiled_for(scene, allow_code, announce, **settings)
+    simulation = settings_of(compiled, start=start_word(start), **settings)
     check_checkpoint(checkpoint, output)
     with compiled.borrow_evaluator():
-        run = Run(compiled, settings, Callbacks(announce=announce, progress=progress, watch=watch),
-                  events, output=output, force=force, estimate_error=estimate_error,
+        callbacks = Callbacks(announce=announce, progress=progress, watch=watch)
+        run = Run(compiled, simulation, callbacks, events,
+                  output=output, force=force, estimate_error=estimate_error,
                   start=given_state(start, compiled), controllers=controllers)  # fmt: skip
         if checkpoint is not None:
             run.save_every(checkpoint, force=force)

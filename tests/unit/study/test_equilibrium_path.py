@@ -180,12 +180,13 @@ def test_column_that_is_pushed_follows_one_path():
     assert not (found.turning | found.branching).any()
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("parameter", "values"),
     [
-        ("forces.spring.k", "50:300:4"),
         ("points.tip.sPp.z", "1:0.6:3"),
-        pytest.param("bodies.bar.mass", "1:9:3", marks=pytest.mark.slow),
+        ("forces.spring.k", "50:300:4"),
+        ("bodies.bar.mass", "1:9:3"),
     ],
 )
 def test_path_without_turns_is_that_of_separate_searches(parameter, values):

@@ -15,6 +15,8 @@ class Material:
         name: its name in the scene.
         mu, mu_s: coefficients of friction of sliding and of sticking.
         e, law: coefficient of restitution, and of whose law of impact.
+        with_: of shapes that collide: name of another material -> fields of the pair (``with`` in
+            scene files). Of pairs that are not named mu and e are geometric means.
     """
 
     name: str
@@ -22,6 +24,22 @@ class Material:
     mu_s: Any = attrs.field(default=None, converter=plain)
     e: Any = attrs.field(default=None, converter=plain)
     law: Any = attrs.field(default=None, converter=plain)
+    with_: Any = attrs.field(default=None, converter=plain)
+
+
+@attrs.define
+class Collisions:
+    """Which shapes that collide meet each other.
+
+    Attributes:
+        bodies: "all", or names of bodies, ``ground`` among them.
+        exclude: pairs of names of bodies that do not meet; bodies of one joint never do.
+        material: of shapes that name none.
+    """
+
+    bodies: Any = attrs.field(default="all", converter=plain)
+    exclude: Any = attrs.field(default=(), converter=plain)
+    material: Any = attrs.field(default=None, converter=plain)
 
 
 class ContactTables:
@@ -34,7 +52,7 @@ class ContactTables:
 
         Args:
             name: without dots, not used by another material.
-            fields: mu, mu_s, e, law, as in ``Material``.
+            fields: mu, mu_s, e, law, with_, as in ``Material``.
 
         Raises:
             SceneError: the name is taken or illegal, or a key is unknown.
@@ -50,3 +68,13 @@ class ContactTables:
         """
         scene: Any = self
         return str(scene._add_element("contacts", type, name, fields))
+
+    def add_collisions(
+        self, bodies: Any = "all", exclude: Any = (), material: str | None = None
+    ) -> None:
+        """Let shapes with ``collides=True`` meet; arguments as of ``Collisions``.
+
+        Without it all of them do.
+        """
+        scene: Any = self
+        scene.collisions = Collisions(bodies, exclude, material)

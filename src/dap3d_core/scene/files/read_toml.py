@@ -9,9 +9,11 @@ from typing import Any
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.coerce import canonical, plain, with_identifiers
+from dap3d_core.scene.contacts.tables import Collisions
 from dap3d_core.scene.errors import MISSING, Key, MistakeList, SceneError, dotted, file_error
 from dap3d_core.scene.files.text_file import read_text, unreadable
-from dap3d_core.scene.scene import (
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import (
     HEADER_KEYS,
     NAMED,
     SCENE_FILE,
@@ -20,8 +22,8 @@ from dap3d_core.scene.scene import (
     Animation,
     AnimationPoint,
     Element,
-    Scene,
     Simulation,
+    entry_of,
     keys_of,
 )
 
@@ -124,6 +126,9 @@ def scene_of(
     for table in ("requires", "parameters", "outputs"):
         content = _table(mistakes, (table,), data.get(table, {}))
         setattr(scene, table, {name: plain(value) for name, value in content.items()})
+    if "collisions" in data:
+        content = _known(mistakes, ("collisions",), data["collisions"], keys_of(Collisions))
+        scene.collisions = Collisions(**content)
     scene.animation = _animation(mistakes, data.get("animation", {}))
     settings = data.get("simulation", {})
     scene.simulation = Simulation(
@@ -194,7 +199,7 @@ def _entry(mistakes: MistakeList, key: Key, content: Any, class_: type) -> Any:
         table = with_identifiers(_table(mistakes, key, content))
         fields = {k: plain(v) for k, v in table.items()}
         return Element(name, fields.pop("type", None), fields)
-    return class_(name, **_known(mistakes, key, content, keys_of(class_)))
+    return entry_of(class_, name, _known(mistakes, key, content, keys_of(class_)))
 
 
 def _animation(mistakes: MistakeList, content: Any) -> Animation:

@@ -11,7 +11,7 @@ import attrs
 
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import MISSING, Mistake, SceneError, file_error
-from dap3d_core.scene.scene import NAMED, SCENE_FILE, Element, Scene
+from dap3d_core.scene.tables import NAMED, SCENE_FILE, Element, SceneTables
 
 #: Maximal bits of an integer; TOML requires readers to take 64, Python writes some 14000.
 LONGEST_INTEGER = 4096
@@ -19,7 +19,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
-def to_toml(scene: Scene) -> str:
+def to_toml(scene: SceneTables) -> str:
     """The text of the scene file of a scene; reading it gives an equal scene.
 
     Raises:
@@ -35,13 +35,15 @@ def to_toml(scene: Scene) -> str:
         for name, entry in getattr(scene, table).items():
             lines += _table(f"{table}.{_key(name)}", _fields(entry))
     lines += _table("outputs", scene.outputs.items(), needed=False)
+    if scene.collisions is not None:
+        lines += _table("collisions", _fields(scene.collisions))
     if scene.animation.points or scene.animation.limits is not None:
         lines += _animation(scene)
     lines += _table("simulation", _fields(scene.simulation), needed=False)
     return "\n".join(lines)
 
 
-def save(scene: Scene, path: str | Path) -> Path:
+def save(scene: SceneTables, path: str | Path) -> Path:
     """Write a scene to a file, whole or not at all; returns the file.
 
     Raises:
@@ -83,10 +85,10 @@ def _fields(entry: Any) -> Iterator[tuple[str, Any]]:
             continue
         if type(value) is bool and value == field.default:
             continue
-        yield field.name, value
+        yield field.name.rstrip("_"), value
 
 
-def _animation(scene: Scene) -> list[str]:
+def _animation(scene: SceneTables) -> list[str]:
     lines = ["[animation]"]
     points = [dict(_fields(point)) for point in scene.animation.points]
     if points:

@@ -1,4 +1,4 @@
-"""Shapes: solids, lines and meshes fixed in bodies, which are drawn and have no effect."""
+"""Shapes: solids, lines and meshes fixed in bodies, which are drawn, and may collide."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -11,7 +11,7 @@ import attrs
 
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.errors import MISSING, Key
-from dap3d_core.scene.scene import NO_TURN, ZERO, Element
+from dap3d_core.scene.tables import NO_TURN, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     SHORTEST,
     Fault,
@@ -21,6 +21,7 @@ from dap3d_core.scene.validate.coerce_values import (
     points_of,
     quaternion_of,
     text_of,
+    truth_of,
 )
 from dap3d_core.scene.validate.geometry import BAD, body_index_of
 from dap3d_core.scene.validate.mistake_collector import Collector
@@ -74,12 +75,26 @@ _AT = Field(lambda v: numbers_of(v, 3), ZERO, "centre in the axes of the body, m
 _P = Field(quaternion_of, NO_TURN, "Euler parameters of its axes in those of the body")
 _AXIS = Field(_axis, (0.0, 0.0, 1.0), "direction of its axis in the body")
 _COLOR = Field(text_of, "", "as of a body, whose colour it has when left out")
+_ROD = {"radius": _NUMBER, "length": _NUMBER, "at": _AT, "axis": _AXIS, "color": _COLOR}
+#: Fields of shapes that may meet others.
+_MEETS = {
+    "collides": Field(truth_of, False, "whether it meets other shapes that collide"),
+    "material": Field(text_of, "", "of its surface; that of [collisions] when left out"),
+}
 
 #: Type -> its fields, besides body.
 SHAPES: Mapping[str, Mapping[str, Field]] = {
-    "box": {"size": Field(_size, None, "edges, 3 numbers, m"), "at": _AT, "p": _P, "color": _COLOR},
-    "sphere": {"radius": _NUMBER, "at": _AT, "color": _COLOR},
-    "cylinder": {"radius": _NUMBER, "length": _NUMBER, "at": _AT, "axis": _AXIS, "color": _COLOR},
+    "box": {"size": Field(_size, None, "edges, 3 numbers, m"), "at": _AT, "p": _P,
+            "color": _COLOR} | _MEETS,
+    "sphere": {"radius": _NUMBER, "at": _AT, "color": _COLOR} | _MEETS,
+    "capsule": _ROD | _MEETS,
+    "cylinder": _ROD | _MEETS,
+    "plane": {
+        "at": Field(_AT.read, ZERO, "a point of it in the axes of the body, m"),
+        "normal": Field(_axis, (0.0, 0.0, 1.0), "from what is solid outward, in the body"),
+        "extent": Field(_NUMBER.read, 2.0, "m, edge of the square that is drawn; it has no end"),
+        "color": _COLOR,
+    } | _MEETS,
     "cone": {
         "radius": _NUMBER,
         "length": _NUMBER,

@@ -8,13 +8,16 @@ import attrs
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import MISSING, dotted
-from dap3d_core.scene.scene import NAMED, Scene, fault_of_name
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import NAMED, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
 
 if TYPE_CHECKING:
+    from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
     from dap3d_core.scene.validate.bodies import Bodies
     from dap3d_core.scene.validate.geometry import Geometry
+    from dap3d_core.scene.validate.shapes import Shape
     from dap3d_core.scene.validate.types import Types
 
 
@@ -50,7 +53,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     _report_twins(report, "joints", joints)
     _report_twins(report, "forces", forces)
     contacts = _read_contacts(report, geometry, types, functions)
-    _check_shapes_and_outputs(report, bodies)
+    collisions = _check_shapes_and_outputs(report, bodies, joints)
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()
@@ -70,6 +73,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
         animation_count=geometry.animation_count,
         joints=joints,
         contacts=contacts,
+        collisions=collisions,
         forces=forces,
         functions=functions,
         inputs=inputs,
@@ -126,16 +130,24 @@ def _check_requires(report: Collector) -> str:
     return read_requirements(report)
 
 
-def _check_shapes_and_outputs(report: Collector, bodies: "Bodies") -> None:
-    """Check what has no effect on the motion."""
+def _check_shapes_and_outputs(
+    report: Collector, bodies: "Bodies", joints: list[Instance]
+) -> "CollisionShapes | None":
+    """Check shapes and outputs; the shapes that collide, or None."""
+    shapes: list[Shape] = []
     if report.scene.shapes:
         from dap3d_core.scene.validate.shapes import read_shapes
 
-        read_shapes(report, bodies.body_index)
+        shapes = read_shapes(report, bodies.body_index)
     if report.scene.outputs:
         from dap3d_core.scene.expressions.outputs import read_outputs
 
         read_outputs(report)
+    if report.scene.collisions is None and not any(s.values.get("collides") for s in shapes):
+        return None
+    from dap3d_core.scene.contacts.read_collisions import read_collisions
+
+    return read_collisions(report, shapes, bodies.body_index, joints)
 
 
 def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Instance]) -> None:

@@ -12,6 +12,7 @@ from dap3d_core.scene.scene import Scene
 
 if TYPE_CHECKING:
     from dap3d_core.kernels.array_types import Floats, Integers
+    from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
 
 
 @attrs.define
@@ -69,6 +70,7 @@ class ValidatedScene:
         animation_count: number of animation points among the points.
         joints, forces, functions, contacts: in file order; of a contact one for each point.
         inputs: value of each input at the start of a run, by name, in file order.
+        collisions: shapes that collide, or None.
         notes: changes, assumptions and unusual values; none of them stops a run.
     """
 
@@ -92,6 +94,7 @@ class ValidatedScene:
     inputs: dict[str, float]
     notes: list[str]
     contacts: list[Instance] = attrs.Factory(list)
+    collisions: "CollisionShapes | None" = None
 
     @property
     def holding(self) -> list[Instance]:

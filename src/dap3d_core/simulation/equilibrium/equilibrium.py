@@ -187,7 +187,7 @@ def equilibrium(
         SimulationError: there is no equilibrium, because nothing holds a freedom, or none was
             found; names what gives way. AssemblyError: the joints cannot be assembled.
     """
-    compiled = compiled_for(scene, None, allow_code, announce, "auto")
+    compiled = compiled_for(scene, allow_code, announce, integrator="auto")
     settings = compiled.scene.simulation
     state = None
     if start is not None:

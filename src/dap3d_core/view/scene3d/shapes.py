@@ -163,6 +163,8 @@ def _add(shapes: SceneShapes, shape: Shape, hue: str, folder: Path | None) -> st
     elif shape.type == "line":
         piece = Line(points=values["points"], **about)
         corners = [(shape.body, point) for point in piece.points]
+    elif shape.type == "capsule":
+        return "".join(_add(shapes, part, hue, folder) for part in _capsule(shape))
     else:
         piece = _solid(shape, hue)
         half = {"box": (0.5, 0.5, 0.5), "cylinder": (1.0, 1.0, 0.5)}.get(piece.kind, (1.0,) * 3)
@@ -185,8 +187,24 @@ def _corners(body: int, at: tuple[float, ...], q: tuple[float, ...], box: Floats
     return [(body, floats_of(corner)) for corner in np.asarray(at) + to_global(q, corners)]
 
 
+def _capsule(shape: Shape) -> list[Shape]:
+    """A capsule as a cylinder and two spheres."""
+    v, axis = shape.values, np.array(shape.values["axis"])
+    half = 0.5 * v["length"] * axis / np.linalg.norm(axis)
+    ends = [floats_of(np.add(v["at"], side * half)) for side in (-1.0, 1.0)]
+    return [
+        attrs.evolve(shape, type="cylinder"),
+        *(attrs.evolve(shape, type="sphere", values=v | {"at": at}) for at in ends),
+    ]
+
+
 def _solid(shape: Shape, hue: str) -> Mark:
     v = shape.values
+    if shape.type == "plane":
+        normal, extent = np.array(v["normal"]), v["extent"]
+        at = floats_of(v["at"] - 0.005 * extent * normal / np.linalg.norm(normal))
+        size = (extent, extent, 0.01 * extent)
+        return Mark("shapes", "box", shape.body, at, size, turned_to(normal), hue, shape.name)
     radius = v.get("radius", 0.0)
     thickness = 0.02 * radius if shape.type == "disk" else v.get("length", radius)
     kind = {"disk": "cylinder"}.get(shape.type, shape.type)

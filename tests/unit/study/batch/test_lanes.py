@@ -86,6 +86,7 @@ def check(make, points):
     return of, batch
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("integrator", "step"), [("dop853", None), ("dopri5", None), ("rk4", 0.01), ("auto", None)]
 )
@@ -181,6 +182,7 @@ CASES = {
 }
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("case", CASES)
 def test_points_of_all_kinds_have_the_bits_of_points_alone(case):
     make, vary, output = CASES[case]

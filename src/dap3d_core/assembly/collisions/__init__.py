@@ -1,0 +1,1 @@
+"""Where shapes that collide meet: points, normals and gaps of pairs."""

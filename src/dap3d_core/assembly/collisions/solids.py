@@ -1,0 +1,154 @@
+"""Balls and capsules at boxes, balls at cylinders: nearest points of solids."""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+
+from dap3d_core.assembly.collisions.records import add
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.runtime.cache import compiled
+
+#: Feature of the point between the ends of a capsule.
+BETWEEN = 2
+
+
+@compiled
+def clamp(x: float, half: float) -> float:
+    """The nearest number from -half to half."""
+    return min(max(x, -half), half)
+
+
+@compiled
+def local(x: float, y: float, z: float, d: Floats, u: Floats, k: int) -> float:
+    """Component k of a point in the axes u of a shape about d."""
+    return (x - d[0]) * u[k] + (y - d[1]) * u[3 + k] + (z - d[2]) * u[6 + k]
+
+
+@compiled
+def put(
+    which: Integers, found: Floats, count: int, i: int, j: int, feature: int, q: Floats, n: Floats,
+    gap: float, radius: float, d: Floats, u: Floats, most: float,
+) -> int:  # fmt: skip
+    """Append a point: ball j of a radius at solid i.
+
+    q, n: nearest point of the solid and outward normal there, in its axes; gap: of the centre.
+    """
+    nx = u[0] * n[0] + u[1] * n[1] + u[2] * n[2]
+    ny = u[3] * n[0] + u[4] * n[1] + u[5] * n[2]
+    nz = u[6] * n[0] + u[7] * n[1] + u[8] * n[2]
+    s = gap - radius  # the surface of the ball is so far along the normal
+    x = d[0] + u[0] * q[0] + u[1] * q[1] + u[2] * q[2] + s * nx
+    y = d[1] + u[3] * q[0] + u[4] * q[1] + u[5] * q[2] + s * ny
+    z = d[2] + u[6] * q[0] + u[7] * q[1] + u[8] * q[2] + s * nz
+    return add(which, found, count, i, j, feature, x, y, z, -nx, -ny, -nz, s, most)
+
+
+@compiled
+def ball_box(
+    which: Integers, found: Floats, count: int, i: int, j: int, feature: int,
+    x: float, y: float, z: float, radius: float,
+    centre: Floats, axes: Floats, size: Floats, q: Floats, n: Floats, most: float,
+) -> int:  # fmt: skip
+    """Box i and a ball of shape j; q, n: (3,) scratch."""
+    d, u, h = centre[i], axes[i], size[i]
+    length, nearest, face = 0.0, -1e300, 0
+    for k in range(3):
+        p = local(x, y, z, d, u, k)
+        q[k] = clamp(p, h[k])
+        n[k] = p - q[k]
+        length += n[k] * n[k]
+        if abs(p) - h[k] > nearest:
+            nearest, face = abs(p) - h[k], k
+    length = math.sqrt(length)
+    if length > 0.0:
+        for k in range(3):
+            n[k] /= length
+    else:  # the centre is inside: out by the nearest face
+        side = 1.0 if local(x, y, z, d, u, face) >= 0.0 else -1.0
+        n[0], n[1], n[2] = 0.0, 0.0, 0.0
+        n[face] = side
+        q[face] = side * h[face]
+        length = nearest
+    return put(which, found, count, i, j, feature, q, n, length, radius, d, u, most)
+
+
+@compiled
+def sphere_cylinder(
+    which: Integers, found: Floats, count: int, i: int, j: int,
+    centre: Floats, axes: Floats, size: Floats, q: Floats, n: Floats, most: float,
+) -> int:  # fmt: skip
+    """Cylinder i and sphere j; q, n: (3,) scratch."""
+    c, d, u, r, h = centre[j], centre[i], axes[i], size[i, 0], size[i, 1]
+    x, y = local(c[0], c[1], c[2], d, u, 0), local(c[0], c[1], c[2], d, u, 1)
+    z, across = local(c[0], c[1], c[2], d, u, 2), math.sqrt(x * x + y * y)
+    a = x / across if across > 0.0 else 1.0
+    b = y / across if across > 0.0 else 0.0
+    out, up = across - r, abs(z) - h
+    side = 1.0 if z >= 0.0 else -1.0
+    p, s = min(across, r), clamp(z, h)
+    length = out if out > up else up
+    if out > 0.0 and up > 0.0:
+        length = math.sqrt(out * out + up * up)
+        n[0], n[1], n[2] = a * out / length, b * out / length, side * up / length
+    elif out > up:
+        p = r
+        n[0], n[1], n[2] = a, b, 0.0
+    else:
+        s = side * h
+        n[0], n[1], n[2] = 0.0, 0.0, side
+    q[0], q[1], q[2] = a * p, b * p, s
+    return put(which, found, count, i, j, 0, q, n, length, size[j, 0], d, u, most)
+
+
+@compiled
+def capsule_box(
+    which: Integers, found: Floats, count: int, i: int, j: int,
+    centre: Floats, axes: Floats, size: Floats, q: Floats, n: Floats, most: float,
+) -> int:  # fmt: skip
+    """Box i and capsule j: the balls at its ends, and that at its point nearest to the box."""
+    c, w, radius, half = centre[j], axes[j], size[j, 0], size[j, 1]
+    low, high = -half, half
+    # the squared distance is convex along the axis: its slope is monotonic
+    if slope(low, i, j, centre, axes, size) < 0.0 < slope(high, i, j, centre, axes, size):
+        s = _lowest(low, high, i, j, centre, axes, size)
+        x, y, z = c[0] + s * w[2], c[1] + s * w[5], c[2] + s * w[8]
+        count = ball_box(which, found, count, i, j, BETWEEN,
+                         x, y, z, radius, centre, axes, size, q, n, most)  # fmt: skip
+    for end in range(2):
+        s = half * (2.0 * end - 1.0)
+        x, y, z = c[0] + s * w[2], c[1] + s * w[5], c[2] + s * w[8]
+        count = ball_box(which, found, count, i, j, end,
+                         x, y, z, radius, centre, axes, size, q, n, most)  # fmt: skip
+    return count
+
+
+@compiled
+def slope(s: float, i: int, j: int, centre: Floats, axes: Floats, size: Floats) -> float:
+    """Half the slope of the squared distance of box i at s along the axis of capsule j."""
+    c, w, d, u, total = centre[j], axes[j], centre[i], axes[i], 0.0
+    x, y, z = c[0] + s * w[2], c[1] + s * w[5], c[2] + s * w[8]
+    for k in range(3):
+        p = local(x, y, z, d, u, k)
+        total += (p - clamp(p, size[i, k])) * (u[k] * w[2] + u[3 + k] * w[5] + u[6 + k] * w[8])
+    return total
+
+
+@compiled
+def _lowest(
+    low: float, high: float, i: int, j: int, centre: Floats, axes: Floats, size: Floats
+) -> float:
+    """The zero of a slope that is linear between places where a face is passed."""
+    c, w, d, u = centre[j], axes[j], centre[i], axes[i]
+    for k in range(6):
+        face, side = k // 2, 2.0 * (k % 2) - 1.0
+        rate = u[face] * w[2] + u[3 + face] * w[5] + u[6 + face] * w[8]
+        if abs(rate) > 1e-12:
+            s = (side * size[i, face] - local(c[0], c[1], c[2], d, u, face)) / rate
+            if low < s < high:
+                if slope(s, i, j, centre, axes, size) < 0.0:
+                    low = s
+                else:
+                    high = s
+    first, last = slope(low, i, j, centre, axes, size), slope(high, i, j, centre, axes, size)
+    return low - first * (high - low) / (last - first) if last > first else 0.5 * (low + high)

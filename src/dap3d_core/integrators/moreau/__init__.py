@@ -1,0 +1,1 @@
+"""Time stepping of contacts: impulses over steps of equal length (Moreau)."""

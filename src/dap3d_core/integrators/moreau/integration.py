@@ -1,0 +1,310 @@
+"""An integration by time stepping of contacts.
+
+Moreau, Unilateral contact and dry friction in finite freedom dynamics (1988), with the gap term of
+Anitescu and Potra (Nonlinear Dynamics 14, 1997): a step of length h is
+
+    M (v+ - v_free) = J^T x,   u = J v+ + bias,   0 <= x_N _|_ u_N >= 0,   x_T by Coulomb's law
+
+where v_free comes of the explicit midpoint rule without contacts, and bias of the normal is e u_N
+of before where a gap closes at speed, else max(gap, 0) / h. Positions follow by the trapezoidal
+rule, second order, or by v+ for bodies that collide; then what overlaps is moved apart.
+"""
+
+from typing import Any
+
+import attrs
+import numpy as np
+
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
+from dap3d_core.integrators.moreau.contact_set import ContactFinder, ContactSet
+from dap3d_core.integrators.moreau.problem import Problem
+from dap3d_core.integrators.stepping.integration import Integration
+from dap3d_core.integrators.stepping.integration_state import (
+    NOT_FINITE,
+    OTHER,
+    RUNNING,
+    IntegrationState,
+    Y,
+)
+from dap3d_core.integrators.stepping.output import may_step
+from dap3d_core.integrators.stepping.step_control import count_turns, end_of_step
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.array_struct import MATRIX
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.model.rotations import rotation
+from dap3d_core.model.state_layout import bodies_of, split, u_from_y, y_from_u
+
+#: Gaps, m of a scene of ordinary size, below which overlaps are left; passes that remove them.
+OVERLAP, PASSES = 1e-12, 8
+#: A contact collides where it approaches by more than this times h times the acceleration.
+COLLIDES = 4.0
+#: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
+MARGIN, LEAST_MARGIN = 1.2, 1e-6
+#: Contacts of a shape whose impulses are kept for the next step.
+KEPT = 12
+
+
+@attrs.define(eq=False, kw_only=True, slots=False)
+class MoreauState(IntegrationState):
+    """State of an integration by time stepping."""
+
+    types = {**IntegrationState.types, "memory": MATRIX}
+
+    memory: Floats  # (room, 4) key of a contact, or -1, and its impulse, N s, global axes
+
+
+@compiled
+def state_at(work: Any, t: float, y: Floats) -> None:
+    """The state reached: steps end where something is reported."""
+    for i in range(y.size):
+        y[i] = work.state[Y, i]
+
+
+@compiled
+def goes_on(work: Any, functions: Any, system: Any, loops: Any, limit: int) -> bool:
+    """Report what is reached; True if a step is to be taken now."""
+    return may_step(work, state_at, limit, functions[1], functions[2], system, loops)
+
+
+@compiled
+def take_state(work: Any, functions: Any, system: Any, loops: Any) -> None:
+    """Count turns up to the state reached."""
+    if work.calls_accepted != 0:
+        count_turns(work, functions[3], system, loops)
+
+
+class MoreauIntegration(Integration):
+    """An initial value problem with contacts, in steps of equal length.
+
+    Attributes:
+        problem: of the last step; None where no contact was near.
+        step_length: its length, s.
+        largest_residual: of all steps, a part of the largest impulse of each.
+        friction_work: of all steps so far, J, not positive.
+        deepest: largest overlap at the end of a step, m.
+    """
+
+    name, adaptive = "moreau", False
+    state_class = MoreauState
+    problem: Problem | None = None
+    step_length = 0.0
+    largest_residual = friction_work = deepest = 0.0
+
+    def __init__(self, evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> None:
+        """Args: the evaluator of the model; the others as of ``Integration``."""
+        self._evaluator = evaluator
+        options |= {"watched": min(evaluator.watched, 1), "ends": (),
+                    "length_count": evaluator.length_count}  # fmt: skip
+        options.pop("stop_when_stiff", None)
+        self._finder = ContactFinder(evaluator)
+        functions = evaluator.functions, evaluator.system, evaluator.loops
+        super().__init__(*functions, y0, times, **options)
+        model = evaluator.model
+        self._mean = np.zeros(6 * model.body_count)
+        self._inverse = np.linalg.inv(model.Jp)
+
+    def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
+        """As ``Integration.own_arrays``."""
+        model = self._evaluator.model
+        shapes = 0 if model.collisions is None else len(model.collisions.names)
+        return {"memory": np.full((KEPT * shapes + model.contact_count, 4), -1.0)}
+
+    @IGNORE_FLOAT_ERRORS
+    def _advance(self, budget: int) -> None:
+        work, arguments = self.work, self._arguments
+        limit = work.rhs_count + budget
+        while True:
+            rows = int(work.row_count)
+            again = goes_on(work, *arguments, limit)
+            self._complete(rows)
+            if not again:
+                return
+            self._step(min(float(end_of_step(work)), float(work.t_limit)))
+
+    def _complete(self, first: int) -> None:
+        """Put mean accelerations of the last step, with its impulses, into rows of reports."""
+        work, model = self.work, self._evaluator.model
+        rows = work.rows[first : work.row_count]
+        if not len(rows) or work.step_count == 0:
+            return
+        start = 1 + work.state.shape[1]
+        layout = model.report_layout
+        rows[:, start + layout["v_dot"].start : start + layout["v_dot"].stop] = self._mean
+
+    # ---------------------------------------------------------------- a step
+
+    def _step(self, t1: float) -> None:
+        work, evaluator, t = self.work, self._evaluator, float(self.work.t)
+        h = t1 - t
+        y, states = work.state[Y].copy(), evaluator.model.state_count
+        free = self._free(t, y, h)
+        u, u_free = u_from_y(y[None], states)[0], u_from_y(free[None], states)[0]
+        self.step_length = h
+        contacts = self._near(t, u, u_free, h)
+        after, worked = self._with_contacts(t, u, u_free, contacts, h)
+        self._mean = (after - u)[-len(self._mean) :] / h
+        own = free[len(free) - 1 - states : -1]
+        work.state[OTHER] = y
+        work.state[Y] = y_from_u(after, free[-1] + worked, own)
+        work.t_dense, work.h_dense, work.t = t, h, t1
+        work.step_count += 1
+        work.segment_step += 1
+        if not np.all(np.abs(work.state[Y]) <= 1e100):
+            work.t_stop, work.status = t1, NOT_FINITE
+            return
+        if work.projects and evaluator.model.joint_row_count and not self.project():
+            return
+        take_state(work, *self._arguments)
+
+    def _free(self, t: float, y: Floats, h: float) -> Floats:
+        """The state at the end of a step without contacts, by the explicit midpoint rule."""
+        rhs = self._arguments[0][0]
+        slope = np.zeros_like(y)
+        rhs(t, y, slope, *self._arguments[1:])
+        middle = y + 0.5 * h * slope
+        rhs(t + 0.5 * h, middle, slope, *self._arguments[1:])
+        self.work.rhs_count += 2
+        free: Floats = y + h * slope
+        p = split(bodies_of(free, self._evaluator.model.state_count))[1]
+        p /= np.linalg.norm(p, axis=1, keepdims=True)
+        return free
+
+    def _near(self, t: float, u: Floats, u_free: Floats, h: float) -> ContactSet:
+        """Contacts that may close within a step."""
+        _, _, v, w = split(u)
+        _, _, v1, w1 = split(u_free)
+        speed = np.maximum(np.linalg.norm(v, axis=1), np.linalg.norm(v1, axis=1))
+        spin = np.maximum(np.linalg.norm(w, axis=1), np.linalg.norm(w1, axis=1))
+        margin = np.zeros(len(speed) + 1)
+        least = LEAST_MARGIN * self._evaluator.model.length
+        margin[1:] = MARGIN * h * (speed + spin * self._finder.reach[1:]) + least
+        return self._finder.find(t, u, margin)
+
+    def _problem(self, t: float, u: Floats, contacts: ContactSet) -> Problem:
+        """The problem of contacts at a state u (13 n,)."""
+        model, A = self._evaluator.model, rotation(split(u)[1])
+        inverse, masses = np.zeros((2, len(A) + 1, 6, 6))
+        turned = A.transpose(0, 2, 1)
+        for found, mass, Jp in (
+            (inverse, 1.0 / model.mass, self._inverse),
+            (masses, model.mass, model.Jp),
+        ):
+            found[1:, [0, 1, 2], [0, 1, 2]] = mass[:, None]
+            found[1:, 3:, 3:] = A @ Jp @ turned
+        own = model.joint_row_count
+        D = self._evaluator.rows(t, u).dense()[:own] if own else np.zeros((0, 6 * len(A)))
+        return Problem(contacts, inverse, masses, D)
+
+    def _with_contacts(
+        self, t: float, u: Floats, u_free: Floats, contacts: ContactSet, h: float
+    ) -> tuple[Floats, float]:
+        """State u at the end of a step, and the work of its impulses, J."""
+        self.problem = None
+        if not len(contacts.gap):
+            return u_free, 0.0
+        problem = self._problem(t, u, contacts)
+        before, v = _velocities(u), _velocities(u_free)
+        approach, normal = problem.velocity(before)[:, 0], problem.velocity(v)[:, 0]
+        fall = COLLIDES * float(np.abs(v - before).max())
+        collides = (approach < -fall) & (contacts.gap + h * np.minimum(approach, normal) < 0.0)
+        bias = np.where(collides & (contacts.e > 0.0), contacts.e * approach,
+                        np.maximum(contacts.gap, 0.0) / h)  # fmt: skip
+        end = problem.solve(v, bias, contacts.mu, self._remembered(contacts), self.work.rtol)
+        self.problem = problem
+        self._remember(contacts, problem.x)
+        self.largest_residual = max(self.largest_residual, problem.residual)
+        mean = problem.velocity(0.5 * (v + end))
+        works = problem.x * mean
+        self.friction_work += float(works[:, 1:].sum())
+        moved = 0.5 * h * (end - v)
+        impact = np.zeros(len(before), dtype=bool)
+        if collides.any():
+            hit = np.isin(problem.groups, problem.groups[collides])
+            impact[contacts.bodies[hit].ravel()] = True
+        if len(problem.y) and collides.any():
+            impact[:] = True
+        impact = impact[1:]
+        after = u_free.copy()
+        r, p, v1, w1 = split(after)
+        r0, p0, _, _ = split(u)
+        r[impact], p[impact] = r0[impact], p0[impact]
+        moved = np.where(impact[:, None], h * end[1:], moved[1:])
+        _move(r, p, moved)
+        v1[:], w1[:] = end[1:, :3], end[1:, 3:]
+        self._part(t + h, after)
+        return after, float(works.sum())
+
+    def _part(self, t: float, u: Floats) -> None:
+        """Move bodies that overlap apart, by the least change in the metric of their masses."""
+        least = OVERLAP * self._evaluator.model.length
+        r, p, _, _ = split(u)
+        margin = np.full(len(r) + 1, 0.5 * LEAST_MARGIN * self._evaluator.model.length)
+        deepest = 0.0
+        for _ in range(PASSES):
+            contacts = self._finder.find(t, u, margin)
+            contacts = contacts.some(np.flatnonzero(contacts.gap < 2.0 * margin[0]))
+            deepest = max(0.0, -float(contacts.gap.min(initial=0.0)))
+            if deepest <= least:
+                break
+            problem = self._problem(t, u, contacts)
+            none, zero = np.zeros((len(r) + 1, 6)), np.zeros(len(contacts.gap))
+            moves = problem.solve(none, contacts.gap, zero, np.zeros((len(zero), 3)), 1e-6)
+            _move(r, p, moves[1:])
+        self.deepest = max(self.deepest, deepest)
+
+    # ---------------------------------------------------------------- impulses of the last step
+
+    def _remembered(self, contacts: ContactSet) -> Floats:
+        """(m, 3) impulses of the last step in the frames of contacts, zero of new ones."""
+        memory = self.work.memory
+        keys = memory[:, 0]
+        found = np.zeros((len(contacts.key), 3))
+        order = np.argsort(keys, kind="stable")
+        place = np.searchsorted(keys[order], contacts.key)
+        place = order[np.minimum(place, len(keys) - 1)] if len(keys) else place
+        known = keys[place] == contacts.key if len(keys) else np.zeros(len(place), dtype=bool)
+        impulses = memory[place[known], 1:]
+        found[known] = np.einsum("mrk,mk->mr", contacts.J[known, :, :3], impulses)
+        found[:, 0] = np.maximum(found[:, 0], 0.0)
+        return found
+
+    def _remember(self, contacts: ContactSet, x: Floats) -> None:
+        memory = self.work.memory
+        closed = np.flatnonzero(x[:, 0] > 0.0)[: len(memory)]
+        memory[:] = -1.0
+        memory[: len(closed), 0] = contacts.key[closed]
+        memory[: len(closed), 1:] = np.einsum("mr,mrk->mk", x[closed], contacts.J[closed, :, :3])
+
+    # ---------------------------------------------------------------- as of Integration
+
+    def state_within(self, t: float) -> Floats | None:
+        """As ``Integration.state_within``, linear."""
+        work = self.work
+        if work.status != RUNNING or not work.t_dense < t <= work.t_dense + work.h_dense:
+            return None
+        part = (t - work.t_dense) / work.h_dense
+        found: Floats = (1.0 - part) * work.state[OTHER] + part * work.state[Y]
+        return found
+
+    @property
+    def dy_dt(self) -> Floats | None:
+        """None: rates jump with impulses."""
+        return None
+
+
+def _velocities(u: Floats) -> Floats:
+    """(n + 1, 6) velocities of a state u, those of ground first."""
+    _, _, v, w = split(u)
+    return np.concatenate([np.zeros((1, 6)), np.hstack([v, w])])
+
+
+def _move(r: Floats, p: Floats, d: Floats) -> None:
+    """Move and turn bodies by d (n, 6), m and rad in global axes, in place."""
+    r += d[:, :3]
+    angle = np.linalg.norm(d[:, 3:], axis=1)
+    b = 0.5 * np.sinc(0.5 * angle / np.pi)[:, None] * d[:, 3:]
+    a, e = np.cos(0.5 * angle), p[:, 1:].copy()
+    e0 = p[:, 0].copy()
+    p[:, 0] = a * e0 - np.sum(b * e, axis=1)
+    p[:, 1:] = a[:, None] * e + b * e0[:, None] + np.cross(b, e)
+    p /= np.linalg.norm(p, axis=1, keepdims=True)
