@@ -3,15 +3,13 @@
 Values are stored as plain Python (arrays and lists become tuples); ``check`` validates them all.
 """
 
-from functools import cache
-from keyword import iskeyword
 from pathlib import Path
 from typing import Any
 
 import attrs
 
 from dap3d_core.registry.arguments import checked
-from dap3d_core.scene.coerce import plain, with_identifiers
+from dap3d_core.scene.coerce import entry_of, keys_of, plain, with_identifiers
 from dap3d_core.scene.contacts.tables import Collisions, ContactTables, Material
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Key, Mistake, MistakeList, SceneError
@@ -164,17 +162,6 @@ class Simulation:
     alpha: Any = attrs.field(default=1e7, converter=plain)
     Omega: Any = attrs.field(default=10.0, converter=plain)
     mu: Any = attrs.field(default=1.0, converter=plain)
-
-
-@cache
-def keys_of(class_: type) -> frozenset[str]:
-    """The keys that a table of the scene file may hold, given the class it becomes."""
-    return frozenset(a.name.rstrip("_") for a in attrs.fields(class_)) - {"name"}
-
-
-def entry_of(class_: type, name: str, fields: dict[str, Any]) -> Any:
-    """An entry of a table; a key that is a word of Python has an underscore in its class."""
-    return class_(name, **{f"{k}_" if iskeyword(k) else k: v for k, v in fields.items()})
 
 
 HEADER_KEYS = frozenset({"name", "description", "schema"})

@@ -30,7 +30,6 @@ from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.explain import takes_joint_coordinates
 from dap3d_core.simulation.initial.tolerances import atol_vector, kinds_of, resolved_atol
 
-
 #: Points of declared contacts up to which "auto" follows them by events.
 MOST_BY_EVENTS = 30
 

@@ -28,21 +28,19 @@ class Problem:
         residual: of the solution, a part of the largest impulse.
     """
 
-    def __init__(
-        self, contacts: ContactSet, inverse: Floats, masses: Floats, D: Floats
-    ) -> None:
+    def __init__(self, contacts: ContactSet, inverse: Floats, masses: Floats, D: Floats) -> None:
         """Args:
-            contacts: of the step.
-            inverse, masses: (n + 1, 6, 6) M^-1 and M of each body; of ground zero and anything.
-            D: (k, 6 n) rows of joints.
+        contacts: of the step.
+        inverse, masses: (n + 1, 6, 6) M^-1 and M of each body; of ground zero and anything.
+        D: (k, 6 n) rows of joints.
         """
         self._inverse, self._masses, self._D = inverse, masses, D
         self._bodies = np.ascontiguousarray(contacts.bodies)
         i, j = self._bodies.T
         J = contacts.J
-        MJ = np.concatenate([J[:, :, :6] @ inverse[i], J[:, :, 6:] @ inverse[j]], axis=2)
-        self._J, self._MJ = (np.ascontiguousarray(x.reshape(-1, 36)) for x in (J, MJ))
-        self._W = np.ascontiguousarray((MJ @ J.transpose(0, 2, 1)).reshape(-1, 9))
+        moved = np.concatenate([J[:, :, :6] @ inverse[i], J[:, :, 6:] @ inverse[j]], axis=2)
+        self._J, self._MJ = (np.ascontiguousarray(x.reshape(-1, 36)) for x in (J, moved))
+        self._W = np.ascontiguousarray((moved @ J.transpose(0, 2, 1)).reshape(-1, 9))
         diagonal = self._W[:, ::4].max(axis=1)
         self._r = 1.0 / np.maximum(diagonal, TINY)
         self.x: Floats = np.zeros((len(J), 3))
@@ -82,12 +80,12 @@ class Problem:
         """
         self._free, self._bias, self._mu = v, bias, mu
         self.x = start.copy()
-        few, goal = len(mu) <= FEW, tolerance
+        few = len(mu) <= FEW
         if few or len(self.y):
             self._refine(np.arange(len(mu)), ROUNDING if few else tolerance)
             if self._judge() <= tolerance or len(self.y):
                 return v + self.change()
-        if self._judge() > goal:
+        if self._judge() > tolerance:
             self._sweep(SWEEPS, max(tolerance, NEAR))
             self._finish(tolerance)
         return v + self.change()
@@ -114,8 +112,9 @@ class Problem:
         """Newton's method on groups that are not solved; more sweeps where it does not end."""
         done = SWEEPS
         while self._judge() > tolerance:
-            for group in self._groups(tolerance):
-                self._refine(group, tolerance)
+            if tolerance < NEAR:
+                for group in self._groups(tolerance):
+                    self._refine(group, tolerance)
             if self._judge() <= tolerance or done >= MOST_SWEEPS:
                 return
             self._sweep(done, tolerance)
@@ -142,9 +141,7 @@ class Problem:
         D = self._D if len(self.y) else np.zeros((0, 6 * len(used)))
         s = 1.0 / np.maximum(self._feel(D), TINY)
         J = self._J[group].reshape(-1, 3, 2, 6)
-        parts = _matrices(
-            place[self._bodies[group]], J, self._masses[used], self._inverse[used], D
-        )
+        parts = _matrices(place[self._bodies[group]], J, self._masses[used], self._inverse[used], D)
         return Rows(*parts, b.ravel(), self._free[used].ravel(), self._mu[group], self._r[group], s)
 
     def _feel(self, D: Floats) -> Floats:
