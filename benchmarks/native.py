@@ -35,7 +35,9 @@ int main(void)
         took[k - 1] = 1e6 * (double)(b.tv_sec - a.tv_sec) + 1e-3 * (double)(b.tv_nsec - a.tv_nsec);
     }
     qsort(took, %(steps)d, sizeof *took, order);
-    printf("%%g %%g %%g\\n", took[%(steps)d / 2], took[%(steps)d - %(steps)d / 1000], took[%(steps)d - 1]);
+    for (int k = 2; k <= 2000; k *= k == 2 ? 500 : 2) /* median, 99.9 %%, 99.95 %% */
+        printf("%%g ", took[%(steps)d - %(steps)d / k]);
+    printf("%%g\\n", took[%(steps)d - 1]);
     return 0;
 }
 """
@@ -60,9 +62,19 @@ def real_time():
         subprocess.run(["cc", "-O2", "-DDAP3D_STATIC", f"-I{made.path}", folder / "real.c", archive,
                         "-lm", "-o", program], check=True)  # fmt: skip
         done = subprocess.run([program], check=True, capture_output=True, text=True)
-    median, most, worst = map(float, done.stdout.split())
-    return [{"part": "median", "us": median}, {"part": "99.9 %", "us": most},
-            {"part": "worst", "us": worst}]  # fmt: skip
+    parts = ("median", "99.9 %", "99.95 %", "worst")
+    times = map(float, done.stdout.split())
+    return [{"part": part, "us": us} for part, us in zip(parts, times, strict=True)]
+
+
+def _median(step, count):
+    """Microseconds of a step."""
+    took = []
+    for k in range(count):
+        start = time.perf_counter()
+        step(k)
+        took.append(time.perf_counter() - start)
+    return 1e6 * statistics.median(took)
 
 
 def steps(models=("pen1", "crane", "fourbar3", "quarter_car"), count=500, dt=1e-3):
@@ -74,15 +86,8 @@ def steps(models=("pen1", "crane", "fourbar3", "quarter_car"), count=500, dt=1e-
             made, seconds = exported(Path(scratch), name)
             run = dap.load_native(made.path).start(10.0)
             here = dap.start(name, t_end=10.0, record=False)
-            times = {}
-            for part, step in (("C", lambda k: run.step_to(dt * (k + 1))),
-                               ("Python", lambda _: here.step(dt))):  # fmt: skip
-                took = []
-                for k in range(count):
-                    start = time.perf_counter()
-                    step(k)
-                    took.append(time.perf_counter() - start)
-                times[part] = 1e6 * statistics.median(took)
+            times = {"C": _median(lambda k, run=run: run.step_to(dt * (k + 1)), count),
+                     "Python": _median(lambda _, run=here: run.step(dt), count)}  # fmt: skip
             found.append({"model": name, **times, "kB": made.size / 1e3, "export_s": seconds})
     return found
 

@@ -16,6 +16,7 @@ from pathlib import Path
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
 import calls
+import contact
 import derivatives
 import derived
 import elements
@@ -111,6 +112,7 @@ def main():
         "streaming": streaming.measure,
         "study": study.measure,
         "points": points.measure,
+        "contact": contact.measure,
         "lanes": lanes.measure,
         "programs": programs.measure,
         "joint_motions": joint_motions.measure,

@@ -2,13 +2,13 @@
 
 from dap3d_core.scene.errors import MISSING, Mistake, SceneError
 from dap3d_core.scene.files.read_toml import load, parse, shipped_models, tables_of
-from dap3d_core.scene.scene import (
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import (
     Animation,
     AnimationPoint,
     Body,
     Element,
     Point,
-    Scene,
     Simulation,
     Vector,
     Vector2,

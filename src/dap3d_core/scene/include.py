@@ -20,14 +20,14 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import MISSING, Key, MistakeList, dotted
 from dap3d_core.scene.expressions.expression import fault_of_word
-from dap3d_core.scene.scene import (
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import (
     GROUND,
     NAMED,
     NO_TURN,
     ZERO,
     Element,
     Point,
-    Scene,
     Vector,
     fault_of_name,
 )

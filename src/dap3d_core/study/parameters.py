@@ -12,7 +12,7 @@ from dap3d_core.interface.fields import specs_of
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Instance, Mistake, Scene, SceneError, Simulation, ValidatedScene
 from dap3d_core.scene.coerce import canonical
-from dap3d_core.scene.scene import NAMED, Element
+from dap3d_core.scene.tables import NAMED, Element
 from dap3d_core.settings import SETTINGS
 
 AXES = ("x", "y", "z")
@@ -259,7 +259,8 @@ def _fields(checked: ValidatedScene, path: tuple[str, ...]) -> Iterator[_Field]:
     holder = _holder(checked.scene, (*path, ""))
     if isinstance(holder, Element):
         instances: list[Instance] = getattr(checked, table)
-        instance = next(instance for instance in instances if instance.name == path[1])
+        # of a contact of several points, NAME#1 and so on, the first
+        instance = next(one for one in instances if one.name.partition("#")[0] == path[1])
         yield from _element_fields(holder, path, instance)
         return
     if isinstance(holder, dict):

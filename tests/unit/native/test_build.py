@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from support.binaries import macho_names, pe_names
 
 import dap3d_core as dap
 from dap3d_core.native import build
@@ -169,4 +170,17 @@ def test_libraries_of_other_platforms_are_linked_here(tmp_path, platform, begin)
     content = library.read_bytes()
     assert content.startswith(begin)
     assert b"dap3d_step_to" in content
+    if platform.startswith("windows"):
+        libraries, names = pe_names(content)
+        system = {"kernel32.dll", "msvcrt.dll", "ucrtbase.dll"}
+        assert all(n in system or n.startswith("api-ms-win-crt-") for n in libraries)
+    elif platform.startswith("macos"):
+        libraries, names = macho_names(content)
+        assert libraries == ["/usr/lib/libSystem.B.dylib"]
+        names = [name.removeprefix("_") for name in names]
+    else:
+        return
+    assert "dap3d_step_to" in names
+    assert all(name.startswith("dap3d_") for name in names)
+    assert "dap3d_outputs" not in names
     assert (made.path / platform / "libpen1.a").exists()

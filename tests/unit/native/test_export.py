@@ -1,5 +1,6 @@
 """Exported models: their runs have the bits of runs in Python."""
 
+import shutil
 import subprocess
 
 import numpy as np
@@ -247,6 +248,21 @@ def test_the_example_compiles_without_a_warning_and_runs(tmp_path):
     last = [float(word) for word in rows[-1].split(",")]
     assert len(rows) == 11
     assert last == [0.5, *run.values(["cone.r.x", "energy.total"])]
+
+
+def test_the_example_in_rust_gives_the_same(tmp_path):
+    if shutil.which("rustc") is None:
+        pytest.skip("there is no rustc")
+    made, library = exported(dap.load("pen1"), tmp_path, outputs=["cone.r.x"], t_end=0.5)
+    subprocess.run(["rustc", "-L", own_platform(), "example.rs", "-o", "example"], check=True,
+                   cwd=made.path)  # fmt: skip
+    done = subprocess.run([made.path / "example"], capture_output=True, text=True, check=True)
+    run = library.start(0.5)
+    for line in done.stdout.splitlines():
+        t, name, value = line.split()
+        run.step_to(float(t))
+        assert (name, float(value)) == ("cone.r.x", run["cone.r.x"])
+    assert run.t == 0.5
 
 
 @pytest.mark.parametrize(

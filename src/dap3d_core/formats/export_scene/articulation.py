@@ -21,7 +21,8 @@ from dap3d_core.interface.formats.articulation import (
 from dap3d_core.interface.formats.frames import Frame, axis_angle, from_quaternion, quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.scene.scene import GROUND, Element, Scene
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import GROUND, Element
 
 #: Kinds of joints whose points may be apart along the axis.
 SLIDERS = ("prismatic", "cylindrical")

@@ -5,7 +5,8 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.scene.scene import Element, Scene
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import Element
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene
 
 

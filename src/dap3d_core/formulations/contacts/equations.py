@@ -40,6 +40,7 @@ from dap3d_core.formulations.common.constraints import (
 )
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import is_differentiated
 
 #: Compliance of a row as part of its squared length; how much less where passes do not converge,
 #: and the least.
@@ -278,7 +279,7 @@ def has_settled(system: System, count: int) -> bool:
     converge.
     """
     x, total, rows = system.multipliers, system.total, system.total.shape[0]
-    before, change, found = 0.0, 0.0, 0.0
+    before, change, found, settled = 0.0, 0.0, 0.0, 0
     zero(total)
     for k in range(PASSES):
         for r in range(rows):
@@ -291,7 +292,9 @@ def has_settled(system: System, count: int) -> bool:
             if system.compliance[r] != 0.0:  # else a hub's place, or a row that is zero
                 change, found = max(change, abs(x[r])), max(found, abs(total[r]))
         if change <= SETTLED * found or (k > 0 and not change < FALLING * before):
-            break
+            if settled != 0 or not is_differentiated():
+                break
+            settled = 1  # derivatives follow a pass later
         before = change
     for r in range(rows):
         x[r] = total[r]
@@ -302,7 +305,7 @@ def has_settled(system: System, count: int) -> bool:
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """As in lsq.py; where switches were read last at this state, it is solved already."""
     watched = system.watched
-    is_known = watched[0] == t
+    is_known = watched[0] == t and not is_differentiated()
     for k in range(y.shape[0]):
         is_known &= watched[2 + k] == y[k]
     power = watched[1] if is_known else accelerate(t, y, system, loops)

@@ -222,9 +222,7 @@ def call_element(t: float, e: int, q: int, system: System, loops: Any, tangent: 
 
 
 @compiled
-def set_product(
-    keep: float, a: Floats, i: int, b: Floats, j: int, out: Floats, o: int
-) -> None:
+def set_product(keep: float, a: Floats, i: int, b: Floats, j: int, out: Floats, o: int) -> None:
     """Value and slopes of keep * out[o] + a[i] b[j], into out[o]."""
     x, y = a[i], b[j]
     out[o] = keep * out[o] + x * y
@@ -285,7 +283,8 @@ def bridge_bends(
 ) -> None:  # fmt: skip
     """Secants across bends into ``out``, where its slopes by a level of body b are zero.
 
-    The shortest step that sees the bend is taken: that is as long as the bend is away.
+    The shortest step that sees the bend is taken: that is as long as the bend is away. A jump, which
+    every step sees, has none.
     """
     out, kept, ahead = tangent.out, tangent.kept, tangent.ahead
     s, body = tangent.wide.body[b], system.body[b]
@@ -299,7 +298,8 @@ def bridge_bends(
         slope = 0.0
         for k in range(size):
             slope = max(slope, abs(kept[WIDTH * k + lane]))
-        for _ in range(LEVELS if step * slope <= NOISY * here else 0):
+        level_count, seen = (LEVELS if step * slope <= NOISY * here else 0), 0
+        for _ in range(level_count):
             move(s, body, lane, step)
             call_element(t, e, q, system, loops, tangent)
             for k in range(size):
@@ -311,10 +311,15 @@ def bridge_bends(
                 change = max(change, abs(ahead[k] - out[WIDTH * k]))
             if change <= NOISY * here:
                 break
-            tangent.bends[0] = BENT
+            seen += 1
             for k in range(size):
                 kept[WIDTH * k + lane] = 0.5 / step * (ahead[k] - out[WIDTH * k])
             step *= FINER
+        if seen == LEVELS:  # it jumps here
+            for k in range(size):
+                kept[WIDTH * k + lane] = 0.0
+        elif seen > 0:
+            tangent.bends[0] = BENT
         move(s, body, lane, 0.0)
     for k in range(WIDTH * size):
         out[k] = kept[k]

@@ -15,7 +15,7 @@ All of them are blocks of the matrix of a stage, in which the states of an eleme
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import Floats, Integers, System
+from dap3d_core.assembly.arrays import Integers, System
 from dap3d_core.assembly.evaluate import zero
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
 from dap3d_core.formulations.stabilized_index2.jacobian import (

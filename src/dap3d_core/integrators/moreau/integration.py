@@ -185,7 +185,10 @@ class MoreauIntegration(Integration):
         model, A = self._evaluator.model, rotation(split(u)[1])
         inverse, masses = np.zeros((2, len(A) + 1, 6, 6))
         turned = A.transpose(0, 2, 1)
-        for found, mass, Jp in ((inverse, 1.0 / model.mass, self._inverse), (masses, model.mass, model.Jp)):
+        for found, mass, Jp in (
+            (inverse, 1.0 / model.mass, self._inverse),
+            (masses, model.mass, model.Jp),
+        ):
             found[1:, [0, 1, 2], [0, 1, 2]] = mass[:, None]
             found[1:, 3:, 3:] = A @ Jp @ turned
         own = model.joint_row_count

@@ -117,7 +117,7 @@ def newton(rows: Rows, x: Floats, y: Floats, tolerance: float) -> tuple[Floats, 
     for _ in range(ROUNDS):
         if best[2] <= tolerance:
             break
-        v = _round(rows, v, x, y, weight, INNER * max(tolerance, min(best[2], 1e-3)))
+        v = _round(rows, v, x, y, weight, INNER * max(0.1 * tolerance, min(best[2], 1e-3)))
         x, y = _impulses(rows, v, x, y, weight)
         left = rows.residual(x, y)
         if left > HELPS * best[2]:
@@ -138,17 +138,13 @@ def _argument(rows: Rows, v: Floats, x: Floats, weight: float) -> Floats:
     return found
 
 
-def _impulses(
-    rows: Rows, v: Floats, x: Floats, y: Floats, weight: float
-) -> tuple[Floats, Floats]:
+def _impulses(rows: Rows, v: Floats, x: Floats, y: Floats, weight: float) -> tuple[Floats, Floats]:
     """The impulses at velocities v, given those that the round began with."""
     pull: Floats = y - weight * rows.s * (rows.D @ (v - rows.free))
     return project(_argument(rows, v, x, weight), rows.mu), pull
 
 
-def _round(
-    rows: Rows, v: Floats, x: Floats, y: Floats, weight: float, tolerance: float
-) -> Floats:
+def _round(rows: Rows, v: Floats, x: Floats, y: Floats, weight: float, tolerance: float) -> Floats:
     """Velocities that solve the equations of a round."""
 
     def rest(v: Floats) -> tuple[Floats, float]:

@@ -16,7 +16,7 @@ NEAR, SWEEPS = 1e-4, 200
 #: Sweeps at most, where Newton's method does not end.
 MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
-FEW, ROUNDING = 100, 4e-15
+FEW, ROUNDING = 100, 1e-14
 
 
 class Problem:
@@ -28,13 +28,11 @@ class Problem:
         residual: of the solution, a part of the largest impulse.
     """
 
-    def __init__(
-        self, contacts: ContactSet, inverse: Floats, masses: Floats, D: Floats
-    ) -> None:
+    def __init__(self, contacts: ContactSet, inverse: Floats, masses: Floats, D: Floats) -> None:
         """Args:
-            contacts: of the step.
-            inverse, masses: (n + 1, 6, 6) M^-1 and M of each body; of ground zero and anything.
-            D: (k, 6 n) rows of joints.
+        contacts: of the step.
+        inverse, masses: (n + 1, 6, 6) M^-1 and M of each body; of ground zero and anything.
+        D: (k, 6 n) rows of joints.
         """
         self._inverse, self._masses, self._D = inverse, masses, D
         self._bodies = np.ascontiguousarray(contacts.bodies)
@@ -142,9 +140,7 @@ class Problem:
         D = self._D if len(self.y) else np.zeros((0, 6 * len(used)))
         s = 1.0 / np.maximum(self._feel(D), TINY)
         J = self._J[group].reshape(-1, 3, 2, 6)
-        parts = _matrices(
-            place[self._bodies[group]], J, self._masses[used], self._inverse[used], D
-        )
+        parts = _matrices(place[self._bodies[group]], J, self._masses[used], self._inverse[used], D)
         return Rows(*parts, b.ravel(), self._free[used].ravel(), self._mu[group], self._r[group], s)
 
     def _feel(self, D: Floats) -> Floats:

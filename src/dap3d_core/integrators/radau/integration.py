@@ -34,7 +34,11 @@ from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, r
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
 from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.runtime.cache import table_of
-from dap3d_core.kernels.runtime.function_lists import LOOP_LIST, number_signature, procedure_signature
+from dap3d_core.kernels.runtime.function_lists import (
+    LOOP_LIST,
+    number_signature,
+    procedure_signature,
+)
 from dap3d_core.linear.lu.plan import LuPlan, StateNode, make_lu_plan
 from dap3d_core.linear.ordering.ordering import JointNode
 from dap3d_core.model import Model
@@ -246,7 +250,7 @@ class RadauIntegration(Integration):
     def loop_arguments(self) -> tuple[Any, ...]:
         """As ``Integration.loop_arguments``."""
         evaluator = self.evaluator
-        return (self.work, evaluator.functions, self._parts, evaluator.system, self.own_loops,
+        return (self.work, evaluator.functions, *self._parts, evaluator.system, self.own_loops,
                 self.tangent, self.matrix)  # fmt: skip
 
     def _project(self) -> bool:

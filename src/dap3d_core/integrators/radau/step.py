@@ -78,6 +78,7 @@ def advance(
     work: RadauState,
     functions: Sequence[Function],
     parts: Sequence[Any],
+    tangents: Sequence[Any],
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -95,10 +96,12 @@ def advance(
             tangent.bends[0] = 0.0
             start(work, rhs, project, system, loops)
         else:
-            step(work, parts, (project, accepted, watch), system, loops, tangent, matrix)
+            step(
+                work, parts, tangents, (project, accepted, watch), system, loops, tangent, matrix
+            )
             h = work.factored_step
             if work.rounding_state != 0 and h > 0.0 and can_measure(work, rejected):
-                measure = parts[0][4]
+                measure = parts[4]
                 measure(work.t, h, work, system, loops, tangent, matrix)
                 bound_stage_noise(h, work, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
@@ -133,6 +136,7 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
 def step(
     work: RadauState,
     parts: Sequence[Any],
+    tangents: Sequence[Any],
     functions: Any,
     system: System,
     loops: Any,
@@ -140,8 +144,8 @@ def step(
     matrix: StageMatrix,
 ) -> None:
     """Try one step: accept it, reject it, or stop the run; functions: project, accepted, watch."""
-    (project, accepted, watch), steps = functions, parts[0]
-    estimate_error, find_slope, find_work = steps[2], steps[3], steps[5]
+    project, accepted, watch = functions
+    estimate_error, find_slope, find_work = parts[2], parts[3], parts[5]
     state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
     end = t1 = end_of_step(work)
     longest = h = t1 - t
@@ -150,7 +154,7 @@ def step(
         if h == 0.0:
             return
         t1 = t1 if h == longest else t + h
-    shorter = search(t, h, work, parts, system, loops, tangent, matrix)
+    shorter = search(t, h, work, parts, tangents, system, loops, tangent, matrix)
     if shorter != 0.0:
         reject_iteration(work, t1, h, shorter)
         return
@@ -209,6 +213,7 @@ def search(
     h: float,
     work: RadauState,
     parts: Sequence[Any],
+    tangents: Sequence[Any],
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -216,14 +221,14 @@ def search(
 ) -> float:
     """Predict and find the stages of a step h, by up to three attempts; as find_stages."""
     predict(h, work, True)
-    shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+    shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
     if shorter > 0.0 and work.convergence_rate < HOPELESS:  # once more, with the tangent at the end
         work.tangent_needed = 1
-        shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+        shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
     if shorter > 0.0 and tangent.bends[0] == BENT:  # the prediction may lie beyond the bend
         predict(h, work, False)
         work.tangent_needed = 1
-        shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+        shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
     if shorter != 0.0 and work.tangent_is_current != 0:
         tangent.bends[0] = max(tangent.bends[0], MAY_BEND)
     return shorter
@@ -235,14 +240,14 @@ def iterate(
     h: float,
     work: RadauState,
     parts: Sequence[Any],
+    tangents: Sequence[Any],
     system: System,
     loops: Any,
     tangent: Tangent,
     matrix: StageMatrix,
 ) -> float:
     """Find the stages from their present values, with a new tangent if needed; as find_stages."""
-    steps, tangents = parts
-    factorise_both, find_stages, find_tangent = steps[0], steps[1], tangents[0]
+    factorise_both, find_stages, find_tangent = parts[0], parts[1], tangents[0]
     wrong = 0.0
     if work.tangent_needed != 0:
         work.tangent_step = h

@@ -210,9 +210,7 @@ def names_of(label: str, functions: Sequence[Any], *parts: str | bytes) -> tuple
     return f"{label}-{ready}", f"{label}-{digest(ready, *codes, objects.identity())}"
 
 
-def table_of(
-    signature: Signature, functions: Sequence[Any], *, values_alone: bool = False
-) -> Any:
+def table_of(signature: Signature, functions: Sequence[Any], *, values_alone: bool = False) -> Any:
     """A table of functions of one signature for compiled code; in plain Python a list.
 
     values_alone: what they compute needs no derivatives in differentiated code (lanes.py).

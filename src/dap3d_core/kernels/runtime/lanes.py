@@ -267,8 +267,6 @@ class Differentiation:
 
     def wide(self, argument: Any) -> Any:
         """An argument of a function in the form that differentiated code takes."""
-        if isinstance(argument, tuple):
-            return tuple(self.wide(item) for item in argument)
         if not isinstance(argument, (Functions, Arrays)):
             return argument
         if id(argument) not in self._wide:

@@ -92,10 +92,7 @@ class Advance:
         )
         given: tuple[Any, ...] = (integration.work, *integration._arguments)
         if isinstance(integration, RadauIntegration):
-            _, system, loops = integration._arguments
-            function = advance_radau
-            given = (integration.work, integration.functions, integration._parts, system, loops,
-                     integration.tangent, integration.matrix)  # fmt: skip
+            function, given = advance_radau, integration.loop_arguments
         elif function is None:
             raise refusal(f"integrator {integration.name} cannot be exported")
         return cls(integration, function.compile([*map(type_of, given), INT]), given)
@@ -254,7 +251,7 @@ class PreparedRun:
         parts = [part for one in self.advances for part in one.arguments]
         parts += [] if self.jumps is None else [*self.jumps.arguments]
         parts += [] if self.start is None else [self.start.arrays, self.start.functions]
-        return Image(*parts, *self.more)
+        return Image(self.evaluator.loops, *parts, *self.more)
 
     def _refuse_jumps(self) -> None:
         refuse_contacts(self.evaluator.model, "export")

@@ -185,7 +185,10 @@ def table_of(data: "xarray.Dataset", at: Mapping[str, float] | None = None) -> T
             words = [w for w in words if not w.startswith(f"{varied[-1]} = ")]
     numbers = tuple(n for n in varied if n in cut.coords) if sampled else tuple(dimensions)
     title = str(data.attrs.get("model", ""))
-    outputs = tuple(str(n) for n in cut.data_vars if n not in ("status", "note"))
+    others = ("status", "note")
+    outputs = tuple(
+        str(n) for n in cut.data_vars if n not in others and "parameter" not in cut[n].dims
+    )
     return Table(cut, sampled, numbers, outputs, tuple(w for w in (title, *words) if w))
 
 

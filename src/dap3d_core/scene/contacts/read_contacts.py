@@ -7,7 +7,7 @@ import attrs
 
 from dap3d_core.interface.contacts.contact import HIDDEN, MATERIAL
 from dap3d_core.scene.errors import MISSING
-from dap3d_core.scene.scene import Element
+from dap3d_core.scene.tables import Element
 from dap3d_core.scene.validate.elements import read_elements
 from dap3d_core.scene.validate.geometry import Geometry, missing_words
 from dap3d_core.scene.validate.mistake_collector import Collector

@@ -7,7 +7,7 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import MISSING
-from dap3d_core.scene.scene import NO_TURN, Body
+from dap3d_core.scene.tables import NO_TURN, Body
 from dap3d_core.scene.validate.coerce_columns import Keys, numbers, vectors
 from dap3d_core.scene.validate.coerce_values import (
     UNIT_LENGTH_ROUNDING,

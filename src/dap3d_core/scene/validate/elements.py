@@ -10,7 +10,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
-from dap3d_core.scene.scene import GROUND, ZERO, Element
+from dap3d_core.scene.tables import GROUND, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     READERS,
     Fault,

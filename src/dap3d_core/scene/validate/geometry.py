@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dap3d_core.interface.fields import FieldSpec
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import MISSING, Key
-from dap3d_core.scene.scene import GROUND, ZERO
+from dap3d_core.scene.tables import GROUND, ZERO
 from dap3d_core.scene.validate.bodies import Bodies
 from dap3d_core.scene.validate.coerce_columns import Keys, tuples, vectors
 from dap3d_core.scene.validate.coerce_values import (

@@ -6,7 +6,8 @@ from typing import Any
 
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.errors import MISSING, Key, MistakeList
-from dap3d_core.scene.scene import HEADER_KEYS, SCHEMA, Scene, Simulation
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import HEADER_KEYS, SCHEMA, Simulation
 from dap3d_core.scene.validate.coerce_values import (
     Fault,
     bounded,

@@ -4,6 +4,7 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
+import attrs
 import numpy as np
 
 from dap3d_core.formulations import RHS
@@ -16,8 +17,8 @@ from dap3d_core.formulations.contacts.contact_rows import (
     ContactRows,
     ContactTable,
 )
-from dap3d_core.formulations.contacts.impacts import collide
-from dap3d_core.formulations.contacts.modes import JamError, find_modes
+from dap3d_core.formulations.contacts.impacts import Impact, collide, repeat
+from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.switches import POSITION_ROUNDING
 from dap3d_core.integrators import Integration, Status
@@ -46,6 +47,24 @@ CHANGES = {(0, 1): "touch", (0, 2): "touch", (1, 0): "lift", (2, 0): "lift", (1,
            (2, 1): "slip"}  # fmt: skip
 
 
+@attrs.frozen
+class Decided:
+    """What was decided at one instant, for the same once more from a state nearby.
+
+    Attributes:
+        impact: with its rounds.
+        stopped: contacts whose slip was stopped.
+        modes: of all contacts, behind it.
+        held, others: contacts that hold, and those that touch and do not.
+    """
+
+    impact: Impact
+    stopped: list[int]
+    modes: Modes
+    held: list[int]
+    others: list[int]
+
+
 class ContactJumps(Jumps):
     """Changes velocities and modes of contacts where the integrations of a run stop for it."""
 
@@ -70,6 +89,9 @@ class ContactJumps(Jumps):
             remedy = "take it out, or the contacts; friction of its own a contact has (mu)"
             raise SceneError([Mistake(f"forces.{readers[0]}", MISSING, what, remedy=remedy)])
         self.table = ContactTable(evaluator)
+        #: What the last instant decided; where ``repeats``, what is decided at the next.
+        self.decided: Decided | None = None
+        self.repeats = False
         self._stood = (0, -np.inf)
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
 
@@ -80,6 +102,9 @@ class ContactJumps(Jumps):
             SceneError: bodies overlap.
         """
         length = self._evaluator.model.length
+        if self.repeats:
+            self._repeat(integration)
+            return
         gaps = self._gaps(integration)
         mistakes = [
             Mistake(
@@ -103,8 +128,30 @@ class ContactJumps(Jumps):
         which = [(c, part) for c, pair in enumerate(self.table.switches.tolist())
                  for part, k in enumerate(pair) if crossed[k] != 0.0]  # fmt: skip
         work.switches[at.COUNT][self.table.switches.ravel()] = 0.0  # it is counted here
+        if self.repeats:
+            self._repeat(integration)
+            return
         self._refuse_endless(integration, [self.table.names[c] for c, _ in which])
         self._resolve(integration, which, TOUCHING * self._evaluator.model.length)
+
+    def repeat_of(self, other: Jumps) -> None:
+        """Decide what another decided at its last instant, at states nearby.
+
+        Raises:
+            SimulationError: contacts that share what they carry slide, each with a force of its own.
+        """
+        assert isinstance(other, ContactJumps) and other.decided is not None
+        modes = other.decided.modes
+        shares = [
+            name for name, mode, near in zip(self.table.names, modes.mode, modes.near, strict=True)
+            if mode == 1.0 and near.any()
+        ]  # fmt: skip
+        if shares:
+            raise SimulationError(
+                f"contacts {', '.join(shares)} share what they carry, and slide: what each of them "
+                "takes is a choice, of which derivatives are not known; let fewer points touch"
+            )
+        self.decided, self.repeats = other.decided, True
 
     def follow(self, integration: Integration) -> None:
         """SimulationError where steps have become too short for the run to come to an end."""
@@ -123,8 +170,8 @@ class ContactJumps(Jumps):
             raise SimulationError(
                 f"the run stopped at t = {t:.9g} s: {steps - before} steps brought it on by "
                 f"{t - since:.2g} s, with contacts {', '.join(names)} closed; {slowest}slip that "
-                "turns while it is next to nothing asks for steps as short. A larger mu_s, above "
-                "mu, lets it begin at once; or end the run by an event before"
+                "turns while it is next to nothing asks for steps as short. Integrator radau may "
+                "pass; a larger mu_s, above mu, lets it begin at once; or end the run by an event"
             )
 
     def _refuse_endless(self, integration: Integration, names: list[str]) -> None:
@@ -184,13 +231,16 @@ class ContactJumps(Jumps):
         outputs = self._outputs(t, u)
         rows = ContactRows(table, t, u)
         # of those that hold what ends is the force, or the reach of their surfaces
-        beyond = {c for c, part in ended
-                  if part == 0 and before[c] > 0.5 and outputs[c, REACH] < outputs[c, NORMAL]}
+        beyond = {
+            c
+            for c, part in ended
+            if part == 0 and before[c] > 0.5 and outputs[c, REACH] < outputs[c, NORMAL]
+        }
         ended = [(c, part) for c, part in ended if c not in beyond]
         near = (outputs[:, GAP] < touching) & (outputs[:, REACH] >= 0.0)
         closed = [c for c in range(table.count) if c not in beyond
                   and (before[c] > 0.5 or near[c] or (c, 0) in ended)]  # fmt: skip
-        sliding, leaving = self._what_ended(rows, outputs, before, ended)
+        sliding, leaving, stopped = self._what_ended(rows, outputs, before, ended)
         impact = collide(table, rows, closed, evaluator.model.length)
         try:
             modes = find_modes(table, rows, closed, sliding, leaving)
@@ -210,6 +260,7 @@ class ContactJumps(Jumps):
             modes.mode, modes.way, modes.near
         )  # fmt: skip
         work = float(np.sum(impact.work))
+        self.decided = Decided(impact, stopped, modes, held, others)
         self.lose |= abs(work) > LOSSLESS * impact.exchanged
         self._go_on(integration, u, rows, moved, states, work)
         after = rows.with_velocities(rows.v)
@@ -230,9 +281,10 @@ class ContactJumps(Jumps):
 
     def _what_ended(
         self, rows: ContactRows, outputs: Floats, before: Floats, ended: list[tuple[int, int]]
-    ) -> tuple[dict[int, Floats], list[int]]:
-        """Contacts that begin to slide, with directions, and those whose normal force vanishes."""
+    ) -> tuple[dict[int, Floats], list[int], list[int]]:
+        """Contacts that begin to slide, with directions, whose normal force vanishes, that stop."""
         sliding: dict[int, Floats] = {}
+        stopped: list[int] = []
         leaving = [c for c, part in ended if part == 0 and before[c] > 0.5]
         for c, part in ended:
             if part == 0:
@@ -244,7 +296,35 @@ class ContactJumps(Jumps):
                     sliding[c] = -force / size
             elif float(np.hypot(*rows.slip[c, 1:])) < STOPPED * self._evaluator.model.length:
                 self._stop(rows, c)
-        return sliding, leaving
+                stopped.append(c)
+        return sliding, leaving, stopped
+
+    @IGNORE_FLOAT_ERRORS
+    def _repeat(self, integration: Integration) -> None:
+        """What was decided, at the present state: velocities and directions follow smoothly.
+
+        Shares of what contacts carry stay: where they stick no motion depends on them.
+        """
+        decided, table, evaluator = self.decided, self.table, self._evaluator
+        assert decided is not None
+        u = self._state_of(integration)
+        rows, states = ContactRows(table, integration.t, u), evaluator.states.copy()
+        for c in decided.stopped:
+            self._stop(rows, c)
+        impact = repeat(table, rows, decided.impact)
+        rows.change(rows.lifted(rows.slip[:, 0], decided.held, []))
+        modes = decided.modes
+        states[table.mode], states[table.way], states[table.near] = (
+            modes.mode,
+            modes.way,
+            modes.near,
+        )
+        for c in np.flatnonzero(modes.mode == 1.0).tolist():
+            slip = rows.slip[c, 1:]
+            if float(np.hypot(*slip)) > STOPPED * evaluator.model.length:
+                states[table.way[c]] = slip / np.hypot(*slip) @ rows.frames[c, 1:]
+        moved = np.zeros(len(rows.v))
+        self._go_on(integration, u, rows, moved, states, float(np.sum(impact.work)))
 
     @staticmethod
     def _stop(rows: ContactRows, c: int) -> None:

@@ -79,6 +79,9 @@ class Jumps:
         crossing[self._contact.pushes] = 0.0  # rows that push need not cross to answer
         self._jump(integration, crossing, None)
 
+    def repeat_of(self, other: "Jumps") -> None:
+        """Decide what another decided at its last instant, at states nearby."""
+
     def restart(self, integration: Integration) -> None:
         """Forget the jumps so far, and begin again."""
         self.records, self.count, self.lose = [], 0, False

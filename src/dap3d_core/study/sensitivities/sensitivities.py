@@ -16,7 +16,6 @@ from dap3d_core.result import Result, ResultError, RunMetadata, find
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.settings import RunSettings
 from dap3d_core.simulation import CompiledModel, SimulationError
-from dap3d_core.simulation.errors import refuse_contacts
 from dap3d_core.simulation.failure.narrow_forces import notes_on_derivatives
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
@@ -200,13 +199,11 @@ def sensitivities(
 
     Raises:
         SceneError, PluginError: as ``simulate``; an unknown parameter, with the nearest.
-        SimulationError: the run stopped; no derivative by a parameter; the scene has contacts.
+        SimulationError: the run stopped; no derivative by a parameter.
     """
-    if not jit_is_on():
-        raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
     compiled = compiled_for(scene, allow_code, announce, **settings)
-    refuse_contacts(compiled.model, "a run with derivatives")
     parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
+    check_differentiable(compiled, parameters, "a run with derivatives", "by")
     given: dict[str, Any] = {**settings, "start": start_word(start)}
     method = given.pop("method", None)
     state = given_state(start, compiled)
@@ -224,6 +221,37 @@ def sensitivities(
     for note in _notes(compiled, runs):
         results[0].note(note)
     return Sensitivities(results[0], runs, parameters)
+
+
+def check_differentiable(
+    compiled: CompiledModel, parameters: Sequence[SceneParameter], what: str, key: str
+) -> None:
+    """Refuse scenes and parameters without derivatives.
+
+    Args:
+        compiled: the model.
+        parameters: by which to differentiate.
+        what: is to be done, in words.
+        key: the argument that names the parameters.
+
+    Raises:
+        SceneError: a parameter has no derivative.
+        SimulationError: the scene has none, or nothing is compiled.
+    """
+    if not jit_is_on():
+        raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
+    mistakes = [Mistake(key, p.name, why) for p in parameters if (why := no_derivative(p))]
+    if mistakes:
+        raise SceneError(mistakes)
+
+
+def no_derivative(parameter: SceneParameter) -> str:
+    """Why there is no derivative by a parameter, "" where there may be one."""
+    if parameter.table == "simulation" and parameter.path[-1] != "t_end":
+        return "this says how a run is computed; a run has derivatives by what it computes alone"
+    if parameter.whole:
+        return "this is a whole number, by which there is no derivative"
+    return ""
 
 
 def _directions(count: int) -> tuple[int, int]:

@@ -39,6 +39,7 @@ def sweep(
     seed: int = 0,
     start: str | None = None,
     allow_code: bool = False,
+    gradients: bool = False,
     threads: int | None = None,
     client: Any = None,
     output: str | os.PathLike[str] | None = None,
@@ -60,6 +61,7 @@ def sweep(
         sample, design, seed: number (without: a grid), "lhs", "random", "sobol" or "halton", seed.
         t_end, dt, method, integrator, rtol, atol, step: as of ``simulate``; likewise correct,
             project, correct_metric, start (a word), allow_code; announce as of ``compile``.
+        gradients: True for exact derivatives ``d OUTPUT`` by what varies, along ``parameter``.
         threads, client: points at once; a ``distributed.Client`` whose workers run them.
         output, force, resume: file to write; overwrite it; continue with ``OUTPUT.part``.
         progress: called as progress(done, total).
@@ -73,6 +75,7 @@ def sweep(
     """
     given = {**settings, "start": start}
     study, plan = _read(scene, vary, outputs, (sample, design, seed), given, allow_code)
+    study = attrs.evolve(study, gradients=gradients)
     runner = _Runner(threads, client, progress, announce, force=force, resume=resume)
     return runner.run(study, plan, output)
 
@@ -117,7 +120,7 @@ def _ensemble(study: Study, announce: Callable[[str], None] | None) -> Ensemble:
         mistakes = error.mistakes
     if all(mistake.key == "vary" for mistake in mistakes):
         try:
-            Ensemble(attrs.evolve(study, names=()))
+            Ensemble(attrs.evolve(study, names=(), gradients=False))
         except SceneError as error:
             mistakes = (*mistakes, *error.mistakes)
     raise SceneError(mistakes)
@@ -158,6 +161,7 @@ def _check_space(ensemble: Ensemble, plan: Design, output: str | os.PathLike[str
     """Refuse what fits neither into memory nor on the disk."""
     series = [o for o in ensemble.outputs if o.reduction == "series"]
     width = 8 * (len(ensemble.outputs) + len(series) * (len(ensemble.times) - 1))
+    width *= 1 + len(plan.varied) * ensemble.study.gradients
     # in addition status and note; in memory the points, three times while they are drawn
     width += 1 + (NOTE if output is not None else 8 + 3 * 8 * len(plan.varied))
     check_room_of_points(plan.size, width, output)

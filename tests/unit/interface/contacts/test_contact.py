@@ -5,20 +5,16 @@ import math
 import pytest
 
 import dap3d_core as dap
+from dap3d_contacts.box_box import BoxBox, part_of
 from dap3d_core.interface import Contact, PluginError, Point, examine, number, point
 from dap3d_core.interface.contacts.rates import rate_of
 from dap3d_core.kernels import acos, asin, atan, cos, exp, log, scale, sin, sqrt, tan, where
 from dap3d_core.registry import load_registry
 from dap3d_core.testing.kit import checks_for
-from dap3d_contacts.box_box import BoxBox, part_of
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize(
-    "keyword",
-    ["ball_ball", "ball_box", "ball_cylinder", "ball_plane", "box_box", "box_plane",
-     "capsule_plane", "cylinder_plane"],
-)  # fmt: skip
+@pytest.mark.every(7)
+@pytest.mark.parametrize("keyword", load_registry().keywords("contact"))
 def test_rows_of_the_standard_types_are_exact_derivatives(keyword):
     """Rate of the gap and normal velocity, J, gamma of a moving point, friction, compiled code."""
     failed = [str(outcome) for check in checks_for(load_registry().get("contact", keyword))

@@ -12,7 +12,7 @@ from dap3d_core.registry import load_registry
 from dap3d_core.scene import Scene, SceneError, check, load, shipped_models
 from dap3d_core.scene.files.line_numbers import lines_of
 from dap3d_core.scene.files.read_toml import scene_of
-from dap3d_core.scene.scene import Element, fault_of_name
+from dap3d_core.scene.tables import Element, fault_of_name
 
 import tomllib  # isort: skip
 

@@ -156,7 +156,9 @@ def test_a_stop_of_an_angle(method):
 
 
 @pytest.mark.every(3)
-@pytest.mark.parametrize("how", [{"method": "standard"}, {"method": "lsq"}, {"integrator": "radau"}])
+@pytest.mark.parametrize(
+    "how", [{"method": "standard"}, {"method": "lsq"}, {"integrator": "radau"}]
+)
 def test_a_start_that_a_parameter_takes_off_the_constraints(how):
     """Its derivatives are brought onto them as its values would be, whether it is corrected or not.
 
@@ -169,14 +171,6 @@ def test_a_start_that_a_parameter_takes_off_the_constraints(how):
     scale = np.max(np.abs(corrected))
     np.testing.assert_allclose(s.of("cylinder.r.z"), corrected, rtol=0.0, atol=1e-4 * scale)
     assert np.max(np.abs(s.of("constraint.position"))) < 1e-8
-
-
-def test_contacts_are_refused():
-    scene = dap.Scene(name="ball")
-    scene.add_body("ball", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
-    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
-    with pytest.raises(dap.SimulationError, match="derivatives does not take contacts yet"):
-        dap.sensitivities(scene, "bodies.ball.r.z", **SHORT)
 
 
 def test_what_nothing_reads_has_derivatives_of_zero():

@@ -1,0 +1,49 @@
+"""An objective as a function of JAX, with its gradient."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from dap3d_core.kernels.array_types import Floats
+
+if TYPE_CHECKING:
+    from dap3d_core.study.sensitivities.objective import Objective
+
+
+def in_jax(objective: "Objective") -> Callable[[Any], Any]:
+    """A function of an array (p,) that JAX differentiates once, and calls in traced code.
+
+    Runs are calls of the host; those of ``jax.vmap`` follow one another.
+
+    Raises:
+        ImportError: JAX is not installed.
+    """
+    try:
+        import jax
+    except ImportError as error:
+        raise ImportError("to_jax needs JAX: pip install 'dap3d[jax]'") from error
+
+    def value_at(x: Any) -> Floats:
+        return np.asarray(objective(np.asarray(x, dtype=float)), dtype=x.dtype)
+
+    def both_at(x: Any) -> tuple[Floats, Floats]:
+        value, gradient = objective.value_and_gradient(np.asarray(x, dtype=float))
+        return np.asarray(value, dtype=x.dtype), gradient.astype(x.dtype)
+
+    def number(x: Any) -> Any:
+        return jax.ShapeDtypeStruct((), x.dtype)
+
+    @jax.custom_vjp
+    def function(x: Any) -> Any:
+        return jax.pure_callback(value_at, number(x), x, vmap_method="sequential")
+
+    def forward(x: Any) -> Any:
+        shapes = number(x), jax.ShapeDtypeStruct(x.shape, x.dtype)
+        return jax.pure_callback(both_at, shapes, x, vmap_method="sequential")
+
+    def backward(gradient: Any, cotangent: Any) -> tuple[Any]:
+        return (cotangent * gradient,)
+
+    function.defvjp(forward, backward)
+    return lambda x: function(jax.numpy.asarray(x, dtype=float))
