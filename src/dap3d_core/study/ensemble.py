@@ -75,7 +75,7 @@ class Ensemble:
         if self.study.gradients:
             from dap3d_core.study.sensitivities.sensitivities import check_differentiable
 
-            check_differentiable(self.compiled, self.parameters, "a sweep with gradients", "vary")
+            check_differentiable(self.parameters, "vary")
 
     def prepare(self) -> None:
         """Compile the code of batches in advance: threads would wait for one another."""

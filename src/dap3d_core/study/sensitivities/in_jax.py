@@ -24,7 +24,7 @@ def in_jax(
     try:
         import jax
     except ImportError as error:
-        raise ImportError("to_jax needs JAX: pip install 'dap3d[jax]'") from error
+        raise ImportError("to_jax needs JAX: pip install jax") from error
 
     def value_at(x: Any) -> Floats:
         return np.asarray(objective(np.asarray(x, dtype=float)), dtype=x.dtype)

@@ -20,7 +20,7 @@ def in_torch(
     try:
         import torch
     except ImportError as error:
-        raise ImportError("to_torch needs PyTorch: pip install 'dap3d[torch]'") from error
+        raise ImportError("to_torch needs PyTorch: pip install torch") from error
 
     class Run(torch.autograd.Function):  # type: ignore[misc]
         """A run; its gradient is computed with it, where it will be asked for."""

@@ -203,7 +203,7 @@ def sensitivities(
     """
     compiled = compiled_for(scene, allow_code, announce, **settings)
     parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
-    check_differentiable(compiled, parameters, "a run with derivatives", "by")
+    check_differentiable(parameters, "by")
     given: dict[str, Any] = {**settings, "start": start_word(start)}
     method = given.pop("method", None)
     state = given_state(start, compiled)
@@ -223,20 +223,12 @@ def sensitivities(
     return Sensitivities(results[0], runs, parameters)
 
 
-def check_differentiable(
-    compiled: CompiledModel, parameters: Sequence[SceneParameter], what: str, key: str
-) -> None:
-    """Refuse scenes and parameters without derivatives.
-
-    Args:
-        compiled: the model.
-        parameters: by which to differentiate.
-        what: is to be done, in words.
-        key: the argument that names the parameters.
+def check_differentiable(parameters: Sequence[SceneParameter], key: str) -> None:
+    """Refuse parameters without derivatives; key: the argument that names them.
 
     Raises:
         SceneError: a parameter has no derivative.
-        SimulationError: the scene has none, or nothing is compiled.
+        SimulationError: nothing is compiled.
     """
     if not jit_is_on():
         raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
