@@ -34,13 +34,11 @@ ENDS, BEGINS, UNSEEN, JUMPS = 1, 0, -1, 2
 # often the multipliers did not settle with friction, the numbers of the penalty formulation, how
 # often a pose was singular where something was reported, the length that tolerances speak of
 # (Model.length), 1.0 where pivots are those of equal masses, a scratch number of angles whose turns
-# are in doubt, and 1.0 where forces read reactions, CONTACTS where there are contacts: multipliers
-# that do not settle end a run.
+# are in doubt, and 1.0 where forces read reactions: multipliers that do not settle end a run.
 (
     TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, LENGTH, EVEN,
     DOUBTFUL, JAMS, SETTINGS
 ) = range(13)  # fmt: skip
-CONTACTS = 2.0
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import CONTACTS, EVEN, KINDS, LENGTH, Floats, Integers, System
+from dap3d_core.assembly.arrays import EVEN, KINDS, LENGTH, Floats, Integers, System
 from dap3d_core.assembly.metric import METRIC_WIDTH
 from dap3d_core.assembly.turns import (
     BODY_I,
@@ -101,7 +101,7 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         settings=np.array(
             [
                 *(1e-15, 1e-15, 0.0, 0.0, *PENALTY, 0.0, model.length, masses_differ(model), 0.0),
-                CONTACTS if model.contacts else float(any(group.read for group in model.forces)),
+                float(any(group.read for group in model.forces)),
             ]
         ),
         friction=np.zeros(_friction_size(model, plan)),

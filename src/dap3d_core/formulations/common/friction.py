@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import CONTACTS, FRICTION, JAMS, UNSETTLED, Floats, System
-from dap3d_core.assembly.evaluate import call_kinds, largest, zero
+from dap3d_core.assembly.arrays import FRICTION, JAMS, UNSETTLED, Floats, System
+from dap3d_core.assembly.evaluate import call_kinds, zero
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 #: The multipliers have settled where a pass changes them by less than this part of the largest.
@@ -73,11 +73,8 @@ def memory_size(bodies: int, rows: int, matrix: int) -> int:
 
 
 @compiled
-def accelerate_fixed_point(system: System, passes: int, scale: float) -> bool:
-    """True if ``multipliers`` have settled; else they become the start of the next pass.
-
-    scale: a size of multipliers below which no change counts, of contacts that carry by ``near``.
-    """
+def accelerate_fixed_point(system: System, passes: int) -> bool:
+    """True if ``multipliers`` have settled; else they become the start of the next pass."""
     x, rows = system.multipliers, system.multipliers.shape[0]
     memory = system.friction[2 * system.force.shape[0] :]
     guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows : 3 * rows]
@@ -85,7 +82,7 @@ def accelerate_fixed_point(system: System, passes: int, scale: float) -> bool:
         for k in range(rows):
             guess[k] = x[k]
         return False
-    size, largest_change = scale, 0.0
+    size, largest_change = 0.0, 0.0
     for k in range(rows):
         size = max(size, abs(x[k]))
         largest_change = max(largest_change, abs(x[k] - guess[k]))
@@ -159,8 +156,7 @@ def solve_with_friction(
     solve(system)
     if has_friction(system):
         unsettled = system.settings[UNSETTLED]
-        scale = largest(system.multipliers) if system.settings[JAMS] == CONTACTS else 0.0
-        while not accelerate_fixed_point(system, passes, scale):
+        while not accelerate_fixed_point(system, passes):
             passes += 1
             power = apply_friction(t, system, loops)
             solve(system)

@@ -118,7 +118,6 @@ NOT_CALLED = {
         "study.batch.lanes": "set_lane load next_step run_lanes exchange_kept take_stages "
         "take_rates watch_stages",
         # of scenes with contacts, which have closed forms: verification/test_contacts.py
-        "formulations.common.switching_functions": "contact_rates watch_contacts",
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate",
         "formulations.jumps.rounds": "kick has_crossed stop",
