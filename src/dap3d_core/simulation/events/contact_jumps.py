@@ -139,9 +139,10 @@ class ContactJumps(Jumps):
         """Decide what another decided at its last instant, at states nearby.
 
         Raises:
-            SimulationError: contacts that share what they carry slide, each with a force of its own.
+            SimulationError: contacts that share what they carry slide.
         """
-        assert isinstance(other, ContactJumps) and other.decided is not None
+        assert isinstance(other, ContactJumps)
+        assert other.decided is not None
         modes = other.decided.modes
         shares = [
             name for name, mode, near in zip(self.table.names, modes.mode, modes.near, strict=True)
