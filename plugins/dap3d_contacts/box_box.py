@@ -51,8 +51,9 @@ def picked(first, second, values):
 def at_face(corner, r, A, h, other, B, k):
     """A corner of a box (other, B, k) at the nearest face of a box (r, A, h).
 
-    Gap, reach, normal off the face, distance of the other box from its plane. The face is that whose plane is the farthest from the other
-    box, so that of corners on edges the normal is that of the plane which parts the boxes.
+    Gap, reach, normal off the face, distance of the other box from its plane. The face is that
+    whose plane is the farthest from the other box, so that of corners on edges the normal is that
+    of the plane which parts the boxes.
     """
     x, d = (rotate(transpose(A), sub(p, r)) for p in (corner, other))
     axes = transpose(A)

@@ -8,8 +8,8 @@ from dap3d_core.interface import Contact, Point, Vector, hookimpl, number, point
 from dap3d_core.kernels import add, cross, dot, scale, sqrt, sub, where
 
 interface_version = 1
-#: Points of a cap; sine of the tilt below which they count, and half of it, below which a rim has no
-#: lowest point.
+#: Points of a cap; sine of the tilt below which they count, and half of it, below which a rim has
+#: no lowest point.
 ON_CAP, UPRIGHT = 8, 1e-9
 
 

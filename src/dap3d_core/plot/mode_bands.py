@@ -43,8 +43,11 @@ def bands_of(result: Result, quantities: Iterable[Quantity]) -> list[Band]:
     for before, after in pairwise(range(len(modes))):
         if modes[before] != modes[after]:
             first, last = float(result.t[before]), float(result.t[after])
-            found = [e.t for e in result.events
-                     if e.name.split(POINT)[0] == name.split(POINT)[0] and first <= e.t <= last]  # fmt: skip
+            found = [
+                e.t
+                for e in result.events
+                if e.name.split(POINT)[0] == name.split(POINT)[0] and first <= e.t <= last
+            ]
             cuts.append(found[-1] if found else 0.5 * (first + last))
     cuts.append(float(result.t[-1]))
     kept = [modes[0], *(b for a, b in pairwise(modes) if a != b)]

@@ -157,7 +157,7 @@ def friction_of_one(c, n, r_i, v_i, w_i, lam, mu, mode, way, near):
 
 
 def switch(gap, reach, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mu_s, mode, way, near):
-    """What ends a mode where it is negative: gap, or normal force and reach; slip, or rest of a cone."""
+    """What ends a mode where it is negative: gap; force, reach; slip, rest of a cone."""
     normal, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
     slip = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
     slides = where(mu > 0.0, dot(slip, across(way, n)), 1.0)

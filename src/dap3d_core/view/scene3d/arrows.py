@@ -20,8 +20,9 @@ LONGEST, USUAL = 0.36, 0.16
 def arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any]:
     """The arrows of a page and their scales.
 
-    The force of a contact on body i is at the point of contact, which moves. A joint's reaction is that on the body of its first slot, at the joint's point there; the other
-    body feels the opposite force. A force element has an arrow on each of its moving bodies.
+    The force of a contact on body i is at the point of contact, which moves. A joint's reaction is
+    that on the body of its first slot, at the joint's point there; the other body feels the
+    opposite force. A force element has an arrow on each of its moving bodies.
 
     Args:
         result: its instants are those of the page.
@@ -30,7 +31,8 @@ def arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any]
 
     Returns:
         ``arrows``: ``layer``, ``what``, ``name``, ``body``, ``at``, packed ``values`` (nt, 3) N or
-        N m, global axes, of contacts packed ``places`` (nt, 3) m; ``scales``: m for one N, m for one N m; ``notes``.
+        N m, global axes, of contacts packed ``places`` (nt, 3) m; ``scales``: m for one N, m for
+        one N m; ``notes``.
     """
     notes: list[str] = []
     every = [

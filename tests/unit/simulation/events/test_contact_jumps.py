@@ -31,6 +31,20 @@ def test_bodies_that_overlap_are_refused_with_depth_and_remedy():
         dap.simulate(bouncing(height=-0.01))
 
 
+@pytest.mark.parametrize("height", [0.2, -0.05])
+def test_bodies_are_moved_until_they_touch(height):
+    result = dap.simulate(bouncing(height=height, touch=True), t_end=0.1, dt=0.05)
+    assert result.r[0, 0] == pytest.approx([0.0, 0.0, 0.1], abs=1e-12)
+    assert not any(event.kind == "impact" for event in result.events)
+
+
+def test_a_contact_of_several_points_cannot_be_moved_until_it_touches():
+    scene = bouncing()
+    scene.add_contact("box_plane", "box", P_i="ball.O", size=[0.1, 0.1, 0.1], touch=True)
+    with pytest.raises(dap.SceneError, match=r"box.touch = true.*8 points"):
+        dap.simulate(scene)
+
+
 @pytest.mark.parametrize(
     ("what", "call"),
     [
