@@ -55,25 +55,23 @@ def simulate(
         method: "auto", "unconstrained", "standard", "penalty", "lsq" or "joint".
         integrator: "dopri5", "dop853", "adams", "rk4" (needs ``step``), "radau" (implicit), "auto".
         rtol, atol, step: tolerances of the step's error; a fixed step, s, without error control.
-        correct, correct_metric, project: bring the start onto the constraints, by the least change
-            in m and rad ("unit") or weighted by masses ("mass"), and then every state.
+        correct, project: bring the start, and then every state, onto the constraints.
         start: "scene", "equilibrium", a result (its end), (result, time) or an ``Equilibrium``.
         progress, watch: called each 0.1 s or so, as progress(t, t_end), with a ``RunProgress``.
-        events, controllers: see ``Event``, ``Controller``.
-        contact, contact_step: "events", "stepping" or "auto"; step of stepping, s.
-        output, force: file to write, ``OUTPUT.part`` meanwhile; whether over an existing one.
+        events, controllers, others: see ``Event``, ``Controller``, ``Simulation``.
         estimate_error: of ``result.error`` by a second, finer run; "quick": if within 1 s.
+        output, force: file to write, ``OUTPUT.part`` meanwhile; whether over an existing one.
         checkpoint: seconds between checkpoints, for ``resume``; inf: one where the run is ended.
 
     Raises:
         SceneError, PluginError, ResultError: as ``compile``; unusable settings or output.
-        SimulationError (RedundantError, AssemblyError): the run stopped, with ``.result``.
+        SimulationError (and its kinds): the run stopped, with ``.result``, or could not begin.
     """
     compiled = compiled_for(scene, method, allow_code, announce, integrator)
     settings = settings_of(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
-                         rtol=rtol, atol=atol, step=step, correct=correct, project=project,
-                         correct_metric=correct_metric, start=start_word(start), contact=contact,
-                         contact_step=contact_step)  # fmt: skip
+        rtol=rtol, atol=atol, step=step, correct=correct, project=project, contact=contact,
+        contact_step=contact_step, correct_metric=correct_metric,
+        start=start_word(start))  # fmt: skip
     check_checkpoint(checkpoint, output)
     with compiled.borrow_evaluator():
         run = Run(compiled, settings, Callbacks(announce=announce, progress=progress, watch=watch),

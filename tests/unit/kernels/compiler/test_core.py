@@ -120,6 +120,18 @@ NOT_CALLED = {
         # of scenes with contacts, which have closed forms: verification/test_contacts.py
         "formulations.common.switching_functions": "contact_rates watch_contacts",
         "formulations.contacts.cone": "sweep",
+        # of shapes that collide: unit/assembly/collisions, verification/test_stepping.py
+        "assembly.collisions.records": "add",
+        "assembly.collisions.rods": "balls along sphere_capsule capsules _pair",
+        "assembly.collisions.planes": "above at_plane _rims",
+        "assembly.collisions.solids": "clamp local put ball_box sphere_cylinder capsule_box slope "
+        "_lowest",
+        "assembly.collisions.boxes": "dot_axis apart boxes _edges _face _facing _clip",
+        "assembly.collisions.broad_phase": "sweep",
+        "assembly.collisions.find": "touch",
+        "integrators.moreau.dense": "solve_dense",
+        "integrators.moreau.gauss_seidel": "sweep_bodies change_of",
+        "integrators.moreau.integration": "state_at goes_on take_state",
         # of runs with derivatives: study/sensitivities compares their values with those without
         "integrators.stepping.integration": "project_here",
     }.items()
