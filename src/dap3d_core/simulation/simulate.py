@@ -64,14 +64,13 @@ def simulate(
         checkpoint: seconds between checkpoints, for ``resume``; inf: one where the run is ended.
 
     Raises:
-        SceneError, PluginError, ResultError: as ``compile``; unusable settings or output.
-        SimulationError (and its kinds): the run stopped, with ``.result``, or could not begin.
+        SceneError, PluginError, ResultError, SimulationError: as ``compile``; the run stopped.
     """
     compiled = compiled_for(scene, method, allow_code, announce, integrator)
     settings = settings_of(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
         rtol=rtol, atol=atol, step=step, correct=correct, project=project, contact=contact,
-        contact_step=contact_step, correct_metric=correct_metric,
-        start=start_word(start))  # fmt: skip
+        contact_step=contact_step, correct_metric=correct_metric, start=start_word(start),
+    )  # fmt: skip
     check_checkpoint(checkpoint, output)
     with compiled.borrow_evaluator():
         run = Run(compiled, settings, Callbacks(announce=announce, progress=progress, watch=watch),
