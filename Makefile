@@ -39,7 +39,7 @@ run: $(VENV)/.installed  ## simulate MODEL (fourbar3): result, picture, curve an
 	@$(VENV)/bin/dap3d run "$(MODEL)" -o "$(RUN).nc" --force $(FLAGS)
 	@$(VENV)/bin/dap3d animate "$(RUN).nc" -o "$(RUN).png" --at 0 --model "$(MODEL)" --force
 	@$(VENV)/bin/dap3d plot "$(RUN).nc" "$(QUANTITY)" -o "$(RUN)-curve.png" --force
-	@$(VENV)/bin/dap3d view "$(RUN).nc" -o "$(RUN).html" --model "$(MODEL)" --force $(FLAGS)
+	@$(VENV)/bin/dap3d view "$(RUN).nc" -o "$(RUN).html" --model "$(MODEL)" --play --force $(FLAGS)
 	@echo "Open $(RUN).html in a browser: the scene moves there, with its curves and its ledger."
 
 install: $(VENV)/.installed  ## put dap3d into .venv, editable (what run, test and lint do themselves)

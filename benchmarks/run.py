@@ -16,8 +16,10 @@ from pathlib import Path
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
 import calls
+import contact
 import derivatives
 import derived
+import elements
 import extension
 import hard
 import hard.chaos
@@ -96,6 +98,7 @@ def main():
         "kernels": kernels.measure,
         "derivatives": derivatives.measure,
         "derived": derived.measure,
+        "elements": elements.measure,
         "extension": extension.measure,
         "states": states.measure,
         "call": calls.call,
@@ -109,6 +112,7 @@ def main():
         "streaming": streaming.measure,
         "study": study.measure,
         "points": points.measure,
+        "contact": contact.measure,
         "lanes": lanes.measure,
         "programs": programs.measure,
         "joint_motions": joint_motions.measure,

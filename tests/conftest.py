@@ -3,6 +3,7 @@
 import gc
 import os
 import signal
+from collections import Counter
 
 import pytest
 
@@ -21,13 +22,29 @@ def pytest_collection(session):
 
     Slow tests need that code; quick ones have ended before it is there.
     """
+    gc.disable()  # nothing that is imported or collected is garbage
     if "not slow" in session.config.option.markexpr:
         from dap3d_core.kernels.compiler import background
 
         background.core_count = lambda: 1
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Of the cases of a verification the quick tests take the first, of `every(n)` each n-th."""
+    counts = Counter()
+    for item in items:
+        mark = item.get_closest_marker("every")
+        is_swept = mark or "/verification/" in item.path.as_posix()
+        if not is_swept or item.get_closest_marker("slow"):
+            continue
+        test = item.nodeid.partition("[")[0]
+        count, counts[test] = counts[test], counts[test] + 1
+        if count % mark.args[0] if mark else count:
+            item.add_marker("slow")
+
+
 def pytest_collection_finish():
     """Thousands of tests are no garbage: each collection would go through them again."""
-    gc.collect()
     gc.freeze()
+    gc.enable()

@@ -1,7 +1,7 @@
 """Check that no files of src and plugins import each other in a circle.
 
 Imports within functions and for type checkers count as well: a file can be read, and changed, with
-those below it in mind alone. Where a circle is right it is listed in ALLOWED with the reason.
+those below it in mind alone.
 
     python tools/check_circles.py
 
@@ -17,11 +17,6 @@ PACKAGES = (
     "dap3d_core", "dap3d_joints", "dap3d_forces", "dap3d_functions", "dap3d_formats",
     "dap3d_matlab", "dap3d_results",
 )  # fmt: skip
-#: Imports, of a file from another, that close a circle -> why.
-ALLOWED = {
-    ("dap3d_core.scene.scene", "dap3d_core.scene.files.write_toml"): "Scene.save, Scene.to_toml",
-    ("dap3d_core.scene.scene", "dap3d_core.scene.expressions.parameters"): "Scene.resolved",
-}
 #: Packages offer what is in their files, and their files may name them.
 OFFERING = ("dap3d_core", "dap3d_core.interface", "dap3d_core.kernels")
 
@@ -30,14 +25,7 @@ def imports() -> dict[str, set[str]]:
     """The files that each file imports."""
     graph = grimp.build_graph(*PACKAGES, include_external_packages=False, cache_dir=None)
     files = graph.modules - set(OFFERING)
-    return {
-        file: {
-            other
-            for other in graph.find_modules_directly_imported_by(file) & files
-            if (file, other) not in ALLOWED
-        }
-        for file in sorted(files)
-    }
+    return {file: graph.find_modules_directly_imported_by(file) & files for file in sorted(files)}
 
 
 def main() -> int:
@@ -47,7 +35,7 @@ def main() -> int:
     except CycleError as error:
         print("circle: " + " <- ".join(error.args[1]))
         return 1
-    print(f"circles: none; {len(ALLOWED)} imports are exempt")
+    print("circles: none")
     return 0
 
 

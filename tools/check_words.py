@@ -17,6 +17,8 @@ from pathlib import Path
 FOLDERS = ("src", "plugins")
 #: Name of a function, class or constant -> what replaced it.
 NAMES = {
+    "FAR": "a name that says of what, such as FARTHEST_MOTION",
+    "ROUNDING": "a name that says of what, such as RATE_ROUNDING",
     "AGAIN": "a name that says of what, such as SECOND_RUN_FACTOR",
     "ASIDE": "OFFSET_ANGLE",
     "Pulling": "UnilateralMonitor",

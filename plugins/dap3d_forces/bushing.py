@@ -1,10 +1,10 @@
 """Bushing: an elastic joint, stiff and damped in all six directions."""
 
 from dap3d_core.interface import Force, Point, hookimpl, point, square
+from dap3d_core.kernels import abs as magnitude
 from dap3d_core.kernels import (
     add,
     conjugate,
-    cos,
     cross,
     dot,
     neg,
@@ -13,7 +13,6 @@ from dap3d_core.kernels import (
     rotate,
     rotation_vector,
     scale,
-    sin,
     sqrt,
     sub,
     transpose,
@@ -65,14 +64,15 @@ class Bushing(Force):
         home, K_t, K_tr, K_r, C_t, C_tr, C_r,
     ):  # fmt: skip
         d, to_i = sub(r_P_j, r_P_i), transpose(A_i)
-        x, phi = rotate(to_i, d), turn(p_i, p_j, home)
+        x, q = rotate(to_i, d), turned(p_i, p_j, home)
+        phi = rotation_vector(q)
         x_dot = rotate(to_i, sub(sub(v_P_j, v_P_i), cross(w_i, d)))
         w = rotate(to_i, sub(w_j, w_i))
         mu = add(rotate(transpose(K_tr), x), rotate(K_r, phi))
         F = add(rotate(K_t, x), rotate(K_tr, phi))
         F = rotate(A_i, add(F, add(rotate(C_t, x_dot), rotate(C_tr, w))))
         damping = add(rotate(transpose(C_tr), x_dot), rotate(C_r, w))
-        M = rotate(A_i, add(gradient(phi, mu), damping))
+        M = rotate(A_i, add(gradient(q, phi, mu), damping))
         return (F, add(M, cross(add(s_P_i, d), F))), (neg(F), neg(add(M, cross(s_P_j, F))))
 
     def energy(r_P_i, r_P_j, A_i, p_i, p_j, home, K_t, K_tr, K_r):
@@ -102,13 +102,15 @@ def turned(p_i, p_j, home):
     return quaternion_product(quaternion_product(conjugate(p_i), p_j), conjugate(home))
 
 
-def gradient(phi, mu):
-    """G mu: the moment whose power is mu . phi_dot."""
+def gradient(q, phi, mu):
+    """G mu: the moment whose power is mu . phi_dot; q are the Euler parameters of phi."""
     square = norm2(phi)
     small = square < 1e-2
-    angle = sqrt(where(small, 1.0, square))
+    sine = norm2((q[1], q[2], q[3]))  # of half the angle, squared
+    cot = magnitude(q[0]) / sqrt(where(small, 1.0, sine))
     series = 1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square / 1209600.0))
-    exact = (1.0 - 0.5 * angle * cos(0.5 * angle) / sin(0.5 * angle)) / (angle * angle)
+    squared = where(small, 1.0, square)
+    exact = (1.0 - 0.5 * sqrt(squared) * cot) / squared
     across = cross(phi, mu)
     return add(add(mu, scale(0.5, across)), scale(where(small, series, exact), cross(phi, across)))
 

@@ -1,6 +1,17 @@
 """Dry friction of hinges and sliders that does not depend on their load."""
 
-from dap3d_core.interface import Body, Force, Point, Vector, body, hookimpl, number, point, vector
+from dap3d_core.interface import (
+    Body,
+    Force,
+    Point,
+    Vector,
+    body,
+    hookimpl,
+    joint_fields,
+    number,
+    point,
+    vector,
+)
 from dap3d_core.kernels import dot, sub, tanh
 from dap3d_forces.axial_spring import along, pull
 from dap3d_forces.torsion import pair
@@ -24,6 +35,7 @@ class RotationFriction(Force):
     keyword = "rot_friction"
     symbol = "ring"
     regularised = "w_tol"
+    joint: str = joint_fields("body_i", "body_j", axis="a_j", doc="the hinge that rubs")
     body_i: Body = body(doc="body that turns")
     body_j: Body = body(doc="body against which it turns")
     axis: Vector = vector(doc="axis, on either body")
@@ -47,6 +59,7 @@ class TranslationFriction(Force):
 
     keyword = "tran_friction"
     regularised = "v_tol"
+    joint: str = joint_fields("P_i", "a_j", doc="the slider that rubs")
     P_i: Point = point(doc="where body i slides")
     a_j: Vector = vector(doc="axis it slides along, on body j")
     f_c: float = number(unit="N", minimum=0.0, doc="friction force")

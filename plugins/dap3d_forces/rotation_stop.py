@@ -1,8 +1,20 @@
 """Stop of the angle between two bodies."""
 
-from dap3d_core.interface import Force, Vector, angle, choice, hookimpl, number, vector
+from dap3d_core.interface import (
+    Body,
+    Force,
+    Vector,
+    angle,
+    body,
+    choice,
+    hookimpl,
+    joint_fields,
+    number,
+    vector,
+)
 from dap3d_core.kernels import dot, neg, rotate, scale, where
 from dap3d_forces.rebound import carried, rebound, reduced, stored
+from dap3d_forces.torsion import marks
 
 interface_version = 1
 
@@ -27,8 +39,11 @@ class RotationStop(Force):
     unilateral = (0,)
     restitution = "e"
     energy_where = "where the bodies turn about the common axis"
-    v_i: Vector = vector(across="axis", doc="direction the angle is measured from, on body i")
-    v_j: Vector = vector(across="axis", doc="direction it is measured to, on body j")
+    joint: str = joint_fields("body_i", "body_j", axis="a_j", doc="the hinge that it stops")
+    body_i: Body = body(default=None, doc="body i; that of v_i")
+    body_j: Body = body(default=None, doc="body j; that of v_j")
+    v_i: Vector = vector(None, across="axis", doc="direction it is measured from, on body i")
+    v_j: Vector = vector(None, across="axis", doc="direction it is measured to, on body j")
     axis: Vector = vector(doc="common axis, on either body")
     theta: float = angle("v_i", "v_j", "axis")
     theta_stop: float = number(unit="rad", doc="least or greatest angle")
@@ -44,7 +59,7 @@ class RotationStop(Force):
     rebound: bool = choice((True, False), default=True, doc="whether fast contact rebounds")
 
     def prepare(self, bodies):
-        return {"way": 1.0 if self.side == "min" else -1.0}
+        return {"way": 1.0 if self.side == "min" else -1.0} | marks(self, bodies)
 
     def switch(theta, theta_stop, way):
         return way * (theta - theta_stop)

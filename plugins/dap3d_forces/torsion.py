@@ -1,17 +1,20 @@
 """Rotational spring, damper and actuator."""
 
 from dap3d_core.interface import (
+    Body,
     Force,
     Vector,
     angle,
+    body,
     choice,
     function,
     hookimpl,
     input_,
+    joint_fields,
     number,
     vector,
 )
-from dap3d_core.kernels import atan2, cos, cross, dot, neg, scale, sin, sub
+from dap3d_core.kernels import atan2, cos, cross, dot, neg, normals, scale, sin, sub
 
 interface_version = 1
 
@@ -30,6 +33,9 @@ class Torsion(Force):
         T = k x + c theta_dot + n_a, moment T u on body i and -T u on body j
         energy = k x^2 / 2
 
+    Where the scene names the ``joint``, v_i and v_j are one direction in its poses: theta is zero
+    there, and always the opposite of the angle that the joint reports.
+
     x = theta - theta_0, brought into (-pi, pi]: half a turn from theta_0 the moment of the spring
     jumps. The actuator's moment n_a has no single-valued potential then and counts as work. With
     ``turns`` x counts whole turns, and energy = k x^2 / 2 + n_a x. A function of x takes the place
@@ -42,8 +48,11 @@ class Torsion(Force):
     actuates = "n_a"
     symbol = "ring"
     energy_where = "where the bodies turn about the common axis, and without n_a"
-    v_i: Vector = vector(across="axis", doc="direction the angle is measured from, on body i")
-    v_j: Vector = vector(across="axis", doc="direction it is measured to, on body j")
+    joint: str = joint_fields("body_i", "body_j", axis="a_j", doc="the hinge that it acts in")
+    body_i: Body = body(default=None, doc="body i; that of v_i")
+    body_j: Body = body(default=None, doc="body j; that of v_j")
+    v_i: Vector = vector(None, across="axis", doc="direction it is measured from, on body i")
+    v_j: Vector = vector(None, across="axis", doc="direction it is measured to, on body j")
     axis: Vector = vector(doc="common axis, on either body")
     k: float = number(default=0.0, unit="N m/rad", usual=(0.0, None), doc="stiffness")
     c: float = number(default=0.0, unit="N m s/rad", usual=(0.0, None), doc="damping coefficient")
@@ -54,7 +63,8 @@ class Torsion(Force):
     function: str = function(argument="theta - theta_0", doc="moment, N m, in place of k x")
 
     def prepare(self, bodies):
-        return {"start": (cos(self.theta_0), sin(self.theta_0))}
+        start = {"start": (cos(self.theta_0), sin(self.theta_0))}
+        return start | marks(self, bodies)
 
     def wrench(v_i, v_j, axis, start, w_i, w_j, k, c, n_a):
         rate = dot(axis, sub(w_j, w_i))
@@ -142,6 +152,16 @@ def wrapped(v_i, v_j, axis, start):
     """The angle theta - theta_0 in (-pi, pi]; start holds cosine and sine of theta_0."""
     y, x = dot(axis, cross(v_i, v_j)), dot(v_i, v_j) - dot(v_i, axis) * dot(v_j, axis)
     return atan2(y * start[0] - x * start[1], x * start[0] + y * start[1])
+
+
+def marks(element, bodies):
+    """V_i and v_j that are one direction in the poses as given, where the scene names a joint."""
+    if element.v_i is not None and element.v_j is not None:
+        return {}
+    if element.joint is None or element.v_i is not None or element.v_j is not None:
+        raise ValueError("give joint, or v_i and v_j")
+    n, _ = normals(element.axis)  # that of the joint, on body j
+    return {"v_i": bodies["i"].to_local(bodies["j"].to_global(n)), "v_j": n}
 
 
 def pair(T, axis):

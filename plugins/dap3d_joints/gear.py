@@ -61,15 +61,15 @@ class Gear(Joint):
 
     Radii follow from the numbers of teeth and the distance of the axes, or are given in their
     place. The radial force of a pressure angle always presses the wheels apart, whichever flank is
-    in touch; a multiplier has both signs, so it is no part of the row: the force ``gear`` has it,
-    an elastic mesh.
+    in touch; a multiplier has both signs, so it is no part of the row. The force
+    ``gear_separation`` adds it; the force ``gear``, an elastic mesh, has it.
 
     phi_i changes at the rate -k_i . g_dot + e_i . w_i, with k_i = a_i x g / |a_i x g|^2 and
     e_i = g x k_i, which give J and gamma (turning.py).
     """
 
     keyword, rows = "gear", 1
-    synonyms = ("gears", "gearpair", "spur", "bevel")
+    synonyms = ("gears", "gearpair", "spur", "bevel", "spur-gear", "bevel-gear")
     symbol = "link"
     example: ClassVar[Mapping[str, str]] = {
         "P_i": '"crank.O"',

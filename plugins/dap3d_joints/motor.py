@@ -41,8 +41,8 @@ class Motor(Joint):
     which steps: bodies would have to jump.
 
     The multiplier is the moment or force of the motor on body i, of any size. One with a largest
-    moment is the force ``motor``, which takes a speed with a ``limit``. A position within a limit
-    takes a controller that sets its ``torque`` (docs/how-to/inputs-and-controllers.md).
+    moment is the force ``motor``, which takes a speed or a position with a ``limit``, and a
+    position that is an input.
     """
 
     keyword, rows = "motor", 1

@@ -35,7 +35,7 @@ class Screw(Joint):
     """
 
     keyword, rows = "screw", 5
-    synonyms = ("helical", "leadscrew")
+    synonyms = ("helical", "leadscrew", "nut")
     symbol = "sleeve"
     P_i: Point = point(doc="point on the axis, on the nut")
     P_j: Point = point(doc="point on the axis, on the screw")

@@ -23,7 +23,7 @@ class Spherical(Joint):
     """
 
     keyword, rows = "sph", 3
-    synonyms = ("spherical", "ball", "socket")
+    synonyms = ("spherical", "ball", "socket", "ball-and-socket")
     symbol = "ball"
     P_i: Point = point(doc="point on body i")
     P_j: Point = point(doc="point on body j")

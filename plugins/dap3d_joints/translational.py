@@ -45,7 +45,7 @@ class Translational(Joint):
     """
 
     keyword, rows = "tran", 5
-    synonyms = ("translational", "prismatic", "slider")
+    synonyms = ("translational", "prismatic", "slider", "slide")
     coordinate = "length"
     symbol = "slider"
     a_j: Vector = vector(doc="direction of sliding, on body j")

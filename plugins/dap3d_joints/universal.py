@@ -20,7 +20,7 @@ class Universal(Joint):
     """
 
     keyword, rows = "univ", 4
-    synonyms = ("universal", "cardan", "hooke")
+    synonyms = ("universal", "cardan", "hooke", "u-joint")
     symbol = "cross"
     P_i: Point = point(doc="centre of the cross, on body i")
     P_j: Point = point(doc="centre of the cross, on body j")

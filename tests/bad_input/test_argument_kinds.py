@@ -15,7 +15,7 @@ import pytest
 
 import dap3d_core as dap
 from dap3d_core.registry.arguments import SETTINGS, checked
-from dap3d_core.scene.scene import Simulation
+from dap3d_core.scene.tables import Simulation
 
 
 def public(name):
@@ -215,3 +215,39 @@ def test_unknown_and_missing_arguments_have_the_words_of_python():
     ) as found:
         taking(y=1)
     assert found.value.__context__ is None  # one traceback, not two
+
+
+@pytest.fixture(scope="module")
+def run():
+    return dap.simulate("pen1", t_end=0.1, dt=0.05)
+
+
+def test_names_are_given_one_by_one_or_in_a_list(run):
+    """Of figures, pages and paths."""
+    names = ["cone.r.z", "cone.w"]
+    assert dap.view(run, names).data["asked"] == names == dap.view(run, *names).data["asked"]
+    figures = [dap.plot(run, *given).figure for given in ((names,), names)]
+    lines = [[line.get_ydata() for ax in one.axes for line in ax.lines] for one in figures]
+    assert len(lines[0]) == len(lines[1]) == 4
+    assert all(np.array_equal(a, b) for a, b in zip(*lines, strict=True))
+
+
+@pytest.mark.parametrize("names", [(["cone.r.z"], "cone.w"), (3,), ([["cone.r.z"]],), (None,)])
+@pytest.mark.parametrize("draw", [dap.plot, dap.view])
+def test_what_is_no_name_of_a_quantity_is_refused(run, draw, names):
+    with pytest.raises(TypeError, match="the argument quantities should be names, not"):
+        draw(run, *names)
+
+
+def test_a_state_is_read_by_one_name(run):
+    state = dap.start("pen1").state
+    with pytest.raises(TypeError, match=r"a quantity is named by text such as 'crank.r.z', not by"):
+        state[["cone.r", "cone.w"]]
+
+
+@pytest.mark.parametrize("format", ["fmuu", "csvv", "urd"])
+def test_a_format_of_models_that_there_is_not_has_those_that_there_are(format):
+    near = {"fmuu": "; did you mean 'fmu'[?]", "urd": "; did you mean 'urdf'[?]"}.get(format, "")
+    known = rf"there is no format '{format}' of models{near} \(there are: c, fmu, mjcf, urdf\)"
+    with pytest.raises(dap.PluginError, match=known):
+        dap.export_model("pen1", "a", format=format)

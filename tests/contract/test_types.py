@@ -25,6 +25,7 @@ OWN = [(key, check) for key, check in CHECKS if INSTALLED[key] == "dap3d"]
 JOINTS = cases(REGISTRY, "joint")
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     "check", [c for _, c in OWN], ids=[f"{kind}-{word}-{c}" for (kind, word), c in OWN]
 )
@@ -40,7 +41,7 @@ def test_every_kind_of_check_is_there():
         "friction power", "friction frame", "friction balance", "energy", "derivatives", "purity",
         "plain", "compiled", "rate", "rate frame", "unilateral",
         "impulse and reaction", "restitution", "round", "jump rows", "jump frame",
-            "branches", "rest", "impulse energy", "velocity form",
+            "branches", "rest", "impulse energy", "velocity form", "unloaded",
     }  # fmt: skip
 
 
@@ -53,6 +54,7 @@ def test_standard_types_derive_nothing():
                 assert not any(t.derived for t in (type_info, *(v for _, v in type_info.variants)))
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("case", JOINTS, ids=case_names(JOINTS))
 @pytest.mark.parametrize("ground", [None, "j"], ids=["body-body", "body-ground"])
 def test_rows_of_a_scene(case, ground):

@@ -169,6 +169,7 @@ def takes_long(page):
     return commands or "LocalCluster(" in text or len(found) > 3
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     "page",
     [

@@ -319,6 +319,21 @@ def test_without_webgl_plots_and_tables_still_work(chromium, four_page):
     context.close()
 
 
+def test_a_page_plays_as_it_opens(chromium, four, tmp_path):
+    """Where that is wished, and the system of its reader does not ask for less motion."""
+    page = dap.view(four, play=True).save(tmp_path / "moving.html")
+    shown = Opened(chromium, page)
+    shown.page.wait_for_function("window.dap3d.time > 0.1", timeout=20_000)
+    assert shown.run("dap3d.playing")
+    shown.close()
+    assert shown.complaints == []
+    calm = chromium.new_context(reduced_motion="reduce").new_page()
+    calm.goto(page.resolve().as_uri())
+    calm.wait_for_selector("html[data-ready]", state="attached", timeout=30_000)
+    assert not calm.evaluate("dap3d.playing")
+    calm.context.close()
+
+
 # ---------------------------------------------------------------- curves
 
 DRAWN = """() => {
@@ -372,3 +387,32 @@ def test_a_coarse_curve_is_smooth_between_its_instants(chromium, tmp_path):
         slopes = 2.0 * drop * k, 2.0 * drop * (k + 1)  # pixels a quarter of a second
         assert first == pytest.approx(y[k] + slopes[0] / 3.0, abs=1e-3)
         assert second == pytest.approx(y[k + 1] - slopes[1] / 3.0, abs=1e-3)
+
+
+def test_a_curve_without_a_known_slope_keeps_its_shape(chromium, tmp_path):
+    """Slopes are those of the figures, by SciPy; an interval with a cut is straight."""
+    from scipy.interpolate import PchipInterpolator
+
+    page = Opened(chromium, dap.view(falling(5), "energy.total").save(tmp_path / "a.html"))
+    t = np.array([0.0, 0.1, 0.3, 0.35, 0.5, 0.7, 1.0, 1.1])
+    x = np.array([1.0, 3.0, 2.5, 2.5, 2.7, 4.0, -1.0, -1.2])
+    script = """([t, x, cuts]) => {
+      const { plots } = window.dap3d.app;
+      plots.motion = { t, cuts };
+      const { after, before } = plots.slopes({}, 0, x);
+      return [[...after], [...before]];
+    }"""
+    after, before = page.page.evaluate(script, [t.tolist(), x.tolist(), []])
+    expected = PchipInterpolator(t, x)(t, 1)
+    np.testing.assert_allclose(after[:-1], expected[:-1], rtol=1e-13, atol=1e-14)
+    np.testing.assert_allclose(before[1:], expected[1:], rtol=1e-13, atol=1e-14)
+    after, before = page.page.evaluate(script, [t.tolist(), x.tolist(), [0.4]])
+    parts = [PchipInterpolator(t[p], x[p])(t[p], 1) for p in (slice(0, 4), slice(4, 8))]
+    straight = (x[4] - x[3]) / (t[4] - t[3])
+    np.testing.assert_allclose(
+        after[:-1], [*parts[0][:-1], straight, *parts[1][:-1]], rtol=1e-13, atol=1e-14
+    )
+    np.testing.assert_allclose(
+        before[1:], [*parts[0][1:], straight, *parts[1][1:]], rtol=1e-13, atol=1e-14
+    )
+    page.close()

@@ -470,7 +470,7 @@ def test_without_the_extra_the_error_says_which(tmp_path):
     )
     found = json.loads(done.stdout)
     assert found["exit_code"] == 2
-    assert 'pip install "dap3d[matlab]"' in found["error"]
+    assert "pip install tree-sitter tree-sitter-matlab" in found["error"]
     assert "Traceback" not in done.stderr
     assert not (tmp_path / "scene.toml").exists()
 

@@ -30,7 +30,7 @@ from dap3d_core.kernels.compiler.types import (
     Table,
     Tuple,
 )
-from dap3d_core.kernels.compiler.units import Functions, address_of, type_of
+from dap3d_core.kernels.compiler.units import Entry, Functions, address_of, type_of
 from dap3d_core.kernels.runtime import cache
 from dap3d_core.kernels.runtime.array_struct import Arrays, pointer
 from dap3d_core.kernels.runtime.cache import Compiled
@@ -38,12 +38,16 @@ from dap3d_core.kernels.runtime.function_lists import LOOP
 from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.kernels.runtime.loop_modules import array_members
 from dap3d_core.kernels.runtime.source_digest import COMPILED_LAYERS
-from support.at_all_levels import all_made_of, function_of, same_bits
+from support.at_all_levels import all_made_of, function_of, same_bits, targets
 
 #: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.
 CALLS = {1, 2, 7, 40, 200}
 #: Numbers that wrappers take as an array of one: C calls take no complex ones, and no vectors.
 BY_ARRAY = (COMPLEX, FLOAT)
+#: Functions that make the tangent of radau: in runs with derivatives they compute values alone.
+OF_TANGENTS = {"find_tangent", "differentiate", "differentiate_element", "differentiate_friction",
+               "call_element", "bridge_bends", "differentiate_states", "differentiate_by_states",
+               "differentiate_rate"}  # fmt: skip
 #: The level of code with derivatives, beside those of ``targets``; numbers for each.
 DIFFERENTIATED, COUNT = "differentiated", 3
 
@@ -65,8 +69,8 @@ class Recorder:
         Compiled.__call__ = lambda function, *arguments: self.call(function, arguments)
         original = cache.table_of
 
-        def table_of(signature, functions):
-            table = PlainTable(original(signature, functions))
+        def table_of(signature, functions, **options):
+            table = PlainTable(original(signature, functions, **options))
             table.signature = signature
             return table
 
@@ -227,6 +231,8 @@ def differences(calls, levels=None):
                     signatures[items[item]] = program.export(
                         item, table.signature.arguments, items[item]
                     )
+                elif isinstance(item, Entry):  # a differentiated loop, compiled as it is
+                    items[id(item)] = item, dict.fromkeys((*targets(), DIFFERENTIATED), item)
                 elif not isinstance(item, Compiled) and id(item) not in items:
                     made = made_at(loop_text(item), {"loop": LOOP}, levels)
                     items[id(item)] = item, {level: e["loop"] for level, e in made.items()}
@@ -240,7 +246,9 @@ def differences(calls, levels=None):
 
         for function, before, after, result in calls:
             symbol, signature, variable = wrappers[function, tuple(map(kind, before))]
-            if level == DIFFERENTIATED and any(map(has_vectors, signature.arguments)):
+            if level == DIFFERENTIATED and (
+                any(map(has_vectors, signature.arguments)) or computes_values_alone(function)
+            ):
                 continue
             numbers = np.array(numbers_of(result), dtype=complex)
             given, out = copied(before, {}), np.zeros(numbers.size, dtype=complex)
@@ -263,6 +271,17 @@ def differences(calls, levels=None):
 def is_by_array(value, type_):
     """Whether a number is to be given as an array."""
     return isinstance(type_, Array) and not isinstance(value, np.ndarray)
+
+
+def computes_values_alone(function):
+    """Whether a function calls loops that are differentiated already, or may."""
+    of_steps = function.__module__.endswith("radau.step")
+    return function.__name__ in OF_TANGENTS or (of_steps and "tangents" in named(function))
+
+
+def named(function):
+    """Names of a function's arguments."""
+    return [parameter.name for parameter in function._parameters]
 
 
 def has_vectors(type_):

@@ -11,7 +11,7 @@ import dap3d_core as dap
 
 G = 9.81
 TOLERANCE = 1e-9
-INTEGRATORS = ("dop853", "adams", "dopri5")
+INTEGRATORS = ("dop853", "adams", "dopri5", "radau")
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}
 
 
@@ -189,6 +189,7 @@ def test_a_ball_bounces_obliquely_by_poissons_law():
     assert result.ledger["energy"].value < TOLERANCE
 
 
+@pytest.mark.slow  # its corners solve their friction in a hundred passes each
 def test_a_block_slips_where_its_load_passes_what_holds_and_is_then_slowed_by_less():
     """Load c t: it slips at mu_s m g / c, with acceleration (c t - mu m g) / m from then on."""
     mu, mu_s, c = 0.2, 0.3, 5.0
@@ -235,3 +236,22 @@ def test_at_usual_tolerances_instants_and_states_are_right_to_a_millionth():
     result = dap.simulate(ball(v=v, mu=mu), t_end=2.0, dt=0.1)
     assert times(result, "stick") == pytest.approx([2.0 / 7.0 * v / (mu * G)], abs=1e-6)
     assert result.rd[-1, 0, 0] == pytest.approx(5.0 / 7.0 * v, abs=1e-6)
+
+
+@pytest.mark.parametrize(("mu", "part", "dof"), [(0.5, 5.0 / 7.0, 3), (0.0, 1.0, 5)])
+def test_a_ball_in_a_bowl_swings_as_it_rolls_or_slides(mu, part, dof):
+    """Linearised in the mode of a run: w^2 = 5/7 g / (R - r) of a ball that rolls."""
+    big, small = 1.0, 0.1
+    scene = dap.Scene(name="bowl")
+    Jp = [0.4 * 2.0 * small**2] * 3
+    scene.add_body("ball", mass=2.0, Jp=Jp, r=[0.0, 0.0, small - big])
+    scene.add_force("weight", "g")
+    ends = {"P_i": "ball.O", "P_j": "ground.O", "radius_i": small, "radius_j": big}
+    scene.add_contact("ball_ball", "bowl", **ends, inside=True, mu=mu)
+    result = dap.simulate(scene, t_end=0.1, dt=0.05)
+    found = dap.linearize(scene, at=result, t=0.1, outputs=["ball.r.x"])
+    w = np.sqrt(part * G / (big - small))
+    rates = np.sort(np.abs(found.eigenvalues.imag))
+    assert rates == pytest.approx([0.0] * (len(rates) - 4) + [w] * 4, abs=TOLERANCE)
+    assert (found.dof, found.element_states, found.is_steady) == (dof, (), True)
+    assert found.stable

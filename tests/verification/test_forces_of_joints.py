@@ -122,3 +122,55 @@ def test_a_ball_spring_swings_about_any_axis(c):
     np.testing.assert_allclose(result.w[:, 0], np.outer(rate, axis), rtol=0, atol=1e-8)
     energy = 0.5 * J * rate**2 + 0.5 * k * expected**2
     np.testing.assert_allclose(result.energy.total, energy, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("turns", [False, True])
+def test_a_torsional_spring_in_a_hinge_by_name(turns):
+    """About theta_0, which is the opposite of the hinge's angle, from a pose turned by 40 deg."""
+    inertia, k, theta_0 = 0.3, 7.0, -5.0 if turns else -0.5
+    scene = hinge(inertia, 0.0)
+    scene.bodies["wheel"].rpy = (0.0, 0.0, "40 deg")
+    scene.add_force("rot_sda", "spring", joint="axle", k=k, theta_0=theta_0, turns=turns)
+    result = dap.simulate(scene, t_end=1.0, dt=0.1, **TIGHT)
+    expected = -theta_0 * (1.0 - np.cos(np.sqrt(k / inertia) * result.t))
+    np.testing.assert_allclose(result.quantity("axle.angle").values, expected, rtol=0, atol=1e-8)
+    assert result.ledger["energy"].ok
+
+
+def test_a_hinge_is_stopped_and_rubs_by_name():
+    """Free to theta = -1, where it rebounds by e: half the speed on the way back."""
+    scene = hinge(0.3, 2.0)
+    scene.add_force("rot_stop", "stop", joint="axle", theta_stop=-1.0, k=1e4, e=0.5)
+    result = dap.simulate(scene, t_end=1.0, dt=0.25, **TIGHT)
+    np.testing.assert_allclose(result.quantity("axle.angle").values, [0.0, 0.5, 1.0, 0.75, 0.5],
+                               rtol=0, atol=1e-9)  # fmt: skip
+    del scene.forces["stop"]
+    scene.add_force("rot_friction", "rub", joint="axle", n_c=0.3)
+    result = dap.simulate(scene, t_end=1.0, dt=0.25, **TIGHT)
+    np.testing.assert_allclose(result.w[:, 0, 2], 2.0 - result.t, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("fields", [{"joint": "axle", "v_i": "wheel.x"}, {"v_i": "wheel.x", "v_j":
+                                                                         "ground.x"}])  # fmt: skip
+def test_half_of_what_an_angle_is_measured_by_is_refused(fields):
+    scene = hinge(0.3, 2.0)
+    scene.add_force("rot_sda", "spring", k=1.0, **fields)
+    with pytest.raises(dap.SceneError, match=r"give joint, or v_i and v_j|axis: is required"):
+        dap.compile(scene)
+
+
+@pytest.mark.parametrize("theta_0", [0.0, "90 deg"])
+def test_a_force_over_the_angle_of_a_hinge(theta_0):
+    """Of a wheel that turns evenly, over several turns: m x.. = k (w t + theta_0)."""
+    scene, k, spin, m = hinge(0.3, 20.0), 0.7, 20.0, 3.0
+    scene.add_body("block", mass=m, Jp=(0.1, 0.1, 0.1), r=(1.0, 0.0, 0.0))
+    scene.add_joint("tran", "slide", P_i="block.O", P_j="ground.O", a_j="ground.x")
+    scene.add_function("a", "gas", coeff=(0.0, k, 0.0))
+    scene.add_force("angle_force", "push", joint="slide", hinge="axle", function="gas",
+                    theta_0=theta_0)  # fmt: skip
+    result = dap.simulate(scene, t_end=1.0, dt=0.1, **TIGHT)
+    t, first = result.t, 0.0 if theta_0 == 0.0 else np.pi / 2.0
+    expected = 1.0 + k / m * (spin * t**3 / 6.0 + first * t**2 / 2.0)
+    np.testing.assert_allclose(result.r[:, 1, 0], expected, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(result.w[:, 0, 2], spin, rtol=0, atol=1e-10)
+    assert result.ledger["energy"].ok

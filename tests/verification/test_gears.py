@@ -124,6 +124,39 @@ def test_bevel_gears_turn_by_the_ratio_and_bear_the_tooth_force():
     assert moment == pytest.approx(np.cross([0.1, 0.0, 0.0], force), abs=1e-9)
 
 
+@pytest.mark.parametrize("method", ["standard", "lsq", "joint"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_pressure_angle_presses_rigid_wheels_apart(method, sign):
+    """30 N at 20 deg, whichever flank is in touch; helical teeth have tan(20 deg) / cos(0.4)."""
+    for helix in (0.0, 0.4):
+        scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
+        pair(scene, "a", "b", teeth_i=20, teeth_j=40, helix=helix)
+        scene.add_force("gear_separation", "flanks", mesh="mesh", joint_i="hinge_a",
+                        joint_j="hinge_b", pressure_angle="20 deg", helix=helix)  # fmt: skip
+        torque(scene, "a", 3.0 * sign)
+        torque(scene, "b", 6.0 * sign)
+        result = dap.simulate(scene, t_end=0.1, dt=0.1, method=method)
+        apart = 30.0 * math.tan(math.radians(20.0)) / math.cos(helix)
+        for wheel, side in (("a", 1.0), ("b", -1.0)):  # what the hinges do to the wheels
+            x, y, _ = load(result, f"hinge_{wheel}")
+            assert (x, y) == pytest.approx((side * apart, side * sign * 30.0), abs=1e-9)
+        moment = result.force("flanks").on["j"].moment[-1]
+        assert moment == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+
+
+def test_a_pressure_angle_presses_a_wheel_in_a_ring_inwards():
+    """A wheel of 0.1 m in a ring of 0.3 m, held by a torque of 2 N m: 20 N tan(25 deg)."""
+    scene = wheels(a=(0.2, 0.0), ring=(0.0, 0.0))
+    pair(scene, "a", "ring", teeth_i=20, teeth_j=60, internal=True)
+    scene.add_force("gear_separation", "flanks", mesh="mesh", joint_i="hinge_a",
+                    joint_j="hinge_ring", pressure_angle="25 deg", internal=True)  # fmt: skip
+    torque(scene, "a", 2.0)
+    torque(scene, "ring", -6.0)
+    result = dap.simulate(scene, t_end=0.1, dt=0.1)
+    x, y, _ = load(result, "hinge_a")  # the ring presses the wheel to -x, and its hinge back
+    assert (x, abs(y)) == pytest.approx((20.0 * math.tan(math.radians(25.0)), 20.0), abs=1e-9)
+
+
 def test_helical_teeth_push_along_the_axis():
     """By tan(helix) of the tangential force, on both wheels."""
     scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))

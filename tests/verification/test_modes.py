@@ -363,3 +363,19 @@ def test_governor():
     assert lin.is_steady
     assert lin.stable
     np.testing.assert_allclose(magnitudes(lin, 2), np.sqrt(abs(square)), rtol=RTOL)
+
+
+def test_the_campbell_diagram_of_the_rotor_model():
+    """Tilting J_t z.. + (c_r - i W J_p) z. + k_r z = 0, and translation, at each speed W.
+
+    Without its unbalance, with which the state is no steady motion and numbers change by 8e-6.
+    """
+    scene = dap.load("rotor")
+    scene.parameters["e"] = scene.parameters["acceleration"] = 0.0
+    found = dap.modes_over(scene, "parameters.speed", [0.0, 150.0, 400.0])
+    half, k, c, m = 0.3, 4e5, 100.0, 20.0
+    J_t, J_p, k_r, c_r = 0.5, 0.2, 2 * k * half**2, 2 * c * half**2
+    for speed, frequencies in zip(found.values, found.frequencies, strict=True):
+        tilting = np.abs(np.roots([J_t, c_r - 1j * speed * J_p, k_r]))
+        expected = np.sort([*[np.sqrt(2 * k / m)] * 3, *tilting]) / (2 * np.pi)
+        np.testing.assert_allclose(np.sort(frequencies), expected, rtol=RTOL)

@@ -55,6 +55,49 @@ def test_a_given_moment_or_force(way, kind, field, name, inertia):
     np.testing.assert_allclose(rate, impulse(result.t) / inertia, atol=1e-7)
 
 
+PLACES = {"number": (13.0, 0.0), "function": ("ramp", 2.0), "input": ("signal", 0.0)}
+
+
+@pytest.mark.parametrize("way", PLACES)
+@pytest.mark.parametrize(("kind", "name", "inertia"), [("rev", "angle", J), ("tran", "length", M)])
+def test_a_position_is_sought(way, kind, name, inertia):
+    """The error e obeys I e.. + c e. + k e = 0, here critically damped, also over two turns."""
+    value, rate = PLACES[way]
+    scene = machine(kind)
+    k, c = 25.0 * inertia, 10.0 * inertia  # (s + 5)^2
+    scene.add_force("motor", "motor", joint="guide", position=value, k=k, c=c)
+    result = dap.simulate(scene, t_end=2.0, dt=0.25, rtol=1e-9, atol=1e-11)
+    place = {"number": 13.0, "function": 0.0, "input": 1.5}[way]
+    t = result.t
+    error = (place + (rate + 5.0 * place) * t) * np.exp(-5.0 * t)  # at rest at the start
+    np.testing.assert_allclose(coordinate(result, name)[0], place + rate * t - error, atol=1e-7)
+
+
+def test_a_position_is_sought_within_a_limit():
+    """Far from it the motor gives its limit: q = limit t^2 / (2 I) while k (position - q) is more;
+    then about it, sqrt(k / I), from where it is."""
+    scene, k, limit = machine(), 2.0, 1.0
+    scene.add_force("motor", "motor", joint="guide", position=1.5, k=k, limit=limit)
+    result = dap.simulate(scene, t_end=0.9, dt=0.1, rtol=1e-9, atol=1e-11)
+    leaves = np.sqrt(2.0 * J * 1.0 / limit)  # q = 1 there: 0.5 rad are left, k times 0.5 = limit
+    rate, omega = limit / J * leaves, np.sqrt(k / J)
+    s = result.t - leaves
+    after = 1.5 - 0.5 * np.cos(omega * s) + rate / omega * np.sin(omega * s)
+    expected = np.where(s < 0.0, limit / J * result.t**2 / 2.0, after)
+    np.testing.assert_allclose(coordinate(result)[0], expected, atol=1e-6)  # a corner in a step
+
+
+def test_the_position_of_a_motor_is_an_input_of_a_linear_model():
+    """k / I at the input, at rest."""
+    scene = machine()
+    scene.inputs["signal"].value = 0.0
+    scene.add_force("motor", "motor", joint="guide", position="signal", k=3.0, c=0.1)
+    lin = dap.linearize(scene, inputs=["signal"], outputs=["guide.angle"])
+    s = 2j * np.pi * 0.5
+    found = lin.frequency_response(0.5)[0, 0, 0]
+    assert found == pytest.approx(3.0 / (J * s**2 + 0.1 * s + 3.0), rel=1e-9)
+
+
 @pytest.mark.parametrize(("kind", "field", "name"), [("rev", "torque", "angle"),
                                                      ("tran", "force", "length")])  # fmt: skip
 def test_a_motor_saturates(kind, field, name):
@@ -211,10 +254,15 @@ def test_kinematics_over_the_coordinate_of_a_motor():
         ("joint", {"speed": True}, "should be a number, not a truth value"),
         ("joint", {"speed": 1.0, "limit": 2.0}, r"the force motor has it: \[forces.NAME\]"),
         ("joint", {"speed": 1.0, "a_j": "ground.x"}, "give joint or a_j, not both"),
-        ("force", {}, "give torque, force or speed; a position is held by a joint motor"),
+        ("force", {}, "give torque, force, speed or position"),
+        (
+            "force",
+            {"position": 1.0},
+            "a position needs k here; one that is held exactly is a joint",
+        ),
         ("force", {"speed": 1.0}, "a speed needs a limit here; without one it is a joint motor"),
         ("force", {"torque": 1.0, "force": 1.0}, "give torque or force, not both"),
-        ("force", {"position": 1.0}, r"the joint motor has it: \[joints.NAME\]"),
+        ("force", {"position": 1.0, "speed": 1.0}, "give speed or position, not both"),
         ("force", {"force": 1.0}, "the coordinate is an angle, which a torque changes"),
         ("force", {"torque": 1.0, "limit": -1.0}, "limit = -1.0: should be greater than 0"),
     ],

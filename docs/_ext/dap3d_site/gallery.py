@@ -15,7 +15,7 @@ import click
 from dap3d_core.cli.app import dap3d
 from dap3d_core.cli.commands.plot import ENERGIES
 from dap3d_core.scene import load
-from dap3d_core.scene.scene import PLUGIN_FILE
+from dap3d_core.scene.tables import PLUGIN_FILE
 from dap3d_site.markdown import doc_of
 
 #: Folders of the source folder of Sphinx: scripts and what they include; pages made from them.

@@ -1,15 +1,10 @@
 """Reference of the settings of a run, the formulations and the integrators."""
 
-import inspect
 from collections.abc import Iterator
 from importlib import import_module
 from typing import Any
 
-import attrs
-
-from dap3d_core.cli.framework.options import SETTINGS
-from dap3d_core.scene import INTEGRATORS, METHODS, Simulation
-from dap3d_core.scene.validate.settings import CORRECT_METRICS
+from dap3d_core.settings import INTEGRATORS, METHODS, SETTINGS
 from dap3d_site.markdown import code, doc_of, page, table
 
 #: What no module of its own says.
@@ -54,7 +49,6 @@ def _parts() -> Iterator[str]:
         "`dap.simulate` take their place."
     )
     yield table(("setting", "default", "option", "is"), _settings())
-    yield f"`correct_metric` is one of {', '.join(code(word) for word in CORRECT_METRICS)}."
     yield "## Formulations"
     yield "Values of `method`."
     for name in METHODS:
@@ -70,10 +64,9 @@ def _parts() -> Iterator[str]:
 
 
 def _settings() -> Iterator[tuple[str, ...]]:
-    docs = attributes(Simulation)
-    for field in attrs.fields(Simulation):
-        option = code(SETTINGS.get(field.name, ""))
-        yield code(field.name), code(_written(field.default)), option, docs[field.name]
+    for name, setting in SETTINGS.items():
+        option = code(setting.option) if setting.on_command_line else ""
+        yield code(name), code(_written(setting.default)), option, setting.text
 
 
 def _written(default: Any) -> str:
@@ -83,21 +76,6 @@ def _written(default: Any) -> str:
     if isinstance(default, float):
         return f"{default:g}"
     return "[]" if default == () else str(default).lower()
-
-
-def attributes(class_: type) -> dict[str, str]:
-    """What the section Attributes of a docstring says of each name; names may share a line."""
-    section = doc_of(class_).partition("Attributes:\n")[2].partition("\n\n")[0]
-    found: dict[str, str] = {}
-    names: list[str] = []
-    for line in inspect.cleandoc(section).splitlines():
-        if line.startswith(" "):
-            found |= {name: f"{found[name]} {line.strip()}" for name in names}
-        else:
-            head, _, text = line.partition(": ")
-            names = head.split(", ")
-            found |= dict.fromkeys(names, text)
-    return found
 
 
 def _module(name: str) -> str:

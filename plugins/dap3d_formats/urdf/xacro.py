@@ -18,7 +18,7 @@ def expanded(source: Source, root: XmlElement) -> XmlElement:
     try:
         from xacrodoc import XacroDoc, packages
     except ImportError:
-        what = "xacro files are read with xacrodoc: pip install 'dap3d[xacro]'"
+        what = "xacro files are read with xacrodoc: pip install xacrodoc"
         raise FormatError(what, root.place) from None
     try:
         packages.update_package_cache({k: str(v) for k, v in source.packages.items()})

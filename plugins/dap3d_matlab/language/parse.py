@@ -30,7 +30,6 @@ BLOCKS = 500
 #: Maximal number of reported syntax errors of a file: the first ones explain the others.
 SYNTAX_ERRORS = 5
 
-EXTRA = "matlab"
 #: Characters of text processors and PDF files in place of those of MATLAB.
 _TYPOGRAPHIC = frozenset("‘’“”–−")
 
@@ -110,7 +109,7 @@ class Grammar:
     """
 
     def __init__(self) -> None:
-        remedy = f'install them with the extra "{EXTRA}": pip install "dap3d[{EXTRA}]"'
+        remedy = "pip install tree-sitter tree-sitter-matlab"
         needed = "reading MATLAB files needs the packages tree-sitter and tree-sitter-matlab"
         try:
             import tree_sitter

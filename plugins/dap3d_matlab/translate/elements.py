@@ -6,7 +6,7 @@ import attrs
 
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Scene
-from dap3d_core.scene.scene import Element
+from dap3d_core.scene.tables import Element
 from dap3d_matlab.files.report import remark
 from dap3d_matlab.language.structures import DISKS
 from dap3d_matlab.language.values import GivenValue, Struct

@@ -61,6 +61,7 @@ class System(LoopArrays):
                 "updates",
                 "hubs",
                 "turns",
+                "contacts",
             ),
             INTEGER_MATRIX,
         ),
@@ -85,7 +86,7 @@ class System(LoopArrays):
     smallest: Floats  # (rows,) a pivot not above this is singular
     settings: Floats  # (SETTINGS,) see above
     friction: Floats  # where forces depend on multipliers (common/friction.py: memory_size)
-    watched: Floats  # of contacts: t, power, y where switches were read (switching_functions.py)
+    watched: Floats  # of contacts: t, power, y where switches were read (contacts/equations.py)
     groups: Integers  # (loops, 3) i0, p0, count
     kinds: Integers  # (KINDS + 1,) first loop of each kind
     row: Integers  # (model rows,) place of each constraint row in the row vectors
@@ -97,6 +98,7 @@ class System(LoopArrays):
     updates: Integers
     hubs: Integers
     turns: Integers  # (angles of joints, COLUMNS) as in assembly/turns.py
+    contacts: Integers  # (contacts, COLUMNS) as in formulations/contacts/equations.py
     tree: Any = None  # TreeArrays, where the state is that of a tree in joint coordinates
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import attrs
 
 from dap3d_core.formats.export_scene.articulation import articulation_of
+from dap3d_core.formats.export_scene.plain_scene import plain_scene
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import (
     Articulation,
@@ -69,10 +70,10 @@ def export_model(
     if isinstance(exporter, ResultExporter):
         raise PluginError(f"{format} is a format of results, which dap.export writes")
     given = scene if isinstance(scene, Scene) else load(scene)
-    check(given, load_registry() if registry is None else registry)
+    valid = check(given, load_registry() if registry is None else registry)
     remarks = Remarks()
     try:
-        model = articulation_of(given.resolved(), remarks)
+        model = articulation_of(plain_scene(valid), remarks)
         if path is not None and given.path is not None:
             model = _beside(model, Path(given.path).parent, Path(path).parent)
         text = exporter.write(model, remarks)

@@ -57,16 +57,16 @@ class Formulation:
 
         equations: the module that has them, where it is not the one of the formulation's name.
         """
-        module: Any = import_module(f"dap3d_core.formulations.{equations or self.name}")
+        name = "contacts.equations" if contacts else equations or self.name
+        module: Any = import_module(f"dap3d_core.formulations.{name}")
+        of_switches = module
         functions = [module.rhs, module.project, module.report]
         if turns or switches:
             if not self.has_own_coordinates:
                 module = import_module("dap3d_core.formulations.common.switching_functions")
             functions.append(module.accepted)
             if switches:
-                functions.append(module.watch_contacts if contacts else module.watch)
-            if contacts:
-                functions[0] = module.contact_rates
+                functions.append(of_switches.watch if contacts else module.watch)
         return step_functions(*functions)
 
     def coordinates(self, evaluator: Any) -> Any:

@@ -104,9 +104,8 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
                 CONTACTS if model.contacts else float(any(group.read for group in model.forces)),
             ]
         ),
-        friction=np.zeros(
-            memory_size(n + 1, plan.row_size, plan.matrix_size) if model.iterated_forces else 0
-        ),
+        friction=np.zeros(_friction_size(model, plan)),
+        contacts=_contacts_of(model, plan, what, groups),
         watched=np.full(2 + model.integrated_layout["work"].stop if model.contacts else 0, np.nan),
         idx=idx,
         groups=groups,
@@ -121,6 +120,45 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         hubs=plan.hubs,
         turns=turns,
     )
+
+
+def _friction_size(model: Model, plan: Plan) -> int:
+    """Size of ``System.friction``."""
+    if not model.iterated_forces:
+        return 0
+    size = memory_size(model.body_count + 1, plan.row_size, plan.matrix_size)
+    if model.contacts:
+        from dap3d_core.formulations.contacts import equations
+
+        count = model.contact_count
+        size += equations.memory_size(model.body_count + 1, plan.row_size, count)
+    return size
+
+
+def _contacts_of(
+    model: Model, plan: Plan, what: list[tuple[str, Group]], groups: Integers
+) -> Integers:
+    """``System.contacts``."""
+    if not model.contacts:
+        return np.zeros((0, 0), dtype=np.int64)
+    from dap3d_core.formulations.contacts import equations
+
+    first = len(model.joint_names) - model.contact_count
+    table = np.zeros((model.contact_count, equations.COLUMNS), dtype=np.int64)
+    for q, (kind, group) in enumerate(what):
+        if kind != "friction" or not group.type_info.type.is_contact:
+            continue
+        integers, k = _integers_of(group, plan, model), np.arange(group.count)
+        slots, layout = len(group.type_info.layout.slots), group.type_info.layout
+        rows = table[group.members - first]
+        rows[:, equations.LOOP] = q
+        rows[:, equations.INTEGERS] = groups[q, 0] + k * integers.shape[1]
+        rows[:, equations.NUMBERS] = groups[q, 1] + k * layout.par_width
+        rows[:, equations.ROW] = integers[:, layout.integers]
+        rows[:, equations.BODY_I : equations.BODY_I + slots] = integers[:, :slots]
+        rows[:, equations.STATE] = integers[:, layout.integers - 1]
+        table[group.members - first] = rows
+    return table
 
 
 def turn_tables(model: Model, first: int) -> tuple[Integers, Floats]:

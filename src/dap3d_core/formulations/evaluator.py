@@ -84,7 +84,9 @@ class Evaluator:
         self.formulation = FORMULATIONS[method]
         if like is None:
             rows = model.joint_rows.tolist()
-            self.plan: Plan = make_plan(model.body_count, model.joint_slots, rows)
+            self.plan: Plan = make_plan(
+                model.body_count, model.joint_slots, rows, model.contact_count
+            )
             self.loops, self.loop_groups = build_loops(model, self.formulation.loops, announce)
         else:
             self.plan, self.loops = like.plan, like.loops

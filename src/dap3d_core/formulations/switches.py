@@ -15,7 +15,7 @@ from dap3d_core.model.knots import narrowest
 JUMPING = frozenset(("impulse", "reset"))
 #: Bodies that touch are apart, or not, by the rounding of their positions: this part of the length
 #: of the scene is some of them.
-ROUNDING = 32.0 * float(np.finfo(float).eps)
+POSITION_ROUNDING = 32.0 * float(np.finfo(float).eps)
 #: Slip, m/s of a scene of that size, and the rest of a cone, N, that are rounding of contacts that
 #: begin to slip, or to stick.
 STILL = 1e-11
@@ -86,7 +86,7 @@ class Switch:
             if self.is_contact and self.part == 1:
                 return STILL * self.length
             touches = self.is_contact or (self.jumps and type_.unilateral and not self.words)
-            return ROUNDING * self.length if touches else 0.0
+            return POSITION_ROUNDING * self.length if touches else 0.0
         row, numbers = self.group.numbers[self.place], self.group.type_info.layout.numbers
         own = [place for name, place in numbers.items() if is_knots(name)]
         knots = [row[at : at + count] for at, (count,) in own]

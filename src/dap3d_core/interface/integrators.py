@@ -9,7 +9,7 @@ from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.hooks import PROJECT
 
 #: Largest error of a row sum or an order condition, of coefficients written as fractions.
-ROUNDING = 1e-12
+COEFFICIENT_ROUNDING = 1e-12
 
 hookspec = pluggy.HookspecMarker(PROJECT)
 
@@ -56,9 +56,9 @@ class RungeKuttaMethod:
         if type(self.order) is not int or not 1 <= self.order <= s:
             raise PluginError(f"{who}: order is a whole number from 1 to {s}, not {self.order!r}")
         for order, words, value in self._conditions(self.b, self.c):
-            if order <= self.order and not abs(value) < ROUNDING:
+            if order <= self.order and not abs(value) < COEFFICIENT_ROUNDING:
                 raise PluginError(f"{who} is not of order {order}: {words} is off by {value:.3g}")
-        if self.b_hat and not abs(sum(self.b_hat) - 1.0) < ROUNDING:
+        if self.b_hat and not abs(sum(self.b_hat) - 1.0) < COEFFICIENT_ROUNDING:
             raise PluginError(f"{who}: the sum of b_hat is {sum(self.b_hat):.16g}, not 1")
 
     def _conditions(

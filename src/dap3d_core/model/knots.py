@@ -12,7 +12,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene import Instance
 
 #: Knots of a function without any, next to functions that have some.
-FAR = 1e100
+BEYOND_ALL_KNOTS = 1e100
 
 
 def breaks_of(function: Instance) -> Floats:
@@ -46,11 +46,11 @@ def breaks_are_told(function: Instance) -> bool:
 def knots_of(functions: Sequence[Instance]) -> Floats:
     """(functions, k) their breaks, in order; the last one again where another function has more.
 
-    Of a function without any, among others that have some, they are FAR away.
+    Of a function without any, among others that have some, they are BEYOND_ALL_KNOTS away.
     """
     found = [np.unique(breaks_of(function)) for function in functions]
     count = max(map(len, found))
-    knots = np.full((len(found), count), FAR)
+    knots = np.full((len(found), count), BEYOND_ALL_KNOTS)
     for row, own in zip(knots, found, strict=True):
         if len(own):
             row[:] = own[-1]
@@ -60,7 +60,7 @@ def knots_of(functions: Sequence[Instance]) -> Floats:
 
 def narrowest(knots: Floats) -> float:
     """The least distance of two knots that differ; of a single one its own size."""
-    own = np.unique(knots[knots < FAR])
+    own = np.unique(knots[knots < BEYOND_ALL_KNOTS])
     if len(own) > 1:
         return float(np.min(np.diff(own)))
     return float(np.max(np.abs(own), initial=0.0))

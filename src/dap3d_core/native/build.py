@@ -15,12 +15,13 @@ from dap3d_core.kernels.compiler.objects import OPTIMISED, Processor
 from dap3d_core.kernels.compiler.units import Unit
 from dap3d_core.kernels.runtime.cache import cache_folder
 from dap3d_core.native.c_source import symbols_of
-from dap3d_core.native.prepared import refusal
+from dap3d_core.native.run.directions import PairUnit
+from dap3d_core.native.run.prepared import refusal
 
 #: Compiler options; nothing is contracted, for the bits of plain arithmetic.
 OPTIONS = ("-std=c11", "-O2", "-ffp-contract=off", "-fvisibility=hidden")
-#: The extra with the compiler for every platform.
-EXTRA = "pip install 'dap3d[native]'"
+#: The compiler for every platform.
+COMPILER = "pip install ziglang"
 
 
 @attrs.frozen
@@ -110,11 +111,11 @@ def _compiler(target: Platform) -> list[str]:
         return [sys.executable, "-m", "ziglang", "cc", "-target", target.zig]
     own = next((c for c in ("cc", "gcc", "clang") if shutil.which(c)), None)
     if own is None:
-        raise refusal("there is no C compiler", f"{EXTRA} brings one")
+        raise refusal("there is no C compiler", f"{COMPILER} brings one")
     if not target.is_own:
         raise refusal(
             f"the compiler of this machine makes no libraries for {target.name}",
-            f"{EXTRA} brings one that does",
+            f"{COMPILER} brings one that does",
         )
     return [own]
 
@@ -126,7 +127,7 @@ def _run(command: list[str]) -> None:
         raise refusal(f"the compiler failed: {' | '.join(words[-6:])} [{' '.join(command[:6])}]")
 
 
-def object_of(unit: Unit, target: Platform) -> bytes:
+def object_of(unit: Unit | PairUnit, target: Platform) -> bytes:
     """Object code of a unit for the linker of a platform, from the cache folder if it is there."""
     folder = cache_folder()
     path = None if folder is None else folder / f"{unit.name}.{target.name}.o"
@@ -151,11 +152,14 @@ def compiled(text: str, symbols: Sequence[str], target: Platform) -> bytes:
 
 
 def build_objects(
-    units: Sequence[Unit], outputs: tuple[str, str], target: Platform, folder: Path
+    units: Sequence[Unit | PairUnit],
+    texts: Sequence[tuple[str, str]],
+    target: Platform,
+    folder: Path,
 ) -> list[Path]:
-    """Object files of units and of the function (LLVM IR, symbol) of outputs, in a folder."""
+    """Object files of units and of further functions (LLVM IR, symbol), in a folder."""
     codes = [object_of(unit, target) for unit in units]
-    codes.append(compiled(outputs[0], [outputs[1]], target))
+    codes += [compiled(text, [symbol], target) for text, symbol in texts]
     files = []
     for k, code in enumerate(codes):
         files.append(folder / f"unit{k}.o")

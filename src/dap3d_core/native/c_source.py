@@ -2,21 +2,28 @@
 
 import hashlib
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from typing import Any
 
 import attrs
 import numpy as np
 
+from dap3d_core.assembly.metric import METRIC_WIDTH
+from dap3d_core.formulations.jumps.jump_arrays import CROSSING, SIDE, JumpArrays
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, V, W
-from dap3d_core.native.outputs import Output
-from dap3d_core.native.prepared import Advance, PreparedRun
+from dap3d_core.native.run.directions import Directions, PairEntry, PairUnit
+from dap3d_core.native.run.elements import Elements
+from dap3d_core.native.run.outputs import Output
+from dap3d_core.native.run.prepared import Advance, PreparedRun
+from dap3d_core.study.batch import initial_state
 
-KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator")
+KINDS = ("time", "input", "parameter", "output", "state", "derivative", "indicator", "fixed")
+#: Of these those that are parameters: set at any time, and before a run begins.
+PARAMETERS = ("parameter", "fixed")
 
 
 @attrs.frozen
@@ -26,7 +33,7 @@ class Variable:
     Attributes:
         name, unit, label: as in results.
         kind: one of KINDS.
-        first: word of an input, index of others.
+        first: word of an input; of a parameter 1 where the start depends on it; index of others.
         start: its value at the start.
         words: of a parameter: words of the memory that it is, each with its sign.
     """
@@ -78,25 +85,65 @@ def _state_units(prepared: PreparedRun) -> list[str]:
     return [units.get(q, "1") for q in prepared.evaluator.coordinates.quantities]
 
 
-def symbols_of(unit: Unit) -> list[str]:
+def symbols_of(unit: Unit | PairUnit) -> list[str]:
     """C names of the functions of a unit in an exported model."""
     digest = hashlib.sha256(unit.name.encode()).hexdigest()[:16]
     return [f"dap3d_{digest}_{k}" for k in range(len(unit.symbols))]
 
 
-def symbol_of(entry: Entry) -> str:
+def symbol_of(entry: Entry | PairEntry) -> str:
     """The C name of a function."""
     return symbols_of(entry.unit)[entry.k]
 
 
-def units_of(prepared: PreparedRun) -> list[Unit]:
+def units_of(prepared: PreparedRun, directions: Directions | None) -> list[Unit | PairUnit]:
     """The units of compiled code that a run calls, each once."""
-    entries = [*prepared.image.functions.values(), *(one.entry for one in prepared.advances)]
+    entries: list[Entry | PairEntry] = list(prepared.image.functions.values())
+    entries += [one.entry for one in prepared.advances]
+    entries += [prepared.jumps.entry] if prepared.jumps else []
+    entries += directions.entries if directions else []
     return list({entry.unit.name: entry.unit for entry in entries}.values())
 
 
-def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
+def data_of(
+    prepared: PreparedRun,
+    variables: Sequence[Variable],
+    elements: Elements,
+    directions: Directions | None,
+) -> str:
     """The text of data.h: what runtime.c takes from one model."""
+    lines = _numbers(prepared, variables)
+    lines += _enumeration("R", IntegrationState.indices("real"))
+    lines += _enumeration("I", IntegrationState.indices("integer"))
+    lines += _enumeration("J", JumpArrays.indices("real"))
+    lines += _enumeration("JI", JumpArrays.indices("integer"))
+    lines += _memory(prepared)
+    lines += _jumps(prepared)
+    lines += _start(prepared, variables)
+    lines += _elements(prepared, elements)
+    lines += _directions(prepared, elements, directions)
+    places = [place for v in variables for place in v.words]
+    lines += _table(
+        "static const struct { int64_t word; double sign; } places[]",
+        (f"{{{word}, {sign:g}}}" for word, sign in places or [(0, 1.0)]),
+    )
+    lines += _table(
+        "static const struct { double t; int jumps; double needs; } stops[]",
+        (f"{{{s.t.hex()}, {int(s.jumps)}, {s.needs.hex()}}}" for s in prepared.stops)
+        if prepared.stops else ["{0.0, 0, 0.0}"],
+    )  # fmt: skip
+    lines += _table(
+        "static const struct { const char *name, *unit; int kind, first, count; } variables[]",
+        _rows_of(variables),
+    )
+    lines.append(f"void dap3d_outputs({', '.join(['const double *'] * 4)}, double *);")
+    text = "\n".join(lines)
+    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
+    return f"#define IDENTITY 0x{digest}ULL\n{text}\n"
+
+
+def _numbers(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
+    """Sizes and places."""
     image, system = prepared.image, prepared.evaluator.system
     work = prepared.run.present.work
     outputs = sum(v.kind == "output" for v in variables)
@@ -126,36 +173,17 @@ def data_of(prepared: PreparedRun, variables: Sequence[Variable]) -> str:
         "BODY_MASS": MASS,
         "BODY_JP": JP,
     }
-    lines = [f"#define {name} {value}" for name, value in numbers.items()]
-    lines += _enumeration("R", IntegrationState.indices("real"))
-    lines += _enumeration("I", IntegrationState.indices("integer"))
-    lines += _memory(prepared)
-    places = [place for v in variables for place in v.words]
-    lines += _table(
-        "static const struct { int64_t word; double sign; } places[]",
-        (f"{{{word}, {sign:g}}}" for word, sign in places or [(0, 1.0)]),
-    )
-    lines += _table(
-        "static const struct { double t; int jumps; double needs; } stops[]",
-        (f"{{{s.t.hex()}, {int(s.jumps)}, {s.needs.hex()}}}" for s in prepared.stops)
-        if prepared.stops else ["{0.0, 0, 0.0}"],
-    )  # fmt: skip
-    lines += _table(
-        "static const struct { const char *name, *unit; int kind, first, count; } variables[]",
-        _rows_of(variables),
-    )
-    lines += [
-        "void dap3d_outputs(double, const double *, const double *, const double *, double *);"
-    ]
-    text = "\n".join(lines)
-    digest = hashlib.sha256(text.encode()).hexdigest()[:16]
-    return f"#define IDENTITY 0x{digest}ULL\n{text}\n"
+    return _defined(numbers)
+
+
+def _defined(numbers: Mapping[str, Any]) -> list[str]:
+    return [f"#define {name} {value}" for name, value in numbers.items()]
 
 
 def _rows_of(variables: Sequence[Variable]) -> list[str]:
     rows, first = [], 0
     for v in variables:
-        place = first if v.kind == "parameter" else v.first
+        place = first if v.kind in PARAMETERS else v.first
         first += len(v.words)
         name, unit = c_text(v.name), c_text(v.unit)
         rows.append(f"{{{name}, {unit}, DAP3D_{v.kind.upper()}, {place}, {len(v.words)}}}")
@@ -216,6 +244,125 @@ def _loop(prepared: PreparedRun, k: int, one: Advance) -> list[str]:
         f"void {symbol}({types}, int64_t);",
         f"static void advance_{k}(int64_t *w, int64_t budget) {{ {symbol}({given}, budget); }}",
     ]
+
+
+def _jumps(prepared: PreparedRun) -> list[str]:
+    """The function jump_law, and where its arrays are; nothing where velocities do not jump."""
+    law, place = prepared.jumps, prepared.image.at
+    if law is None:
+        return ["#define JUMPS 0"]
+    symbol, j = symbol_of(law.entry), law.arguments[0]
+    types = ", ".join(["void *"] * len(law.arguments))
+    given = ", ".join(f"w + {place(part)}" for part in law.arguments)
+    numbers = {
+        "JUMPS": 1,
+        "JUMP_REAL": place(j.real),
+        "JUMP_INTEGER": place(j.integer),
+        "JUMP_Y": place(j.y),
+        "JUMP_SIDES": place(j.switches[SIDE]),
+        "JUMP_CROSSING": place(j.switches[CROSSING]),
+        "JUMP_ACTING": place(j.acting),
+        "ELEMENTS": j.acting.size,
+        "DOES_JUMP": place(j.jumps),
+        "CROSSED_BEHIND_SIDES": (at.CROSSED - at.SIDE) * len(j.jumps),
+    }
+    return [
+        *_defined(numbers),
+        f"void {symbol}(double, {types});",
+        f"static void jump_law(double t, int64_t *w) {{ {symbol}(t, {given}); }}",
+    ]
+
+
+def _elements(prepared: PreparedRun, elements: Elements) -> list[str]:
+    """Calls of loops for outputs."""
+    if not elements.calls:
+        return ["#define CALLS 0", "#define VALUES_OF_ELEMENTS 0"]
+    system, place, arrays = prepared.evaluator.system, prepared.image.at, elements.arrays
+    values, layout = place(arrays.values), prepared.evaluator.model.report_layout["Lam"]
+    rows = [
+        [place(c.table), c.q, place(c.arrays), *c.group, c.first, c.size, *c.more]
+        for c in elements.calls
+    ]
+    numbers = {
+        "CALLS": len(rows),
+        "VALUES_OF_ELEMENTS": values,
+        "MINUS_LAMBDA": values + elements.minus,
+        "COUNTER": values + elements.counter,
+        "MULTIPLIERS": layout.stop - layout.start,
+        "MULTIPLIER": 1 + prepared.run.present.work.state.shape[1] + layout.start,
+        "ROW_OF": place(system.row) if layout.stop > layout.start else 0,
+    }
+    lines = _defined(numbers)
+    head = ("static const struct { int64_t table, q, arrays, i0, p0, out, size, second, third; } "
+            "calls[]")  # fmt: skip
+    return [*lines, *_table(head, (f"{{{', '.join(map(str, row))}}}" for row in rows))]
+
+
+def _directions(
+    prepared: PreparedRun, elements: Elements, directions: Directions | None
+) -> list[str]:
+    """The second memory, and differentiated functions."""
+    if directions is None:
+        return ["#define DIRECTIONS 0"]
+    place, arrays, evaluator = prepared.image.at, directions.arrays, prepared.evaluator
+    addresses, shapes = directions.tables()
+    codes = {word: symbol_of(entry) for word, entry in directions.codes.items()}
+    numbers = {
+        "DIRECTIONS": 1,
+        "ALONG_ROW": place(arrays.row),
+        "ALONG_RATES": place(arrays.rates),
+        "ALONG_OUT": place(arrays.out),
+    }
+    lines = _defined(numbers)
+    lines += [f"void {symbol}(void);" for symbol in dict.fromkeys(codes.values())]
+    lines += _table("static const uint32_t wide_addresses[][3]",
+                    (f"{{{a}, {b}, {c}}}" for a, b, c in addresses))  # fmt: skip
+    lines += _table("static const uint32_t wide_shapes[][2]", (f"{{{a}, {b}}}" for a, b in shapes))
+    lines += _table("static const struct { uint32_t word; void (*code)(void); } wide_codes[]",
+                    (f"{{{word}, {symbol}}}" for word, symbol in codes.items()))  # fmt: skip
+    four = "void *, void *, void *, void *"
+    given = [arrays, prepared.functions, evaluator.system, evaluator.loops]
+    for name, entry in (("rates", directions.rates), ("report", directions.report)):
+        words, symbol = ", ".join(f"x + {2 * place(part)}" for part in given), symbol_of(entry)
+        lines.append(f"void {symbol}({four});")
+        lines.append(f"static void {name}_along(double *x) {{ {symbol}({words}); }}")
+    lines.append("static void elements_along(double *x)\n{\n    (void)x;")
+    for call, one in zip(elements.calls, directions.elements, strict=True):
+        parts = arrays, elements.arrays, call.table, call.arrays
+        more = [call.q, *call.group, call.first, *call.more]
+        all_words = [*(f"x + {2 * place(part)}" for part in parts), *map(str, more)]
+        lines.append(f"    void {symbol_of(one)}({four}, {', '.join(['int64_t'] * 6)});")
+        lines.append(f"    {symbol_of(one)}({', '.join(all_words)});")
+    return [*lines, "}", f"void {directions.symbol}({', '.join(['double *'] * 5)});"]
+
+
+def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
+    """Where the start is found anew for parameters that it depends on, if there are any."""
+    fixed = [v for v in variables if v.kind == "fixed"]
+    if not fixed or prepared.start is None:
+        return ["#define FIXED 0"]
+    start, system, place = prepared.start, prepared.evaluator.system, prepared.image.at
+    body = place(system.body)
+    owned = {(w - body) // BODY_WIDTH for v in fixed for w, _ in v.words
+             if 0 <= w - body < system.body.size}  # fmt: skip
+    numbers = {
+        "FIXED": 1,
+        "ASSEMBLES": int(start.assembles),
+        "GIVEN": place(start.arrays.given),
+        "UNIT": place(start.arrays.unit),
+        "STARTING": place(start.arrays.starting),
+        "STARTING_SIZE": len(start.arrays.starting),
+        "START_OPEN": initial_state.OPEN,
+        "START_PIVOT": initial_state.LEAST_PIVOT,
+        "BEGIN": place(start.functions),
+        "METRIC": place(system.metric),
+        "METRIC_WIDTH": METRIC_WIDTH,
+        "ELEMENT_STATES": len(prepared.evaluator.model.initial_states),
+    }
+    lines = _defined(numbers)
+    lines += _table("static const int heavy[]", map(str, sorted(owned) or [0]))
+    moving = [str(k) for k, v in enumerate(variables) if v.kind == "fixed" and v.first]
+    return [*lines, *_table("static const int moving[]", moving or ["-1"])]
 
 
 def _integration(prepared: PreparedRun, k: int, one: Advance) -> str:

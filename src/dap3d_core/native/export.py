@@ -10,21 +10,24 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
-from dap3d_core.native.c_source import Variable, data_of, variables_header, variables_of
+from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_header, variables_of
 from dap3d_core.native.exported import Exported
 from dap3d_core.native.fmu import write_fmu
-from dap3d_core.native.outputs import SYMBOL, outputs_of
-from dap3d_core.native.prepared import PreparedRun, refusal, tunable_words
+from dap3d_core.native.run.directions import Directions
+from dap3d_core.native.run.outputs import Outputs, outputs_of
+from dap3d_core.native.run.parameters import places_of
+from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.registry import Registry
 from dap3d_core.scene import Scene, SceneError, load
-from dap3d_core.study.parameters import SceneParameter, parameters_named, with_values
+from dap3d_core.study.parameters import SceneParameter, parameters_named
 
 #: Formats, with the suffix of their files; "c" is a folder.
 NATIVE_FORMATS = {"c": "", "fmu": ".fmu"}
 SOURCE = Path(__file__).parent / "source"
-#: Factors on a parameter by which its places in the memory are found, and summands where it is 0.
-TRIALS = (1.001, 0.9975)
+#: Files of it with words of the model.
+WRITTEN = ("example.c", "example.rs", "example.m", "CMakeLists.txt", "README.md")
 
 
 @attrs.frozen
@@ -86,19 +89,24 @@ def export_native(
     given = scene if isinstance(scene, Scene) else load(scene)
     options = {"allow_code": allow_code, "registry": registry} | settings
     prepared = PreparedRun(given, **options)
-    found, text, left_out = outputs_of(prepared, outputs)
+    given_outputs = outputs_of(prepared, outputs)
+    left_out = given_outputs.left_out
     if strict and left_out:
         raise refusal(left_out[0], "name the outputs to be exported")
-    variables = variables_of(prepared, found, _tunable(prepared, parameters, options))
+    directions = Directions.of(prepared, given_outputs)
+    chosen_parameters = _parameters(prepared, parameters, options, given_outputs)
+    variables = variables_of(prepared, given_outputs.found, chosen_parameters)
     _refuse_shared(variables)
     name = re.sub(r"\W+", "_", str(given.name or target.stem), flags=re.ASCII) or "model"
     name = f"_{name}" if name[0].isdigit() else name  # an identifier of C
-    model = Exported(prepared, variables, name, (text, SYMBOL))
-    size = _write(model, chosen, target, fmi if format == "fmu" else 0)
-    names = {
-        kind: tuple(v.name for v in variables if v.kind == kind)
-        for kind in ("input", "parameter", "output")
-    }
+    model = Exported(prepared, variables, name, given_outputs, directions)
+    version = fmi if format == "fmu" else 0
+    try:
+        size = _write(model, chosen, target, version)
+    except CompileError:  # a function without a derivative
+        size = _write(attrs.evolve(model, directions=None), chosen, target, version)
+    kinds = {"input": ("input",), "parameter": PARAMETERS, "output": ("output",)}
+    names = {k: tuple(v.name for v in variables if v.kind in of) for k, of in kinds.items()}
     return NativeExport(
         format, target, tuple(p.name for p in chosen), names["input"], names["parameter"],
         names["output"], tuple(left_out), size,
@@ -114,7 +122,8 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
     """Write an FMU of a version, or for 0 a folder; bytes of the largest library."""
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        (folder / "data.h").write_text(data_of(model.prepared, model.variables))
+        given = model.prepared, model.variables, model.outputs.elements, model.directions
+        (folder / "data.h").write_text(data_of(*given))
         for file in SOURCE.iterdir():
             shutil.copy(file, folder / file.name)
         if fmi:
@@ -128,8 +137,8 @@ def _write(model: Exported, platforms: Sequence[Platform], target: Path, fmi: in
         return size
 
 
-def _tunable(
-    prepared: PreparedRun, names: Sequence[str], options: dict[str, Any]
+def _parameters(
+    prepared: PreparedRun, names: Sequence[str], options: dict[str, Any], outputs: Outputs
 ) -> list[Variable]:
     """Parameters as variables.
 
@@ -140,7 +149,7 @@ def _tunable(
         parameters = parameters_named(prepared.compiled.checked, names)
     except SceneError as error:
         raise SceneError([attrs.evolve(m, key="parameters") for m in error.mistakes]) from None
-    return [_parameter(prepared, parameter, options) for parameter in parameters]
+    return [_parameter(prepared, parameter, options, outputs) for parameter in parameters]
 
 
 def _refuse_shared(variables: Sequence[Variable]) -> None:
@@ -163,42 +172,25 @@ def _refuse_shared(variables: Sequence[Variable]) -> None:
 
 
 def _parameter(
-    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any]
+    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any], outputs: Outputs
 ) -> Variable:
     """A parameter as a variable.
 
     Raises:
         SceneError: what depends on it is assembled before the run.
     """
-    compiled, name = prepared.compiled, parameter.name
+    name = parameter.name
     if parameter.table == "inputs":
         raise refusal(
             f"{name} is the start of an input, which exported models have as a variable",
             f"set {parameter.path[1]} in its place",
         )
-    value = parameter.value
-    if value is None:
-        raise refusal(f"parameter {name} has no number in the scene", "give it one")
-    trials = [value * factor if value else factor for factor in TRIALS]
-    others = [
-        (x, PreparedRun(with_values(compiled.scene, [parameter], [x]), **options)) for x in trials
-    ]
-    if any(one.stops != prepared.stops for _, one in others):
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: it moves a break point of a "
-            "function, where steps end",
-            "export a model for each value",
-        )
-    words = tunable_words(prepared, others, value)
-    if words is None:
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: masses, geometry, the start or "
-            "the assembly depend on it, or nothing does",
-            "export a model for each value, or name a stiffness, damping or similar number",
-        )
+    places = places_of(prepared, parameter, options, outputs)
+    kind = "fixed" if places.is_fixed else "parameter"
     return Variable(
-        name, "parameter", parameter.unit, f"parameter {name}", 0, value, tuple(words.items())
-    )
+        name, kind, parameter.unit, f"parameter {name}", int(places.moves_start),
+        float(parameter.value or 0.0), tuple(places.words.items()),
+    )  # fmt: skip
 
 
 def _write_folder(
@@ -217,7 +209,7 @@ def _write_folder(
     (target / "variables.h").write_text(header, encoding="utf-8", newline="\n")
     shutil.copy(SOURCE / "dap3d.h", target / "dap3d.h")
     words = _words(model, platforms)
-    for file in ("example.c", "CMakeLists.txt", "README.md"):
+    for file in WRITTEN:
         text = (SOURCE / file).read_text(encoding="utf-8")
         for key, value in words.items():
             text = text.replace(f"@{key}@", str(value))
@@ -241,6 +233,7 @@ def _words(model: Exported, platforms: Sequence[Platform]) -> dict[str, Any]:
         "VERSION": current_versions()["dap3d"],
         "PLATFORMS": ", ".join(p.name for p in platforms),
         "FIRST": platforms[0].name,
+        "LIBRARY": library_name(model.name, platforms[0]),
         "OUTPUTS": sum(v.kind == "output" for v in model.variables),
         "T_END": repr(prepared.t_end),
         "METHOD": prepared.compiled.method,

@@ -7,10 +7,14 @@ from typing import Any
 
 from dap3d_core.formats.export_model import ExportReport
 from dap3d_core.formats.export_model import export_model as export_text
+from dap3d_core.interface.errors import PluginError
+from dap3d_core.interface.formats import ResultExporter
 from dap3d_core.native.export import NATIVE_FORMATS, NativeExport, export_native
-from dap3d_core.native.prepared import refusal
+from dap3d_core.native.run.prepared import refusal
 from dap3d_core.registry import Registry
 from dap3d_core.registry.arguments import checked
+from dap3d_core.registry.extensions import extensions
+from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Scene
 
 
@@ -58,19 +62,38 @@ def export_model(
         OSError: the file cannot be written, or exists and ``force`` is off.
     """
     kind = format or Path("" if path is None else path).suffix.lstrip(".") or "c"
-    of_native: dict[str, Any] = {"outputs": outputs, "parameters": parameters,
-                                 "platforms": platforms}  # fmt: skip
-    settings: dict[str, Any] = {"t_end": t_end, "method": method, "integrator": integrator,
-                                "rtol": rtol, "atol": atol, "step": step}  # fmt: skip
+    chosen: dict[str, Any] = {
+        "outputs": outputs, "parameters": parameters, "platforms": platforms, "t_end": t_end,
+        "method": method, "integrator": integrator, "rtol": rtol, "atol": atol, "step": step,
+    }  # fmt: skip
+    given = {name: value for name, value in chosen.items() if value is not None}
     if kind not in NATIVE_FORMATS:
-        for name, value in (of_native | settings).items():
-            if value is not None:
-                raise refusal(f"{name} is of formats {', '.join(NATIVE_FORMATS)}, not of {kind}")
+        for name in given:
+            raise refusal(f"{name} is of formats {', '.join(NATIVE_FORMATS)}, not of {kind}")
+        _require_format(kind)
         return export_text(scene, path, format=kind, strict=strict, force=force, registry=registry)
     if path is None:
         raise refusal(f"format {kind} needs a path", "give that of the file or folder")
-    of_native |= {"parameters": parameters or (), "platforms": platforms or ()}
     return export_native(
         scene, path, format=kind, fmi=fmi, strict=strict, force=force, allow_code=allow_code,
-        registry=registry, **of_native, **settings,
+        registry=registry, **given,
     )  # fmt: skip
+
+
+def _require_format(kind: str) -> None:
+    """Refuse a format that there is not; names those of models, and the nearest."""
+    exporters = extensions("exporter")
+    if kind in exporters.keywords:
+        return
+
+    def is_of_models(keyword: str) -> bool:
+        try:
+            return not issubclass(exporters.load(keyword), ResultExporter)
+        except PluginError:
+            return False
+
+    formats = sorted([*NATIVE_FORMATS, *filter(is_of_models, exporters.keywords)])
+    near = nearest(kind, formats)
+    hint = f"; did you mean {near!r}?" if near else ""
+    listed = ", ".join(formats)
+    raise PluginError(f"there is no format {kind!r} of models{hint} (there are: {listed})")

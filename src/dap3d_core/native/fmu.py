@@ -23,6 +23,7 @@ ROLES = {
     "time": ("independent", "continuous", ""),
     "input": ("input", "continuous", ""),
     "parameter": ("parameter", "tunable", "exact"),
+    "fixed": ("parameter", "fixed", "exact"),
     "output": ("output", "continuous", "calculated"),
     "state": ("local", "continuous", "exact"),
     "derivative": ("local", "continuous", "calculated"),
@@ -83,7 +84,7 @@ def description_of(model: Exported, token: str, fmi: int) -> bytes:
             **({"numberOfEventIndicators": str(count)} if fmi == 2 else {}),
         },
     )
-    _capabilities(root, model.name, fmi)
+    _capabilities(root, model, fmi)
     _units(SubElement(root, "UnitDefinitions"), (v.unit for v in model.variables))
     categories = SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusError"):
@@ -101,15 +102,19 @@ def description_of(model: Exported, token: str, fmi: int) -> bytes:
     return text
 
 
-def _capabilities(root: Element, name: str, fmi: int) -> None:
+def _capabilities(root: Element, model: Exported, fmi: int) -> None:
     state = "canGetAndSetFMUState" if fmi == 3 else "canGetAndSetFMUstate"
     serial = "canSerializeFMUState" if fmi == 3 else "canSerializeFMUstate"
-    common = {"modelIdentifier": name, state: "true", serial: "true"}
+    common = {"modelIdentifier": model.name, state: "true", serial: "true"}
+    if model.directions is not None:
+        common[f"providesDirectionalDerivative{'s' if fmi == 3 else ''}"] = "true"
     steps = "needsCompletedIntegratorStep" if fmi == 3 else "completedIntegratorStepNotNeeded"
-    exchange = common | {steps: "true" if fmi == 3 else "false"}
-    SubElement(root, "ModelExchange", exchange)
-    variable = {"canHandleVariableCommunicationStepSize": "true"}
-    SubElement(root, "CoSimulation", common | variable)
+    SubElement(root, "ModelExchange", common | {steps: "true" if fmi == 3 else "false"})
+    able = ["canHandleVariableCommunicationStepSize"]
+    if fmi == 3:
+        able += ["hasEventMode", "mightReturnEarlyFromDoStep", "providesIntermediateUpdate",
+                 "canReturnEarlyAfterIntermediateUpdate"]  # fmt: skip
+    SubElement(root, "CoSimulation", common | dict.fromkeys(able, "true"))
 
 
 def _units(parent: Element, names: Iterable[str]) -> None:
@@ -145,7 +150,7 @@ def _variable(parent: Element, k: int, v: Variable, first: dict[str, int], fmi: 
     if initial:
         common["initial"] = initial
     own = {} if v.unit in ("", "1", "SI") else {"unit": v.unit}
-    if v.kind in ("input", "parameter", "state"):
+    if v.kind in ("input", "parameter", "fixed", "state"):
         own["start"] = repr(float(v.start))
     if v.kind == "derivative":
         own["derivative"] = str(first["state"] + v.first + (1 if fmi == 2 else 0))
@@ -156,24 +161,38 @@ def _variable(parent: Element, k: int, v: Variable, first: dict[str, int], fmi: 
 
 
 def _structure(parent: Element, variables: Sequence[Variable], fmi: int) -> None:
-    def places(*kinds: str) -> list[int]:
-        return [k for k, v in enumerate(variables) if v.kind in kinds]
-
-    if fmi == 3:
-        parts = {"Output": ("output",), "ContinuousStateDerivative": ("derivative",),
-                 "InitialUnknown": ("output", "derivative"),
-                 "EventIndicator": ("indicator",)}  # fmt: skip
-        for name, kinds in parts.items():
-            for k in places(*kinds):
-                SubElement(parent, name, {"valueReference": str(k)})
-        return
-    parts = {"Outputs": ("output",), "Derivatives": ("derivative",),
+    parts = {"Output": ("output",), "ContinuousStateDerivative": ("derivative",),
+             "InitialUnknown": ("output", "derivative"),
+             "EventIndicator": ("indicator",)} if fmi == 3 else {
+             "Outputs": ("output",), "Derivatives": ("derivative",),
              "InitialUnknowns": ("output", "derivative")}  # fmt: skip
+    references = {v.name: k + (1 if fmi == 2 else 0) for k, v in enumerate(variables)}
     for name, kinds in parts.items():
-        if found := places(*kinds):
-            part = SubElement(parent, name)
-            for k in found:
-                SubElement(part, "Unknown", {"index": str(k + 1)})
+        found = [v for v in variables if v.kind in kinds]
+        part = SubElement(parent, name) if fmi == 2 and found else parent
+        for v in found:
+            key, tag = ("valueReference", name) if fmi == 3 else ("index", "Unknown")
+            place = {key: str(references[v.name])}
+            SubElement(part, tag, place | _dependencies(v, references))
+
+
+def _dependencies(v: Variable, references: dict[str, int]) -> dict[str, str]:
+    """Of rates of positions and orientations; others depend on all, which is said by no word."""
+    state = v.name.removeprefix("der(").removesuffix(")")
+    body, _, component = state.rpartition(".")
+    owner, _, quantity = body.rpartition(".")
+    names: list[str] = []
+    if v.kind == "derivative" and quantity == "r":
+        names = [f"{owner}.rd.{component}"]
+    elif v.kind == "derivative" and quantity == "p":
+        names = [*(f"{owner}.p.e{k}" for k in range(4)), *(f"{owner}.wp.{a}" for a in "xyz")]
+    if not names or not set(names) <= set(references):
+        return {}
+    kind = "constant" if quantity == "r" else "dependent"
+    return {
+        "dependencies": " ".join(str(references[name]) for name in names),
+        "dependenciesKind": " ".join([kind] * len(names)),
+    }
 
 
 def _page(model: Exported) -> bytes:

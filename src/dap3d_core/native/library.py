@@ -4,7 +4,7 @@ import ctypes
 import os
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -37,6 +37,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "save": (_INT, [_MODEL, _MODEL]),
     "load": (_INT, [_MODEL, _MODEL]),
     "state_count": (_INT, []),
+    "directional": (_INT, [_MODEL, _MODEL, _INT, _MODEL, _INT, _MODEL, _MODEL]),
     "derivatives": (_INT, [_MODEL, _DOUBLE, _MODEL, _MODEL]),
 }
 
@@ -145,6 +146,26 @@ class NativeRun:
             raise ValueError("the state is not one of this model")
         if self._call.dap3d_load(self._model, state) != OK:
             raise ValueError(self.message)
+
+    def directional(self, unknowns: Sequence[str], along: Mapping[str, float]) -> Floats:
+        """(k,) derivatives of outputs or derivatives along a direction of states, inputs, ...
+
+        Args:
+            unknowns: names of outputs and derivatives.
+            along: name of a state, input, tunable parameter or "time" -> its part.
+
+        Raises:
+            SimulationError: there are no such derivatives.
+        """
+        of = np.array([self._reference(name) for name in unknowns], dtype=np.int32)
+        by = np.array([self._reference(name) for name in along], dtype=np.int32)
+        seed, found = np.array([*along.values()], dtype=float), np.zeros(len(of))
+        pointers = seed.ctypes.data, found.ctypes.data
+        if self._call.dap3d_directional(
+            self._model, of.ctypes.data, len(of), by.ctypes.data, len(by), *pointers
+        ):
+            raise SimulationError(self.message)
+        return found
 
     def derivatives(self, t: float, y: Floats) -> Floats:
         """(k,) derivatives of the states y at t."""

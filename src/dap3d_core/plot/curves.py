@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dap3d_core.model.groups import Floats
+from dap3d_core.plot.mode_bands import Band, bands_of, shade
 from dap3d_core.plot.style import (
     DASHES,
     HEIGHT,
@@ -110,11 +111,15 @@ class Curve(NamedTuple):
 
 @attrs.frozen(eq=False)
 class CurvePicture(Picture):
-    """Panels of curves over one quantity: unit -> curves; a title above them."""
+    """Panels of curves over one quantity: unit -> curves; a title above them.
+
+    bands: unit -> modes of the contact of its curves over time.
+    """
 
     x: Quantity
     panels: dict[str, list[Curve]]
     title: str
+    bands: Mapping[str, Sequence[Band]] = attrs.field(factory=dict)
 
     @property
     def is_path(self) -> bool:
@@ -163,6 +168,7 @@ class CurvePicture(Picture):
         Colours differ from curve to curve, dashes from run to run: curves that lie on one another
         are still seen.
         """
+        shade(ax, self.bands.get(unit, ()))
         several = len({curve.run for curve in curves}) > 1
         for k, curve in enumerate(curves):
             single = len(curve.quantity.values) == 1
@@ -216,7 +222,11 @@ def curve_picture(
             panels.setdefault(unit, []).extend(curves)
     titles = list(dict.fromkeys(_title_of(run) for run in runs.values()))
     over = next(iter(drawn.values()))[0]
-    return CurvePicture(over, panels, titles[0] if len(titles) == 1 else "")
+    bands = {}
+    if len(runs) == 1 and over.name == "t":
+        (run,) = runs.values()
+        bands = {unit: bands_of(run, (c.quantity for c in of)) for unit, of in panels.items()}
+    return CurvePicture(over, panels, titles[0] if len(titles) == 1 else "", bands)
 
 
 def _quantities(

@@ -20,6 +20,7 @@ from dap3d_core.plot.style import (
     LETTERS,
     PALETTE,
     PANEL_HEIGHT,
+    REAL_PART_ROUNDING,
     WIDTH,
     Picture,
     PlainOffset,
@@ -61,8 +62,6 @@ NO_WINDOW = (
 )
 #: Eigenvalues whose numbers are written beside them.
 MOST_LABELS = 12
-#: A real part below this part of the largest magnitude is drawn as zero.
-ROUNDING = 1e-9
 #: Attribute of a path -> label, marker and colour of its special points.
 SPECIAL = {
     "turning": ("turning point", "o", PALETTE[1]),
@@ -255,14 +254,14 @@ def draw_eigenvalues(ax: Axes, linearization: "Linearization") -> Axes:
     """Draw the eigenvalues of a linearisation on axes; returns these."""
     values = linearization.eigenvalues
     size = float(np.max(np.abs(values), initial=0.0)) or 1.0
-    real = np.where(np.abs(values.real) > ROUNDING * size, values.real, 0.0)
+    real = np.where(np.abs(values.real) > REAL_PART_ROUNDING * size, values.real, 0.0)
     grows = real > 0.0
     ax.axvline(0.0, color="0.6", linewidth=0.8)
     ax.plot(real[~grows], values.imag[~grows], "o", color=PALETTE[0], markersize=4.5)
     ax.plot(real[grows], values.imag[grows], "X", color=PALETTE[1], markersize=5.5)
     modes = linearization.mode_eigenvalues
     for k, value in enumerate(modes[:MOST_LABELS]):
-        x = value.real if abs(value.real) > ROUNDING * size else 0.0
+        x = value.real if abs(value.real) > REAL_PART_ROUNDING * size else 0.0
         if abs(value) > 0.0:
             ax.annotate(str(k + 1), (x, value.imag), xytext=(4, 3), textcoords="offset points",
                         fontsize=LETTERS)  # fmt: skip

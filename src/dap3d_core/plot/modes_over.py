@@ -14,6 +14,7 @@ from dap3d_core.plot.style import (
     HEIGHT,
     LETTERS,
     PALETTE,
+    REAL_PART_ROUNDING,
     Picture,
     folded,
     legend_above,
@@ -31,8 +32,6 @@ GROWS = PALETTE[1]
 COLOURS = tuple(colour for colour in PALETTE if colour != GROWS)
 #: What is drawn, by name; frequencies by default.
 FREQUENCIES, EIGENVALUES = "frequencies", "eigenvalues"
-#: A real part below this part of the largest magnitude is drawn as zero.
-ROUNDING = 1e-9
 #: Points of a curve on which a pair meets the real axis.
 MEETING = 24
 
@@ -120,7 +119,7 @@ class RootLocusPicture(Picture):
         found, x = self.modes, self.modes.values
         values = np.where(np.isnan(found.eigenvalues), complex(np.nan, np.nan), found.eigenvalues)
         size = float(np.nanmax(np.abs(values), initial=0.0)) or 1.0
-        values.real[np.abs(values.real) <= ROUNDING * size] = 0.0
+        values.real[np.abs(values.real) <= REAL_PART_ROUNDING * size] = 0.0
         norm = norm_of(x)
         curves = list(_loci(x, values))
         points = [np.column_stack([z.real, z.imag]) for _, z in curves]
@@ -192,6 +191,6 @@ def _meeting(pair: complex, reals: "Complex") -> tuple[Floats, list["Complex"]]:
     parts = np.sort(np.append(np.linspace(0.0, 1.0, MEETING), below / (below + above)))
     mean = pair.real + parts * (np.mean(reals.real) - pair.real)
     square = parts * above - (1.0 - parts) * below
-    square[np.abs(square) <= ROUNDING * (below + above)] = 0.0
+    square[np.abs(square) <= REAL_PART_ROUNDING * (below + above)] = 0.0
     root = np.sqrt(square.astype(complex))
     return parts, [mean + root, mean - root]

@@ -19,7 +19,9 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 WIDTH, HEIGHT, PANEL_HEIGHT = 3.8, 2.9, 2.1
 LETTERS = 8.0
 #: A range below this fraction of the values is their rounding.
-ROUNDING = 1e-12
+RANGE_ROUNDING = 1e-12
+#: A real part below this part of the largest magnitude is drawn as zero.
+REAL_PART_ROUNDING = 1e-9
 MINUS = "\N{MINUS SIGN}"
 #: Offsets as matplotlib writes them: 1e-9+4.3e1.
 _OFFSET = re.compile(r"(?:1e(-?\d+))?([+-]\d[^+]*)?")
@@ -66,7 +68,7 @@ def show_rounding_flat(ax: Axes, span: float = 0.0) -> None:
     """
     low, high = ax.dataLim.intervaly
     size = max(abs(low), abs(high))
-    if 0.0 < high - low < ROUNDING * size:
+    if 0.0 < high - low < RANGE_ROUNDING * size:
         span = max(span, 0.2 * size)
     if high - low < span:
         middle = 0.5 * (low + high)

@@ -10,7 +10,10 @@ from functools import wraps
 from numbers import Integral, Real
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Any, TypeVar, Union, get_args, get_origin
+from typing import Any, TypeVar, Union, Unpack, get_args, get_origin, get_type_hints
+
+from dap3d_core.registry.suggestions import nearest
+from dap3d_core.settings import RunSettings
 
 Function = TypeVar("Function", bound=Callable[..., Any])
 
@@ -27,9 +30,7 @@ _NOUNS: dict[Any, str] = {
     Callable: "a function",
 }
 #: Settings of a run, whose values are checked with those of the scene.
-SETTINGS = frozenset(
-    ("t_end", "dt", "method", "integrator", "rtol", "atol", "step", "correct", "project")
-) | {"correct_metric", "start"}
+SETTINGS = frozenset(get_type_hints(RunSettings)) | {"start"}
 #: Functions that make an object of a class from a name or a path.
 _READERS = {"Result": "dap.open", "Scene": "dap.load", "CompiledModel": "dap.compile"}
 
@@ -37,10 +38,11 @@ _READERS = {"Result": "dap.open", "Scene": "dap.load", "CompiledModel": "dap.com
 def checked(function: Function) -> Function:
     """Decorator of a public function: refuses arguments of kinds that its annotations exclude.
 
-    Numbers of numpy become Python's; text and truth values are no numbers, and text is no list.
+    Numbers of numpy become Python's; text and truth values are no numbers, and text is no list. In
+    place of several names one list of them may be given.
     ``SETTINGS`` are left to the function, and annotations that are known to type checkers alone.
     """
-    signature = inspect.signature(function)
+    signature = _with_settings(inspect.signature(function))
     kinds: dict[str, Any] = dict.fromkeys(SETTINGS, Any)
 
     @wraps(function)
@@ -49,11 +51,15 @@ def checked(function: Function) -> Function:
         with suppress(TypeError):
             bound = signature.bind(*args, **kwargs)
         if bound is None:
+            _refuse_unknown(function, signature, kwargs)
             return function(*args, **kwargs)  # Python's own message names the function
         given = bound.arguments
         for name in given:
-            value = given[name] = _python_number(given[name])
             parameter = signature.parameters[name]
+            if parameter.kind is parameter.VAR_POSITIONAL:
+                given[name] = _several(name, parameter.annotation, given[name])
+                continue
+            value = given[name] = _python_number(given[name])
             if value is parameter.default:
                 continue
             if name not in kinds:
@@ -62,7 +68,30 @@ def checked(function: Function) -> Function:
                 raise TypeError(_fault(name, kinds[name], value))
         return function(*bound.args, **bound.kwargs)
 
+    call.__signature__ = signature  # type: ignore[attr-defined]
     return call  # type: ignore[return-value]
+
+
+def _with_settings(signature: inspect.Signature) -> inspect.Signature:
+    """A signature with the settings that ``**settings: Unpack[...]`` stands for, one by one."""
+    given = list(signature.parameters.values())
+    last = given[-1:]
+    if not last or get_origin(last[0].annotation) is not Unpack:
+        return signature
+    hints = get_type_hints(get_args(last[0].annotation)[0])
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    settings = [inspect.Parameter(n, keyword, default=None, annotation=h) for n, h in hints.items()]
+    return signature.replace(parameters=given[:-1] + settings)
+
+
+def _refuse_unknown(
+    function: Callable[..., Any], signature: inspect.Signature, given: Mapping[str, Any]
+) -> None:
+    """Refuse an argument that there is none of, with the nearest, as Python words it."""
+    for name in given.keys() - signature.parameters.keys():
+        near = nearest(name, signature.parameters)
+        words = f"{function.__name__}() got an unexpected keyword argument {name!r}"
+        raise TypeError(f"{words}; did you mean {near!r}?" if near else words)
 
 
 def require(name: str, kind: Any, value: Any) -> None:
@@ -73,6 +102,18 @@ def require(name: str, kind: Any, value: Any) -> None:
     """
     if not _fits(kind, value):
         raise TypeError(_fault(name, kind, value))
+
+
+def _several(name: str, kind: Any, values: tuple[Any, ...]) -> tuple[Any, ...]:
+    """Names one by one, or as one list of them."""
+    if kind not in (str, "str"):
+        return values
+    if len(values) == 1 and _is_list(values[0]):
+        values = tuple(values[0])
+    for value in values:
+        if not isinstance(value, str):
+            raise TypeError(f"the argument {name} should be names, not {_shown(value)}")
+    return values
 
 
 def _annotation(function: Callable[..., Any], parameter: inspect.Parameter) -> Any:

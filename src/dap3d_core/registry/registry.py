@@ -1,5 +1,6 @@
 """The registry of types; each is loaded and examined on first use."""
 
+import re
 from collections.abc import Callable, Collection
 from pathlib import Path
 
@@ -116,7 +117,7 @@ class Registry:
                 synonyms = self._load(source).type.synonyms
             except PluginError:
                 continue
-            if word.casefold() in synonyms:
+            if _plain(word) in map(_plain, synonyms):
                 return source.keyword
         return ""
 
@@ -271,6 +272,11 @@ def info_of(source: Source, rivals: list[Source], load: Callable[[Source], objec
             state, reason = "broken", str(error)
     s = source
     return PluginInfo(s.kind, s.keyword, s.distribution, s.version, s.module, state, reason)
+
+
+def _plain(word: str) -> str:
+    """A name of a type without what writers differ in: case, signs, "joint" behind it."""
+    return re.sub(r"[^a-z]", "", word.casefold()).removesuffix("joint")
 
 
 def _check_kind(kind: str) -> None:

@@ -38,7 +38,7 @@ class ResultContacts:
         Returns:
             ``.gap`` (nt,) m, ``.normal_force`` (nt,) N, ``.friction`` (nt, 3) N on body i,
             ``.slip`` (nt, 3) m/s, ``.mode`` (nt,) 0 open, 1 slides, 2 sticks, ``.at`` (nt, 3) m,
-            global axes; of k points (nt, k) and (nt, k, 3).
+            ``.force`` (nt, 3) N on body i, global axes; of k points (nt, k) and (nt, k, 3).
 
         Raises:
             UnknownNameError: there is no such contact; names the nearest.

@@ -12,7 +12,7 @@ import attrs
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.note import Note
 from dap3d_core.scene import SceneError, tables_of
-from dap3d_core.scene.scene import FIXED_STEP
+from dap3d_core.settings import FIXED_STEP
 
 #: How a run can have ended.
 STATUSES = ("done", "interrupted", "stopped")

@@ -2,15 +2,13 @@
 
 from dap3d_core.scene.errors import MISSING, Mistake, SceneError
 from dap3d_core.scene.files.read_toml import load, parse, shipped_models, tables_of
-from dap3d_core.scene.scene import (
-    INTEGRATORS,
-    METHODS,
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import (
     Animation,
     AnimationPoint,
     Body,
     Element,
     Point,
-    Scene,
     Simulation,
     Vector,
     Vector2,
@@ -21,8 +19,6 @@ from dap3d_core.scene.validate.validate import check
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene
 
 __all__ = [
-    "INTEGRATORS",
-    "METHODS",
     "MISSING",
     "Animation",
     "AnimationPoint",

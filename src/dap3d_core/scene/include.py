@@ -20,14 +20,14 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import MISSING, Key, MistakeList, dotted
 from dap3d_core.scene.expressions.expression import fault_of_word
-from dap3d_core.scene.scene import (
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import (
     GROUND,
     NAMED,
     NO_TURN,
     ZERO,
     Element,
     Point,
-    Scene,
     Vector,
     fault_of_name,
 )
@@ -51,7 +51,7 @@ PLACE = ("r", *ORIENTATIONS)
 #: Suffixes of names that stand for the origin and the axes of a body.
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 #: Entries of a rotation matrix below this are rounding, as of a turn of 90 deg.
-ROUNDING = 1e-15
+ROTATION_ROUNDING = 1e-15
 #: Elements whose type may take something from ground that is not written, and the kind of each.
 KINDS = {"joints": "joint", "forces": "force", "contacts": "contact"}
 #: The field of a constant orientation A_i^T A_j, which is another one where ground is turned.
@@ -179,7 +179,7 @@ def _place(mistakes: MistakeList, key: Key, at: Any) -> _Place | None:
                     [e1 * e2, -e1 * e1 - e3 * e3, e2 * e3],
                     [e1 * e3, e2 * e3, -e1 * e1 - e2 * e2]])
     )  # fmt: skip
-    A[np.abs(A) < ROUNDING] = 0.0
+    A[np.abs(A) < ROTATION_ROUNDING] = 0.0
     return _Place(A, p, r)
 
 

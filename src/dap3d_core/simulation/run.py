@@ -16,7 +16,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import Computed, Result, ResultError, information
 from dap3d_core.scene import Mistake, SceneError, Simulation
-from dap3d_core.simulation.errors import RedundantError, SimulationError, refuse_contacts
+from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.handover import (
     crossing_notes,
     hand_over,
@@ -234,8 +234,6 @@ class Run(RunState):
         }
         integrator = integrator_named(settings.integrator)
         check_fit(integrator, evaluator.formulation)
-        if integrator.name == IMPLICIT.name:
-            refuse_contacts(evaluator.model, f"integrator {IMPLICIT.name}")
         if settings.integrator == "auto":
             options = options | {
                 "stop_when_stiff": fits(IMPLICIT, evaluator.formulation)

@@ -15,16 +15,9 @@ from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
 from dap3d_core.result.note import information
-from dap3d_core.scene import (
-    METHODS,
-    MISSING,
-    Mistake,
-    Scene,
-    SceneError,
-    Simulation,
-    check_simulation,
-)
+from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
 from dap3d_core.scene.validate.settings import notes_of
+from dap3d_core.settings import METHODS
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.explain import takes_joint_coordinates
@@ -87,14 +80,16 @@ def settings_notes(compiled: CompiledModel, settings: Simulation) -> list[str]:
 
 def compiled_for(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
-    method: str | None,
     allow_code: bool,
-    announce: Callable[[str], None] | None,
+    announce: Callable[[str], None] | None = None,
+    *,
+    method: str | None = None,
     integrator: str | None = None,
+    **_: Any,
 ) -> CompiledModel:
     """The compiled model of a scene; one that was compiled before must have the requested method.
 
-    integrator: that of the runs; the scene's when left out.
+    method, integrator: those of the runs; the scene's when left out. Other settings make no odds.
 
     Raises:
         SceneError: there is no such method.

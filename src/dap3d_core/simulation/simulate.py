@@ -2,11 +2,12 @@
 
 import os
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene
+from dap3d_core.settings import RunSettings
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.output.monitor import RunProgress
@@ -23,29 +24,18 @@ if TYPE_CHECKING:
 def simulate(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     *,
-    t_end: float | None = None,
-    dt: float | None = None,
-    method: str | None = None,
-    integrator: str | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    step: float | None = None,
-    correct: bool | None = None,
-    project: bool | None = None,
     progress: Progress | None = None,
     allow_code: bool = False,
     announce: Callable[[str], None] | None = None,
     output: str | os.PathLike[str] | None = None,
     force: bool = False,
-    correct_metric: str | None = None,
     start: "Start | None" = None,
     estimate_error: bool | str = False,
     checkpoint: float | None = None,
     events: Sequence[Event] = (),
     watch: Callable[[RunProgress], None] | None = None,
     controllers: "Sequence[Controller]" = (),
-    contact: str | None = None,
-    contact_step: float | None = None,
+    **settings: Unpack[RunSettings],
 ) -> Result:
     """Simulate a scene from t = 0 to t_end; settings left out are those of its [simulation].
 
@@ -55,26 +45,27 @@ def simulate(
         method: "auto", "unconstrained", "standard", "penalty", "lsq" or "joint".
         integrator: "dopri5", "dop853", "adams", "rk4" (needs ``step``), "radau" (implicit), "auto".
         rtol, atol, step: tolerances of the step's error; a fixed step, s, without error control.
-        correct, project: bring the start, and then every state, onto the constraints.
+        correct, correct_metric, project: bring the start onto the constraints, by the least change
+            in m and rad ("unit") or weighted by masses ("mass"), and then every state.
         start: "scene", "equilibrium", a result (its end), (result, time) or an ``Equilibrium``.
         progress, watch: called each 0.1 s or so, as progress(t, t_end), with a ``RunProgress``.
-        events, controllers, others: see ``Event``, ``Controller``, ``Simulation``.
-        estimate_error: of ``result.error`` by a second, finer run; "quick": if within 1 s.
+        events, controllers: see ``Event``, ``Controller``.
+        contact, contact_step: "events", "stepping" or "auto"; step of stepping, s.
         output, force: file to write, ``OUTPUT.part`` meanwhile; whether over an existing one.
+        estimate_error: of ``result.error`` by a second, finer run; "quick": if within 1 s.
         checkpoint: seconds between checkpoints, for ``resume``; inf: one where the run is ended.
 
     Raises:
-        SceneError, PluginError, ResultError, SimulationError: as ``compile``; the run stopped.
+        SceneError, PluginError, ResultError: as ``compile``; unusable settings or output.
+        SimulationError (RedundantError, AssemblyError): the run stopped, with ``.result``.
     """
-    compiled = compiled_for(scene, method, allow_code, announce, integrator)
-    settings = settings_of(compiled, t_end=t_end, dt=dt, method=method, integrator=integrator,
-        rtol=rtol, atol=atol, step=step, correct=correct, project=project, contact=contact,
-        contact_step=contact_step, correct_metric=correct_metric, start=start_word(start),
-    )  # fmt: skip
+    compiled = compiled_for(scene, allow_code, announce, **settings)
+    simulation = settings_of(compiled, start=start_word(start), **settings)
     check_checkpoint(checkpoint, output)
     with compiled.borrow_evaluator():
-        run = Run(compiled, settings, Callbacks(announce=announce, progress=progress, watch=watch),
-                  events, output=output, force=force, estimate_error=estimate_error,
+        callbacks = Callbacks(announce=announce, progress=progress, watch=watch)
+        run = Run(compiled, simulation, callbacks, events,
+                  output=output, force=force, estimate_error=estimate_error,
                   start=given_state(start, compiled), controllers=controllers)  # fmt: skip
         if checkpoint is not None:
             run.save_every(checkpoint, force=force)

@@ -16,7 +16,7 @@ from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
 from dap3d_core.study.outputs import Reduction
 from dap3d_core.study.parameters import SceneParameter, parameters_named, with_values
-from dap3d_core.study.study import Batch, PointStatus, Study
+from dap3d_core.study.study import Batch, PointStatus, Study, derivative_name
 
 if TYPE_CHECKING:
     from dap3d_core.study.batch.batch import BatchRunner
@@ -69,9 +69,13 @@ class Ensemble:
         self.outputs = self.reduction.outputs
         self.labels, self.units = self.reduction.labels, self.reduction.units
         self._of_thread = threading.local()
-        self._takes_batches = integrator_named(settings.integrator).one_step and not any(
-            parameter.table == "simulation" for parameter in self.parameters
-        )
+        is_plain = not any(parameter.table == "simulation" for parameter in self.parameters)
+        one_step = integrator_named(settings.integrator).one_step
+        self._takes_batches = one_step and is_plain and not self.study.gradients
+        if self.study.gradients:
+            from dap3d_core.study.sensitivities.sensitivities import check_differentiable
+
+            check_differentiable(self.compiled, self.parameters, "a sweep with gradients", "vary")
 
     def prepare(self) -> None:
         """Compile the code of batches in advance: threads would wait for one another."""
@@ -93,7 +97,8 @@ class Ensemble:
     def run(self, points: ArrayLike) -> Batch:
         """Run points (k, parameters): the values of the parameters at each."""
         values = np.asarray(points, dtype=float).reshape(-1, len(self.parameters))
-        batch = Batch.empty(self.outputs, len(values), len(self.times))
+        p = len(self.parameters) if self.study.gradients else 0
+        batch = Batch.empty(self.outputs, len(values), len(self.times), p)
         runner = self._runner()
         if runner is not None:
             most = max(1, MAX_ROW_VALUES // (self._row_width() * len(self.times)))
@@ -108,9 +113,27 @@ class Ensemble:
         return self._result(self.requested.scene, point)
 
     def _result(self, scene: Scene, point: Sequence[float]) -> Result:
+        return simulate(self._model(scene, point))
+
+    def _model(self, scene: Scene, point: Sequence[float]) -> CompiledModel:
         changed = with_values(scene, self.parameters, point)
         registry = self.compiled.checked.registry
-        return simulate(CompiledModel(changed, registry=registry, joint=self._joint))
+        return CompiledModel(changed, registry=registry, joint=self._joint)
+
+    def _with_derivatives(self, k: int, point: Floats, batch: Batch) -> Result:
+        """The result of one point; stores the derivatives of its outputs."""
+        from dap3d_core.study.sensitivities.sensitivities import sensitivities
+
+        found = sensitivities(self._model(self.study.scene, point.tolist()), self.study.names)
+        parts = [np.atleast_1d(output.value(found.result)) for output in self.outputs]
+        slopes = found.derivative(
+            lambda result: np.concatenate([np.atleast_1d(o.value(result)) for o in self.outputs])
+        )
+        ends = np.cumsum([len(part) for part in parts])[:-1]
+        for output, slope in zip(self.outputs, np.split(slopes, ends), strict=True):
+            stored = batch.values[derivative_name(output.name)]
+            stored[k] = slope if output.reduction == "series" else slope[0]
+        return found.result
 
     def _runner(self) -> "BatchRunner | None":
         """The batch runner of this thread; None where points have to be run individually."""
@@ -130,7 +153,10 @@ class Ensemble:
         """Run one point by ``simulate`` and store its status, note and outputs."""
         result: Result | None
         try:
-            result = self._result(self.study.scene, point.tolist())
+            if self.study.gradients:
+                result = self._with_derivatives(k, point, batch)
+            else:
+                result = self._result(self.study.scene, point.tolist())
             status, note = PointStatus.DONE, self._note(result)
         except (SceneError, SimulationError) as error:
             result = Computed.of(error).result

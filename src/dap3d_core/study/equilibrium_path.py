@@ -145,7 +145,7 @@ class EquilibriumPath:
         scene = self._family.scene(point.s)
         angles = self._rows[k, self._compiled.model.row_layout["angles"]]
         start = StartState(point.pose.u, angles, states=point.states)
-        compiled = compiled_for(scene, None, self._family.allow_code, None, "auto")
+        compiled = compiled_for(scene, self._family.allow_code, integrator="auto")
         return equilibrium(compiled, start=start)
 
     @checked
@@ -221,7 +221,7 @@ def equilibrium_path(
     varied, numbers = read_values(own, parameter, values)
     _check_values(varied, values, numbers)
     first = with_values(scene, [varied], [numbers[0]])
-    compiled = compiled_for(first, None, allow_code, announce, "auto")
+    compiled = compiled_for(first, allow_code, announce, integrator="auto")
     try:
         rest = equilibrium(compiled, start=start)
     except SimulationError as error:

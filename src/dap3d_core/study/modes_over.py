@@ -15,7 +15,7 @@ from dap3d_core.scene import Scene, check, load
 from dap3d_core.simulation import SimulationError
 from dap3d_core.simulation.linearization.linearization import (
     MANY_BODIES,
-    ROUNDING,
+    REAL_PART_ROUNDING,
     Complex,
     Linearization,
     linearize,
@@ -70,7 +70,7 @@ class ModesOver:
     @property
     def grows(self) -> NDArray[np.bool_]:
         """(n, modes) whether the motion of the mode grows, beyond rounding."""
-        beyond = self.eigenvalues.real > ROUNDING[0] * np.abs(self.eigenvalues)
+        beyond = self.eigenvalues.real > REAL_PART_ROUNDING[0] * np.abs(self.eigenvalues)
         return np.asarray(beyond & ~self.stable[:, None])
 
     def __repr__(self) -> str:

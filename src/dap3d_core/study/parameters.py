@@ -12,8 +12,8 @@ from dap3d_core.interface.fields import specs_of
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Instance, Mistake, Scene, SceneError, Simulation, ValidatedScene
 from dap3d_core.scene.coerce import canonical
-from dap3d_core.scene.scene import NAMED, Element
-from dap3d_core.scene.validate.settings import OPEN
+from dap3d_core.scene.tables import NAMED, Element
+from dap3d_core.settings import SETTINGS
 
 AXES = ("x", "y", "z")
 EULER_PARAMETERS = ("e0", "e1", "e2", "e3")
@@ -259,7 +259,8 @@ def _fields(checked: ValidatedScene, path: tuple[str, ...]) -> Iterator[_Field]:
     holder = _holder(checked.scene, (*path, ""))
     if isinstance(holder, Element):
         instances: list[Instance] = getattr(checked, table)
-        instance = next(instance for instance in instances if instance.name == path[1])
+        # of a contact of several points, NAME#1 and so on, the first
+        instance = next(one for one in instances if one.name.partition("#")[0] == path[1])
         yield from _element_fields(holder, path, instance)
         return
     if isinstance(holder, dict):
@@ -271,7 +272,7 @@ def _fields(checked: ValidatedScene, path: tuple[str, ...]) -> Iterator[_Field]:
         is_given = value is not None
         if not is_given and table == "bodies":
             value = BODY_DEFAULTS.get(name)
-        is_open = value is None and table == "simulation" and name in OPEN
+        is_open = value is None and table == "simulation" and SETTINGS[name].default is None
         if _is_numeric(value) or is_open:
             yield _Field((*path, name), value, UNITS.get(name, "1"), is_given=is_given)
 

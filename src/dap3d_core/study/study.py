@@ -32,12 +32,19 @@ class Study:
         names: dotted names of the parameters that vary.
         outputs: computed from each run.
         allow_code: whether the model's own types may be loaded.
+        gradients: whether derivatives of the outputs by the parameters are computed, too.
     """
 
     scene: Scene
     names: tuple[str, ...]
     outputs: tuple[Output, ...]
     allow_code: bool = False
+    gradients: bool = False
+
+
+def derivative_name(name: str) -> str:
+    """Name of the derivatives of an output."""
+    return f"d {name}"
 
 
 @attrs.frozen(eq=False)
@@ -47,7 +54,8 @@ class Batch:
     Attributes:
         status: (k,) ``PointStatus`` of each.
         notes: (k,) warning or error message of each, "" for none.
-        values: name of an output -> (k,), or (k, nt) of a series; NaN where there is none.
+        values: name of an output -> (k,), or (k, nt) of a series; NaN where there is none. Those of
+            derivatives have the p parameters behind: (k, p), (k, nt, p).
     """
 
     status: NDArray[np.int8]
@@ -55,9 +63,13 @@ class Batch:
     values: dict[str, Floats]
 
     @classmethod
-    def empty(cls, outputs: Sequence[Output], count: int, nt: int) -> "Batch":
-        """A batch of points that are still to be run."""
-        shapes = {o.name: (count, nt) if o.reduction == "series" else (count,) for o in outputs}
+    def empty(cls, outputs: Sequence[Output], count: int, nt: int, p: int = 0) -> "Batch":
+        """A batch of points that are still to be run; p: parameters of derivatives."""
+        shapes: dict[str, tuple[int, ...]] = {
+            o.name: (count, nt) if o.reduction == "series" else (count,) for o in outputs
+        }
+        if p:
+            shapes |= {derivative_name(name): (*shape, p) for name, shape in shapes.items()}
         values = {name: np.full(shape, np.nan) for name, shape in shapes.items()}
         return cls(np.zeros(count, dtype=np.int8), [""] * count, values)
 

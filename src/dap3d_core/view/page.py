@@ -73,6 +73,7 @@ def view(
     result: Any,
     *quantities: str,
     fps: float | None = None,
+    play: bool = False,
     model: str | os.PathLike[str] | None = None,
     allow_code: bool = False,
     progress: Callable[[int, int], None] | None = None,
@@ -87,6 +88,7 @@ def view(
         quantities: curves that are shown at first, such as ``crank.r.z``; more can be chosen in
             the page. By default energies, and motion of the first body; of a sweep its outputs.
         fps: frames a second of the page, nearest reported instants; by default every instant.
+        play: the scene moves as the page opens, unless its reader's system asks for less motion.
         model: the model (a name, a folder, a file) in whose folder meshes of shapes lie; of a
             sweep also that of its own types.
         allow_code: of a sweep: permits types of that model's ``plugin.py``.
@@ -103,10 +105,12 @@ def view(
     if hasattr(result, "data_vars"):  # a data set of xarray
         from dap3d_core.view.sweep_page import sweep_data
 
-        return View(sweep_data(result, quantities, fps, model=model, allow_code=allow_code,
-                               progress=progress, announce=announce))  # fmt: skip
-    require("result", Result, result)
-    return View(page_data(result, scene_of(result, model), quantities, fps))
+        data = sweep_data(result, quantities, fps, model=model, allow_code=allow_code,
+                          progress=progress, announce=announce)  # fmt: skip
+    else:
+        require("result", Result, result)
+        data = page_data(result, scene_of(result, model), quantities, fps)
+    return View(data | {"play": play})
 
 
 def _page(data: dict[str, Any]) -> str:

@@ -57,6 +57,7 @@ def page_data(
     return {
         "instants": len(index),
         "t": pack(shown.t, "<f8"),
+        "cuts": [event.t for event in result.events if event.kind != "record"],
         "poses": pack(Motion(shown).poses),
         **geometry,
         **arrows,

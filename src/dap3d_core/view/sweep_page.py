@@ -260,7 +260,9 @@ def _joined(
     common = {"stage": _stage(present), "scales": _scales(present)}
     first, data = {**present[0], **common}, points.data
     outputs = [
-        str(n) for n in data.data_vars if n not in ("status", "note") and "time" not in data[n].dims
+        str(n)
+        for n in data.data_vars
+        if n not in ("status", "note") and not {"time", "parameter"} & set(data[n].dims)
     ]
 
     def row(point: "xarray.Dataset", page: dict[str, Any] | None) -> dict[str, Any]:

@@ -20,8 +20,10 @@ from dap3d_core import interface, kernels
 from dap3d_core.cli.app import dap3d
 from dap3d_core.interface import hooks
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.scene import INTEGRATORS, METHODS, Simulation
-from dap3d_core.scene.scene import HEADER_KEYS, NAMED, TABLES, Animation, keys_of
+from dap3d_core.scene import Simulation
+from dap3d_core.scene.coerce import keys_of
+from dap3d_core.scene.tables import HEADER_KEYS, NAMED, TABLES, Animation
+from dap3d_core.settings import INTEGRATORS, METHODS
 
 DOCS = REPOSITORY / "docs"
 #: Members of a class that have docstrings of their own.
@@ -371,3 +373,21 @@ def test_formulas():
     assert "mathvariant" not in found
     with pytest.raises(ValueError, match="not understood"):
         mathml(r"a \unheardof b", "inline")
+
+
+def test_what_is_missing_is_named_by_distributions_that_an_extra_brings():
+    """An extra of dap3d itself may not be had where dap3d is installed from its repository."""
+    extras = tomllib.loads((REPOSITORY / "pyproject.toml").read_text())["project"]
+    brought = {re.split(r"[\[<>=;]", text)[0] for group in extras["optional-dependencies"].values()
+               for text in group}  # fmt: skip
+    command = re.compile(r"pip install (['\"]?[\w.\[\] -]*)")
+    ours = "dap3d[", "'dap3d[", '"dap3d['
+    for folder in ("src", "plugins", "docs/how-to", "docs/tutorials"):
+        for path in (REPOSITORY / folder).rglob("*"):
+            if path.suffix not in (".py", ".md"):
+                continue
+            for words in command.findall(path.read_text(encoding="utf-8")):
+                assert not words.startswith(ours), f"{path}: pip install {words}"
+    for words in ("sympy", "trimesh", "control", "xacrodoc", "ziglang", "tree-sitter",
+                  "tree-sitter-matlab", "cloudpickle", "dask", "distributed"):  # fmt: skip
+        assert words in brought

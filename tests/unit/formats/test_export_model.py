@@ -183,6 +183,40 @@ def test_joints_that_slide_may_start_anywhere_on_their_axis(tmp_path, keyword, f
         dap.export_model(scene, format="mjcf")
 
 
+@pytest.mark.parametrize(
+    ("joint", "keyword", "fields"),
+    [
+        ("axle", "rot_sda", {"k": 3.0, "c": 0.1, "theta_0": "-20 deg"}),
+        ("axle", "rot_friction", {"n_c": 0.3}),
+        ("way", "tran_sda", {"k": 30.0, "c": 0.1, "x_0": 0.2}),
+        ("way", "tran_friction", {"f_c": 0.3}),
+    ],
+)
+def test_angles_in_degrees_and_forces_that_name_a_joint_read_back(tmp_path, joint, keyword, fields):
+    """A wheel whose orientation is given by roll, pitch and yaw: accelerations are the same."""
+    yaw, roll = np.radians(30.0), np.radians(20.0)
+    lean = np.array([np.sin(yaw) * np.sin(roll), -np.cos(yaw) * np.sin(roll), np.cos(roll)])
+    scene = dap.Scene(name="short")
+    scene.add_body("block", mass=2.0, Jp=(0.2, 0.3, 0.4), r=(0.3, 0.0, 0.0), r_dot=(0.2, 0, 0))
+    scene.add_body("wheel", mass=1.0, Jp=(0.2, 0.3, 0.4), r=(0.3, 0.0, 1.0), r_dot=(0.2, 0, 0),
+                   rpy=("20 deg", 0.0, "30 deg"), w=0.7 * lean)  # fmt: skip
+    scene.add_point("P", "block", (0.0, 0.0, 1.0))
+    scene.add_vector("lean", "block", lean)
+    scene.add_joint("tran", "way", P_i="block.O", P_j="ground.O", a_j="ground.x")
+    axes = {"a_i": "wheel.z", "a_j": "lean"} if joint == "axle" else {}
+    scene.add_joint("rev" if axes else "sph", "axle", P_i="wheel.O", P_j="P", **axes)
+    scene.add_force(keyword, "force", joint=joint, **fields)
+    report = dap.export_model(scene, tmp_path / "a.xml", format="mjcf")
+    assert {one.text for one in report.left_out} <= {"initial velocities"}
+    back, _ = dap.import_model(tmp_path / "a.xml")
+    back.forces.pop("gravity", None)
+    starts = dap.compile(scene).model.u0, dap.compile(back).model.u0
+    np.testing.assert_allclose(starts[0][:14], starts[1][:14], rtol=0, atol=1e-14)
+    ends = [dap.compile(one).rhs(0.0, starts[0])[-12:] for one in (scene, back)]
+    assert np.abs(ends[0]).max() > 0.05
+    np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-12)
+
+
 def test_what_acts_in_a_closed_loop_is_listed():
     """An equality of MJCF, and a <constraint> of URDF, have no damper."""
     scene, _ = dap.import_model(DATA / "parallelogram.sdf")

@@ -12,7 +12,7 @@ from dap3d_core.model.rotations import rotation, to_body, to_global
 from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
 from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
-from dap3d_core.scene.scene import AnimationPoint
+from dap3d_core.scene.tables import AnimationPoint
 
 ZERO = (0.0, 0.0, 0.0)
 

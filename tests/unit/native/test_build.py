@@ -5,6 +5,7 @@ import subprocess
 import sys
 
 import pytest
+from support.binaries import macho_names, pe_names
 
 import dap3d_core as dap
 from dap3d_core.native import build
@@ -71,6 +72,7 @@ def compiler():
     return found
 
 
+@pytest.mark.slow
 def test_a_hundred_runs_in_eight_threads_are_clean_under_sanitizers(tmp_path, monkeypatch):
     run = dap.load_native(exported(tmp_path).path).start(0.5)
     for k in range(1, 11):
@@ -139,7 +141,7 @@ def test_the_shared_library_needs_the_c_library_alone(tmp_path):
 def test_without_a_compiler_it_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(build.shutil, "which", lambda name: None)
     monkeypatch.setattr(build.importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(dap.SceneError, match=r"no C compiler\s+pip install 'dap3d\[native\]'"):
+    with pytest.raises(dap.SceneError, match=r"no C compiler\s+pip install ziglang"):
         exported(tmp_path)
 
 
@@ -169,4 +171,17 @@ def test_libraries_of_other_platforms_are_linked_here(tmp_path, platform, begin)
     content = library.read_bytes()
     assert content.startswith(begin)
     assert b"dap3d_step_to" in content
+    if platform.startswith("windows"):
+        libraries, names = pe_names(content)
+        system = {"kernel32.dll", "msvcrt.dll", "ucrtbase.dll"}
+        assert all(n in system or n.startswith("api-ms-win-crt-") for n in libraries)
+    elif platform.startswith("macos"):
+        libraries, names = macho_names(content)
+        assert libraries == ["/usr/lib/libSystem.B.dylib"]
+        names = [name.removeprefix("_") for name in names]
+    else:
+        return
+    assert "dap3d_step_to" in names
+    assert all(name.startswith("dap3d_") for name in names)
+    assert "dap3d_outputs" not in names
     assert (made.path / platform / "libpen1.a").exists()

@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
+from support.bouncing import bouncing
 from tests.unit.native.test_export import SPRING, _written
 
 import dap3d_core as dap
@@ -47,6 +48,16 @@ def test_model_exchange_by_cvode_gives_the_motion(tmp_path, fmi):
         found = [np.interp(t, rows["time"], rows[f"coupler.r.{axis}"]) for axis in "xyz"]
         # CVode to 1e-8 a step, times of rows to the last digits
         np.testing.assert_allclose(found, r, rtol=0, atol=1e-6)
+
+
+@VERSIONS
+def test_velocities_jump_at_events_of_model_exchange(tmp_path, fmi):
+    """A ball from 1 m: at rest on top of the next flight, e^2 = 0.64 m, after V (1 + e)/g."""
+    made = written(bouncing(), tmp_path, fmi=fmi, outputs=["ball.r"])
+    t = np.sqrt(2.0 / 9.81) * 1.8
+    rows = fmpy.simulate_fmu(str(made.path), stop_time=t, output_interval=0.01, solver="CVode",
+                             fmi_type="ModelExchange", relative_tolerance=1e-8)  # fmt: skip
+    assert rows["ball.r.z"][-1] == pytest.approx(0.64, abs=1e-4)  # FMPy ends steps behind events
 
 
 @VERSIONS
@@ -100,6 +111,93 @@ def test_a_state_is_kept_and_serialised(tmp_path, fmi):
     assert get([reference]) == later
     fmu.reset()
     assert get([reference])[0] == pytest.approx(dap.compile(scene).model.r[0, 2], abs=1e-9)
+    fmu.terminate()
+    fmu.freeInstance()
+
+
+def begun(made, folder, fmi, kind="CoSimulation", **options):
+    """An instance of an FMU, and the references of its variables."""
+    description = fmpy.read_model_description(str(made.path))
+    unzipped = fmpy.extract(str(made.path), str(folder / "unzipped"))
+    arguments = {"unzipDirectory": unzipped, "guid": description.guid, "instanceName": "one",
+                 "modelIdentifier": description.coSimulation.modelIdentifier}  # fmt: skip
+    module = __import__(f"fmpy.fmi{fmi}", fromlist=["x"])
+    name = {"CoSimulation": "Slave", "ModelExchange": "Model"}[kind]
+    fmu = getattr(module, f"FMU{fmi}{name}")(**arguments)
+    fmu.instantiate(**options)
+    if fmi == 2:
+        fmu.setupExperiment(startTime=0.0, stopTime=5.0)
+        fmu.enterInitializationMode()
+    else:
+        fmu.enterInitializationMode(startTime=0.0, stopTime=5.0)
+    fmu.exitInitializationMode()
+    return fmu, {v.name: v.valueReference for v in description.modelVariables}
+
+
+@VERSIONS
+def test_directional_derivatives(tmp_path, fmi):
+    """m r'' = f - k r - c v with m = 2 kg, k = 40 N/m, c = 0.3 N s/m."""
+    made = written(_written(SPRING, tmp_path), tmp_path, fmi=fmi, outputs=["cart.rdd.x"])
+    fmu, at = begun(made, tmp_path, fmi)
+    unknowns = [at["der(state.cart.rd.x)"], at["cart.rdd.x"]]
+    knowns = [at["state.cart.r.x"], at["state.cart.rd.x"], at["push"]]
+    for seed, expected in (([1.0, 0.0, 0.0], -20.0), ([0.0, 1.0, 2.0], -0.15 + 1.0)):
+        found = fmu.getDirectionalDerivative(unknowns, knowns, seed)
+        assert list(found) == pytest.approx([expected] * 2, rel=1e-13)
+    fmu.terminate()
+    fmu.freeInstance()
+
+
+def test_event_mode_and_early_return(tmp_path):
+    """A function that takes another form at 0.4 s and 0.7 s: a step to 1 s ends there."""
+    scene = _written(SPRING, tmp_path)
+    scene.add_function("step", "push", x_start=0.4, x_end=0.7, f_start=6.0, f_end=0.0)
+    scene.add_force("f", "pushed", body_i="cart", f=(1.0, 0.0, 0.0), function="push")
+    made = written(scene, tmp_path, outputs=["cart.r.x"])
+    fmu, _ = begun(made, tmp_path, 3, eventModeUsed=True, earlyReturnAllowed=True)
+    needs, *_, next_event = fmu.updateDiscreteStates()
+    assert (needs, next_event) == (False, 0.4)
+    fmu.enterStepMode()
+    assert fmu.doStep(0.0, 0.3) == (False, False, False, 0.3)
+    assert fmu.doStep(0.3, 0.7) == (True, False, True, 0.4)
+    fmu.enterEventMode()
+    fmu.updateDiscreteStates()
+    fmu.enterStepMode()
+    assert fmu.doStep(0.4, 0.6) == (True, False, True, 0.7)
+    fmu.terminate()
+    fmu.freeInstance()
+
+
+def test_a_bounce_is_an_event_of_co_simulation(tmp_path):
+    made = written(bouncing(), tmp_path, outputs=["ball.r.z"])
+    fmu, _ = begun(made, tmp_path, 3, eventModeUsed=True)
+    fmu.enterStepMode()
+    assert [fmu.doStep(0.2 * k, 0.2)[0] for k in range(4)] == [False, False, True, False]
+    fmu.terminate()
+    fmu.freeInstance()
+
+
+def test_intermediate_updates_change_no_bit_and_may_end_a_step(tmp_path):
+    scene = dap.load("pen1")
+    made = written(scene, tmp_path, outputs=["cone.r"])
+    seen, ends = [], []
+
+    def update(_environment, t, _set, may_get, finished, can_return, early, when):
+        seen.append((t, may_get, finished, fmu.getFloat64([at["cone.r.x"]])[0]))
+        if ends and can_return:
+            early[0], when[0] = True, ends[0]
+
+    fmu, at = begun(made, tmp_path, 3, earlyReturnAllowed=True, intermediateUpdate=update)
+    assert fmu.doStep(0.0, 0.5)[3] == 0.5
+    times = [t for t, *_ in seen]
+    assert len(times) > 3
+    assert times == sorted(times)
+    assert times[-1] < 0.5
+    expected = dap.simulate(scene, t_end=5.0, dt=0.5).quantity("cone.r.x").values[1]
+    assert fmu.getFloat64([at["cone.r.x"]])[0] == expected
+    ends.append(0.75)
+    _, _, early, last = fmu.doStep(0.5, 0.5)
+    assert (early, last) == (True, 0.75)
     fmu.terminate()
     fmu.freeInstance()
 

@@ -18,7 +18,7 @@ from dap3d_core.report.error_norms import final_position_error, first_parting, t
 from dap3d_core.report.recommend import front, recommend
 from dap3d_core.report.settings_ladder import ADAPTIVE, ladder, ladder_of_steps
 from dap3d_core.report.timing import Bench
-from dap3d_core.scene.scene import FIXED_STEP
+from dap3d_core.settings import FIXED_STEP
 
 REQUIRED = {"method", "integrator", "time_s", "error", "energy_error", "constraint_error",
             "steps", "rejected", "rhs", "projections"}  # fmt: skip

@@ -78,6 +78,7 @@ def driven():
     return scene
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("make", "method"),
     [

@@ -100,6 +100,7 @@ def short_chunks(monkeypatch):
     monkeypatch.setattr("dap3d_core.simulation.compiled_model.MANY_BODIES", 16)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     "case", quickly(sorted(CASES, key=lambda case: case not in QUICK), len(QUICK))
 )

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from dap3d_core.simulation.redundancy.redundancy import Redundancy
 
 #: Violations below this are rounding.
-ROUNDING = 1e-10
+VIOLATION_ROUNDING = 1e-10
 
 
 @command(
@@ -179,7 +179,7 @@ def _show(console: "Terminal", compiled: "CompiledModel", data: dict[str, Any]) 
 
 def _violation(violation: dict[str, float], compiled: "CompiledModel") -> str:
     text = f"position {violation['position']:.2g}, velocity {violation['velocity']:.2g}"
-    if max(violation.values()) < ROUNDING:
+    if max(violation.values()) < VIOLATION_ROUNDING:
         return text
     corrects = compiled.scene.simulation.correct
     return f"{text}; {'a run corrects it' if corrects else 'correct is off: a run starts with it'}"

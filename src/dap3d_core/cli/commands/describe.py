@@ -13,6 +13,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
+    from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
     from dap3d_core.interface.codegen.type_info import TypeInfo
     from dap3d_core.registry import Registry
 
@@ -33,8 +34,9 @@ if TYPE_CHECKING:
 def describe(keyword: str, *, names: bool, source: bool, allow_code: bool, as_json: bool) -> int:
     """Explain the type with a KEYWORD: equations, fields, units, defaults, an example.
 
-    A keyword may belong to a joint, a force and a function; all of them are shown. Of a MODEL, what
-    its results have: bodies, coordinates of its joints, outputs; and its parameters.
+    A keyword may belong to a joint, a force and a function; all of them are shown. Names of other
+    programs, such as hinge or prismatic, lead to the type. Of a MODEL, what its results have:
+    bodies, coordinates of its joints, outputs; and its parameters.
     """
     import dap3d_core as dap
     from dap3d_core.cli.commands.describe_model import is_model, model_data, show_model
@@ -50,11 +52,15 @@ def describe(keyword: str, *, names: bool, source: bool, allow_code: bool, as_js
         else:
             show_model(stdout(), model)
         return DONE
-    types = [type_data(registry, kind, keyword) for kind in _kinds(registry, keyword)]
+    types = [type_data(registry, kind, word) for kind, word in _types(registry, keyword)]
     if as_json:
         print_json({"types": types})
         return DONE
     console = stdout()
+    if not _is_type(registry, keyword):
+        here = sorted({data["keyword"] for data in types})
+        console.say(f"{keyword} is called {' or '.join(here)} here.", whole=True)
+        console.print()
     for k, data in enumerate(types):
         if k:
             console.print()
@@ -70,20 +76,21 @@ def _is_type(registry: "Registry", keyword: str) -> bool:
     return any(registry.sources_of(kind, keyword) for kind in GROUPS)
 
 
-def _kinds(registry: "Registry", keyword: str) -> list[str]:
-    """The kinds that have a type of this keyword."""
+def _types(registry: "Registry", word: str) -> list[tuple[str, str]]:
+    """Kind and keyword of the types of a keyword, or of those with this other name."""
     from dap3d_core.cli.framework.error_messages import type_hint
     from dap3d_core.interface.hooks import GROUPS
 
     known = {kind: registry.keywords(kind) for kind in GROUPS}
-    kinds = [kind for kind in known if registry.sources_of(kind, keyword)]
-    if not kinds:
-        same = [k for kind in known if (k := registry.keyword_of_synonym(kind, keyword))]
-        every = same or sorted({k for keywords in known.values() for k in keywords})
-        hint = f"; did you mean {same[0]!r}?" if same else type_hint(keyword, every)
+    found = [(kind, word) for kind in known if registry.sources_of(kind, word)]
+    if not found:
+        same = {kind: registry.keyword_of_synonym(kind, word) for kind in known}
+        found = [(kind, keyword) for kind, keyword in same.items() if keyword]
+    if not found:
+        hint = type_hint(word, sorted({k for keywords in known.values() for k in keywords}))
         lists = "; ".join(f"{kind}s: {', '.join(all_) or 'none'}" for kind, all_ in known.items())
-        raise Refused(f"there is no type {keyword!r}{hint} ({lists})")
-    return kinds
+        raise Refused(f"there is no type {word!r}{hint} ({lists})")
+    return found
 
 
 # ---------------------------------------------------------------------------- data
@@ -112,6 +119,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
         "file": where_is(type_).removesuffix(f": {type_.__name__}"),
         "bodies": list(type_info.layout.slots),
         "states": type_.state_lengths(),
+        "synonyms": list(type_.synonyms),
         **_class_data(type_info),
         "fields": [
             {
@@ -126,15 +134,7 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
             for name, spec in specs_of(type_).items()
             if spec.given
         ],
-        "names": [
-            {
-                "name": argument.name,
-                "shape": list(argument.shape),
-                "level": "velocity" if argument.velocity else "position",
-                "doc": argument.doc,
-            }
-            for argument in type_info.names.values()
-        ],
+        "names": list(map(_name_data, type_info.names.values())),
         "variants": [
             {"with": dict(conditions), "class": e.type.__name__, **_class_data(e)}
             for conditions, e in type_info.variants
@@ -147,6 +147,16 @@ def type_data(registry: "Registry", kind: str, keyword: str) -> dict[str, Any]:
             else {}
         ),
         **({"arguments": type_.arguments} if kind == "function" else {}),
+    }
+
+
+def _name_data(argument: "KernelArgument") -> dict[str, Any]:
+    """A name that kernels may use."""
+    return {
+        "name": argument.name,
+        "shape": list(argument.shape),
+        "level": "velocity" if argument.velocity else "position",
+        "doc": argument.doc,
     }
 
 
@@ -229,6 +239,8 @@ def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
     if data["kind"] == "joint":
         pairs[:1] = [("rows", rows_text(data)), ("bodies", bodies_text(data))]
         pairs[2:2] = [("motion", motion_text(motion)) for motion in data["motions"]]
+    if data["synonyms"]:
+        pairs.append(("called", ", ".join(data["synonyms"]) + " elsewhere"))
     if data["states"]:
         pairs.append(("states", states_text(data["states"])))
     console.facts(pairs)

@@ -1,6 +1,7 @@
 """Example of a type: a complete scene, made from the fields of the type, that runs."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -56,6 +57,18 @@ def _has_friction(type_info: "TypeInfo") -> bool:
     return kernel is not None and ("radius" in own or "radius" not in parameters(kernel))
 
 
+def _is_joint_for(spec: Any, fields: Mapping[str, Any], joint: "TypeInfo") -> bool:
+    """True for a joint with as many rows as a field takes, and the points and axes of its type."""
+    from dap3d_core.interface.fields import specs_of
+
+    if spec.rows is None:
+        return _has_friction(joint)
+    places = {name for name, other in fields.items() if other.kind in ("point", "vector")}
+    own = specs_of(joint.type)
+    is_sized = any(field.size for field in own.values())
+    return not is_sized and joint.row_count == spec.rows and places <= own.keys()
+
+
 class _Example:
     """The tables of a scene file, added as elements need them."""
 
@@ -103,6 +116,8 @@ class _Example:
             for body in PLACES if own else ():
                 if own.startswith(f'"{body}.'):
                     self._body_named(body)
+            if spec.kind == "joint":
+                self.add(self.first("joint", partial(_is_joint_for, spec, specs)), "J1")
             values = self._values(field, spec, owners, motor) if own is None else [(field, own)]
             for key, value in values:
                 line = f"{key} = {value}"
@@ -144,7 +159,6 @@ class _Example:
             self.elements["input.command"] = "[inputs.command]\nvalue = 1.0\n"
             yield name, '"command"'
         elif spec.kind == "joint":
-            self.add(self.first("joint", _has_friction), "J1")
             yield name, '"J1"'
         elif spec.kind == "choice" and spec.required:
             yield name, _toml(spec.choices[0])

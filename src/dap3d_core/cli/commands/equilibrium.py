@@ -22,7 +22,7 @@ MOST_ROWS = 12
 #: Suffixes of pictures, which are no names for a scene.
 PICTURES = (".png", ".svg", ".pdf")
 #: Smaller numbers, as parts of the largest of a table, are printed as zero.
-ROUNDING = 1e-12
+PRINTED_AS_ZERO = 1e-12
 #: Points and columns that are printed.
 MOST_POINTS, MOST_COLUMNS = 60, 4
 #: How a path ends, in words.
@@ -211,7 +211,7 @@ def _show_vectors(console: "Terminal", heading: str, rows: list[tuple[str, str, 
     console.title(heading)
     largest = max(float(np.max(np.abs(vector))) for *_, vector in rows)
     cells = [
-        (name, what, *(f"{x:.6g}" if abs(x) > ROUNDING * largest else "0" for x in vector))
+        (name, what, *(f"{x:.6g}" if abs(x) > PRINTED_AS_ZERO * largest else "0" for x in vector))
         for name, what, vector in rows
     ]
     console.table(("", "", "x", "y", "z"), cells[:MOST_ROWS], right=(2, 3, 4))
@@ -310,5 +310,5 @@ def _columns(path: "EquilibriumPath", name: str) -> list[tuple[str, Any]]:
     quantity = path.quantity(name)
     labels = [f"{name}.{c}" for c in quantity.components] or [name]
     columns = quantity.values.reshape(len(path.values), -1).T
-    rounded = [np.where(np.abs(x) > ROUNDING * np.max(np.abs(x)), x, 0.0) for x in columns]
+    rounded = [np.where(np.abs(x) > PRINTED_AS_ZERO * np.max(np.abs(x)), x, 0.0) for x in columns]
     return list(zip(labels, rounded, strict=True))

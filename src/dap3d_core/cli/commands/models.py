@@ -39,7 +39,7 @@ def _data(folder: Path) -> dict[str, Any]:
     """A model as data; only its scene file is read."""
     from dap3d_core.scene import SceneError, load
     from dap3d_core.scene.files.read_toml import group_of
-    from dap3d_core.scene.scene import PLUGIN_FILE
+    from dap3d_core.scene.tables import PLUGIN_FILE
 
     data = {"group": group_of(folder), "folder": folder}
     try:

@@ -146,8 +146,8 @@ def _article(kind: str) -> str:
 
 def _built_in(kind: str) -> Collection[str]:
     """Words that scenes and commands take for dap3d's own, whatever packages bring."""
-    from dap3d_core.scene import INTEGRATORS
     from dap3d_core.scene.validate.shapes import SHAPES
+    from dap3d_core.settings import INTEGRATORS
 
     return {"integrator": INTEGRATORS, "shape": SHAPES}.get(kind, ())
 

@@ -68,7 +68,7 @@ def _ask_number(question: str, usual: Any, **bounds: Any) -> float:
 
 def _ask_method(usual: str) -> str:
     """The formulation; its first letters are enough, as in the manual."""
-    from dap3d_core.scene import METHODS
+    from dap3d_core.settings import METHODS
 
     def read(text: str) -> str:
         matches = [m for m in METHODS if m.startswith(text.strip().lower())]

@@ -40,6 +40,8 @@ OPTIONS = {"vary": "--vary", "outputs": "--keep"} | {
                  help="How samples are drawn: lhs (by default), random, sobol, halton."),
     click.option("--seed", type=int, metavar="S", help="Seed of the samples; 0 by default."),
     options.output("File of the sweep; MODEL-sweep.nc in the current folder by default."),
+    click.option("--gradients", is_flag=True,
+                 help="Derivatives of the outputs by what varies, too, at each point."),
     *options.SETTING_OPTIONS.values(),
     click.option("--threads", type=int, metavar="N",
                  help="Points that run at once; by default one for each core."),

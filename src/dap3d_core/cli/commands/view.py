@@ -20,6 +20,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
                  help="A curve that is drawn at once; may be given several times."),
     options.FPS, options.MODEL_OF_RESULT, options.ALLOW_CODE,
     click.option("--open/--no-open", "opens", default=False, help="Open the page in a browser."),
+    click.option("--play", is_flag=True, help="Let the scene move as the page opens."),
     options.FORCE, options.JSON, options.QUIET,
     saves=True,
 )  # fmt: skip
@@ -35,6 +36,7 @@ def view(
     model: str | None,
     allow_code: bool,
     opens: bool,
+    play: bool,
     force: bool,
     as_json: bool,
     quiet: bool,
@@ -69,7 +71,7 @@ def view(
         refusing(UnknownNameError, ValueError),
     ):
         count = signals_of(ctx).interruptible(progress.count)
-        page = make_view(data, *quantities, fps=fps, model=model, allow_code=allow_code,
+        page = make_view(data, *quantities, fps=fps, play=play, model=model, allow_code=allow_code,
                          progress=count, announce=progress.announce)  # fmt: skip
     page.save(target, force=force)
     about = {"instants": page.instants, "quantities": list(page.data["asked"])}

@@ -75,7 +75,7 @@ def _point(
     for name, coordinate in dataset.coords.items():
         if set(coordinate.dims) <= places.keys():
             place = tuple(places[dimension] for dimension in coordinate.dims)
-            point[str(name)] = float(coordinate.values[place])
+            point[str(name)] = coordinate.values[place].item()
     return point
 
 
@@ -126,7 +126,8 @@ def show_failing(console: Terminal, data: dict[str, Any], others: str) -> None:
 
 def _in_words(at: dict[str, Any]) -> str:
     """A point in words."""
-    return ", ".join(f"point {v}" if k == "point" else f"{k} = {v:.6g}" for k, v in at.items())
+    shown = {k: v if isinstance(v, str) else f"{v:.6g}" for k, v in at.items()}
+    return ", ".join(f"point {v}" if k == "point" else f"{k} = {v}" for k, v in shown.items())
 
 
 def _design(data: dict[str, Any]) -> str:

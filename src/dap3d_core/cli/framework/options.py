@@ -9,6 +9,8 @@ import click
 from dap3d_core.cli.framework import completion
 from dap3d_core.cli.framework.command import Option
 from dap3d_core.cli.process.exit_codes import Refused
+from dap3d_core.settings import SETTINGS as ALL_SETTINGS
+from dap3d_core.settings import Setting
 
 if TYPE_CHECKING:
     from dap3d_core.scene import Scene, SceneError
@@ -77,41 +79,25 @@ class Seconds(click.ParamType):  # type: ignore[type-arg]
         return seconds
 
 
-#: Settings of a run that the command line overrides: name in the scene -> option.
-SETTING_OPTIONS = {
-    "t_end": click.option("--t-end", type=float, metavar="S",
-                          help="Final time in s; 0 solves once at t = 0."),
-    "dt": click.option("--dt", type=float, metavar="S", help="Reporting step in s."),
-    "method": click.option("--method", metavar="NAME",
-                           help="Formulation: auto, unconstrained, standard, penalty, lsq, joint."),
-    "integrator": click.option(
-        "--integrator", metavar="NAME",
-        help="dop853, dopri5, adams, radau for stiff scenes, or rk4 with --step."),
-    "rtol": click.option("--rtol", type=float, metavar="X", help="Relative tolerance."),
-    "atol": click.option(
-        "--atol", type=Tolerance(), metavar="X",
-        help="Absolute tolerance: a number, or r=1e-12,p=1e-10,v=1e-12,w=1e-10 or some."),
-    "step": click.option("--step", type=float, metavar="S",
-                         help="Fixed step in s, without error control."),
-    "correct": click.option(
-        "--correct/--no-correct", default=None,
-        help="Correct the initial conditions so that they fulfil the constraints."),
-    "correct_metric": click.option(
-        "--correct-metric", type=click.Choice(["unit", "mass"]), default=None,
-        help="The smallest correction is that in m and rad, or weighted by masses."),
-    "start": click.option(
-        "--start", type=click.Choice(["scene", "equilibrium"]), default=None,
-        help="Start from the scene's initial conditions, or where they come to rest."),
-    "contact": click.option(
-        "--contact", type=click.Choice(["auto", "events", "stepping"]), default=None,
-        help="Follow contacts by events, exact, or by stepping, for any number of them."),
-    "contact_step": click.option("--contact-step", type=float, metavar="S",
-                                 help="Step of --contact stepping in s; 1e-3 by default."),
-    "project": click.option("--project/--no-project", default=None,
-                            help="Project every step onto the constraints."),
-}  # fmt: skip
-#: Names of these options.
-SETTINGS = {name: f"--{name.replace('_', '-')}" for name in SETTING_OPTIONS}
+def _setting(setting: Setting) -> Option:
+    """The option of a setting of a run."""
+    text = f"{setting.text[0].upper()}{setting.text[1:]}."
+    if setting.kind == "truth":
+        flags = f"{setting.option}/--no-{setting.option[2:]}"
+        return click.option(flags, default=None, help=text)
+    if setting.kind in ("word", "integrator"):  # those of packages are checked with the scene
+        if setting.name in ("method", "integrator"):
+            return click.option(setting.option, metavar="NAME", help=text)
+        return click.option(setting.option, type=click.Choice(setting.words), help=text)
+    if setting.kind == "tolerance":
+        return click.option(setting.option, type=Tolerance(), metavar="X", help=text)
+    metavar = "S" if setting.kind in ("end", "time") else "X"
+    return click.option(setting.option, type=float, metavar=metavar, help=text)
+
+
+#: Settings of a run that the command line overrides: name in the scene -> option, its name.
+SETTING_OPTIONS = {n: _setting(one) for n, one in ALL_SETTINGS.items() if one.on_command_line}
+SETTINGS = {name: ALL_SETTINGS[name].option for name in SETTING_OPTIONS}
 
 RESULT = click.argument("result", type=click.Path())
 MODEL = click.argument("model", shell_complete=completion.models)

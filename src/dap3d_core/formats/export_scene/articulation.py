@@ -21,7 +21,8 @@ from dap3d_core.interface.formats.articulation import (
 from dap3d_core.interface.formats.frames import Frame, axis_angle, from_quaternion, quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.scene.scene import GROUND, Element, Scene
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import GROUND, Element
 
 #: Kinds of joints whose points may be apart along the axis.
 SLIDERS = ("prismatic", "cylindrical")
@@ -224,15 +225,19 @@ def _joint_along(
 def _of_hinge(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:
     """The joint of a torsional spring, the sense of its angle, and the angle where q = 0."""
     elements, fields = builder.elements, element.fields
-    (i, v_i), (j, v_j) = (elements.vector(fields[key]) for key in ("v_i", "v_j"))
+    marks = [elements.vector(fields[key]) for key in ("v_i", "v_j") if key in fields]
+    i, j = [on for on, _ in marks] or [fields["body_i"], fields["body_j"]]
     found = _joint_along(builder, "revolute", {i, j}, fields["axis"])
     if found is None:
         return None
     joint, along = found
-    on, u = elements.vector(fields["axis"])
-    here, there = elements.turn(on, i) @ v_i, elements.turn(on, j) @ v_j
-    theta = float(np.arctan2(u @ np.cross(here, there), here @ there - (here @ u) * (there @ u)))
-    return builder.placed[joint.name], along * (-1.0 if i == joint.body_i else 1.0), theta
+    sense, theta = along * (-1.0 if i == joint.body_i else 1.0), 0.0
+    if marks:
+        on, u = elements.vector(fields["axis"])
+        here, there = elements.turn(on, i) @ marks[0][1], elements.turn(on, j) @ marks[1][1]
+        sine, cosine = u @ np.cross(here, there), here @ there - (here @ u) * (there @ u)
+        theta = float(np.arctan2(sine, cosine))
+    return builder.placed[joint.name], sense, theta
 
 
 def _of_slider(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:

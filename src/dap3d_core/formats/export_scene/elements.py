@@ -8,7 +8,8 @@ import numpy as np
 from dap3d_core.interface.formats.frames import Frame, from_quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.scene.scene import GROUND, Element, Scene
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import GROUND, Element
 
 #: Type of a joint of a scene -> kind of a joint of a model.
 KINDS = {"rev": "revolute", "tran": "prismatic", "sph": "ball", "cyl": "cylindrical",

@@ -7,7 +7,7 @@ from dap3d_core.formats.export_scene.elements import SceneElements
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint
 from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.interface.formats.remarks import Remarks
-from dap3d_core.scene.scene import GROUND
+from dap3d_core.scene.tables import GROUND
 
 
 @attrs.define(eq=False)

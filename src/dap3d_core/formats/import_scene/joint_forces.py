@@ -12,7 +12,7 @@ from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.interface.formats.articulation import Articulation, Joint, Limits
 from dap3d_core.interface.formats.frames import quaternion
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.scene.scene import GROUND
+from dap3d_core.scene.tables import GROUND
 
 #: Time constant of stops where the format says no stiffness: of soft ones, and of contact at rest
 #: at hard ones, s. Critically damped, what they stop stands still within some of it.

@@ -3,7 +3,7 @@
 import attrs
 
 from dap3d_core.interface.formats.remarks import Place, Remarks
-from dap3d_core.scene.scene import fault_of_name
+from dap3d_core.scene.tables import fault_of_name
 
 
 @attrs.define

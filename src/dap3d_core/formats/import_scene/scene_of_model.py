@@ -20,7 +20,8 @@ from dap3d_core.interface.formats.frames import IDENTITY, quaternion
 from dap3d_core.interface.formats.joint_inertia import JointInertia
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.scene.scene import GROUND, Scene
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import GROUND
 
 #: Steps of a settled result: a model does not say how long to simulate.
 DURATION, STEP = 1.0, 0.01

@@ -5,8 +5,6 @@
 
 from typing import Any
 
-import numpy as np
-
 from dap3d_core.assembly.arrays import (
     ANGLE,
     DOUBTFUL,
@@ -16,7 +14,7 @@ from dap3d_core.assembly.arrays import (
     Floats,
     System,
 )
-from dap3d_core.assembly.evaluate import call_kinds, place, place_state, rates, state_rates
+from dap3d_core.assembly.evaluate import call_kinds, place, place_state
 from dap3d_core.assembly.turns import (
     doubtful_angles,
     has_measured,
@@ -24,7 +22,6 @@ from dap3d_core.assembly.turns import (
     measure_all,
     needs_places,
 )
-from dap3d_core.formulations.regularised import accelerate
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 
 
@@ -75,29 +72,3 @@ def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     place(t, y, system, loops)
     place_of_next[0] = 0.0
     call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, place_of_next)
-
-
-@compiled
-def watch_contacts(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """As ``watch``, where switches of contacts read multipliers."""
-    place_of_next, watched = system.settings[SCRATCH : SCRATCH + 1], system.watched
-    watched[1] = accelerate(t, y, system, loops)
-    watched[0] = t
-    for k in range(y.shape[0]):
-        watched[2 + k] = y[k]
-    place_of_next[0] = 0.0
-    call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, system.multipliers)
-
-
-@compiled
-def contact_rates(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """As ``rhs`` of lsq.py; where switches were read last at this state, it is solved already."""
-    watched = system.watched
-    is_known = watched[0] == t
-    for k in range(y.shape[0]):
-        is_known &= watched[2 + k] == y[k]
-    power = watched[1] if is_known else accelerate(t, y, system, loops)
-    watched[0] = np.inf - np.inf  # once: numbers of the scene may change
-    rates(y, system.metric, system.acceleration, out)
-    state_rates(t, out, system, loops)
-    out[out.shape[0] - 1] = power

@@ -21,7 +21,7 @@ from dap3d_core.kernels.runtime.cache import compiled
 SWEEPS, TRIES = 50, 6
 FIRST = 5
 #: Newton passes, halvings of a step in one, and where it stands at rounding.
-PASSES, CUTS, ROUNDING = 50, 12, 1e-15
+PASSES, CUTS, RESIDUAL_ROUNDING = 50, 12, 1e-15
 #: Of the scale of the solution: a problem counts as solved.
 SOLVED = 1e-12
 TINY = 1e-300
@@ -55,20 +55,34 @@ def solve_cone(
     return x, left / scale
 
 
-def _project(z: Floats, radius: Floats) -> Floats:
-    size = np.hypot(z[..., 0], z[..., 1])
-    factor = np.where(size > radius, radius / np.where(size > 0.0, size, 1.0), 1.0)
-    projected: Floats = z * factor[..., None]
-    return projected
-
-
-def _residual(x: Floats, u: Floats, mu: Floats, r: Floats, more: Floats) -> Floats:
-    X, U = x.reshape(-1, 3), u.reshape(-1, 3)
-    F = np.empty_like(X)
-    F[:, 0] = X[:, 0] - np.maximum(0.0, X[:, 0] - r * U[:, 0])
-    radius = mu * np.maximum(X[:, 0] + more, 0.0)
-    F[:, 1:] = X[:, 1:] - _project(X[:, 1:] - r[:, None] * U[:, 1:], radius)
-    return F.ravel()
+@compiled
+def residual_of(
+    A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats, F: Floats, S: Floats
+) -> None:
+    """The residual F of the equations at x, and a generalised derivative S of it, unless empty."""
+    size = x.shape[0]
+    for c in range(mu.shape[0]):
+        k = 3 * c
+        z0, z1, z2 = x[k] - r[c] * b[k], x[k + 1] - r[c] * b[k + 1], x[k + 2] - r[c] * b[k + 2]
+        for q in range(size):
+            z0 -= r[c] * A[k, q] * x[q]
+            z1 -= r[c] * A[k + 1, q] * x[q]
+            z2 -= r[c] * A[k + 2, q] * x[q]
+        radius, length = mu[c] * max(x[k] + more[c], 0.0), np.sqrt(z1 * z1 + z2 * z2)
+        part = radius / length if length > radius else 1.0
+        F[k] = x[k] - max(0.0, z0)
+        F[k + 1], F[k + 2] = x[k + 1] - part * z1, x[k + 2] - part * z2
+        if S.shape[0] == 0:
+            continue
+        d1, d2 = (z1 / length, z2 / length) if length > radius else (0.0, 0.0)
+        rim = mu[c] if x[k] + more[c] > 0.0 else 0.0
+        for q in range(size):
+            own0, own1, own2 = float(q == k), float(q == k + 1), float(q == k + 2)
+            s1, s2 = own1 - r[c] * A[k + 1, q], own2 - r[c] * A[k + 2, q]
+            along = d1 * s1 + d2 * s2
+            S[k, q] = r[c] * A[k, q] if z0 > 0.0 else own0
+            S[k + 1, q] = own1 - part * (s1 - along * d1) - rim * d1 * own0
+            S[k + 2, q] = own2 - part * (s2 - along * d2) - rim * d2 * own0
 
 
 @compiled
@@ -97,46 +111,27 @@ def sweep(
             x[k], x[k + 1], x[k + 2] = n, z1, z2
         for q in range(size):
             largest = max(largest, abs(x[q]))
-        if change <= ROUNDING * (largest + TINY):
+        if change <= RESIDUAL_ROUNDING * (largest + TINY):
             break
-
-
-def _slopes(A: Floats, x: Floats, u: Floats, mu: Floats, r: Floats, more: Floats) -> Floats:
-    """A generalised derivative of the residual."""
-    unit = np.eye(len(x))
-    found = unit.copy()
-    for c in range(len(mu)):
-        k = 3 * c
-        if x[k] - r[c] * u[k] > 0.0:
-            found[k] = r[c] * A[k]
-        t = slice(k + 1, k + 3)
-        z, dz = x[t] - r[c] * u[t], unit[t] - r[c] * A[t]
-        size, radius = float(np.hypot(*z)), mu[c] * max(x[k] + more[c], 0.0)
-        if size <= radius:
-            found[t] -= dz
-        elif size > 0.0:
-            d = z / size
-            found[t] -= radius / size * (np.eye(2) - np.outer(d, d)) @ dz
-            if x[k] + more[c] > 0.0:
-                found[t] -= mu[c] * np.outer(d, unit[k])
-    return found
 
 
 def _newton(
     A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats
 ) -> tuple[Floats, float]:
     """Semismooth Newton with a line search; x and its residual."""
-    best = float(np.abs(_residual(x, A @ x + b, mu, r, more)).max())
+    F, S, none = np.empty_like(x), np.empty_like(A), np.empty((0, 0))
     least = float(np.abs(b / np.maximum(np.diag(A), TINY)).max())
+    residual_of(A, b, mu, x, r, more, F, none)
+    best = float(np.abs(F).max())
     for _ in range(PASSES):
-        if best <= ROUNDING * (float(np.abs(x).max()) + least + TINY):
+        if best <= RESIDUAL_ROUNDING * (float(np.abs(x).max()) + least + TINY):
             break
-        u = A @ x + b
-        F = _residual(x, u, mu, r, more)
-        step = np.linalg.lstsq(_slopes(A, x, u, mu, r, more), -F, rcond=1e-13)[0]
+        residual_of(A, b, mu, x, r, more, F, S)
+        step = np.linalg.lstsq(S, -F, rcond=1e-13)[0]
         for cut in range(CUTS):
             new = x + step * 0.5**cut
-            size = float(np.abs(_residual(new, A @ new + b, mu, r, more)).max())
+            residual_of(A, b, mu, new, r, more, F, none)
+            size = float(np.abs(F).max())
             if size < best:
                 x, best = new, size
                 break

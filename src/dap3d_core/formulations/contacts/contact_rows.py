@@ -4,6 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
+from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -14,7 +15,7 @@ from dap3d_core.model.state_layout import split
 #: Numbers that the kernel ``tension`` of a contact returns (interface/contacts/rows.py).
 GAP, NORMAL = 0, 1
 FRICTION, SLIP, PLACE = slice(2, 5), slice(5, 8), slice(8, 11)
-WIDTH = 11
+REACH, FORCE, WIDTH = 11, slice(12, 15), 15
 
 
 class ContactTable:
@@ -81,7 +82,7 @@ class ContactRows:
 
     Attributes:
         v: (6 n,) velocities; M, inverse: (6 n, 6 n) masses and their inverse, global axes.
-        G: (3 m, 6 n) rows, normal first; gamma: (3 m,) their right-hand sides.
+        G: (3 m, 6 n) rows, normal first.
         frames: (m, 3, 3) normal and tangents.
         P: (6 n, 6 n) changes of velocity by impulses, with the joints held.
     """
@@ -91,15 +92,12 @@ class ContactRows:
         """Args: the contacts; time and state u (13 n,). States of the evaluator stay."""
         evaluator, self.t, self.u = table.evaluator, t, u
         self._table, model = table, evaluator.model
-        self.states = states = evaluator.states
-        stuck = states.copy()
-        stuck[table.mode], stuck[table.near.ravel()] = 2.0, 0.0
-        evaluator.states = stuck
-        rows = evaluator.rows(t, u)
-        evaluator.states = states
+        self.states = evaluator.states
+        rows = self._stuck(u)
         D, own = rows.dense(), model.joint_row_count
-        self.D, self.G, self.gamma = D[:own], D[own:], rows.gamma[own:]
+        self.D, self.G = D[:own], D[own:]
         self.C = rows.C[own:].reshape(-1, 3)[:, 0]
+        self._free: Floats | None = None
         _, p, v, w = split(u)
         self.v = np.hstack([v, w]).ravel()
         n = model.body_count
@@ -127,17 +125,33 @@ class ContactRows:
             found[k] = sign * blocks[k, :, body - 1]
         return found
 
-    @cached_property
-    def free(self) -> Floats:
-        """(3 m,) rates of slip where all contacts are open, joints held, forces acting."""
+    def _stuck(self, u: Floats) -> ConstraintRows:
+        """The rows at a state u (13 n,), as if all contacts stuck."""
         evaluator, table = self._table.evaluator, self._table
-        apart = self.states.copy()
-        apart[table.mode] = 0.0
-        evaluator.states = apart
-        v_dot = evaluator.report(self.t, self.with_velocities(self.v))[: len(self.v)]
+        stuck = self.states.copy()
+        stuck[table.mode], stuck[table.near.ravel()] = 2.0, 0.0
+        evaluator.states = stuck
+        rows = evaluator.rows(self.t, u)
         evaluator.states = self.states
-        rates: Floats = self.G @ v_dot - self.gamma
-        return rates
+        return rows
+
+    @property
+    def free(self) -> Floats:
+        """(3 m,) rates of slip at these velocities, where all contacts are open, joints held."""
+        if self._free is None:
+            evaluator, table = self._table.evaluator, self._table
+            u, apart = self.with_velocities(self.v), self.states.copy()
+            gamma = self._stuck(u).gamma[table.evaluator.model.joint_row_count :]
+            apart[table.mode] = 0.0
+            evaluator.states = apart
+            v_dot = evaluator.report(self.t, u)[: len(self.v)]
+            evaluator.states = self.states
+            self._free = self.G @ v_dot - gamma
+        return self._free
+
+    def change(self, dv: Floats) -> None:
+        """Change the velocities by dv (6 n,)."""
+        self.v, self._free = self.v + dv, None
 
     @property
     def slip(self) -> Floats:
@@ -153,7 +167,7 @@ class ContactRows:
 
     def kick(self, x: Floats) -> None:
         """Let impulses (3 m,) act."""
-        self.v = self.v + self.P @ self.G.T @ x
+        self.change(self.P @ self.G.T @ x)
 
     def lifted(
         self, values: Floats, held: list[int], others: list[int], slack: float = 0.0

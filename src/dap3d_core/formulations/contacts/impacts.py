@@ -23,6 +23,10 @@ ROUNDS = 500
 LAST_HEIGHT = 1e-13
 
 
+#: Contacts that answer in a round, and coefficients of restitution of all.
+Round = tuple[list[int], Floats]
+
+
 @attrs.frozen
 class Impact:
     """What impacts at one instant did.
@@ -32,16 +36,33 @@ class Impact:
         work: (m,) J, of the impulses of each contact.
         exchanged: J, sum of the magnitudes of its parts.
         rest: contact -> s from now on until its bounces end.
+        rounds: the contacts of each, and the coefficients of restitution of all.
+        low: contacts that are held, as they would be back at once.
     """
 
     impulses: Floats
     work: Floats
     exchanged: float
     rest: dict[int, float]
+    rounds: list[Round]
+    low: list[int]
+
+
+def repeat(table: ContactTable, rows: ContactRows, impact: Impact) -> Impact:
+    """The rounds of an impact once more, of the same contacts, from other velocities."""
+    work = 0.0
+    for taking, e in impact.rounds:
+        x = _impulses(table, rows, taking, np.where(e > 0.0, table.e, 0.0))
+        before = rows.slip[taking]
+        rows.kick(_spread(x, taking, table.count))
+        work += float(np.sum(x.reshape(-1, 3) * 0.5 * (before + rows.slip[taking])))
+    _hold_low(rows, impact.low, [])
+    return attrs.evolve(impact, work=np.array([work]))
 
 
 def collide(table: ContactTable, rows: ContactRows, touching: list[int], length: float) -> Impact:
     """Let the contacts that touch collide until none approaches; velocities of ``rows`` follow."""
+    rounds: list[Round] = []
     impulses, rest = np.zeros((table.count, 3)), dict[int, float]()
     work, exchanged = np.zeros(table.count), 0.0
     e = table.e.copy()
@@ -60,23 +81,29 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
             rest |= short
             e[list(short)] = 0.0
             continue
+        rounds.append((taking, of.copy()))
         parts = x.reshape(-1, 3) * 0.5 * slip[taking]
         rows.kick(_spread(x, taking, table.count))
         after = x.reshape(-1, 3) * 0.5 * rows.slip[taking]
         work[taking] += np.sum(parts + after, axis=1)
         exchanged += float(np.sum(np.abs(parts)) + np.sum(np.abs(after)))
         impulses[taking] += x.reshape(-1, 3)
-    _stop_low_rocking(rows, touching, length)
-    return Impact(impulses, work, exchanged, rest)
+    low = _stop_low_rocking(rows, touching, length)
+    return Impact(impulses, work, exchanged, rest, rounds, low)
 
 
-def _stop_low_rocking(rows: ContactRows, touching: list[int], length: float) -> None:
-    """Hold what would be back from a height too low to tell from rest, as of rocking."""
+def _stop_low_rocking(rows: ContactRows, touching: list[int], length: float) -> list[int]:
+    """Hold what would be back from a height too low to tell from rest, as of rocking: which."""
     v, a = rows.slip[:, 0], -rows.free[::3]
     limit = 2.0 * LAST_HEIGHT * length * a
     low = [c for c in touching if v[c] > AT_REST * length and v[c] ** 2 < limit[c]]
+    _hold_low(rows, low, [c for c in touching if c not in low])
+    return low
+
+
+def _hold_low(rows: ContactRows, low: list[int], others: list[int]) -> None:
     if low:
-        rows.v = rows.v + rows.lifted(v, low, [c for c in touching if c not in low])
+        rows.change(rows.lifted(rows.slip[:, 0], low, others))
 
 
 def _spread(x: Floats, contacts: list[int], count: int) -> Floats:

@@ -92,7 +92,7 @@ def _put_modes(
     if left or any(c in sliding for c in closed):
         # of contacts that share, one at the end of its cone may only have to carry less
         inner = _inside(table, rows, closed, {}, limit)
-        if inner is not None:
+        if inner is not None and all(inner[3 * closed.index(c)] > ZERO * inner.max() for c in left):
             _put(table, rows, closed, {}, limit, found, inner)
             return
         which = rows.rows_of(closed)
@@ -102,7 +102,7 @@ def _put_modes(
             return
     without = [c for c in closed if c not in left]
     if left and without:
-        x, *_ = _solve(table, rows, without, sliding, limit)
+        x, _ = _solve(table, rows, without, *_matrix(table, rows, without, sliding, limit))
         big = float(np.abs(rows.free).max()) + 1e-300
         rates = _rates(rows, without, x, left)
         closed = without if all(rate >= -ZERO * big for rate in rates) else closed
@@ -135,21 +135,30 @@ def _ways(
     return found
 
 
-def _solve(
+def _matrix(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float, part: float = 1.0, *, loose: bool = False, **more: Any,
-) -> tuple[Floats, Floats, Floats, dict[int, Floats]]:  # fmt: skip
-    """Forces (3 k,) with sliding friction, the matrix, accelerations, and directions of sliding."""
+    limit: float,
+) -> tuple[Floats, dict[int, Floats]]:  # fmt: skip
+    """Rates by forces, those along normals with sliding friction, and directions of sliding."""
     which = rows.rows_of(closed)
-    full, b = rows.W[np.ix_(which, which)], rows.free[which]
-    A, mu = full.copy(), LOOSE * table.mu[closed] if loose else part * table.mu_s[closed]
-    ways = _ways(table, rows, closed, sliding, limit)
+    full = rows.W[np.ix_(which, which)]
+    A, ways = full.copy(), _ways(table, rows, closed, sliding, limit)
     for k, c in enumerate(closed):
         if c in ways:
             A[:, 3 * k] -= table.mu[c] * full[:, 3 * k + 1 : 3 * k + 3] @ ways[c]
-            mu[k] = 0.0
             if A[3 * k, 3 * k] <= 0.0:
                 raise JamError(table.names[c])
+    return A, ways
+
+
+def _solve(
+    table: ContactTable, rows: ContactRows, closed: list[int], A: Floats, ways: dict[int, Floats],
+    part: float = 1.0, *, loose: bool = False, **more: Any,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Forces (3 k,) with sliding friction, and accelerations; A, ways: of ``_matrix``."""
+    b = rows.free[rows.rows_of(closed)]
+    mu = LOOSE * table.mu[closed] if loose else part * table.mu_s[closed]
+    mu[[c in ways for c in closed]] = 0.0
     x, left = solve_cone(A, b, mu, **more)
     if left > 1e-6 and not more:
         raise JamError(table.names[closed[0]])
@@ -157,7 +166,7 @@ def _solve(
     for k, c in enumerate(closed):
         if c in ways:
             x[3 * k + 1 : 3 * k + 3] = -table.mu[c] * x[3 * k] * ways[c]
-    return x, A, a, ways
+    return x, a
 
 
 def _put(
@@ -170,7 +179,8 @@ def _put(
     """
     if not closed:
         return
-    x, A, a, ways = _solve(table, rows, closed, sliding, limit, loose=loose)
+    A, ways = _matrix(table, rows, closed, sliding, limit)
+    x, a = _solve(table, rows, closed, A, ways, loose=loose)
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
     shares = _share(A)
     if inner is None and not loose:
@@ -209,11 +219,12 @@ def _inside(
     """
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
     best, low, high = None, 0, len(INSIDE) - 1
+    A, ways = _matrix(table, rows, closed, sliding, limit)
+    if not _share(A):
+        return None
     while low <= high:  # what one part allows, so does every larger one
         k = high if best is None else (low + high) // 2
-        x, A, a, _ = _solve(table, rows, closed, sliding, limit, INSIDE[k], start=best, tries=3)
-        if not _share(A):
-            return None
+        x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=best, tries=3)
         if np.abs(a).max() <= min(HELD, OF_REST * (1.0 - INSIDE[k])) * big:
             best, high = x, k - 1
         elif best is None:

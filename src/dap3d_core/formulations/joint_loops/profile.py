@@ -30,7 +30,7 @@ from dap3d_core.linear.ldlt.factor import SINGULAR_NODE_RATIO, SINGULAR_PIVOT_RA
 #: Solutions at most where rows may depend on each other. One leaves some ``PART`` of what lacked
 #: before, less of weak rows; they go on while the square of the change falls by this factor, until
 #: it is rounding. What dependent rows contradict each other in changes by the same each time.
-SOLVES, FALLING, ROUNDING = 12, 0.25, 1e-30
+SOLVES, FALLING, PROFILE_ROUNDING = 12, 0.25, 1e-30
 #: e of such rows by the diagonal of their matrix. A motion that joints permit on C = 0 alone takes
 #: rows for dependent there that are not, a little beside it: the smaller the part, the shorter are
 #: the steps that this leaves.
@@ -114,7 +114,7 @@ def solve_profile(system: System) -> None:
             change = max(change, E[k] * (z[k] - x[k]) * (z[k] - x[k]))
             total = max(total, E[k] * z[k] * z[k])
             x[k] = z[k]
-        if not change > ROUNDING * total or not change < FALLING * before:
+        if not change > PROFILE_ROUNDING * total or not change < FALLING * before:
             return
         before = change
 

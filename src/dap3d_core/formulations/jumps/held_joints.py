@@ -4,12 +4,7 @@ In the scaled coordinates of the bodies (docs/decisions/0006), by the block fact
 formulation. Compiled for scenes whose velocities jump, at the first jump.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
-
-import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System, step_functions
 from dap3d_core.assembly.evaluate import place
@@ -21,12 +16,13 @@ from dap3d_core.formulations.common.constraints import (
     linearise,
     velocity_residuals,
 )
-from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Corrections of one solution. The first solves; the others are refinement and, with regularised
 #: factors, passes of the proximal method, each of which leaves a small part (regularised.py).
 CORRECTIONS = 6
+#: Places in the table of functions.
+FACTOR, SOLVE = 0, 1
 
 
 @compiled
@@ -45,6 +41,12 @@ def factor_regularised(t: float, y: Floats, out: Floats, system: System, loops: 
     linearise(t, system, loops)
     velocity_residuals(system)
     factorise_anyway(system, PART)
+
+
+@compiled
+def place_alone(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """The same where there are no rows."""
+    place(t, y, system, loops)
 
 
 @compiled
@@ -67,66 +69,14 @@ def solve_held(t: float, y: Floats, out: Floats, system: System, loops: Any) -> 
         out[k] = x[k]
 
 
-class HeldJoints:
-    """The joints of a model at one state, which hold while impulses act.
+@compiled
+def solve_free(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """The same where there are no rows: scaled impulses are changes of scaled velocities."""
 
-    Attributes:
-        root: (n + 1,) 1/sqrt(m), and B: (n + 1, 3, 3), of each body, ground zero.
-        residual: (rows,) D v - nu, and nu: (rows,), both in the order of the solver.
-    """
 
-    def __init__(self, evaluator: Evaluator) -> None:
-        """Args: an evaluator in coordinates of bodies; its arrays are worked on."""
-        self._evaluator = evaluator
-        self.size = 6 * (evaluator.model.body_count + 1)
-        self._has_rows = evaluator.model.row_count > 0
-        if self._has_rows:
-            regular = evaluator.formulation.accepts_redundant
-            factor = factor_regularised if regular else factor_independent
-            self._functions = step_functions(factor, solve_held)
-
-    @IGNORE_FLOAT_ERRORS
-    def set_state(self, t: float, u: Floats, states: Floats, inputs: Floats) -> None:
-        """Factors at a state u (13 n,), states of elements (states,) and inputs (inputs,)."""
-        evaluator = self._evaluator
-        evaluator.states = states
-        evaluator.set_inputs(inputs)
-        system = evaluator.system
-        if self._has_rows:
-            y = evaluator.integrated(u)
-            self._functions[0](t, y, np.zeros(0), system, evaluator.loops)
-        else:
-            evaluator.place(t, u)
-        self.residual, self.nu = system.residual.copy(), system.nu.copy()
-        self.root = system.metric[:, 0].copy()
-        self.B = system.metric[:, 7:16].reshape(-1, 3, 3).copy()
-
-    @IGNORE_FLOAT_ERRORS
-    def solve(self, impulses: Floats, changes: Floats) -> tuple[Floats, Floats]:
-        """Scaled changes of velocity, (6 n + 6), and the impulses Lambda of the rows.
-
-        Args:
-            impulses: (6 n + 6,) scaled impulses on the bodies, ground first.
-            changes: (rows,) change of D v.
-        """
-        if not self._has_rows:
-            return impulses.copy(), np.zeros(0)
-        evaluator, size = self._evaluator, impulses.size
-        out = np.concatenate([impulses, changes])
-        self._functions[1](0.0, out[:0], out, evaluator.system, evaluator.loops)
-        return out[:size], -out[size:]
-
-    def scaled(self, impulses: Floats) -> Floats:
-        """Scaled impulses or rows (..., 6 n + 6) of those in global axes: G M^(-1/2)."""
-        parts = impulses.reshape(*impulses.shape[:-1], self.root.size, 2, 3)
-        linear = self.root[:, None] * parts[..., 0, :]
-        turning = np.einsum("...nc,ncd->...nd", parts[..., 1, :], self.B)
-        scaled: Floats = np.stack([linear, turning], axis=-2).reshape(impulses.shape)
-        return scaled
-
-    def unscaled(self, dv: Floats) -> Floats:
-        """Changes of velocity (6 n + 6,) in global axes of scaled ones."""
-        parts = dv.reshape(-1, 2, 3)
-        turning = np.einsum("ncd,nd->nc", self.B, parts[:, 1])
-        unscaled: Floats = np.stack([self.root[:, None] * parts[:, 0], turning], axis=1).ravel()
-        return unscaled
+def held_functions(has_rows: bool, accepts_redundant: bool) -> Any:
+    """The table of functions of a model whose joints have rows, which may depend on each other."""
+    if not has_rows:
+        return step_functions(place_alone, solve_free)
+    factor = factor_regularised if accepts_redundant else factor_independent
+    return step_functions(factor, solve_held)

@@ -1,11 +1,13 @@
 """The tangent of the equations of motion, element by element, from the types' own group loops.
 
-One element's loop is called (count 1) with the row of one of its bodies moved along one of twelve
-coordinates, forwards and backwards: positions r, rotations about body axes, velocities r_dot,
-angular velocities in body axes. What it returns differs by the derivative. So every type has a
-tangent, a third party's too, and nothing is compiled for it. The error is some 1e-10 of the largest
-entry (central differences; the step is 6e-6 of the element's size, or rad), which a simplified
-Newton iteration, that reuses its matrix over many steps, does not see.
+One element's loop is called (count 1) in its differentiated form (interface/codegen/
+loop_derivatives.py), with the motion of one of its bodies as directions: positions r and rotations
+about body axes, then velocities r_dot and angular velocities in body axes. So every type has a
+tangent, a third party's too, exact to rounding.
+
+Laws that bend within the tolerance of a state, as contact at rest and friction below its v_tol do,
+are flat to one side of the bend. Once an iteration failed (``Tangent.bends``) such an element has
+the secant across its bend in place of the zero slope.
 
 In the bodies' scaled coordinates (linear/ldlt/factor.py), translations in body axes too, x a
 displacement and v a velocity:
@@ -14,15 +16,14 @@ displacement and v a velocity:
     turning   d(D v - nu) / dx, laid out as D
     force_by_lambda  d(forces that read multipliers) / dlambda, blocks of rows x 6 (transposed)
 
-A fine tangent (``Tangent.fine``) is that of laws which bend within such a step, as contact at rest
-and friction below its v_tol do: there the step is shortened until the derivative no longer depends
-on it.
-
 In body axes a mechanism that turns as a whole keeps its tangent. What a wrench owes to the body
 axes in which its moment acts is in it; the gyroscopic moment is added in closed form.
+
+Arrays of the differentiated loops have ``WIDTH`` numbers for each of the plain ones: its value and
+its derivatives, called slopes, by the directions.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
+# An element of an array is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
 import math
@@ -35,25 +36,29 @@ from dap3d_core.assembly.evaluate import largest, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, Arrays
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.runtime.function_lists import call_loop
+from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop
+from dap3d_core.kernels.runtime.loop_support import A, P, R, V, W
 
-#: Step of the differences: the cube root of a rounding balances its error with that of the formula.
-PART = 6e-6
-#: Least step of a velocity in m/s (times PART), and least size of an element in m: below the
-#: velocities at which Coulomb friction turns.
+#: Numbers of differentiated loops for each: a value and slopes. A body has so many directions of
+#: each level, positions and velocities.
+WIDTH, DIRECTIONS = 8, 6
+#: Numbers of a body row that move.
+MOVING = 22
+#: Steps of secants: the first one as part of the element's size, the next one as part of the one
+#: before, how many there are. Changes of so many roundings of what an element returns are none.
+PART, FINER, LEVELS, NOISY = 6e-6, 0.0625, 8, 1e3 * 2.220446049250313e-16
+#: ``Tangent.bends`` where an iteration failed with the tangent of its step, so that laws may bend;
+#: and where one did.
+MAY_BEND, BENT = 1.0, 2.0
+#: Least velocity, m/s, and least size of an element, m, that steps are parts of.
 SLOWEST, SMALLEST = 0.1, 1e-4
-#: Steps of a fine tangent: the next one as part of the one before, how many there are, and to which
-#: part two differences agree. Changes of so many roundings of what an element returns say nothing.
-FINER, LEVELS, AGREEMENT, NOISY = 0.0625, 8, 0.1, 1e3 * 2.220446049250313e-16
-#: ``Tangent.fine`` where a law did bend.
-BENT = 2.0
 #: What an element is; the last two only of types with states of their own (state_tangent.py).
 WRENCH_ELEMENT, JOINT_ELEMENT, FRICTION_ELEMENT, RATE_ELEMENT, POSITION_ELEMENT = range(5)
-#: Columns of ``elements``.
+#: Columns of ``elements``; DERIVATIVE: the differentiated loop.
 (
-    LOOP, KIND, STRIDE, WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY, FIRST_READING,
-    JOINTS_READ, ELEMENT_WIDTH
-) = range(12)  # fmt: skip
+    LOOP, DERIVATIVE, KIND, STRIDE, PAR_WIDTH, SLOT_COUNT, ROW_AT, ROWS, FIRST_PAIR, VELOCITY,
+    FIRST_READING, JOINTS_READ, ELEMENT_WIDTH
+) = range(13)  # fmt: skip
 #: Columns of ``StateTangent.records``: number of states; places in ``values`` of rate by z (m x m),
 #: of rate by each slot (m x 12), of force by z of each slot (6 x m), of C and of D v - nu by z
 #: (rows x m); slots; rows.
@@ -78,12 +83,11 @@ class StateTangent(Arrays):
     records: Integers  # (elements, 8) COUNT, ...
     record: Integers  # (states,) of the element whose first state it is
     values: Floats
-    size: Floats  # (states,) least size of a state, of which steps are parts
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
 class Tangent(Arrays):
-    """Tables of the differences, and the derivatives that they give."""
+    """Tables of the elements, and the derivatives that they give."""
 
     types: ClassVar[dict[str, Any]] = {
         "elements": INTEGER_MATRIX,
@@ -91,6 +95,7 @@ class Tangent(Arrays):
         "blocks": INTEGER_MATRIX,
         "readings": INTEGER_MATRIX,
         "states": StateTangent.type_of(),
+        "wide": LoopArrays.type_of(),
     }
 
     elements: Integers  # (groups, ELEMENT_WIDTH); ROW_AT: place of the joint's row in idx
@@ -100,184 +105,148 @@ class Tangent(Arrays):
     turning: Floats  # (block_size,)
     readings: Integers  # (k, 4) of each instance, joint that it reads, slot: PLACE, BODY, ...
     force_by_lambda: Floats  # blocks of ``readings``
-    D: Floats  # (block_size,) scratch: an element's own blocks
-    gamma: Floats  # (rows,) scratch
-    nu: Floats  # (rows,) scratch
-    force: Floats  # (6 (n+1),) scratch
-    saved: Floats  # (BODY_WIDTH,) scratch
-    ahead: Floats  # (outputs,) what the element returns with a body moved forwards
-    behind: Floats  # (outputs,) the same backwards
-    here: Floats  # (outputs,) the same as it is placed
-    column: Floats  # (outputs,) derivatives by a coordinate
-    coarser: Floats  # (outputs,) the same by a longer step
-    one_sided: Floats  # (outputs,) the same by the side on which it does not jump
-    fine: Floats  # (1,) 1 where laws may bend within the usual step, BENT once one did
+    bends: Floats  # (1,) 0, MAY_BEND or BENT
     states: StateTangent
+    wide: Any  # LoopArrays of the differentiated loops, as the next ones
+    D: Floats  # (WIDTH block_size,) an element's own blocks
+    gamma: Floats  # (WIDTH rows,)
+    nu: Floats  # (WIDTH rows,)
+    minus_lambda: Floats  # (WIDTH rows,)
+    force: Floats  # (WIDTH 6 (n+1),)
+    out: Floats  # (WIDTH outputs,) what an element returns
+    kept: Floats  # (WIDTH outputs,) the same at its place, while it is moved
+    ahead: Floats  # (WIDTH outputs,) the same moved forwards
 
 
 @compiled
-def move_body(s: Floats, saved: Floats, c: int, step: float) -> None:
-    """Body row s = ``saved``, moved by ``step`` along coordinate c of 12."""
-    for k in range(s.shape[0]):
-        s[k] = saved[k]
-    if c < 3:
-        s[c] += step
-    elif c < 6:
-        rotate_body(s, saved, c - 3, step)
-    elif c < 9:
-        s[6 + c] += step  # velocities stand from 12
-    else:
-        for k in range(3):
-            s[15 + k] += saved[3 + 3 * k + c - 9] * step
+def spread(values: Floats, wide: Floats) -> None:
+    """Numbers into the first lane of wide ones, whose slopes are left as they are."""
+    for k in range(values.shape[0]):
+        wide[WIDTH * k] = values[k]
 
 
 @compiled
-def rotate_body(s: Floats, saved: Floats, axis: int, angle: float) -> None:
-    """Turn the body about one of its own axes; it keeps its angular velocity in body axes."""
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    cosine, sine = math.cos(angle), math.sin(angle)
-    w0, w1, w2 = in_body_axes(saved, saved[15], saved[16], saved[17])
-    for r in range(3):
-        a, b = saved[3 + 3 * r + i], saved[3 + 3 * r + j]
-        s[3 + 3 * r + i] = cosine * a + sine * b
-        s[3 + 3 * r + j] = cosine * b - sine * a
-        s[15 + r] = s[3 + 3 * r] * w0 + s[4 + 3 * r] * w1 + s[5 + 3 * r] * w2
-    cosine, sine = math.cos(0.5 * angle), math.sin(0.5 * angle)
-    e0, e, ei, ej = saved[18], saved[19 + axis], saved[19 + i], saved[19 + j]
-    s[18] = cosine * e0 - sine * e
-    s[19 + axis] = cosine * e + sine * e0
-    s[19 + i] = cosine * ei + sine * ej
-    s[19 + j] = cosine * ej - sine * ei
+def load_values(x: Floats, system: System, tangent: Tangent) -> None:
+    """Give the differentiated loops the numbers of the present state; x: (row_size,) -lambda."""
+    wide = tangent.wide
+    for b in range(system.body.shape[0]):
+        spread(system.body[b], wide.body[b])
+    for f in range(system.F.shape[0]):
+        spread(system.F[f], wide.F[f])
+    spread(system.par, wide.par)
+    spread(system.states, wide.states)
+    spread(x, tangent.minus_lambda)
 
 
 @compiled
-def call_element(
-    t: float, e: int, q: int, x: Floats, out: Floats, system: System, loops: Any, tangent: Tangent
-) -> None:
-    """One instance q of group e: force and moment (body axes) of each slot, then D v - nu."""
-    row = tangent.elements[e]
+def seed_positions(s: Floats, body: Floats) -> None:
+    """Slopes of a wide body row s by r and by rotations about the body's own axes.
+
+    It keeps its angular velocity in body axes.
+    """
+    w = in_body_axes(body, body[W], body[W + 1], body[W + 2])
+    for axis in range(3):
+        i, j, lane = (axis + 1) % 3, (axis + 2) % 3, 4 + axis
+        s[WIDTH * (R + axis) + 1 + axis] = 1.0
+        for r in range(3):
+            a, b = body[A + 3 * r + i], body[A + 3 * r + j]
+            s[WIDTH * (A + 3 * r + i) + lane] = b
+            s[WIDTH * (A + 3 * r + j) + lane] = -a
+            wi = w[0] if i == 0 else (w[1] if i == 1 else w[2])
+            wj = w[0] if j == 0 else (w[1] if j == 1 else w[2])
+            s[WIDTH * (W + r) + lane] = b * wi - a * wj
+        s[WIDTH * P + lane] = -0.5 * body[P + 1 + axis]
+        s[WIDTH * (P + 1 + axis) + lane] = 0.5 * body[P]
+        s[WIDTH * (P + 1 + i) + lane] = 0.5 * body[P + 1 + j]
+        s[WIDTH * (P + 1 + j) + lane] = -0.5 * body[P + 1 + i]
+
+
+@compiled
+def seed_velocities(s: Floats, body: Floats) -> None:
+    """Slopes of a wide body row s by r_dot and by angular velocities in body axes."""
+    clear(s)
+    for c in range(3):
+        s[WIDTH * (V + c) + 1 + c] = 1.0
+        for r in range(3):
+            s[WIDTH * (W + r) + 4 + c] = body[A + 3 * r + c]
+
+
+@compiled
+def clear(s: Floats) -> None:
+    """Take the slopes away from a wide body row."""
+    for c in range(MOVING):
+        for lane in range(1, WIDTH):
+            s[WIDTH * c + lane] = 0.0
+
+
+@compiled
+def call_element(t: float, e: int, q: int, system: System, loops: Any, tangent: Tangent) -> None:
+    """What instance q of group e returns, with slopes, into ``out``.
+
+    Of forces and joints: force and moment (body axes) of each slot, then D v - nu. Of others their
+    rates, or C.
+    """
+    row, idx, wide, out = tangent.elements[e], system.idx, tangent.wide, tangent.out
     g, kind, slots = row[LOOP], row[KIND], row[SLOT_COUNT]
-    i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[WIDTH]
-    body, idx, force, D = system.body, system.idx, tangent.force, tangent.D
+    i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[PAR_WIDTH]
+    place, force, D, x = (i0, p0, 1), tangent.force, tangent.D, tangent.minus_lambda
     for n in range(slots):
-        for c in range(6 * idx[i0 + n], 6 * idx[i0 + n] + 6):
+        for c in range(6 * WIDTH * idx[i0 + n], 6 * WIDTH * (idx[i0 + n] + 1)):
             force[c] = 0.0
-    if kind == JOINT_ELEMENT:
-        call_loop(loops, g, t, system, (i0, p0, 1), D, tangent.gamma, tangent.nu)
-        r0, at = idx[i0 + row[ROW_AT]], i0 + row[ROW_AT] + 1
-        for r in range(row[ROWS]):
-            rate = -tangent.nu[r0 + r]
-            for n in range(slots):
-                b, d = idx[i0 + n], idx[at + n] + 6 * r
-                if b > 0:
-                    for c in range(6):
-                        rate += D[d + c] * body[b, 12 + c]
-                        force[6 * b + c] -= D[d + c] * x[r0 + r]
-            out[6 * slots + r] = rate
-    else:
-        call_loop(loops, g, t, system, (i0, p0, 1), force, x, x)
-    for n in range(slots):
-        b = idx[i0 + n]
-        for c in range(3):
-            out[6 * n + c] = force[6 * b + c]
-            turned = 0.0
-            for k in range(3):
-                turned += body[b, 3 + 3 * k + c] * force[6 * b + 3 + k]
-            out[6 * n + 3 + c] = turned
-
-
-@compiled
-def call_any(
-    t: float, e: int, q: int, x: Floats, out: Floats, system: System, loops: Any, tangent: Tangent
-) -> None:
-    """What instance q of group e returns: rates, C, or as ``call_element``."""
-    row = tangent.elements[e]
-    if row[KIND] != RATE_ELEMENT and row[KIND] != POSITION_ELEMENT:
-        call_element(t, e, q, x, out, system, loops, tangent)
-        return
-    g = row[LOOP]
-    i0, p0 = system.groups[g, 0] + q * row[STRIDE], system.groups[g, 1] + q * row[WIDTH]
-    if row[KIND] == POSITION_ELEMENT:
-        call_loop(loops, g, t, system, (i0, p0, 1), tangent.gamma, x, x)
-        first = system.idx[i0 + row[ROW_AT]]
-        for k in range(row[ROWS]):
+    if kind == POSITION_ELEMENT:
+        call_loop(loops, row[DERIVATIVE], t, wide, place, tangent.gamma, x, x)
+        first = WIDTH * idx[i0 + row[ROW_AT]]
+        for k in range(WIDTH * row[ROWS]):
             out[k] = tangent.gamma[first + k]
         return
-    call_loop(loops, g, t, system, (i0, p0, 1), tangent.force, x, x)
-    first = system.idx[i0 + tangent.states.at[e]]
-    for k in range(tangent.states.records[tangent.states.record[first], COUNT]):
-        out[k] = system.rates[first + k]
-
-
-@compiled
-def find_column(
-    t: float, e: int, q: int, x: Floats, c: int, step: float, size: int, s: Floats, system: System,
-    loops: Any, tangent: Tangent,
-) -> None:  # fmt: skip
-    """Derivatives of what an element returns, ``size`` numbers, by coordinate c of body row s.
-
-    s is left moved; ``tangent.saved`` has it as it is.
-    """
-    column, coarser = tangent.column, tangent.coarser
-    if tangent.fine[0] != 0.0:
-        move_body(s, tangent.saved, c, 0.0)
-        call_any(t, e, q, x, tangent.here, system, loops, tangent)
-    bent = bends(t, e, q, x, c, step, size, s, system, loops, tangent)
-    if tangent.fine[0] == 0.0:
+    if kind == JOINT_ELEMENT:
+        call_loop(loops, row[DERIVATIVE], t, wide, place, D, tangent.gamma, tangent.nu)
+        add_reactions(i0, row, system, tangent)
+    else:
+        call_loop(loops, row[DERIVATIVE], t, wide, place, force, x, x)
+    if kind == RATE_ELEMENT:
+        first = idx[i0 + tangent.states.at[e]]
+        count = tangent.states.records[tangent.states.record[first], COUNT]
+        for k in range(WIDTH * count):
+            out[k] = wide.rates[WIDTH * first + k]
         return
-    find_smooth_side(step, size, tangent)
-    for _ in range(LEVELS):
-        step *= FINER
-        was_bent, most, apart = bent, 0.0, 0.0
-        for k in range(size):
-            coarser[k] = column[k]
-        bent = bends(t, e, q, x, c, step, size, s, system, loops, tangent)
-        change = here = 0.0
-        for k in range(size):
-            most, apart = max(most, abs(column[k])), max(apart, abs(column[k] - coarser[k]))
-            change = max(change, step * abs(column[k]))
-            here = max(here, abs(tangent.here[k]))
-        agree = not bent and apart <= AGREEMENT * most
-        if change <= NOISY * here or (agree and not was_bent):
-            for k in range(size):
-                column[k] = coarser[k]
-            return
-        tangent.fine[0] = BENT
-        if agree:
-            return
-    for k in range(size):  # it jumps here
-        column[k] = tangent.one_sided[k]
+    for n in range(slots):
+        s, f, o = wide.body[idx[i0 + n]], 6 * WIDTH * idx[i0 + n], 6 * WIDTH * n
+        for k in range(3 * WIDTH):
+            out[o + k] = force[f + k]
+        for c in range(3):
+            o, f = 6 * WIDTH * n + WIDTH * (3 + c), 6 * WIDTH * idx[i0 + n] + WIDTH * 3
+            set_product(0.0, s, WIDTH * (A + c), force, f, out, o)
+            set_product(1.0, s, WIDTH * (A + 3 + c), force, f + WIDTH, out, o)
+            set_product(1.0, s, WIDTH * (A + 6 + c), force, f + 2 * WIDTH, out, o)
 
 
 @compiled
-def find_smooth_side(step: float, size: int, tangent: Tangent) -> None:
-    """The lesser of both one-sided differences: a jump lies on the other side."""
-    ahead, behind, here = tangent.ahead, tangent.behind, tangent.here
-    rise = fall = 0.0
-    for k in range(size):
-        rise, fall = max(rise, abs(ahead[k] - here[k])), max(fall, abs(here[k] - behind[k]))
-    for k in range(size):
-        change = ahead[k] - here[k] if rise < fall else here[k] - behind[k]
-        tangent.one_sided[k] = change / step
+def set_product(keep: float, a: Floats, i: int, b: Floats, j: int, out: Floats, o: int) -> None:
+    """Value and slopes of keep * out[o] + a[i] b[j], into out[o]."""
+    x, y = a[i], b[j]
+    out[o] = keep * out[o] + x * y
+    for lane in range(1, WIDTH):
+        out[o + lane] = keep * out[o + lane] + x * b[j + lane] + y * a[i + lane]
 
 
 @compiled
-def bends(
-    t: float, e: int, q: int, x: Floats, c: int, step: float, size: int, s: Floats, system: System,
-    loops: Any, tangent: Tangent,
-) -> bool:  # fmt: skip
-    """Central differences into ``tangent.column``; whether they differ from one-sided ones."""
-    ahead, behind, here = tangent.ahead, tangent.behind, tangent.here
-    move_body(s, tangent.saved, c, step)
-    call_any(t, e, q, x, ahead, system, loops, tangent)
-    move_body(s, tangent.saved, c, -step)
-    call_any(t, e, q, x, behind, system, loops, tangent)
-    half, bend, rise = 0.5 / step, 0.0, 0.0
-    for k in range(size):
-        tangent.column[k] = half * (ahead[k] - behind[k])
-        bend = max(bend, abs(ahead[k] - 2.0 * here[k] + behind[k]))
-        rise = max(rise, max(abs(ahead[k] - here[k]), abs(behind[k] - here[k])))
-    return bend > AGREEMENT * rise
+def add_reactions(i0: int, row: Integers, system: System, tangent: Tangent) -> None:
+    """Reactions D^T lambda of a joint's instance into ``force``, its D v - nu into ``out``."""
+    idx, slots, D, out = system.idx, row[SLOT_COUNT], tangent.D, tangent.out
+    r0, at = idx[i0 + row[ROW_AT]], i0 + row[ROW_AT] + 1
+    for r in range(row[ROWS]):
+        o, x = WIDTH * (6 * slots + r), tangent.minus_lambda[WIDTH * (r0 + r)]
+        for lane in range(WIDTH):
+            out[o + lane] = -tangent.nu[WIDTH * (r0 + r) + lane]
+        for n in range(slots):
+            b, d = idx[i0 + n], WIDTH * (idx[at + n] + 6 * r)
+            if b > 0:
+                for c in range(6):
+                    set_product(1.0, D, d + WIDTH * c, tangent.wide.body[b], WIDTH * (V + c),
+                                out, o)  # fmt: skip
+                for k in range(6 * WIDTH):
+                    tangent.force[6 * WIDTH * b + k] -= D[d + k] * x
 
 
 @compiled
@@ -296,74 +265,125 @@ def sizes_of(e: int, q: int, system: System, tangent: Tangent) -> tuple[float, f
         for c in range(3):
             if a != b:
                 extent = max(extent, abs(body[b, c] - body[a, c]))
-            speed, spin = max(speed, abs(body[b, 12 + c])), max(spin, abs(body[b, 15 + c]))
+            speed, spin = max(speed, abs(body[b, V + c])), max(spin, abs(body[b, W + c]))
     return extent, max(speed, extent * spin)
 
 
 @compiled
+def move(s: Floats, body: Floats, lane: int, step: float) -> None:
+    """A wide body row s, moved from where it is along a direction."""
+    for c in range(MOVING):
+        s[WIDTH * c] = body[c] + step * s[WIDTH * c + lane]
+
+
+@compiled
+def bridge_bends(
+    t: float, e: int, q: int, b: int, level: int, size: int, system: System, loops: Any,
+    tangent: Tangent,
+) -> None:  # fmt: skip
+    """Secants across bends into ``out``, where its slopes by a level of body b are zero.
+
+    The shortest step that sees the bend is taken: that is as long as the bend is away. A jump,
+    which every step sees, has none.
+    """
+    out, kept, ahead = tangent.out, tangent.kept, tangent.ahead
+    s, body = tangent.wide.body[b], system.body[b]
+    extent, speed = sizes_of(e, q, system, tangent)
+    here = 0.0
+    for k in range(WIDTH * size):
+        kept[k] = out[k]
+        here = max(here, abs(out[k]) if k % WIDTH == 0 else 0.0)
+    for lane in range(1, 1 + DIRECTIONS):
+        step = PART * (speed if level == 1 else extent) / (1.0 if lane < 4 else extent)
+        slope = 0.0
+        for k in range(size):
+            slope = max(slope, abs(kept[WIDTH * k + lane]))
+        level_count, seen = (LEVELS if step * slope <= NOISY * here else 0), 0
+        for _ in range(level_count):
+            move(s, body, lane, step)
+            call_element(t, e, q, system, loops, tangent)
+            for k in range(size):
+                ahead[k] = out[WIDTH * k]
+            move(s, body, lane, -step)
+            call_element(t, e, q, system, loops, tangent)
+            change = 0.0
+            for k in range(size):
+                change = max(change, abs(ahead[k] - out[WIDTH * k]))
+            if change <= NOISY * here:
+                break
+            seen += 1
+            for k in range(size):
+                kept[WIDTH * k + lane] = 0.5 / step * (ahead[k] - out[WIDTH * k])
+            step *= FINER
+        if seen == LEVELS:  # it jumps here
+            for k in range(size):
+                kept[WIDTH * k + lane] = 0.0
+        elif seen > 0:
+            tangent.bends[0] = BENT
+        move(s, body, lane, 0.0)
+    for k in range(WIDTH * size):
+        out[k] = kept[k]
+
+
+@compiled
 def differentiate_element(
-    t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
+    t: float, e: int, q: int, system: System, loops: Any, tangent: Tangent
 ) -> None:
     """Add the derivatives of one element by the coordinates of each of its bodies, unscaled."""
-    row = tangent.elements[e]
-    kind, slots, rows = row[KIND], row[SLOT_COUNT], row[ROWS]
+    row, out = tangent.elements[e], tangent.out
+    slots = row[SLOT_COUNT]
     i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
     first_pair = row[FIRST_PAIR] + q * slots * slots
-    extent, speed = sizes_of(e, q, system, tangent)
-    saved, column = tangent.saved, tangent.column
-    size = 6 * slots + (rows if kind == JOINT_ELEMENT else 0)
     for m in range(slots):
         b = system.idx[i0 + m]
         if tangent.pairs[first_pair + m * slots + m] < 0:  # ground, or a body met before
             continue
-        s = system.body[b]
-        for k in range(s.shape[0]):
-            saved[k] = s[k]
-        for c in range(12 if row[VELOCITY] != 0 else 6):
-            scale = extent if c < 3 else 1.0
-            if c >= 6:
-                scale = speed if c < 9 else speed / extent
-            find_column(t, e, q, x, c, PART * scale, size, s, system, loops, tangent)
+        seed_positions(tangent.wide.body[b], system.body[b])
+        for level in range(1 + row[VELOCITY]):
+            if level == 1:
+                seed_velocities(tangent.wide.body[b], system.body[b])
+            call_element(t, e, q, system, loops, tangent)
+            if tangent.bends[0] != 0.0 and row[KIND] != JOINT_ELEMENT:
+                bridge_bends(t, e, q, b, level, 6 * slots, system, loops, tangent)
             for n in range(slots):
                 o = tangent.pairs[first_pair + n * slots + m]
                 if o >= 0:
                     for k in range(6):
-                        tangent.coupling[o + 12 * k + c] += column[6 * n + k]
-            if kind == JOINT_ELEMENT:
-                d = system.idx[i0 + row[ROW_AT] + 1 + m] + c
-                for r in range(rows):
-                    tangent.turning[d + 6 * r] += column[6 * slots + r]
-        for k in range(s.shape[0]):
-            s[k] = saved[k]
+                        for c in range(6):
+                            slope = out[WIDTH * (6 * n + k) + 1 + c]
+                            tangent.coupling[o + 12 * k + 6 * level + c] += slope
+        clear(tangent.wide.body[b])
+        if row[KIND] == JOINT_ELEMENT:
+            d = system.idx[i0 + row[ROW_AT] + 1 + m]
+            for r in range(row[ROWS]):
+                for c in range(6):
+                    tangent.turning[d + 6 * r + c] += out[WIDTH * (6 * slots + r) + 1 + c]
 
 
 @compiled
 def differentiate_friction(
-    t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
+    t: float, e: int, q: int, system: System, loops: Any, tangent: Tangent
 ) -> None:
     """Derivatives of one element by the multipliers that it reads, moments in body axes."""
-    row = tangent.elements[e]
+    row, x = tangent.elements[e], tangent.minus_lambda
     slots = row[SLOT_COUNT]
     for joint in range(row[JOINTS_READ]):
         first = row[FIRST_READING] + (q * row[JOINTS_READ] + joint) * slots
         r0, rows = tangent.readings[first, FIRST_ROW], tangent.readings[first, ROW_COUNT]
-        size = 1e-3
-        for r in range(r0, r0 + rows):
-            size = max(size, abs(x[r]))
-        step = PART * size
         for r in range(rows):
-            kept = x[r0 + r]
-            x[r0 + r] = kept - step  # x is -lambda
-            call_element(t, e, q, x, tangent.ahead, system, loops, tangent)
-            x[r0 + r] = kept + step
-            call_element(t, e, q, x, tangent.behind, system, loops, tangent)
-            x[r0 + r] = kept
-            for n in range(slots):
-                o = tangent.readings[first + n, PLACE]
-                if o >= 0:
-                    for k in range(6):
-                        rise = tangent.ahead[6 * n + k] - tangent.behind[6 * n + k]
-                        tangent.force_by_lambda[o + 6 * r + k] += 0.5 / step * rise
+            x[WIDTH * (r0 + r) + 1 + r % DIRECTIONS] = -1.0
+            if r % DIRECTIONS < DIRECTIONS - 1 and r < rows - 1:
+                continue
+            call_element(t, e, q, system, loops, tangent)
+            for k in range(r - r % DIRECTIONS, r + 1):
+                lane = 1 + k % DIRECTIONS
+                x[WIDTH * (r0 + k) + lane] = 0.0
+                for n in range(slots):
+                    o = tangent.readings[first + n, PLACE]
+                    if o >= 0:
+                        for c in range(6):
+                            slope = tangent.out[WIDTH * (6 * n + c) + lane]
+                            tangent.force_by_lambda[o + 6 * k + c] += slope
 
 
 @compiled
@@ -439,7 +459,8 @@ def differentiate(t: float, x: Floats, system: System, loops: Any, tangent: Tang
     Args:
         t: time, s.
         x: (row_size,) -lambda.
-        system, loops: of the evaluator.
+        system: of the evaluator.
+        loops: with the differentiated ones.
         tangent: its outputs are overwritten.
 
     Returns:
@@ -448,12 +469,13 @@ def differentiate(t: float, x: Floats, system: System, loops: Any, tangent: Tang
     zero(tangent.coupling)
     zero(tangent.turning)
     zero(tangent.force_by_lambda)
+    load_values(x, system, tangent)
     for e in range(tangent.elements.shape[0]):
         count = system.groups[tangent.elements[e, LOOP], 2]
         for q in range(count if tangent.elements[e, KIND] < RATE_ELEMENT else 0):
-            differentiate_element(t, e, q, x, system, loops, tangent)
+            differentiate_element(t, e, q, system, loops, tangent)
             if tangent.elements[e, KIND] == FRICTION_ELEMENT:
-                differentiate_friction(t, e, q, x, system, loops, tangent)
+                differentiate_friction(t, e, q, system, loops, tangent)
     add_gyroscopic(system, tangent)
     scale_tangent(system, tangent)
     worst = largest(tangent.coupling) + largest(tangent.turning) + largest(tangent.force_by_lambda)

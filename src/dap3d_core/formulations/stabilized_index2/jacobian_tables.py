@@ -13,13 +13,16 @@ from dap3d_core.formulations.stabilized_index2.jacobian import (
     JOINT_ELEMENT,
     POSITION_ELEMENT,
     RATE_ELEMENT,
+    WIDTH,
     WRENCH_ELEMENT,
     StateTangent,
     Tangent,
 )
+from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.codegen.kernel_arguments import in_order, parameters
 from dap3d_core.interface.codegen.loop_source import computes_rate, stride
-from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
+from dap3d_core.kernels.runtime.function_lists import LoopArrays, loop_list
+from dap3d_core.kernels.runtime.loop_modules import build_differentiated
 from dap3d_core.model import Group, Model
 
 _KINDS = {
@@ -27,14 +30,14 @@ _KINDS = {
 }  # fmt: skip
 #: The same of types with states of their own, as their derivatives by states need them.
 _WITH_STATES = {"rate": RATE_ELEMENT, "position": POSITION_ELEMENT}
-#: Arrays of what an element returns.
-OUTPUTS = ("ahead", "behind", "here", "column", "coarser", "one_sided")
+#: Members of ``Tangent`` that differentiated loops write, and what is made of it.
+OF_LOOPS = ("D", "gamma", "nu", "minus_lambda", "force", "out", "kept", "ahead")
 #: Numbers of a block of ``coupling``.
 _BLOCK = 72
 
 
-def make_tangent(evaluator: Evaluator) -> Tangent:
-    """Tables and arrays of the tangent of an evaluator's model."""
+def make_tangent(evaluator: Evaluator) -> tuple[Tangent, Any]:
+    """Tables and arrays of the tangent of an evaluator's model; all loops, with those it calls."""
     system, plan, model = evaluator.system, evaluator.plan, evaluator.model
     n = model.body_count
     place = {(b, b): _BLOCK * (b - 1) for b in range(1, n + 1)}
@@ -42,6 +45,7 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
     at: list[int] = []
     pairs: list[Integers] = []
     readings: list[tuple[int, ...]] = []
+    loops: list[Any] = list(evaluator.loops)
     count = widest = size = 0
     for loop, (kind, group) in enumerate(evaluator.loop_groups):
         layout = group.type_info.layout
@@ -54,9 +58,11 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         slots = len(group.type_info.layout.slots)
         rows = group.type_info.row_count
         read = _joints_read(group) if kind == "friction" else []
-        elements += [(loop, code, stride(group.type_info), layout.par_width, slots,
+        elements += [(loop, len(loops), code, stride(group.type_info), layout.par_width, slots,
                       layout.integers, rows, count, int(_sees_velocity(kind, group)),
                       len(readings), len(read)) for code in codes]  # fmt: skip
+        if source := write(group.type_info, kind):
+            loops.append(build_differentiated(source, WIDTH))
         at += [layout.integers - 1 if layout.states else -1 for _ in codes]
         for q, bodies in enumerate(group.bodies.tolist()):
             for joints in read:
@@ -68,7 +74,8 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         count += pairs[-1].size
         widest = max(widest, 6 * slots + rows, layout.state_width)
     blocks = [(where, a, b) for (a, b), where in place.items()]
-    return Tangent(
+    sizes = (plan.block_size, *(3 * [plan.row_size]), system.force.size, *(3 * [widest]))
+    tangent = Tangent(
         elements=np.array(elements, dtype=np.int64).reshape(-1, ELEMENT_WIDTH),
         pairs=np.concatenate([np.zeros(0, dtype=np.int64), *pairs]),
         blocks=np.array(blocks, dtype=np.int64).reshape(-1, 3),
@@ -76,15 +83,19 @@ def make_tangent(evaluator: Evaluator) -> Tangent:
         turning=np.zeros(plan.block_size),
         readings=np.array(readings, dtype=np.int64).reshape(-1, 4),
         force_by_lambda=np.zeros(size),
-        D=np.zeros(plan.block_size),
-        gamma=np.zeros(plan.row_size),
-        nu=np.zeros(plan.row_size),
-        force=np.zeros(len(system.force)),
-        saved=np.zeros(BODY_WIDTH),
-        **{name: np.zeros(widest) for name in OUTPUTS},
-        fine=np.zeros(1),
+        bends=np.zeros(1),
         states=_state_tangent(evaluator.model, at),
+        wide=_wide(system),
+        **{name: np.zeros(WIDTH * numbers) for name, numbers in zip(OF_LOOPS, sizes, strict=True)},
     )
+    return tangent, loop_list(loops)
+
+
+def _wide(system: Any) -> LoopArrays:
+    """Arrays of differentiated loops: ``WIDTH`` numbers for each of a system's."""
+    arrays = {name: getattr(system, name) for name in ("body", "F", "par", "states")}
+    wide = {name: np.zeros((*x.shape[:-1], WIDTH * x.shape[-1])) for name, x in arrays.items()}
+    return LoopArrays(idx=system.idx, **wide)
 
 
 def _state_tangent(model: Model, at: Sequence[int]) -> StateTangent:
@@ -105,7 +116,6 @@ def _state_tangent(model: Model, at: Sequence[int]) -> StateTangent:
         records=np.array(records, dtype=np.int64).reshape(-1, 8),
         record=record,
         values=np.zeros(size),
-        size=np.zeros(model.state_count),
     )
 
 

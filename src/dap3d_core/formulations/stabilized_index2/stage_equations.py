@@ -166,6 +166,9 @@ def keep_state(system: System, matrix: StageMatrix, part: float) -> None:
             for c in range(o, o + 6):
                 matrix.compliance[f + r] += part * system.D[c] * system.D[c]
             o += 6
+    for f in range(matrix.compliance.shape[0] if part > 0.0 else 0):
+        if matrix.compliance[f] == 0.0:  # a row that is zero, as of an open contact
+            matrix.compliance[f] = 1.0
     for b in range(1, system.body.shape[0]):
         s, k, z = system.body[b], system.metric[b], matrix.spin[b]
         w0, w1, w2 = in_body_axes(s, s[15], s[16], s[17])

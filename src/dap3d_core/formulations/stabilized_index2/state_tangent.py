@@ -1,4 +1,4 @@
-"""The tangent of elements with states of their own, by differences as in jacobian.py.
+"""The tangent of elements with states of their own, by differentiated loops as in jacobian.py.
 
 With z the states of an element, x and v as there:
 
@@ -7,8 +7,7 @@ With z the states of an element, x and v as there:
     rows by z                    of C and D v - nu, of joints
 
 All of them are blocks of the matrix of a stage, in which the states of an element are a node
-(linear/lu/plan.py). The step of a state is a part of its size, which is at least that below which
-its error control is absolute: a state may have any unit.
+(linear/lu/plan.py).
 """
 
 # An element of an array is Any to mypy.
@@ -16,7 +15,7 @@ its error control is absolute: a state may have any unit.
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import Floats, Integers, System
+from dap3d_core.assembly.arrays import Integers, System
 from dap3d_core.assembly.evaluate import zero
 from dap3d_core.assembly.metric import in_body_axes, scaled_moment
 from dap3d_core.formulations.stabilized_index2.jacobian import (
@@ -27,7 +26,6 @@ from dap3d_core.formulations.stabilized_index2.jacobian import (
     KIND,
     LOOP,
     NU_BY_STATE,
-    PART,
     POSITION_ELEMENT,
     RATE_BY_BODY,
     RATE_BY_STATE,
@@ -38,11 +36,13 @@ from dap3d_core.formulations.stabilized_index2.jacobian import (
     SLOTS_OF,
     STRIDE,
     VELOCITY,
+    WIDTH,
     Tangent,
-    call_any,
-    find_column,
+    call_element,
+    clear,
     scale_columns,
-    sizes_of,
+    seed_positions,
+    seed_velocities,
 )
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -53,88 +53,77 @@ FIRST, UNKNOWN, DIAGONAL, JOINT_BLOCK, NODE_ROWS, ROW_SHIFT, FIRST_ROW, WIDTH_OF
 
 
 @compiled
-def differentiate_states(t: float, x: Floats, system: System, loops: Any, tangent: Tangent) -> None:
-    """Derivatives by and of all states, at the bodies and states as placed.
+def differentiate_states(t: float, system: System, loops: Any, tangent: Tangent) -> None:
+    """Derivatives by and of all states, at the state that ``differentiate`` took.
 
     Args:
         t: time, s.
-        x: (row_size,) -lambda.
-        system, loops: of the evaluator.
+        system: of the evaluator.
+        loops: with the differentiated ones.
         tangent: ``tangent.states.values`` are overwritten.
     """
     zero(tangent.states.values)
     for e in range(tangent.elements.shape[0]):
         row = tangent.elements[e]
         for q in range(system.groups[row[LOOP], 2] if tangent.states.at[e] >= 0 else 0):
-            differentiate_by_states(t, e, q, x, system, loops, tangent)
+            differentiate_by_states(t, e, q, system, loops, tangent)
             if row[KIND] == RATE_ELEMENT:
-                differentiate_rate(t, e, q, x, system, loops, tangent)
+                differentiate_rate(t, e, q, system, loops, tangent)
     scale_state_tangent(system, tangent)
 
 
 @compiled
 def differentiate_by_states(
-    t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
+    t: float, e: int, q: int, system: System, loops: Any, tangent: Tangent
 ) -> None:
     """Add the derivatives of what an element returns by its own states, unscaled."""
-    row, own, z = tangent.elements[e], tangent.states, system.states
-    kind, ahead, behind, values = row[KIND], tangent.ahead, tangent.behind, own.values
-    i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
-    first = system.idx[i0 + tangent.states.at[e]]
+    row, own, z = tangent.elements[e], tangent.states, tangent.wide.states
+    first = system.idx[system.groups[row[LOOP], 0] + q * row[STRIDE] + own.at[e]]
     record = own.records[own.record[first]]
-    m = record[COUNT]
+    m, size = record[COUNT], 6 * row[SLOT_COUNT]
     for k in range(m):
-        kept = z[first + k]
-        step = PART * max(abs(kept), own.size[first + k])
-        z[first + k] = kept + step
-        call_any(t, e, q, x, ahead, system, loops, tangent)
-        z[first + k] = kept - step
-        call_any(t, e, q, x, behind, system, loops, tangent)
-        z[first + k] = kept
-        half = 0.5 / step
-        if kind == RATE_ELEMENT:
-            for c in range(m):
-                values[record[RATE_BY_STATE] + m * c + k] = half * (ahead[c] - behind[c])
-            continue
-        if kind == POSITION_ELEMENT:
-            for c in range(row[ROWS]):
-                values[record[C_BY_STATE] + m * c + k] = half * (ahead[c] - behind[c])
-            continue
-        size = 6 * row[SLOT_COUNT]
-        for c in range(size):
-            values[record[FORCE_BY_STATE] + m * c + k] += half * (ahead[c] - behind[c])
-        for c in range(row[ROWS] if kind == JOINT_ELEMENT else 0):
-            rise = ahead[size + c] - behind[size + c]
-            values[record[NU_BY_STATE] + m * c + k] = half * rise
+        z[WIDTH * (first + k) + 1] = 1.0
+        call_element(t, e, q, system, loops, tangent)
+        z[WIDTH * (first + k) + 1] = 0.0
+        if row[KIND] == RATE_ELEMENT:
+            add_column(0, m, record[RATE_BY_STATE] + k, m, tangent)
+        elif row[KIND] == POSITION_ELEMENT:
+            add_column(0, row[ROWS], record[C_BY_STATE] + k, m, tangent)
+        else:
+            add_column(0, size, record[FORCE_BY_STATE] + k, m, tangent)
+            rows = row[ROWS] if row[KIND] == JOINT_ELEMENT else 0
+            add_column(size, rows, record[NU_BY_STATE] + k, m, tangent)
+
+
+@compiled
+def add_column(first: int, count: int, place: int, stride: int, tangent: Tangent) -> None:
+    """Add slopes of ``count`` outputs of an element to every stride-th value from a place on."""
+    for c in range(count):
+        tangent.states.values[place + stride * c] += tangent.out[WIDTH * (first + c) + 1]
 
 
 @compiled
 def differentiate_rate(
-    t: float, e: int, q: int, x: Floats, system: System, loops: Any, tangent: Tangent
+    t: float, e: int, q: int, system: System, loops: Any, tangent: Tangent
 ) -> None:
     """Derivatives of the rates of an element by the coordinates of its bodies, unscaled."""
-    row, own = tangent.elements[e], tangent.states
+    row, own, wide = tangent.elements[e], tangent.states, tangent.wide
     i0 = system.groups[row[LOOP], 0] + q * row[STRIDE]
-    record = own.records[own.record[system.idx[i0 + tangent.states.at[e]]]]
+    record = own.records[own.record[system.idx[i0 + own.at[e]]]]
     m = record[COUNT]
-    extent, speed = sizes_of(e, q, system, tangent)
-    saved = tangent.saved
     for n in range(row[SLOT_COUNT]):
         b, o = system.idx[i0 + n], record[RATE_BY_BODY] + 12 * m * n
         if b == 0:
             continue
-        s = system.body[b]
-        for k in range(s.shape[0]):
-            saved[k] = s[k]
-        for c in range(12 if row[VELOCITY] != 0 else 6):
-            scale = extent if c < 3 else 1.0
-            if c >= 6:
-                scale = speed if c < 9 else speed / extent
-            find_column(t, e, q, x, c, PART * scale, m, s, system, loops, tangent)
+        seed_positions(wide.body[b], system.body[b])
+        for level in range(1 + row[VELOCITY]):
+            if level == 1:
+                seed_velocities(wide.body[b], system.body[b])
+            call_element(t, e, q, system, loops, tangent)
             for k in range(m):
-                own.values[o + 12 * k + c] = tangent.column[k]
-        for k in range(s.shape[0]):
-            s[k] = saved[k]
+                for c in range(6):
+                    own.values[o + 12 * k + 6 * level + c] = tangent.out[WIDTH * k + 1 + c]
+        clear(wide.body[b])
 
 
 @compiled

@@ -16,7 +16,7 @@ NEAR, SWEEPS = 1e-4, 200
 #: Sweeps at most, where Newton's method does not end.
 MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
-FEW, ROUNDING = 100, 1e-14
+FEW, RESIDUAL_ROUNDING = 100, 1e-14
 
 
 class Problem:
@@ -82,7 +82,7 @@ class Problem:
         self.x = start.copy()
         few = len(mu) <= FEW
         if few or len(self.y):
-            self._refine(np.arange(len(mu)), ROUNDING if few else tolerance)
+            self._refine(np.arange(len(mu)), RESIDUAL_ROUNDING if few else tolerance)
             if self._judge() <= tolerance or len(self.y):
                 return v + self.change()
         if self._judge() > tolerance:

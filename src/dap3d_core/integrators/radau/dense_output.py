@@ -31,6 +31,10 @@ from dap3d_core.kernels.runtime.cache import compiled
 #: A step before that was shorter than this part of the present one says nothing: rounding, divided
 #: by the square, would be seen.
 NEGLIGIBLE = 1e-4
+#: A component whose polynomial strays from the inner stages by more than this many of its changes
+#: in the step has a stiff part that has not died away: its slope says nothing beyond some instants,
+#: and it keeps the collocation polynomial.
+STRAY = 5.0
 
 
 @compiled
@@ -98,11 +102,11 @@ def prepare_dense(h: float, work: RadauState) -> None:
         y, rise = state[Y, k], state[TRIAL, k] - state[Y, k]
         terms[0, k], terms[1, k] = y, rise
         terms[4, k] = terms[5, k] = 0.0
+        a = (stages[0, k] / c[0] - rise) / (1.0 - c[0])
+        b = (stages[1, k] / c[1] - rise) / (1.0 - c[1])
+        terms[3, k] = (b - a) / (c[1] - c[0])
+        terms[2, k] = a - c[0] * terms[3, k]
         if first:
-            a = (stages[0, k] / c[0] - rise) / (1.0 - c[0])
-            b = (stages[1, k] / c[1] - rise) / (1.0 - c[1])
-            terms[3, k] = (b - a) / (c[1] - c[0])
-            terms[2, k] = a - c[0] * terms[3, k]
             continue
         r2 = h * state[SLOPE, k] - rise
         r3 = rise - h * state[TRIAL_SLOPE, k] - r2
@@ -112,6 +116,11 @@ def prepare_dense(h: float, work: RadauState) -> None:
         slope = rise + (1.0 + 2.0 * q) * r2 - (2.0 + 3.0 * q) * q * r3
         at = (state[OLD, k] - value) / square
         bend = h * state[OLD_SLOPE, k] - slope + 2.0 * q * (1.0 + q) * (1.0 + 2.0 * q) * at
-        terms[2, k], terms[3, k] = r2, r3
-        terms[5, k] = bend / square
-        terms[4, k] = at + q * terms[5, k]
+        r5 = bend / square
+        r4 = at + q * r5
+        off = max(
+            abs(r2 + c[0] * (r3 + (1.0 - c[0]) * (r4 + c[0] * r5)) - a),
+            abs(r2 + c[1] * (r3 + (1.0 - c[1]) * (r4 + c[1] * r5)) - b),
+        )
+        if off <= STRAY * max(abs(stages[0, k]), max(abs(stages[1, k]), abs(rise))):
+            terms[2, k], terms[3, k], terms[4, k], terms[5, k] = r2, r3, r4, r5

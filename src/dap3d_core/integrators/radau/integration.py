@@ -10,7 +10,11 @@ from numpy.typing import ArrayLike
 from dap3d_core.assembly.arrays import System
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.stabilized_index2.jacobian import BODY, FIRST_ROW, Tangent
-from dap3d_core.formulations.stabilized_index2.jacobian_tables import coupled_bodies, make_tangent
+from dap3d_core.formulations.stabilized_index2.jacobian_tables import (
+    OF_LOOPS,
+    coupled_bodies,
+    make_tangent,
+)
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau import state as at
 from dap3d_core.integrators.radau.dense_output import find_slope
@@ -30,7 +34,11 @@ from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, r
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
 from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.runtime.cache import table_of
-from dap3d_core.kernels.runtime.function_lists import LOOP_LIST, number_signature
+from dap3d_core.kernels.runtime.function_lists import (
+    LOOP_LIST,
+    number_signature,
+    procedure_signature,
+)
 from dap3d_core.linear.lu.plan import LuPlan, StateNode, make_lu_plan
 from dap3d_core.linear.ordering.ordering import JointNode
 from dap3d_core.model import Model
@@ -44,6 +52,8 @@ REGULAR = 1e-6
 
 #: Arrays of states of elements, which a scene without any has not in its checkpoints.
 OF_STATES = ("tangent.states.", "matrix.state_")
+#: Arrays that each tangent writes before it reads them.
+SCRATCH = ("tangent.wide.", *(f"tangent.{name}" for name in OF_LOOPS))
 
 
 class Effort(NamedTuple):
@@ -192,7 +202,7 @@ class RadauIntegration(Integration):
     def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
         """As ``Integration.own_arrays``; makes the tangent and the matrix, too."""
         evaluator = self.evaluator
-        self.tangent = make_tangent(evaluator)
+        self.tangent, self.own_loops = make_tangent(evaluator)
         self.matrix, self.lu_plan = make_matrix(evaluator, self.tangent)
         lu, rows, bodies = self.lu_plan, evaluator.plan.row_size, evaluator.model.body_count + 1
         shapes: dict[str, Any] = {
@@ -222,23 +232,25 @@ class RadauIntegration(Integration):
         """The parts of a step as first-class functions, each compiled separately.
 
         A compiled function that calls another one takes in its code, and optimises it again; calls
-        by pointer keep the parts apart: part(t, h, work, system, loops, tangent, matrix).
+        by pointer keep the parts apart: part(t, h, work, system, loops, tangent, matrix). The
+        tangent stands by itself: no derivative of a run needs its derivatives, as the iteration
+        converges to the same stages with any.
         """
-        signature = number_signature(
+        kinds = (
             RadauState.type_of(), System.type_of(), LOOP_LIST, Tangent.type_of(),
             StageMatrix.type_of(),
         )  # fmt: skip
-        parts = (
-            find_tangent, factorise_both, find_stages, estimate_error, find_slope,
-            measure_stage_noise, find_work,
+        steps = (
+            factorise_both, find_stages, estimate_error, find_slope, measure_stage_noise, find_work,
         )  # fmt: skip
-        return table_of(signature, parts)
+        tangents = table_of(procedure_signature(*kinds), (find_tangent,), values_alone=True)
+        return table_of(number_signature(*kinds), steps), tangents
 
     @property
     def loop_arguments(self) -> tuple[Any, ...]:
         """As ``Integration.loop_arguments``."""
         evaluator = self.evaluator
-        return (self.work, evaluator.functions, self._parts, evaluator.system, evaluator.loops,
+        return (self.work, evaluator.functions, *self._parts, evaluator.system, self.own_loops,
                 self.tangent, self.matrix)  # fmt: skip
 
     def _project(self) -> bool:
@@ -254,7 +266,7 @@ class RadauIntegration(Integration):
         """As ``Integration.all_arrays``."""
         yield from super().all_arrays()
         own = (*self.tangent.walk("tangent."), *self.matrix.walk("matrix."))
-        without = () if self.evaluator.model.state_count else OF_STATES
+        without = SCRATCH if self.evaluator.model.state_count else (*SCRATCH, *OF_STATES)
         yield from ((name, array) for name, array in own if not name.startswith(without))
 
     def restored(self, name: str, array: Any, found: Any) -> Any:

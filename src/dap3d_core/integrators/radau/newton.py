@@ -18,12 +18,7 @@ from dap3d_core.assembly.evaluate import largest, place, zero
 from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
-from dap3d_core.formulations.stabilized_index2.jacobian import (
-    BENT,
-    SMALLEST,
-    Tangent,
-    differentiate,
-)
+from dap3d_core.formulations.stabilized_index2.jacobian import BENT, Tangent, differentiate
 from dap3d_core.formulations.stabilized_index2.stage_equations import (
     StageMatrix,
     add_transposed,
@@ -48,12 +43,12 @@ from dap3d_core.integrators.radau.convergence import (
     size_of_change,
 )
 from dap3d_core.integrators.radau.state import RadauState
-from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, SCRATCH, TRIAL, Y
+from dap3d_core.integrators.stepping.integration_state import SCRATCH, TRIAL, Y
 from dap3d_core.integrators.stepping.vector_ops import scaled_largest
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.lu.factor import factor_lu, solve_lu
 
-ROUNDING = 2.220446049250313e-16
+EPSILON = 2.220446049250313e-16
 #: Iterations at most; more where the step is fixed, for a shorter one is no choice there.
 MOST, MOST_FIXED = 10, 40
 #: Slow iterations that a fixed step, or multipliers on their way, are left.
@@ -70,15 +65,11 @@ LARGEST = 1.7976931348623157e308
 
 @compiled
 def find_tangent(
-    t: float,
-    h: float,
-    work: RadauState,
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:
-    """The tangent of a step h at t, at its end as predicted; 0, or NaN where it is not finite.
+    work: RadauState, system: System, loops: Any, tangent: Tangent, matrix: StageMatrix
+) -> None:
+    """The tangent of the step ``work.tangent_step`` at its end as predicted.
+
+    ``work.tangent_is_current`` is 0 after it where it is not finite.
 
     The directions of stiff elements change during a step, and of its stages the last one counts
     most: on the governor of A05 the iteration converges 20 times faster than with the tangent at
@@ -87,7 +78,7 @@ def find_tangent(
     argument = work.state[SCRATCH]
     for k in range(argument.shape[0]):
         argument[k] = work.state[Y, k] + work.Z[2, k]
-    at = t + h if work.has_last_step != 0 else t
+    at = work.t + work.tangent_step if work.has_last_step != 0 else work.t
     place(at, argument, system, loops)
     linearise(at, system, loops)
     keep_state(system, matrix, work.regularisation)
@@ -96,19 +87,12 @@ def find_tangent(
     work.jacobian_count += 1
     work.tangent_needed, work.tangent_is_current = 0, 1
     work.factored_step = 0.0
-    if not differentiate(at, system.multipliers, system, loops, tangent):
-        return math.nan
-    own, rtol = tangent.states, work.rtol
-    count = own.size.shape[0]
-    if count == 0:
-        return 0.0
-    first = argument.shape[0] - 1 - count
-    for k in range(count):
-        own.size[k] = work.tolerance[ABSOLUTE, first + k] / (rtol if rtol > 0.0 else 1.0)
-        if not own.size[k] > 0.0:
-            own.size[k] = SMALLEST
-    differentiate_states(at, system.multipliers, system, loops, tangent)
-    return 0.0 if largest(own.values) < math.inf else math.nan
+    finite = differentiate(at, system.multipliers, system, loops, tangent)
+    if finite and tangent.states.values.shape[0] > 0:
+        differentiate_states(at, system, loops, tangent)
+        finite = largest(tangent.states.values) < math.inf
+    if not finite:
+        work.tangent_is_current = 0
 
 
 @compiled
@@ -299,11 +283,11 @@ def find_stages(
     """
     limit = newton_limit(work)
     stale = abs(h - work.factored_step) / h  # factors of another step converge at this rate
-    work.convergence_factor = max(max(work.convergence_factor, ROUNDING) ** 0.8, stale)
+    work.convergence_factor = max(max(work.convergence_factor, EPSILON) ** 0.8, stale)
     before = ratio = ratio_before = states = multipliers = 1.0
     fixed = work.fixed_step != 0.0
     most = MOST_FIXED if fixed else MOST
-    least = 2 if tangent.fine[0] == BENT else 1  # rates of other steps say nothing across a bend
+    least = 2 if tangent.bends[0] == BENT else 1  # rates of other steps say nothing across a bend
     for done in range(1, most + 1):
         evaluate_stages(t, h, work, system, loops, matrix)
         solve_stages(h, work, system, matrix)
@@ -337,7 +321,7 @@ def find_stages(
             if done < most and left >= 1.0 and not patient:
                 excess = max(1e-4, min(20.0, left))
                 return 0.8 * excess ** (-1.0 / (3.0 + most - done))
-        before = max(change, ROUNDING)
+        before = max(change, EPSILON)
         states, multipliers = work.state_change, work.multiplier_change
         factor = work.convergence_factor
         if done > 1 and (work.has_last_step == 0 or least > 1):  # the first rate may be that of

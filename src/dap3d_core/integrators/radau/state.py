@@ -57,6 +57,7 @@ class RadauState(IntegrationState):
     convergence_rate = _own()
     accepted_step = _own()  # length of the last accepted step
     factored_step = _own()  # length of the step that the factors belong to
+    tangent_step = _own()  # length of the step that the tangent is asked for
     accepted_error = _own()  # of the last accepted step
     regularisation = _own()  # of the rows; 0: none
     state_change = _own()  # norms of the last change of the stages and of their multipliers

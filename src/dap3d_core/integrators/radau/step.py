@@ -9,11 +9,12 @@ RADAU5.
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
 from dap3d_core.assembly.arrays import System
-from dap3d_core.formulations.stabilized_index2.jacobian import BENT, Tangent
+from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND, Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau.convergence import is_at_rounding, newton_limit
 from dap3d_core.integrators.radau.dense_output import prepare_dense
@@ -77,6 +78,7 @@ def advance(
     work: RadauState,
     functions: Sequence[Function],
     parts: Sequence[Any],
+    tangents: Sequence[Any],
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -91,13 +93,13 @@ def advance(
     while may_step(work, dense_state, limit, project, report, system, loops):
         steps, rejected = work.step_count, work.rejected_count
         if work.first_stage_valid == 0:
-            tangent.fine[0] = 0.0
+            tangent.bends[0] = 0.0
             start(work, rhs, project, system, loops)
         else:
-            step(work, parts, (project, accepted, watch), system, loops, tangent, matrix)
+            step(work, parts, tangents, (project, accepted, watch), system, loops, tangent, matrix)
             h = work.factored_step
             if work.rounding_state != 0 and h > 0.0 and can_measure(work, rejected):
-                measure = parts[5]
+                measure = parts[4]
                 measure(work.t, h, work, system, loops, tangent, matrix)
                 bound_stage_noise(h, work, rhs, system, loops)
         if work.calls_accepted != 0 and work.step_count > steps:
@@ -132,6 +134,7 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
 def step(
     work: RadauState,
     parts: Sequence[Any],
+    tangents: Sequence[Any],
     functions: Any,
     system: System,
     loops: Any,
@@ -139,8 +142,8 @@ def step(
     matrix: StageMatrix,
 ) -> None:
     """Try one step: accept it, reject it, or stop the run; functions: project, accepted, watch."""
-    (project, accepted, watch), find_work = functions, parts[6]
-    estimate_error, find_slope = parts[3], parts[4]
+    project, accepted, watch = functions
+    estimate_error, find_slope, find_work = parts[2], parts[3], parts[5]
     state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
     end = t1 = end_of_step(work)
     longest = h = t1 - t
@@ -149,7 +152,7 @@ def step(
         if h == 0.0:
             return
         t1 = t1 if h == longest else t + h
-    shorter = search(t, h, work, parts, system, loops, tangent, matrix)
+    shorter = search(t, h, work, parts, tangents, system, loops, tangent, matrix)
     if shorter != 0.0:
         reject_iteration(work, t1, h, shorter)
         return
@@ -208,6 +211,7 @@ def search(
     h: float,
     work: RadauState,
     parts: Sequence[Any],
+    tangents: Sequence[Any],
     system: System,
     loops: Any,
     tangent: Tangent,
@@ -215,16 +219,16 @@ def search(
 ) -> float:
     """Predict and find the stages of a step h, by up to three attempts; as find_stages."""
     predict(h, work, True)
-    shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+    shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
     if shorter > 0.0 and work.convergence_rate < HOPELESS:  # once more, with the tangent at the end
         work.tangent_needed = 1
-        shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
-    if shorter > 0.0 and tangent.fine[0] == BENT:  # the prediction may lie beyond the bend
+        shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
+    if shorter > 0.0 and tangent.bends[0] == BENT:  # the prediction may lie beyond the bend
         predict(h, work, False)
         work.tangent_needed = 1
-        shorter = iterate(t, h, work, parts, system, loops, tangent, matrix)
+        shorter = iterate(t, h, work, parts, tangents, system, loops, tangent, matrix)
     if shorter != 0.0 and work.tangent_is_current != 0:
-        tangent.fine[0] = max(tangent.fine[0], 1.0)
+        tangent.bends[0] = max(tangent.bends[0], MAY_BEND)
     return shorter
 
 
@@ -234,16 +238,19 @@ def iterate(
     h: float,
     work: RadauState,
     parts: Sequence[Any],
+    tangents: Sequence[Any],
     system: System,
     loops: Any,
     tangent: Tangent,
     matrix: StageMatrix,
 ) -> float:
     """Find the stages from their present values, with a new tangent if needed; as find_stages."""
-    find_tangent, factorise_both, find_stages = parts[0], parts[1], parts[2]
+    factorise_both, find_stages, find_tangent = parts[0], parts[1], tangents[0]
     wrong = 0.0
     if work.tangent_needed != 0:
-        wrong = find_tangent(t, h, work, system, loops, tangent, matrix)
+        work.tangent_step = h
+        find_tangent(work, system, loops, tangent, matrix)
+        wrong = 0.0 if work.tangent_is_current != 0 else math.nan
     if wrong == 0.0 and not abs(h - work.factored_step) <= SAME_STEP * h:
         wrong = factorise_both(t, h, work, system, loops, tangent, matrix)
     if wrong == 0.0:

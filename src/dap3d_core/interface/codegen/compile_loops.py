@@ -21,7 +21,8 @@ from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, is_out_of_memory, where_is
 from dap3d_core.interface.fields import sized_fields
-from dap3d_core.kernels.runtime.loop_modules import Loop, build
+from dap3d_core.kernels.compiler.units import Entry
+from dap3d_core.kernels.runtime.loop_modules import Loop, build, build_differentiated
 
 
 def write(type_info: TypeInfo, what: str) -> Loop | None:
@@ -68,13 +69,30 @@ def compiled_loop(
     """The compiled loop of a type for ``what`` (a key of LOOP_KINDS); None where it has none.
 
     Args:
-        examined: the type.
+        type_info: the type, which keeps it: names of units are digests of all their sources.
         what: the kind of the loop.
         announce: called with the loop's name before it is compiled.
 
     Raises:
         PluginError: it cannot be compiled; names file, type, kernels, line, reason and remedy.
     """
+    if what not in type_info.loops:
+        type_info.loops[what] = _compiled_loop(type_info, what, announce)
+    return type_info.loops[what]
+
+
+def differentiated_loop(type_info: TypeInfo, what: str, count: int) -> Entry:
+    """A loop that a type has, with derivatives (``build_differentiated``); kept as well."""
+    key = what, count
+    if key not in type_info.loops:
+        loop = write(type_info, what)
+        assert loop is not None
+        type_info.loops[key] = build_differentiated(loop, count)
+    made: Entry = type_info.loops[key]
+    return made
+
+
+def _compiled_loop(type_info: TypeInfo, what: str, announce: Callable[[str], None] | None) -> Any:
     loop = write(type_info, what)
     if loop is None:
         return None

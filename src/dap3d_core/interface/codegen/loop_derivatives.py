@@ -13,14 +13,14 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.interface.codegen.compile_loops import write
+from dap3d_core.interface.codegen.compile_loops import differentiated_loop
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.interface.codegen.reactions import body_columns, rows_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.compiler.units import Entry
 from dap3d_core.kernels.runtime.function_lists import LoopArrays
 from dap3d_core.kernels.runtime.lanes import DifferentiatedArrays
-from dap3d_core.kernels.runtime.loop_modules import build_differentiated
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P, R, V, W
 
 #: Directions of a body: r, rotation vector, r_dot, omega.
@@ -115,12 +115,9 @@ class _Instances:
         places: Integers = self.idx[:, column, None] + np.arange(length)
         return places
 
-    def run(self, loop: Any, t: float, p0: int) -> list[Floats]:
+    def run(self, entry: Entry, t: float, p0: int) -> list[Floats]:
         """(size, 1 + d) values and slopes: of the three outputs of a loop, and rates of states."""
-        entry, multipliers = (
-            build_differentiated(loop, 1 + AT_ONCE),
-            self._arrays.pop("multipliers"),
-        )
+        multipliers = self._arrays.pop("multipliers")
         arrays = LoopArrays(idx=self.idx.ravel(), **self._arrays)
         size = max(self._places, arrays.body.shape[0] * 6, len(multipliers))
         parts = []
@@ -131,7 +128,7 @@ class _Instances:
             for lane, (name, at, slopes) in enumerate(self.seeds[first : first + AT_ONCE], 1):
                 numbers = outs[1] if name == "multipliers" else wide.matrix(self._arrays[name])
                 numbers[at, lane] = slopes
-            entry(np.array([t] + [0.0] * AT_ONCE), wide, 0, p0, len(self.idx), *outs)
+            entry(t, wide, 0, p0, len(self.idx), *outs)
             parts.append([*outs, wide.matrix(arrays.rates)])
         return [
             np.hstack([part[k] if part is parts[0] else part[k][:, 1:] for part in parts])[
@@ -193,7 +190,7 @@ def differentiate_loop(
     for k in range(layout.state_width if states else 0):
         own.seed("states", own.at["states", state][:, k])
     where = _places(type_info, what, own)
-    found = own.run(write(type_info, what), t, p0)
+    found = own.run(differentiated_loop(type_info, what, 1 + AT_ONCE), t, p0)
     outputs = {name: found[k][at] for name, (k, at) in where.items()}
     bodies = np.ascontiguousarray(idx[:, places])
     return LoopDerivatives(bodies, {name: (x[..., 0], x[..., 1:]) for name, x in outputs.items()})

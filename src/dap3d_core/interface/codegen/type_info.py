@@ -50,6 +50,7 @@ class TypeInfo:
         derived: kernels derived from others.
         joints: of a force, the joints whose reactions it reads, once a scene has named them.
         terms: of a function that combines functions, the types of those.
+        loops: its loops that were compiled, by what they compute.
     """
 
     type: type[TypeBase]
@@ -64,6 +65,7 @@ class TypeInfo:
     derived: tuple[str, ...] = ()
     joints: tuple[JointOfForce, ...] = ()
     terms: tuple["TypeInfo", ...] = ()
+    loops: dict[Any, Any] = attrs.field(factory=dict, init=False, eq=False, repr=False)
 
     @property
     def row_count(self) -> int:

@@ -8,10 +8,14 @@ from dap3d_core.interface.types import Joint
 
 #: What authors define.
 DECLARED = ("gap", "at", "normal")
+#: What they may define besides.
+OPTIONAL = ("reach",)
 #: Fields that a material gives.
 MATERIAL = ("mu", "mu_s", "e", "law")
 #: Values of ``law``.
 LAWS = ("poisson", "newton")
+#: Initial mode of a contact that touches as the scene is assembled.
+TOUCHES = 1.0
 _ZERO = (0.0, 0.0, 0.0)
 #: Fields that a run knows best: which point it is, and the initial values of its states.
 HIDDEN: dict[str, Any] = {
@@ -29,6 +33,10 @@ class Contact(Joint):
     * ``at``      the point of contact, global axes;
     * ``normal``  the unit vector there that points from body j to body i.
 
+    A fourth is for surfaces that end, as edges do: ``reach``, not negative while the point of
+    contact is on both of them. Where it becomes negative the contact opens, whatever its force, and
+    beyond it nothing touches.
+
     Rows, right-hand sides, slip and friction follow from them: one of the normal, two across it, of
     the velocity of body i at the point of contact less that of body j. The gap must be such that
     its rate is that velocity along the normal, as of every distance between smooth surfaces
@@ -41,11 +49,11 @@ class Contact(Joint):
     """
 
     kernel_names: ClassVar[tuple[str, ...]] = (  # type: ignore[assignment]
-        *DECLARED, *Joint.kernel_names, "tension"
+        *DECLARED, *OPTIONAL, *Joint.kernel_names, "tension"
     )  # fmt: skip
     rows, holonomic = 3, (True, False, False)
     is_contact: ClassVar[bool] = True
-    declared: ClassVar[tuple[str, ...]] = DECLARED
+    declared: ClassVar[tuple[str, ...]] = (*DECLARED, *OPTIONAL)
     points: ClassVar[int] = 1
 
     def __init_subclass__(cls, **conditions: Any) -> None:
@@ -75,6 +83,7 @@ def _add_material(class_: type) -> None:
         "mu_s": number(None, minimum=0.0, doc="the same of sticking; mu where it is left out"),
         "e": number(0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution"),
         "law": choice(LAWS, "poisson", doc="of impacts: whose coefficient e is"),
+        "touch": choice((False, True), False, doc="the bodies are moved until they touch at t = 0"),
     }
     fields |= {name: hidden(value) for name, value in HIDDEN.items()}
     own = dict(vars(class_).get("__annotations__", {}))
@@ -104,7 +113,8 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     from dap3d_core.interface.codegen.specialise import bound_kernel
     from dap3d_core.interface.contacts import rates, rows
 
-    declared = {name: getattr(class_, name) for name in DECLARED}
+    names_of = [*DECLARED, *(n for n in OPTIONAL if getattr(class_, n, None) is not None)]
+    declared = {name: getattr(class_, name) for name in names_of}
     specs = _specs(class_)
     kinds = {name: spec.kind for name, spec in specs.items()}
     has_j = any(slot_of(name) == "j" for name in specs)
@@ -117,6 +127,11 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         wanted[short] = list(names)
         found = [c.removeprefix("turned__(").split(",")[0] for c in changes]
         wanted[f"{short}_dot"] = [*names, *(c for c in found if c not in ("None", "1.0"))]
+    if "reach" in declared:
+        wanted["reach"] = list(parameters(declared["reach"]))
+        calls["reach"] = f"reach__({', '.join(wanted['reach'])})"
+    else:
+        calls["reach"] = "1.0"
     if not has_j:
         calls |= dict.fromkeys(("r_j", "v_j", "w_j"), "(0.0, 0.0, 0.0)")
     kernels = {f"{name}__": kernel for name, kernel in declared.items()}

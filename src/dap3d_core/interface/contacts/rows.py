@@ -25,6 +25,8 @@ from dap3d_core.kernels import (
 OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0
 #: Speed, m/s, below which friction points against the direction in which sliding began.
 STILL = 1e-8
+#: Gap, m, of what does not touch as its surfaces end before.
+APART = 1.0
 _ZERO = (0.0, 0.0, 0.0)
 
 
@@ -154,14 +156,18 @@ def friction_of_one(c, n, r_i, v_i, w_i, lam, mu, mode, way, near):
     return friction(c, n, r_i, v_i, w_i, _ZERO, _ZERO, _ZERO, lam, mu, mode, way, near)[0]
 
 
-def switch(gap, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mu_s, mode, way, near):
-    """What ends a mode where it is negative: gap or normal force; slip or the rest of a cone."""
+def switch(gap, reach, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mu_s, mode, way, near):
+    """What ends a mode where it is negative: gap, or normal force and reach; slip, or rest of a cone."""
     normal, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
     slip = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
     slides = where(mu > 0.0, dot(slip, across(way, n)), 1.0)
     sticks = where(mu_s > 0.0, mu_s * normal - sqrt(dot(tangential, tangential)), 1.0)
     return (
-        where(closed(mode), normal, gap),
+        where(
+            closed(mode),
+            where(reach < normal, reach, normal),
+            where(reach < 0.0, APART, gap),
+        ),
         where(held(mode), sticks, where(closed(mode), slides, 1.0)),
     )
 
@@ -171,8 +177,11 @@ def rate(mode, way, near):
     return 0.0, _ZERO, _ZERO
 
 
-def output(gap, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):
-    """Of results: gap, normal force, friction on body i (3), slip (3), point of contact (3)."""
+def output(gap, reach, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):
+    """Of results: gap, normal force, friction on body i (3), slip (3), point of contact (3), reach,
+    force on body i (3).
+    """
     normal, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
     slip = across(slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j), n)
-    return (gap, normal, *tangential, *slip, *c)
+    force = add(scale(normal, n), tangential)
+    return (gap, normal, *tangential, *slip, *c, reach, *force)

@@ -87,7 +87,7 @@ def _text(
     except ImportError as error:
         raise CannotDeriveError(
             f"it leaves {', '.join(wanted)} to be derived from {', '.join(given)}, which needs "
-            "sympy; install it with: pip install 'dap3d[derive]'"
+            "sympy; install it with: pip install sympy"
         ) from error
     symbols = symbolic.Symbols(names, layout.slots)
     try:

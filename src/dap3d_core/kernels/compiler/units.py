@@ -38,7 +38,10 @@ class Unit:
         write: as given; writes the code anew, for another target.
         results: what ``write`` returned with the code, read back from the object file.
         cost: estimated seconds to optimise it.
+        has_slopes: its code is differentiated.
     """
+
+    has_slopes = False
 
     def __init__(
         self,
@@ -105,10 +108,16 @@ class Unit:
 
 
 class Functions:
-    """A table of addresses of functions of one signature, for calls from compiled code."""
+    """A table of addresses of functions of one signature, for calls from compiled code.
 
-    def __init__(self, signature: t.Signature, entries: "Sequence[Entry]") -> None:
-        self.signature = signature
+    Attributes:
+        values_alone: what they compute needs no derivatives in differentiated code.
+    """
+
+    def __init__(
+        self, signature: t.Signature, entries: "Sequence[Entry]", values_alone: bool = False
+    ) -> None:
+        self.signature, self.values_alone = signature, values_alone
         self.entries = list(entries)
         self.addresses = np.zeros(max(1, len(self.entries)), dtype=np.int64)
         for index, entry in enumerate(self.entries):

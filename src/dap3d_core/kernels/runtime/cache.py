@@ -210,8 +210,11 @@ def names_of(label: str, functions: Sequence[Any], *parts: str | bytes) -> tuple
     return f"{label}-{ready}", f"{label}-{digest(ready, *codes, objects.identity())}"
 
 
-def table_of(signature: Signature, functions: Sequence[Any]) -> Any:
-    """A table of functions of one signature for compiled code; in plain Python a list."""
+def table_of(signature: Signature, functions: Sequence[Any], *, values_alone: bool = False) -> Any:
+    """A table of functions of one signature for compiled code; in plain Python a list.
+
+    values_alone: what they compute needs no derivatives in differentiated code (lanes.py).
+    """
     if not jit_is_on():
         return list(functions)
     entries: dict[Any, Entry] = {f: f for f in functions if isinstance(f, Entry)}
@@ -219,7 +222,7 @@ def table_of(signature: Signature, functions: Sequence[Any]) -> Any:
     for module in dict.fromkeys(f.__module__ for f in rest):
         here = [f for f in rest if f.__module__ == module]
         entries.update(zip(here, entries_of(here, signature.arguments), strict=True))
-    return Functions(signature, [entries[f] for f in functions])
+    return Functions(signature, [entries[f] for f in functions], values_alone)
 
 
 def distrust(folder: Path) -> str:

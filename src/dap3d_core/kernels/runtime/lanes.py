@@ -5,6 +5,7 @@ are one in each lane, and have the bits of each alone; or lane 0 is a number, wi
 has alone, and the others are its derivatives. Item k of all lanes lies together.
 """
 
+import ctypes
 import functools
 import inspect
 import threading
@@ -86,17 +87,39 @@ def unit_of(name: str, functions: int, write: Any, optimise: bool = False) -> Un
 def differentiated(entry: Entry, count: int) -> Entry:
     """A compiled function whose floats are ``count`` numbers: a value, and derivatives."""
     unit = entry.unit
+    if unit.has_slopes:  # of a table that is called where values alone are computed
+        return entry
 
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
         return differentiate(unit.fresh_text(symbols), count), unit.results
 
     wide = unit_of(f"{unit.name}-d{count}", len(unit.symbols), write)
+    wide.has_slopes = True
     return Entry(wide, entry.k, entry.signature)
 
 
 def differentiated_table(table: Functions, count: int) -> Functions:
     """A table of functions, each as ``differentiated`` gives it."""
     return Functions(table.signature, [differentiated(entry, count) for entry in table.entries])
+
+
+class ValueFunctions:
+    """A table of functions that compute values alone, for differentiated code.
+
+    They run on the plain arrays; what they change has no slopes.
+
+    Attributes:
+        address: of the table.
+    """
+
+    def __init__(self, table: Functions, run: Callable[..., None]) -> None:
+        """Args: the plain functions; runs one of them, given it and addresses of its arguments."""
+        words = [ctypes.c_void_p] * len(table.signature.arguments)
+        kind = ctypes.CFUNCTYPE(None, *words)
+        self._calls = [kind(functools.partial(run, entry)) for entry in table.entries]
+        addresses = [ctypes.cast(call, ctypes.c_void_p).value or 0 for call in self._calls]
+        self._addresses = np.array(addresses, dtype=np.int64)
+        self.address = address_of(self._addresses)
 
 
 class WideArrays:
@@ -247,13 +270,22 @@ class Differentiation:
         if not isinstance(argument, (Functions, Arrays)):
             return argument
         if id(argument) not in self._wide:
-            wide: Any = (
-                DifferentiatedArrays(argument, self.count, self._buffers)
-                if isinstance(argument, Arrays)
-                else differentiated_table(argument, self.count)
-            )
+            wide: Any
+            if isinstance(argument, Arrays):
+                wide = DifferentiatedArrays(argument, self.count, self._buffers)
+            elif argument.values_alone:
+                wide = ValueFunctions(argument, self._run_plain)
+            else:
+                wide = differentiated_table(argument, self.count)
             self._wide[id(argument)] = argument, wide
         return self._wide[id(argument)][1]
+
+    def _run_plain(self, entry: Entry, *addresses: int) -> None:
+        """Call a function from differentiated code with the plain arrays."""
+        plain = {wide.address: argument for argument, wide in self._wide.values()}
+        self._any.give()
+        entry(*(plain[address] for address in addresses))
+        self.take()
 
 
 def _flat(array: Floats) -> Floats:

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 from dap3d_core.kernels import table_lookup
 from dap3d_core.kernels.compiler.trace import trace
-from dap3d_core.kernels.compiler.types import FLOAT, Array, Signature, Struct
+from dap3d_core.kernels.compiler.types import Struct
 from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime import generated_modules, loop_support
 from dap3d_core.kernels.runtime.cache import cache_folder, jit_is_on, names_of
@@ -120,7 +120,8 @@ def build_wide(loop: Loop, count: int) -> Entry:
 def build_differentiated(loop: Loop, count: int) -> Entry:
     """The loop with derivatives: of each number its value and ``count`` - 1 slopes.
 
-    In plain Python as well, where nothing else is compiled. It takes t as an array of one number.
+    In plain Python as well, where nothing else is compiled. Time has no slopes: the signature is
+    that of all loops.
     """
     from dap3d_core.kernels.compiler.derivatives import differentiate
     from dap3d_core.kernels.runtime.lanes import unit_of
@@ -130,13 +131,15 @@ def build_differentiated(loop: Loop, count: int) -> Entry:
 
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
         traced = trace(symbols[0], _module(loop, text, name), array_members())
-        helpers, define, body = traced.rpartition("define void @")
-        body = body.replace("(double %t, ", "(ptr %t.at, ", 1)
-        body = body.replace("entry:", "entry:\n  %t = load double, ptr %t.at, align 8", 1)
-        return differentiate(helpers + define + body, count), ["None"]
+        helpers, define, body = differentiate(traced, count).rpartition("define void @")
+        vector = f"<{count} x double>"
+        body = body.replace(f"{vector} %t, ", "double %t.0, ", 1)
+        start = f"  %t = insertelement {vector} zeroinitializer, double %t.0, i32 0"
+        return helpers + define + body.replace("entry:", f"entry:\n{start}", 1), ["None"]
 
-    _, *others = LOOP.arguments
-    return Entry(unit_of(name, 1, write), 0, Signature((Array(FLOAT, 0), *others)))
+    unit = unit_of(name, 1, write)
+    unit.has_slopes = True
+    return Entry(unit, 0, LOOP)
 
 
 def _module(loop: Loop, text: str, name: str) -> dict[str, Any]:

@@ -30,6 +30,9 @@ from dap3d_core.linear.ordering.supernodes import LEAST_ROWS
 #: at the start, and the product of its node has fallen by as much: to LESS at least, where others
 #: have grown.
 SINGULAR_PIVOT_RATIO, SINGULAR_NODE_RATIO = 1e-4, 1e-2
+#: Compliance of a row that is zero, as those of an open contact are: its multiplier is zero. A node
+#: of three such rows is passed over.
+IDLE = 1e40
 
 
 @compiled_into
@@ -117,13 +120,13 @@ def weigh_rows(blocks: Integers, D: Floats, part: float, compliance: Floats) -> 
 def regularise(nodes: Integers, compliance: Floats, K: Floats) -> None:
     """Subtract E from the pivots of the joints, between ``assemble`` and ``factor``.
 
-    A row that is zero, as those of open contacts are, weighs one: its multiplier is zero.
+    Of a row that is zero it is ``IDLE``.
     """
     for k in range(nodes.shape[0] - 1):
         m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
         if nodes[k, 3] < 0:
             for r in range(m):
-                K[d + r * (m + 1)] -= compliance[f + r] if compliance[f + r] != 0.0 else 1.0
+                K[d + r * (m + 1)] -= compliance[f + r] if compliance[f + r] != 0.0 else IDLE
 
 
 @compiled_into
@@ -200,6 +203,21 @@ def eliminate(
     return counted
 
 
+@compiled_into
+def is_idle(d: int, K: Floats) -> bool:
+    """True if the three rows at d, factored, are zero: right-hand sides of theirs are as well."""
+    return K[d] == -1.0 / IDLE and K[d + 4] == -1.0 / IDLE and K[d + 8] == -1.0 / IDLE
+
+
+@compiled_into
+def pass_over(d: int, K: Floats) -> bool:
+    """Factor the three rows at d if they are zero; True if they are."""
+    if K[d] == -IDLE and K[d + 4] == -IDLE and K[d + 8] == -IDLE:
+        K[d] = K[d + 4] = K[d + 8] = -1.0 / IDLE
+        return True
+    return False
+
+
 @compiled
 def factor(
     nodes: Integers, columns: Integers, updates: Integers, K: Floats, smallest: Floats, drop: bool
@@ -221,7 +239,8 @@ def factor(
     for k in range(nodes.shape[0] - 1):
         m = nodes[k, 0]
         if m == 3:
-            counted += eliminate(k, 3, nodes, columns, updates, K, smallest, drop)
+            if not pass_over(nodes[k, 2], K):
+                counted += eliminate(k, 3, nodes, columns, updates, K, smallest, drop)
         elif m == 5:
             counted += eliminate(k, 5, nodes, columns, updates, K, smallest, drop)
         elif m >= LEAST_ROWS:
@@ -316,7 +335,8 @@ def solve_down(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None
     for k in range(nodes.shape[0] - 1):
         m = nodes[k, 0]
         if m == 3:
-            solve_forwards(k, 3, nodes, columns, K, x)
+            if not is_idle(nodes[k, 2], K):
+                solve_forwards(k, 3, nodes, columns, K, x)
         elif m == 5:
             solve_forwards(k, 5, nodes, columns, K, x)
         elif m >= LEAST_ROWS:
@@ -331,7 +351,8 @@ def solve_up(nodes: Integers, columns: Integers, K: Floats, x: Floats) -> None:
     for k in range(nodes.shape[0] - 2, -1, -1):
         m = nodes[k, 0]
         if m == 3:
-            solve_backwards(k, 3, nodes, columns, K, x)
+            if not is_idle(nodes[k, 2], K):
+                solve_backwards(k, 3, nodes, columns, K, x)
         elif m == 5:
             solve_backwards(k, 5, nodes, columns, K, x)
         elif m >= LEAST_ROWS:

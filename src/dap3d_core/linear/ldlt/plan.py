@@ -290,6 +290,7 @@ def make_plan(
     body_count: int,
     joint_slots: Sequence[tuple[int, ...]],
     joint_rows: Sequence[int],
+    alone: int = 0,
 ) -> Plan:
     """Find the elimination program of a model's sparsity.
 
@@ -297,8 +298,9 @@ def make_plan(
         body_count: bodies without ground, numbered from 1.
         joint_slots: bodies of each joint by slot, ground 0.
         joint_rows: rows of each joint.
+        alone: so many joints, the last ones, share a node with no other.
     """
-    found = order_nodes(body_count, joint_slots, joint_rows)
+    found = order_nodes(body_count, joint_slots, joint_rows, alone)
     node_count, sizes = len(found.nodes), found.sizes
     starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64).tolist()
     place = {node: k for k, node in enumerate(found.order)}

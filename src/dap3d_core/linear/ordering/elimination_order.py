@@ -45,6 +45,7 @@ def order_nodes(
     body_count: int,
     joint_slots: Sequence[tuple[int, ...]],
     joint_rows: Sequence[int],
+    alone: int = 0,
 ) -> Ordering:
     """Find the order of elimination.
 
@@ -52,8 +53,9 @@ def order_nodes(
         body_count: bodies without ground; they are numbered from 1.
         joint_slots: bodies of each joint, ground 0.
         joint_rows: rows of each joint.
+        alone: so many joints, the last ones, share a node with no other.
     """
-    nodes = _merge(joint_slots, joint_rows)
+    nodes = _merge(joint_slots, joint_rows, alone)
     of_body: list[list[int]] = [[] for _ in range(body_count + 1)]
     for k, node in enumerate(nodes):
         for b in node.bodies:
@@ -79,7 +81,9 @@ def order_nodes(
     return found
 
 
-def _merge(joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]) -> list[JointNode]:
+def _merge(
+    joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int], alone: int
+) -> list[JointNode]:
     found: dict[tuple[tuple[int, ...], bool], int] = {}
     keys: list[tuple[tuple[int, ...], bool]] = []
     joints: list[list[int]] = []
@@ -88,7 +92,8 @@ def _merge(joint_slots: Sequence[tuple[int, ...]], joint_rows: Sequence[int]) ->
         others = tuple(sorted({b for b in slots if b}))
         key = others, 0 in slots or len(others) == 1
         node = found.get(key)
-        if node is None or rows[node] + m > NODE_ROWS:
+        is_alone = joint >= len(joint_slots) - alone
+        if node is None or is_alone or rows[node] + m > NODE_ROWS:
             found[key] = len(keys)
             keys.append(key)
             joints.append([joint])

@@ -60,7 +60,7 @@ enum {
 
 /* Kinds of variables. */
 enum { DAP3D_TIME, DAP3D_INPUT, DAP3D_PARAMETER, DAP3D_OUTPUT, DAP3D_STATE, DAP3D_DERIVATIVE,
-       DAP3D_INDICATOR };
+       DAP3D_INDICATOR, DAP3D_FIXED /* a parameter that is set before the run begins alone */ };
 
 /* ---------------------------------------------------------------------- instances */
 
@@ -91,7 +91,8 @@ DAP3D_API int dap3d_kind(int variable);
 DAP3D_API int dap3d_find(const char *name);
 
 /* Set an input or a parameter. It takes effect from the present time on. DAP3D_INVALID if the
-   variable is neither, or the value is not finite. */
+   variable is neither, the value is not finite, or a fixed parameter is set in the course of a run:
+   then the start is found anew, and outputs before it show what was set. */
 DAP3D_API int dap3d_set(dap3d_model *model, int variable, double value);
 
 /* The value of a variable at the present time; not a number for a reference that is none. */
@@ -139,6 +140,14 @@ DAP3D_API int dap3d_set_states(dap3d_model *model, double t, const double *y);
 /* Their derivatives at t and y. DAP3D_ERROR if they are not finite. */
 DAP3D_API int dap3d_derivatives(dap3d_model *model, double t, const double *y, double *rates);
 
+/* Derivatives of unknowns (outputs, derivatives) at the present time and state along a direction: by
+   knowns (states, inputs, tunable parameters, time), each times its seed. They are exact to rounding,
+   as is the code that is differentiated; where a function bends, those of the side that is computed.
+   DAP3D_INVALID for variables of other kinds, and of models without derivatives. */
+DAP3D_API int dap3d_directional(dap3d_model *model, const int *unknowns, int count,
+                                const int *knowns, int known_count, const double *seed,
+                                double *result);
+
 /* Bring y at t onto the constraints, from near them. On return *moved (if not NULL) is the largest
    change of a state. */
 DAP3D_API int dap3d_project(dap3d_model *model, double t, double *y, double *moved);
@@ -147,6 +156,11 @@ DAP3D_API int dap3d_project(dap3d_model *model, double t, double *y, double *mov
    their values at t and y. */
 DAP3D_API int dap3d_indicator_count(void);
 DAP3D_API int dap3d_indicators(dap3d_model *model, double t, const double *y, double *values);
+
+/* Handle an event at the present time and state, as at the start of a run, and where an indicator
+   has changed its sign: velocities jump, if the model has such elements, and the state is brought
+   onto the constraints. *changed is 1 where the states are others then. */
+DAP3D_API int dap3d_event(dap3d_model *model, int *changed);
 
 /* The first time after t at which a function of time takes another form; infinite if none does. */
 DAP3D_API double dap3d_next_event(const dap3d_model *model, double t);

@@ -31,6 +31,8 @@ typedef struct {
     char *name;
     bool logs, is_exchange, is_initialised, is_terminated;
     bool early_return;       /* of FMI 3: steps may end early */
+    bool has_events;         /* of FMI 3: event mode is used in co-simulation */
+    void *intermediate;      /* of FMI 3: callback */
     double t_end, moved;
 } fmu;
 
@@ -85,7 +87,7 @@ static fmi_status fmi_setup(fmu *f, double start, bool has_stop, double stop)
 {
     if (start != 0.0)
         return fmi_failed(f, fmi_error, "the start time of the model is 0");
-    f->model->t_end = has_stop && stop > 0.0 ? stop : HORIZON;
+    f->model->t_end = f->model->span = has_stop && stop > 0.0 ? stop : HORIZON;
     for (int k = 0; k < INTEGRATIONS; k++)
         numbers(f->model, integrations[k].times)[2] = f->model->t_end;
     return fmi_ok;
@@ -125,13 +127,13 @@ static fmi_status fmi_reset(fmu *f)
 }
 
 /* One step of co-simulation; *ended where the model has ended the run before. */
-static fmi_status fmi_step(fmu *f, double t, double h, bool *ended)
+static fmi_status fmi_step(fmu *f, double t, double end, bool *ended)
 {
-    double now = dap3d_time(f->model), end = t + h;
+    double now = dap3d_time(f->model);
     *ended = false;
     if (fabs(t - now) > 1e-9 * fmax(fabs(t), 1e-3))
         return fmi_failed(f, fmi_error, "the communication point is not where the last step ended");
-    if (!(h > 0.0))
+    if (!(end > t))
         return fmi_failed(f, fmi_error, "the communication step size is not positive");
     int result = dap3d_step_to(f->model, end);
     if (result == DAP3D_OK)
@@ -144,18 +146,13 @@ static fmi_status fmi_step(fmu *f, double t, double h, bool *ended)
     return fmi_failed(f, fmi_error, dap3d_message(f->model));
 }
 
-/* An event of model exchange: the state onto the constraints. Whether the state has changed. */
+/* An event of model exchange. Whether the state has changed. */
 static fmi_status fmi_event(fmu *f, bool *changed)
 {
-    double y[STATES], t = f->model->t;
-    dap3d_states(f->model, y);
-    *changed = false;
-    if (dap3d_project(f->model, t, y, &f->moved) != DAP3D_OK)
+    int moved = 0;
+    if (dap3d_event(f->model, &moved) != DAP3D_OK)
         return fmi_failed(f, fmi_error, dap3d_message(f->model));
-    if (f->moved > 0.0) {
-        *changed = true;
-        return dap3d_set_states(f->model, t, y) == DAP3D_OK ? fmi_ok : fmi_error;
-    }
+    *changed = moved != 0;
     return fmi_ok;
 }
 
@@ -198,6 +195,17 @@ static fmi_status fmi_derivatives(fmu *f, double *rates, size_t count)
     return fmi_ok;
 }
 
+/* Derivatives along a direction; references are those of variables. */
+static fmi_status fmi_directional(fmu *f, const uint32_t *unknowns, size_t count,
+                                  const uint32_t *knowns, size_t given, const double *seed,
+                                  double *result)
+{
+    if (dap3d_directional(f->model, (const int *)unknowns, (int)count, (const int *)knowns,
+                          (int)given, seed, result) != DAP3D_OK)
+        return fmi_failed(f, fmi_error, dap3d_message(f->model));
+    return fmi_ok;
+}
+
 static fmi_status fmi_indicators(fmu *f, double *values, size_t count)
 {
     double y[STATES];
@@ -208,7 +216,7 @@ static fmi_status fmi_indicators(fmu *f, double *values, size_t count)
     return fmi_ok;
 }
 
-static size_t fmi_state_size(void) { return sizeof(fmu_state) + sizeof(dap3d_model); }
+static size_t fmi_state_size(void) { return sizeof(fmu_state) + dap3d_state_size(); }
 
 static void fmi_keep(const fmu *f, char *bytes)
 {

@@ -117,7 +117,12 @@ NONE(String, text)
 #define ABSENT(name, ...)                                                                         \
     FMI_API S name(I instance, __VA_ARGS__) { return fmi_failed(F, fmi_error, #name ": no such"); }
 #define P const void *
-ABSENT(fmi2GetDirectionalDerivative, P, size_t, P, size_t, P, P)
+FMI_API S fmi2GetDirectionalDerivative(I instance, const R unknowns[], size_t count,
+                                       const R knowns[], size_t given, const double seed[],
+                                       double result[])
+{
+    return fmi_directional(F, unknowns, count, knowns, given, seed, result);
+}
 ABSENT(fmi2SetRealInputDerivatives, P, size_t, P, P)
 ABSENT(fmi2GetRealOutputDerivatives, P, size_t, P, P)
 ABSENT(fmi2GetStringStatus, int, P)
@@ -226,7 +231,7 @@ FMI_API S fmi2DoStep(I instance, double t, double h, int no_set_state)
 {
     bool ended;
     UNUSED(no_set_state);
-    S status = fmi_step(F, t, h, &ended);
+    S status = fmi_step(F, t, t + h, &ended);
     return status == fmi_ok && ended && dap3d_time(F->model) < t + h ? fmi_discard : status;
 }
 

@@ -56,11 +56,13 @@ FMI_API I fmi3InstantiateCoSimulation(const char *name, const char *token, const
                                       const R required[], size_t n, void *environment,
                                       logger3 logger, void *intermediate)
 {
-    UNUSED(path), UNUSED(visible), UNUSED(events), UNUSED(required), UNUSED(n),
-        UNUSED(intermediate);
+    UNUSED(path), UNUSED(visible), UNUSED(required), UNUSED(n);
     fmu *f = instantiate(name, token, logs, environment, logger, false);
-    if (f != NULL)
+    if (f != NULL) {
         f->early_return = early;
+        f->has_events = events;
+        f->intermediate = intermediate;
+    }
     return f;
 }
 
@@ -162,7 +164,6 @@ ABSENT(fmi3GetClock, P, size_t, P)
 ABSENT(fmi3SetClock, P, size_t, P)
 ABSENT(fmi3GetNumberOfVariableDependencies, R, P)
 ABSENT(fmi3GetVariableDependencies, R, P, P, P, P, size_t)
-ABSENT(fmi3GetDirectionalDerivative, P, size_t, P, size_t, P, size_t, P, size_t)
 ABSENT(fmi3GetAdjointDerivative, P, size_t, P, size_t, P, size_t, P, size_t)
 ABSENT(fmi3GetIntervalDecimal, P, size_t, P, P)
 ABSENT(fmi3GetIntervalFraction, P, size_t, P, P, P)
@@ -174,6 +175,15 @@ ABSENT(fmi3SetShiftDecimal, P, size_t, P)
 ABSENT(fmi3SetShiftFraction, P, size_t, P, P)
 ABSENT(fmi3GetOutputDerivatives, P, size_t, P, P, size_t)
 ABSENT(fmi3ActivateModelPartition, R, double)
+
+FMI_API S fmi3GetDirectionalDerivative(I instance, const R unknowns[], size_t count,
+                                       const R knowns[], size_t given, const double seed[],
+                                       size_t seeds, double result[], size_t results)
+{
+    if (seeds != given || results != count)
+        return fmi_failed(F, fmi_error, "all variables are scalars");
+    return fmi_directional(F, unknowns, count, knowns, given, seed, result);
+}
 
 FMI_API S fmi3EvaluateDiscreteStates(I instance)
 {
@@ -285,13 +295,38 @@ FMI_API S fmi3GetNumberOfContinuousStates(I instance, size_t *n)
 
 /* ---------------------------------------------------------------------- co-simulation */
 
+/* The end of a step of the integrator within one of communication; as runtime.c's ``between``. */
+static int between(void *instance, double t, double *end)
+{
+    void (*update)(void *, double, bool, bool, bool, bool, bool *, double *);
+    bool early = false;
+    double when = t;
+    memcpy(&update, &F->intermediate, sizeof update);
+    update(F->environment, t, false, true, true, F->early_return, &early, &when);
+    if (!early || !F->early_return)
+        return 0;
+    *end = fmin(*end, when);
+    return when <= t;
+}
+
+/* In event mode a step ends where a function of time takes another form, if it may; an event is
+   also where a switch has crossed within the step: it has been handled. */
 FMI_API S fmi3DoStep(I instance, double t, double h, bool no_set_state, bool *event,
                      bool *terminate, bool *early, double *last)
 {
     UNUSED(no_set_state);
-    *event = *early = false;
-    S status = fmi_step(F, t, h, terminate);
+    double next = dap3d_next_event(F->model, dap3d_time(F->model)), end = t + h;
+    int64_t before = crossings(F->model);
+    bool is_due = F->has_events && next <= end;
+    if (is_due && F->early_return)
+        end = next;
+    F->model->between = F->intermediate == NULL ? NULL : between;
+    F->model->who = instance;
+    S status = fmi_step(F, t, end, terminate);
+    F->model->between = NULL;
+    F->model->who = NULL;
     *last = dap3d_time(F->model);
-    *early = F->early_return && *terminate && *last < t + h;
+    *event = F->has_events && ((is_due && *last >= next) || crossings(F->model) != before);
+    *early = F->early_return && *last < t + h;
     return status;
 }

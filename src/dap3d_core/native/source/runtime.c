@@ -2,7 +2,8 @@
    begins, and compiled functions; the integrators and equations are those that Python runs.
 
    It does what integrators/stepping/integration.py (break points), integrators/stepping/hold.py
-   (inputs) and simulation/handover.py (stiff scenes) do, in the same order, for the same bits. */
+   (inputs), simulation/handover.py (stiff scenes) and simulation/events/jumps.py (velocities that
+   jump) do, in the same order, for the same bits. */
 
 #define DAP3D_BUILD
 #include <math.h>
@@ -24,17 +25,25 @@ enum { RUNNING, FINISHED, STEP_FLOOR, NOT_FINITE, PROJECTION_FAILED, SWITCHED, C
 struct dap3d_model {
     uint64_t identity;
     double t, t_end;         /* present time; end of the run */
+    double span;             /* s, by which times of jumps are judged */
     double first_h;          /* of a hold: the step that it began with; -1: none has begun */
     int64_t first_rejected;
     int64_t which;           /* the integration that the run is in */
     int64_t is_ahead;        /* steps have gone beyond the present time, which is interpolated */
     int64_t is_changed;      /* inputs have changed since the last step */
+    int64_t jump_count;
+    int64_t is_other;        /* 1: parameters that the start depends on are set; 2: it moves */
+    int64_t has_begun;       /* what touches at the start has jumped */
     int64_t has_row;         /* the row is that of the present time, and so are the outputs */
     int64_t is_over;
+    int (*between)(void *, double, double *); /* called at ends of steps, while one is going on */
+    void *who;
     char message[160];
+    double sides[SWITCHES + 1]; /* of indicators, for integrators of others */
     double row[ROW + 1];     /* t, y and report at the present time */
     double outputs[OUTPUTS + 1];
-    int64_t w[WORDS];        /* the memory of the run */
+    int64_t w[WORDS];        /* the memory of the run: the state of it ends here */
+    double wide[DIRECTIONS ? 2 * WORDS : 1]; /* the same with slopes, for directional derivatives */
 };
 
 typedef void (*function)(double, const double *, int64_t, double *, int64_t, void *, void *);
@@ -80,6 +89,7 @@ static void begin(dap3d_model *m, double t_end)
     m->identity = IDENTITY;
     m->t_end = t_end;
     m->first_h = -1.0;
+    m->span = t_end;
     for (int k = 0; k < INTEGRATIONS; k++) {
         double *times = numbers(m, integrations[k].times);
         times[0] = 0.0;
@@ -114,6 +124,12 @@ const char *dap3d_name(int v) { return v < 0 || v >= VARIABLES ? NULL : variable
 
 const char *dap3d_unit(int v) { return v < 0 || v >= VARIABLES ? NULL : variables[v].unit; }
 
+static int is_parameter(int v)
+{
+    int kind = v < 0 || v >= VARIABLES ? -1 : variables[v].kind;
+    return kind == DAP3D_PARAMETER || kind == DAP3D_FIXED;
+}
+
 int dap3d_kind(int v) { return v < 0 || v >= VARIABLES ? -1 : variables[v].kind; }
 
 int dap3d_find(const char *name)
@@ -124,27 +140,83 @@ int dap3d_find(const char *name)
     return -1;
 }
 
+#if CALLS
+/* Let the loops of elements that outputs are of run at the bodies as reported. */
+static void call_elements(dap3d_model *m)
+{
+    typedef void (*loop)(double, void *, int64_t, int64_t, int64_t, double *, double *, double *);
+    for (int k = 0; k < MULTIPLIERS; k++)
+        numbers(m, MINUS_LAMBDA)[m->w[ROW_OF + k]] = -m->row[MULTIPLIER + k];
+    for (int k = 0; k < CALLS; k++) {
+        double *x = numbers(m, VALUES_OF_ELEMENTS);
+        loop code = (loop)(uintptr_t)m->w[calls[k].table + calls[k].q];
+        memset(x + calls[k].out, 0, 8 * (size_t)calls[k].size);
+        m->w[COUNTER] = 0;
+        code(m->t, m->w + calls[k].arrays, calls[k].i0, calls[k].p0, 1, x + calls[k].out,
+             x + calls[k].second, x + calls[k].third);
+    }
+}
+#else
+static void call_elements(dap3d_model *m) { (void)m; }
+#endif
+
+static void start(dap3d_model *m);
+
 /* The row and the outputs of the present time. */
 static void report(dap3d_model *m)
 {
+    start(m);
     if (m->has_row)
         return;
     if (!m->is_ahead)
         memcpy(m->row + 1, y_of(m), 8 * STATES);
     m->row[0] = m->t;
     call(m, REPORT, m->t, m->row + 1, m->row + 1 + STATES, ROW - 1 - STATES);
-    dap3d_outputs(m->t, numbers(m, BODIES), m->row + 1, numbers(m, VALUES), m->outputs);
+    call_elements(m);
+    dap3d_outputs(numbers(m, BODIES), m->row + 1, numbers(m, VALUES),
+                  numbers(m, VALUES_OF_ELEMENTS), m->outputs);
     m->has_row = 1;
 }
 
 static int restart_here(dap3d_model *m);
 
+static void place_parameter(dap3d_model *m, int v, double x)
+{
+    for (int k = 0; k < variables[v].count; k++)
+        *numbers(m, places[variables[v].first + k].word) = places[variables[v].first + k].sign * x;
+}
+
+#if FIXED
+/* Set a parameter on which the start depends: the run begins anew, with all that has been set. */
+static int set_fixed(dap3d_model *m, int v, double x)
+{
+    double values[VARIABLES];
+    if (m->t > 0.0 || integer_of(m)[I_step_count] > 0)
+        return fail(m, DAP3D_INVALID, "this parameter is set before a run begins");
+    for (int k = 0; k < VARIABLES; k++)
+        values[k] = variables[k].kind == DAP3D_INPUT || is_parameter(k) ? dap3d_get(m, k) : 0.0;
+    int64_t is_other = m->is_other;
+    begin(m, m->t_end);
+    values[v] = x;
+    for (int k = 0; k < VARIABLES; k++)
+        if (is_parameter(k))
+            place_parameter(m, k, values[k]);
+        else if (variables[k].kind == DAP3D_INPUT)
+            *numbers(m, variables[k].first) = values[k];
+    m->is_other = is_other | 1;
+    for (size_t k = 0; k < sizeof moving / sizeof *moving; k++)
+        m->is_other |= v == moving[k] ? 2 : 0;
+    return DAP3D_OK;
+}
+#endif
+
 int dap3d_set(dap3d_model *m, int v, double x)
 {
     int kind = dap3d_kind(v);
-    if ((kind != DAP3D_INPUT && kind != DAP3D_PARAMETER) || !(fabs(x) <= LARGEST))
+    if ((kind != DAP3D_INPUT && !is_parameter(v)) || !(fabs(x) <= LARGEST))
         return fail(m, DAP3D_INVALID, "only inputs and parameters are set, to finite numbers");
     if (kind == DAP3D_INPUT) {
+        start(m);
         double *value = numbers(m, variables[v].first);
         if (*value != x) {
             *value = x;
@@ -156,9 +228,12 @@ int dap3d_set(dap3d_model *m, int v, double x)
     double *value = numbers(m, places[variables[v].first].word);
     if (*value == places[variables[v].first].sign * x)
         return DAP3D_OK;
+#if FIXED
+    if (kind == DAP3D_FIXED)
+        return set_fixed(m, v, x);
+#endif
     int result = m->t > 0.0 ? restart_here(m) : DAP3D_OK;
-    for (int k = 0; k < variables[v].count; k++)
-        *numbers(m, places[variables[v].first + k].word) = places[variables[v].first + k].sign * x;
+    place_parameter(m, v, x);
     m->has_row = 0;
     return result;
 }
@@ -169,6 +244,7 @@ double dap3d_get(dap3d_model *m, int v)
     switch (dap3d_kind(v)) {
     case DAP3D_TIME: return m->t;
     case DAP3D_INPUT: return *numbers(m, k);
+    case DAP3D_FIXED:
     case DAP3D_PARAMETER: return places[k].sign * *numbers(m, places[k].word);
     case DAP3D_OUTPUT: report(m); return m->outputs[k];
     case DAP3D_STATE: report(m); return m->row[1 + k];
@@ -294,6 +370,172 @@ static int hand_over(dap3d_model *m)
     return 1;
 }
 
+/* ---------------------------------------------------------------------- jumps */
+
+#if JUMPS
+/* As Jumps._set_sides: sides of the switches after a jump; of one that goes back, where it goes. */
+static void set_sides(dap3d_model *m)
+{
+    double *real = real_of(m), *y = y_of(m), *sides = numbers(m, integrations[m->which].sides);
+    double span = fmax(m->span, fabs(real[R_t])), h = 1e-8 * span, t = real[R_t], one = 1.0;
+    double slope[STATES], later[STATES], values[SWITCHES + 1], ahead[SWITCHES + 1];
+    call(m, RHS, t, y, slope, STATES);
+    call(m, WATCH, t, y, values, SWITCHES);
+    for (int k = 0; k < STATES; k++)
+        later[k] = y[k] + h * slope[k];
+    call(m, WATCH, t + h, later, ahead, SWITCHES);
+    for (int k = 0; k < SWITCHES; k++) {
+        double rate = (ahead[k] - values[k]) / h;
+        int at_once = fabs(values[k]) <= 1e-10 * span * fabs(rate);
+        double side = at_once ? (rate > 0.0) - (rate < 0.0) : numbers(m, JUMP_SIDES)[k];
+        sides[k] = m->w[DOES_JUMP + k] ? side : 0.0;
+    }
+    if (integer_of(m)[I_calls_accepted])
+        call(m, ACCEPTED, t, y, &one, 1);
+}
+
+/* As Jumps._jump: velocities jump at the present state; whether that went well, and *acted. */
+static int let_jump(dap3d_model *m, const double *crossing, const double *sides, int *acted)
+{
+    double *j = numbers(m, JUMP_REAL);
+    *acted = 0;
+    memcpy(numbers(m, JUMP_CROSSING), crossing, 8 * SWITCHES);
+    memset(numbers(m, JUMP_SIDES), 0, 8 * SWITCHES);
+    if (sides != NULL)
+        memcpy(numbers(m, JUMP_SIDES), sides, 8 * SWITCHES);
+    memcpy(numbers(m, JUMP_Y), y_of(m), 8 * STATES);
+    j[J_soon] = 1e-13 * fmax(m->span, fabs(real_of(m)[R_t]));
+    m->w[JUMP_INTEGER + JI_has_sides] = sides != NULL;
+    m->w[JUMP_INTEGER + JI_given_count] = m->w[JUMP_INTEGER + JI_follows] = 0;
+    jump_law(real_of(m)[R_t], m->w);
+    if (m->w[JUMP_INTEGER + JI_missed] != -1)
+        return 0;
+    for (int k = 0; k < ELEMENTS; k++)
+        *acted |= m->w[JUMP_ACTING + k] != 0;
+    if (*acted) {
+        memcpy(y_of(m), numbers(m, JUMP_Y), 8 * STATES);
+        restart(m);
+        set_sides(m);
+    }
+    return 1;
+}
+
+#endif
+
+#if FIXED
+static void table_call(dap3d_model *m, int64_t word, double t, double *y, double *out, int64_t size)
+{
+    function f = (function)(uintptr_t)m->w[word];
+    f(t, y, STATES, out, size, m->w + SYSTEM, m->w + LOOPS);
+}
+
+/* The metric of a body, of its mass and inertia: 1/sqrt(m), and U = L^-T with J' = L L^T. */
+static void weigh(dap3d_model *m, int b)
+{
+    const double *x = numbers(m, BODIES) + BODY_WIDTH * b, *J = x + BODY_JP;
+    double *k = numbers(m, METRIC) + METRIC_WIDTH * b;
+    double a = sqrt(J[0]), c = J[3] / a, d = J[6] / a, e = sqrt(J[4] - c * c);
+    double f = (J[7] - d * c) / e, g = sqrt(J[8] - d * d - f * f);
+    k[0] = 1.0 / sqrt(x[BODY_MASS]);
+    k[1] = 1.0 / a, k[4] = 1.0 / e, k[6] = 1.0 / g;
+    k[2] = 0.0 - c * k[1] * k[4];
+    k[5] = 0.0 - f * k[4] * k[6];
+    k[3] = 0.0 - (d * k[1] + f * k[2]) * k[6];
+}
+
+/* The state that the scene gives. */
+static void take_given(dap3d_model *m, double *y)
+{
+    const double *u = numbers(m, GIVEN), *v = u + 7 * BODY_COUNT;
+    double *rates = y + 7 * BODY_COUNT;
+    memcpy(y, u, 8 * 13 * BODY_COUNT);
+    memcpy(y + 13 * BODY_COUNT, u + 13 * BODY_COUNT, 8 * ELEMENT_STATES);
+    for (int b = 0; b < BODY_COUNT; b++) { /* w' = A^T w */
+        const double *e = u + 7 * b + 3, *w = v + 6 * b + 3;
+        double *own = rates + 6 * b + 3, c[3], d[3], *p = own;
+        c[0] = e[2] * w[2] - e[3] * w[1];
+        c[1] = e[3] * w[0] - e[1] * w[2];
+        c[2] = e[1] * w[1] - e[2] * w[0];
+        d[0] = e[2] * c[2] - e[3] * c[1];
+        d[1] = e[3] * c[0] - e[1] * c[2];
+        d[2] = e[1] * c[1] - e[2] * c[0];
+        for (int k = 0; k < 3; k++)
+            p[k] = w[k] - 2.0 * e[0] * c[k] + 2.0 * d[k];
+    }
+}
+
+/* The start with the parameters that it depends on; whether there is one. */
+static int find_start(dap3d_model *m)
+{
+    double *y = y_of(m), *k = numbers(m, METRIC), kept[7 * (BODY_COUNT + 1)], none[1] = {0.0};
+    if (m->is_other & 2)
+        take_given(m, y);
+    if ((m->is_other & 2) && ASSEMBLES) {
+        double *out = numbers(m, STARTING);
+        for (int b = 1; b <= BODY_COUNT; b++) {
+            memcpy(kept + 7 * b, k + METRIC_WIDTH * b, 8 * 7);
+            memcpy(k + METRIC_WIDTH * b, numbers(m, UNIT), 8 * 7);
+        }
+        table_call(m, BEGIN + 1, 0.0, y, out, STARTING_SIZE);
+        for (int b = 1; b <= BODY_COUNT; b++)
+            memcpy(k + METRIC_WIDTH * b, kept + 7 * b, 8 * 7);
+        if (out[START_OPEN] != 0.0 || !(out[START_PIVOT] > 1e-10))
+            return 0;
+    }
+    for (size_t n = 0; n < sizeof heavy / sizeof *heavy; n++)
+        if (heavy[n] > 0)
+            weigh(m, heavy[n]);
+    table_call(m, BEGIN, 0.0, y, none, 0);
+    for (int n = 1; n < INTEGRATIONS; n++)
+        memcpy(numbers(m, integrations[n].state), y, 8 * STATES);
+    return 1;
+}
+#endif
+
+/* Find the start, and let what touches and approaches jump there, once. */
+static void start(dap3d_model *m)
+{
+    if (m->has_begun)
+        return;
+    m->has_begun = 1;
+#if FIXED
+    if (m->is_other && !find_start(m)) {
+        integer_of(m)[I_status] = PROJECTION_FAILED;
+        real_of(m)[R_t_stop] = 0.0;
+        return;
+    }
+#endif
+#if JUMPS
+    double none[SWITCHES + 1] = {0.0};
+    int acted;
+    if (!let_jump(m, none, NULL, &acted)) {
+        integer_of(m)[I_status] = JUMPED;
+        real_of(m)[R_t_stop] = real_of(m)[R_t];
+    }
+#endif
+}
+
+/* As Jumps.apply, where an integration has stopped for it; whether it goes on. */
+static int apply_jump(dap3d_model *m)
+{
+#if JUMPS
+    if (integer_of(m)[I_status] == JUMPED) {
+        double *sides = numbers(m, integrations[m->which].sides), crossing[SWITCHES], before[SWITCHES];
+        int acted;
+        m->jump_count++;
+        memcpy(before, sides, sizeof before);
+        memcpy(crossing, sides + CROSSED_BEHIND_SIDES, sizeof crossing);
+        memset(sides + CROSSED_BEHIND_SIDES, 0, sizeof crossing);
+        if (let_jump(m, crossing, before, &acted)) {
+            integer_of(m)[I_status] = RUNNING;
+            return 1;
+        }
+        real_of(m)[R_t_stop] = real_of(m)[R_t];
+    }
+#endif
+    return hand_over(m);
+}
+
 /* The run has stopped short of a time. */
 static int stopped(dap3d_model *m)
 {
@@ -301,13 +543,23 @@ static int stopped(dap3d_model *m)
         "", "the run has reached its end", "the error requires a step that time cannot resolve",
         "rates or a state are not finite", "no state on the constraints was found",
         "a switch of the model ended the run", "a switch changed its sign again and again", "",
-        "the scene is stiff", "velocities jump", "steps are so short that the run would not end"};
+        "the scene is stiff", "joints hold a velocity that is to jump", "steps are so short that the run would not end"};
     int64_t status = integer_of(m)[I_status];
     double t = status == FINISHED ? real_of(m)[R_t] : real_of(m)[R_t_stop];
     m->is_over = 1;
     snprintf(m->message, sizeof m->message, "the run stopped at t = %.9g s: %s", t,
              words[status >= 0 && status <= STALLED ? status : 0]);
     return status == SWITCHED || status == FINISHED ? DAP3D_ENDED : DAP3D_ERROR;
+}
+
+/* At the end of a step, before that of a call: whether the call ends here; *end may become earlier. */
+static int pauses(dap3d_model *m, double *end)
+{
+    if (m->between == NULL || real_of(m)[R_t] >= *end || integer_of(m)[I_status] != RUNNING)
+        return 0;
+    m->t = real_of(m)[R_t];
+    m->has_row = m->is_ahead = 0;
+    return m->between(m->who, m->t, end);
 }
 
 /* Integrate beyond a time, and interpolate there: as a run with reports. */
@@ -319,12 +571,17 @@ static int step_freely(dap3d_model *m, double t)
     integer_of(m)[I_row_count] = 0;
     if (integer_of(m)[I_status] == FINISHED)
         integer_of(m)[I_status] = RUNNING; /* the last step has reached the end, and reported it */
+    if (integer_of(m)[I_status] == JUMPED && !apply_jump(m))
+        return stopped(m);
     if (real_of(m)[R_t] >= t)
         advance_once(m, -1); /* no step */
     while (integer_of(m)[I_row_count] == 0) {
-        if (integer_of(m)[I_status] != RUNNING && !hand_over(m))
+        if (integer_of(m)[I_status] != RUNNING && !apply_jump(m))
             return stopped(m);
         advance(m, 0);
+        if (integer_of(m)[I_row_count] == 0 && pauses(m, &t))
+            return DAP3D_OK;
+        numbers(m, integrations[m->which].times)[1] = t;
     }
     double *row = numbers(m, integrations[m->which].rows);
     memcpy(m->row, row, 8 * ROW);
@@ -396,14 +653,18 @@ static int hold_to(dap3d_model *m, double end)
         if (real_of(m)[R_t] >= end && (status == RUNNING || status == FINISHED))
             break;
         if (status != RUNNING) {
+            if (status == JUMPED && apply_jump(m))
+                continue;
             if (!hand_over(m))
                 return m->t = real_of(m)[R_t], m->has_row = m->is_ahead = 0, stopped(m);
             m->first_h = real_of(m)[R_h];
             m->first_rejected = integer_of(m)[I_rejected_count];
         }
         real_of(m)[R_t_limit] = end;
-        advance(m, 1000);
+        advance(m, m->between == NULL ? 1000 : 0);
         real_of(m)[R_t_limit] = INFINITY;
+        if (pauses(m, &end))
+            end = real_of(m)[R_t];
     }
     double *real = real_of(m);
     int64_t *integer = integer_of(m);
@@ -422,6 +683,15 @@ static int hold_to(dap3d_model *m, double end)
 
 double dap3d_time(const dap3d_model *m) { return m->t; }
 
+/* Crossings of switches so far, those where velocities jump included. */
+static int64_t crossings(dap3d_model *m)
+{
+    int64_t count = m->jump_count;
+    for (int k = 0; k < INTEGRATIONS; k++)
+        count += m->w[integrations[k].integer + I_crossing_count];
+    return count;
+}
+
 int dap3d_step_to(dap3d_model *m, double t)
 {
     m->message[0] = 0;
@@ -436,16 +706,19 @@ int dap3d_step_to(dap3d_model *m, double t)
         t = m->t_end;
     if (t > m->t_end)
         return fail(m, DAP3D_INVALID, "the time is beyond the end that dap3d_create was given");
+    start(m);
+    if (INPUTS > 0) /* its end is open: a usual number of such steps */
+        m->span = fmin(1000.0 * (t - m->t), m->t_end);
     return INPUTS > 0 ? hold_to(m, t) : step_freely(m, t);
 }
 
 /* ---------------------------------------------------------------------- states of a run */
 
-size_t dap3d_state_size(void) { return sizeof(dap3d_model); }
+size_t dap3d_state_size(void) { return offsetof(dap3d_model, wide); }
 
 int dap3d_save(const dap3d_model *m, void *state)
 {
-    memcpy(state, m, sizeof *m);
+    memcpy(state, m, dap3d_state_size());
     return DAP3D_OK;
 }
 
@@ -455,7 +728,7 @@ int dap3d_load(dap3d_model *m, const void *state)
     memcpy(&identity, state, sizeof identity);
     if (identity != IDENTITY)
         return fail(m, DAP3D_INVALID, "the state is not one of this model");
-    memcpy(m, state, sizeof *m);
+    memcpy(m, state, dap3d_state_size());
     place(m);
     return DAP3D_OK;
 }
@@ -466,7 +739,8 @@ int dap3d_state_count(void) { return STATES; }
 
 int dap3d_states(const dap3d_model *model, double *y)
 {
-    dap3d_model *m = (dap3d_model *)model; /* y_of changes nothing */
+    dap3d_model *m = (dap3d_model *)model; /* which begins where it has not */
+    start(m);
     memcpy(y, m->is_ahead ? m->row + 1 : y_of(m), 8 * STATES);
     return DAP3D_OK;
 }
@@ -513,6 +787,84 @@ int dap3d_derivatives(dap3d_model *m, double t, const double *y, double *rates)
     return DAP3D_OK;
 }
 
+#if DIRECTIONS
+/* The memory with slopes zero. */
+static void widen(dap3d_model *m)
+{
+    for (int k = 0; k < WORDS; k++) {
+        m->wide[2 * k] = numbers(m, 0)[k];
+        m->wide[2 * k + 1] = 0.0;
+    }
+    int64_t *x = (int64_t *)m->wide;
+    for (size_t k = 0; k < sizeof wide_addresses / sizeof *wide_addresses; k++) {
+        const uint32_t *a = wide_addresses[k];
+        x[a[0]] = (int64_t)(uintptr_t)(a[2] == 2 ? (void *)(m->wide + a[1]) : (void *)(m->w + a[1]));
+    }
+    for (size_t k = 0; k < sizeof wide_shapes / sizeof *wide_shapes; k++)
+        x[wide_shapes[k][0]] = wide_shapes[k][1];
+    for (size_t k = 0; k < sizeof wide_codes / sizeof *wide_codes; k++)
+        x[wide_codes[k].word] = (int64_t)(uintptr_t)wide_codes[k].code;
+}
+#endif
+
+int dap3d_directional(dap3d_model *m, const int *unknowns, int count, const int *knowns, int given,
+                      const double *seed, double *result)
+{
+#if DIRECTIONS
+    double *x = m->wide, *row = x + 2 * ALONG_ROW;
+    report(m);
+    widen(m);
+    for (int k = 0; k < ROW; k++)
+        row[2 * k] = m->row[k], row[2 * k + 1] = 0.0;
+    for (int k = 0; k < given; k++) {
+        int v = knowns[k], first = v < 0 || v >= VARIABLES ? 0 : variables[v].first;
+        switch (dap3d_kind(v)) {
+        case DAP3D_TIME: row[1] += seed[k]; break;
+        case DAP3D_STATE: row[2 * (1 + first) + 1] += seed[k]; break;
+        case DAP3D_INPUT: x[2 * first + 1] += seed[k]; break;
+        case DAP3D_PARAMETER:
+            for (int n = 0; n < variables[v].count; n++)
+                x[2 * places[first + n].word + 1] += places[first + n].sign * seed[k];
+            break;
+        default: return fail(m, DAP3D_INVALID, "there is no derivative by such a variable");
+        }
+    }
+    int needs = 0;
+    for (int k = 0; k < count; k++)
+        needs |= dap3d_kind(unknowns[k]) == DAP3D_OUTPUT ? 2 : 1;
+    if (needs & 1)
+        rates_along(x);
+    if (needs & 2) {
+        report_along(x);
+#if CALLS
+        double *values = x + 2 * VALUES_OF_ELEMENTS;
+        memset(values, 0, 16 * (size_t)(COUNTER - VALUES_OF_ELEMENTS + 1));
+        for (int k = 0; k < MULTIPLIERS; k++)
+            for (int c = 0; c < 2; c++)
+                x[2 * (MINUS_LAMBDA + m->w[ROW_OF + k]) + c] = -row[2 * (MULTIPLIER + k) + c];
+        for (int k = 0; k < CALLS; k++)
+            memset(values + 2 * calls[k].out, 0, 16 * (size_t)calls[k].size);
+#endif
+        elements_along(x);
+        dap3d_outputs_along(x + 2 * BODIES, row + 2, x + 2 * VALUES, x + 2 * VALUES_OF_ELEMENTS,
+                            x + 2 * ALONG_OUT);
+    }
+    for (int k = 0; k < count; k++) {
+        int v = unknowns[k], first = v < 0 || v >= VARIABLES ? 0 : variables[v].first;
+        switch (dap3d_kind(v)) {
+        case DAP3D_OUTPUT: result[k] = x[2 * (ALONG_OUT + first) + 1]; break;
+        case DAP3D_DERIVATIVE: result[k] = x[2 * (ALONG_RATES + first) + 1]; break;
+        case DAP3D_STATE: result[k] = row[2 * (1 + first) + 1]; break;
+        default: return fail(m, DAP3D_INVALID, "there is no derivative of such a variable");
+        }
+    }
+    return DAP3D_OK;
+#else
+    (void)unknowns, (void)count, (void)knowns, (void)given, (void)seed, (void)result;
+    return fail(m, DAP3D_INVALID, "the model calls a function without a derivative");
+#endif
+}
+
 int dap3d_project(dap3d_model *m, double t, double *y, double *moved)
 {
     double out[PROJECTED + 1] = {0.0}, before[STATES], largest = 0.0;
@@ -524,6 +876,37 @@ int dap3d_project(dap3d_model *m, double t, double *y, double *moved)
     if (moved != NULL)
         *moved = largest;
     return out[1] == 1.0 ? fail(m, DAP3D_ERROR, "no state on the constraints was found") : DAP3D_OK;
+}
+
+int dap3d_event(dap3d_model *m, int *changed)
+{
+    double y[STATES], moved;
+    dap3d_states(m, y);
+    if (dap3d_project(m, m->t, y, &moved) != DAP3D_OK)
+        return DAP3D_ERROR;
+    *changed = moved > 0.0;
+    if (moved > 0.0 && dap3d_set_states(m, m->t, y) != DAP3D_OK)
+        return DAP3D_ERROR;
+#if JUMPS
+    double values[SWITCHES], crossing[SWITCHES];
+    int acted, crosses = 0;
+    dap3d_indicators(m, m->t, y, values);
+    for (int k = 0; k < SWITCHES; k++) {
+        double side = (values[k] > 0.0) - (values[k] < 0.0);
+        crossing[k] = m->w[DOES_JUMP + k] && side * m->sides[k] < 0.0 ? side : 0.0;
+        m->sides[k] = crossing[k] != 0.0 || m->sides[k] == 0.0 ? side : m->sides[k];
+        crosses |= crossing[k] != 0.0;
+    }
+    if (crosses) {
+        if (!let_jump(m, crossing, m->sides, &acted))
+            return fail(m, DAP3D_ERROR, "joints hold a velocity that is to jump");
+        if (acted)
+            memcpy(m->sides, numbers(m, integrations[m->which].sides), sizeof values);
+        m->has_row = 0;
+        *changed |= acted;
+    }
+#endif
+    return DAP3D_OK;
 }
 
 int dap3d_indicator_count(void) { return SWITCHES; }

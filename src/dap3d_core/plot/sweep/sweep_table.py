@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 POINT, TIME = "point", "time"
 #: Values that reach so far, greatest over least, lie on a log scale when their logarithmic steps
 #: differ by less than this, relative.
-FAR, EVEN = 10.0, 1e-6
+LOG_SCALE_RATIO, EVEN = 10.0, 1e-6
 #: Names that an error lists.
 LISTED = 12
 #: Status of a point with a result: outputs of other points are not drawn as values.
@@ -144,7 +144,7 @@ class Table:
             return bool(np.all(values > 0.0))
         if self.sampled or name == TIME or len(values) < 3 or np.any(values <= 0.0):
             return False
-        if values[-1] < FAR * values[0]:
+        if values[-1] < LOG_SCALE_RATIO * values[0]:
             return False
         steps = np.diff(np.log(values))
         return bool(np.ptp(steps) <= EVEN * np.abs(steps).max())
@@ -185,7 +185,10 @@ def table_of(data: "xarray.Dataset", at: Mapping[str, float] | None = None) -> T
             words = [w for w in words if not w.startswith(f"{varied[-1]} = ")]
     numbers = tuple(n for n in varied if n in cut.coords) if sampled else tuple(dimensions)
     title = str(data.attrs.get("model", ""))
-    outputs = tuple(str(n) for n in cut.data_vars if n not in ("status", "note"))
+    others = ("status", "note")
+    outputs = tuple(
+        str(n) for n in cut.data_vars if n not in others and "parameter" not in cut[n].dims
+    )
     return Table(cut, sampled, numbers, outputs, tuple(w for w in (title, *words) if w))
 
 

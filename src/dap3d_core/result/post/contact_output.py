@@ -27,6 +27,7 @@ class ContactOutput:
             the normal, global axes.
         mode: (nt,) 0 open, 1 slides, 2 sticks.
         at: (nt, 3) m, the point of contact, global axes.
+        force: (nt, 3) N, on body i, normal force and friction together, global axes.
     """
 
     gap: Floats
@@ -35,6 +36,7 @@ class ContactOutput:
     slip: Floats
     mode: Integers
     at: Floats
+    force: Floats
 
 
 def contact_names(state_names: Sequence[str]) -> dict[str, list[str]]:
@@ -75,6 +77,7 @@ def contact_outputs(
             gap=values[:, k, rows.GAP], normal_force=values[:, k, rows.NORMAL],
             friction=values[:, k, rows.FRICTION], slip=values[:, k, rows.SLIP],
             mode=modes[:, k], at=values[:, k, rows.PLACE],
+            force=values[:, k, rows.FORCE],
         )
         for k, name in enumerate(table.names)
     }  # fmt: skip

@@ -26,7 +26,7 @@ FIXED = 1e-3
 #: The largest limit, as a part of a quantity's scale.
 MOST = 1e-2
 #: Relative rounding error of sums over a run.
-ROUNDING = 1e-12
+SUM_ROUNDING = 1e-12
 #: Residual, relative to 1 + largest magnitude, up to which a projection counts as converged
 #: (formulations/standard.py: 1e3 times its tolerance 1e-13).
 PROJECTED = 1e-10
@@ -173,7 +173,7 @@ def ledger_of(summary: ModelSummary, arrays: Arrays, record: RunMetadata) -> dic
 def _relative_limit(record: RunMetadata) -> float:
     """LOOSE rtol, and rounding."""
     control = record.tolerances
-    return FIXED if control is None else LOOSE * control[0] + ROUNDING
+    return FIXED if control is None else LOOSE * control[0] + SUM_ROUNDING
 
 
 def _floors(record: RunMetadata) -> dict[str, float]:
@@ -215,7 +215,7 @@ def _rounding_at_rest(summary: ModelSummary, course: LedgerSeries, record: RunMe
     far = PROJECTED * course.first_size
     work_of_reactions = (open_ + far) * _largest(course.reaction)
     moving = open_**2 * float(summary.mass.sum()) + PROJECTED**2 * _inertia(summary)
-    return ROUNDING * _largest(course.potential_energy) + work_of_reactions + moving
+    return SUM_ROUNDING * _largest(course.potential_energy) + work_of_reactions + moving
 
 
 def _inertia(summary: ModelSummary) -> float:

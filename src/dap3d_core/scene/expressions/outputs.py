@@ -8,7 +8,7 @@ import attrs
 
 from dap3d_core.scene.errors import MISSING, Key
 from dap3d_core.scene.expressions.expression import Expression, fault_of_word, read_expression
-from dap3d_core.scene.scene import Scene, fault_of_name
+from dap3d_core.scene.tables import SceneTables, fault_of_name
 from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
 
@@ -56,13 +56,13 @@ def outputs_of(outputs: Mapping[str, Any]) -> dict[str, Expression]:
     Raises:
         SceneError: all mistakes.
     """
-    report = Collector(Scene(outputs=dict(outputs)))
+    report = Collector(SceneTables(outputs=dict(outputs)))
     expressions = read_outputs(report)
     report.raise_mistakes()
     return expressions
 
 
-def fault_of_quantity(scene: Scene, name: Any, but: str = "") -> str:
+def fault_of_quantity(scene: SceneTables, name: Any, but: str = "") -> str:
     """The reason why something cannot name an output or an input; "" where it can.
 
     Args:

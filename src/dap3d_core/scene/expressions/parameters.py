@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
-from typing import Any
+from typing import Any, TypeVar
 
 import attrs
 
@@ -14,15 +14,16 @@ from dap3d_core.scene.expressions.expression import (
     fault_of_word,
     read_expression,
 )
-from dap3d_core.scene.scene import NAMED, Element, Scene, fault_of_name
+from dap3d_core.scene.tables import NAMED, Element, SceneTables, fault_of_name
 from dap3d_core.scene.validate.coerce_values import Fault, number_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 
+Tables = TypeVar("Tables", bound=SceneTables)
 #: How text begins that is an expression of parameters.
 MARK = "="
 
 
-def resolve(scene: Scene) -> Scene:
+def resolve(scene: Tables) -> Tables:
     """A copy of a scene with numbers in place of expressions of its parameters.
 
     Settings of the run have no expressions.

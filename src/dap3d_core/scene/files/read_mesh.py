@@ -23,7 +23,7 @@ def read_mesh(path: Path, name: str) -> Arrays | str:
     try:
         import trimesh
     except ImportError:
-        return "reading meshes needs trimesh: pip install 'dap3d[mesh]'"
+        return "reading meshes needs trimesh: pip install trimesh"
     try:
         with path.open("rb") as file:
             data = file.read(LARGEST_MESH + 1)

@@ -12,7 +12,8 @@ from dap3d_core.scene.coerce import canonical, entry_of, keys_of, plain, with_id
 from dap3d_core.scene.contacts.tables import Collisions
 from dap3d_core.scene.errors import MISSING, Key, MistakeList, SceneError, dotted, file_error
 from dap3d_core.scene.files.text_file import read_text, unreadable
-from dap3d_core.scene.scene import (
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import (
     HEADER_KEYS,
     NAMED,
     SCENE_FILE,
@@ -21,7 +22,6 @@ from dap3d_core.scene.scene import (
     Animation,
     AnimationPoint,
     Element,
-    Scene,
     Simulation,
 )
 

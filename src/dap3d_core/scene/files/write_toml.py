@@ -11,7 +11,7 @@ import attrs
 
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import MISSING, Mistake, SceneError, file_error
-from dap3d_core.scene.scene import NAMED, SCENE_FILE, Element, Scene
+from dap3d_core.scene.tables import NAMED, SCENE_FILE, Element, SceneTables
 
 #: Maximal bits of an integer; TOML requires readers to take 64, Python writes some 14000.
 LONGEST_INTEGER = 4096
@@ -19,7 +19,7 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _ESCAPES = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "\r": "\\r"}
 
 
-def to_toml(scene: Scene) -> str:
+def to_toml(scene: SceneTables) -> str:
     """The text of the scene file of a scene; reading it gives an equal scene.
 
     Raises:
@@ -43,7 +43,7 @@ def to_toml(scene: Scene) -> str:
     return "\n".join(lines)
 
 
-def save(scene: Scene, path: str | Path) -> Path:
+def save(scene: SceneTables, path: str | Path) -> Path:
     """Write a scene to a file, whole or not at all; returns the file.
 
     Raises:
@@ -88,7 +88,7 @@ def _fields(entry: Any) -> Iterator[tuple[str, Any]]:
         yield field.name.rstrip("_"), value
 
 
-def _animation(scene: Scene) -> list[str]:
+def _animation(scene: SceneTables) -> list[str]:
     lines = ["[animation]"]
     points = [dict(_fields(point)) for point in scene.animation.points]
     if points:

@@ -7,10 +7,10 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import MISSING
-from dap3d_core.scene.scene import NO_TURN, Body
+from dap3d_core.scene.tables import NO_TURN, Body
 from dap3d_core.scene.validate.coerce_columns import Keys, numbers, vectors
 from dap3d_core.scene.validate.coerce_values import (
-    ROUNDING,
+    UNIT_LENGTH_ROUNDING,
     UNIT_TOLERANCE,
     Fault,
     from_axis_angle,
@@ -102,7 +102,7 @@ def _quaternions(report: Collector, names: tuple[str, ...], bodies: list[Body]) 
     )
     length = np.sqrt(np.einsum("nk,nk->n", p, p))
     deviation = np.abs(length - 1.0)
-    for k in np.flatnonzero(deviation > ROUNDING):
+    for k in np.flatnonzero(deviation > UNIT_LENGTH_ROUNDING):
         if length[k] == 0.0:
             what = "Euler parameters of zero length mean no rotation at all"
             remedy = "write [1.0, 0.0, 0.0, 0.0] for a body that is not turned"

@@ -19,9 +19,9 @@ ANGLE_UNITS: dict[str, dict[str, float]] = {
     "rad": {"deg": math.pi / 180.0, "rad": 1.0},
     "rad/s": {"deg/s": math.pi / 180.0, "rpm": math.pi / 30.0, "rad/s": 1.0},
 }
-#: Euler parameters farther from unit length are refused; those farther than ROUNDING are noted.
+#: Euler parameters farther from unit length are refused; those farther than the second are noted.
 UNIT_TOLERANCE = 1e-6
-ROUNDING = 1e-9
+UNIT_LENGTH_ROUNDING = 1e-9
 #: A shorter vector has no direction.
 SHORTEST = 1e-12
 #: An angle beyond a full turn is probably given in degrees.
@@ -311,7 +311,7 @@ def unusual_value_note(spec: FieldSpec, value: Any) -> str:
         length = sum(x * x for x in value) ** 0.5
         if length == 0.0:
             return "is a direction of zero length: it has no effect"
-        if abs(length - 1.0) > ROUNDING:
+        if abs(length - 1.0) > UNIT_LENGTH_ROUNDING:
             return f"is a direction of length {length:.9g}, not 1; it is used as it is"
     return ""
 

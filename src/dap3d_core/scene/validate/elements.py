@@ -10,7 +10,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
-from dap3d_core.scene.scene import GROUND, ZERO, Element
+from dap3d_core.scene.tables import GROUND, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     READERS,
     Fault,
@@ -34,6 +34,8 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.types import Types
 from dap3d_core.scene.validate.validated_scene import Instance, arguments_of
 
+#: Keys of a table's elements that are read before their fields.
+ADDED_KEYS = {"contacts": ("material",)}
 #: The two points that may be given in place of a vector of type 2.
 ENDS = ("P_i", "P_j")
 
@@ -118,12 +120,9 @@ class Reader:
             element = whole
         reading = _Reading(self, element)
         if not element.fields.keys() <= self.known.keys():
+            allowed = (*self.known, *ADDED_KEYS.get(self.table, ()))
             reading.report.add_unknown_keys(
-                reading.key,
-                element.fields,
-                tuple(self.known),
-                in_order=True,
-                remedy=self.other_kind,
+                reading.key, element.fields, allowed, in_order=True, remedy=self.other_kind
             )
             reading.good = False
         for field in self.fields:

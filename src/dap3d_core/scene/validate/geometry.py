@@ -11,10 +11,15 @@ from numpy.typing import NDArray
 from dap3d_core.interface.fields import FieldSpec
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.errors import MISSING, Key
-from dap3d_core.scene.scene import GROUND, ZERO
+from dap3d_core.scene.tables import GROUND, ZERO
 from dap3d_core.scene.validate.bodies import Bodies
 from dap3d_core.scene.validate.coerce_columns import Keys, tuples, vectors
-from dap3d_core.scene.validate.coerce_values import ROUNDING, SHORTEST, Fault, numbers_of
+from dap3d_core.scene.validate.coerce_values import (
+    SHORTEST,
+    UNIT_LENGTH_ROUNDING,
+    Fault,
+    numbers_of,
+)
 from dap3d_core.scene.validate.mistake_collector import Collector
 
 #: Body index (ground 0) and components on that body.
@@ -268,7 +273,7 @@ def _directions(report: Collector, names: tuple[str, ...]) -> tuple[Floats, Floa
     for k in np.flatnonzero(length < SHORTEST):
         what = f"a vector needs a direction; the length of this one is {length[k]:g}"
         report.add(keys[k], given[k], what)
-    for k in np.flatnonzero((np.abs(length - 1.0) > ROUNDING) & (length >= SHORTEST)):
+    for k in np.flatnonzero((np.abs(length - 1.0) > UNIT_LENGTH_ROUNDING) & (length >= SHORTEST)):
         text = f"vectors.{names[k]}.sp: length {length[k]:.9g}, normalised to 1"
         report.note(text, "vectors normalised")
     with np.errstate(invalid="ignore", divide="ignore"):

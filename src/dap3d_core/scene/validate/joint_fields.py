@@ -7,7 +7,7 @@ import attrs
 
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of
-from dap3d_core.scene.scene import GROUND, Element
+from dap3d_core.scene.tables import GROUND, Element
 from dap3d_core.scene.validate.geometry import Geometry, missing_words
 from dap3d_core.scene.validate.mistake_collector import Collector
 

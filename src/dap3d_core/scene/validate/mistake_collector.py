@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.scene.errors import MISSING, Key, Mistake, MistakeList, SceneError, dotted
-from dap3d_core.scene.scene import NAMED, Scene
+from dap3d_core.scene.tables import NAMED, SceneTables
 from dap3d_core.scene.validate.coerce_values import Fault
 
 #: Notes of one kind that are written out; the others are counted.
@@ -17,7 +17,7 @@ NOTES_OF_A_KIND = 10
 class Collector(MistakeList):
     """Mistakes and notes of a scene."""
 
-    def __init__(self, scene: Scene) -> None:
+    def __init__(self, scene: SceneTables) -> None:
         super().__init__(scene.faults)
         self.scene = scene
         self._notes: dict[str, list[str]] = {}
@@ -62,7 +62,7 @@ class Collector(MistakeList):
             raise SceneError(located(self.scene, self.mistakes))
 
 
-def located(scene: Scene, mistakes: list[tuple[Key, Mistake]]) -> list[Mistake]:
+def located(scene: SceneTables, mistakes: list[tuple[Key, Mistake]]) -> list[Mistake]:
     """Mistakes with the file and the line of their keys, sorted by line."""
     files = {"": scene.path} | scene.included
     lines = {name: _lines(path) for name, path in files.items()}
@@ -84,7 +84,7 @@ def located(scene: Scene, mistakes: list[tuple[Key, Mistake]]) -> list[Mistake]:
     return sorted(result, key=lambda m: (m.line is None, m.line or 0))
 
 
-def mistake_at(scene: Scene, key: Key, what: str, remedy: str = "") -> Mistake:
+def mistake_at(scene: SceneTables, key: Key, what: str, remedy: str = "") -> Mistake:
     """A mistake found by a higher floor, located: ``("joints", "J1")`` and the fault there."""
     return located(scene, [(key, Mistake(dotted(key), MISSING, what, remedy=remedy))])[0]
 

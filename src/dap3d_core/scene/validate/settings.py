@@ -1,22 +1,13 @@
 """Check of the settings of a run, from a scene file, a script or the command line."""
 
 from collections.abc import Callable, Collection, Mapping
+from functools import partial
 from typing import Any
 
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.errors import MISSING, Key, MistakeList
-from dap3d_core.scene.scene import (
-    CONTACT_ENGINES,
-    FIXED_STEP,
-    HEADER_KEYS,
-    INTEGRATORS,
-    METHODS,
-    NO_STEP,
-    SCHEMA,
-    STARTS,
-    Scene,
-    Simulation,
-)
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import HEADER_KEYS, SCHEMA, Simulation
 from dap3d_core.scene.validate.coerce_values import (
     Fault,
     bounded,
@@ -26,14 +17,11 @@ from dap3d_core.scene.validate.coerce_values import (
     word_of,
 )
 from dap3d_core.scene.validate.mistake_collector import Collector
+from dap3d_core.settings import FIXED_STEP, NO_STEP, SETTINGS, Setting
 
-#: Values of ``correct_metric`` (simulation/initial/assemble.py).
-CORRECT_METRICS = ("unit", "mass")
 #: Default absolute tolerance, SI, and the quantities that may have one of their own.
 USUAL_ATOL = 1e-10
 QUANTITIES = ("r", "p", "v", "w", "z")
-#: Relative tolerances below are beyond double precision.
-SMALLEST_RTOL = 1e-14
 #: Shorter times, s, leave double precision in products and quotients.
 SHORTEST_TIME = 1e-100
 #: Maximal number of reported times.
@@ -62,39 +50,32 @@ def _tolerance(value: Any) -> Any:
     return value
 
 
-def _positive(value: Any) -> Any:
-    return bounded(number_of(value), positive=True)
-
-
-def _integrator(value: Any) -> Any:
+def _integrator(value: Any, words: tuple[str, ...]) -> Any:
     """An integrator of dap3d, or of an installed package; it is loaded where a run begins."""
-    if value in INTEGRATORS:
+    if value in words:
         return value
     from dap3d_core.registry.extensions import extensions
 
-    return word_of(value, (*INTEGRATORS, *extensions("integrator").keywords))
+    return word_of(value, (*words, *extensions("integrator").keywords))
 
 
-_READERS: dict[str, Callable[[Any], Any]] = {
-    "t_end": lambda v: _time(v, positive=False),
-    "dt": _time,
-    "method": lambda v: word_of(v, METHODS),
-    "integrator": _integrator,
-    "rtol": lambda v: bounded(number_of(v), minimum=SMALLEST_RTOL, maximum=1.0),
-    "atol": _tolerance,
-    "step": _time,
-    "correct": truth_of,
-    "project": truth_of,
-    "start": lambda v: word_of(v, STARTS),
-    "contact": lambda v: word_of(v, CONTACT_ENGINES),
-    "contact_step": _time,
-    "correct_metric": lambda v: word_of(v, CORRECT_METRICS),
-    "alpha": _positive,
-    "Omega": _positive,
-    "mu": _positive,
+def _number(value: Any, setting: Setting) -> Any:
+    """A number within the bounds of a setting."""
+    if setting.most is None:
+        return bounded(number_of(value), positive=True)
+    return bounded(number_of(value), minimum=setting.least, maximum=setting.most)
+
+
+#: Readers of the kinds of settings; bodies have theirs below.
+_READERS: dict[str, Callable[..., Any]] = {
+    "end": lambda v, setting: _time(v, positive=False),
+    "time": lambda v, setting: _time(v),
+    "word": lambda v, setting: word_of(v, setting.words),
+    "integrator": lambda v, setting: _integrator(v, setting.words),
+    "number": _number,
+    "tolerance": lambda v, setting: _tolerance(v),
+    "truth": lambda v, setting: truth_of(v),
 }
-#: Settings without a default.
-OPEN = ("t_end", "dt", "atol", "step")
 
 
 def check_simulation(simulation: Simulation, body_names: Collection[str]) -> None:
@@ -117,11 +98,12 @@ def check_settings(
 ) -> None:
     """Report all mistakes in settings, under a key such as ``("simulation",)``."""
     good: dict[str, Any] = {}
-    for name, reader in _READERS.items():
+    for name, setting in SETTINGS.items():
         value = getattr(simulation, name)
-        if value is None and name in OPEN:
+        if setting.kind == "bodies" or (value is None and setting.default is None):
             continue
-        result = report.read((*key, name), value, reader)
+        reader = _READERS[setting.kind]
+        result = report.read((*key, name), value, partial(reader, setting=setting))
         if not isinstance(result, Fault):
             good[name] = result
     _check_step(report, simulation, good.get("integrator"), (*key, "step"))

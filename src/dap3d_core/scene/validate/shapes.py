@@ -11,7 +11,7 @@ import attrs
 
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.errors import MISSING, Key
-from dap3d_core.scene.scene import NO_TURN, ZERO, Element
+from dap3d_core.scene.tables import NO_TURN, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     SHORTEST,
     Fault,

@@ -8,7 +8,7 @@ from dap3d_core.interface.errors import PluginError
 from dap3d_core.registry import Registry, UnknownTypeError
 from dap3d_core.registry.declared_types import declares
 from dap3d_core.scene.errors import MISSING
-from dap3d_core.scene.scene import PLUGIN_FILE
+from dap3d_core.scene.tables import PLUGIN_FILE
 from dap3d_core.scene.validate.coerce_values import Fault, text_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 

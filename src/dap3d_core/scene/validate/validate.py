@@ -8,7 +8,8 @@ import attrs
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import MISSING, dotted
-from dap3d_core.scene.scene import NAMED, Scene, fault_of_name
+from dap3d_core.scene.scene import Scene
+from dap3d_core.scene.tables import NAMED, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
 

@@ -30,7 +30,7 @@ from dap3d_core.result.file.validate import (
     is_text,
     list_of,
 )
-from dap3d_core.scene import METHODS
+from dap3d_core.settings import METHODS
 from dap3d_core.simulation.errors import CheckpointError
 
 #: Version of this layout, raised when an older reader would misread it.

@@ -94,8 +94,9 @@ class StateView:
 
         Raises:
             UnknownNameError: there is no such quantity.
+            TypeError: the name is no text.
         """
-        getter = self._getters.get(name)
+        getter = self._getters.get(name) if isinstance(name, str) else None
         if getter is None:
             getter = self._getters[name] = self._getter(name)
         if not self._is_placed:

@@ -34,12 +34,12 @@ ACCEPTED = 0.1
 #: The radius changes by these factors, below and above these parts of the predicted work.
 SHRINK, GROW, POOR, GOOD = 0.25, 2.0, 0.25, 0.75
 #: A motion that is further than this from its start, in parts of the scene or rad, does not end.
-FAR = 1e5
+FARTHEST_MOTION = 1e5
 #: The same of rotations, rad: where poses repeat themselves after a turn, and where turns are
 #: counted or rolling joints make a way of them.
 MOST_TURNS, MOST_COUNTED_TURNS = 6.0 * np.pi, 200.0 * np.pi
 #: Unbalanced forces of this part are as small as they get.
-ROUNDING = 1e-17
+LEAST_UNBALANCED = 1e-17
 
 
 class Outcome(Enum):
@@ -191,13 +191,13 @@ class _Search:
     def _is_far(self) -> bool:
         shift = np.linalg.norm(self.path[:, :3], axis=1) * self.statics.length
         turn = np.linalg.norm(self.path[:, 3:], axis=1)
-        return bool(np.any(shift > FAR * self.extent) or np.any(turn > self.most_turns))
+        return bool(np.any(shift > FARTHEST_MOTION * self.extent) or np.any(turn > self.most_turns))
 
     def _refine(self) -> int:
         """Newton steps, as long as they help; returns their number."""
         for steps in range(20):
             pose = self.pose
-            if pose.residual <= ROUNDING:
+            if pose.residual <= LEAST_UNBALANCED:
                 return steps
             K = self.statics.stiffness(pose)
             y = held_solution(K, pose.unbalanced, pose.size)

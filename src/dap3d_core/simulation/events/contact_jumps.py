@@ -4,22 +4,26 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
+import attrs
 import numpy as np
 
 from dap3d_core.formulations import RHS
 from dap3d_core.formulations.contacts.contact_rows import (
     FRICTION,
     GAP,
+    NORMAL,
+    REACH,
     SLIP,
     ContactRows,
     ContactTable,
 )
-from dap3d_core.formulations.contacts.impacts import collide
-from dap3d_core.formulations.contacts.modes import JamError, find_modes
+from dap3d_core.formulations.contacts.impacts import Impact, collide, repeat
+from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.formulations.switches import ROUNDING
+from dap3d_core.formulations.switches import POSITION_ROUNDING
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.interface.contacts.rows import APART
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.model.state_layout import split
@@ -41,6 +45,24 @@ MOST_STEPS, SLOW = 10_000, 1e-5
 #: Records of changes from one mode to another.
 CHANGES = {(0, 1): "touch", (0, 2): "touch", (1, 0): "lift", (2, 0): "lift", (1, 2): "stick",
            (2, 1): "slip"}  # fmt: skip
+
+
+@attrs.frozen
+class Decided:
+    """What was decided at one instant, for the same once more from a state nearby.
+
+    Attributes:
+        impact: with its rounds.
+        stopped: contacts whose slip was stopped.
+        modes: of all contacts, behind it.
+        held, others: contacts that hold, and those that touch and do not.
+    """
+
+    impact: Impact
+    stopped: list[int]
+    modes: Modes
+    held: list[int]
+    others: list[int]
 
 
 class ContactJumps(Jumps):
@@ -67,6 +89,9 @@ class ContactJumps(Jumps):
             remedy = "take it out, or the contacts; friction of its own a contact has (mu)"
             raise SceneError([Mistake(f"forces.{readers[0]}", MISSING, what, remedy=remedy)])
         self.table = ContactTable(evaluator)
+        #: What the last instant decided; where ``repeats``, what is decided at the next.
+        self.decided: Decided | None = None
+        self.repeats = False
         self._stood = (0, -np.inf)
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
 
@@ -77,12 +102,16 @@ class ContactJumps(Jumps):
             SceneError: bodies overlap.
         """
         length = self._evaluator.model.length
+        if self.repeats:
+            self._repeat(integration)
+            return
         gaps = self._gaps(integration)
         mistakes = [
             Mistake(
                 f"contacts.{name}", MISSING, f"its bodies overlap by {-gap:.6g} m at the start",
-                remedy=f"move them apart by that along the normal (a gap of up to "
-                f"{TOUCHING_AT_START * length:g} m counts as touching)",
+                remedy="move them apart by that along the normal, or have them moved until they "
+                f"touch (touch = true); a gap of up to {TOUCHING_AT_START * length:g} m counts as "
+                "touching",
             )
             for name, gap in zip(self.table.names, gaps, strict=True)
             if gap < -TOUCHING_AT_START * length
@@ -100,8 +129,31 @@ class ContactJumps(Jumps):
         which = [(c, part) for c, pair in enumerate(self.table.switches.tolist())
                  for part, k in enumerate(pair) if crossed[k] != 0.0]  # fmt: skip
         work.switches[at.COUNT][self.table.switches.ravel()] = 0.0  # it is counted here
+        if self.repeats:
+            self._repeat(integration)
+            return
         self._refuse_endless(integration, [self.table.names[c] for c, _ in which])
         self._resolve(integration, which, TOUCHING * self._evaluator.model.length)
+
+    def repeat_of(self, other: Jumps) -> None:
+        """Decide what another decided at its last instant, at states nearby.
+
+        Raises:
+            SimulationError: contacts that share what they carry slide.
+        """
+        assert isinstance(other, ContactJumps)
+        assert other.decided is not None
+        modes = other.decided.modes
+        shares = [
+            name for name, mode, near in zip(self.table.names, modes.mode, modes.near, strict=True)
+            if mode == 1.0 and near.any()
+        ]  # fmt: skip
+        if shares:
+            raise SimulationError(
+                f"contacts {', '.join(shares)} share what they carry, and slide: what each of them "
+                "takes is a choice, of which derivatives are not known; let fewer points touch"
+            )
+        self.decided, self.repeats = other.decided, True
 
     def follow(self, integration: Integration) -> None:
         """SimulationError where steps have become too short for the run to come to an end."""
@@ -120,8 +172,8 @@ class ContactJumps(Jumps):
             raise SimulationError(
                 f"the run stopped at t = {t:.9g} s: {steps - before} steps brought it on by "
                 f"{t - since:.2g} s, with contacts {', '.join(names)} closed; {slowest}slip that "
-                "turns while it is next to nothing asks for steps as short. A larger mu_s, above "
-                "mu, lets it begin at once; or end the run by an event before"
+                "turns while it is next to nothing asks for steps as short. Integrator radau may "
+                "pass; a larger mu_s, above mu, lets it begin at once; or end the run by an event"
             )
 
     def _refuse_endless(self, integration: Integration, names: list[str]) -> None:
@@ -160,7 +212,8 @@ class ContactJumps(Jumps):
 
     def _gaps(self, integration: Integration) -> Floats:
         u = self._state_of(integration)
-        gaps: Floats = self.table.outputs(integration.t, u)[:, GAP]
+        outputs = self.table.outputs(integration.t, u)
+        gaps: Floats = np.where(outputs[:, REACH] < 0.0, APART, outputs[:, GAP])
         return gaps
 
     @IGNORE_FLOAT_ERRORS
@@ -179,9 +232,17 @@ class ContactJumps(Jumps):
         before = evaluator.states[table.mode].copy()
         outputs = self._outputs(t, u)
         rows = ContactRows(table, t, u)
-        closed = [c for c in range(table.count)
-                  if before[c] > 0.5 or outputs[c, GAP] < touching or (c, 0) in ended]  # fmt: skip
-        sliding, leaving = self._what_ended(rows, outputs, before, ended)
+        # of those that hold what ends is the force, or the reach of their surfaces
+        beyond = {
+            c
+            for c, part in ended
+            if part == 0 and before[c] > 0.5 and outputs[c, REACH] < outputs[c, NORMAL]
+        }
+        ended = [(c, part) for c, part in ended if c not in beyond]
+        near = (outputs[:, GAP] < touching) & (outputs[:, REACH] >= 0.0)
+        closed = [c for c in range(table.count) if c not in beyond
+                  and (before[c] > 0.5 or near[c] or (c, 0) in ended)]  # fmt: skip
+        sliding, leaving, stopped = self._what_ended(rows, outputs, before, ended)
         impact = collide(table, rows, closed, evaluator.model.length)
         try:
             modes = find_modes(table, rows, closed, sliding, leaving)
@@ -193,14 +254,15 @@ class ContactJumps(Jumps):
             ) from error
         held = [c for c in closed if modes.mode[c] > 0.5]
         others = [c for c in closed if modes.mode[c] < 0.5]
-        rows.v += rows.lifted(rows.slip[:, 0], held, others)
+        rows.change(rows.lifted(rows.slip[:, 0], held, others))
         gaps = np.where(np.abs(outputs[:, GAP]) < touching, outputs[:, GAP], 0.0)
-        moved = rows.lifted(gaps, held, others, 2.0 * ROUNDING * evaluator.model.length)
+        moved = rows.lifted(gaps, held, others, 2.0 * POSITION_ROUNDING * evaluator.model.length)
         states = evaluator.states.copy()
         states[table.mode], states[table.way], states[table.near] = (
             modes.mode, modes.way, modes.near
         )  # fmt: skip
         work = float(np.sum(impact.work))
+        self.decided = Decided(impact, stopped, modes, held, others)
         self.lose |= abs(work) > LOSSLESS * impact.exchanged
         self._go_on(integration, u, rows, moved, states, work)
         after = rows.with_velocities(rows.v)
@@ -221,9 +283,10 @@ class ContactJumps(Jumps):
 
     def _what_ended(
         self, rows: ContactRows, outputs: Floats, before: Floats, ended: list[tuple[int, int]]
-    ) -> tuple[dict[int, Floats], list[int]]:
-        """Contacts that begin to slide, with directions, and those whose normal force vanishes."""
+    ) -> tuple[dict[int, Floats], list[int], list[int]]:
+        """Contacts that begin to slide, with directions, whose normal force vanishes, that stop."""
         sliding: dict[int, Floats] = {}
+        stopped: list[int] = []
         leaving = [c for c, part in ended if part == 0 and before[c] > 0.5]
         for c, part in ended:
             if part == 0:
@@ -235,7 +298,35 @@ class ContactJumps(Jumps):
                     sliding[c] = -force / size
             elif float(np.hypot(*rows.slip[c, 1:])) < STOPPED * self._evaluator.model.length:
                 self._stop(rows, c)
-        return sliding, leaving
+                stopped.append(c)
+        return sliding, leaving, stopped
+
+    @IGNORE_FLOAT_ERRORS
+    def _repeat(self, integration: Integration) -> None:
+        """What was decided, at the present state: velocities and directions follow smoothly.
+
+        Shares of what contacts carry stay: where they stick no motion depends on them.
+        """
+        decided, table, evaluator = self.decided, self.table, self._evaluator
+        assert decided is not None
+        u = self._state_of(integration)
+        rows, states = ContactRows(table, integration.t, u), evaluator.states.copy()
+        for c in decided.stopped:
+            self._stop(rows, c)
+        impact = repeat(table, rows, decided.impact)
+        rows.change(rows.lifted(rows.slip[:, 0], decided.held, []))
+        modes = decided.modes
+        states[table.mode], states[table.way], states[table.near] = (
+            modes.mode,
+            modes.way,
+            modes.near,
+        )
+        for c in np.flatnonzero(modes.mode == 1.0).tolist():
+            slip = rows.slip[c, 1:]
+            if float(np.hypot(*slip)) > STOPPED * evaluator.model.length:
+                states[table.way[c]] = slip / np.hypot(*slip) @ rows.frames[c, 1:]
+        moved = np.zeros(len(rows.v))
+        self._go_on(integration, u, rows, moved, states, float(np.sum(impact.work)))
 
     @staticmethod
     def _stop(rows: ContactRows, c: int) -> None:

@@ -9,7 +9,6 @@ import numpy as np
 
 from dap3d_core.formulations import ACCEPTED, RHS, WATCH
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.formulations.jumps.elements import JumpRows
 from dap3d_core.formulations.jumps.law import ImpossibleJumpError, Jump, JumpLaw
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
@@ -80,6 +79,9 @@ class Jumps:
         crossing[self._contact.pushes] = 0.0  # rows that push need not cross to answer
         self._jump(integration, crossing, None)
 
+    def repeat_of(self, other: "Jumps") -> None:
+        """Decide what another decided at its last instant, at states nearby."""
+
     def restart(self, integration: Integration) -> None:
         """Forget the jumps so far, and begin again."""
         self.records, self.count, self.lose = [], 0, False
@@ -136,12 +138,12 @@ class Jumps:
         """
         t, u = integration.t, self._state_of(integration)
         none = np.zeros(integration.work.switches.shape[1])
-        own = self._evaluator.states.copy()
+        y = self._evaluator.body_state(integration.y)
+        own = y[self._evaluator.model.integrated_layout["states"]]
         for first, numbers in states.items():
             own[first : first + len(numbers)] = numbers
-        self._evaluator.states = own
         try:
-            jump = self._law.jump(t, u, None, none, self._soon(integration), _rows_to(u, bodies))
+            jump = self._law.jump(t, y, None, none, self._soon(integration), _rows_to(u, bodies))
         except ImpossibleJumpError as error:
             names = ", ".join(self._evaluator.model.body_names[k] for k in bodies) or "no body"
             raise SimulationError(
@@ -166,7 +168,8 @@ class Jumps:
         t, u = integration.t, self._state_of(integration)
         states_before = self._evaluator.states
         try:
-            jump = self._law.jump(t, u, sides, crossing, self._soon(integration))
+            y = self._evaluator.body_state(integration.y)
+            jump = self._law.jump(t, y, sides, crossing, self._soon(integration))
         except ImpossibleJumpError as error:
             raise SimulationError(
                 f"the run stopped at t = {t:.9g} s: {error} cannot change the velocity as its "
@@ -199,8 +202,9 @@ class Jumps:
 
     def _take(self, integration: Integration, u: Floats, jump: Jump) -> Floats:
         """Make the velocities of an integration those after a jump; its state u (13 n,) then."""
-        coordinates = self._evaluator.coordinates
-        y = coordinates.with_jump(integration.y, jump.dv, jump.states, jump.work)
+        evaluator, y = self._evaluator, jump.y
+        if evaluator.formulation.has_own_coordinates:
+            y = evaluator.coordinates.with_jump(integration.y, jump.dv, jump.states, jump.work)
         integration.work.state[at.Y] = y
         integration.restart()
         if len(jump.sides):
@@ -268,15 +272,12 @@ class Jumps:
             functions[ACCEPTED](t, y, np.ones(1), *arrays)
 
 
-def _rows_to(u: Floats, bodies: Mapping[int, Floats]) -> JumpRows:
-    """Rows that bring velocities of bodies to the values given."""
-    v = velocities_of(u)
-    numbers = np.array(list(bodies), dtype=np.int64)
-    targets = np.array(list(bodies.values())).reshape(-1, 6)
-    places = (6 * numbers[:, None] + np.arange(6))[np.isfinite(targets)]
-    change = targets[np.isfinite(targets)] - v[places]
-    count = len(places)
-    G = np.zeros((count, 6 + v.size))
-    G[np.arange(count), 6 + places] = 1.0
-    none = np.full(count, -1)
-    return JumpRows(G, change, np.zeros(count, dtype=bool), none, np.arange(count))
+def _rows_to(u: Floats, bodies: Mapping[int, Floats]) -> list[tuple[Floats, float]]:
+    """Rows that bring velocities of bodies to the values given, and their changes."""
+    v, rows = velocities_of(u), []
+    for body, targets in bodies.items():
+        for k in np.flatnonzero(np.isfinite(targets)).tolist():
+            row = np.zeros(6 + v.size)
+            row[6 + 6 * body + k] = 1.0
+            rows.append((row, float(targets[k] - v[6 * body + k])))
+    return rows

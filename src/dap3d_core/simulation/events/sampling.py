@@ -21,7 +21,7 @@ from dap3d_core.result.file.validate import is_number
 FRACTIONS = np.array((0.0, 0.17, 0.41, 0.63, 0.86, 1.0))
 #: Each inner value is predicted from the others: it may miss by this part of their range, and by
 #: this part of the largest value so far, which is rounding.
-MISFIT, ROUNDING = 0.2, 1e-12
+MISFIT, LEVEL_ROUNDING = 0.2, 1e-12
 #: A function this many times its misfit away from the level does not reach it.
 CLEARANCE = 3.0
 #: A turning point this near to the level, as a part of the range in its window, is evaluated at the
@@ -177,7 +177,7 @@ class Sampler:
             values = np.array([first, *map(value, instants)])
             left -= 1.0
             miss, turns = self._misfit(values), self._turns(value, a, b, values)
-            followed = miss <= MISFIT * np.ptp(values) + ROUNDING * self._largest
+            followed = miss <= MISFIT * np.ptp(values) + LEVEL_ROUNDING * self._largest
             if self._may_hide(values, miss, turns, followed):
                 least = self._narrowest(step, resolution)
                 if b - a > least and left > 0.0:
@@ -219,12 +219,12 @@ class Sampler:
     def _may_hide(self, values: Floats, miss: float, turns: list[Turn], followed: bool) -> bool:
         """True if a window may have crossings that its samples and turning points do not show."""
         miss = max([miss, *(turn.miss for turn in turns)])
-        if miss <= ROUNDING * self._largest:
+        if miss <= LEVEL_ROUNDING * self._largest:
             return False
         if any(abs(turn.value) <= CLEARANCE * miss for turn in turns):
             return True
         nearest = np.abs(values).tolist()
-        ends = [x for x in (nearest[0], nearest[-1]) if x > ROUNDING * self._largest]
+        ends = [x for x in (nearest[0], nearest[-1]) if x > LEVEL_ROUNDING * self._largest]
         is_alike = np.sign(values[0]) * np.sign(values[-1]) > 0.0
         if is_alike and min(ends, default=np.inf) <= CLEARANCE * miss:
             return True
@@ -251,7 +251,7 @@ class Sampler:
                     continue
                 is_near = abs(turn.value) <= near
                 found = exact(turn.t) if is_near else turn.value
-                if is_near and self.touch is None and abs(found) <= ROUNDING * self._largest:
+                if is_near and self.touch is None and abs(found) <= LEVEL_ROUNDING * self._largest:
                     self.touch = turn.t
                 yield turn.t, found
             yield sample

@@ -15,7 +15,7 @@ AT_ZERO = 1e-9
 #: do. The second is larger, as what comes of it must exceed the rounding of the first.
 DIFFERENCE, AHEAD = 1e-8, 1e-4
 #: A difference of values of a switch is rounding below this part of its size.
-ROUNDING = 1e-15
+SWITCH_ROUNDING = 1e-15
 #: An impulse stops what approaches where it leaves no more than this part of the rate.
 STOPPED = 1e-6
 
@@ -52,7 +52,7 @@ class UncarriedContact:
         if not self.is_bare.any():
             return []
         values, size = self._values(t, y), max(1.0, self._evaluator.model.length)
-        closed = (sides < 0.0) | (sides == 0.0) & (values <= ROUNDING * size)
+        closed = (sides < 0.0) | (sides == 0.0) & (values <= SWITCH_ROUNDING * size)
         candidates = self.is_bare & closed & (self.pushes | (values >= -AT_ZERO * size))
         if not candidates.any():
             return []
@@ -60,7 +60,7 @@ class UncarriedContact:
         later = y + ahead * self._slope(t, y)
         rates, rates_later = self._rates(t, y, span), self._rates(t, later, span)
         candidates &= (sides < 0.0) | (rates <= 0.0)  # else it is on its way out
-        closes = rates_later < -ROUNDING * size / (DIFFERENCE * span)
+        closes = rates_later < -SWITCH_ROUNDING * size / (DIFFERENCE * span)
         stays = candidates & self.pushes & (closes | (sides < 0.0))
         found = [k for k in np.flatnonzero(candidates & closes & ~self.pushes).tolist()
                  if self._stops(k, t, later, rates_later[k], span)]  # fmt: skip
@@ -71,9 +71,8 @@ class UncarriedContact:
         evaluator = self._evaluator
         states, crossing = evaluator.states, np.zeros(len(evaluator.switches))
         crossing[k] = -1.0
-        u = evaluator.hold(evaluator.body_state(y))
         try:
-            jump = self._law.jump(t, u, crossing, crossing, 0.0)
+            jump = self._law.jump(t, evaluator.body_state(y), crossing, crossing, 0.0)
         except ImpossibleJumpError:
             return False
         finally:

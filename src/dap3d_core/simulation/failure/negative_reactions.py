@@ -11,7 +11,7 @@ from dap3d_core.model.groups import Floats
 from dap3d_core.result.arrays import Arrays
 
 #: A multiplier is negative beyond this part of the largest of its joint so far.
-ROUNDING = 1e-6
+NEGATIVE_PART = 1e-6
 
 
 @attrs.define
@@ -59,7 +59,7 @@ class UnilateralMonitor:
             own = np.abs(arrays.Lam[:, one.first : one.last])
             one.largest = max(one.largest, float(np.max(own, initial=0.0)))
             lam = arrays.Lam[:, one.row]
-            (negative,) = np.nonzero(lam < -ROUNDING * one.largest)
+            (negative,) = np.nonzero(lam < -NEGATIVE_PART * one.largest)
             if not len(negative):
                 continue
             if one.since is None:
@@ -74,7 +74,7 @@ class UnilateralMonitor:
         for one in self._rows:
             own = np.abs(Lam[:, :, one.first : one.last])
             largest = np.max(own, axis=(1, 2), initial=0.0)
-            found |= np.any(Lam[:, :, one.row] < -ROUNDING * largest[:, None], axis=1)
+            found |= np.any(Lam[:, :, one.row] < -NEGATIVE_PART * largest[:, None], axis=1)
         return found
 
     def notes(self) -> list[str]:

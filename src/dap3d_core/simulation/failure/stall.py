@@ -18,14 +18,14 @@ WORDS = {
 #: An iteration that converges slower than this limits the steps.
 SLOW = 0.3
 #: ``rounding_state`` where errors are rounding.
-ROUNDING = 2
+AT_ROUNDING = 2
 
 
 def describe_stall(evaluator: Evaluator, integration: Integration) -> str:
     """What limits the steps of an integration that stalled, and what would change that."""
     work = integration.work
     what = _fastest(evaluator, integration)
-    if work.rounding_state == ROUNDING:
+    if work.rounding_state == AT_ROUNDING:
         limit = f"rounding of the rates limits them, first that of {what}"
         remedy = (
             "Larger tolerances (rtol, atol) let longer steps pass; inertias that differ less, or "

@@ -32,7 +32,7 @@ MOST_PASSES = 25
 #: A pass turns no body by more than this (rad), moves none by more than this part of the model.
 MOST_TURN, MOST_SHIFT = 0.5, 0.5
 #: A correction of this part of the model's size, or of the speeds, is one of rounding.
-ROUNDING = 1e-6
+SMALL_CORRECTION = 1e-6
 #: A row of a shorter gradient, in its own units, is not changed by small changes.
 FLAT = 1e-6
 #: Singular poses that an assembly leaves.
@@ -132,7 +132,7 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
     position, velocity = initial.violation
     tolerance = TOLERANCE * evaluator.model.length
     if position > tolerance:
-        note = information if position <= ROUNDING * evaluator.model.size else Note
+        note = information if position <= SMALL_CORRECTION * evaluator.model.size else Note
         notes.append(
             note(
                 f"initial positions corrected in {initial.passes} passes: "
@@ -158,7 +158,7 @@ def correction_notes(initial: Initial, evaluator: Evaluator, scene: Scene) -> li
             body.r_dot is usual.r_dot.default and body.w is usual.w.default
             for body in scene.bodies.values()
         )
-        note = information if open_ or velocity <= ROUNDING * speed else Note
+        note = information if open_ or velocity <= SMALL_CORRECTION * speed else Note
         notes.append(
             note(
                 "initial velocities corrected: "

@@ -6,6 +6,7 @@ brought onto the rows of their levels by the least change.
 """
 
 from collections.abc import Mapping
+from contextlib import suppress
 from typing import Any
 
 import attrs
@@ -37,7 +38,7 @@ MOST_PASSES, SETTLED = 50, 1e-12
 #: Slopes of quantities are computed anew behind a larger change.
 SLOPES_ANEW = 1e-2
 #: Changes no longer shrink below this: rounding.
-ROUNDING = 1e-8
+LEAST_CHANGE = 1e-8
 #: No pass turns a body by more, or moves it by more of the model.
 MOST_CHANGE = 0.5
 #: Motions that move the data by less than this part of the others are not seen by them.
@@ -155,7 +156,7 @@ def _on_rows(
         rows = ChosenRows(evaluator, t, u, chosen)
         change = rows.least(rows.rows.C)
         size = max_speed(evaluator, change)
-        if size <= SETTLED or (size <= ROUNDING and size > 0.5 * before):
+        if size <= SETTLED or (size <= LEAST_CHANGE and size > 0.5 * before):
             break
         u, before = displaced(u, -change), size
     else:
@@ -220,7 +221,7 @@ class _Fit:
             if not np.isfinite(size):
                 break
             u = displaced(u, min(1.0, MOST_CHANGE / max(size, 1e-300)) * change)
-            if size <= SETTLED or (size <= ROUNDING and size > 0.5 * before):
+            if size <= SETTLED or (size <= LEAST_CHANGE and size > 0.5 * before):
                 found = np.abs(self._gap(target, self._values(np.array([t]), u[None])[:, 0]))
                 for label, gap in zip(self._labels, found, strict=True):
                     if np.isfinite(gap):
@@ -234,15 +235,36 @@ class _Fit:
 
     def _quantities(self, t: float, u: Floats) -> tuple[Floats, Floats]:
         """Values (labels,) of the quantities, and slopes (labels, 6 n) by central differences."""
+        values = self._values(*self._near(t, u))
+        return values[:, 0], _slopes(values)
+
+    def _near(self, t: float, u: Floats) -> tuple[Floats, Floats]:
+        """The state and those on both sides of it, of each motion of a body, and their times."""
         n = self.evaluator.model.body_count
         steps = SPAN * np.vstack([np.zeros(6 * n), np.eye(6 * n), -np.eye(6 * n)])
         near = np.array([displaced(u, step) for step in steps])
-        values = self._values(np.full(len(near), t), near)
-        ahead, behind = values[:, 1 : 6 * n + 1], values[:, 6 * n + 1 :]
-        return values[:, 0], (ahead - behind) / (2.0 * SPAN)
+        return np.full(len(near), t), near
+
+    def _of_joints(self, t: float, u: Floats) -> dict[str, Floats]:
+        """Slopes (6 n,) of the coordinates of joints, lengths as parts of the model."""
+        result, slopes = self._result(*self._near(t, u)), {}
+        for joint in result.summary.joint_names:
+            with suppress(UnknownNameError):
+                found = result.coordinates(joint)
+                names = {k: name for name, k in found.aliases.items()}
+                for k, unit in enumerate(found.units):
+                    size = self.evaluator.model.size if unit == "m" else 1.0
+                    name = names.get(k, f"q{k + 1}")
+                    slopes[f"{joint}.{name}"] = _slopes(found.q[:, k]) / size
+        return slopes
 
     def _values(self, t: Floats, u: Floats) -> Floats:
         """(labels, k) the quantities of the data at states (k, 13 n)."""
+        result = self._result(t, u)
+        return np.array([self._found(result, label) for label in self._labels])
+
+    def _result(self, t: Floats, u: Floats) -> Result:
+        """States (k, 13 n) as a result."""
         model, count = self.evaluator.model, len(t)
         nothing = np.zeros(count)
         arrays = Arrays(t, u, np.zeros((count, 6 * model.body_count)),
@@ -251,8 +273,7 @@ class _Fit:
                         np.tile(self.evaluator.states, (count, 1)),
                         np.tile(model.input_values, (count, 1)))  # fmt: skip
         record = RunMetadata(scene_text=self._scene_text)
-        result = Result(self._summary, arrays, record, lambda: (model, lambda: self.evaluator))
-        return np.array([self._found(result, label) for label in self._labels])
+        return Result(self._summary, arrays, record, lambda: (model, lambda: self.evaluator))
 
     def _found(self, result: Result, label: str) -> Floats:
         try:
@@ -291,12 +312,20 @@ class _Fit:
         rank = int(np.sum(values > SEEN * max(1.0, np.max(values, initial=0.0))))
         if rank < freedoms:
             motions = rows.free @ right[rank:].T
-            names = ", ".join(coordinates_of(self.evaluator.model, u, motions))
+            joints = self._of_joints(t, u)
+            names = ", ".join(coordinates_of(self.evaluator.model, u, motions, joints))
             raise SimulationError(
                 f"at t = {t:.6g} s the motion leaves {freedoms - rank} of {freedoms} degrees of "
                 f"freedom open: give {names} as well, or other positions that move with the same "
                 "bodies"
             )
+
+
+def _slopes(values: Floats) -> Floats:
+    """Central differences (..., 6 n) of values (..., 12 n + 1) at the states of ``_Fit._near``."""
+    count = values.shape[-1] // 2
+    slopes: Floats = (values[..., 1 : count + 1] - values[..., count + 1 :]) / (2.0 * SPAN)
+    return slopes
 
 
 def misfit_notes(misfit: Mapping[str, float]) -> list[str]:

@@ -27,7 +27,7 @@ from dap3d_core.simulation.kinematics.pose_equations import LinearisedRows
 
 #: Newton stops behind a correction (rad, or parts of the model) whose product with the one behind
 #: which rows were factored is this: the size of the next; or where corrections no longer shrink.
-CLOSED, ROUNDING, MOST_PASSES = 1e-17, 1e-7, 16
+CLOSED, LEAST_ERROR, MOST_PASSES = 1e-17, 1e-7, 16
 #: Rows are factored anew behind a larger correction.
 FACTORED_ANEW = 1e-3
 #: Corrections of an accepted step are at most this; a step aims at a hundredth of it, and moves
@@ -219,7 +219,7 @@ class KinematicPath:
             if not np.isfinite(size) or size > max(MOST_TURN, 4.0 * before):
                 return None
             u = displaced(u, -change)
-            if size * factored_at <= CLOSED or (size <= ROUNDING and size > 0.5 * before):
+            if size * factored_at <= CLOSED or (size <= LEAST_ERROR and size > 0.5 * before):
                 return u, first
             if factored_at > FACTORED_ANEW:
                 rows, factored_at = self._rows(t, u), size

@@ -29,7 +29,7 @@ MANY_BODIES = 150
 #: Modes of such scenes by default.
 FEW_MODES = 10
 #: A real part below this part of the magnitude, or of the largest terms, is zero but for rounding.
-ROUNDING = 1e-9, 1e-12
+REAL_PART_ROUNDING = 1e-9, 1e-12
 #: Eigenvalues within this part of i Omega are drifts of free bodies, seen from axes that turn.
 DRIFT = 1e-5
 
@@ -88,7 +88,7 @@ class Linearization:
 
     def _space_of(self, drivers: DriverRows | None) -> StateSpace:
         point = self._point
-        rank = point.redundancy.rank.rank
+        rank = point.rank.rank
         return state_space(point.equations, rank, point.position_rank, drivers)
 
     @cached_property
@@ -105,7 +105,8 @@ class Linearization:
         """(states, inputs) input matrix."""
         space, inputs = self._space, self._inputs
         B: Floats = space.force_input @ inputs.wrench + space.driver_input @ inputs.driver
-        return B + space.own @ inputs.rate if len(inputs.rate) else B
+        kept = self._point.kept
+        return B + space.own @ inputs.rate[kept] if len(kept) else B
 
     @property
     def C(self) -> Floats:
@@ -165,12 +166,13 @@ class Linearization:
     def element_states(self) -> tuple[str, ...]:
         """Names of the states of elements, the last among the states: ``spring.z``."""
         states = self._point.model.element_states
-        return tuple(name.partition(".")[2] for state in states for name in state.labels)
+        names = [name.partition(".")[2] for state in states for name in state.labels]
+        return tuple(names[k] for k in self._point.kept)
 
     @property
     def dof(self) -> int:
         """Degrees of freedom: independent velocities."""
-        return self._point.redundancy.rank.dof
+        return self._point.rank.dof
 
     @property
     def basis(self) -> Floats:
@@ -201,9 +203,7 @@ class Linearization:
         try:
             import control
         except ImportError as error:
-            raise ImportError(
-                "to_control needs python-control: pip install 'dap3d[control]'"
-            ) from error
+            raise ImportError("to_control needs python-control: pip install control") from error
         states = [f"xi{k + 1}" for k in range(self.coordinate_count)]
         own = len(self.element_states)
         states += [f"eta{k + 1}" for k in range(self.state_count - len(states) - own)]
@@ -221,7 +221,7 @@ class Linearization:
         """Eigenvalues, and displacements (6 n, k) in place of eigenvectors."""
         point = self._point
         if self._is_large and self._mode_count is not None:
-            dependencies = point.redundancy.rank.dependencies
+            dependencies = point.rank.dependencies
             count = min(2 * self._mode_count, 12 * point.model.body_count - 2)
             lowest = lowest_eigenvalues(point.equations, dependencies, count)
             return Eigenvalues(lowest.values, point.equations.U @ lowest.vectors)
@@ -325,7 +325,7 @@ class Linearization:
         values = self.eigenvalues
         for rate in self._point.frames.drift:  # a double eigenvalue, which rounding splits
             values = values[np.abs(np.abs(values.imag) - rate) + np.abs(values.real) > DRIFT * rate]
-        own, all_of_them = ROUNDING
+        own, all_of_them = REAL_PART_ROUNDING
         equations = self._point.equations
         size = max(float(np.sqrt(abs(equations.K).max())), float(abs(equations.C).max()))
         return bool(np.all(values.real <= own * np.abs(values) + all_of_them * size))

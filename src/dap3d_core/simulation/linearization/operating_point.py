@@ -12,14 +12,14 @@ from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.reactions import reaction_names
-from dap3d_core.kernels.array_types import Floats
-from dap3d_core.linear.rank.rank import dense_rank
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.linear.rank.rank import Rank, dense_rank
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import join
 from dap3d_core.result import Result, information
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.errors import SimulationError, refuse_contacts
+from dap3d_core.simulation.errors import SimulationError, refuse_collisions
 from dap3d_core.simulation.initial.assemble import correct_initial, fit_of, violation
 from dap3d_core.simulation.initial.given_state import state_of, time_of
 from dap3d_core.simulation.initial_state import start_notes
@@ -52,6 +52,7 @@ class OperatingPoint:
         frames: axes in which the equations are written.
         redundancy: rank of the constraints.
         notes: choices and warnings.
+        rank: of all rows, those of closed contacts too.
     """
 
     compiled: CompiledModel
@@ -62,6 +63,7 @@ class OperatingPoint:
     frames: SteadyFrames
     redundancy: Redundancy
     notes: tuple[str, ...]
+    rank: Rank
 
     @property
     def model(self) -> Model:
@@ -76,14 +78,28 @@ class OperatingPoint:
     @cached_property
     def equations(self) -> ScaledEquations:
         """The linearised equations, scaled."""
-        return scaled_equations(self.model, self.tangent, self.u, self.frames)
+        found = scaled_equations(self.model, self.tangent, self.u, self.frames)
+        kept = self.kept
+        if found.states is None or kept.size == self.model.state_count:
+            return found
+        return attrs.evolve(found, states=found.states.of(kept) if kept.size else None)
+
+    @cached_property
+    def kept(self) -> Integers:
+        """(k,) places of the states of elements that may change: those of contacts stay."""
+        contacts = set(
+            self.model.joint_names[len(self.model.joint_names) - self.model.contact_count :]
+        )
+        own = [s for s in self.model.element_states if s.element not in contacts]
+        places = [np.arange(s.first, s.first + s.length) for s in own]
+        return np.concatenate([np.zeros(0, dtype=np.int64), *places])
 
     @cached_property
     def position_rank(self) -> int:
         """Number of independent rows with a position level."""
         position = self.model.position_row
         if np.all(position):
-            return self.redundancy.rank.rank
+            return self.rank.rank
         rows, _ = scaled_rows(self.evaluator.rows(self.t, self.u), self.model.length)
         return dense_rank(rows.dense()[position], fit_of(self.model)).rank
 
@@ -95,11 +111,12 @@ def operating_point(
     t = time_of(t)
     compiled = compile_exact(scene, allow_code)
     model = compiled.model
-    refuse_contacts(model, "linearisation")
+    refuse_collisions(model, "linearisation")
     notes: list[str] = []
     with compiled.borrow_evaluator() as evaluator:
         u, turns, states = _state(compiled, at, t, notes)
         evaluator.start(t, u, turns, states)
+        _refuse_unknown_modes(evaluator, t, u, states)
         _check(evaluator, t, u)
         redundancy = redundancy_of(evaluator, u, t)
         if redundancy.singular is not None:
@@ -108,7 +125,12 @@ def operating_point(
                 "this pose alone count as freedoms; linearise about a pose nearby"
             )
         tangent = tangent_matrices(evaluator, t, u)
-        frames = steady_frames(model, tangent, u, redundancy.rank.dependencies)
+        rank = redundancy.rank
+        if model.contact_count:
+            rank = dense_rank(
+                scaled_rows(evaluator.rows(t, u), model.length)[0].dense(), fit_of(model)
+            )
+        frames = steady_frames(model, tangent, u, rank.dependencies)
     if not (frames.is_steady and _keeps_states(model, tangent, evaluator.states)):
         frames = attrs.evolve(frames, is_steady=False)
         notes.append(
@@ -140,8 +162,24 @@ def operating_point(
             "which at rest is a strong damper and no stiction"
         )
     return OperatingPoint(
-        compiled, t, u, evaluator.states, tangent, frames, redundancy, tuple(notes)
+        compiled, t, u, evaluator.states, tangent, frames, redundancy, tuple(notes), rank
     )
+
+
+def _refuse_unknown_modes(evaluator: Evaluator, t: float, u: Floats, states: Floats | None) -> None:
+    """Refuses a state at which bodies touch, in modes that are not known."""
+    if states is not None or not evaluator.model.contact_count:
+        return
+    from dap3d_core.formulations.contacts.contact_rows import GAP, ContactTable
+
+    table = ContactTable(evaluator)
+    gaps = table.outputs(t, u)[:, GAP]
+    k = int(np.argmin(gaps))
+    if gaps[k] < AT_SWITCH * evaluator.model.length:
+        raise SimulationError(
+            f"linearisation of a scene with contacts that touch ({table.names[k]}) takes modes "
+            "from a run: linearize(scene, at=result, t=...)"
+        )
 
 
 def _keeps_states(model: Model, tangent: TangentMatrices, states: Floats) -> bool:

@@ -48,11 +48,13 @@ def output_derivatives(
         UnknownNameError: there is no such quantity, or it is a vector; names the nearest.
     """
     states = len(space.A)
+    own = np.zeros((states, point.model.state_count))
+    own[:, point.kept] = space.own
     directions = [
         (space.displacement[:, k], space.velocity[:, k], space.acceleration[:, k],
-         space.multipliers[:, k], space.own[k]) for k in range(states)
+         space.multipliers[:, k], own[k]) for k in range(states)
     ]  # fmt: skip
-    unmoved = np.zeros(space.own.shape[1])
+    unmoved = np.zeros(own.shape[1])
     none = np.zeros(6 * point.model.body_count)
     for wrench, driver in zip(inputs.wrench.T, inputs.driver.T, strict=True):
         a_change = space.acceleration_by_force @ wrench + space.acceleration_by_driver @ driver

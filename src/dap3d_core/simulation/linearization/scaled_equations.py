@@ -18,7 +18,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import skew
 from dap3d_core.model.state_layout import split
@@ -43,6 +43,16 @@ class ScaledStates:
     position: Any
     velocity: Any
     acceleration: Any
+
+    def of(self, kept: Integers) -> "ScaledStates":
+        """The matrices of some of the states."""
+        rates = {"by_displacement": self.by_displacement, "by_velocity": self.by_velocity}
+        others = ("force", "position", "velocity", "acceleration")
+        return ScaledStates(
+            by_states=self.by_states[kept][:, kept],
+            **{name: matrix[kept] for name, matrix in rates.items()},
+            **{name: getattr(self, name)[:, kept] for name in others},
+        )
 
 
 @attrs.frozen(eq=False, kw_only=True)

@@ -12,7 +12,7 @@ import numpy as np
 from dap3d_core.result import Computed, Note, Result, estimated_error, information
 from dap3d_core.result.post.global_error import MEANINGLESS
 from dap3d_core.scene import SceneError, Simulation
-from dap3d_core.scene.validate.settings import SMALLEST_RTOL
+from dap3d_core.settings import SMALLEST_RTOL
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.initial.tolerances import tighter, words_of
 

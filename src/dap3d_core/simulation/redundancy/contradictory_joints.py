@@ -21,7 +21,7 @@ from dap3d_core.simulation.redundancy.near_redundant import HELD
 MOST_ROWS = 300
 #: How far the bodies would go until the latest instant that is tried, in rad or parts of the model;
 #: the earlier ones, as parts of that time.
-FAR, EARLIER = 0.05, (1e-6, 1e-4, 1e-2, 1.0)
+TRIED_MOTION, EARLIER = 0.05, (1e-6, 1e-4, 1e-2, 1.0)
 #: Singular values below this part of the largest are those of rows that nearly depend.
 NEARLY = 1e-2
 #: A row takes part in a combination with this part of its largest weight.
@@ -53,7 +53,7 @@ def find_contradiction(evaluator: Evaluator, t: float, y: Floats, rank: int) -> 
 
 def _out_of_reach(evaluator: Evaluator, t: float, u: Floats) -> str:
     speed = max_speed(evaluator, velocities_of(u))
-    span = FAR / speed if speed else FAR * (1.0 + abs(t))
+    span = TRIED_MOTION / speed if speed else TRIED_MOTION * (1.0 + abs(t))
     good = t
     for part in EARLIER:
         late = t + part * span

@@ -1,5 +1,7 @@
 """Freedoms that joints and drivers leave, in words: the bodies that move, and how."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from dap3d_core.formulations.constraint_rows import scaled_rows
@@ -14,6 +16,8 @@ from dap3d_core.simulation.redundancy.redundancy import rank_of
 
 #: Parts of a motion smaller than this part of the largest are not named.
 NAMED = 1e-6
+#: Coordinates of joints are named that change by more than this part of those of bodies.
+PREFERRED = 1e-3
 #: Bodies and motions that a message gives.
 MOST_BODIES, MOST_MOTIONS = 6, 6
 
@@ -42,10 +46,13 @@ def free_motions(evaluator: Evaluator, t: float, u: Floats) -> Floats:
     return np.asarray(apart * np.tile(np.repeat([model.size, 1.0], 3), model.body_count)[:, None])
 
 
-def coordinates_of(model: Model, u: Floats, motions: Floats) -> list[str]:
+def coordinates_of(
+    model: Model, u: Floats, motions: Floats, joints: Mapping[str, Floats]
+) -> list[str]:
     """Positions that tell motions (6 n, k) in m and rad apart at a state u (13 n,), k names.
 
-    The Euler parameters stand with twice their changes, which is 1 for a turn of 1 rad.
+    Coordinates of joints come first, by their slopes (6 n,): an angle changes by 1 for a turn of
+    1 rad. The Euler parameters stand with twice their changes, which is as much.
     """
     from scipy.linalg import qr
 
@@ -55,7 +62,10 @@ def coordinates_of(model: Model, u: Floats, motions: Floats) -> list[str]:
     changes = np.concatenate([moves[:, :3] / model.size, 2.0 * np.swapaxes(turns, 1, 2)], axis=1)
     names = [f"{body}.{name}" for body in model.body_names
              for name in ("r.x", "r.y", "r.z", "p.e0", "p.e1", "p.e2", "p.e3")]  # fmt: skip
-    order = qr(changes.reshape(len(names), -1).T, pivoting=True, mode="r")[1]
+    of_joints = [slope @ motions / PREFERRED for slope in joints.values()]
+    names += joints
+    changes = np.vstack([changes.reshape(-1, motions.shape[1]), *of_joints])
+    order = qr(changes.T, pivoting=True, mode="r")[1]
     return [names[k] for k in order[: motions.shape[1]]]
 
 

@@ -34,7 +34,7 @@ SHARED, LEAST = "shared", "least"
 #: Magnitudes of random multipliers with which a law is tried, N or N m.
 LOADS = (1.0, 1e3, 1e6)
 #: A law changes where its forces do by more than this part of the largest.
-ROUNDING = 1e-9
+FORCE_CHANGE = 1e-9
 #: Instants of a run, at most, at which other shares are tried.
 MOST_INSTANTS = 100
 #: So many other shares are tried, of rows up to this many times stiffer or softer than all alike.
@@ -272,6 +272,6 @@ def _depends(evaluator: Evaluator, q: int, t: float, change: Floats) -> bool:
             call_loop(evaluator.loops, q, t, arrays, s.groups[q], force, minus, minus)
             forces.append(force)
         size = np.max(np.abs(forces))
-        if not np.max(np.abs(forces[1] - forces[0])) <= ROUNDING * size:
+        if not np.max(np.abs(forces[1] - forces[0])) <= FORCE_CHANGE * size:
             return True
     return False

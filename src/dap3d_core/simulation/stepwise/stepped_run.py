@@ -4,7 +4,7 @@ import math
 import os
 import threading
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 import attrs
 import numpy as np
@@ -20,6 +20,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result
 from dap3d_core.scene import Scene
+from dap3d_core.settings import StepSettings
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
 from dap3d_core.simulation.control.sampled import ALIKE, jump
@@ -240,17 +241,10 @@ def start(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     *,
     t_end: float | None = None,
-    method: str | None = None,
-    integrator: str | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    step: float | None = None,
-    correct: bool | None = None,
-    project: bool | None = None,
     allow_code: bool = False,
     announce: Callable[[str], None] | None = None,
-    correct_metric: str | None = None,
     record: bool = True,
+    **settings: Unpack[StepSettings],
 ) -> SteppedRun:
     """Begin a run that a script takes step by step; settings are those of ``simulate``.
 
@@ -271,13 +265,11 @@ def start(
         SceneError, PluginError: as ``compile``; unusable settings.
         SimulationError (RedundantError, AssemblyError): the run cannot begin.
     """
-    compiled = compiled_for(scene, method, allow_code, announce, integrator)
+    compiled = compiled_for(scene, allow_code, announce, **settings)
     end = HORIZON if t_end is None else t_end
-    settings = settings_of(compiled, t_end=end, dt=end, method=method, integrator=integrator,
-                           rtol=rtol, atol=atol, step=step, correct=correct, project=project,
-                           correct_metric=correct_metric)  # fmt: skip
+    simulation = settings_of(compiled, t_end=end, dt=end, **settings)
     with compiled.borrow_evaluator():
-        run = OpenRun(compiled, settings, Callbacks(announce=announce))
+        run = OpenRun(compiled, simulation, Callbacks(announce=announce))
         return SteppedRun(run, record=record)
 
 

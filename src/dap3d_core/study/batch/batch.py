@@ -11,7 +11,12 @@ from dap3d_core.result.note import warnings_of
 from dap3d_core.scene import SceneError
 from dap3d_core.simulation import AssemblyError
 from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
-from dap3d_core.simulation.initial.assemble import ROUNDING, Initial, correction_notes, distance
+from dap3d_core.simulation.initial.assemble import (
+    SMALL_CORRECTION,
+    Initial,
+    correction_notes,
+    distance,
+)
 from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.study.batch import driver, initial_state
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
@@ -170,7 +175,10 @@ class BatchRunner:
     ) -> None:
         """Warn of starts that were corrected by more than rounding."""
         evaluator = self.compiled_batch.evaluator
-        large = rows.diagnostics[good, initial_state.C_BEFORE] > ROUNDING * self.compiled_batch.size
+        large = (
+            rows.diagnostics[good, initial_state.C_BEFORE]
+            > SMALL_CORRECTION * self.compiled_batch.size
+        )
         good, index = good[large], index[large]
         moved, turned = distance(rows.given[good], rows.y0[good], evaluator.model.body_count)
         for j, k in enumerate(good):

@@ -111,7 +111,7 @@ class CompiledBatch:
             "first_switches": work.switches.copy(),
             "first_lengths": work.lengths.copy(),
         }
-        self._begin, self.takes_lanes = _begin_functions(evaluator.formulation), True
+        self._begin, self.takes_lanes = begin_functions(evaluator.formulation), True
         self._programs: tuple[Any, ChangeOver] | None = None
         self._lanes: tuple[Any, LaneBatch | str] | None = None
         self._calls, self._point_calls = 0.0, USUAL_CALLS
@@ -257,7 +257,7 @@ def varied_at(system: System, places: Integers) -> dict[str, Integers]:
 
 
 @cache
-def _begin_functions(formulation: Formulation) -> Any:
+def begin_functions(formulation: Formulation) -> Any:
     """Compiled functions that store the references of a start, and correct it."""
     if formulation.has_own_coordinates:
         from dap3d_core.study.batch.tree_start import begin_tree, state_of_bodies

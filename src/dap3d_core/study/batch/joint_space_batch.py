@@ -11,7 +11,7 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.state_layout import u_from_y
-from dap3d_core.simulation.initial.assemble import ROUNDING, distance
+from dap3d_core.simulation.initial.assemble import SMALL_CORRECTION, distance
 from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.study.batch import driver
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
@@ -49,6 +49,6 @@ class TreePoints:
         moved, turned = distance(
             u_from_y(corrected.y0), self._u, self._batch.evaluator.model.body_count
         )
-        stays = np.maximum(moved / self._batch.size, turned) <= ROUNDING
+        stays = np.maximum(moved / self._batch.size, turned) <= SMALL_CORRECTION
         done = rows.done & corrected.done & stays
         return BatchRows(done, rows.rows, y0, corrected.y0, rows.diagnostics)

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Unpack
 
 import attrs
 import numpy as np
@@ -12,6 +12,7 @@ from dap3d_core.registry import load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result.quantities.measured_data import MeasuredData, read_measured
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, check, check_simulation, load
+from dap3d_core.settings import RunSettings
 from dap3d_core.simulation import SimulationError
 from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.fit.fit_parameters import Parameter, read_parameters
@@ -61,20 +62,11 @@ def fit(
     outputs: Any = None,
     *,
     sigma: Any = None,
-    t_end: float | None = None,
-    dt: float | None = None,
-    method: str | None = None,
-    integrator: str | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    step: float | None = None,
-    correct: bool | None = None,
-    project: bool | None = None,
-    correct_metric: str | None = None,
     allow_code: bool = False,
     threads: int | None = None,
     progress: Progress | None = None,
     announce: Announce | None = None,
+    **settings: Unpack[RunSettings],
 ) -> Fit:
     """Find the values of parameters of a scene with which its run explains measured data best.
 
@@ -103,9 +95,7 @@ def fit(
         SceneError, PluginError: all mistakes of the arguments, or of the scene.
         SimulationError: the run at the start fails, or all runs on both sides of a point.
     """
-    task = _read(scene, parameters, measured, outputs, sigma, allow_code, announce, dict(
-        t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol, step=step,
-        correct=correct, project=project, correct_metric=correct_metric))  # fmt: skip
+    task = _read(scene, parameters, measured, outputs, sigma, allow_code, announce, dict(settings))
     predict = _predictor(task, threads, announce)
     search = _Search(task, predict, progress)
     return _result(task, search, *search.run())
@@ -136,7 +126,7 @@ def _read(
     fitted, mistakes = read_parameters(checked, parameters)
     data, quantities, wrong = read_measured(measured, outputs, sigma)
     mistakes += wrong
-    t_end = settings["t_end"]
+    t_end = settings.get("t_end")
     given = {k: v for k, v in settings.items() if v is not None}
     simulation = attrs.evolve(own.simulation, **given)
     try:
@@ -159,7 +149,7 @@ def _read(
     running = own.copy()
     running.simulation = simulation
     study = Study(running, tuple(fitted), series, allow_code)
-    return _Task(own, study, list(fitted.values()), data, settings["dt"])
+    return _Task(own, study, list(fitted.values()), data, settings.get("dt"))
 
 
 def _output_mistakes(

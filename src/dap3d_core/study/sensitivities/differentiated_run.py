@@ -10,7 +10,6 @@ from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.simulation import SimulationError
-from dap3d_core.simulation.events.jumps import Jumps
 from dap3d_core.simulation.run import Run
 from dap3d_core.study.sensitivities.neighbours import (
     Neighbours,
@@ -60,8 +59,9 @@ class DifferentiatedRun(Run):
         self._seed()
         integration.compile()
         if self.jumps is not None:
-            self.jumps.begin = self._jumping(Jumps.begin)  # type: ignore
-            self.jumps.apply = self._jumping(Jumps.apply)  # type: ignore
+            law = type(self.jumps)
+            self.jumps.begin = self._jumping(law.begin)  # type: ignore
+            self.jumps.apply = self._jumping(law.apply)  # type: ignore
 
     def _slopes_of(self, array: Floats) -> Floats:
         """(size, p) view of the derivatives of an array of the integration."""
@@ -119,6 +119,8 @@ class DifferentiatedRun(Run):
 
     def _jumping(self, change: Callable[..., None]) -> Callable[[Integration], None]:
         """A jump of velocities, whose derivatives are those of the law that Python solves."""
+        of = self.jumps
+        assert of is not None
 
         def jump(integration: Integration) -> None:
             work = integration.work
@@ -141,14 +143,15 @@ class DifferentiatedRun(Run):
                         arrays[name] += offset * system[name][:, j].reshape(array.shape)
                 own = run.present.work
                 own.state[Y], own.t = state[:-1], state[-1]
-                jumps = Jumps(run.evaluator)
-                jumps.span = self.jumps.span if self.jumps is not None else None
+                jumps = type(of)(run.evaluator)
+                jumps.span = of.span
+                jumps.repeat_of(of)
                 change(jumps, run.present)
                 result: Floats = own.state[Y].copy()
                 return result
 
+            change(of, integration)
             slopes = self._derivative(after, given, np.vstack([of_state, of_time]))
-            change(self.jumps, integration)
             self.instants[float(work.t)] = of_time
             self._differentiation.take()
             self._slopes_of(work.state)[: work.state.shape[1]] = slopes

@@ -167,12 +167,6 @@ def _check(parameter: SceneParameter) -> None:
     if parameter.value is None:
         what = "the scene leaves this number to its type; give it a value"
         raise SceneError([Mistake("by", parameter.name, what)])
-    if parameter.table == "simulation" and parameter.path[-1] != "t_end":
-        what = "this says how a run is computed; a run has derivatives by what it computes alone"
-        raise SceneError([Mistake("by", parameter.name, what)])
-    if parameter.whole:
-        what = "this is a whole number, by which there is no derivative"
-        raise SceneError([Mistake("by", parameter.name, what)])
 
 
 def _size(compiled: CompiledModel, parameter: SceneParameter) -> float:

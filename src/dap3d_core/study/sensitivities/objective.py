@@ -95,6 +95,29 @@ class Objective:
         found = sensitivities(self._compiled(self._at(x)), self.names, **self._settings)
         return float(self._of(found.result)), found.derivative(self._of)
 
+    def to_jax(self) -> Callable[[Any], Any]:
+        """A function of JAX, for ``jax.grad`` and ``jax.jit`` (extra ``jax``).
+
+        It takes an array (p,) and returns a number of JAX's floating-point type: switch
+        ``jax_enable_x64`` on for double precision.
+
+        Raises:
+            ImportError: JAX is not installed.
+        """
+        from dap3d_core.study.sensitivities.in_jax import in_jax
+
+        return in_jax(self, self.value_and_gradient)
+
+    def to_torch(self) -> Callable[[Any], Any]:
+        """A function of PyTorch, of a tensor (p,), with its gradient (extra ``torch``).
+
+        Raises:
+            ImportError: PyTorch is not installed.
+        """
+        from dap3d_core.study.sensitivities.in_torch import in_torch
+
+        return in_torch(self, self.value_and_gradient)
+
     def _of(self, result: Result) -> Any:
         return self._number(result.quantity(self._quantity).values, result.t)
 

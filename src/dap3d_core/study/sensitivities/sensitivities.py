@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import attrs
 import numpy as np
@@ -14,8 +14,8 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.suggestions import some
 from dap3d_core.result import Result, ResultError, RunMetadata, find
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
+from dap3d_core.settings import RunSettings
 from dap3d_core.simulation import CompiledModel, SimulationError
-from dap3d_core.simulation.errors import refuse_contacts
 from dap3d_core.simulation.failure.narrow_forces import notes_on_derivatives
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
@@ -178,19 +178,10 @@ def sensitivities(
     scene: Scene | str | os.PathLike[str] | CompiledModel,
     by: Sequence[str] | str,
     *,
-    t_end: float | None = None,
-    dt: float | None = None,
-    method: str | None = None,
-    integrator: str | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    step: float | None = None,
-    correct: bool | None = None,
-    project: bool | None = None,
-    correct_metric: str | None = None,
     start: "Start | None" = None,
     allow_code: bool = False,
     announce: Callable[[str], None] | None = None,
+    **settings: Unpack[RunSettings],
 ) -> Sensitivities:
     """Simulate a scene, with exact derivatives of the run by parameters of the scene.
 
@@ -208,16 +199,13 @@ def sensitivities(
 
     Raises:
         SceneError, PluginError: as ``simulate``; an unknown parameter, with the nearest.
-        SimulationError: the run stopped; no derivative by a parameter; the scene has contacts.
+        SimulationError: the run stopped; no derivative by a parameter.
     """
-    if not jit_is_on():
-        raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
-    compiled = compiled_for(scene, method, allow_code, announce, integrator)
-    refuse_contacts(compiled.model, "a run with derivatives")
+    compiled = compiled_for(scene, allow_code, announce, **settings)
     parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
-    given = dict(t_end=t_end, dt=dt, integrator=integrator, rtol=rtol, atol=atol, step=step,
-                 correct=correct, project=project, correct_metric=correct_metric,
-                 start=start_word(start))  # fmt: skip
+    check_differentiable(compiled, parameters, "a run with derivatives", "by")
+    given: dict[str, Any] = {**settings, "start": start_word(start)}
+    method = given.pop("method", None)
     state = given_state(start, compiled)
     base = run_beside(compiled, given, (), state)
     directions, lanes = _directions(len(parameters))
@@ -226,13 +214,44 @@ def sensitivities(
         part = parameters[first : first + directions]
         beside = [neighbours_of(compiled, parameter, given, base) for parameter in part]
         with compiled.borrow_evaluator():
-            settings = settings_of(compiled, method=method, **given)
-            run = DifferentiatedRun(compiled, settings, Callbacks(announce=announce), start=state)
+            simulation = settings_of(compiled, method=method, **given)
+            run = DifferentiatedRun(compiled, simulation, Callbacks(announce=announce), start=state)
             results.append(run.carry(beside, base, lanes).execute())
         runs.append(run)
     for note in _notes(compiled, runs):
         results[0].note(note)
     return Sensitivities(results[0], runs, parameters)
+
+
+def check_differentiable(
+    compiled: CompiledModel, parameters: Sequence[SceneParameter], what: str, key: str
+) -> None:
+    """Refuse scenes and parameters without derivatives.
+
+    Args:
+        compiled: the model.
+        parameters: by which to differentiate.
+        what: is to be done, in words.
+        key: the argument that names the parameters.
+
+    Raises:
+        SceneError: a parameter has no derivative.
+        SimulationError: the scene has none, or nothing is compiled.
+    """
+    if not jit_is_on():
+        raise SimulationError("derivatives of runs are those of compiled code: unset DAP3D_PLAIN")
+    mistakes = [Mistake(key, p.name, why) for p in parameters if (why := no_derivative(p))]
+    if mistakes:
+        raise SceneError(mistakes)
+
+
+def no_derivative(parameter: SceneParameter) -> str:
+    """Why there is no derivative by a parameter, "" where there may be one."""
+    if parameter.table == "simulation" and parameter.path[-1] != "t_end":
+        return "this says how a run is computed; a run has derivatives by what it computes alone"
+    if parameter.whole:
+        return "this is a whole number, by which there is no derivative"
+    return ""
 
 
 def _directions(count: int) -> tuple[int, int]:

@@ -2,13 +2,13 @@
 
 Of a grid there is a dimension for each number that varies, called by its name; of samples there is
 ``point``, along which the numbers are coordinates. Outputs are variables called by their names;
-series have ``time`` as their last dimension.
+series have ``time`` as their last dimension. Derivatives, ``d NAME``, have ``parameter`` behind.
 """
 
 import json
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -30,7 +30,7 @@ from dap3d_core.scene.display import html_table
 from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.study.design import Design
 from dap3d_core.study.ensemble import Ensemble
-from dap3d_core.study.study import Batch, PointStatus
+from dap3d_core.study.study import Batch, PointStatus, derivative_name
 
 if TYPE_CHECKING:
     import xarray
@@ -39,6 +39,8 @@ Read = TypeVar("Read")
 
 #: Version of the format, raised when an older reader would misread it.
 FORMAT = 1
+#: Dimension of the parameters of derivatives.
+PARAMETER = "parameter"
 #: Seconds that a reader waits for who writes the file.
 PATIENCE = 1.0
 #: Attributes whose text is JSON.
@@ -99,7 +101,8 @@ class SweepLayout:
     @property
     def width(self) -> int:
         """Numbers that are kept of one point."""
-        return sum(self.sizes["time"] if o.dimensions[-1] == "time" else 1 for o in self.outputs)
+        of_point = len(self.dimensions)
+        return int(sum(np.prod(self.shape_of(o)[of_point:]) for o in self.outputs))
 
     def shape_of(self, variable: Variable) -> tuple[int, ...]:
         """The shape of a variable."""
@@ -137,16 +140,30 @@ def layout_of(ensemble: Ensemble, design: Design, points: Floats) -> SweepLayout
         )
         for output in ensemble.outputs
     ]
-    about_all = _attributes(ensemble, design)
+    if ensemble.study.gradients:
+        sizes[PARAMETER] = len(ensemble.parameters)
+        outputs += [
+            Variable(derivative_name(o.name), (*o.dimensions, PARAMETER), _of_derivative(o.about))
+            for o in outputs
+        ]
+    about_all = _attributes(ensemble, design, outputs)
     return SweepLayout(sizes, design.dimensions, tuple(coordinates), tuple(outputs), about_all)
 
 
-def _attributes(ensemble: Ensemble, design: Design) -> dict[str, Any]:
+def _of_derivative(about_output: dict[str, Any]) -> dict[str, Any]:
+    """Attributes of the derivatives of an output."""
+    unit, label = about_output.get("units", "1"), about_output["long_name"]
+    return about(f"{unit} per unit of parameter", f"derivative of {label}")
+
+
+def _attributes(
+    ensemble: Ensemble, design: Design, variables: Sequence[Variable]
+) -> dict[str, Any]:
     scene = ensemble.compiled.scene
     varied = [{"name": v.name, "spec": v.spec} for v in design.varied]
     outputs = [
-        {"name": o.name, "label": ensemble.labels[o.name], "unit": ensemble.units[o.name]}
-        for o in ensemble.outputs
+        {"name": v.name, "label": v.about["long_name"], "unit": v.about.get("units", "")}
+        for v in variables
     ]
     found: dict[str, Any] = {
         SWEEP: np.int32(FORMAT),
@@ -196,7 +213,7 @@ class InMemory:
         variables["status"] = (dimensions, self._status.reshape(shape), ABOUT_STATUS)
         variables["note"] = (dimensions, self._notes.reshape(shape), ABOUT_NOTE)
         coordinates = {c.name: (c.dimensions, c.values, c.about) for c in layout.coordinates}
-        return Sweep(variables, coordinates, layout.attributes)
+        return _with_names(Sweep(variables, coordinates, layout.attributes))
 
 
 @checked
@@ -251,9 +268,17 @@ def _opened(file: Path) -> "xarray.Dataset":
                     found.load()
         except Exception as error:  # whatever a damaged file makes of it
             raise unreadable(file, error) from error
-    sweep = Sweep(found.data_vars, found.coords, found.attrs)
+    sweep = _with_names(Sweep(found.data_vars, found.coords, found.attrs))
     sweep.set_close(found.close)
     return sweep
+
+
+def _with_names(sweep: "Sweep") -> "Sweep":
+    """A sweep whose dimension of derivatives has the names of the parameters."""
+    if PARAMETER not in sweep.dims:
+        return sweep
+    names = [one["name"] for one in json.loads(sweep.attrs["varied"])]
+    return sweep.assign_coords({PARAMETER: names})
 
 
 def is_sweep(path: str | os.PathLike[str]) -> bool:

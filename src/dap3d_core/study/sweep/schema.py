@@ -74,7 +74,7 @@ def define(dataset: Any, layout: SweepLayout) -> None:
         write_attributes(variable, output.about)
         if names and not any(" " in name for name in names):
             variable.setncattr_string("coordinates", " ".join(names))
-        variable[(*last, -1)[: len(output.dimensions)]] = np.nan  # allocates it
+        variable[(-1,) * len(output.dimensions)] = np.nan  # allocates it
     status = _variable(dataset, "status", "i1", layout.dimensions, False)
     write_attributes(status, ABOUT_STATUS)
     status[last] = PointStatus.OPEN

@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import attrs
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Computed, ResultError
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
+from dap3d_core.settings import RunSettings
 from dap3d_core.simulation.output.free_space import check_room_of_points
 from dap3d_core.study.design import Design, design_of
 from dap3d_core.study.ensemble import Ensemble
@@ -36,18 +37,9 @@ def sweep(
     sample: int | None = None,
     design: str = "lhs",
     seed: int = 0,
-    t_end: float | None = None,
-    dt: float | None = None,
-    method: str | None = None,
-    integrator: str | None = None,
-    rtol: float | None = None,
-    atol: float | None = None,
-    step: float | None = None,
-    correct: bool | None = None,
-    project: bool | None = None,
-    correct_metric: str | None = None,
     start: str | None = None,
     allow_code: bool = False,
+    gradients: bool = False,
     threads: int | None = None,
     client: Any = None,
     output: str | os.PathLike[str] | None = None,
@@ -55,10 +47,9 @@ def sweep(
     resume: bool = False,
     progress: Callable[[int, int], None] | None = None,
     announce: Callable[[str], None] | None = None,
+    **settings: Unpack[RunSettings],
 ) -> "xarray.Dataset":
     """Run a scene at many points, combinations of values of its parameters (docs/how-to/sweeps.md).
-
-    Outputs are those of ``simulate`` of the changed scene; details in docs/concepts/studies.md.
 
     Args:
         scene: a Scene, or what ``load`` takes.
@@ -68,6 +59,7 @@ def sweep(
         sample, design, seed: number (without: a grid), "lhs", "random", "sobol" or "halton", seed.
         t_end, dt, method, integrator, rtol, atol, step: as of ``simulate``; likewise correct,
             project, correct_metric, start (a word), allow_code; announce as of ``compile``.
+        gradients: True for exact derivatives ``d OUTPUT`` by what varies, along ``parameter``.
         threads, client: points at once; a ``distributed.Client`` whose workers run them.
         output, force, resume: file to write; overwrite it; continue with ``OUTPUT.part``.
         progress: called as progress(done, total).
@@ -79,10 +71,9 @@ def sweep(
         SceneError, PluginError, SimulationError, ResultError: nothing can be run or stored; what
             ends it later (Ctrl-C, say) has the points so far as ``.result``.
     """
-    settings = dict(t_end=t_end, dt=dt, method=method, integrator=integrator, rtol=rtol, atol=atol,
-                    step=step, start=start, correct=correct, project=project,
-                    correct_metric=correct_metric)  # fmt: skip
-    study, plan = _read(scene, vary, outputs, (sample, design, seed), settings, allow_code)
+    given = {**settings, "start": start}
+    study, plan = _read(scene, vary, outputs, (sample, design, seed), given, allow_code)
+    study = attrs.evolve(study, gradients=gradients)
     runner = _Runner(threads, client, progress, announce, force=force, resume=resume)
     return runner.run(study, plan, output)
 
@@ -127,7 +118,7 @@ def _ensemble(study: Study, announce: Callable[[str], None] | None) -> Ensemble:
         mistakes = error.mistakes
     if all(mistake.key == "vary" for mistake in mistakes):
         try:
-            Ensemble(attrs.evolve(study, names=()))
+            Ensemble(attrs.evolve(study, names=(), gradients=False))
         except SceneError as error:
             mistakes = (*mistakes, *error.mistakes)
     raise SceneError(mistakes)
@@ -168,6 +159,7 @@ def _check_space(ensemble: Ensemble, plan: Design, output: str | os.PathLike[str
     """Refuse what fits neither into memory nor on the disk."""
     series = [o for o in ensemble.outputs if o.reduction == "series"]
     width = 8 * (len(ensemble.outputs) + len(series) * (len(ensemble.times) - 1))
+    width *= 1 + len(plan.varied) * ensemble.study.gradients
     # in addition status and note; in memory the points, three times while they are drawn
     width += 1 + (NOTE if output is not None else 8 + 3 * 8 * len(plan.varied))
     check_room_of_points(plan.size, width, output)

@@ -131,7 +131,7 @@ def check_workers(client: Any, here: Environment, payload: bytes) -> None:
     """
     answers = _answers(client, payload)
     version = here["versions"]["dap3d"]
-    remedy = f'pip install "dap3d[cluster]=={version}" in its environment'
+    remedy = f"install dap3d {version} in its environment, as here"
     unfit = []
     for worker, answer in sorted(answers.items()):
         faults = [f"dap3d {version} cannot be used there ({answer}); {remedy}"]
@@ -399,6 +399,6 @@ def _distributed() -> Any:
     except ImportError as error:
         raise ClusterError(
             f"a cluster needs dask, which is not installed here ({error}); "
-            'pip install "dap3d[cluster]"'
+            "pip install cloudpickle dask distributed"
         ) from error
     return distributed

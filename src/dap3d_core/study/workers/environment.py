@@ -70,8 +70,7 @@ def version_differences(here: dict[str, str], there: dict[str, str]) -> list[str
     if here["dap3d"] != there["dap3d"]:
         version = here["dap3d"]
         messages.append(
-            f"it has dap3d {there['dap3d']}, here is {version}; "
-            f'pip install "dap3d[cluster]=={version}" there'
+            f"it has dap3d {there['dap3d']}, here is {version}; install {version} there, as here"
         )
     return messages
 

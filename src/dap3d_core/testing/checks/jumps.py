@@ -15,7 +15,7 @@ from dap3d_core.testing.samples.sampled_type import Sample, SampledType
 #: Factors of the random velocities: both senses, and fast enough for what rests below a speed.
 SPEEDS = (1.0, -1.0, 1e3, -1e3)
 #: A change of a rate below this part of the rate is rounding.
-ROUNDING = 1e-9
+RATE_ROUNDING = 1e-9
 
 # Texts of findings: formats of the wrong number x and of further words.
 _ROWS = (
@@ -106,9 +106,9 @@ def restitution(subject: SampledType) -> CheckOutcome:
         before = _rates(sample.value("J"), state)
         after = before + sample.value("impulse", state)
         for k, (rate, new) in enumerate(zip(before, after, strict=True)):
-            if abs(new - rate) <= ROUNDING * abs(rate):
+            if abs(new - rate) <= RATE_ROUNDING * abs(rate):
                 continue
-            parts, faster = rate >= 0.0, abs(new) > (1.0 + ROUNDING) * abs(rate)
+            parts, faster = rate >= 0.0, abs(new) > (1.0 + RATE_ROUNDING) * abs(rate)
             text = _PARTING if parts else _ENERGY if faster else _RESTITUTION
             c.compare(sample, np.array([new]), rate if parts else -value * rate, text,
                       words={"e": field, "value": value, "rate": rate}, rows=[k])  # fmt: skip
@@ -275,7 +275,7 @@ def _after(J: Floats, change: Floats, state: State) -> State | None:
             of_impulse[slot, :, :3] = J[slot, :, :3] / mass
             of_impulse[slot, :, 3:] = np.linalg.solve(inertia, J[slot, :, 3:].T).T
     K = np.einsum("src,sqc->rq", J, of_impulse)
-    if np.linalg.cond(K) > 1.0 / ROUNDING:
+    if np.linalg.cond(K) > 1.0 / RATE_ROUNDING:
         return None
     dv = np.einsum("src,r->sc", of_impulse, np.linalg.solve(K, change))
     v, w = state.v.copy(), state.w.copy()

@@ -1,4 +1,4 @@
-"""Reactions of joints and forces of force elements as arrows over the instants."""
+"""Reactions of joints, forces of force elements and of contacts as arrows over the instants."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -20,7 +20,7 @@ LONGEST, USUAL = 0.36, 0.16
 def arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any]:
     """The arrows of a page and their scales.
 
-    A joint's reaction is that on the body of its first slot, at the joint's point there; the other
+    The force of a contact on body i is at the point of contact, which moves. A joint's reaction is that on the body of its first slot, at the joint's point there; the other
     body feels the opposite force. A force element has an arrow on each of its moving bodies.
 
     Args:
@@ -30,10 +30,12 @@ def arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any]
 
     Returns:
         ``arrows``: ``layer``, ``what``, ``name``, ``body``, ``at``, packed ``values`` (nt, 3) N or
-        N m, global axes; ``scales``: m for one N, m for one N m; ``notes``.
+        N m, global axes, of contacts packed ``places`` (nt, 3) m; ``scales``: m for one N, m for one N m; ``notes``.
     """
     notes: list[str] = []
-    every = [*_reactions(result, elements), *_applied(result, elements, notes)]
+    every = [
+        *_reactions(result, elements), *_applied(result, elements, notes), *_contacts(result)
+    ]  # fmt: skip
     scales, arrows, least = {}, [], 0.0
     for what in ("force", "moment"):
         alike = [
@@ -43,7 +45,10 @@ def arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any]
         least = max(least * size, SMALLEST * largest)  # forces that cancel leave rounding moments
         visible = [(arrow, length) for arrow, length in alike if length.max() > least]
         scales[what] = _scale([length for _, length in visible], size)
-        arrows += [{**arrow, "values": pack(arrow["values"])} for arrow, _ in visible]
+        arrows += [
+            {n: pack(v) if n in ("values", "places") else v for n, v in arrow.items()}
+            for arrow, _ in visible
+        ]
     return {"arrows": arrows, "scales": scales, "notes": notes}
 
 
@@ -76,6 +81,16 @@ def _applied(result: Result, elements: Elements, notes: list[str]) -> Iterator[d
         for slot, action in applied.on.items():
             if force.bodies.get(slot):
                 yield from _pair("forces", force, slot, action)
+
+
+def _contacts(result: Result) -> Iterator[dict[str, Any]]:
+    for name in result.contacts:
+        contact = result.contact(name)
+        forces, places = (x.reshape(len(result.t), -1, 3) for x in (contact.force, contact.at))
+        for k in range(forces.shape[1]):
+            if np.all(np.isfinite(forces[:, k])):
+                yield {"layer": "contacts", "what": "force", "name": name, "body": 0, "at": ORIGIN,
+                       "values": forces[:, k], "places": places[:, k]}  # fmt: skip
 
 
 def _pair(

@@ -46,6 +46,7 @@ def residual(compiled, motion, q, base):
     return float(np.max(np.abs(compiled.evaluator.rows(0.0, u).C), initial=0.0))
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("on_ground", [False, True], ids=["between bodies", "on ground"])
 @pytest.mark.parametrize("keyword", JOINTS)
 def test_motion_keeps_the_constraints(keyword, on_ground):

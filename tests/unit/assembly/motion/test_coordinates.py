@@ -27,6 +27,7 @@ def motion_of(keyword):
     return classify(compiled_pair(keyword, JOINTS[keyword], 2).model).of(0)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("reverse", [False, True], ids=["of body i", "of body j"])
 @pytest.mark.parametrize("keyword", JOINTS)
 def test_coordinates_are_recovered(keyword, reverse):

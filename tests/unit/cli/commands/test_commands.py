@@ -125,6 +125,10 @@ REFUSED = [
     ((*SWEEP, *VARY), "--keep: a study needs at least one"),
     ((*SWEEP, "--vary", "bodies.stone.mass", *KEEP), "what varies is NAME=FORM"),
     ((*SWEEP, "--vary", "bodies.stnoe.mass=1,2", *KEEP), "did you mean 'bodies.stone.mass'"),
+    (
+        (*SWEEP, "--vary", "simulation.rtol=1e-6,1e-8", *KEEP, "--gradients"),
+        "this says how a run is computed",
+    ),
     ((*SWEEP, *VARY, "--keep", "stnoe.r.z"), "did you mean 'stone.r.z'"),
     ((*SWEEP, *VARY, *KEEP, "--sample", "two"), "'two' is not a valid integer"),
     ((*SWEEP, *VARY, *KEEP, "--seed", "3"), "--seed is of samples"),
@@ -278,7 +282,7 @@ def test_an_absolute_tolerance_of_zero_is_noted(call):
 
 @pytest.mark.parametrize(
     ("package", "extra", "words"),
-    [("tree_sitter", "dap3d[matlab]", ("import-matlab", "sub"))],
+    [("tree_sitter", "pip install tree-sitter tree-sitter-matlab", ("import-matlab", "sub"))],
 )
 def test_a_missing_package_is_told_with_its_extra(call, folder, monkeypatch, package, extra, words):
     (folder / "sub" / "inBodies.m").write_text("B1 = Body_struct;\n")

@@ -25,6 +25,7 @@ def described(keyword, *options, width=80):
     return done.output
 
 
+@pytest.mark.every(6)
 @long_in_plain_python
 @each
 def test_the_example_of_every_type_runs(kind, keyword, tmp_path):
@@ -39,6 +40,7 @@ def test_the_example_of_every_type_runs(kind, keyword, tmp_path):
     assert keyword in {element["type"] for element in used}
 
 
+@pytest.mark.every(6)
 @each
 def test_every_type_is_described(kind, keyword):
     """Fields with unit, default and meaning, in 60 columns; the docstring; where it is; in JSON."""
@@ -194,3 +196,21 @@ def test_states_of_a_type_are_shown():
     said = " ".join(result.output.split())
     assert "states z; initial values by fields in _0, tolerances by fields in _atol" in said
     assert "z_atol" in said
+
+
+@pytest.mark.parametrize(
+    ("word", "keyword"),
+    [
+        ("hinge", "rev"), ("RevoluteJoint", "rev"), ("Ball joint", "sph"), ("prismatic", "tran"),
+        ("gravity", "weight"), ("lead-screw", "screw"), ("u-joint", "univ"),
+    ],
+)  # fmt: skip
+def test_a_name_of_another_program_describes_the_type(word, keyword):
+    text = described(word)
+    assert text.startswith(f"{word} is called {keyword} here.\n\n{keyword}, a ")
+    assert text.endswith(described(keyword))
+    assert {one["keyword"] for one in json.loads(described(word, "--json"))["types"]} == {keyword}
+
+
+def test_a_type_has_its_names_in_other_programs():
+    assert "called  revolute, hinge, pin elsewhere" in described("rev")

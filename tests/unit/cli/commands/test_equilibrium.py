@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.plain import long_in_plain_python
 from unit.simulation.equilibrium.test_continuation import reach
-from unit.study.test_equilibrium_path import truss, truss_load, turning_height
+from unit.study.test_equilibrium_path import pendulum
 
 import dap3d_core as dap
 from dap3d_core.cli import main
@@ -18,57 +18,55 @@ pytestmark = long_in_plain_python
 
 
 @functools.cache
-def path_of_truss(parameter, values):
-    return equilibrium_path(truss(), parameter, values)
+def path_of_pendulum():
+    """Followed once for all tests; it turns at the largest torque and comes back."""
+    return equilibrium_path(pendulum(), "parameters.torque", "0:12:4")
 
 
 def known(scene, parameter, values, **_):
-    return path_of_truss(parameter, values)
+    if parameter == "parameters.torque":
+        return path_of_pendulum()
+    return equilibrium_path(scene, parameter, values)
 
 
 @pytest.fixture
 def model(tmp_path, monkeypatch):
-    """The truss in the current folder; its path is followed once for all tests."""
+    """The pendulum in the current folder."""
     monkeypatch.chdir(tmp_path)
-    path_of_truss("forces.load.f.z", "60:-60:5")
+    path_of_pendulum()
     monkeypatch.setattr(dap, "equilibrium_path", known)
-    truss().save("truss.toml")
-    return ["equilibrium", "truss.toml", "--over", "forces.load.f.z=60:-60:5"]
+    pendulum().save("pendulum.toml")
+    return ["equilibrium", "pendulum.toml", "--over", "parameters.torque=0:12:4"]
 
 
 def test_json(model, capsys):
     """All points, with marks and quantities of each."""
-    assert main([*model, "--of", "node.r.z", "--json"]) == 0
+    assert main([*model, "--of", "bob.r.x", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
-    z = np.array(data["quantities"]["node.r.z"])
-    np.testing.assert_allclose(data["values"], truss_load(z), atol=1e-9)
-    turns = np.array(data["values"])[data["turning"]]
-    np.testing.assert_allclose(turns, truss_load(turning_height() * np.array([1.0, -1.0])))
-    assert data["end"] == "reached"
-    assert len(data["stable"]) == len(data["given"]) == len(z)
+    x = np.array(data["quantities"]["bob.r.x"])
+    np.testing.assert_allclose(data["values"], -2.0 * 9.81 * x, atol=1e-9)
+    assert np.array(data["values"])[data["turning"]] == pytest.approx([9.81])
+    assert data["end"] == "returned"
+    assert len(data["stable"]) == len(data["given"]) == len(x)
 
 
 def test_table_fits_sixty_columns(model, capsys, monkeypatch):
-    """Given values and turning points, with the coordinate that changes most; a picture."""
+    """Given values and turning points, with the coordinate that changes most; a picture.
+
+    To return is no failure; a note says how to go on.
+    """
     monkeypatch.setenv("COLUMNS", "60")
     assert main([*model, "-o", "curve.png"]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 60
     words = [line.split() for line in lines]
-    assert ["-42.9143", "0.27788", "unstable", "turns"] in words
-    assert ["0", "0", "unstable"] in words
-    assert sum(line[-1:] == ["stable"] for line in words) == 8
-    assert "-42.914326 N, 42.914326 N" in " ".join(" ".join(words_) for words_ in words)
-    assert main([*model, "-o", "curve.png"]) == 2  # it exists
-
-
-def test_path_that_returns(model, capsys):
-    """It is no failure; a note says how to go on."""
-    model[-1] = "forces.load.f.z=0:-60:3"
-    assert main(model) == 0
-    out = " ".join(capsys.readouterr().out.split())
+    assert ["9.81", "0", "unstable", "turns"] in words
+    assert ["8", "0.289382", "unstable"] in words
+    assert sum(line[-1:] == ["stable"] for line in words) == 3
+    out = " ".join(" ".join(lines).split())
     assert "back at the first value" in out
     assert "values that begin beyond it follow the path further" in out
+    assert main([*model, "-o", "curve.png"]) == 2  # it exists
 
 
 def test_path_that_ends_on_its_way(tmp_path, capsys, monkeypatch):
@@ -83,9 +81,9 @@ def test_path_that_ends_on_its_way(tmp_path, capsys, monkeypatch):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--of", "nod.r.z"), "did you mean 'node.r.z'"),
+        (("--of", "bab.r.z"), "did you mean 'bob.r.z'"),
         (("-o", "path.toml"), ".png"),
-        (("--over", "forces.load.f.q=0:1:3"), "did you mean 'forces.load.f"),
+        (("--over", "parameters.torqe=0:1:3"), "did you mean 'parameters.torque"),
     ],
 )
 def test_what_is_refused(model, words, said, capsys):

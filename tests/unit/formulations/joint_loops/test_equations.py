@@ -61,6 +61,7 @@ def is_redundant(scene):
     return CompiledModel(scene, method="joint").redundancy().rank.redundant > 0
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("seed", range(8))
 def test_loops_have_the_accelerations_of_a_dense_solution(seed):
     """Random trees with spherical, universal, revolute joints and rods that close loops."""

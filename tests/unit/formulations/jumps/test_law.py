@@ -30,7 +30,8 @@ def balls(masses, velocities, e, gaps=None):
 def velocities_after(masses, velocities, e, **more):
     compiled = balls(masses, velocities, e, **more)
     none = np.zeros(len(masses) - 1)
-    jump = JumpLaw(compiled.evaluator).jump(0.0, compiled.model.u0, None, none, 1e-12)
+    y = compiled.evaluator.integrated(compiled.model.u0)
+    jump = JumpLaw(compiled.evaluator).jump(0.0, y, None, none, 1e-12)
     return np.array(velocities) + jump.dv.reshape(-1, 6)[:, 0], jump
 
 

@@ -80,6 +80,7 @@ def test_error_is_proportional_to_the_tolerance():
     assert run.statistics.rhs < 0.75 * other.nfev
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("tol", [1e-7, 1e-9, 1e-11, 1e-12])
 def test_reported_states_are_as_good_as_steps(tol):
     """Every interpolated state is as near to the orbit as the steps themselves, to 5 %: its

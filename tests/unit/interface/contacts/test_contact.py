@@ -4,6 +4,8 @@ import math
 
 import pytest
 
+import dap3d_core as dap
+from dap3d_contacts.box_box import BoxBox, part_of
 from dap3d_core.interface import Contact, PluginError, Point, examine, number, point
 from dap3d_core.interface.contacts.rates import rate_of
 from dap3d_core.kernels import acos, asin, atan, cos, exp, log, scale, sin, sqrt, tan, where
@@ -11,7 +13,8 @@ from dap3d_core.registry import load_registry
 from dap3d_core.testing.kit import checks_for
 
 
-@pytest.mark.parametrize("keyword", ["ball_ball", "ball_plane", "box_plane", "capsule_plane"])
+@pytest.mark.every(7)
+@pytest.mark.parametrize("keyword", load_registry().keywords("contact"))
 def test_rows_of_the_standard_types_are_exact_derivatives(keyword):
     """Rate of the gap and normal velocity, J, gamma of a moving point, friction, compiled code."""
     failed = [str(outcome) for check in checks_for(load_registry().get("contact", keyword))
@@ -84,3 +87,57 @@ def test_rates_of_functions(function, slope):
     x, rate = 0.3, 2.0
     assert rate_of(function, (x,), (rate,)) == pytest.approx(rate * slope(x), rel=1e-14)
     assert rate_of(function, (x,), (None,)) == 0.0
+
+
+@pytest.mark.parametrize("part", [8, 16, 21, 51])
+def test_corners_and_edges_of_boxes_are_exact_derivatives(part):
+    class Part(BoxBox):
+        keyword = "part_of_boxes"
+
+        def prepare(self, bodies):
+            return {**super().prepare(bodies), **part_of(part, self.size_i, self.size_j)}
+
+    failed = [str(outcome) for check in checks_for(Part) if not (outcome := check.run()).ok]
+    assert not failed
+
+
+TABLE = """
+from dap3d_core.interface import Contact, Point, hookimpl, point
+
+interface_version = 1
+
+
+class Table(Contact):
+    keyword = "table"
+    P_i: Point = point()
+
+    def gap(r_P_i):
+        return r_P_i[2]
+
+    def at(r_P_i):
+        return r_P_i
+
+    def normal():
+        return (0.0, 0.0, 1.0)
+
+    def reach(r_P_i):
+        return 0.5 - r_P_i[0]
+
+
+@hookimpl
+def dap3d_contacts():
+    return [Table]
+"""
+
+
+def test_a_contact_opens_where_its_surfaces_end(tmp_path):
+    """What slides off a table falls freely from its edge on."""
+    (tmp_path / "plugin.py").write_text(TABLE, encoding="utf-8")
+    scene = dap.Scene(name="table", path=tmp_path / "scene.toml")
+    scene.add_body("ball", mass=1.0, Jp=[1.0, 1.0, 1.0], r_dot=[1.0, 0.0, 0.0])
+    scene.add_force("weight", "g")
+    scene.add_contact("table", "top", P_i="ball.O")
+    result = dap.simulate(scene, t_end=1.0, dt=0.25, allow_code=True, rtol=1e-12, atol=1e-14)
+    lift = next(e for e in result.events if e.kind == "lift")
+    assert lift.t == pytest.approx(0.5, abs=1e-9)
+    assert result.r[-1, 0, 2] == pytest.approx(-0.5 * 9.81 * 0.25, abs=1e-9)

@@ -129,6 +129,7 @@ def differences(function, one, direction):
     return total
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("count", [2, 3, 4, 8, 9, 10])
 @pytest.mark.parametrize("function", [smooth, with_corners])
 def test_values_have_the_bits_of_the_function_and_slopes_are_its_derivatives(function, count):

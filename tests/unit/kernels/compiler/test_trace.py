@@ -68,6 +68,7 @@ TYPES = [(kind, keyword) for kind in ("joint", "force", "function")
          for keyword in REGISTRY.keywords(kind)]  # fmt: skip
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     "level", [pytest.param(n, marks=[pytest.mark.slow] if n != "O3" else []) for n in targets()]
 )

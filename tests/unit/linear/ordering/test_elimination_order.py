@@ -117,6 +117,7 @@ NETS = {
 }
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("name", NETS)
 def test_nets_are_solved(name, panels_everywhere):
     """With panels of all kinds: some gather from small nodes, some update small ones."""
@@ -125,6 +126,7 @@ def test_nets_are_solved(name, panels_everywhere):
     check_solution(case)
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("name", [*GRAPHS, *RANDOM])
 def test_any_graph_is_solved_with_panels(name, panels_everywhere):
     """Hubs, floating bodies, joints of three bodies, as in ../ldlt."""

@@ -60,6 +60,7 @@ def projector(found):
     return P
 
 
+@pytest.mark.every(5)
 @long_in_plain_python
 @pytest.mark.parametrize("sparse", WAYS, indirect=True)
 @pytest.mark.parametrize("name", REDUNDANT)

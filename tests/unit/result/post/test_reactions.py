@@ -61,6 +61,7 @@ def test_reactions_of_all_joints_are_those_of_each():
                 np.testing.assert_array_equal(a, b, err_msg=f"{name}.{slot}.{part}")
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("keyword", SEVERAL)
 @pytest.mark.parametrize("ground", [None, "j"], ids=["body-body", "body-ground"])
 def test_action_and_reaction(keyword, ground):

@@ -12,7 +12,7 @@ from dap3d_core.registry import load_registry
 from dap3d_core.scene import Scene, SceneError, check, load, shipped_models
 from dap3d_core.scene.files.line_numbers import lines_of
 from dap3d_core.scene.files.read_toml import scene_of
-from dap3d_core.scene.scene import Element, fault_of_name
+from dap3d_core.scene.tables import Element, fault_of_name
 
 import tomllib  # isort: skip
 
@@ -106,6 +106,7 @@ def test_what_was_read_back_is_checked_alike(scene):
     assert answer(scene) == answer(scene_of(tomllib.loads(scene.to_toml())))
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(scenes(good=False))
 def test_every_key_of_a_written_scene_has_its_line(scene):

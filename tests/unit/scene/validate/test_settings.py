@@ -5,9 +5,10 @@ import pytest
 from support import problems
 
 import dap3d_core as dap
+from dap3d_core import settings
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.integrators import INTEGRATORS
-from dap3d_core.scene import Scene, SceneError, Simulation, check_simulation, mistake_at, scene
+from dap3d_core.scene import Scene, SceneError, Simulation, check_simulation, mistake_at
 
 
 def test_the_defaults_are_good():
@@ -33,10 +34,10 @@ def test_a_mistake_of_a_higher_floor_finds_its_line(tmp_path):
 
 
 def test_names_of_formulations_and_integrators_are_those_of_their_tables():
-    """The scene floor, below both tables, repeats their names and who takes a step as data."""
-    assert set(scene.METHODS) == {"auto", *FORMULATIONS}
-    assert set(scene.INTEGRATORS) == {"auto", *INTEGRATORS}
-    assert set(scene.FIXED_STEP) == {n for n, one in INTEGRATORS.items() if not one.adaptive}
+    """The settings, below both tables, repeat their names and who takes a step as data."""
+    assert set(settings.METHODS) == {"auto", *FORMULATIONS}
+    assert set(settings.INTEGRATORS) == {"auto", *INTEGRATORS}
+    assert set(settings.FIXED_STEP) == {n for n, one in INTEGRATORS.items() if not one.adaptive}
     model = dap.compile(problems.pendulum())
     evaluator, refusing = model.evaluator, set()
     y = evaluator.integrated(model.model.u0)
@@ -45,4 +46,15 @@ def test_names_of_formulations_and_integrators_are_those_of_their_tables():
             integrator.make(evaluator, y, [0.0, 0.1], step=0.05)
         except ValueError:
             refusing.add(name)
-    assert set(scene.NO_STEP) == refusing
+    assert set(settings.NO_STEP) == refusing
+
+
+def test_settings_of_functions_and_scenes_are_those_of_the_table():
+    """Arguments of functions for type checkers, and attributes, are the settings by name."""
+    names = [one.name for one in attrs.fields(Simulation)]
+    assert names == list(settings.SETTINGS)
+    given = {name for name, one in settings.SETTINGS.items() if one.on_command_line}
+    assert settings.RunSettings.__annotations__.keys() == given - {"start"}
+    assert dap.simulate.__signature__.parameters.keys() >= given
+    with pytest.raises(TypeError, match="'rtoll'; did you mean 'rtol'"):
+        dap.simulate("pen1", rtoll=1e-3)

@@ -44,6 +44,7 @@ def tumbling():
     return problems.free_body((1.0, 2.0, 3.0), (0.01, 0.5, 0.02))
 
 
+@pytest.mark.every(5)
 @pytest.mark.skipif(not jit_is_on(), reason="takes long in plain Python")
 @pytest.mark.parametrize(
     ("make", "t", "has_factors"),

@@ -191,6 +191,7 @@ def test_events_are_located_between_samples():
     assert result.events[0].t == pytest.approx(0.25 + s, abs=1e-12)
 
 
+@pytest.mark.every(4)
 @long_in_plain_python
 @pytest.mark.parametrize("chunk", [0.0, 1.0])
 @pytest.mark.parametrize("integrator", ["dop853", "adams"])

@@ -61,7 +61,7 @@ def toggle_load(angle):
     return -2.0 * np.tan(angle) * 200.0 * (2.0 * np.cos(angle) - 1.2)
 
 
-@long_in_plain_python
+@pytest.mark.slow  # quickly: a truss in tests/unit/study/test_equilibrium_path.py
 def test_toggle_turns_where_virtual_work_says():
     """Its derivative vanishes where cos^3 = 0.6: three bodies with redundant joints."""
     found = dap.equilibrium_path(toggle(), "forces.load.f.z", "80:-200:8")
@@ -119,7 +119,7 @@ def test_path_that_ends_on_its_way():
 
 def test_states_of_elements_follow():
     """The relaxed part of a solid: its state is its extension, m g / k_p."""
-    found = dap.equilibrium_path(hanging(), "forces.solid.k_p", "50:200:4")
+    found = dap.equilibrium_path(hanging(), "forces.solid.k_p", "100:200:2")
     exact = 2.0 * 9.81 / found.values
     np.testing.assert_allclose(found.of("solid.z"), exact, rtol=1e-11)
     np.testing.assert_allclose(np.linalg.norm(found.of("bob.r"), axis=1), 1.0 + exact, rtol=1e-11)

@@ -121,6 +121,7 @@ CASES = {
 }  # fmt: skip
 
 
+@pytest.mark.every(4)
 @long_in_plain_python
 @pytest.mark.parametrize("case", CASES)
 def test_points_are_single_runs_bit_for_bit(case):
@@ -318,6 +319,7 @@ TREES = {
 }  # fmt: skip
 
 
+@pytest.mark.every(4)
 @long_in_plain_python
 @pytest.mark.parametrize("case", TREES)
 def test_points_in_joint_coordinates_are_single_runs_bit_for_bit(case):

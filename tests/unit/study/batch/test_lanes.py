@@ -86,6 +86,7 @@ def check(make, points):
     return of, batch
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("integrator", "step"), [("dop853", None), ("dopri5", None), ("rk4", 0.01), ("auto", None)]
 )
@@ -181,6 +182,7 @@ CASES = {
 }
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("case", CASES)
 def test_points_of_all_kinds_have_the_bits_of_points_alone(case):
     make, vary, output = CASES[case]
@@ -262,6 +264,7 @@ def test_turns_are_counted_in_steps_near_singular_poses():
     check(lambda: Ensemble(of.requested), np.linspace(0.2, 1.0, 9)[:, None])
 
 
+@pytest.mark.slow
 def test_a_start_that_fails_beside_one_that_does_not_leaves_it_its_numbers():
     """The first lane alone has a run; the frame of the others is too long for their rods."""
     scene = four_bar()

@@ -18,6 +18,7 @@ def oscillator():
     return scene
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("number", ["final", "mean", "max", "min", "integral"])
 def test_gradients_are_those_of_differences(number):
     f = dap.objective(

@@ -19,6 +19,12 @@ def arrays(result):
     return [array.tobytes() for array in result.arrays.columns()]
 
 
+@pytest.fixture(scope="module")
+def reference():
+    return dap.sensitivities("pen2", BY, **SHORT, rtol=1e-12, atol=1e-14)
+
+
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "settings",
     [
@@ -34,12 +40,11 @@ def arrays(result):
     ],
     ids=lambda s: "-".join(map(str, s.values())),
 )
-def test_values_are_those_of_the_run_alone_and_derivatives_agree(settings):
+def test_values_are_those_of_the_run_alone_and_derivatives_agree(settings, reference):
     """All that is reported has the same bits; formulations and integrators find one derivative."""
     tight = {"rtol": 1e-10, "atol": 1e-12}
     s = dap.sensitivities("pen2", BY, **SHORT, **settings, **tight)
     assert arrays(s.result) == arrays(dap.simulate("pen2", **SHORT, **settings, **tight))
-    reference = dap.sensitivities("pen2", BY, **SHORT, rtol=1e-12, atol=1e-14)
     for quantity in ("cylinder.r.z", "cylinder.rd.z", "energy.kinetic"):
         scale = np.max(np.abs(reference.of(quantity)))
         # penalty keeps constraints to some 1e-7 alone
@@ -49,6 +54,7 @@ def test_values_are_those_of_the_run_alone_and_derivatives_agree(settings):
         )
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("scene", "by"),
     [
@@ -65,6 +71,7 @@ def test_values_of_many_kinds_of_scenes(scene, by):
         assert np.all(np.isfinite(s.of(f"{body}.r")))
 
 
+@pytest.mark.slow
 def test_more_directions_than_lanes():
     """Blocks of runs; each direction is what it is alone."""
     by = [f"bodies.{body}.{field}" for body in ("rod", "cylinder")
@@ -133,6 +140,7 @@ def test_the_values_of_a_control_history():
         assert s.final("mass.r.x")[k] == pytest.approx(alone, rel=1e-9)
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_a_stop_of_an_angle(method):
     """Jumps in coordinates of bodies and of joints find one derivative."""
@@ -148,30 +156,22 @@ def test_a_stop_of_an_angle(method):
     assert s.final("bar.r.x")[0] == pytest.approx((ends[0] - ends[1]) / (2.0 * h), rel=1e-6)
 
 
-def test_a_start_that_a_parameter_takes_off_the_constraints():
+@pytest.mark.every(3)
+@pytest.mark.parametrize(
+    "how", [{"method": "standard"}, {"method": "lsq"}, {"integrator": "radau"}]
+)
+def test_a_start_that_a_parameter_takes_off_the_constraints(how):
     """Its derivatives are brought onto them as its values would be, whether it is corrected or not.
 
     The model's start is on the constraints, where projections find nothing to do.
     """
     by, settings = ["points.P3.sPp.y"], SHORT | {"rtol": 1e-10, "atol": 1e-12}
-    given = [{"method": "standard"}, {"method": "lsq"}, {"integrator": "radau"}]
-    corrected = dap.sensitivities("pen2", by, correct=True, **settings)
-    scale = np.max(np.abs(corrected.of("cylinder.r.z")))
-    for how in given:
-        s = dap.sensitivities("pen2", by, correct=False, **how, **settings)
-        # the two corrections differ: unit metric, and that of the masses
-        np.testing.assert_allclose(
-            s.of("cylinder.r.z"), corrected.of("cylinder.r.z"), rtol=0.0, atol=1e-4 * scale
-        )
-        assert np.max(np.abs(s.of("constraint.position"))) < 1e-8
-
-
-def test_contacts_are_refused():
-    scene = dap.Scene(name="ball")
-    scene.add_body("ball", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
-    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
-    with pytest.raises(dap.SimulationError, match="derivatives does not take contacts yet"):
-        dap.sensitivities(scene, "bodies.ball.r.z", **SHORT)
+    corrected = dap.sensitivities("pen2", by, correct=True, **settings).of("cylinder.r.z")
+    s = dap.sensitivities("pen2", by, correct=False, **how, **settings)
+    # the two corrections differ: unit metric, and that of the masses
+    scale = np.max(np.abs(corrected))
+    np.testing.assert_allclose(s.of("cylinder.r.z"), corrected, rtol=0.0, atol=1e-4 * scale)
+    assert np.max(np.abs(s.of("constraint.position"))) < 1e-8
 
 
 def test_what_nothing_reads_has_derivatives_of_zero():

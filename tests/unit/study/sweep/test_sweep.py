@@ -10,6 +10,7 @@ import xarray
 
 import dap3d_core as dap
 from dap3d_core.cli.console import sweep_tables
+from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import ResultError
 from dap3d_core.simulation.output import free_space
 from dap3d_core.study.sweep import file as growing
@@ -474,3 +475,38 @@ def test_whole_numbers_stay_whole(monkeypatch):
             dap.sweep(scene, {"forces.spring.k": spec}, outputs="block.r.x", sample=sample, **TIMES)
     found = dap.sweep(scene, {"forces.spring.k": "1:3:3"}, outputs="block.r.x", t_end=0.1)
     assert (found["status"] == 1).all()
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
+def test_derivatives_by_what_varies(swept, tmp_path):
+    """Outputs have the bits that they have without; derivatives those of the closed form, to 1e-7.
+
+    Of x = l + a cos(sqrt(k/m) t): dx/dk = -a t sin(w t) / (2 sqrt(k m)), dx/dm = -k/m dx/dk.
+    """
+    with_slopes = dap.sweep(
+        spring(), VARY, outputs=OUTPUTS, gradients=True, output=tmp_path / "x.nc", **TIMES
+    )
+    for name in (*OUTPUTS, "status", "note"):
+        assert with_slopes[name].identical(swept[name])
+    slopes = with_slopes["d block.r.x:series"]
+    assert slopes.dims == (*VARY, "time", "parameter")
+    assert slopes.parameter.values.tolist() == list(VARY)
+    m, k, t = swept["bodies.block.mass"], swept["forces.spring.k"], with_slopes["time"]
+    by_k = -(START - LENGTH) * t * np.sin(np.sqrt(k / m) * t) / (2.0 * np.sqrt(k * m))
+    for name, expected in (("forces.spring.k", by_k), ("bodies.block.mass", -k / m * by_k)):
+        found = slopes.sel(parameter=name).transpose(*expected.dims)
+        np.testing.assert_allclose(found, expected, atol=1e-7)
+    np.testing.assert_array_equal(with_slopes["d block.r.x"], slopes[:, :, -1])
+    table = sweep_tables.sweep_data(with_slopes)["outputs"]
+    assert [one["name"] for one in table] == [*OUTPUTS, *(f"d {name}" for name in OUTPUTS)]
+    assert table[-1]["at_max"]["parameter"] in VARY
+    again = dap.open_sweep(tmp_path / "x.nc")
+    assert again.identical(with_slopes)
+
+
+@pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
+def test_what_has_no_derivative_is_refused_before_any_point():
+    with pytest.raises(dap.SceneError, match=r"simulation\.rtol.*how a run is computed"):
+        dap.sweep(
+            spring(), {"simulation.rtol": [1e-6]}, outputs="block.r.x", gradients=True, **TIMES
+        )

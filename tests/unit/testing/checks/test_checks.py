@@ -367,6 +367,7 @@ PLANTED = [
 ]  # fmt: skip
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("type_", "failing", "words"),
     PLANTED,

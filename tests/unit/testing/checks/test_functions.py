@@ -102,6 +102,7 @@ class Clipped(Force):
         return ((where(F > 0.0, F, 0.0), 0.0, 0.0), ZERO)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("type_", "failing", "words"),
     [

@@ -16,6 +16,7 @@ def failures(type_):
     return {o.check: "\n".join(map(str, o.findings)) for o in outcomes if not o.ok}
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("type_", WITH_UNKNOWNS, ids=lambda t: t.keyword)
 def test_joints_that_are_right_pass(type_):
     """Derived J, gamma, nu and G agree with C."""
@@ -72,6 +73,7 @@ class NoArm(ByHand):
         return hstack(eye(1.0), skew(neg(s_P_i))), hstack(eye(-1.0), skew(s_P_j))
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("type_", "checks", "words"),
     [

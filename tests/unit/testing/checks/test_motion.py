@@ -78,6 +78,7 @@ def test_every_installed_joint_is_in_the_list():
     assert set(INSTALLED) == set(load_registry().keywords("joint"))
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("keyword", INSTALLED)
 def test_motion_of_installed_types(keyword):
     motions = type_motions(load_registry().get("joint", keyword))

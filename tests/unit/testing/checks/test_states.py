@@ -123,6 +123,7 @@ PLANTED = [
 ]  # fmt: skip
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("type_", "failing", "words"), PLANTED, ids=[type_.__name__ for type_, *_ in PLANTED]
 )

@@ -261,6 +261,7 @@ def test_a_rail_is_as_long_as_the_motion():
     assert (sleeve[1], sleeve[2]) == ("box", 1)
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("ground", [None, "j"])
 @pytest.mark.parametrize(("kind", "keyword"), TYPES)
 def test_every_installed_type_is_drawn_with_finite_sizes(kind, keyword, ground):

@@ -4,6 +4,7 @@ const ARROWS = {
   "reactions force": { label: "Reaction forces", color: "#AA3377", unit: "N", heads: 1, key: "5" },
   "reactions moment": { label: "Reaction moments", color: "#C9789F", unit: "N m", heads: 2, key: "6" },
   "forces force": { label: "Applied forces", color: "#CC3311", unit: "N", heads: 1, key: "7" },
+  "contacts force": { label: "Contact forces", color: "#228833", unit: "N", heads: 1, key: "9" },
   "forces moment": { label: "Applied moments", color: "#DD8452", unit: "N m", heads: 2, key: "8" },
 };
 
@@ -17,7 +18,7 @@ class Arrows {
     this.groups = {};
     for (const [key, look] of Object.entries(ARROWS)) {
       const items = data.arrows.filter((a) => `${a.layer} ${a.what}` === key)
-        .map((a) => ({ ...a, values: float32(a.values) }));
+        .map((a) => ({ ...a, values: float32(a.values), places: a.places && float32(a.places) }));
       if (!items.length) continue;
       const shafts = instances(SOLIDS.cylinder(items.length < MANY), items.length);
       const tips = instances(SOLIDS.cone(items.length < MANY), look.heads * items.length);
@@ -42,7 +43,9 @@ class Arrows {
       const length = v.length() * scale;
       const drawn = length > 0.5 * this.unit;
       const direction = drawn ? v.normalize() : v;
-      const from = new THREE.Vector3().fromArray(item.at).applyMatrix4(this.stage.matrices[item.body]);
+      // a contact moves over its bodies: it is drawn where it was last
+      const from = item.places ? new THREE.Vector3().fromArray(item.places, 3 * frame)
+        : new THREE.Vector3().fromArray(item.at).applyMatrix4(this.stage.matrices[item.body]);
       const radius = Math.min(0.5 * this.unit, 0.1 * length), head = Math.min(5 * this.unit, 0.45 * length);
       const neck = from.clone().addScaledVector(direction, length - head);
       (drawn ? between(from, neck, radius, matrix) : nothing).toArray(shafts.instanceMatrix.array, 16 * k);

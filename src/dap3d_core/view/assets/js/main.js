@@ -29,6 +29,7 @@ class App {
     element("help-open").addEventListener("click", () => element("help").showModal());
     new ResizeObserver(() => { this.stage?.resize(); this.plots.drawAll(); this.request(); }).observe(element("scene"));
     this.request();
+    if (data.play && !window.matchMedia("(prefers-reduced-motion: reduce)").matches) this.transport.play();
   }
 
   title() {

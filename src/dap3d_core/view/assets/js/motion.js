@@ -4,6 +4,7 @@
 class Motion {
   constructor(data) {
     this.t = float64(data.t);
+    this.cuts = data.cuts; // instants at which other quantities may jump
     this.poses = float32(data.poses);
     this.count = data.bodies.length;
     this.frames = this.t.length;

@@ -63,7 +63,7 @@ class Plots {
   }
 
   #keys(panel) {
-    panel.curves = panel.quantities.flatMap((q) => q.values().map((values, k) => ({ q, values, rates: q.rates?.()[k], name: q.parts.length ? `${q.name}.${q.parts[k]}` : q.name })));
+    panel.curves = panel.quantities.flatMap((q) => q.values().map((values, k) => ({ q, values, ...this.slopes(q, k, values), name: q.parts.length ? `${q.name}.${q.parts[k]}` : q.name })));
     panel.keys.replaceChildren(...panel.curves.map((curve, k) => {
       curve.color = PALETTE[k % PALETTE.length];
       curve.dash = [[], [6, 3], [2, 2]][Math.floor(k / PALETTE.length) % 3];
@@ -73,6 +73,12 @@ class Plots {
     const drop = make("button", "\u00d7", { title: "Remove the last curve", "aria-label": "Remove the last curve" });
     drop.addEventListener("click", () => this.remove(panel, panel.quantities.at(-1)));
     panel.top.replaceChildren(make("span", ["", "1"].includes(panel.unit) ? "" : `[${unitText(panel.unit)}]`), drop);
+  }
+
+  // Slopes at the begin of the intervals from each instant on, and at the end of those before it.
+  slopes(quantity, k, values) {
+    const rates = quantity.rates?.()[k];
+    return rates ? { after: rates, before: rates } : shaped(this.motion.t, values, this.motion.cuts);
   }
 
   draw(panel) {
@@ -157,13 +163,42 @@ function rule(g, x0, y0, x1, y1) {
   g.stroke();
 }
 
-// The value of a curve a part of the way from one instant to the next: by a cubic where its rate is known.
-function valueAt({ values, rates }, t, n, part) {
+// The value of a curve a part of the way from one instant to the next, by a cubic.
+function valueAt({ values, after, before }, t, n, part) {
   if (!(part > 0)) return values[n];
   const straight = values[n] * (1 - part) + values[n + 1] * part;
-  if (!rates) return straight;
   const h = t[n + 1] - t[n], rise = values[n + 1] - values[n];
-  return straight + part * (1 - part) * ((1 - part) * (h * rates[n] - rise) - part * (h * rates[n + 1] - rise));
+  return straight + part * (1 - part) * ((1 - part) * (h * after[n] - rise) - part * (h * before[n + 1] - rise));
+}
+
+// Slopes that keep the shape of a curve between its instants, as the figures of dap3d have them (Fritsch
+// and Carlson 1980). Straight where an interval has a cut, at which the curve may jump, or has no length.
+function shaped(t, values, cuts) {
+  const count = values.length, after = new Float64Array(count), before = new Float64Array(count);
+  const h = (k) => t[k + 1] - t[k], chord = (k) => (h(k) > 0 ? (values[k + 1] - values[k]) / h(k) : 0);
+  let cut = 0;
+  const broken = Array.from({ length: Math.max(count - 1, 0) }, (_, k) => {
+    while (cut < cuts.length && cuts[cut] <= t[k]) cut++;
+    return cuts[cut] <= t[k + 1] || !(h(k) > 0) || !Number.isFinite(chord(k));
+  });
+  const joins = (k) => k >= 0 && k < count - 1 && !broken[k];
+  const end = (k, next) => { // of a part, by three points
+    if (!joins(next)) return chord(k);
+    const slope = ((2 * h(k) + h(next)) * chord(k) - h(k) * chord(next)) / (h(k) + h(next));
+    if (slope * chord(k) <= 0) return 0;
+    return chord(k) * chord(next) < 0 && Math.abs(slope) > 3 * Math.abs(chord(k)) ? 3 * chord(k) : slope;
+  };
+  for (let k = 0; k < count; k++) {
+    const left = joins(k - 1), right = joins(k);
+    if (left && right) {
+      const a = chord(k - 1), b = chord(k), u = 2 * h(k) + h(k - 1), v = h(k) + 2 * h(k - 1);
+      after[k] = before[k] = a * b > 0 ? (u + v) / (u / a + v / b) : 0;
+    } else {
+      if (right) after[k] = end(k, k + 1); else if (k < count - 1) after[k] = chord(k);
+      if (left) before[k] = end(k - 1, k - 2); else if (k > 0) before[k] = chord(k - 1);
+    }
+  }
+  return { after, before };
 }
 
 // Of many instants in one column of pixels the first and the last, the least and the largest value say
@@ -184,7 +219,7 @@ function seen(values, column) {
   return kept;
 }
 
-function stroke(g, { values, rates, color, dash }, t, x, y, width) {
+function stroke(g, { values, after, before: arriving, color, dash }, t, x, y, width) {
   g.strokeStyle = color;
   g.setLineDash(dash);
   g.beginPath();
@@ -195,9 +230,9 @@ function stroke(g, { values, rates, color, dash }, t, x, y, width) {
     if (!Number.isFinite(values[n])) { before = -1; continue; }
     const px = x(t[n]), py = y(values[n]);
     if (before < 0) g.moveTo(px, py);
-    else if (rates && !dense) {
-      const third = (t[n] - t[before]) / 3; // the cubic through both ends with their rates
-      g.bezierCurveTo(x(t[before] + third), y(values[before] + third * rates[before]), x(t[n] - third), y(values[n] - third * rates[n]), px, py);
+    else if (!dense) {
+      const third = (t[n] - t[before]) / 3; // the cubic through both ends with their slopes
+      g.bezierCurveTo(x(t[before] + third), y(values[before] + third * after[before]), x(t[n] - third), y(values[n] - third * arriving[n]), px, py);
     } else g.lineTo(px, py);
     before = n;
   }

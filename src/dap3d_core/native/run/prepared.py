@@ -1,15 +1,16 @@
 """A scene made ready to be exported: its run as it begins, in one block of memory."""
 
 import os
-from collections.abc import Iterable, Sequence
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.jumps.law import JumpLaw
+from dap3d_core.formulations.jumps.rounds import jump
 from dap3d_core.integrators import IMPLICIT, Integration
 from dap3d_core.integrators.adams.integration import AdamsIntegration
 from dap3d_core.integrators.adams.step import advance_adams
@@ -18,20 +19,28 @@ from dap3d_core.integrators.radau.step import advance as advance_radau
 from dap3d_core.integrators.runge_kutta.integration import RungeKutta
 from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.integrators.stepping import integration_state as at
-from dap3d_core.kernels.compiler.types import INT
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.compiler.types import FLOAT, INT
 from dap3d_core.kernels.compiler.units import Entry, type_of
+from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.model.knots import breaks_of
-from dap3d_core.native.image import Image
+from dap3d_core.model.state_layout import y_from_u
+from dap3d_core.native.run.image import Image
 from dap3d_core.registry import Registry
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
 from dap3d_core.simulation.errors import refuse_contacts
+from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
+from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.breakpoints import SEEN
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import compiled_for, settings_of
 from dap3d_core.simulation.stepwise.stepped_run import HORIZON, OpenRun
+from dap3d_core.study.batch import initial_state
+from dap3d_core.study.batch.compiled_batch import UNIT_METRIC, begin_functions
+from dap3d_core.study.batch.driver import MIN_PIVOT
 
 #: Final time of an exported run where the scene has none, s.
 USUAL_END = 1.0
@@ -83,13 +92,101 @@ class Advance:
         )
         given: tuple[Any, ...] = (integration.work, *integration._arguments)
         if isinstance(integration, RadauIntegration):
-            _, system, loops = integration._arguments
-            function = advance_radau
-            given = (integration.work, integration.functions, integration._parts, system, loops,
-                     integration.tangent, integration.matrix)  # fmt: skip
+            function, given = advance_radau, integration.loop_arguments
         elif function is None:
             raise refusal(f"integrator {integration.name} cannot be exported")
         return cls(integration, function.compile([*map(type_of, given), INT]), given)
+
+
+@attrs.frozen(eq=False)
+class JumpCode:
+    """The law of jumps (formulations/jumps/rounds.py).
+
+    Attributes:
+        entry, arguments: as of ``Advance``, behind the time; the first are its arrays.
+    """
+
+    entry: Entry
+    arguments: tuple[Any, ...]
+
+    @classmethod
+    def of(cls, evaluator: Evaluator) -> "JumpCode":
+        """The law of a model.
+
+        Raises:
+            SceneError: it cannot be exported.
+        """
+        if evaluator.formulation.has_own_coordinates:
+            raise refusal(
+                f"velocities jump, which exported models of method {evaluator.method} do not",
+                "export it by method standard or lsq",
+            )
+        law = JumpLaw(evaluator)
+        contact = UncarriedContact(evaluator, law)
+        if contact.is_bare.any():  # Python sees contact that stays, and ends the run
+            switch = evaluator.switches[int(np.argmax(contact.is_bare))]
+            raise refusal(
+                f"velocities jump at {switch.name(evaluator.model)}, whose type carries nothing "
+                "where contact stays: runs of Python alone notice that",
+                "give the type a wrench, as ptp_stop and its like have",
+            )
+        given = law.arguments(law.arrays)
+        function: Any = jump
+        return cls(function.compile([FLOAT, *map(type_of, given)]), given)
+
+
+@attrs.define(eq=False, kw_only=True, slots=False)
+class StartArrays(Arrays):
+    """What compiled code makes a start of."""
+
+    given: Floats  # (13 n + states,) of the scene: u, and states of elements
+    unit: Floats  # (7,) constants of the metric of displacements
+    starting: Floats  # arguments of study/batch/initial_state.py
+
+
+@attrs.frozen(eq=False)
+class StartCode:
+    """The start of a run as compiled code finds it, for parameters that it depends on.
+
+    Attributes:
+        arrays: what it works on.
+        functions: those that store references of a start, and that assemble it.
+        assembles: it is brought onto the constraints.
+    """
+
+    arrays: StartArrays
+    functions: Any
+    assembles: bool
+    least_pivot: ClassVar[float] = MIN_PIVOT
+
+    @classmethod
+    def of(cls, evaluator: Evaluator, settings: Any) -> "StartCode | None":
+        """That of a model; None where Python alone finds its start."""
+        model, formulation = evaluator.model, evaluator.formulation
+        if formulation.has_own_coordinates or model.contact_count or evaluator.has_unknowns:
+            return None
+        if settings.start == "equilibrium" or settings.hold or model.iterated_forces:
+            return None
+        if str(settings.correct_metric) != "unit":
+            return None
+        unit = UNIT_METRIC.copy()
+        unit[0] = model.length
+        starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size)
+        starting[initial_state.SIZE] = model_size(evaluator)
+        without = evaluator.system.row[np.flatnonzero(~model.position_row)]
+        starting[initial_state.STARTING + without] = 1.0
+        given = np.concatenate([model.u0, model.initial_states])
+        arrays = StartArrays(given=given, unit=unit, starting=starting)
+        assembles = bool(model.row_count and settings.correct)
+        if assembles and formulation.accepts_redundant:
+            return None
+        return cls(arrays, begin_functions(formulation), assembles)
+
+    @staticmethod
+    def given_state(evaluator: Evaluator) -> Floats:
+        """The state that the scene gives."""
+        model = evaluator.model
+        return y_from_u(np.asarray(model.u0), states=model.initial_states)
 
 
 class PreparedRun:
@@ -99,7 +196,8 @@ class PreparedRun:
         compiled, evaluator: the model.
         t_end: s, by default.
         advances: the integration that it begins with; for "auto" the implicit one as well.
-        image: their memory.
+        jumps: the law of jumps; None where velocities do not.
+        start: how it starts; None where Python alone finds that.
     """
 
     def __init__(
@@ -121,7 +219,7 @@ class PreparedRun:
         method, integrator = settings.get("method"), settings.get("integrator")
         if registry is not None and not isinstance(scene, CompiledModel):
             scene = CompiledModel(scene, method=method, allow_code=allow_code, registry=registry)
-        compiled = compiled_for(scene, method, allow_code, None, integrator)
+        compiled = compiled_for(scene, allow_code, method=method, integrator=integrator)
         given = settings.pop("t_end", None)
         if given is not None and not given > 0.0:
             raise refusal(f"t_end = {given:g} leaves no time to run", "give a later end")
@@ -142,17 +240,24 @@ class PreparedRun:
                 second.compile()
                 integrations.append(second)
         self.advances = [Advance.of(one) for one in integrations]
-        self.image = Image(*(part for one in self.advances for part in one.arguments))
+        is_singular = run.singular is not None
+        self.start = None if is_singular else StartCode.of(self.evaluator, run.settings)
+        #: Arrays and tables besides: of outputs.
+        self.more: list[Any] = []
+
+    @cached_property
+    def image(self) -> Image:
+        """The memory of the run, once all that it needs is known."""
+        parts = [part for one in self.advances for part in one.arguments]
+        parts += [] if self.jumps is None else [*self.jumps.arguments]
+        parts += [] if self.start is None else [self.start.arrays, self.start.functions]
+        return Image(self.evaluator.loops, *parts, *self.more)
 
     def _refuse_jumps(self) -> None:
         refuse_contacts(self.evaluator.model, "export")
-        switches = [s for s in self.evaluator.switches if s.jumps]
-        if switches:
-            types = sorted({str(s.group.type_info.type.keyword) for s in switches})
-            raise refusal(
-                f"velocities jump at elements of type {', '.join(types)}: that is not exported yet",
-                "model the contact by a force, such as a stiff spring with a damper",
-            )
+        self.jumps: JumpCode | None = None
+        if any(s.jumps for s in self.evaluator.switches):
+            self.jumps = JumpCode.of(self.evaluator)
 
     @property
     def functions(self) -> Any:
@@ -191,46 +296,3 @@ class PreparedRun:
         ]
         own = [f"state.{label}" for s in model.element_states for label in s.labels]
         return [*names, *own, "state.work"]
-
-    def constants(self) -> "Iterable[tuple[str, Any, Any]]":
-        """Names, arrays and flat indices of what nothing changes in the course of a run."""
-        from dap3d_core.formulations.programs.symbolic_arrays import constants
-
-        arrays = dict(self.evaluator.system.walk())
-        for name, places in constants(self.evaluator):
-            yield name, arrays[name], places
-        for k, one in enumerate(self.advances):
-            work = one.integration.work
-            for name in ("real", "integer", "state", "switches", "tolerance"):
-                array = getattr(work, name)
-                yield f"{k}.{name}", array, np.arange(array.size)
-
-
-def tunable_words(
-    prepared: PreparedRun, others: Sequence[tuple[float, PreparedRun]], value: float
-) -> dict[int, float] | None:
-    """Words of the memory that are a parameter, each with its sign; None where more depends on it.
-
-    Args:
-        prepared: of the scene as it is.
-        others: the same with other values of the parameter.
-        value: of the parameter in the scene.
-    """
-    found: dict[int, float] = {}
-    rows = zip(prepared.constants(), *(other.constants() for _, other in others), strict=True)
-    for (_, array, places), *changed in rows:
-        mine = array.reshape(-1)[places]
-        theirs = [a.reshape(-1)[p] for _, a, p in changed]
-        if any(len(one) != len(mine) for one in theirs):
-            return None
-        moved = np.zeros(len(mine), dtype=bool)
-        for one in theirs:
-            moved |= (one != mine) & ~((one != one) & (mine != mine))
-        for k in np.flatnonzero(moved).tolist():
-            sign = next((s for s in (1.0, -1.0) if mine[k] == s * value), 0.0)
-            if not sign or array.dtype != np.float64:
-                return None
-            if any(a[k] != sign * x for a, (x, _) in zip(theirs, others, strict=True)):
-                return None
-            found[prepared.image.at(array) + int(places[k])] = sign
-    return found or None

@@ -16,15 +16,17 @@ from dap3d_core.assembly.motion.joint_motion import ROTATION, TRANSLATION
 from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators.stepping.integration_state import Y
+from dap3d_core.interface.fields import SLOTS, specs_of
 from dap3d_core.kernels import scalar_math, vectors
-from dap3d_core.kernels.compiler import types as t
-from dap3d_core.kernels.compiler.trace import NumberArray, Symbol, Tracer
+from dap3d_core.kernels.compiler.trace import NumberArray, Tracer
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P, R, V, W
 from dap3d_core.model.joint_angles import joint_angle_name
 from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
-from dap3d_core.native.prepared import PreparedRun, refusal
+from dap3d_core.native.run.elements import Element, Elements
+from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.result import Result, ResultError, RunMetadata
 from dap3d_core.result.errors import UnknownNameError
+from dap3d_core.result.quantities.catalogue import ACTIONS
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.scene.expressions.expression import WORDS
@@ -33,9 +35,10 @@ from dap3d_core.simulation.control.state_view import NAMES, conjugate, product
 #: Quantities of a body that an export without outputs has.
 OF_BODIES = ("r", "p", "rd", "w")
 SYMBOL = "dap3d_outputs"
-#: t, bodies (n + 1, BODY_WIDTH), the reported row without t, functions (k, 5); the values.
-_FUNCTION = """define hidden void @{symbol}(double %t, ptr %bodies, ptr %row, ptr %F,
-                                ptr %out) nounwind {{
+#: Bodies (n + 1, BODY_WIDTH), the reported row behind t, functions (k, 5), what loops of elements
+#: have found; the values.
+_FUNCTION = """define hidden void @{symbol}(ptr %bodies, ptr %row, ptr %F,
+                                ptr %elements, ptr %out) nounwind {{
 entry:
 {body}
   ret void
@@ -62,10 +65,27 @@ class NotExportedError(Exception):
     """A quantity that compiled code does not compute; its name."""
 
 
-def outputs_of(
-    prepared: PreparedRun, names: Sequence[str] | None
-) -> tuple[list[Output], str, list[str]]:
-    """Outputs, LLVM IR of the function that computes them, and outputs of the scene left out.
+@attrs.frozen
+class Outputs:
+    """Outputs of a model.
+
+    Attributes:
+        names: of the quantities that were chosen.
+        found: the outputs.
+        text: LLVM IR of the function that computes them.
+        left_out: outputs of the scene that compiled code does not compute.
+        elements: that they are of.
+    """
+
+    names: list[str]
+    found: list[Output]
+    text: str
+    left_out: list[str]
+    elements: Elements
+
+
+def outputs_of(prepared: PreparedRun, names: Sequence[str] | None) -> Outputs:
+    """Outputs of a model; the run's memory then has what they need.
 
     Args:
         prepared: the run.
@@ -83,7 +103,7 @@ def outputs_of(
     result, tracer = _first_row(prepared), Tracer()
     quantities = _Quantities(prepared, result, tracer)
     found: list[Output] = []
-    left_out: list[str] = []
+    left_out: dict[str, str] = {}
     values: list[Any] = []
     for name in chosen:
         try:
@@ -93,7 +113,7 @@ def outputs_of(
             raise SceneError([Mistake("outputs", name, str(error))]) from error
         except NotExportedError as error:
             if names is None:
-                left_out.append(f"outputs.{name}: {error} is computed by Python alone")
+                left_out[name] = f"outputs.{name}: {error} is computed by Python alone"
                 continue
             raise refusal(
                 f"output {name}: {error} is computed by Python alone",
@@ -111,7 +131,10 @@ def outputs_of(
         tracer.line(f"store double {word}, ptr {place}, align 8")
     program = tracer.program
     program.text.append(_FUNCTION.format(symbol=SYMBOL, body="\n".join(tracer.lines)))
-    return found, program.module(), left_out
+    prepared.more += quantities.elements.finish()
+    names_of = [name for name in chosen if name not in left_out]
+    text = program.module()
+    return Outputs(names_of, found, text, list(left_out.values()), quantities.elements)
 
 
 @IGNORE_FLOAT_ERRORS
@@ -130,10 +153,12 @@ class _Quantities:
 
     def __init__(self, prepared: PreparedRun, result: Result, tracer: Tracer) -> None:
         self._tracer, self._result, self._prepared = tracer, result, prepared
+        self.elements = Elements(prepared)
+        self._values = NumberArray(tracer, "%elements")
         model = self._model = prepared.evaluator.model
         self._body = NumberArray(tracer, "%bodies", width=BODY_WIDTH)
         self._row, self._F = NumberArray(tracer, "%row"), NumberArray(tracer, "%F", width=5)
-        self._t = Symbol(tracer, t.Value(t.FLOAT, ("%t",)))
+        self._t = self._row[-1]
         #: Of the report in a row: behind the integrated state.
         self._report = len(prepared.run.present.work.state[Y])
         self._layout = model.report_layout
@@ -153,8 +178,8 @@ class _Quantities:
         if system is not None:
             return system()
         whole, _, component = name.rpartition(".")
-        for owner, attribute in self._parsed(name):
-            return self._of_owner(owner, attribute, name)
+        for owner, slot, attribute in self._parsed(name):
+            return self._of_owner(owner, slot, attribute, name)
         if whole in self._result.outputs or list(self._parsed(whole)):
             vector = self.value(whole)
             if component == "norm" and isinstance(vector, tuple):
@@ -164,14 +189,17 @@ class _Quantities:
                 return vector[columns.index(component)]
         raise NotExportedError(name)
 
-    def _parsed(self, name: str) -> list[tuple[str, str]]:
-        """The owner and the attribute of a name, where it is a whole quantity of one."""
-        owner, _, attribute = name.rpartition(".")
+    def _parsed(self, name: str) -> list[tuple[str, str, str]]:
+        """Owner, slot and attribute of a name, where it is a whole quantity of one."""
+        head, _, attribute = name.rpartition(".")
+        owner, _, slot = head.rpartition(".")
         model = self._model
-        known = {*model.body_names, *self._result.summary.point_names, *model.joint_names}
-        return [(owner, attribute)] if owner in known else []
+        elements = {*model.joint_names, *model.force_names}
+        if head in {*model.body_names, *self._result.summary.point_names, *elements}:
+            return [(head, "", attribute)]
+        return [(owner, slot, attribute)] if owner in elements and slot in SLOTS else []
 
-    def _of_owner(self, owner: str, attribute: str, name: str) -> Any:
+    def _of_owner(self, owner: str, slot: str, attribute: str, name: str) -> Any:
         model, summary = self._model, self._result.summary
         if owner in model.body_names and attribute in _OF_BODY:
             return self._of_body(1 + model.body_names.index(owner), attribute)
@@ -182,12 +210,79 @@ class _Quantities:
         if owner in model.joint_names:
             joint = model.joint_names.index(owner)
             if attribute == "lambda":
-                first, rows = int(model.joint_start[joint]), int(model.joint_rows[joint])
-                return tuple(self._reported("Lam", first + k) for k in range(rows))
+                return self._multipliers(joint)
+            if attribute in ACTIONS:
+                element = self.elements.joint(owner)
+                if element is None:
+                    raise NotExportedError(name)
+                return self._action(element, slot, attribute, self._reaction(element, slot, joint))
             found = self._coordinate(owner, joint, attribute)
             if found is not None:
                 return found
+        elif owner in model.force_names:
+            element = self.elements.force(owner)
+            if element is not None and attribute in ACTIONS:
+                return self._action(element, slot, attribute, self._wrench(element, slot))
+            found = element and self._of_force(element, attribute)
+            if found is not None:
+                return found
         raise NotExportedError(name)
+
+    # ---------------------------------------------------------------- joints and forces
+
+    def _multipliers(self, joint: int) -> tuple[Any, ...]:
+        first, rows = int(self._model.joint_start[joint]), int(self._model.joint_rows[joint])
+        return tuple(self._reported("Lam", first + k) for k in range(rows))
+
+    def _reaction(self, element: Element, slot: str, joint: int) -> tuple[Any, ...]:
+        """D^T lambda on the body of a slot: force and moment."""
+        Lam, place = self._multipliers(joint), element.place(slot)
+        first = element.first + 6 * len(Lam) * place
+        column = [tuple(self._values[first + 6 * r + v] for r in range(len(Lam))) for v in range(6)]
+        return tuple(_dot(rows, Lam) for rows in column)
+
+    def _wrench(self, element: Element, slot: str) -> tuple[Any, ...]:
+        body = int(element.group.bodies[element.index][element.place(slot)])
+        return tuple(self._values[element.first + 6 * body + v] for v in range(6))
+
+    def _action(self, element: Element, slot: str, part: str, wrench: Any) -> Any:
+        """Part of a ``Reaction``."""
+        place = element.place(slot)
+        axes = self._axes(int(element.group.bodies[element.index][place]))
+        force, moment = wrench[:3], wrench[3:]
+        if part == "moment_at_point":
+            local = element.local(place)
+            assert local is not None  # the result has such a quantity
+            return vectors.sub(moment, vectors.cross(tuple(_dot(a, local) for a in axes), force))
+        vector = force if part.startswith("force") else moment
+        if part.endswith("_body"):
+            return tuple(_dot(tuple(row[k] for row in axes), vector) for k in range(3))
+        return vector
+
+    def _of_force(self, element: Element, attribute: str) -> Any:
+        """Part of a ``ForceOutput``; None where it is none that is a number."""
+        specs = specs_of(element.group.type_info.type).values()
+        if attribute == "energy" and element.energy >= 0:
+            return self._values[element.energy]
+        if any(spec.kind == "vector2" for spec in specs):
+            return self._along(element).get(attribute)
+        is_single = element.group.type_info.outputs.get("tension", ()) == ("out",)
+        return self._values[element.tension] if attribute == "tension" and is_single else None
+
+    def _along(self, element: Element) -> dict[str, Any]:
+        """Length, its rate and the tension of an element between points P_i and P_j."""
+        ends = []
+        for body, end in zip(element.group.bodies[element.index].tolist(), "ij", strict=False):
+            at, _ = element.group.type_info.layout.numbers[f"P_{end}"]
+            local = tuple(element.group.numbers[element.index, at : at + 3].tolist())
+            ends.append([self._of_point(int(body), local, level) for level in (0, 1)])
+        d, rate = (vectors.sub(b, a) for a, b in zip(*ends, strict=True))
+        length = scalar_math.sqrt(_dot(d, d))
+        d = tuple(scalar_math.where(length == 0.0, y, x) for x, y in zip(d, rate, strict=True))
+        size = scalar_math.sqrt(_dot(d, d))
+        size = scalar_math.where(size > 0.0, size, 1.0)
+        tension = _dot(d, self._wrench(element, "i")[:3]) / size
+        return {"length": length, "length_rate": _dot(d, rate) / size, "tension": tension}
 
     # ---------------------------------------------------------------- bodies, points, the whole
 

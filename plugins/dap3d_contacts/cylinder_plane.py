@@ -1,0 +1,97 @@
+"""A cylinder at a plane: on its rims, its side or a cap."""
+
+import math
+from collections.abc import Mapping
+from typing import ClassVar
+
+from dap3d_core.interface import Contact, Point, Vector, hookimpl, number, point, vector
+from dap3d_core.kernels import add, cross, dot, scale, sqrt, sub, where
+
+interface_version = 1
+#: Points of a cap; sine of the tilt below which they count, and half of it, below which a rim has no
+#: lowest point.
+ON_CAP, UPRIGHT = 8, 1e-9
+
+
+def tilt(a_i, a_j):
+    """What of the normal of the plane lies across the axis, and the square of its length."""
+    across = cross(a_i, cross(a_j, a_i))  # without rounding where they are nearly parallel
+    return across, dot(across, across)
+
+
+def upright(a_i, a_j):
+    """Not negative while the cap lies on the plane."""
+    return UPRIGHT - tilt(a_i, a_j)[1] / UPRIGHT
+
+
+def lowest(r_P_i, a_i, spoke_i, a_j, radius, length, end):
+    """A point of part ``end``: -1, 1 the lowest of a rim, else one of the cap that is lower.
+
+    Of a cylinder that stands upright the lowest of a rim is the centre of its cap.
+    """
+    across, square = tilt(a_i, a_j)
+    tilts = square > 0.25 * UPRIGHT * UPRIGHT
+    rim = scale(where(tilts, -radius / sqrt(where(tilts, square, 1.0)), 0.0), across)
+    of_rim = is_rim(end)
+    way = where(of_rim, end, where(dot(a_j, a_i) > 0.0, -1.0, 1.0))
+    arm = where(of_rim, rim, scale(radius, spoke_i))
+    return add(add(r_P_i, scale(0.5 * way * length, a_i)), arm)
+
+
+def is_rim(end):
+    """True of the parts that are rims."""
+    return (end > 0.5) | (end < -0.5)
+
+
+class CylinderPlane(Contact):
+    """The cylinder of ``radius`` and ``length`` about P_i, with axis a_i, at a plane.
+
+    The plane goes through P_j, with normal a_j towards the cylinder. It rolls on the lowest point
+    of a rim, lies on those of both, and stands on its cap, which eight points of its rim carry, the
+    first of them along the axis of the body that is farthest from a_i: a load that tips it does so
+    at its rim itself where it acts towards one of them, and at 0.92 of it between two.
+
+        gap = a_j . (r_Pi +- length / 2 a_i - r_Pj) - radius sin(tilt),   and of 8 points of the cap
+    """
+
+    keyword, points = "cylinder_plane", 2 + ON_CAP
+    example: ClassVar[Mapping[str, str]] = {"radius": "0.1", "length": "0.2"}
+    P_i: Point = point(doc="centre of the cylinder")
+    a_i: Vector = vector(doc="axis of the cylinder")
+    radius: float = number(unit="m", positive=True, doc="of the cylinder")
+    length: float = number(unit="m", positive=True, doc="of the cylinder, from cap to cap")
+    P_j: Point = point("ground.O", doc="point of the plane")
+    a_j: Vector = vector("ground.z", doc="normal of the plane, towards the cylinder")
+
+    def gap(r_P_i, a_i, spoke_i, r_P_j, a_j, radius, length, end):
+        low = lowest(r_P_i, a_i, spoke_i, a_j, radius, length, end)
+        return dot(a_j, sub(low, r_P_j))
+
+    def at(r_P_i, a_i, spoke_i, a_j, radius, length, end):
+        return lowest(r_P_i, a_i, spoke_i, a_j, radius, length, end)
+
+    def normal(a_j):
+        return a_j
+
+    def reach(a_i, a_j, end):
+        return where(is_rim(end), 1.0, upright(a_i, a_j))
+
+    def prepare(self, bodies):
+        """The rim of parts 0 and 1, the spoke of the others, in axes of the body."""
+        k = int(self.part)
+        a = self.a_i
+        far = min(range(3), key=lambda m: abs(a[m]))
+        first = [(m == far) - a[far] * a[m] for m in range(3)]
+        size = math.sqrt(sum(x * x for x in first))
+        u = [x / size for x in first]
+        v = [a[m - 2] * u[m - 1] - a[m - 1] * u[m - 2] for m in range(3)]
+        turn = 2.0 * math.pi * (k - 2) / ON_CAP
+        spoke = tuple(math.cos(turn) * x + math.sin(turn) * y for x, y in zip(u, v, strict=True))
+        end = 0.0 if k > 1 else 2.0 * k - 1.0
+        return {**super().prepare(bodies), "spoke_i": spoke, "end": end}
+
+
+@hookimpl
+def dap3d_contacts():
+    """The contact types of this module."""
+    return [CylinderPlane]

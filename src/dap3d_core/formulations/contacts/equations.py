@@ -1,0 +1,353 @@
+"""Right-hand side, projection, report and switches of scenes with contacts (lsq.py has the rows).
+
+Sliding friction is linear in the normal force of its contact. So the rows are factored once and
+solved once more for each contact that slides, by its friction of a normal force of one; what these
+forces are follows from as many equations:
+
+    N = N_0 + L N,    L_rs the normal force at r by friction of a normal force of one at s.
+
+The compliance of the rows is so large that multipliers of rows that depend on each other have no
+rounding of their own: they are the least ones. Passes (lsq.py) remove what it changes. Where rows
+hold so weakly that passes do not, it is made smaller.
+"""
+
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+import numpy as np
+
+from dap3d_core.assembly.arrays import KNOT, SCRATCH, SWITCH, Floats, System
+from dap3d_core.assembly.evaluate import (
+    call_kinds,
+    global_accelerations,
+    place,
+    place_states,
+    rates,
+    state_rates,
+    zero,
+)
+from dap3d_core.formulations.common.constraints import (
+    evaluate_forces,
+    factorise,
+    linearise,
+    power_of_drivers,
+    project_onto,
+    report_levels,
+    report_multipliers,
+    solve_rows,
+)
+from dap3d_core.kernels.runtime.array_struct import pointer
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import is_differentiated
+
+#: Compliance of a row as part of its squared length; how much less where passes do not converge,
+#: and the least.
+PART, SMALLER, LEAST = 1e-4, 1e-3, 1e-11
+#: Passes at most; each is to leave this part of the one before. They end where they change
+#: multipliers by this part: the next would by a ``PART`` of it; or where they change them by
+#: rounding alone, which rows that depend on each other enlarge.
+PASSES, FALLING, SETTLED, NOISE = 12, 0.1, 1e-12, 1e-9
+#: Columns of ``System.contacts``: of each point its loop and where its integers and numbers begin,
+#: its first row, its bodies, its first state.
+LOOP, INTEGERS, NUMBERS, ROW, BODY_I, BODY_J, STATE, COLUMNS = range(8)
+#: Places in a column, from its end.
+PLACE, FORCE, POWER = 1, 2, 3
+#: Of a contact's states: mode; then the direction of sliding, and from here on what it is given.
+NEAR = 4
+#: Modes (interface/contacts/rows.py) are above these.
+_OPEN, _SLIDING = 0.5, 1.5
+
+
+def memory_size(bodies: int, rows: int, contacts: int) -> int:
+    """Numbers of ``System.friction`` (bodies: with ground).
+
+    Applied forces; forces of one contact; of each contact that slides a ``column``; equations of
+    their normal forces, and what solves them.
+    """
+    return 12 * bodies + contacts * (6 * bodies + rows + POWER + 2 * contacts + 1)
+
+
+@compiled
+def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
+    """Scaled ``acceleration`` and ``multipliers``; returns the power of forces and drivers."""
+    power = evaluate_forces(t, y, system, loops)
+    linearise(t, system, loops)
+    zero(system.multipliers)
+    contacts, size = system.contacts, system.acceleration.shape[0]
+    force, closed = system.friction[size : 2 * size], 0
+    for c in range(contacts.shape[0]):
+        closed |= mode_of(system, c) > _OPEN
+        if is_given(system, c):
+            power += force_of(t, c, force, system.acceleration, system, loops)
+    if closed == 0 and system.row.shape[0] == 3 * contacts.shape[0]:
+        return power
+    applied = system.friction[:size]
+    for k in range(size):
+        applied[k] = system.acceleration[k]
+    part = PART
+    factorise(system, part)
+    count = add_columns(t, system, loops)
+    while not has_settled(system, count) and part > LEAST:
+        part *= SMALLER
+        factorise(system, part)
+        count = add_columns(t, system, loops)
+        for k in range(size):
+            system.acceleration[k] = applied[k]
+    for c in range(count):
+        own = column(system, c)
+        power += own[own.shape[0] - POWER] * own[own.shape[0] - FORCE]
+    return power + power_of_drivers(system)
+
+
+@compiled_into
+def column(system: System, c: int) -> Floats:
+    """What friction of contact c of those that slide does by a normal force of one.
+
+    Accelerations, multipliers, power; then the normal force and its row.
+    """
+    size, rows = system.acceleration.shape[0], system.multipliers.shape[0]
+    width = size + rows + POWER
+    return system.friction[2 * size + c * width : 2 * size + (c + 1) * width]
+
+
+@compiled_into
+def mode_of(system: System, c: int) -> float:
+    """The mode of a contact."""
+    return system.states[system.contacts[c, STATE]]
+
+
+@compiled_into
+def is_sliding(system: System, c: int) -> bool:
+    """True if a contact slides."""
+    mode = mode_of(system, c)
+    return (mode > _OPEN) & (mode < _SLIDING)
+
+
+@compiled_into
+def is_given(system: System, c: int) -> bool:
+    """True if a contact has a force besides those of its rows."""
+    near, states = system.contacts[c, STATE] + NEAR, system.states
+    some = (states[near] != 0.0) | (states[near + 1] != 0.0) | (states[near + 2] != 0.0)
+    return some & (mode_of(system, c) > _OPEN)
+
+
+@compiled
+def largest_given(system: System) -> float:
+    """The largest component of the forces that contacts are given: a size of multipliers."""
+    found, states = 0.0, system.states
+    for c in range(system.contacts.shape[0]):
+        if is_given(system, c):
+            near = system.contacts[c, STATE] + NEAR
+            for k in range(near, near + 3):
+                found = max(found, abs(states[k]))
+    return found
+
+
+@compiled
+def force_of(t: float, c: int, force: Floats, out: Floats, system: System, loops: Any) -> float:
+    """What contact c does besides its rows, with ``multipliers``, added to scaled forces ``out``.
+
+    force: (6 (n+1),) scratch. Returns its power.
+    """
+    row = system.contacts[c]
+    loop, x = loops[row[LOOP]], pointer(system.multipliers)
+    for side in range(BODY_I, BODY_J + 1):
+        for k in range(6 * row[side], 6 * row[side] + 6):
+            force[k] = 0.0
+    loop(t, system, row[INTEGERS], row[NUMBERS], 1, pointer(force), x, x)
+    power = 0.0
+    for side in range(BODY_I, BODY_J + 1):
+        b = row[side]
+        if b > 0:
+            s, metric, o = system.body[b], system.metric[b], 6 * b
+            n0, n1, n2 = force[o + 3], force[o + 4], force[o + 5]
+            for q in range(6):
+                power += force[o + q] * s[12 + q]
+            for q in range(3):
+                out[o + q] += metric[0] * force[o + q]
+                turned = metric[7 + q] * n0 + metric[10 + q] * n1 + metric[13 + q] * n2
+                out[o + 3 + q] += turned
+    return power
+
+
+@compiled
+def friction_of_one(t: float, c: int, own: Floats, system: System, loops: Any) -> None:
+    """Scaled friction of contact c by a normal force of one alone, and its power, into ``own``."""
+    size, states, near = (
+        system.acceleration.shape[0],
+        system.states,
+        system.contacts[c, STATE] + NEAR,
+    )
+    given = states[near], states[near + 1], states[near + 2]
+    states[near] = states[near + 1] = states[near + 2] = 0.0
+    zero(own)
+    zero(system.multipliers)
+    system.multipliers[system.contacts[c, ROW]] = -1.0
+    force = system.friction[size : 2 * size]
+    own[own.shape[0] - POWER] = force_of(t, c, force, own[:size], system, loops)
+    states[near], states[near + 1], states[near + 2] = given
+
+
+@compiled
+def add_columns(t: float, system: System, loops: Any) -> int:
+    """Solve, with the present factors, for friction of each contact that slides; their number.
+
+    Behind the columns stands what gives normal forces from those without friction: (I - L)^-1.
+    """
+    size, count, contacts, x = system.acceleration.shape[0], 0, system.contacts, system.multipliers
+    for c in range(contacts.shape[0]):
+        if is_sliding(system, c):
+            own = column(system, count)
+            friction_of_one(t, c, own, system, loops)
+            zero(x)
+            solve_rows(system, own[:size])
+            for k in range(x.shape[0]):
+                own[size + k] = x[k]
+            own[own.shape[0] - PLACE] = float(contacts[c, ROW])
+            count += 1
+    A = inverse(system, count)
+    for r in range(count):
+        place = row_of(system, r)
+        for s in range(count):
+            A[2 * count * r + s] = column(system, s)[size + place] + (1.0 if r == s else 0.0)
+            A[2 * count * r + count + s] = 1.0 if r == s else 0.0
+    invert(A, count)
+    return count
+
+
+@compiled_into
+def row_of(system: System, c: int) -> int:
+    """The normal row of contact c of those that slide."""
+    own = column(system, c)
+    return int(own[own.shape[0] - PLACE])
+
+
+@compiled_into
+def inverse(system: System, count: int) -> Floats:
+    """Space behind the columns."""
+    size, rows = system.acceleration.shape[0], system.multipliers.shape[0]
+    return system.friction[2 * size + count * (size + rows + POWER) :]
+
+
+@compiled
+def add_friction(system: System, count: int) -> None:
+    """Add friction to ``acceleration`` and ``multipliers``, which were found without it."""
+    A, x, size = inverse(system, count), system.multipliers, system.acceleration.shape[0]
+    N = A[2 * count * count :]
+    for r in range(count):
+        N[r] = 0.0
+        for s in range(count):
+            N[r] -= A[2 * count * r + count + s] * x[row_of(system, s)]
+    for r in range(count):
+        own = column(system, r)
+        for k in range(size):
+            system.acceleration[k] += N[r] * own[k]
+        for k in range(x.shape[0]):
+            x[k] += N[r] * own[size + k]
+        own[own.shape[0] - FORCE] += N[r]
+
+
+@compiled
+def invert(A: Floats, count: int) -> None:
+    """The inverse of a matrix, behind it in each row of A (count, 2 count), takes its place.
+
+    Not numbers where it has none.
+    """
+    n = 2 * count
+    for k in range(count):
+        best = k
+        for r in range(k + 1, count):
+            best = r if abs(A[r * n + k]) > abs(A[best * n + k]) else best
+        for q in range(k, n):
+            A[k * n + q], A[best * n + q] = A[best * n + q], A[k * n + q]
+        pivot = A[k * n + k]
+        for q in range(k, n):
+            A[k * n + q] /= pivot
+        for r in range(count):
+            w = A[r * n + k]
+            for q in range(k, n):
+                A[r * n + q] -= w * A[k * n + q] if r != k else 0.0
+
+
+@compiled
+def has_settled(system: System, count: int) -> bool:
+    """``acceleration`` and ``multipliers`` from the forces in ``acceleration``, in passes.
+
+    In each what it finds for contacts that slide has its friction. False where passes did not
+    converge.
+    """
+    x, total, rows = system.multipliers, system.total, system.total.shape[0]
+    before, change, found, settled = 0.0, 0.0, 0.0, 0
+    zero(total)
+    for k in range(PASSES):
+        for r in range(rows):
+            x[r] = system.gamma[r]
+        solve_rows(system, system.acceleration)
+        add_friction(system, count)
+        change, found = 0.0, 0.0
+        for r in range(rows):
+            total[r] += x[r]
+            if system.compliance[r] != 0.0:  # else a hub's place, or a row that is zero
+                change, found = max(change, abs(x[r])), max(found, abs(total[r]))
+        if change <= SETTLED * found or (k > 0 and not change < FALLING * before):
+            if settled != 0 or not is_differentiated():
+                break
+            settled = 1  # derivatives follow a pass later
+        before = change
+    for r in range(rows):
+        x[r] = total[r]
+    return change <= NOISE * max(largest_given(system), found)
+
+
+@compiled
+def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """As in lsq.py; where switches were read last at this state, it is solved already."""
+    watched = system.watched
+    is_known = watched[0] == t and not is_differentiated()
+    for k in range(y.shape[0]):
+        is_known &= watched[2 + k] == y[k]
+    power = watched[1] if is_known else accelerate(t, y, system, loops)
+    watched[0] = np.inf - np.inf  # once: numbers of the scene may change
+    rates(y, system.metric, system.acceleration, out)
+    state_rates(t, out, system, loops)
+    out[out.shape[0] - 1] = power
+
+
+@compiled
+def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Move a state onto its constraints; out as in ``project_onto``."""
+    project_onto(t, y, out, system, loops, PART, True)
+
+
+@compiled
+def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """As in lsq.py."""
+    accelerate(t, y, system, loops)
+    global_accelerations(system.metric, system.acceleration, out)
+    report_levels(t, y, out, system, loops)
+    report_multipliers(system, out)
+
+
+@compiled
+def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Switches at a state into ``out``, by groups and instances; then distances from knots.
+
+    Those of closed contacts read multipliers.
+    """
+    place_of_next, watched = system.settings[SCRATCH : SCRATCH + 1], system.watched
+    place_states(y, system)
+    closed = 0
+    for c in range(system.contacts.shape[0]):
+        closed |= mode_of(system, c) > _OPEN
+    watched[0] = np.inf - np.inf
+    if closed == 0:
+        place(t, y, system, loops)
+    else:
+        watched[1] = accelerate(t, y, system, loops)
+        watched[0] = t
+        for k in range(y.shape[0]):
+            watched[2 + k] = y[k]
+    place_of_next[0] = 0.0
+    call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, system.multipliers)

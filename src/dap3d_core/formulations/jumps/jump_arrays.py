@@ -1,0 +1,216 @@
+"""The elements of a model by which velocities jump, or whose states do, as arrays of the law."""
+
+from typing import Any, ClassVar
+
+import attrs
+import numpy as np
+
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, row_count
+from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.compiler.types import FLOAT, Array
+from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
+from dap3d_core.model import Group
+
+#: Columns of ``rows``: place of the change among the numbers of the loops, of the first entry of
+#: the row, and from slot to slot; slots and the first of their bodies; element, and row of it; 1
+#: where it pushes; first switch and their number; the switch of the row itself, -1 where it has
+#: none.
+(
+    CHANGE, ENTRY, STEP, SLOTS, BODY, ELEMENT, ROW, PUSHES, SWITCH, SWITCHES, OWN, ROW_WIDTH
+) = range(12)  # fmt: skip
+#: Columns of ``kicks``, impulses that are given: place, slots, first body, element, switches.
+KICK, KICK_SLOTS, KICK_BODY, KICK_ELEMENT, KICK_SWITCH, KICK_SWITCHES, KICK_WIDTH = range(7)
+#: Columns of ``resets``: element, switches, first state and their number.
+RESET_ELEMENT, RESET_SWITCH, RESET_SWITCHES, RESET_STATE, RESET_STATES, RESET_WIDTH = range(6)
+#: Rows of ``switches``: values; side of each, +1, -1 or 0; where one has just come to a side, that.
+VALUE, SIDE, CROSSING = range(3)
+#: Rows of ``v``, (6 n,): at present, before, the largest magnitude so far, scratch.
+NOW, BEFORE, FASTEST, OLD = range(4)
+
+
+def _integer() -> Scalar[int]:
+    return Scalar("integer")
+
+
+def _real() -> Scalar[float]:
+    return Scalar("real")
+
+
+@attrs.define(eq=False, kw_only=True, slots=False)
+class JumpArrays(Arrays):
+    """Elements that jump, and scratch of the law; m rows at the most, 6 n + 6 velocities."""
+
+    types: ClassVar[dict[str, Any]] = {
+        "integer": INTEGERS,
+        **dict.fromkeys(("rows", "kicks", "resets"), INTEGER_MATRIX),
+        **dict.fromkeys(
+            ("bodies", "of_switch", "order", "reset_order", "jumps", "which", "pushes", "acts",
+             "acting", "is_touched"),
+            INTEGERS,
+        ),
+        **dict.fromkeys(
+            ("switches", "v", "given", "G", "scaled", "x", "held", "A", "Lam", "touched"), MATRIX
+        ),
+        "space": Array(FLOAT, 3),
+    }  # fmt: skip
+
+    soon = _real()  # s, what closes within it is closed
+    work = _real()  # of all impulses, J
+    exchanged = _real()  # sum of the magnitudes of its parts, J
+
+    most_rounds = _integer()
+    given_count = _integer()  # rows of the first round besides those of elements
+    follows = _integer()  # velocities follow the joints with states that have been set
+    has_sides = _integer()  # sides are given
+    rounds = _integer()
+    row_count = _integer()  # of the present round
+    missed = _integer()  # -1, or the element whose row joints hold, or -2 where it is of none
+
+    real: Floats
+    integer: Integers
+    rows: Integers
+    kicks: Integers
+    resets: Integers
+    bodies: Integers  # of slots
+    of_switch: Integers  # switches of elements
+    order: Integers  # switch of each number that the loops of impulses read; the same of resets
+    reset_order: Integers
+    jumps: Integers  # (switches,) 1 where velocities may jump as it changes its sign
+    switches: Floats
+    v: Floats
+    given: Floats  # rows, global axes, and behind each its change
+    numbers: Floats  # that the loops write, of impulses or states
+    counts: Floats  # scratch of the loops
+    of_loop: Floats
+    y: Floats  # the state in coordinates of bodies
+    which: Integers  # (m,) row of each row of the round: in ``rows``; -1 of one that is given
+    pushes: Integers  # (m,)
+    acts: Integers
+    G: Floats  # (m, 6 n + 6) rows of the round, global axes; behind each its change
+    scaled: Floats  # (m, 6 n + 6) of unit length in the metric of the masses
+    x: Floats  # (m, 6 n + 6) changes of scaled velocities by unit impulses of them
+    held: Floats  # (m, rows) impulses of the joints then
+    A: Floats
+    Lam: Floats  # (4, m) changes, impulses, scratch
+    space: Floats
+    length: Floats
+    P: Floats  # (6 n + 6,)
+    solution: Floats  # (6 n + 6 + rows,)
+    residual: Floats
+    nu: Floats
+    acting: Integers  # (elements,) 1 where it has acted
+    touched: Floats  # rows that push and have taken part
+    is_touched: Integers
+
+
+class JumpElements:
+    """The elements of a model by which velocities jump, or whose states do.
+
+    Attributes:
+        names: of each, "force NAME" or "joint NAME".
+        is_jump: (switches,) velocities may jump where this switch changes its sign.
+    """
+
+    def __init__(self, evaluator: Evaluator) -> None:
+        """Args: the evaluator of the model."""
+        switches, model = evaluator.switches, evaluator.model
+        self.is_jump: Any = np.array([s.jumps for s in switches], dtype=bool)
+        self.names: list[str] = []
+        self._tables: dict[str, list[Any]] = {
+            name: []
+            for name in ("rows", "kicks", "resets", "bodies", "of_switch", "order", "reset_order")
+        }
+        self._numbers = 0
+        of_group: dict[int, list[int]] = {}
+        for k, switch in enumerate(switches):
+            if switch.jumps:
+                of_group.setdefault(id(switch.group), []).append(k)
+        for q, (kind, group) in enumerate(evaluator.loop_groups):
+            if kind not in JUMP_KINDS:
+                continue
+            own = np.array(of_group[id(group)], dtype=np.int64).reshape(group.count, -1)
+            first, type_kind = len(self.names), group.type_info.type.kind
+            names = model.joint_names if type_kind == "joint" else model.force_names
+            self.names += [f"{type_kind} {names[int(m)]}" for m in group.members]
+            if kind == "reset":
+                self._add_resets(_state_places(evaluator, q, group), first, own)
+            else:
+                self._add_impulses(group, first, own)
+
+    def _switches(self, own: Integers, order: str) -> tuple[int, int]:
+        """First place and number of the switches of an element, which are added."""
+        place = len(self._tables["of_switch"])
+        self._tables["of_switch"] += own.tolist()
+        self._tables[order] += own.tolist()
+        return place, len(own)
+
+    def _add_resets(self, places: Integers, first: int, own: Integers) -> None:
+        for k, states in enumerate(places):
+            start = int(states[0]) if len(states) else 0
+            row = [first + k, *self._switches(own[k], "reset_order"), start, len(states)]
+            self._tables["resets"].append(row)
+
+    def _add_impulses(self, group: Group, first: int, own: Integers) -> None:
+        info, tables = group.type_info, self._tables
+        type_: Any = info.type
+        slots = len(info.layout.slots)
+        rows = row_count(info.outputs, slots) if info.type.kind == "force" else 0
+        count = len(info.outputs["impulse"])
+        for k in range(group.count):
+            switch = self._switches(own[k], "order")
+            body, place = len(tables["bodies"]), self._numbers
+            tables["bodies"] += group.bodies[k].tolist()
+            for r in range(rows):
+                pushes = int(r in type_.unilateral)
+                one = int(own[k, r]) if own.shape[1] == rows else -1
+                tables["rows"].append([place + r, place + count + 6 * r, 6 * rows, slots, body,
+                                       first + k, r, pushes, *switch, one])  # fmt: skip
+            if not rows:
+                tables["kicks"].append([place, slots, body, first + k, *switch])
+            self._numbers += count + 6 * slots * rows
+
+    def arrays(self, evaluator: Evaluator, held: Evaluator, given: int, rounds: int) -> JumpArrays:
+        """Arrays of the law, for so many rows that are given at the most, and so many rounds."""
+        tables = {k: np.array(v, dtype=np.int64) for k, v in self._tables.items()}
+        for name, width in (("rows", ROW_WIDTH), ("kicks", KICK_WIDTH),
+                            ("resets", RESET_WIDTH)):  # fmt: skip
+            tables[name] = tables[name].reshape(-1, width)
+        R, size = len(tables["rows"]), 6 * (evaluator.model.body_count + 1)
+        m, states = R + given, len(evaluator.states)
+        rows = len(held.system.gamma) if held.model.row_count else 0
+
+        def whole(*shape: int) -> Integers:
+            return np.zeros(shape, dtype=np.int64)
+
+        found = JumpArrays(
+            real=np.zeros(len(JumpArrays.indices("real"))),
+            integer=whole(len(JumpArrays.indices("integer"))),
+            **tables,
+            jumps=self.is_jump.astype(np.int64),
+            switches=np.zeros((3, len(evaluator.switches))),
+            v=np.zeros((4, size - 6)),
+            given=np.zeros((given, size + 1)),
+            numbers=np.zeros(max(self._numbers, states, 1)),
+            counts=np.zeros(2),
+            of_loop=np.zeros(max(len(tables["order"]), len(tables["reset_order"]), 1)),
+            y=np.zeros(13 * evaluator.model.body_count + states + 1),
+            which=whole(m), pushes=whole(m), acts=whole(m),
+            G=np.zeros((m, size + 1)), scaled=np.zeros((m, size)), x=np.zeros((m, size)),
+            held=np.zeros((m, rows)), A=np.zeros((m, m)), Lam=np.zeros((4, m)),
+            space=np.zeros((2, m, m)), length=np.zeros(m), P=np.zeros(size),
+            solution=np.zeros(size + rows), residual=np.zeros(rows), nu=np.zeros(rows),
+            acting=whole(len(self.names)), touched=np.zeros((R, size)), is_touched=whole(R),
+        )  # fmt: skip
+        found.most_rounds = rounds
+        return found
+
+
+def _state_places(evaluator: Evaluator, q: int, group: Group) -> Integers:
+    """(count, m) places of the states of the elements of loop q."""
+    layout, system = group.type_info.layout, evaluator.system
+    width = stride(group.type_info)
+    first = system.idx[system.groups[q, 0] + layout.integers - 1 :: width][: group.count]
+    places: Integers = first[:, None] + np.arange(layout.state_width)
+    return places

@@ -1,0 +1,1 @@
+"""The run of an exported model: memory, parameters, outputs, derivatives."""

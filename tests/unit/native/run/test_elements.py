@@ -1,0 +1,60 @@
+"""Outputs of joints and forces: those of a result, which other code computes, to rounding."""
+
+import numpy as np
+import pytest
+from tests.unit.native.test_export import SPRING, _written, exported
+
+import dap3d_core as dap
+from dap3d_core.result import ResultError
+from dap3d_core.result.errors import UnknownNameError
+
+PARTS = ("force", "moment", "force_body", "moment_body", "moment_at_point")
+
+
+def elements_of(result, scene):
+    """Quantities of all joints and forces that a result has."""
+    names = [f"{j}.{part}" for j in scene.joints for part in PARTS]
+    names += [f"{j}.j.{part}" for j in scene.joints for part in PARTS[:2]]
+    more = ("length", "length_rate", "tension", "energy", "j.force", "force", "moment_at_point")
+    names += [f"{f}.{part}" for f in scene.forces for part in more]
+    found = []
+    for name in names:
+        try:
+            result.quantity(name)
+        except (ResultError, UnknownNameError):
+            continue
+        found.append(name)
+    return found
+
+
+@pytest.mark.parametrize("model", ["fourbar3", "quarter_car", "crane", "A03"])
+def test_reactions_and_forces_are_those_of_a_result(tmp_path, model):
+    scene = dap.load(model)
+    t_end = 0.2
+    result = dap.simulate(scene, t_end=t_end, dt=0.1)
+    names = elements_of(result, scene)
+    made, library = exported(scene, tmp_path, outputs=names)
+    run = library.start(t_end)
+    for k, t in enumerate(result.t):
+        run.step_to(t)
+        expected = np.concatenate([np.atleast_1d(result.quantity(n).values[k]) for n in names])
+        # sums in another order: of numbers as large as the largest of all
+        size = np.abs(expected).max()
+        np.testing.assert_allclose(run.values(made.outputs), expected, rtol=0, atol=1e-11 * size)
+
+
+def test_outputs_of_the_scene_may_be_reactions(tmp_path):
+    scene = _written(SPRING.replace('reach = "', 'held = "norm(track.force)"\nreach = "'), tmp_path)
+    made, library = exported(scene, tmp_path)
+    assert made.left_out == ()
+    run, here = library.start(2.0), dap.start(scene, t_end=2.0)
+    here.step(0.5)
+    run.step_to(0.5)
+    assert run["held"] == pytest.approx(here.result().quantity("held").values[-1], rel=1e-12)
+
+
+def test_a_point_that_outputs_read_is_no_parameter(tmp_path):
+    scene = dap.load("fourbar3")
+    options = {"parameters": ["points.P3.sPp.z"], "outputs": ["P3.v"]}
+    with pytest.raises(dap.SceneError, match="outputs depend on it"):
+        exported(scene, tmp_path, **options)

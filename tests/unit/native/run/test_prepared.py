@@ -1,0 +1,71 @@
+"""Velocities that jump in exported models: the bits of runs in Python."""
+
+import numpy as np
+import pytest
+from support.bouncing import bouncing, swinging
+from support.jumping import JUMPING
+from tests.unit.native.test_export import differences, exported
+
+import dap3d_core as dap
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "rk4", "adams", "radau"])
+def test_a_ball_bounces_with_the_bits_of_simulate(tmp_path, integrator):
+    step = 1e-2 if integrator == "rk4" else None
+    assert differences(bouncing(), tmp_path, 2.0, integrator=integrator, step=step)
+
+
+@pytest.mark.parametrize("method", ["standard", "lsq"])
+def test_so_does_a_bar_on_a_hinge(tmp_path, method):
+    assert differences(swinging(), tmp_path, 2.0, method=method)
+
+
+def test_what_touches_at_the_start_jumps_there_and_once(tmp_path):
+    """At z = 0 with 1 m/s downwards and e = 0.8: 0.8 m/s upwards at once."""
+    scene = bouncing()
+    scene.bodies["ball"].r, scene.bodies["ball"].r_dot = (0.0, 0.0, 0.0), (0.0, 0.0, -1.0)
+    assert differences(scene, tmp_path, 0.3)
+    _, library = exported(scene, tmp_path, outputs=["ball.rd.z"], parameters=["forces.floor.e"])
+    run = library.start(1.0)
+    assert run["ball.rd.z"] == pytest.approx(0.8, rel=1e-14)
+    run = library.start(1.0)
+    run["forces.floor.e"] = 0.5
+    assert run["ball.rd.z"] == pytest.approx(0.5, rel=1e-14)
+
+
+def test_jumps_between_steps_with_inputs(tmp_path):
+    scene = bouncing()
+    scene.add_input("wind", value=0.0)
+    scene.add_force("f", "blow", body_i="ball", f=(1.0, 0.0, 0.0), input="wind")
+    _, library = exported(scene, tmp_path, outputs=["ball.r", "ball.rd"])
+    here, there = dap.start(scene, t_end=2.0), library.start(2.0)
+    for k in range(20):
+        wind = float(np.sin(k))
+        here.step(0.1, inputs={"wind": wind})
+        there["wind"] = wind
+        there.step_to(here.t)
+        for name in ("ball.r.x", "ball.r.z", "ball.rd.z"):
+            assert there[name] == here.state[name]
+
+
+def test_a_saved_state_continues_behind_a_jump(tmp_path):
+    _, library = exported(bouncing(), tmp_path, outputs=["ball.r.z"])
+    run, other = library.start(2.0), library.start(2.0)
+    run.step_to(0.6)
+    other.load(run.save())
+    run.step_to(1.9)
+    other.step_to(1.9)
+    assert run["ball.r.z"] == other["ball.r.z"]
+
+
+def test_what_nothing_carries_is_refused_by_name(tmp_path):
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=2.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
+    scene.add_force("test-bounce", "floor", P_i="ball.O", e=0.5)
+    with pytest.raises(dap.SceneError, match="jump at floor, whose type carries nothing"):
+        exported(scene, tmp_path, registry=JUMPING)
+
+
+def test_a_method_in_coordinates_of_joints_is_refused(tmp_path):
+    with pytest.raises(dap.SceneError, match="method standard or lsq"):
+        exported(swinging(), tmp_path, method="joint")

@@ -1,0 +1,191 @@
+"""Contacts of boxes and cylinders against closed forms, to 1e-9 at rtol 1e-12."""
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+
+G = 9.81
+TOLERANCE = 1e-9
+TIGHT = {"rtol": 1e-12, "atol": 1e-14}
+
+
+def first(result, kind, name=""):
+    """The first event of a kind."""
+    return next(e for e in result.events if e.kind == kind and e.name.startswith(name))
+
+
+def leaves_at(v, R):
+    """Cosine of the angle at which what slides off a round edge leaves it."""
+    return 2.0 / 3.0 * (1.0 + v**2 / (2.0 * G * R))
+
+
+def test_a_ball_slides_over_the_edge_of_a_table():
+    """Its centre turns about the edge, once it is past the face: both in one contact."""
+    radius, v = 0.1, 0.3
+    scene = dap.Scene(name="table")
+    r = [-0.2, 0.0, radius]
+    scene.add_body("ball", mass=1.0, Jp=[0.004] * 3, r=r, r_dot=[v, 0.0, 0.0])
+    scene.add_point("table", "ground", [-0.5, 0.0, -0.05])
+    scene.add_force("weight", "g")
+    ends = {"P_i": "ball.O", "P_j": "table", "radius": radius, "size": [1.0, 1.0, 0.1]}
+    scene.add_contact("ball_box", "top", **ends)
+    result = dap.simulate(scene, t_end=1.0, dt=0.1, **TIGHT)
+    lift = first(result, "lift")
+    assert lift.u[2] / radius == pytest.approx(leaves_at(v, radius), abs=TOLERANCE)
+    assert lift.u[0] ** 2 + lift.u[2] ** 2 == pytest.approx(radius**2, abs=1e-10)
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+def test_a_ball_leaves_a_cylinder_at_two_thirds_of_the_height():
+    big, small, v = 1.0, 0.1, 0.2
+    scene = dap.Scene(name="log")
+    R = big + small
+    r_dot = [0.0, v, 0.0]
+    scene.add_body("ball", mass=1.0, Jp=[0.004] * 3, r=[0.3, 0.0, R], r_dot=r_dot)
+    scene.add_force("weight", "g")
+    ends = {"P_i": "ball.O", "P_j": "ground.O", "a_j": "ground.x"}
+    sizes = {"radius_i": small, "radius_j": big, "length": 1.0}
+    scene.add_contact("ball_cylinder", "log", **ends, **sizes)
+    result = dap.simulate(scene, t_end=1.5, dt=0.1, **TIGHT)
+    assert first(result, "lift").u[2] / R == pytest.approx(leaves_at(v, R), abs=TOLERANCE)
+
+
+def test_a_ball_slides_over_the_rim_of_a_standing_cylinder():
+    big, small, v = 0.5, 0.1, 0.3
+    scene = dap.Scene(name="column")
+    scene.add_body("ball", mass=1.0, Jp=[0.004] * 3, r=[0.2, 0.0, small], r_dot=[v, 0.0, 0.0])
+    scene.add_point("column", "ground", [0.0, 0.0, -0.5])
+    scene.add_force("weight", "g")
+    ends = {"P_i": "ball.O", "P_j": "column", "a_j": "ground.z"}
+    sizes = {"radius_i": small, "radius_j": big, "length": 1.0}
+    scene.add_contact("ball_cylinder", "top", **ends, **sizes)
+    result = dap.simulate(scene, t_end=1.5, dt=0.1, **TIGHT)
+    lift = first(result, "lift")
+    assert lift.u[2] / small == pytest.approx(leaves_at(v, small), abs=TOLERANCE)
+
+
+def test_a_lying_cylinder_slides_then_rolls_with_two_thirds_of_its_speed():
+    v, mu, radius = 3.0, 0.3, 0.1
+    scene = dap.Scene(name="roller")
+    Jp = [0.02, 0.5 * 2.0 * radius**2, 0.02]
+    scene.add_body("roller", mass=2.0, Jp=Jp, r=[0.0, 0.0, radius], r_dot=[v, 0.0, 0.0])
+    scene.add_force("weight", "g")
+    shape = {"P_i": "roller.O", "a_i": "roller.y", "radius": radius, "length": 0.3}
+    scene.add_contact("cylinder_plane", "floor", **shape, mu=mu)
+    result = dap.simulate(scene, t_end=1.5, dt=0.1, **TIGHT)
+    assert first(result, "stick").t == pytest.approx(v / (3.0 * mu * G), abs=TOLERANCE)
+    assert result.rd[-1, 0] == pytest.approx([2.0 / 3.0 * v, 0.0, 0.0], abs=TOLERANCE)
+    forces = result.contact("floor").normal_force
+    assert forces[:, :2] == pytest.approx(G, abs=1e-9)  # the rims, one half each
+    assert np.all(forces[:, 2:] == 0.0)
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+def test_a_disk_rolls_on_its_rim_about_a_centre_at_rest():
+    """Omega^2 sin(alpha) = g / (k a), J = k m a^2 about a diameter (Moffatt, Nature 404, 2000)."""
+    a, alpha, k = 0.2, 0.4, 0.25
+    rate = np.sqrt(G / (k * a * np.sin(alpha)))
+    scene = dap.Scene(name="disk")
+    # its plane turned about y by alpha: the lowest point is towards x, w along that radius
+    p = [np.cos(alpha / 2.0), 0.0, np.sin(alpha / 2.0), 0.0]
+    low = np.array([np.cos(alpha), 0.0, -np.sin(alpha)])
+    Jp = [k * a**2, k * a**2, 2.0 * k * a**2]
+    r = [0.0, 0.0, a * np.sin(alpha)]
+    scene.add_body("disk", mass=1.0, Jp=Jp, r=r, p=p, w=rate * np.sin(alpha) * -low)
+    scene.add_force("weight", "g")
+    scene.add_point("C", "disk", [0.0, 0.0, 0.05])  # a cylinder whose lower rim is the disk
+    shape = {"P_i": "C", "a_i": "disk.z", "radius": a, "length": 0.1}
+    scene.add_contact("cylinder_plane", "floor", **shape, mu=2.0)
+    result = dap.simulate(scene, t_end=3.0, dt=0.1, **TIGHT)
+    contact = result.contact("floor")
+    lowest = int(np.argmax(contact.normal_force[0]))
+    assert set(contact.mode[:, lowest]) == {2}
+    assert result.r[:, 0] == pytest.approx(np.tile(r, (len(result.t), 1)), abs=TOLERANCE)
+    at = contact.at[:, lowest] - r
+    turned = np.unwrap(np.arctan2(at[:, 1], at[:, 0]), period=2.0 * np.pi)
+    wanted = rate * result.t
+    away = np.angle(np.exp(1j * (turned - wanted)))
+    back = np.angle(np.exp(1j * (turned + wanted)))
+    assert min(np.abs(away).max(), np.abs(back).max()) < 1e-8
+
+
+@pytest.mark.parametrize("part", [0.999, 1.001])
+def test_a_standing_cylinder_tips_where_a_push_passes_its_rim(part):
+    """A force F at the height h tips it where F h > m g a, towards a point of its cap."""
+    a, h, mass = 0.1, 0.25, 2.0
+    scene = dap.Scene(name="column")
+    scene.add_body("column", mass=mass, Jp=[0.05, 0.05, 0.01], r=[0.0, 0.0, h])
+    scene.add_force("weight", "g")
+    F = part * mass * G * a / h
+    scene.add_force("f", "push", body_i="column", f=[F, 0.0, 0.0])
+    shape = {"P_i": "column.O", "a_i": "column.z", "radius": a, "length": 2.0 * h}
+    scene.add_contact("cylinder_plane", "floor", **shape, mu=0.8)
+    result = dap.simulate(scene, t_end=0.2, dt=0.05)
+    moved = np.max(np.abs(result.r - result.r[0]))
+    if part < 1.0:
+        assert moved < 1e-14
+        assert result.contact("floor").normal_force.sum(axis=1) == pytest.approx(mass * G)
+    else:
+        # the rate at which it begins: J of the rim w_dot = F h - m g a
+        J = 0.05 + mass * (a**2 + h**2)
+        angle = 0.5 * (F * h - mass * G * a) / J * 0.05**2
+        assert result.p[1, 0, 2] * 2.0 == pytest.approx(angle, rel=1e-2)
+
+
+def stack(offset=0.0, yaw=0.0, mu=0.5):
+    """A cube of 1 kg on another, on a floor."""
+    scene = dap.Scene(name="stack")
+    scene.add_force("weight", "g")
+    size = [0.1, 0.1, 0.1]
+    for k in range(2):
+        r, rpy = [offset * k, 0.0, 0.05 + 0.1 * k], [0.0, 0.0, yaw * k]
+        scene.add_body(f"b{k}", mass=1.0, Jp=[0.01 / 6.0] * 3, r=r, rpy=rpy)
+    scene.add_contact("box_plane", "floor", P_i="b0.O", size=size, mu=mu)
+    ends = {"P_i": "b1.O", "P_j": "b0.O", "size_i": size, "size_j": size}
+    scene.add_contact("box_box", "upper", **ends, mu=mu)
+    return scene
+
+
+@pytest.mark.parametrize(("offset", "yaw"), [(0.0, 0.0), (0.0499, 0.0), (0.01, 0.5)])
+def test_a_box_rests_on_another_while_its_centre_is_above_it(offset, yaw):
+    result = dap.simulate(stack(offset, yaw), t_end=100.0, dt=50.0)
+    assert np.max(np.abs(result.r - result.r[0])) < 1e-14
+    assert np.max(np.abs(result.p - result.p[0])) < 1e-14
+    assert result.contact("upper").normal_force.sum(axis=1) == pytest.approx(G, rel=1e-9)
+
+
+def test_a_box_tips_over_the_edge_of_another_where_its_centre_is_beyond():
+    """J about the edge w_dot = m g x, x = 1e-4 m: the angle x m g / (2 J) t^2 at first."""
+    result = dap.simulate(stack(0.0501), t_end=0.02, dt=0.01, **TIGHT)
+    J = 0.01 / 6.0 + 0.05**2 + 1e-4**2
+    growth = np.sqrt(G * 0.05 / J)  # of the inverted pendulum, whose centre begins above the edge
+    angle = 1e-4 / 0.05 * (np.cosh(growth * result.t[1:]) - 1.0)
+    assert 2.0 * result.p[1:, 1, 2] == pytest.approx(angle, rel=1e-5)
+
+
+def test_a_box_slides_on_another_that_sticks():
+    scene, mu, F = stack(mu=0.2), 0.2, 3.0
+    scene.add_force("f", "push", body_i="b1", f=[F, 0.0, 0.0])
+    result = dap.simulate(scene, t_end=0.15, dt=0.05, **TIGHT)
+    assert result.r[:, 1, 0] == pytest.approx(0.5 * (F - mu * G) * result.t**2, abs=TOLERANCE)
+    assert np.max(np.abs(result.r[:, 0] - result.r[0, 0])) < 1e-14
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+def test_edges_of_crossed_boxes_bounce():
+    e, h, drop = 0.5, 0.1, 0.2
+    scene = dap.Scene(name="crossed")
+    r = [0.0, 0.0, 2.0 * h * np.sqrt(2.0) + drop]
+    scene.add_body("b", mass=1.0, Jp=[0.01, 0.02, 0.03], r=r, rpy=[np.pi / 4.0, 0.0, 0.0])
+    scene.add_body("t", mass=1.0, Jp=[0.01, 0.02, 0.03], rpy=[0.0, np.pi / 4.0, 0.0])
+    scene.add_joint("weld", "stand", body_i="t", body_j="ground")
+    scene.add_force("weight", "g")
+    sizes = {"size_i": [1.0, 2.0 * h, 2.0 * h], "size_j": [2.0 * h, 1.0, 2.0 * h]}
+    scene.add_contact("box_box", "c", P_i="b.O", P_j="t.O", **sizes, e=e)
+    result = dap.simulate(scene, t_end=0.25, dt=0.05, **TIGHT)
+    impact = first(result, "impact")
+    assert impact.t == pytest.approx(np.sqrt(2.0 * drop / G), abs=TOLERANCE)
+    after = np.array(impact.u_after).reshape(2, -1)
+    assert e * np.sqrt(2.0 * G * drop) == pytest.approx(np.max(after), abs=TOLERANCE)
+    assert int(impact.name.split("#")[1]) > 16  # a pair of edges, not a corner
