@@ -56,7 +56,7 @@ def test_a_tower_carries_a_load_a_thousand_times_its_own():
 
 @pytest.mark.parametrize("declared", [False, True])
 def test_a_ball_that_slides_then_rolls_has_the_second_order(declared):
-    """Within a step slip ends unseen, which costs less than mu G h^2; first order costs h v0 / 7."""
+    """Slip that ends unseen within a step costs less than mu G h^2; first order h v0 / 7."""
     scene, v0, mu = ball(mu=0.3), 3.0, 0.3
     if declared:
         scene = dap.Scene(name="declared")

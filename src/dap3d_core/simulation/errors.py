@@ -30,6 +30,11 @@ def refuse_contacts(model: Any, what: str) -> None:
             f"({model.joint_names[-model.contact_count].partition('#')[0]}): take them out of "
             "[contacts], or run the scene (simulate), which does"
         )
+    refuse_collisions(model, what)
+
+
+def refuse_collisions(model: Any, what: str) -> None:
+    """Refuse what knows declared contacts, and not shapes that meet anywhere; as above."""
     if model.collisions is not None:
         raise SimulationError(
             f"{what} does not take shapes that collide yet, and the scene has some "

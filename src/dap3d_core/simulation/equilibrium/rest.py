@@ -22,7 +22,7 @@ from dap3d_core.simulation.equilibrium.states_at_rest import (
     unsettled_part,
 )
 from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
-from dap3d_core.simulation.errors import AssemblyError, SimulationError
+from dap3d_core.simulation.errors import AssemblyError, SimulationError, refuse_collisions
 from dap3d_core.simulation.initial.start_state import StartState
 
 #: Singular values of the Jacobian below this part are left out of the least multipliers.
@@ -79,6 +79,7 @@ def find_rest(
     Raises:
         SimulationError: there is none, or none was found; names what gives way.
     """
+    refuse_collisions(evaluator.model, "the search for an equilibrium")
     evaluator.start(0.0, u, angles, states)
     if evaluator.model.contact_count:
         _hold_contacts(evaluator, u, "at the start of the search for an equilibrium")

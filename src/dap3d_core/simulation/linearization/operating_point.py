@@ -19,7 +19,7 @@ from dap3d_core.model.state_layout import join
 from dap3d_core.result import Result, information
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.errors import SimulationError, refuse_collisions
 from dap3d_core.simulation.initial.assemble import correct_initial, fit_of, violation
 from dap3d_core.simulation.initial.given_state import state_of, time_of
 from dap3d_core.simulation.initial_state import start_notes
@@ -111,6 +111,7 @@ def operating_point(
     t = time_of(t)
     compiled = compile_exact(scene, allow_code)
     model = compiled.model
+    refuse_collisions(model, "linearisation")
     notes: list[str] = []
     with compiled.borrow_evaluator() as evaluator:
         u, turns, states = _state(compiled, at, t, notes)

@@ -16,6 +16,7 @@ from dap3d_core.result import Result, ResultError, RunMetadata, find
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.settings import RunSettings
 from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation.errors import refuse_collisions
 from dap3d_core.simulation.failure.narrow_forces import notes_on_derivatives
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
@@ -202,6 +203,7 @@ def sensitivities(
         SimulationError: the run stopped; no derivative by a parameter.
     """
     compiled = compiled_for(scene, allow_code, announce, **settings)
+    refuse_collisions(compiled.model, "a run with derivatives")
     parameters = _parameters(compiled, [by] if isinstance(by, str) else list(by))
     check_differentiable(parameters, "by")
     given: dict[str, Any] = {**settings, "start": start_word(start)}

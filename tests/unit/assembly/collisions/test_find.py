@@ -106,4 +106,5 @@ def test_all_pairs_of_near_spheres_are_found():
     found = spheres.find(r, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)), np.full(n + 1, 0.01))
     distance = np.linalg.norm(r[:, None] - r[None], axis=2)
     i, j = np.nonzero(np.triu(distance < 0.14, 1))
-    assert {tuple(sorted(pair)) for pair in found.shapes.tolist()} == set(zip(i.tolist(), j.tolist(), strict=True))  # fmt: skip
+    pairs = {tuple(sorted(pair)) for pair in found.shapes.tolist()}
+    assert pairs == set(zip(i.tolist(), j.tolist(), strict=True))

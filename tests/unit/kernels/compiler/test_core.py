@@ -118,6 +118,18 @@ NOT_CALLED = {
         "study.batch.lanes": "set_lane load next_step run_lanes exchange_kept take_stages "
         "take_rates watch_stages",
         # of scenes with contacts, which have closed forms: verification/test_contacts.py
+        # of shapes that collide: unit/assembly/collisions, verification/test_stepping.py
+        "assembly.collisions.records": "add",
+        "assembly.collisions.rods": "balls along sphere_capsule capsules _pair",
+        "assembly.collisions.planes": "above at_plane _rims",
+        "assembly.collisions.solids": "clamp local put ball_box sphere_cylinder capsule_box slope "
+        "_lowest",
+        "assembly.collisions.boxes": "dot_axis apart boxes _edges _face _facing _clip",
+        "assembly.collisions.broad_phase": "sweep",
+        "assembly.collisions.find": "touch",
+        "integrators.moreau.dense": "solve_dense",
+        "integrators.moreau.gauss_seidel": "sweep_bodies change_of",
+        "integrators.moreau.integration": "state_at goes_on take_state",
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate",
         "formulations.jumps.rounds": "kick has_crossed stop",

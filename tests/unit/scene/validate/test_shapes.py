@@ -108,6 +108,8 @@ def test_good_shapes_are_read_with_their_defaults(tmp_path):
         "at": (0.0, 0.0, 0.5),
         "p": (1.0, 0.0, 0.0, 0.0),
         "color": "tab:blue",
+        "collides": False,
+        "material": "",
     }
     assert (floor.body, floor.values["axis"]) == (0, (0.0, 0.0, 1.0))
 
@@ -119,6 +121,8 @@ def test_a_scene_with_every_shape_reads_back_as_it_was_written():
         "box": {"size": (1.0, 2.0, 3.0), "p": (0.6, 0.8, 0.0, 0.0)},
         "sphere": {"radius": 0.1, "at": (0.1, 0.2, 1 / 3)},
         "cylinder": {"radius": 0.1, "length": 1.0, "axis": (0.0, 1.0, 0.0)},
+        "capsule": {"radius": 0.1, "length": 1.0, "collides": True},
+        "plane": {"normal": (0.0, 1.0, 0.0), "extent": 5.0},
         "cone": {"radius": 0.1, "length": 1.0},
         "disk": {"radius": 0.5, "color": "tab:red"},
         "line": {"points": ((0.0, 0.0, 0.0), (1.0, 0.0, 0.1))},
