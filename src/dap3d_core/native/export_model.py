@@ -75,8 +75,10 @@ def export_model(
     if path is None:
         raise refusal(f"format {kind} needs a path", "give that of the file or folder")
     of_native |= {"parameters": parameters or (), "platforms": platforms or ()}
-    return export_native(scene, path, format=kind, fmi=fmi, strict=strict, force=force,
-                         allow_code=allow_code, registry=registry, **of_native, **settings)  # fmt: skip
+    return export_native(
+        scene, path, format=kind, fmi=fmi, strict=strict, force=force, allow_code=allow_code,
+        registry=registry, **of_native, **settings,
+    )  # fmt: skip
 
 
 def _require_format(kind: str) -> None:
