@@ -64,8 +64,11 @@ def at_face(corner, r, A, h, other, B, k):
     gap = picked(first, second, [sign[m] * x[m] - h[m] for m in range(3)])
     slack = BEYOND * larger(h[0], larger(h[1], h[2]))
     reach = slack - picked(first, second, sides)
-    return gap, reach, picked(first, second, [scale(sign[m], axes[m]) for m in range(3)]), picked(
-        first, second, apart
+    return (
+        gap,
+        reach,
+        picked(first, second, [scale(sign[m], axes[m]) for m in range(3)]),
+        picked(first, second, apart),
     )
 
 

@@ -17,7 +17,12 @@ from dap3d_core.scene import check as checked
 from dap3d_core.simulation.linearization.tangent import tangent_matrices
 
 REGISTRY = load_registry()
-FORCES = [case for case in cases(REGISTRY, "force") if case[0] != "friction"]
+#: Those that read reactions need a joint; of friction see below.
+FORCES = [
+    (keyword, values)
+    for keyword, values in cases(REGISTRY, "force")
+    if all(s.kind != "joint" for s in specs_of(REGISTRY.get("force", keyword).type).values())
+]
 JOINTS = cases(REGISTRY, "joint")
 #: Sixth-order central differences: abscissae, weights.
 STENCIL = ((1, 45 / 60), (2, -9 / 60), (3, 1 / 60))
@@ -122,6 +127,16 @@ def test_force(case):
     """The wrenches of a force have their derivatives."""
     keyword, values = case
     compare(scene_for(REGISTRY.get("force", keyword), np.random.default_rng(0), values=values))
+
+
+def test_separation_of_gears():
+    """A force on the reaction of a joint has its derivatives by poses."""
+    gear = REGISTRY.get("joint", "gear")
+    values = {"bevel": False, "internal": False, "helix": 0.2}
+    scene = scene_for(gear, np.random.default_rng(0), values=values)
+    fields = {name: scene.joints["element"].fields[name] for name in ("P_i", "P_j", "a_i")}
+    scene.add_force("gear_separation", "flanks", mesh="element", helix=0.2, **fields)
+    compare(scene)
 
 
 def has_friction(keyword, values):

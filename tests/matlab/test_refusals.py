@@ -205,6 +205,7 @@ def test_arithmetic_that_overflows_is_refused(refused, words):
     assert "not a finite real number" in found
 
 
+@pytest.mark.every(2)
 @long_in_plain_python
 @pytest.mark.parametrize(
     ("begin", "again"),

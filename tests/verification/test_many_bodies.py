@@ -122,6 +122,7 @@ def reference():
     return found.y[:15, -1].reshape(5, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("method", "integrator"),
     [

@@ -62,22 +62,21 @@ def export_model(
         OSError: the file cannot be written, or exists and ``force`` is off.
     """
     kind = format or Path("" if path is None else path).suffix.lstrip(".") or "c"
-    of_native: dict[str, Any] = {"outputs": outputs, "parameters": parameters,
-                                 "platforms": platforms}  # fmt: skip
-    settings: dict[str, Any] = {"t_end": t_end, "method": method, "integrator": integrator,
-                                "rtol": rtol, "atol": atol, "step": step}  # fmt: skip
+    chosen: dict[str, Any] = {
+        "outputs": outputs, "parameters": parameters, "platforms": platforms, "t_end": t_end,
+        "method": method, "integrator": integrator, "rtol": rtol, "atol": atol, "step": step,
+    }  # fmt: skip
+    given = {name: value for name, value in chosen.items() if value is not None}
     if kind not in NATIVE_FORMATS:
-        for name, value in (of_native | settings).items():
-            if value is not None:
-                raise refusal(f"{name} is of formats {', '.join(NATIVE_FORMATS)}, not of {kind}")
+        for name in given:
+            raise refusal(f"{name} is of formats {', '.join(NATIVE_FORMATS)}, not of {kind}")
         _require_format(kind)
         return export_text(scene, path, format=kind, strict=strict, force=force, registry=registry)
     if path is None:
         raise refusal(f"format {kind} needs a path", "give that of the file or folder")
-    of_native |= {"parameters": parameters or (), "platforms": platforms or ()}
     return export_native(
         scene, path, format=kind, fmi=fmi, strict=strict, force=force, allow_code=allow_code,
-        registry=registry, **of_native, **settings,
+        registry=registry, **given,
     )  # fmt: skip
 
 

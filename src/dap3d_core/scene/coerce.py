@@ -1,7 +1,11 @@
 """Conversion of values from scripts and files to plain Python."""
 
+from functools import cache
+from keyword import iskeyword
 from typing import Any
 from unicodedata import normalize
+
+import attrs
 
 _PLAIN = frozenset({float, int, bool, type(None)})
 
@@ -62,3 +66,14 @@ def _of_array(value: Any) -> Any:
     if type(listed) is not type(value):
         return plain(listed)
     return float(listed) if sort == "f" else listed  # long doubles are returned unchanged
+
+
+@cache
+def keys_of(class_: type) -> frozenset[str]:
+    """The keys that a table of the scene file may hold, given the class it becomes."""
+    return frozenset(a.name.rstrip("_") for a in attrs.fields(class_)) - {"name"}
+
+
+def entry_of(class_: type, name: str, fields: dict[str, Any]) -> Any:
+    """An entry of a table; a key that is a word of Python has an underscore in its class."""
+    return class_(name, **{f"{k}_" if iskeyword(k) else k: v for k, v in fields.items()})

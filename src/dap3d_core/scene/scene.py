@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.registry.arguments import checked
-from dap3d_core.scene.coerce import plain, with_identifiers
+from dap3d_core.scene.coerce import entry_of, keys_of, plain, with_identifiers
 from dap3d_core.scene.contacts.tables import ContactTables
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Mistake, MistakeList, SceneError
@@ -17,9 +17,7 @@ from dap3d_core.scene.tables import (
     AnimationPoint,
     Element,
     SceneTables,
-    entry_of,
     fault_of_name,
-    keys_of,
 )
 
 

@@ -3,8 +3,6 @@
 Values are stored as plain Python (arrays and lists become tuples); ``check`` validates them all.
 """
 
-from functools import cache
-from keyword import iskeyword
 from pathlib import Path
 from typing import Any, Self
 
@@ -136,17 +134,6 @@ class Simulation:
     alpha: Any = attrs.field(default=SETTINGS["alpha"].default, converter=plain)
     Omega: Any = attrs.field(default=SETTINGS["Omega"].default, converter=plain)
     mu: Any = attrs.field(default=SETTINGS["mu"].default, converter=plain)
-
-
-@cache
-def keys_of(class_: type) -> frozenset[str]:
-    """The keys that a table of the scene file may hold, given the class it becomes."""
-    return frozenset(a.name.rstrip("_") for a in attrs.fields(class_)) - {"name"}
-
-
-def entry_of(class_: type, name: str, fields: dict[str, Any]) -> Any:
-    """An entry of a table; a key that is a word of Python has an underscore in its class."""
-    return class_(name, **{f"{k}_" if iskeyword(k) else k: v for k, v in fields.items()})
 
 
 HEADER_KEYS = frozenset({"name", "description", "schema"})

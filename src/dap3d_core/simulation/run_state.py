@@ -109,8 +109,7 @@ class RunState:
             self.notes += [
                 information(note) for note in atol_notes(settings.atol, atol, self.evaluator)
             ]
-        self.started = self.compile_time = 0.0
-        self.rank = 0
+        self.started, self.compile_time, self.rank = 0.0, 0.0, 0
         self.estimate_error, self.limits, self.start = estimate_error, limits, start
         self.is_whole = False
         self.integrations: list[Integration] = []
@@ -121,9 +120,9 @@ class RunState:
         if self.event_locator is not None:
             check_every(self.event_locator.events, self.t_end)
         self.jumps = jumps_of(self.evaluator, self.settings)
-        self.programs = ChangeOver(self.evaluator)
         if self.event_locator is not None:
             self.event_locator.jumps = self.jumps
+        self.programs = ChangeOver(self.evaluator)
         self.control: SampledControl | None = None
         if controllers:
             self._take(controllers)

@@ -41,24 +41,23 @@ def simulate(
 
     Args:
         scene: a Scene, what ``load`` takes, or a compiled model; allow_code, announce: as there.
-        t_end, dt: final time, s (0 solves once at t = 0); reporting step, by default t_end / 100.
+        t_end, dt: final time, s (0 solves once); reporting step, by default t_end / 100.
         method: "auto", "unconstrained", "standard", "penalty", "lsq" or "joint".
         integrator: "dopri5", "dop853", "adams", "rk4" (needs ``step``), "radau" (implicit), "auto".
         rtol, atol, step: tolerances of the step's error; a fixed step, s, without error control.
-        correct, project: bring the start, and then every state, onto the constraints.
-        correct_metric: "unit" or "mass": least correction in m and rad, or weighted by masses.
+        correct, correct_metric, project: bring the start onto the constraints, by the least change
+            in m and rad ("unit") or weighted by masses ("mass"), and then every state.
         start: "scene", "equilibrium", a result (its end), (result, time) or an ``Equilibrium``.
         progress, watch: called each 0.1 s or so, as progress(t, t_end), with a ``RunProgress``.
-        events, controllers: see ``Event`` and ``Controller``.
-        contact, contact_step: "events", "stepping" or "auto"; step of the latter, s.
+        events, controllers: see ``Event``, ``Controller``.
+        contact, contact_step: "events", "stepping" or "auto"; step of stepping, s.
         output, force: file to write, ``OUTPUT.part`` meanwhile; whether over an existing one.
-        estimate_error: estimate ``result.error`` by a second, finer run; "quick": if within 1 s.
+        estimate_error: of ``result.error`` by a second, finer run; "quick": if within 1 s.
         checkpoint: seconds between checkpoints, for ``resume``; inf: one where the run is ended.
 
     Raises:
         SceneError, PluginError, ResultError: as ``compile``; unusable settings or output.
-        SimulationError (RedundantError, AssemblyError): the run stopped, or could not begin. What
-            ends it (Ctrl-C, say) has what was computed as ``.result``.
+        SimulationError (RedundantError, AssemblyError): the run stopped, with ``.result``.
     """
     compiled = compiled_for(scene, allow_code, announce, **settings)
     simulation = settings_of(compiled, start=start_word(start), **settings)

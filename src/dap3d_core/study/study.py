@@ -64,7 +64,7 @@ class Batch:
 
     @classmethod
     def empty(cls, outputs: Sequence[Output], count: int, nt: int, p: int = 0) -> "Batch":
-        """A batch of points that are still to be run; p: parameters, where there are derivatives."""
+        """A batch of points that are still to be run; p: parameters of derivatives."""
         shapes: dict[str, tuple[int, ...]] = {
             o.name: (count, nt) if o.reduction == "series" else (count,) for o in outputs
         }

@@ -21,7 +21,8 @@ from dap3d_core.cli.app import dap3d
 from dap3d_core.interface import hooks
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.scene import Simulation
-from dap3d_core.scene.tables import HEADER_KEYS, NAMED, TABLES, Animation, keys_of
+from dap3d_core.scene.coerce import keys_of
+from dap3d_core.scene.tables import HEADER_KEYS, NAMED, TABLES, Animation
 from dap3d_core.settings import INTEGRATORS, METHODS
 
 DOCS = REPOSITORY / "docs"

@@ -72,6 +72,7 @@ def compiler():
     return found
 
 
+@pytest.mark.slow
 def test_a_hundred_runs_in_eight_threads_are_clean_under_sanitizers(tmp_path, monkeypatch):
     run = dap.load_native(exported(tmp_path).path).start(0.5)
     for k in range(1, 11):

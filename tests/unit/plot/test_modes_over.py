@@ -29,6 +29,7 @@ def points_of(ax):
     return np.array(lines.get_segments()) @ np.array([1.0, 1.0j]), lines.get_array()
 
 
+@pytest.mark.slow
 def test_locus_is_a_circle_and_the_real_axis(found):
     """Pairs lie on |lambda| = 10 rad/s, both halves; behind, the product of the two is 100."""
     z, _ = points_of(dap.plot(found, "eigenvalues"))

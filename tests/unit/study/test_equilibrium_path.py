@@ -151,6 +151,7 @@ def test_pendulum_turns_at_its_largest_torque():
     assert "turns before parameters.torque = 20" in found.notes[-1]
 
 
+@pytest.mark.slow
 def test_turns_are_counted():
     """A spring of 2 N m/rad winds up by more than a turn: angle = torque / 2."""
     scene = pendulum()
@@ -171,6 +172,7 @@ def test_column_buckles():
     assert "another path crosses at parameters.P = 50" in found.notes[-1]
 
 
+@pytest.mark.slow
 def test_column_that_is_pushed_follows_one_path():
     """k theta = P L sin(theta) + F L cos(theta), without turning points and branches."""
     found = dap.equilibrium_path(column(push=0.5), "parameters.P", "0:120:4")

@@ -174,7 +174,7 @@ def _clip(
             for c in range(3):
                 polygon[left, c] = p[c]
             left += 1
-        if (a < -border and b > border or a > border and b < -border) and left < half:
+        if ((a < -border and b > border) or (a > border and b < -border)) and left < half:
             s = a / (a - b)
             for c in range(3):
                 polygon[left, c] = p[c] + s * (q[c] - p[c])

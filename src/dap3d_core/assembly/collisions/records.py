@@ -7,7 +7,7 @@ from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Columns of a record: the point halfway between both surfaces, the unit normal from shape j to
-#: shape i, the gap; and in ``which`` shapes i and j, and a number that tells points of a pair apart.
+#: shape i, the gap. In ``which``: shapes i and j, and a number that tells points of a pair apart.
 POINT, NORMAL, GAP, WIDTH = 0, 3, 6, 7
 
 

@@ -4,7 +4,7 @@ Sliding friction is linear in the normal force of its contact. So the rows are f
 solved once more for each contact that slides, by its friction of a normal force of one; what these
 forces are follows from as many equations:
 
-    N = N_0 + L N,      L_rs the normal force at r that friction of a normal force of one at s makes.
+    N = N_0 + L N,    L_rs the normal force at r by friction of a normal force of one at s.
 
 The compliance of the rows is so large that multipliers of rows that depend on each other have no
 rounding of their own: they are the least ones. Passes (lsq.py) remove what it changes. Where rows
@@ -135,7 +135,7 @@ def is_given(system: System, c: int) -> bool:
 
 @compiled
 def largest_given(system: System) -> float:
-    """The largest component of the forces that contacts are given: what is left is rounding of it."""
+    """The largest component of the forces that contacts are given: a size of multipliers."""
     found, states = 0.0, system.states
     for c in range(system.contacts.shape[0]):
         if is_given(system, c):

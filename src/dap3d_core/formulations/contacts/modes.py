@@ -92,7 +92,7 @@ def _put_modes(
     if left or any(c in sliding for c in closed):
         # of contacts that share, one at the end of its cone may only have to carry less
         inner = _inside(table, rows, closed, {}, limit)
-        if inner is not None:
+        if inner is not None and all(inner[3 * closed.index(c)] > ZERO * inner.max() for c in left):
             _put(table, rows, closed, {}, limit, found, inner)
             return
         which = rows.rows_of(closed)

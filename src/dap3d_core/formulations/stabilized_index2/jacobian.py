@@ -283,8 +283,8 @@ def bridge_bends(
 ) -> None:  # fmt: skip
     """Secants across bends into ``out``, where its slopes by a level of body b are zero.
 
-    The shortest step that sees the bend is taken: that is as long as the bend is away. A jump, which
-    every step sees, has none.
+    The shortest step that sees the bend is taken: that is as long as the bend is away. A jump,
+    which every step sees, has none.
     """
     out, kept, ahead = tangent.out, tangent.kept, tangent.ahead
     s, body = tangent.wide.body[b], system.body[b]

@@ -61,7 +61,8 @@ def make_tangent(evaluator: Evaluator) -> tuple[Tangent, Any]:
         elements += [(loop, len(loops), code, stride(group.type_info), layout.par_width, slots,
                       layout.integers, rows, count, int(_sees_velocity(kind, group)),
                       len(readings), len(read)) for code in codes]  # fmt: skip
-        loops.append(build_differentiated(write(group.type_info, kind), WIDTH))
+        if source := write(group.type_info, kind):
+            loops.append(build_differentiated(source, WIDTH))
         at += [layout.integers - 1 if layout.states else -1 for _ in codes]
         for q, bodies in enumerate(group.bodies.tolist()):
             for joints in read:

@@ -79,7 +79,8 @@ class ContactFinder:
     def _of_shapes(self, u: Floats, margin: Floats) -> ContactSet:
         if self._finder is None or self.shapes is None:
             none = np.zeros((0, 2), dtype=np.int64)
-            return ContactSet(none, none[:, 0], np.zeros((0, 3, 12)), *np.zeros((3, 0)),
+            zero = np.zeros(0)
+            return ContactSet(none, none[:, 0], np.zeros((0, 3, 12)), zero, zero, zero,
                               none, np.zeros((0, 3)))  # fmt: skip
         r, p, _, _ = split(u)
         touches, shapes = self._finder.find(r, p, margin), self.shapes

@@ -11,15 +11,15 @@ from dap3d_core.kernels.runtime.cache import compiled
 
 @compiled
 def sweep_bodies(
-    bodies: Integers, J: Floats, MJ: Floats, W: Floats, bias: Floats, mu: Floats,
+    bodies: Integers, J: Floats, moved: Floats, own: Floats, bias: Floats, mu: Floats,
     x: Floats, v: Floats, sweeps: int, tolerance: float,
 ) -> int:  # fmt: skip
     """Sweep until no impulse changes by more than a part of the largest; sweeps done.
 
     Args:
         bodies: (m, 2) i and j, ground 0.
-        J, MJ: (m, 36) rows normal, tangents, each of bodies i and j; the same times M^-1.
-        W: (m, 9) J MJ^T of each contact.
+        J, moved: (m, 36) rows normal, tangents, each of bodies i and j; the same times M^-1.
+        own: (m, 9) J moved^T of each contact.
         bias: (m,) m/s, added to the normal velocity.
         mu: (m,).
         x: (m, 3) impulses, N s, changed in place.
@@ -29,13 +29,13 @@ def sweep_bodies(
         change, largest = 0.0, 1e-300
         for c in range(mu.size):
             i, j = bodies[c, 0], bodies[c, 1]
-            a, b, rows, moves = v[i], v[j], J[c], MJ[c]
+            a, b, rows, moves = v[i], v[j], J[c], moved[c]
             u0, u1, u2 = bias[c], 0.0, 0.0
             for k in range(6):
                 u0 += rows[k] * a[k] + rows[6 + k] * b[k]
                 u1 += rows[12 + k] * a[k] + rows[18 + k] * b[k]
                 u2 += rows[24 + k] * a[k] + rows[30 + k] * b[k]
-            d0, d1, d2 = change_of(W[c], mu[c], x[c], u0, u1, u2)
+            d0, d1, d2 = change_of(own[c], mu[c], x[c], u0, u1, u2)
             for k in range(6):
                 a[k] += moves[k] * d0 + moves[12 + k] * d1 + moves[24 + k] * d2
                 b[k] += moves[6 + k] * d0 + moves[18 + k] * d1 + moves[30 + k] * d2
@@ -48,16 +48,16 @@ def sweep_bodies(
 
 @compiled
 def change_of(
-    W: Floats, mu: float, x: Floats, u0: float, u1: float, u2: float
+    own: Floats, mu: float, x: Floats, u0: float, u1: float, u2: float
 ) -> tuple[float, float, float]:
     """Bring the impulse of one contact into its cone, given its velocities; what it changes by."""
     old, p, q = x[0], x[1], x[2]
-    x[0] = max(0.0, old - u0 / W[0])
+    x[0] = max(0.0, old - u0 / own[0])
     d0 = x[0] - old
     if mu > 0.0:
-        a, b, o = W[4], W[8], W[5]
+        a, b, o = own[4], own[8], own[5]
         big = 0.5 * (a + b) + math.sqrt(0.25 * (a - b) * (a - b) + o * o)
-        y, z = p - (u1 + W[3] * d0) / big, q - (u2 + W[6] * d0) / big
+        y, z = p - (u1 + own[3] * d0) / big, q - (u2 + own[6] * d0) / big
         rim, far = mu * x[0], math.sqrt(y * y + z * z)
         if far > rim:
             y, z = y * rim / far, z * rim / far

@@ -10,14 +10,17 @@ of before where a gap closes at speed, else max(gap, 0) / h. Positions follow by
 rule, second order, or by v+ for bodies that collide; then what overlaps is moved apart.
 """
 
-from typing import Any
+# What a compiled function returns is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any, ClassVar
 
 import attrs
 import numpy as np
 
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.moreau.contact_set import ContactFinder, ContactSet
-from dap3d_core.integrators.moreau.problem import Problem
+from dap3d_core.integrators.moreau.problem import NEAR, Problem
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import (
     NOT_FINITE,
@@ -48,7 +51,7 @@ KEPT = 12
 class MoreauState(IntegrationState):
     """State of an integration by time stepping."""
 
-    types = {**IntegrationState.types, "memory": MATRIX}
+    types: ClassVar[dict[str, Any]] = {**IntegrationState.types, "memory": MATRIX}
 
     memory: Floats  # (room, 4) key of a contact, or -1, and its impulse, N s, global axes
 
@@ -185,10 +188,8 @@ class MoreauIntegration(Integration):
         model, A = self._evaluator.model, rotation(split(u)[1])
         inverse, masses = np.zeros((2, len(A) + 1, 6, 6))
         turned = A.transpose(0, 2, 1)
-        for found, mass, Jp in (
-            (inverse, 1.0 / model.mass, self._inverse),
-            (masses, model.mass, model.Jp),
-        ):
+        both = (inverse, 1.0 / model.mass, self._inverse), (masses, model.mass, model.Jp)
+        for found, mass, Jp in both:
             found[1:, [0, 1, 2], [0, 1, 2]] = mass[:, None]
             found[1:, 3:, 3:] = A @ Jp @ turned
         own = model.joint_row_count
@@ -248,7 +249,7 @@ class MoreauIntegration(Integration):
                 break
             problem = self._problem(t, u, contacts)
             none, zero = np.zeros((len(r) + 1, 6)), np.zeros(len(contacts.gap))
-            moves = problem.solve(none, contacts.gap, zero, np.zeros((len(zero), 3)), 1e-6)
+            moves = problem.solve(none, contacts.gap, zero, np.zeros((len(zero), 3)), NEAR)
             _move(r, p, moves[1:])
         self.deepest = max(self.deepest, deepest)
 

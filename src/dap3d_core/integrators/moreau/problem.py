@@ -16,7 +16,7 @@ NEAR, SWEEPS = 1e-4, 200
 #: Sweeps at most, where Newton's method does not end.
 MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
-FEW, ROUNDING = 100, 1e-14
+FEW, RESIDUAL_ROUNDING = 100, 1e-14
 
 
 class Problem:
@@ -38,9 +38,9 @@ class Problem:
         self._bodies = np.ascontiguousarray(contacts.bodies)
         i, j = self._bodies.T
         J = contacts.J
-        MJ = np.concatenate([J[:, :, :6] @ inverse[i], J[:, :, 6:] @ inverse[j]], axis=2)
-        self._J, self._MJ = (np.ascontiguousarray(x.reshape(-1, 36)) for x in (J, MJ))
-        self._W = np.ascontiguousarray((MJ @ J.transpose(0, 2, 1)).reshape(-1, 9))
+        moved = np.concatenate([J[:, :, :6] @ inverse[i], J[:, :, 6:] @ inverse[j]], axis=2)
+        self._J, self._MJ = (np.ascontiguousarray(x.reshape(-1, 36)) for x in (J, moved))
+        self._W = np.ascontiguousarray((moved @ J.transpose(0, 2, 1)).reshape(-1, 9))
         diagonal = self._W[:, ::4].max(axis=1)
         self._r = 1.0 / np.maximum(diagonal, TINY)
         self.x: Floats = np.zeros((len(J), 3))
@@ -80,12 +80,12 @@ class Problem:
         """
         self._free, self._bias, self._mu = v, bias, mu
         self.x = start.copy()
-        few, goal = len(mu) <= FEW, tolerance
+        few = len(mu) <= FEW
         if few or len(self.y):
-            self._refine(np.arange(len(mu)), ROUNDING if few else tolerance)
+            self._refine(np.arange(len(mu)), RESIDUAL_ROUNDING if few else tolerance)
             if self._judge() <= tolerance or len(self.y):
                 return v + self.change()
-        if self._judge() > goal:
+        if self._judge() > tolerance:
             self._sweep(SWEEPS, max(tolerance, NEAR))
             self._finish(tolerance)
         return v + self.change()
@@ -112,8 +112,9 @@ class Problem:
         """Newton's method on groups that are not solved; more sweeps where it does not end."""
         done = SWEEPS
         while self._judge() > tolerance:
-            for group in self._groups(tolerance):
-                self._refine(group, tolerance)
+            if tolerance < NEAR:
+                for group in self._groups(tolerance):
+                    self._refine(group, tolerance)
             if self._judge() <= tolerance or done >= MOST_SWEEPS:
                 return
             self._sweep(done, tolerance)

@@ -96,9 +96,7 @@ def advance(
             tangent.bends[0] = 0.0
             start(work, rhs, project, system, loops)
         else:
-            step(
-                work, parts, tangents, (project, accepted, watch), system, loops, tangent, matrix
-            )
+            step(work, parts, tangents, (project, accepted, watch), system, loops, tangent, matrix)
             h = work.factored_step
             if work.rounding_state != 0 and h > 0.0 and can_measure(work, rejected):
                 measure = parts[4]

@@ -14,6 +14,8 @@ OPTIONAL = ("reach",)
 MATERIAL = ("mu", "mu_s", "e", "law")
 #: Values of ``law``.
 LAWS = ("poisson", "newton")
+#: Initial mode of a contact that touches as the scene is assembled.
+TOUCHES = 1.0
 _ZERO = (0.0, 0.0, 0.0)
 #: Fields that a run knows best: which point it is, and the initial values of its states.
 HIDDEN: dict[str, Any] = {
@@ -81,6 +83,7 @@ def _add_material(class_: type) -> None:
         "mu_s": number(None, minimum=0.0, doc="the same of sticking; mu where it is left out"),
         "e": number(0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution"),
         "law": choice(LAWS, "poisson", doc="of impacts: whose coefficient e is"),
+        "touch": choice((False, True), False, doc="the bodies are moved until they touch at t = 0"),
     }
     fields |= {name: hidden(value) for name, value in HIDDEN.items()}
     own = dict(vars(class_).get("__annotations__", {}))

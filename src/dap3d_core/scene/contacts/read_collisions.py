@@ -36,7 +36,7 @@ def read_collisions(
         report: takes the mistakes; its scene is read.
         shapes: of the scene.
         index: name of a body -> its index, ground 0.
-        joints: bodies of one joint do not meet.
+        joints: bodies of one joint do not meet, but ground.
     """
     given = report.scene.collisions or Collisions()
     chosen = _bodies(report, given.bodies, index)
@@ -46,7 +46,8 @@ def read_collisions(
         if report.scene.collisions is not None:
             report.note(f"collisions: {what}")
         return None
-    apart = {pair for joint in joints for pair in combinations(sorted(set(joint.bodies)), 2)}
+    jointed = [sorted({*joint.bodies} - {0}) for joint in joints]
+    apart = {pair for bodies in jointed for pair in combinations(bodies, 2)}
     apart |= _excluded(report, given.exclude, index)
     kind = np.array([KINDS[s.type] for s in meeting])
     body = np.array([s.body for s in meeting])
@@ -67,8 +68,10 @@ def _bodies(report: Collector, names: Any, index: Mapping[str, int]) -> set[int]
     if not isinstance(names, tuple):
         report.add(("collisions", "bodies"), names, 'should be "all" or a list of names of bodies')
         return set()
-    return {i for k, name in enumerate(names)
-            if (i := _body(report, ("collisions", "bodies", k), name, index)) is not None}  # fmt: skip
+    found = (
+        _body(report, ("collisions", "bodies", k), name, index) for k, name in enumerate(names)
+    )
+    return {i for i in found if i is not None}
 
 
 def _body(report: Collector, key: Key, name: Any, index: Mapping[str, int]) -> int | None:
@@ -114,7 +117,7 @@ def _materials(
 
 
 def _pair(report: Collector, a: Material, b: Material) -> list[float]:
-    """mu and e of a pair of materials: as declared, or else their geometric means."""
+    """Mu and e of a pair of materials: as declared, or else their geometric means."""
     declared: dict[str, Any] = {}
     for one, other in ((a, b), (b, a)):
         tables, key = one.with_ or {}, ("materials", one.name, "with")
@@ -163,4 +166,5 @@ def _turned_to(axis: Any) -> Floats:
     """Euler parameters that turn z to the direction of a vector."""
     x, y, z = np.array(axis) / np.linalg.norm(axis)
     p = np.array([1.0 + z, -y, x, 0.0] if z > -0.5 else [-y, 1.0 - z, 0.0, x])
-    return p / np.linalg.norm(p)
+    found: Floats = p / np.linalg.norm(p)
+    return found

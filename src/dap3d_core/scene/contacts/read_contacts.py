@@ -5,7 +5,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.contacts.contact import HIDDEN, MATERIAL
+from dap3d_core.interface.contacts.contact import HIDDEN, MATERIAL, TOUCHES
 from dap3d_core.scene.errors import MISSING
 from dap3d_core.scene.tables import Element
 from dap3d_core.scene.validate.elements import read_elements
@@ -27,9 +27,15 @@ def read_contacts(
     found = []
     for one in read_elements(report, geometry, "contacts", types, functions, elements):
         count: int = one.type_info.type.points  # type: ignore[attr-defined]
+        if one.values["touch"] and count > 1:
+            what = f"cannot be: a {one.type_info.type.keyword} may touch at {count} points"
+            remedy = "place its bodies so that they touch, or add a contact of the point that does"
+            report.add(("contacts", one.name, "touch"), True, what, remedy=remedy)
         for k in range(count):
             name = one.name if count == 1 else f"{one.name}#{k + 1}"
             values = one.values | HIDDEN | {"part": float(k)}
+            if values["touch"]:
+                values["mode_0"] = TOUCHES  # its gap is a row as the scene is assembled
             if values["mu_s"] is not None and values["mu_s"] < values["mu"]:
                 what = f"is less than mu = {values['mu']:g}; what slides would stick more than rest"
                 report.add(("contacts", one.name, "mu_s"), values["mu_s"], what)

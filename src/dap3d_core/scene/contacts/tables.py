@@ -33,7 +33,8 @@ class Collisions:
 
     Attributes:
         bodies: "all", or names of bodies, ``ground`` among them.
-        exclude: pairs of names of bodies that do not meet; bodies of one joint never do.
+        exclude: pairs of names of bodies that do not meet; bodies of one joint
+            never do, but ground.
         material: of shapes that name none.
     """
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.suggestions import nearest
-from dap3d_core.scene.coerce import canonical, plain, with_identifiers
+from dap3d_core.scene.coerce import canonical, entry_of, keys_of, plain, with_identifiers
 from dap3d_core.scene.contacts.tables import Collisions
 from dap3d_core.scene.errors import MISSING, Key, MistakeList, SceneError, dotted, file_error
 from dap3d_core.scene.files.text_file import read_text, unreadable
@@ -23,8 +23,6 @@ from dap3d_core.scene.tables import (
     AnimationPoint,
     Element,
     Simulation,
-    entry_of,
-    keys_of,
 )
 
 #: Keys of a table [include.NAME].

@@ -22,11 +22,13 @@ from dap3d_core.simulation.equilibrium.states_at_rest import (
     unsettled_part,
 )
 from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
-from dap3d_core.simulation.errors import AssemblyError, SimulationError, refuse_contacts
+from dap3d_core.simulation.errors import AssemblyError, SimulationError
 from dap3d_core.simulation.initial.start_state import StartState
 
 #: Singular values of the Jacobian below this part are left out of the least multipliers.
 RCOND = 1e-10
+#: Gap, m of a scene of ordinary size, below which bodies touch.
+TOUCHING = 1e-8
 #: Names that a note lists.
 MOST_NAMES = 6
 #: Bodies that move this part of the largest motion, or more, are named.
@@ -77,14 +79,17 @@ def find_rest(
     Raises:
         SimulationError: there is none, or none was found; names what gives way.
     """
-    refuse_contacts(evaluator.model, "the search for an equilibrium")
     evaluator.start(0.0, u, angles, states)
+    if evaluator.model.contact_count:
+        _hold_contacts(evaluator, u, "at the start of the search for an equilibrium")
     search = search_equilibrium(evaluator, u)
     if evaluator.model.state_count:
         search = _with_states(evaluator, search)
     if search.outcome is not Outcome.BALANCED:
         raise SimulationError(failure(search, evaluator.model))
     statics, pose = Statics(evaluator), search.pose
+    if evaluator.model.contact_count:
+        _hold_contacts(evaluator, pose.u, "no equilibrium: where the forces balance")
     stability = stability_of(statics, pose)
     rows = evaluator.rows(0.0, pose.u)
     multipliers, unbalanced = least_multipliers(statics, pose.u)
@@ -98,6 +103,38 @@ def find_rest(
         stability,
         (*findings(search, stability, evaluator.model), *assumptions(evaluator, u, rows)),
     )
+
+
+def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
+    """Let what touches at a pose of u (13 n,) hold, as far as friction does: the cone problem.
+
+    Raises:
+        SimulationError: bodies overlap, or a contact slips.
+    """
+    from dap3d_core.formulations.contacts.contact_rows import GAP, ContactRows, ContactTable
+    from dap3d_core.formulations.contacts.modes import JamError, find_modes
+
+    table, still = ContactTable(evaluator), u.copy()
+    velocities_of(still)[:] = 0.0
+    gaps, limit = table.outputs(0.0, still)[:, GAP], TOUCHING * evaluator.model.length
+    touching, slips = np.flatnonzero(gaps < limit).tolist(), "jams"
+    try:
+        found = find_modes(table, ContactRows(table, 0.0, still), touching, {}, [])
+        bad = [table.names[k] for k in np.flatnonzero((found.mode == 1.0) & (table.mu > 0.0))]
+        slips = "slips"
+    except JamError as error:
+        bad = [str(error)]
+    if over := [table.names[k] for k in np.flatnonzero(gaps < -limit)]:
+        bad, slips = over, "overlaps"
+    if bad:
+        raise SimulationError(
+            f"{where} contact {some(bad, MOST_NAMES)} {slips}. Contacts rest where friction holds "
+            "them from the start on: take a start that rests, such as the end of a damped run "
+            "(start=result)"
+        )
+    states = evaluator.states.copy()
+    states[table.mode], states[table.way.ravel()], states[table.near.ravel()] = found.mode, 0.0, 0.0
+    evaluator.states = states
 
 
 def least_multipliers(statics: Statics, u: Floats) -> tuple[Floats, Floats]:

@@ -109,8 +109,9 @@ class ContactJumps(Jumps):
         mistakes = [
             Mistake(
                 f"contacts.{name}", MISSING, f"its bodies overlap by {-gap:.6g} m at the start",
-                remedy=f"move them apart by that along the normal (a gap of up to "
-                f"{TOUCHING_AT_START * length:g} m counts as touching)",
+                remedy="move them apart by that along the normal, or have them moved until they "
+                f"touch (touch = true); a gap of up to {TOUCHING_AT_START * length:g} m counts as "
+                "touching",
             )
             for name, gap in zip(self.table.names, gaps, strict=True)
             if gap < -TOUCHING_AT_START * length
@@ -138,9 +139,10 @@ class ContactJumps(Jumps):
         """Decide what another decided at its last instant, at states nearby.
 
         Raises:
-            SimulationError: contacts that share what they carry slide, each with a force of its own.
+            SimulationError: contacts that share what they carry slide.
         """
-        assert isinstance(other, ContactJumps) and other.decided is not None
+        assert isinstance(other, ContactJumps)
+        assert other.decided is not None
         modes = other.decided.modes
         shares = [
             name for name, mode, near in zip(self.table.names, modes.mode, modes.near, strict=True)

@@ -115,8 +115,7 @@ def operating_point(
     with compiled.borrow_evaluator() as evaluator:
         u, turns, states = _state(compiled, at, t, notes)
         evaluator.start(t, u, turns, states)
-        if model.contact_count:
-            _refuse_unknown_modes(evaluator, t, u, states)
+        _refuse_unknown_modes(evaluator, t, u, states)
         _check(evaluator, t, u)
         redundancy = redundancy_of(evaluator, u, t)
         if redundancy.singular is not None:
@@ -168,7 +167,7 @@ def operating_point(
 
 def _refuse_unknown_modes(evaluator: Evaluator, t: float, u: Floats, states: Floats | None) -> None:
     """Refuses a state at which bodies touch, in modes that are not known."""
-    if states is not None:
+    if states is not None or not evaluator.model.contact_count:
         return
     from dap3d_core.formulations.contacts.contact_rows import GAP, ContactTable
 
@@ -177,7 +176,7 @@ def _refuse_unknown_modes(evaluator: Evaluator, t: float, u: Floats, states: Flo
     k = int(np.argmin(gaps))
     if gaps[k] < AT_SWITCH * evaluator.model.length:
         raise SimulationError(
-            f"linearisation of a scene with contacts that touch ({table.names[k]}) takes their modes "
+            f"linearisation of a scene with contacts that touch ({table.names[k]}) takes modes "
             "from a run: linearize(scene, at=result, t=...)"
         )
 

@@ -119,7 +119,6 @@ class DifferentiatedRun(Run):
 
     def _jumping(self, change: Callable[..., None]) -> Callable[[Integration], None]:
         """A jump of velocities, whose derivatives are those of the law that Python solves."""
-
         of = self.jumps
         assert of is not None
 

@@ -1,20 +1,22 @@
 """An objective as a function of JAX, with its gradient."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 
-if TYPE_CHECKING:
-    from dap3d_core.study.sensitivities.objective import Objective
 
-
-def in_jax(objective: "Objective") -> Callable[[Any], Any]:
+def in_jax(
+    objective: Callable[[Floats], float], both: Callable[[Floats], tuple[float, Floats]]
+) -> Callable[[Any], Any]:
     """A function of an array (p,) that JAX differentiates once, and calls in traced code.
 
     Runs are calls of the host; those of ``jax.vmap`` follow one another.
+
+    Args:
+        objective, both: the value; value and gradient.
 
     Raises:
         ImportError: JAX is not installed.
@@ -28,7 +30,7 @@ def in_jax(objective: "Objective") -> Callable[[Any], Any]:
         return np.asarray(objective(np.asarray(x, dtype=float)), dtype=x.dtype)
 
     def both_at(x: Any) -> tuple[Floats, Floats]:
-        value, gradient = objective.value_and_gradient(np.asarray(x, dtype=float))
+        value, gradient = both(np.asarray(x, dtype=float))
         return np.asarray(value, dtype=x.dtype), gradient.astype(x.dtype)
 
     def number(x: Any) -> Any:

@@ -1,14 +1,18 @@
 """An objective as a function of PyTorch, with its gradient."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from dap3d_core.study.sensitivities.objective import Objective
+from dap3d_core.kernels.array_types import Floats
 
 
-def in_torch(objective: "Objective") -> Callable[[Any], Any]:
+def in_torch(
+    objective: Callable[[Floats], float], both: Callable[[Floats], tuple[float, Floats]]
+) -> Callable[[Any], Any]:
     """A function of a tensor (p,) that PyTorch differentiates once.
+
+    Args:
+        objective, both: the value; value and gradient.
 
     Raises:
         ImportError: PyTorch is not installed.
@@ -18,7 +22,7 @@ def in_torch(objective: "Objective") -> Callable[[Any], Any]:
     except ImportError as error:
         raise ImportError("to_torch needs PyTorch: pip install 'dap3d[torch]'") from error
 
-    class Run(torch.autograd.Function):  # type: ignore[misc, name-defined]
+    class Run(torch.autograd.Function):  # type: ignore[misc]
         """A run; its gradient is computed with it, where it will be asked for."""
 
         @staticmethod
@@ -26,7 +30,7 @@ def in_torch(objective: "Objective") -> Callable[[Any], Any]:
             point = x.detach().cpu().double().numpy()
             if not x.requires_grad:
                 return x.new_tensor(objective(point))
-            value, gradient = objective.value_and_gradient(point)
+            value, gradient = both(point)
             ctx.save_for_backward(x.new_tensor(gradient))
             return x.new_tensor(value)
 

@@ -106,7 +106,7 @@ class Objective:
         """
         from dap3d_core.study.sensitivities.in_jax import in_jax
 
-        return in_jax(self)
+        return in_jax(self, self.value_and_gradient)
 
     def to_torch(self) -> Callable[[Any], Any]:
         """A function of PyTorch, of a tensor (p,), with its gradient (extra ``torch``).
@@ -116,7 +116,7 @@ class Objective:
         """
         from dap3d_core.study.sensitivities.in_torch import in_torch
 
-        return in_torch(self)
+        return in_torch(self, self.value_and_gradient)
 
     def _of(self, result: Result) -> Any:
         return self._number(result.quantity(self._quantity).values, result.t)

@@ -51,8 +51,6 @@ def sweep(
 ) -> "xarray.Dataset":
     """Run a scene at many points, combinations of values of its parameters (docs/how-to/sweeps.md).
 
-    Outputs are those of ``simulate`` of the changed scene; details in docs/concepts/studies.md.
-
     Args:
         scene: a Scene, or what ``load`` takes.
         vary: name of a parameter (``bodies.crank.mass``) -> how it varies: a list or an array of

@@ -197,6 +197,7 @@ def hinged_spring(theta_0=0.0):
     return scene
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_turns_knots_and_events_are_those_of_standard():
     """A spring over more than a turn, a knot of its law, a quantity that passes a level."""

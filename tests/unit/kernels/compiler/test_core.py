@@ -106,7 +106,7 @@ NOT_CALLED = {
         "integrators.stepping.rounding": "measure_noise",
         "assembly.turns": "measure_all follow_poses",
         "formulations.regularised": "least_multipliers take_seen",
-        "formulations.stabilized_index2.jacobian": "find_smooth_side",
+        "formulations.stabilized_index2.jacobian": "bridge_bends move sizes_of",
         "integrators.stepping.output": "report_end",
         "integrators.runge_kutta.step": "is_rounding",
         "integrators.stepping.event_location": "cut_step",

@@ -106,6 +106,7 @@ def test_what_was_read_back_is_checked_alike(scene):
     assert answer(scene) == answer(scene_of(tomllib.loads(scene.to_toml())))
 
 
+@pytest.mark.slow
 @settings(deadline=None)
 @given(scenes(good=False))
 def test_every_key_of_a_written_scene_has_its_line(scene):

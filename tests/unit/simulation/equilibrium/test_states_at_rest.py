@@ -95,6 +95,7 @@ def test_bristles_at_rest_stay_bent():
     assert eq.r[0, 0] == pytest.approx(1e4 * 1e-4 / 100.0, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_a_state_that_never_rests_is_refused():
     """By its name."""
     with pytest.raises(dap.SimulationError, match=r"the rate of servo\.z vanishes neither"):

@@ -34,7 +34,6 @@ def test_bodies_that_overlap_are_refused_with_depth_and_remedy():
 @pytest.mark.parametrize(
     ("what", "call"),
     [
-        ("equilibrium", dap.equilibrium),
         ("linearisation", lambda s: dap.linearize(touching(s))),
         ("kinematics", lambda s: dap.kinematics(s, t_end=1.0)),
         ("method joint", lambda s: dap.simulate(s, method="joint")),

@@ -130,6 +130,7 @@ def test_contradictory_joints_are_named_with_their_residuals():
     assert caught.value.result is None
 
 
+@pytest.mark.slow
 def test_a_long_list_of_open_joints_is_cut():
     """Twelve bodies torn apart by two joints each: ten joints in the table, the other fourteen as a
     count; names of any length, and no line beyond 80 columns."""

@@ -141,6 +141,7 @@ def test_forces_that_no_actuator_produces_are_told(scene, motion):
     assert any("cannot produce" in note and "crank turns" in note for note in result.notes)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_turns_of_an_angle_are_counted(scene, motion):
     """A spring wound up over whole turns acts with them."""

@@ -100,6 +100,7 @@ def test_over_a_coordinate_time_is_the_coordinate():
     assert np.allclose(result.u, other.u, atol=1e-13)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_rows_of_the_velocity_level_are_integrated_to_rounding():
     """fourbar2 has a rate driver: after a turn both bodies are back."""

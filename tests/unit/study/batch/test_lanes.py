@@ -264,6 +264,7 @@ def test_turns_are_counted_in_steps_near_singular_poses():
     check(lambda: Ensemble(of.requested), np.linspace(0.2, 1.0, 9)[:, None])
 
 
+@pytest.mark.slow
 def test_a_start_that_fails_beside_one_that_does_not_leaves_it_its_numbers():
     """The first lane alone has a run; the frame of the others is too long for their rods."""
     scene = four_bar()

@@ -142,6 +142,7 @@ def test_free_fall_is_linear_least_squares(sigma):
         assert "chi-square" in str(fit)
 
 
+@pytest.mark.slow
 @compiled
 def test_stiffness_and_mass_of_an_oscillator_cannot_be_told_apart():
     """Its motion depends on k/m alone: a note says so; neither has an interval."""
@@ -169,6 +170,7 @@ def test_stiffness_and_mass_of_an_oscillator_cannot_be_told_apart():
     assert low < K < high
 
 
+@pytest.mark.slow
 @compiled
 def test_what_is_determined_keeps_its_interval_beside_what_is_not():
     """The free length is known whether or not k and m can be told apart; inertia is idle."""
@@ -188,6 +190,7 @@ def test_what_is_determined_keeps_its_interval_beside_what_is_not():
     assert np.isnan(fit.correlation[0, 1])
 
 
+@pytest.mark.slow
 @compiled
 def test_bounds_are_kept_and_noted():
     """The truth lies beyond a bound: the fit stands there and says so, others have intervals."""
@@ -207,6 +210,7 @@ def test_bounds_are_kept_and_noted():
     assert 0.0 <= undamped.values["forces.spring.c"] < 1e-7
 
 
+@pytest.mark.slow
 @compiled
 def test_a_fit_that_explains_little_says_so():
     """From a frequency that is too high by a third the search ends in another valley."""

@@ -71,6 +71,7 @@ def test_values_of_many_kinds_of_scenes(scene, by):
         assert np.all(np.isfinite(s.of(f"{body}.r")))
 
 
+@pytest.mark.slow
 def test_more_directions_than_lanes():
     """Blocks of runs; each direction is what it is alone."""
     by = [f"bodies.{body}.{field}" for body in ("rod", "cylinder")

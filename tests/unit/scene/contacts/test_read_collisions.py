@@ -1,0 +1,75 @@
+"""[collisions], shapes that collide, and materials of pairs: what is read, what is refused."""
+
+import pytest
+
+import dap3d_core as dap
+from dap3d_core.scene import check
+
+
+def two_boxes():
+    """Two boxes above a floor, of rubber and steel."""
+    scene = dap.Scene(name="two boxes")
+    scene.add_material("rubber", mu=0.8, e=0.5, with_={"steel": {"mu": 0.6}})
+    scene.add_material("steel", mu=0.2)
+    for name, material in (("a", "rubber"), ("b", "steel")):
+        scene.add_body(name, mass=1.0, Jp=[1.0, 1.0, 1.0])
+        scene.add_shape("box", name, body=name, size=[1.0, 1.0, 1.0], collides=True,
+                        material=material)  # fmt: skip
+    scene.add_shape("plane", "floor", body="ground", collides=True)
+    scene.add_force("weight", "gravity")
+    return scene
+
+
+def read(scene):
+    return check(scene, dap.load_registry()).collisions
+
+
+def test_pairs_have_declared_coefficients_or_geometric_means():
+    scene = two_boxes()
+    scene.add_collisions(material="steel")
+    found = read(scene)
+    assert found.names == ("a", "b", "floor")
+    assert found.mu.ravel() == pytest.approx([0.8, 0.6, 0.6, 0.2])
+    assert found.e[0, 0] == 0.5
+    assert found.e[0, 1] == 0.0  # steel has none
+    assert list(found.material) == [0, 1, 1]
+
+
+def test_bodies_of_joints_and_excluded_ones_do_not_meet():
+    scene = two_boxes()
+    assert list(read(scene).apart) == []
+    scene.add_joint("sph", P_i="a.O", P_j="b.O")
+    scene.add_joint("sph", P_i="a.O", P_j="ground.O")
+    scene.add_collisions(exclude=[["b", "ground"]])
+    assert list(read(scene).apart) == [2, 5]  # (0, 2) and (1, 2) of three bodies
+
+
+def test_a_scene_file_says_the_same(tmp_path):
+    scene = two_boxes()
+    scene.add_collisions(bodies=["a", "ground"], material="rubber")
+    path = scene.save(tmp_path / "scene.toml")
+    assert "[collisions]" in path.read_text()
+    again = dap.load(path)
+    assert again.collisions == scene.collisions
+    assert again.materials == scene.materials
+    assert read(again).names == ("a", "floor")
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "words"),
+    [
+        (lambda s: s.add_collisions(bodies=["c"]), "collisions.bodies", "there is no body 'c'"),
+        (lambda s: s.add_collisions(exclude=["a"]), "collisions.exclude", "pairs of bodies"),
+        (lambda s: s.add_collisions(material="wood"), "collisions.material", "no material 'wood'"),
+        (lambda s: s.add_shape("cylinder", "c", body="b", radius=1.0, length=1.0, collides=True),
+         "shapes.c", "a cylinder may meet spheres and planes"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused_with_its_key(change, key, words):
+    scene = two_boxes()
+    change(scene)
+    with pytest.raises(dap.SceneError) as error:
+        read(scene)
+    mistake = error.value.mistakes[0]
+    assert mistake.key.startswith(key)
+    assert words in str(mistake)

@@ -1,0 +1,87 @@
+"""Equilibria with friction against closed forms: cones of friction, rolling down a bowl."""
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+
+G = 9.81
+
+
+def block(mu, angle=0.4):
+    """A block on four corners, on a slope."""
+    c, s, h = np.cos(angle), np.sin(angle), 0.05
+    scene = dap.Scene(name="slope")
+    scene.add_vector("n", "ground", [-s, 0.0, c])
+    p = [np.cos(angle / 2.0), 0.0, -np.sin(angle / 2.0), 0.0]
+    scene.add_body("box", mass=1.0, Jp=[0.002, 0.003, 0.004], r=[-s * h, 0.0, c * h], p=p)
+    scene.add_force("weight", "g")
+    size = [0.3, 0.2, 2.0 * h]
+    scene.add_contact("box_plane", "floor", P_i="box.O", size=size, a_j="n", mu=mu)
+    return scene
+
+
+def test_a_block_rests_on_a_slope_within_its_cone():
+    found = dap.equilibrium(block(np.tan(0.4) / 0.999))
+    normals = found.Lam[::3]
+    assert normals.sum() == pytest.approx(G * np.cos(0.4), rel=1e-12)
+    assert found.stable
+    assert found.residual < 1e-12
+    run = dap.simulate(block(np.tan(0.4) / 0.999), start=found, t_end=1.0, dt=0.5)
+    assert np.max(np.abs(run.r - run.r[0])) < 1e-14
+
+
+def test_a_block_beyond_its_cone_slips_by_name():
+    with pytest.raises(dap.SimulationError, match=r"floor#1.*slips"):
+        dap.equilibrium(block(np.tan(0.4) / 1.001))
+
+
+def ladder(angle, mu):
+    """A ladder on a rough floor, at a smooth wall."""
+    J = 1.0
+    scene = dap.Scene(name="ladder")
+    p = [np.cos(angle / 2.0), 0.0, np.sin(angle / 2.0), 0.0]
+    scene.add_body("ladder", mass=3.0, Jp=[0.01, J, J], p=p,
+                   r=[np.cos(angle), 0.0, np.sin(angle)])  # fmt: skip
+    scene.add_point("foot", "ladder", [1.0, 0.0, 0.0])
+    scene.add_point("top", "ladder", [-1.0, 0.0, 0.0])
+    scene.add_force("weight", "g")
+    scene.add_contact("ball_plane", "floor", P_i="foot", mu=mu)
+    scene.add_contact("ball_plane", "wall", P_i="top", a_j="ground.x")
+    return scene
+
+
+def test_a_ladder_rests_where_its_tangent_exceeds_half_the_inverse_of_friction():
+    mu = 0.4
+    limit = np.arctan(0.5 / mu)
+    found = dap.equilibrium(ladder(limit * 1.001, mu))
+    push = 3.0 * G / (2.0 * np.tan(limit * 1.001))
+    assert found.Lam[[0, 3]] == pytest.approx([3.0 * G, push], rel=1e-12)
+    assert np.linalg.norm(found.Lam[1:3]) == pytest.approx(push, rel=1e-12)
+    with pytest.raises(dap.SimulationError, match="floor slips"):
+        dap.equilibrium(ladder(limit * 0.999, mu))
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.5])
+def test_a_ball_comes_to_rest_at_the_bottom_of_a_bowl(mu):
+    big, small, angle = 1.0, 0.1, 0.3
+    scene = dap.Scene(name="bowl")
+    r = [(big - small) * np.sin(angle), 0.0, (small - big) * np.cos(angle)]
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=r)
+    scene.add_force("weight", "g")
+    ends = {"P_i": "ball.O", "P_j": "ground.O", "radius_i": small, "radius_j": big}
+    scene.add_contact("ball_ball", "bowl", **ends, inside=True, mu=mu)
+    found = dap.equilibrium(scene)
+    assert found.r[0] == pytest.approx([0.0, 0.0, small - big], abs=1e-9)
+    assert found.Lam[0] == pytest.approx(2.0 * G, rel=1e-9)
+    assert found.stable
+
+
+def test_bodies_do_not_rest_in_each_other():
+    scene = dap.Scene(name="pressed")
+    scene.add_body("ball", mass=1.0, Jp=[0.004] * 3, r=[0.0, 0.0, 0.2])
+    scene.add_point("A", "ground", [0.0, 0.0, -1.0])
+    scene.add_force("ptp", "spring", P_i="ball.O", P_j="A", k=100.0, l0=1.0)
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
+    with pytest.raises(dap.SimulationError, match="floor overlaps"):
+        dap.equilibrium(scene)

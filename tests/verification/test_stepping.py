@@ -1,0 +1,118 @@
+"""Contacts by stepping: what is exact is so to rounding, the rest has the order of the step."""
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+
+G = 9.81
+
+
+def collide(scene, **material):
+    """Let the shapes of a scene that collide meet, under gravity."""
+    scene.add_material("surface", **material)
+    scene.add_collisions(material="surface")
+    scene.add_shape("plane", body="ground", collides=True)
+    scene.add_force("weight", "gravity")
+    return scene
+
+
+def ball(height=0.0, v=3.0, **material):
+    """A solid ball of 0.1 m on or above a floor."""
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0.0, 0.0, 0.1 + height], r_dot=[v, 0, 0])
+    scene.add_shape("sphere", body="ball", radius=0.1, collides=True)
+    return collide(scene, **material)
+
+
+def test_a_box_inside_its_cone_does_not_creep():
+    """0.35 rad, mu = 0.5, 2 s; limit: rounding of its place. (60 s: 4e-17 m.)"""
+    angle, scene = 0.35, dap.Scene(name="slope")
+    n = [-np.sin(angle), 0.0, np.cos(angle)]
+    p = [np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0]
+    scene.add_body("box", mass=2.0, Jp=[0.01] * 3, r=[0.1 * x for x in n], p=p)
+    scene.add_shape("box", body="box", size=[0.3, 0.3, 0.2], collides=True)
+    scene.add_shape("plane", body="ground", normal=n, collides=True)
+    scene.add_material("surface", mu=0.5)
+    scene.add_collisions(material="surface")
+    scene.add_force("weight", "gravity")
+    result = dap.simulate(scene, t_end=2.0, dt=1.0, contact_step=5e-3)
+    assert np.abs(result.r - result.r[0]).max() < 1e-14
+    assert any("by stepping" in note and "2 shapes" in note for note in result.notes)
+
+
+def test_a_tower_carries_a_load_a_thousand_times_its_own():
+    """Boxes of 1 kg under one of 1000 kg: what they move and overlap by, in 0.1 s."""
+    scene = dap.Scene(name="tower")
+    for k, mass in enumerate([1.0] * 19 + [1000.0]):
+        Jp, r = [mass / 600.0] * 3, [0.0, 0.0, 0.05 + 0.1 * k]
+        scene.add_body(f"box{k}", mass=mass, Jp=Jp, r=r)
+        scene.add_shape("box", body=f"box{k}", size=[0.1] * 3, collides=True)
+    result = dap.simulate(collide(scene, mu=0.5), t_end=0.1, dt=0.1, contact_step=5e-3)
+    assert np.abs(result.r - result.r[0]).max() < 1e-8
+    z = result.r[-1, :, 2]
+    assert min(z[0] - 0.05, (np.diff(z) - 0.1).min()) > -1e-10
+
+
+@pytest.mark.parametrize("declared", [False, True])
+def test_a_ball_that_slides_then_rolls_has_the_second_order(declared):
+    """Within a step slip ends unseen, which costs less than mu G h^2; first order costs h v0 / 7."""
+    scene, v0, mu = ball(mu=0.3), 3.0, 0.3
+    if declared:
+        scene = dap.Scene(name="declared")
+        scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.1], r_dot=[v0, 0, 0])
+        scene.add_contact("ball_plane", P_i="ball.O", radius=0.1, mu=mu)
+        scene.add_force("weight", "gravity")
+    end = 2.0 / 7.0 * v0 / (mu * G)
+    exact = v0 * end - 0.5 * mu * G * end**2 + 5.0 / 7.0 * v0 * (1.0 - end)
+    for h in (8e-3, 2e-3):
+        result = dap.simulate(scene, t_end=1.0, dt=0.5, contact="stepping", contact_step=h)
+        assert abs(result.r[-1, 0, 0] - exact) < mu * G * h**2
+        assert result.rd[-1, 0, 0] == pytest.approx(5.0 / 7.0 * v0, abs=1e-11)
+
+
+def test_a_pair_without_loss_keeps_its_energy():
+    scene = dap.Scene(name="pair")
+    scene.add_material("surface", e=1.0)
+    scene.add_collisions(material="surface")
+    balls = ("a", 2.0, [0.0] * 3, [3.0, 0.1, 0.0]), ("b", 1.0, [0.5, 0.02, 0.01], [0.0] * 3)
+    for name, mass, r, v in balls:
+        scene.add_body(name, mass=mass, Jp=[0.004 * mass] * 3, r=r, r_dot=v)
+        scene.add_shape("sphere", body=name, radius=0.1, collides=True)
+    result = dap.simulate(scene, t_end=0.5, dt=0.1)
+    energy = (np.array([2.0, 1.0]) * (result.rd**2).sum(axis=2)).sum(axis=1)
+    assert result.rd[-1, 1, 0] > 3.0
+    assert energy[-1] == pytest.approx(energy[0], rel=1e-12)
+
+
+def test_stepping_tends_to_events():
+    """A ball dropped onto a floor, e = 0: where it is after 0.5 s differs by the order of h."""
+    declared = dap.Scene(name="declared")
+    declared.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.3], r_dot=[1.0, 0, 0])
+    declared.add_contact("ball_plane", P_i="ball.O", radius=0.1, mu=0.3)
+    declared.add_force("weight", "gravity")
+    exact = dap.simulate(declared, t_end=0.5, dt=0.5, contact="events").r[-1, 0]
+    for h in (8e-3, 2e-3):
+        found = dap.simulate(ball(0.2, 1.0, mu=0.3), t_end=0.5, dt=0.5, contact_step=h).r[-1, 0]
+        assert np.abs(found - exact).max() < 0.5 * h  # its velocities are some 1 m/s
+
+
+def test_joints_hold_while_shapes_touch():
+    """A pendulum that falls onto a floor stays on its joint, and rests on the floor."""
+    scene = dap.Scene(name="pendulum")
+    scene.add_body("bob", mass=1.0, Jp=[0.01] * 3, r=[1.0, 0.0, 0.5])
+    scene.add_point("A", "ground", [0.0, 0.0, 0.5])
+    scene.add_point("B", "bob", [-1.0, 0.0, 0.0])
+    scene.add_joint("sph", "J", P_i="B", P_j="A")
+    scene.add_shape("sphere", body="bob", radius=0.1, collides=True)
+    result = dap.simulate(collide(scene, mu=0.5), t_end=1.5, dt=0.5, contact_step=4e-3)
+    assert result.r[-1, 0, 2] == pytest.approx(0.1, abs=1e-9)
+    assert np.linalg.norm(result.r[-1, 0] - [0.0, 0.0, 0.5]) == pytest.approx(1.0, abs=1e-9)
+    assert np.abs(result.rd[-1]).max() < 1e-5  # it comes to rest step by step
+
+
+def test_events_refuse_shapes_that_collide():
+    with pytest.raises(dap.SceneError, match="followed by stepping"):
+        dap.simulate(ball(mu=0.3), t_end=0.1, contact="events")
+    with pytest.raises(dap.SimulationError, match="shapes that collide"):
+        dap.equilibrium(ball(mu=0.3))
