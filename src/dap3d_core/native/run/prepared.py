@@ -90,11 +90,11 @@ class Advance:
         function: Any = {RungeKutta: advance, AdamsIntegration: advance_adams}.get(
             type(integration)
         )
-        given: tuple[Any, ...] = (integration.work, *integration._arguments)
         if isinstance(integration, RadauIntegration):
-            function, given = advance_radau, integration.loop_arguments
+            function = advance_radau
         elif function is None:
             raise refusal(f"integrator {integration.name} cannot be exported")
+        given = integration.loop_arguments
         return cls(integration, function.compile([*map(type_of, given), INT]), given)
 
 
@@ -249,6 +249,7 @@ class PreparedRun:
     def image(self) -> Image:
         """The memory of the run, once all that it needs is known."""
         parts = [part for one in self.advances for part in one.arguments]
+        parts += [self.functions, self.evaluator.system, self.evaluator.loops]
         parts += [] if self.jumps is None else [*self.jumps.arguments]
         parts += [] if self.start is None else [self.start.arrays, self.start.functions]
         return Image(self.evaluator.loops, *parts, *self.more)
