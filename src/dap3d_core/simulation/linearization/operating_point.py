@@ -127,9 +127,8 @@ def operating_point(
         tangent = tangent_matrices(evaluator, t, u)
         rank = redundancy.rank
         if model.contact_count:
-            rank = dense_rank(
-                scaled_rows(evaluator.rows(t, u), model.length)[0].dense(), fit_of(model)
-            )
+            every = scaled_rows(evaluator.rows(t, u), model.length)[0].dense()
+            rank = dense_rank(every, fit_of(model))
         frames = steady_frames(model, tangent, u, rank.dependencies)
     if not (frames.is_steady and _keeps_states(model, tangent, evaluator.states)):
         frames = attrs.evolve(frames, is_steady=False)
