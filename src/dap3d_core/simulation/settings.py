@@ -1,6 +1,7 @@
 """Settings of a run, checked and completed, and its reporting times."""
 
 import os
+from collections import Counter
 from collections.abc import Callable
 from typing import Any
 
@@ -25,6 +26,8 @@ from dap3d_core.simulation.initial.tolerances import atol_vector, kinds_of, reso
 
 #: Points of declared contacts up to which "auto" follows them by events.
 MOST_BY_EVENTS = 30
+#: Points of one contact that may touch at once, such as the corners of a box on a box.
+MOST_CLOSED = 8
 
 
 def settings_of(compiled: CompiledModel, **asked: Any) -> Simulation:
@@ -63,8 +66,11 @@ def contact_engine_reason(model: Model, contact: str) -> str:
         return "asked for"
     if contact == "auto" and model.collisions is not None:
         return f"{len(model.collisions.names)} shapes may meet anywhere"
-    if contact == "auto" and model.contact_count > MOST_BY_EVENTS:
-        return f"there are {model.contact_count} points of contact, more than {MOST_BY_EVENTS}"
+    names = model.joint_names[len(model.joint_names) - model.contact_count :]
+    points = Counter(name.partition("#")[0] for name in names)
+    closed = sum(min(count, MOST_CLOSED) for count in points.values())
+    if contact == "auto" and closed > MOST_BY_EVENTS:
+        return f"{closed} points may touch at once, more than {MOST_BY_EVENTS}"
     return ""
 
 

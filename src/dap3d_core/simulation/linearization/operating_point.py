@@ -151,10 +151,9 @@ def operating_point(
             f"leave {', '.join(rated)} out of the scene"
         )
     if model.iterated_forces and redundancy.rank.redundant:
-        from dap3d_core.simulation.redundancy import shared_reactions
+        from dap3d_core.simulation.redundancy.shared_reactions import refuse_shared, shared_laws
 
-        laws = shared_reactions.shared_laws(compiled.checked, evaluator, u, redundancy, t)
-        shared_reactions.refuse_shared(laws, evaluator)
+        refuse_shared(shared_laws(compiled.checked, evaluator, u, redundancy, t), evaluator)
     if model.friction:
         notes.append(
             "joints with friction: linearised with the smooth law of friction at this state, "
