@@ -52,7 +52,8 @@ SETTINGS = {
         Setting("dt", "time", None, "reporting step, s, by default t_end / 100"),
         Setting("method", "word", "auto", f"formulation: {', '.join(METHODS)}", METHODS),
         Setting("integrator", "integrator", "dop853",
-                "integrator: dop853, dopri5, adams, radau for stiff scenes, rk4 with a step, auto",
+                "integrator: dop853, dopri5, adams, radau for stiff scenes, rk4 with a step, auto; "
+                "moreau with a step for contacts",
                 INTEGRATORS),
         Setting("rtol", "number", 1e-8, "relative tolerance of a step", least=SMALLEST_RTOL,
                 most=1.0),

@@ -35,6 +35,7 @@ INTEGRATOR_MODULES = {
     "rk4": "dap3d_core.integrators.runge_kutta.rk4",
     "adams": "dap3d_core.integrators.adams.step",
     "radau": "dap3d_core.integrators.radau.step",
+    "moreau": "dap3d_core.integrators.moreau.integration",
 }
 
 

@@ -20,6 +20,7 @@ from dap3d_core.report.reference import Reference, find_reference
 from dap3d_core.report.report import Report
 from dap3d_core.report.settings_ladder import (
     ADAPTIVE,
+    MEASURED,
     QUICK_TOLERANCES,
     TOLERANCES,
     Setting,
@@ -102,9 +103,7 @@ def report(
     maker = _Measurement(bench, chosen(methods, tuple(FORMULATIONS)), repeat, progress)
     if given.simulation.step is not None:
         maker.notes.append(_STEP_LEFT_OUT.format(given.simulation.step))
-    return maker.make(
-        chosen(integrators, tuple(INTEGRATORS)), rtols, steps, target_error, quick=quick
-    )
+    return maker.make(chosen(integrators, MEASURED), rtols, steps, target_error, quick=quick)
 
 
 def _check_positive(**numbers: float | None) -> None:
@@ -232,7 +231,7 @@ class _Measurement:
 
     def _fine_steps(self, steps: Sequence[float]) -> list[Setting]:
         """Fixed steps below the ladder, for a reference where no tolerance can be met."""
-        names = [i.name for i in INTEGRATORS.values() if not i.adaptive]
+        names = [name for name in MEASURED if not INTEGRATORS[name].adaptive]
         return [
             Setting(method, name, step=min(steps) / 2.0)
             for name in names

@@ -19,6 +19,8 @@ ATOL = 1e-2
 STEPS, QUICK_STEPS = 8, 3
 QUICK_FACTOR = 4.0
 
+#: Integrators of a report: time stepping of contacts is of low order, for what no other can do.
+MEASURED = tuple(name for name, one in INTEGRATORS.items() if not one.steps_contacts)
 #: Integrators that choose their step, those of the highest order first.
 ADAPTIVE = tuple(
     sorted(

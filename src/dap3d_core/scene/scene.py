@@ -10,8 +10,6 @@ from dap3d_core.scene.coerce import entry_of, keys_of, plain, with_identifiers
 from dap3d_core.scene.contacts.tables import ContactTables
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Mistake, MistakeList, SceneError
-from dap3d_core.scene.expressions.parameters import resolve
-from dap3d_core.scene.files.write_toml import save, to_toml
 from dap3d_core.scene.tables import (
     NAMED,
     AnimationPoint,
@@ -49,6 +47,8 @@ class Scene(SceneTables, SceneDisplay, ContactTables):
         """
         if not self.parameters:
             return self
+        from dap3d_core.scene.expressions.parameters import resolve
+
         return resolve(self)
 
     def add_body(self, name: str, **fields: Any) -> str:
@@ -188,6 +188,8 @@ class Scene(SceneTables, SceneDisplay, ContactTables):
         Raises:
             SceneError: it holds something that a scene file cannot.
         """
+        from dap3d_core.scene.files.write_toml import to_toml
+
         return to_toml(self)
 
     @checked
@@ -197,6 +199,8 @@ class Scene(SceneTables, SceneDisplay, ContactTables):
         Raises:
             SceneError: it cannot be written.
         """
+        from dap3d_core.scene.files.write_toml import save
+
         return save(self, path)
 
     def _add(self, table: str, name: str, fields: dict[str, Any]) -> str:

@@ -90,7 +90,7 @@ def test_what_is_wrong_is_named(install, monkeypatch):
     install(order=3)
     with pytest.raises(PluginError, match="order is a whole number from 1 to 2, not 3"):
         dap.simulate(top(), t_end=1.0, integrator="ralston", step=0.1)
-    with pytest.raises(dap.SceneError, match=r'"radau", "bs32", "ralston".*did you mean .bs32.'):
+    with pytest.raises(dap.SceneError, match=r'"moreau", "bs32", "ralston".*did you mean .bs32.'):
         dap.simulate(top(), t_end=1.0, integrator="bs23")
     monkeypatch.setenv("DAP3D_BLOCK", "my-integrators")
     with pytest.raises(dap.SceneError, match="should be one of"):

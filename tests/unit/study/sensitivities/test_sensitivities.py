@@ -112,7 +112,7 @@ def test_data_sets(tmp_path):
         ([], "name a parameter"),
         (["bodies.rood.mass"], "did you mean 'bodies.rod.mass'"),
         (["bodies.rod.mass", "bodies.rod.mass"], "only once"),
-        (["simulation.step"], "give it a value"),
+        (["simulation.step"], "says how a run is computed"),
         (["simulation.rtol"], "says how a run is computed"),
     ],
 )
