@@ -176,7 +176,9 @@ def test_an_event_within_a_crossing_of_the_implicit_integrator():
     assert expected == pytest.approx(-0.0014, abs=1e-9)
 
 
-@pytest.mark.parametrize("settings", [{"project": False, "rtol": 1e-10, "atol": 1e-12}, {"step": 0.01}])
+@pytest.mark.parametrize(
+    "settings", [{"project": False, "rtol": 1e-10, "atol": 1e-12}, {"step": 0.01}]
+)
 def test_where_the_implicit_integrator_cannot_be_taken_across_the_remedy_is_told(settings):
     """Steps are not placed about a pose where projection is off, or they are fixed; at looser
     tolerances one goes across by itself.
