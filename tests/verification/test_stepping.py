@@ -1,5 +1,7 @@
 """Contacts by stepping: what is exact is so to rounding, the rest has the order of the step."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -69,6 +71,9 @@ def test_a_ball_that_slides_then_rolls_has_the_second_order(declared):
         result = dap.simulate(scene, t_end=1.0, dt=0.5, contact="stepping", contact_step=h)
         assert abs(result.r[-1, 0, 0] - exact) < mu * G * h**2
         assert result.rd[-1, 0, 0] == pytest.approx(5.0 / 7.0 * v0, abs=1e-11)
+    (told,) = (note for note in result.notes if "contacts were solved to" in note)
+    took = float(re.search(r"friction took (\S+) J", told)[1])
+    assert took == pytest.approx(2.0 * v0**2 / 7.0, rel=2e-6)  # what is lost; six digits are told
 
 
 def test_a_pair_without_loss_keeps_its_energy():

@@ -1,0 +1,25 @@
+"""What time stepping of contacts left unsolved."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from dap3d_core.integrators import STEPPING, Integration
+from dap3d_core.result.note import information
+
+#: A residual above this part of the largest impulse is a warning.
+UNSOLVED = 1e-3
+
+
+def stepping_notes(integrations: Sequence[Integration]) -> list[str]:
+    """Residual, overlap and work of friction of a run by time stepping; none of other runs."""
+    ran: list[Any] = [one for one in integrations if one.name == STEPPING.name]
+    if not ran:
+        return []
+    residual, deepest = max(i.largest_residual for i in ran), max(i.deepest for i in ran)
+    words = (
+        f"contacts were solved to {residual:.2g} of the largest impulse of a step, bodies overlap "
+        f"by {deepest:.2g} m at most; friction took {-sum(i.friction_work for i in ran):.6g} J"
+    )
+    if residual <= UNSOLVED:
+        return [information(words)]
+    return [f"{words}: where bodies rest is not to be trusted; give a shorter contact_step"]
