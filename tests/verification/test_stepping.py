@@ -76,6 +76,21 @@ def test_a_ball_that_slides_then_rolls_has_the_second_order(declared):
     assert took == pytest.approx(2.0 * v0**2 / 7.0, rel=2e-6)  # what is lost; six digits are told
 
 
+def test_forces_and_modes_of_declared_contacts_are_those_of_the_step():
+    """The ball of before slides for 2 v0 / (7 mu G), then rolls without friction."""
+    scene, mu = dap.Scene(name="declared"), 0.3
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.1], r_dot=[3.0, 0, 0])
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, mu=mu)
+    scene.add_force("weight", "gravity")
+    result = dap.simulate(scene, t_end=0.4, dt=0.1, contact="stepping", contact_step=2e-3)
+    floor = result.contact("floor")
+    assert floor.mode[1:].tolist() == [1, 1, 2, 2]  # to 0.291 s
+    assert floor.normal_force[1:] == pytest.approx(2.0 * G, rel=1e-12)
+    slides, rolls = floor.friction[1:3, 0], floor.friction[3:, 0]
+    assert slides == pytest.approx(-mu * 2.0 * G, rel=1e-12)
+    assert rolls == pytest.approx(0.0, abs=1e-9)
+
+
 def test_a_pair_without_loss_keeps_its_energy():
     scene = dap.Scene(name="pair")
     scene.add_material("surface", e=1.0)
@@ -110,10 +125,13 @@ def test_joints_hold_while_shapes_touch():
     scene.add_point("B", "bob", [-1.0, 0.0, 0.0])
     scene.add_joint("sph", "J", P_i="B", P_j="A")
     scene.add_shape("sphere", body="bob", radius=0.1, collides=True)
-    result = dap.simulate(collide(scene, mu=0.5), t_end=1.5, dt=0.5, contact_step=4e-3)
+    result = dap.simulate(collide(scene.copy(), mu=0.5), t_end=1.5, dt=0.5, contact_step=4e-3)
     assert result.r[-1, 0, 2] == pytest.approx(0.1, abs=1e-9)
     assert np.linalg.norm(result.r[-1, 0] - [0.0, 0.0, 0.5]) == pytest.approx(1.0, abs=1e-9)
     assert np.abs(result.rd[-1]).max() < 1e-5  # it comes to rest step by step
+    smooth = dap.simulate(collide(scene.copy(), mu=0.0), t_end=1.5, dt=0.5, contact_step=4e-3)
+    # The floor under its centre carries all its weight.
+    assert np.abs(smooth.reaction("J")["i"].force[-1]).max() < 1e-3
 
 
 def test_events_refuse_shapes_that_collide():

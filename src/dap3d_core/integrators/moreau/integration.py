@@ -43,6 +43,8 @@ OVERLAP, PASSES = 1e-12, 8
 COLLIDES = 4.0
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
+#: A contact whose friction is on its cone to this part slides.
+ON_CONE = 1e-6
 #: Contacts of a shape whose impulses are kept for the next step.
 KEPT = 12
 
@@ -125,14 +127,27 @@ class MoreauIntegration(Integration):
             self._step(min(float(end_of_step(work)), float(work.t_limit)))
 
     def _complete(self, first: int) -> None:
-        """Put mean accelerations of the last step, with its impulses, into rows of reports."""
-        work, model = self.work, self._evaluator.model
+        """Put mean accelerations and forces of the last step, and modes, into rows of reports."""
+        work, model, table = self.work, self._evaluator.model, self._finder.table
         rows = work.rows[first : work.row_count]
         if not len(rows) or work.step_count == 0:
             return
-        start = 1 + work.state.shape[1]
-        layout = model.report_layout
-        rows[:, start + layout["v_dot"].start : start + layout["v_dot"].stop] = self._mean
+        layout, own = model.row_layout, model.joint_row_count
+        rows[:, layout["v_dot"]] = self._mean
+        if self.problem is None:
+            return
+        forces = rows[:, layout["Lam"]]
+        forces[:, :own] += self.problem.y / self.step_length
+        if table is not None:  # their forces are the last
+            x = self.problem.x[-table.count :]
+            forces[:, own:] = x.ravel() / self.step_length
+            rows[:, layout["states"]][:, table.mode] = self._modes(x, table.mu)
+
+    @staticmethod
+    def _modes(x: Floats, mu: Floats) -> Floats:
+        """Modes (m,) of contacts by their impulses: 0 open, 1 slides, 2 sticks."""
+        on_cone = np.hypot(x[:, 1], x[:, 2]) >= (1.0 - ON_CONE) * mu * x[:, 0]
+        return np.where(x[:, 0] <= 0.0, 0.0, np.where(on_cone, 1.0, 2.0))
 
     # ---------------------------------------------------------------- a step
 

@@ -69,7 +69,7 @@ def distance(x: Floats, u: Floats, mu: Floats, r: Floats) -> Floats:
 
 @attrs.frozen(eq=False)
 class Rows:
-    """The equations of one group of bodies, sparse.
+    """The equations of one group of bodies, sparse where they are many.
 
     Attributes:
         M, inverse: (6 n, 6 n) masses and their inverse.
@@ -178,17 +178,18 @@ def _round(rows: Rows, v: Floats, x: Floats, y: Floats, weight: float, tolerance
 
 def _solver(rows: Rows, B: Floats, weight: float) -> Callable[[Floats], Floats]:
     """Solves with the matrix of a Newton pass."""
+    m, size = len(rows.mu), len(rows.free)
+    blocks = weight * rows.r[:, None, None] * B
+    if size <= DENSE:
+        K = rows.M + rows.J.T @ (blocks @ rows.J.reshape(m, 3, size)).reshape(3 * m, size)
+        return partial(_solved, K + rows.D.T @ (weight * rows.s[:, None] * rows.D))
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
-    m = len(rows.mu)
-    blocks = weight * rows.r[:, None, None] * B
     middle = sp.bsr_array((blocks, np.arange(m), np.arange(m + 1)), shape=(3 * m, 3 * m))
     K = rows.M + rows.J.T @ (middle.tocsr() @ rows.J)
     if len(rows.s):
         K = K + rows.D.T @ (sp.diags_array(weight * rows.s) @ rows.D)
-    if K.shape[0] <= DENSE:
-        return partial(_solved, K.toarray())
     solve: Callable[[Floats], Floats] = splu(K.tocsc()).solve
     return solve
 

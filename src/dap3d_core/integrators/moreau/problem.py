@@ -8,7 +8,7 @@ import numpy as np
 
 from dap3d_core.integrators.moreau.contact_set import ContactSet
 from dap3d_core.integrators.moreau.gauss_seidel import sweep_bodies
-from dap3d_core.integrators.moreau.newton import TINY, Rows, distance, newton
+from dap3d_core.integrators.moreau.newton import DENSE, TINY, Rows, distance, newton
 from dap3d_core.kernels.array_types import Floats, Integers
 
 #: Residual from which Newton's method begins, and sweeps of Gauss-Seidel that lead there.
@@ -82,7 +82,8 @@ class Problem:
         self.x = start.copy()
         few = len(mu) <= FEW
         if few or len(self.y):
-            self._refine(np.arange(len(mu)), RESIDUAL_ROUNDING if few else tolerance)
+            to_rounding = few and tolerance < NEAR
+            self._refine(np.arange(len(mu)), RESIDUAL_ROUNDING if to_rounding else tolerance)
             if self._judge() <= tolerance or len(self.y):
                 return v + self.change()
         if self._judge() > tolerance:
@@ -179,9 +180,16 @@ def _matrices(
     place: Integers, J: Floats, M: Floats, inverse: Floats, D: Floats
 ) -> tuple[Any, Any, Any, Any]:
     """M, M^-1, J and D; J (m, 3, 2, 6) of bodies at ``place`` (m, 2), ground 0."""
+    n, m = len(M), len(J)
+    if 6 * n <= DENSE:
+        which, both = np.arange(n), np.zeros((2, n, 6, n, 6))
+        both[:, which, :, which] = np.stack([M, inverse], axis=1)
+        full = np.zeros((m, 3, n + 1, 6))
+        for side in range(2):
+            full[np.arange(m), :, place[:, side]] += J[:, :, side]
+        return *both.reshape(2, 6 * n, 6 * n), full[:, :, 1:].reshape(3 * m, 6 * n), D
     import scipy.sparse as sp
 
-    n, m = len(M), len(J)
     row = np.broadcast_to(np.arange(3 * m).reshape(m, 3, 1, 1), J.shape)
     column = np.broadcast_to((6 * place - 6)[:, None, :, None] + np.arange(6), J.shape)
     real = column >= 0

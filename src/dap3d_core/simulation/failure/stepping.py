@@ -18,7 +18,7 @@ def stepping_notes(integrations: Sequence[Integration]) -> list[str]:
     residual, deepest = max(i.largest_residual for i in ran), max(i.deepest for i in ran)
     words = (
         f"contacts were solved to {residual:.2g} of the largest impulse of a step, bodies overlap "
-        f"by {deepest:.2g} m at most; friction took {-sum(i.friction_work for i in ran):.6g} J"
+        f"by {deepest:.2g} m at most; friction took {abs(sum(i.friction_work for i in ran)):.6g} J"
     )
     if residual <= UNSOLVED:
         return [information(words)]
