@@ -134,6 +134,15 @@ def test_joints_hold_while_shapes_touch():
     assert np.abs(smooth.reaction("J")["i"].force[-1]).max() < 1e-3
 
 
+def test_points_of_a_sweep_are_runs_by_stepping():
+    """Each is the run of the changed scene, to the last bit."""
+    scene, name = ball(0.2, mu=0.3), "materials.surface.mu"
+    given = {"t_end": 0.4, "dt": 0.1, "contact_step": 4e-3}
+    swept = dap.sweep(scene, {name: [0.1, 0.3]}, outputs=["ball.r.x"], **given)["ball.r.x"].values
+    runs = (dap.simulate(ball(0.2, mu=mu), **given) for mu in (0.1, 0.3))
+    assert swept.tolist() == [run.r[-1, 0, 0] for run in runs]
+
+
 def test_events_refuse_shapes_that_collide():
     with pytest.raises(dap.SceneError, match="followed by stepping"):
         dap.simulate(ball(mu=0.3), t_end=0.1, contact="events")

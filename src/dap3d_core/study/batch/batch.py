@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.result.note import warnings_of
 from dap3d_core.scene import SceneError
@@ -41,7 +42,9 @@ def batch_runner(reduction: Reduction, times: Floats) -> "BatchRunner | None":
         return None
     if any(switch.jumps for switch in compiled.evaluator.switches):
         return None  # velocities that jump are changed between compiled calls
-    evaluator = compiled.evaluator
+    evaluator, collisions = compiled.evaluator, compiled.model.collisions
+    if collisions is not None or integrator_named(settings.integrator).steps_contacts:
+        return None  # so are those of contacts by stepping
     if evaluator.formulation.has_own_coordinates and (
         evaluator.model.state_count or evaluator.coordinates.kept
     ):
