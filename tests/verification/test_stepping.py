@@ -134,6 +134,13 @@ def test_joints_hold_while_shapes_touch():
     assert np.abs(smooth.reaction("J")["i"].force[-1]).max() < 1e-3
 
 
+def test_an_overlap_at_the_start_is_told():
+    told = dap.simulate(ball(-0.02, mu=0.3), t_end=0.01, contact_step=1e-3).notes
+    (note,) = (note for note in told if "at the start" in note)
+    assert "overlapped by 0.02 m" in note
+    assert note.severity == "warning"
+
+
 def test_points_of_a_sweep_are_runs_by_stepping():
     """Each is the run of the changed scene, but for where steps end at reports, to rounding."""
     scene, name = ball(0.2, mu=0.3), "materials.surface.mu"

@@ -326,7 +326,7 @@ class Run(RunState):
         notes += self.jumps.notes(self.present) if self.jumps is not None else []
         notes += event_notes(self.integrations, self.events())
         notes += crossing_notes(self.crossed)
-        notes += stepping_notes(self.integrations)
+        notes += stepping_notes(self.integrations, self.evaluator.model.length)
         notes += stiffness_notes(
             self.integrations, self.settings.integrator, self.evaluator.formulation
         )

@@ -87,13 +87,14 @@ class MoreauIntegration(Integration):
         largest_residual: of all steps, a part of the largest impulse of each.
         friction_work: of all steps so far, J, not positive.
         deepest: largest overlap at the end of a step, m.
+        overlap_at_start: that of before the first step, m, which moves bodies apart.
     """
 
     name, adaptive = "moreau", False
     state_class = MoreauState
     problem: Problem | None = None
     step_length = 0.0
-    largest_residual = friction_work = deepest = 0.0
+    largest_residual = friction_work = deepest = overlap_at_start = 0.0
 
     def __init__(self, evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> None:
         """Args: the evaluator of the model; the others as of ``Integration``."""
@@ -159,6 +160,8 @@ class MoreauIntegration(Integration):
         u, u_free = u_from_y(y[None], states)[0], u_from_y(free[None], states)[0]
         self.step_length = h
         contacts = self._near(t, u, u_free, h)
+        if work.step_count == 0:
+            self.overlap_at_start = -float(contacts.gap.min(initial=0.0))
         after, worked = self._with_contacts(t, u, u_free, contacts, h)
         self._mean = (after - u)[-len(self._mean) :] / h
         own = free[len(free) - 1 - states : -1]

@@ -8,10 +8,15 @@ from dap3d_core.result.note import information
 
 #: A residual above this part of the largest impulse is a warning.
 UNSOLVED = 1e-3
+#: Overlaps at the start above this part of the length of the scene are told.
+LEAST_OVERLAP = 1e-8
 
 
-def stepping_notes(integrations: Sequence[Integration]) -> list[str]:
-    """Residual, overlap and work of friction of a run by time stepping; none of other runs."""
+def stepping_notes(integrations: Sequence[Integration], length: float) -> list[str]:
+    """Residual, overlap and work of friction of a run by time stepping; none of other runs.
+
+    length: of the scene, m.
+    """
     ran: list[Any] = [one for one in integrations if one.name == STEPPING.name]
     if not ran:
         return []
@@ -20,6 +25,11 @@ def stepping_notes(integrations: Sequence[Integration]) -> list[str]:
         f"contacts were solved to {residual:.2g} of the largest impulse of a step, bodies overlap "
         f"by {deepest:.2g} m at most; friction took {abs(sum(i.friction_work for i in ran)):.6g} J"
     )
-    if residual <= UNSOLVED:
-        return [information(words)]
-    return [f"{words}: where bodies rest is not to be trusted; give a shorter contact_step"]
+    notes: list[str] = [information(words)]
+    if residual > UNSOLVED:
+        notes = [f"{words}: where bodies rest is not to be trusted; give a shorter contact_step"]
+    if (overlap := ran[0].overlap_at_start) > LEAST_OVERLAP * length:
+        notes.append(
+            f"bodies overlapped by {overlap:.2g} m at the start, and were moved apart: move them"
+        )
+    return notes
