@@ -79,7 +79,7 @@ def gathered() -> dict[str, Any]:
     from dap3d_core.interface.codegen.compile_loops import compile_all
     from dap3d_core.kernels.compiler import units
     from dap3d_core.registry.registry import GROUPS
-    from dap3d_core.scene.validate.settings import FIXED_STEP, INTEGRATORS, METHODS
+    from dap3d_core.settings import FIXED_STEP, INTEGRATORS, METHODS
 
     if hasattr(os, "sched_setaffinity"):
         os.sched_setaffinity(0, set(list(os.sched_getaffinity(0))[:1]))  # nothing is made beside

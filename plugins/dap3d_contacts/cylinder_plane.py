@@ -55,7 +55,9 @@ class CylinderPlane(Contact):
     """
 
     keyword, points = "cylinder_plane", 2 + ON_CAP
-    example: ClassVar[Mapping[str, str]] = {"radius": "0.1", "length": "0.2"}
+    example: ClassVar[Mapping[str, str]] = {
+        "P_j": '"ground.O"', "a_j": '"ground.z"', "radius": "0.1", "length": "0.2",
+    }  # fmt: skip
     P_i: Point = point(doc="centre of the cylinder")
     a_i: Vector = vector(doc="axis of the cylinder")
     radius: float = number(unit="m", positive=True, doc="of the cylinder")

@@ -511,5 +511,5 @@ def test_what_is_no_client_is_refused(client):
 
 def test_without_dask_there_is_one_sentence(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(ClusterError, match=r'pip install "dap3d\[cluster\]"'):
+    with pytest.raises(ClusterError, match="pip install cloudpickle dask distributed"):
         connect("tcp://127.0.0.1:8786")

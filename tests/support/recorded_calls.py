@@ -247,7 +247,8 @@ def differences(calls, levels=None):
         for function, before, after, result in calls:
             symbol, signature, variable = wrappers[function, tuple(map(kind, before))]
             if level == DIFFERENTIATED and (
-                any(map(has_vectors, signature.arguments)) or computes_values_alone(function)
+                any(map(has_vectors, signature.arguments))
+                or computes_values_alone(function, before)
             ):
                 continue
             numbers = np.array(numbers_of(result), dtype=complex)
@@ -273,8 +274,10 @@ def is_by_array(value, type_):
     return isinstance(type_, Array) and not isinstance(value, np.ndarray)
 
 
-def computes_values_alone(function):
+def computes_values_alone(function, arguments):
     """Whether a function calls loops that are differentiated already, or may."""
+    if function.__name__ == "call_loop":
+        return isinstance(arguments[0][arguments[1]], Entry)
     of_steps = function.__module__.endswith("radau.step")
     return function.__name__ in OF_TANGENTS or (of_steps and "tangents" in named(function))
 

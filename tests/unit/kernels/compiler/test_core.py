@@ -131,12 +131,13 @@ NOT_CALLED = {
         "integrators.moreau.gauss_seidel": "sweep_bodies change_of",
         "integrators.moreau.integration": "state_at goes_on take_state",
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
-        "formulations.jumps.multipliers": "rotate",
+        "formulations.jumps.multipliers": "rotate seek_active",
         "formulations.jumps.rounds": "kick has_crossed stop",
         "formulations.jumps.held_joints": "place_alone solve_free",
         "formulations.contacts.cone": "residual_of sweep",
         "formulations.contacts.equations": (
-            "accelerate add_columns add_friction force_of friction_of_one has_settled invert "
+            "accelerate add_columns add_friction column force_of friction_of_one has_settled "
+            "inverse invert is_given is_sliding mode_of row_of "
             "largest_given project report rhs watch"
         ),
         # of runs with derivatives: study/sensitivities compares their values with those without

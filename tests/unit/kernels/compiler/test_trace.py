@@ -6,6 +6,7 @@ from support.at_all_levels import made_of, same_bits, targets
 
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
+from dap3d_core.interface.codegen.reactions import bind_joints, joints_read
 from dap3d_core.interface.codegen.specialise import bind_friction
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.examine.sized_types import sample_classes
@@ -30,6 +31,10 @@ def loops_of(type_info):
             yield from loops_of(examine(sample))
         for _, variant in type_info.variants:
             yield from loops_of(variant)
+        return
+    if fields := joints_read(type_info):
+        rubbing = bind_joints(type_info, dict.fromkeys(fields, REGISTRY.get("joint", "gear")))
+        yield rubbing, write(rubbing, "friction")
         return
     type_info = with_functions(type_info, {})
     for what in LOOP_KINDS:

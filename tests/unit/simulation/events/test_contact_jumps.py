@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support.ended import leave, shorten_chunks
+from support.plain import long_in_plain_python
 from support.results import same_bits
 
 import dap3d_core as dap
@@ -270,6 +271,7 @@ def test_a_ball_may_start_in_the_middle_of_a_hollow_one():
     assert result.r[-1, 0] == pytest.approx([0.0, 0.0, -0.9], abs=1e-12)
 
 
+@long_in_plain_python
 def test_a_box_that_falls_flat_sticks_where_it_lands():
     """Modes behind an impact follow from the velocities behind it: it has stopped turning."""
     scene, tilt = sliding_box(mu=1.0), 0.3
