@@ -76,11 +76,13 @@ def wide_unit(name: str, count: int, text: Callable[[str], str], *, optimise: bo
     return unit_of(name, 1, write, optimise)
 
 
-def unit_of(name: str, functions: int, write: Any, optimise: bool = False) -> Unit:
-    """A unit of so many functions, made once; name, write: as of ``Unit``."""
+def unit_of(
+    name: str, functions: int, write: Any, optimise: bool = False, ready_name: str = ""
+) -> Unit:
+    """A unit of so many functions, made once; arguments as of ``Unit``."""
     with _making:
         if name not in _units:
-            _units[name] = Unit(name, functions, write, cache_folder(), optimise=optimise)
+            _units[name] = Unit(name, functions, write, cache_folder(), optimise, ready_name)
         return _units[name]
 
 

@@ -127,7 +127,7 @@ def build_differentiated(loop: Loop, count: int) -> Entry:
     from dap3d_core.kernels.runtime.lanes import unit_of
 
     text = source_of(loop)
-    name = f"d{count}.{unit_names(loop, text)[1]}"
+    ready_name, name = (f"slopes{count}.{one}" for one in unit_names(loop, text))
 
     def write(symbols: list[str]) -> tuple[str, list[Any]]:
         traced = trace(symbols[0], _module(loop, text, name), array_members())
@@ -137,7 +137,7 @@ def build_differentiated(loop: Loop, count: int) -> Entry:
         start = f"  %t = insertelement {vector} zeroinitializer, double %t.0, i32 0"
         return helpers + define + body.replace("entry:", f"entry:\n{start}", 1), ["None"]
 
-    unit = unit_of(name, 1, write)
+    unit = unit_of(name, 1, write, ready_name=ready_name)
     unit.has_slopes = True
     return Entry(unit, 0, LOOP)
 
