@@ -102,9 +102,10 @@ def _materials(
     used: dict[str, int] = {}
     index = []
     for shape in shapes:
-        name = shape.values["material"] or usual or ""
-        if name and name not in materials:
-            key = ("shapes", shape.name) if shape.values["material"] else ("collisions",)
+        own = shape.values["material"]
+        name = own or usual or ""
+        if name and name not in materials and (own or name not in used):
+            key = ("shapes", shape.name) if own else ("collisions",)
             words = missing_words(report, "material", name, materials)
             report.add((*key, "material"), name, *words)
         index.append(used.setdefault(name, len(used)))

@@ -73,3 +73,14 @@ def test_what_cannot_be_is_refused_with_its_key(change, key, words):
     mistake = error.value.mistakes[0]
     assert mistake.key.startswith(key)
     assert words in str(mistake)
+
+
+def test_a_material_that_there_is_not_is_told_once():
+    """[collisions] names it for both shapes that have none of their own."""
+    scene = two_boxes()
+    for shape in scene.shapes.values():
+        shape.fields.pop("material", None)
+    scene.add_collisions(material="rubbr")
+    with pytest.raises(dap.SceneError, match="did you mean 'rubber'") as caught:
+        dap.compile(scene)
+    assert len(caught.value.mistakes) == 1
