@@ -27,8 +27,8 @@ def ball(height=0.0, v=3.0, **material):
     return collide(scene, **material)
 
 
-def test_a_box_inside_its_cone_does_not_creep():
-    """0.35 rad, mu = 0.5, 2 s; limit: rounding of its place. (60 s: 4e-17 m.)"""
+def slope():
+    """A box on a slope of 0.35 rad, within its cone of mu = 0.5."""
     angle, scene = 0.35, dap.Scene(name="slope")
     n = [-np.sin(angle), 0.0, np.cos(angle)]
     p = [np.cos(0.5 * angle), 0.0, -np.sin(0.5 * angle), 0.0]
@@ -38,19 +38,29 @@ def test_a_box_inside_its_cone_does_not_creep():
     scene.add_material("surface", mu=0.5)
     scene.add_collisions(material="surface")
     scene.add_force("weight", "gravity")
-    result = dap.simulate(scene, t_end=2.0, dt=1.0, contact_step=5e-3)
-    assert np.abs(result.r - result.r[0]).max() < 1e-14
-    assert any("by stepping" in note and "2 shapes" in note for note in result.notes)
+    return scene
 
 
-def test_a_tower_carries_a_load_a_thousand_times_its_own():
-    """Boxes of 1 kg under one of 1000 kg: what they move and overlap by, in 0.1 s."""
+def tower():
+    """Nineteen boxes of 1 kg under one of 1000 kg."""
     scene = dap.Scene(name="tower")
     for k, mass in enumerate([1.0] * 19 + [1000.0]):
         Jp, r = [mass / 600.0] * 3, [0.0, 0.0, 0.05 + 0.1 * k]
         scene.add_body(f"box{k}", mass=mass, Jp=Jp, r=r)
         scene.add_shape("box", body=f"box{k}", size=[0.1] * 3, collides=True)
-    result = dap.simulate(collide(scene, mu=0.5), t_end=0.1, dt=0.1, contact_step=5e-3)
+    return collide(scene, mu=0.5)
+
+
+def test_a_box_inside_its_cone_does_not_creep():
+    """2 s; limit: rounding of its place. 60 s: benchmarks/collisions.py."""
+    result = dap.simulate(slope(), t_end=2.0, dt=1.0, contact_step=5e-3)
+    assert np.abs(result.r - result.r[0]).max() < 1e-14
+    assert any("by stepping" in note and "2 shapes" in note for note in result.notes)
+
+
+def test_a_tower_carries_a_load_a_thousand_times_its_own():
+    """What they move and overlap by, in 0.1 s; 10 s: benchmarks/collisions.py."""
+    result = dap.simulate(tower(), t_end=0.1, dt=0.1, contact_step=5e-3)
     assert np.abs(result.r - result.r[0]).max() < 1e-8
     z = result.r[-1, :, 2]
     assert min(z[0] - 0.05, (np.diff(z) - 0.1).min()) > -1e-10
@@ -155,3 +165,12 @@ def test_events_refuse_shapes_that_collide():
         dap.simulate(ball(mu=0.3), t_end=0.1, contact="events")
     with pytest.raises(dap.SimulationError, match="shapes that collide"):
         dap.equilibrium(ball(mu=0.3))
+
+
+def test_small_problems_have_the_results_of_sparse_matrices(monkeypatch):
+    """Dense arrays take the place of sparse ones up to a size, to rounding of the solves."""
+    given = {"t_end": 0.4, "dt": 0.1, "contact_step": 4e-3}
+    dense = dap.simulate(ball(0.2, mu=0.3), **given)
+    for module in ("newton", "problem"):
+        monkeypatch.setattr(f"dap3d_core.integrators.moreau.{module}.DENSE", 0)
+    assert dap.simulate(ball(0.2, mu=0.3), **given).u == pytest.approx(dense.u, abs=1e-11)

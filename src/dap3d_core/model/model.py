@@ -105,6 +105,11 @@ class Model:
         return len(self.contact_laws)
 
     @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Names of points of contacts, ``NAME#1`` of those of several."""
+        return tuple(self.joint_names[len(self.joint_names) - self.contact_count :])
+
+    @property
     def contacts(self) -> tuple[Group, ...]:
         """Groups of joints that are contacts."""
         return tuple(group for group in self.joints if group.type_info.type.is_contact)

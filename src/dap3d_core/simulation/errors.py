@@ -27,7 +27,7 @@ def refuse_contacts(model: Any, what: str) -> None:
     if model.contact_count:
         raise SimulationError(
             f"{what} does not take contacts yet, and the scene has some "
-            f"({model.joint_names[-model.contact_count].partition('#')[0]}): take them out of "
+            f"({model.contact_names[0].partition('#')[0]}): take them out of "
             "[contacts], or run the scene (simulate), which does"
         )
     refuse_collisions(model, what)

@@ -66,8 +66,7 @@ def contact_engine_reason(model: Model, contact: str) -> str:
         return "asked for"
     if contact == "auto" and model.collisions is not None:
         return f"{len(model.collisions.names)} shapes may meet anywhere"
-    names = model.joint_names[len(model.joint_names) - model.contact_count :]
-    points = Counter(name.partition("#")[0] for name in names)
+    points = Counter(name.partition("#")[0] for name in model.contact_names)
     closed = sum(min(count, MOST_CLOSED) for count in points.values())
     if contact == "auto" and closed > MOST_BY_EVENTS:
         return f"{closed} points may touch at once, more than {MOST_BY_EVENTS}"

@@ -33,7 +33,7 @@ class ContactTable:
         model = evaluator.model
         self.evaluator, self.count = evaluator, model.contact_count
         first = len(model.joint_names) - self.count
-        self.names = model.joint_names[first:]
+        self.names = model.contact_names
         self.newton = np.array([law == "newton" for law in model.contact_laws], dtype=bool)
         self.numbers = {name: np.zeros(self.count) for name in ("mu", "mu_s", "e")}
         self.mode = np.zeros(self.count, dtype=np.int64)

@@ -126,9 +126,9 @@ class Equilibrium:
             body.r, body.p = tuple(r), tuple(p)
             body.rpy = body.axis_angle = None
             body.r_dot = body.w = (0.0, 0.0, 0.0)
-        contacts = self.compiled.model.joint_names[-self.compiled.model.contact_count or None :]
+        contacts = self.compiled.model.contact_names
         for state in self.compiled.model.element_states:
-            if self.compiled.model.contact_count and state.element in contacts:
+            if state.element in contacts:
                 continue  # a run finds the modes of contacts itself
             values = self.states[state.first : state.first + state.length].tolist()
             element = getattr(scene, f"{state.kind}s")[state.element]

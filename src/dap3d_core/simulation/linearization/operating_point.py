@@ -87,9 +87,7 @@ class OperatingPoint:
     @cached_property
     def kept(self) -> Integers:
         """(k,) places of the states of elements that may change: those of contacts stay."""
-        contacts = set(
-            self.model.joint_names[len(self.model.joint_names) - self.model.contact_count :]
-        )
+        contacts = set(self.model.contact_names)
         own = [s for s in self.model.element_states if s.element not in contacts]
         places = [np.arange(s.first, s.first + s.length) for s in own]
         return np.concatenate([np.zeros(0, dtype=np.int64), *places])
