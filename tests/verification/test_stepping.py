@@ -172,5 +172,5 @@ def test_small_problems_have_the_results_of_sparse_matrices(monkeypatch):
     given = {"t_end": 0.4, "dt": 0.1, "contact_step": 4e-3}
     dense = dap.simulate(ball(0.2, mu=0.3), **given)
     for module in ("newton", "problem"):
-        monkeypatch.setattr(f"dap3d_core.integrators.moreau.{module}.DENSE", 0)
+        monkeypatch.setattr(f"dap3d_core.integrators.moreau.{module}.SMALL", 0)
     assert dap.simulate(ball(0.2, mu=0.3), **given).u == pytest.approx(dense.u, abs=1e-11)

@@ -29,8 +29,9 @@ HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
 TINY = 1e-300
-#: Unknowns up to which a matrix is taken as dense: scalar elimination is quicker then.
-DENSE = 150
+#: Unknowns up to which all matrices are dense, so small that numpy starts no threads; and up to
+#: which that of a pass is: scalar elimination is quicker then.
+SMALL, DENSE = 36, 150
 
 
 def project(z: Floats, mu: Floats) -> Floats:
@@ -180,7 +181,7 @@ def _solver(rows: Rows, B: Floats, weight: float) -> Callable[[Floats], Floats]:
     """Solves with the matrix of a Newton pass."""
     m, size = len(rows.mu), len(rows.free)
     blocks = weight * rows.r[:, None, None] * B
-    if size <= DENSE:
+    if size <= SMALL:
         K = rows.M + rows.J.T @ (blocks @ rows.J.reshape(m, 3, size)).reshape(3 * m, size)
         return partial(_solved, K + rows.D.T @ (weight * rows.s[:, None] * rows.D))
     import scipy.sparse as sp
@@ -190,6 +191,8 @@ def _solver(rows: Rows, B: Floats, weight: float) -> Callable[[Floats], Floats]:
     K = rows.M + rows.J.T @ (middle.tocsr() @ rows.J)
     if len(rows.s):
         K = K + rows.D.T @ (sp.diags_array(weight * rows.s) @ rows.D)
+    if size <= DENSE:
+        return partial(_solved, K.toarray())
     solve: Callable[[Floats], Floats] = splu(K.tocsc()).solve
     return solve
 

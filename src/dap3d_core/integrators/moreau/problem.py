@@ -8,7 +8,7 @@ import numpy as np
 
 from dap3d_core.integrators.moreau.contact_set import ContactSet
 from dap3d_core.integrators.moreau.gauss_seidel import sweep_bodies
-from dap3d_core.integrators.moreau.newton import DENSE, TINY, Rows, distance, newton
+from dap3d_core.integrators.moreau.newton import SMALL, TINY, Rows, distance, newton
 from dap3d_core.kernels.array_types import Floats, Integers
 
 #: Residual from which Newton's method begins, and sweeps of Gauss-Seidel that lead there.
@@ -181,7 +181,7 @@ def _matrices(
 ) -> tuple[Any, Any, Any, Any]:
     """M, M^-1, J and D; J (m, 3, 2, 6) of bodies at ``place`` (m, 2), ground 0."""
     n, m = len(M), len(J)
-    if 6 * n <= DENSE:
+    if 6 * n <= SMALL:
         which, both = np.arange(n), np.zeros((2, n, 6, n, 6))
         both[:, which, :, which] = np.stack([M, inverse], axis=1)
         full = np.zeros((m, 3, n + 1, 6))
