@@ -434,7 +434,7 @@ class Result(ResultDisplay, ResultContacts):
         from dap3d_core.scene.expressions.outputs import outputs_of
 
         try:
-            return outputs_of(table)
+            return outputs_of(table, self.record.parameters)
         except SceneError as error:
             raise ResultError(f"the outputs of the scene are wrong: {error}") from error
 
