@@ -85,7 +85,7 @@ class TypeInfo:
 
         def holds(name: str, wanted: Any) -> bool:
             if wanted in specs[name].by_name:
-                return named.get(name) == wanted
+                return bool(named.get(name) == wanted)
             value = values[name]
             is_given = value is not None
             return is_given == wanted if specs[name].is_reference else bool(value == wanted)
