@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -155,11 +156,15 @@ class RunState:
         """The integration that the run is in."""
         return self.integrations[-1]
 
+    @cached_property
+    def stops(self) -> Sequence[tuple[float, bool]]:
+        """Break points of functions of time: as the argument of ``Integration``."""
+        stops = self.compiled.breakpoints(self.t_end).stops
+        return stops if self.limits is None else with_midpoints(stops)
+
     def begin(self, integration: Integration) -> None:
         """Make an integration the present one; it is compiled first, off the clock of the run."""
-        integration.tstops = self.compiled.breakpoints(self.t_end).stops
         if self.limits is not None:
-            integration.tstops = with_midpoints(integration.tstops)
             integration.work.longest_step = self.limits.longest
         if self.event_locator is not None:
             integration.follow_steps()
