@@ -486,12 +486,13 @@ def read_elements(
         elements: in place of those of the scene's table, by name.
     """
     arguments = arguments_of(functions)
+    elements = elements or getattr(report.scene, table)
     readers = {
         keyword: Reader(type_info, table, geometry, report, arguments, types.known)
         for keyword, type_info in types.of(table, elements).items()
     }
     instances = []
-    for element in (elements or getattr(report.scene, table)).values():
+    for element in elements.values():
         reader = readers.get(element.type) if type(element.type) is str else None
         instance = reader.read(element) if reader is not None else None
         if instance is not None:
