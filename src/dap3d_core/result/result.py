@@ -305,14 +305,16 @@ class Result(ResultDisplay, ResultContacts):
         joint = canonical(joint)
         if joint not in self.summary.joint_index:
             raise unknown("joint", joint, self.summary.joint_names)
-        if joint.partition(POINT)[0] in self.contacts:
+        if joint.partition(POINT)[0] in self.contact_names:
             raise UnknownNameError(f"{joint!r} is a contact: its forces are those of .contact()")
         self._compute_reactions([joint])
         return dict(self._reactions[joint])
 
     def reactions(self) -> dict[str, Mapping[str, Reaction]]:
         """Reactions of all joints by name, computed in one pass; otherwise as ``reaction``."""
-        names = [n for n in self.summary.joint_names if n.partition(POINT)[0] not in self.contacts]
+        names = [
+            n for n in self.summary.joint_names if n.partition(POINT)[0] not in self.contact_names
+        ]
         self._compute_reactions(names)
         return {name: dict(self._reactions[name]) for name in names}
 

@@ -14,6 +14,7 @@ from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import Integration, StepCounts
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.result import EventRecord, RunMetadata, RunStatistics, information
+from dap3d_core.result.contact_table import ContactTable, no_contacts
 from dap3d_core.scene import MISSING, Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, check_every
@@ -192,6 +193,14 @@ class RunState:
             others = [*others, *self.jumps.records]
         return occurrences(self.evaluator, self.integrations, others)
 
+    def _contacts(self) -> ContactTable:
+        """Contacts of shapes at the instants reported so far."""
+        shapes = self.evaluator.model.collisions
+        if shapes is None:
+            return no_contacts()
+        every = [one.contact_rows for one in self.integrations]
+        return ContactTable.of_rows(shapes.names, np.concatenate(every))
+
     def record(self, status: str, more_notes: Sequence[str] = ()) -> RunMetadata:
         """The metadata of the result so far."""
         counts, events = self.statistics(), self.events()
@@ -212,6 +221,7 @@ class RunState:
             integrator=self.settings.integrator,
             notes=[*self.notes, *more_notes],
             events=events,
+            contacts=self._contacts(),
             types=self.compiled.types,
             settings={
                 "t_end": self.t_end,

@@ -116,6 +116,8 @@ class Integration(Restorable):
     keeps_step = True
     #: The compiled loop of the integrator.
     loop: Callable[..., None]
+    #: (k, 14) contacts of shapes at reported instants: t, i, j, mode, gap, point, normal, force.
+    contact_rows: Floats = np.zeros((0, 14))
     #: Whether programs of a scene's own may take the place of its functions.
     takes_programs = False
 
