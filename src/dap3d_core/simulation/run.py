@@ -231,6 +231,7 @@ class Run(RunState):
         width = 1 + len(y0) + evaluator.report_size
         self.options = options = integration_options(evaluator, settings) | {
             "first_step": None if self.limits is None else self.limits.first,
+            "stops": self.stops,
             "buffer_rows": max(1, min(len(self.times), BUFFER_NUMBERS // width)),
         }
         integrator = integrator_named(settings.integrator)

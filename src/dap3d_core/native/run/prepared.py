@@ -232,6 +232,7 @@ class PreparedRun:
             self.evaluator: Evaluator = compiled.new_evaluator()
             run.evaluator = self.evaluator
             self._refuse_jumps()
+            run.stops = [(stop.t, stop.jumps) for stop in self.stops]
             run.initialise()
             integrations = [run.present]
             if run.present.work.stops_when_stiff:

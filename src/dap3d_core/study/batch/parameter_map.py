@@ -240,7 +240,10 @@ class ParameterMap:
 
     def _of_element(self, parameter: SceneParameter) -> MappedParameter:
         table, name, field = parameter.path
-        instance = next(i for i in getattr(self._checked, table) if i.name == name)
+        named = (i for i in getattr(self._checked, table) if i.name == name)
+        instance = next(named, None)
+        if instance is None:  # a rigid stop, which is a contact
+            raise NotCopiedError
         type_: Any = instance.type_info.type
         spec = specs_of(type_).get(field)
         if spec is None or spec.kind not in ("number", "vec3"):
