@@ -487,8 +487,8 @@ def _expected(
     if issubclass(type_, Function):
         shape, words = VALUES[type_.arguments]
         return shape if isinstance(value, (tuple, list)) else (), words
-    if not issubclass(type_, Joint) or kernel in ("gap", "at", "normal", "reach"):  # of contacts
-        return ((3,), "3 numbers") if kernel in ("at", "normal") else ((), "one number")
+    if not issubclass(type_, Joint) or kernel in type_.declared:  # of contacts
+        return ((3,), "3 numbers") if kernel in ("at", "normal", "along") else ((), "one number")
     if kernel == "G":
         n, k = len(type_.position_rows()), len(unknown_names(type_))
         return (n, k), f"{n} rows of the derivatives of C by its {k} unknowns"
