@@ -131,6 +131,8 @@ class Joint(TypeBase):
             "n - 1".
         holonomic: True, False, or one truth value a row: the rows of the position level.
         coordinate: "angle" or "length", what a motor in this joint acts on; "" for what it says.
+        limit: keyword of the contact that limits that coordinate where the scene gives ``lower`` or
+            ``upper``; "" for none.
         drives: it prescribes a freedom that other joints leave; where there are none between its
             bodies a scene gets a note.
         unilateral: rows, from 0, with multipliers that are not negative in a valid motion: ground
@@ -158,6 +160,7 @@ class Joint(TypeBase):
     rows: ClassVar[int] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
     coordinate: ClassVar[str] = ""
+    limit: ClassVar[str] = ""
     drives: ClassVar[bool] = False
     brings: ClassVar[tuple[str, ...]] = ()
     unilateral: ClassVar[tuple[int, ...]] = ()

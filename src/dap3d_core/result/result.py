@@ -287,8 +287,8 @@ class Result(ResultDisplay, ResultContacts):
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
         """Reaction of a joint on each of its bodies, ground included: D^T lambda (spec 2).
 
-        What a joint brings besides is part of it, as the pressure angle of a ``gear``; friction
-        that a force element adds to a joint is not.
+        What a joint brings besides, such as the pressure angle of a ``gear``, is part of it; the
+        friction of a force element is not.
 
         Args:
             joint: name of the joint.
@@ -306,14 +306,16 @@ class Result(ResultDisplay, ResultContacts):
         joint = canonical(joint)
         if joint not in self.summary.joint_index:
             raise unknown("joint", joint, self.summary.joint_names)
-        if joint.partition(POINT)[0] in self.contacts:
+        if joint.partition(POINT)[0] in self.contact_names:
             raise UnknownNameError(f"{joint!r} is a contact: its forces are those of .contact()")
         self._compute_reactions([joint])
         return dict(self._reactions[joint])
 
     def reactions(self) -> dict[str, Mapping[str, Reaction]]:
         """Reactions of all joints by name, computed in one pass; otherwise as ``reaction``."""
-        names = [n for n in self.summary.joint_names if n.partition(POINT)[0] not in self.contacts]
+        names = [
+            n for n in self.summary.joint_names if n.partition(POINT)[0] not in self.contact_names
+        ]
         self._compute_reactions(names)
         return {name: dict(self._reactions[name]) for name in names}
 
@@ -428,13 +430,12 @@ class Result(ResultDisplay, ResultContacts):
         Raises:
             ResultError: the scene in a file has some that are wrong.
         """
-        table = self.record.outputs
-        if not table:
+        if not self.record.outputs:
             return {}
         from dap3d_core.scene.expressions.outputs import outputs_of
 
         try:
-            return outputs_of(table, self.record.parameters)
+            return outputs_of(self.record.outputs, self.record.parameters)
         except SceneError as error:
             raise ResultError(f"the outputs of the scene are wrong: {error}") from error
 

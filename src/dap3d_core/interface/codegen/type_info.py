@@ -88,7 +88,7 @@ class TypeInfo:
                 return bool(named.get(name) == wanted)
             value = values[name]
             is_given = value is not None
-            return is_given == wanted if specs[name].is_reference else bool(value == wanted)
+            return is_given == wanted if specs[name].asks_presence else bool(value == wanted)
 
         for conditions, type_info in self.variants:
             if all(holds(name, wanted) for name, wanted in conditions.items()):

@@ -10,7 +10,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
-from dap3d_core.scene.tables import GROUND, ZERO, Element
+from dap3d_core.scene.tables import GROUND, LIMITS, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     READERS,
     Fault,
@@ -96,7 +96,8 @@ class Reader:
         self.fields = [self._field(name, spec) for name, spec in specs.items()]
         self.kinds = {name: spec.kind for name, spec in specs.items()}
         self.lists = {name: spec for name, spec in specs.items() if spec.size}
-        self.known = dict.fromkeys([*specs, *self.ends])
+        limits = LIMITS if getattr(type_info.type, "limit", "") else ()
+        self.known = dict.fromkeys([*specs, *self.ends, *limits])
         self.of_joints = {name: spec for name, spec in specs.items() if spec.gives}
         # Bodies and points that may be left out follow from the other fields of their slot.
         self.late = [
@@ -488,10 +489,9 @@ def read_elements(
         keyword: Reader(type_info, table, geometry, report, arguments, types.known)
         for keyword, type_info in types.of(table, elements).items()
     }
-    instances = []
-    for element in elements.values():
-        reader = readers.get(element.type) if type(element.type) is str else None
-        instance = reader.read(element) if reader is not None else None
-        if instance is not None:
-            instances.append(instance)
-    return instances
+    read = (
+        readers[element.type].read(element)
+        for element in elements.values()
+        if type(element.type) is str and element.type in readers
+    )
+    return [instance for instance in read if instance is not None]

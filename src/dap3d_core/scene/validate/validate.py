@@ -9,7 +9,7 @@ from dap3d_core.interface.types import acts_on_all
 from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.scene import Scene
-from dap3d_core.scene.tables import NAMED, fault_of_name
+from dap3d_core.scene.tables import LIMITS, NAMED, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
 
@@ -52,7 +52,8 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     forces = _read_forces(report, geometry, types, functions, joints)
     _report_twins(report, "joints", joints)
     _report_twins(report, "forces", forces)
-    contacts = _read_contacts(report, geometry, types, functions)
+    contacts = _read_contacts(report, geometry, types, functions, (joints, forces))
+    forces = [force for force in forces if not force.type_info.type.is_contact]
     collisions = _check_shapes_and_outputs(report, bodies, joints)
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
@@ -129,13 +130,23 @@ def _read_forces(
 
 
 def _read_contacts(
-    report: Collector, geometry: "Geometry", types: "Types", functions: list[Instance]
-) -> list[Instance]:
-    if not report.scene.contacts:
+    report: Collector, geometry: "Geometry", types: "Types", functions: list[Instance],
+    others: tuple[list[Instance], list[Instance]],
+) -> list[Instance]:  # fmt: skip
+    """Contacts, limits of joints, and stops that are rigid; others: joints and forces."""
+    joints, forces = others
+    limited = [j for j in joints if j.type_info.type.limit]  # type: ignore[attr-defined]
+    limited = [
+        j for j in limited if any(key in report.scene.joints[j.name].fields for key in LIMITS)
+    ]
+    rigid = [force for force in forces if force.type_info.type.is_contact]
+    if not (report.scene.contacts or limited or rigid):
         return []
-    from dap3d_core.scene.contacts.read_contacts import read_contacts
+    from dap3d_core.scene.contacts.read_contacts import limits_of, read_contacts, read_rigid
 
-    return read_contacts(report, geometry, types, functions)
+    elements = report.scene.contacts | limits_of(report, limited)
+    contacts = read_contacts(report, geometry, types, functions, elements) if elements else []
+    return [*contacts, *read_rigid(report, types, rigid)]
 
 
 def _check_requires(report: Collector) -> str:
