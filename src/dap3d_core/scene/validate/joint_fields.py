@@ -99,36 +99,34 @@ def _field(report: Collector, geometry: Geometry, joint: Element, name: str) -> 
 
 
 def brought_forces(
-    report: Collector, joints: Iterable[Instance], known: Callable[[str, Any], TypeInfo | None]
+    report: Collector,
+    joints: Iterable[Instance],
+    known: Callable[[str, Any], TypeInfo | None],
+    *,
+    left: bool,
 ) -> dict[str, Element]:
     """The forces that joints bring, by names that hold a dot, as those of a scene do not.
-
-    Beside contacts, whose modes do not know forces on reactions, they are left out with a note.
 
     Args:
         report: takes notes; its scene has the joints as written.
         joints: the joints.
         known: the type of a kind and keyword, if there is one.
+        left: they are left out with a note: modes of contacts do not know forces on reactions.
     """
     forces: dict[str, Element] = {}
-    scene = report.scene
     for joint in joints:
-        brings: tuple[str, ...] = getattr(joint.type_info.type, "brings", ())
+        brings: tuple[str, ...] = joint.type_info.type.brings  # type: ignore[attr-defined]
         if not brings or not joint.values[brings[0]]:
             continue
         field, keyword, place = brings
-        if scene.contacts or scene.collisions is not None or _any_collides(scene.shapes):
+        if left:
             report.note(f"joints.{joint.name}.{field} is left out beside contacts: it loads "
                         "bearings, and moves nothing where joints carry it")  # fmt: skip
             continue
         force = known("force", keyword)
         own = specs_of(force.type) if force else {}
-        written = scene.joints[joint.name].fields
+        written = report.scene.joints[joint.name].fields
         fields = {name: value for name, value in written.items() if name in own}
         name = f"{joint.name}.{field}"
         forces[name] = Element(name, keyword, fields | {place: joint.name})
     return forces
-
-
-def _any_collides(shapes: Mapping[str, Element]) -> bool:
-    return any(shape.fields.get("collides") for shape in shapes.values())

@@ -49,12 +49,12 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     types = Types(report, registry, allow_code=allow_code, to_install=_check_requires(report))
     inputs, functions = _read_signals(report, geometry, types)
     joints = read_elements(report, geometry, "joints", types, functions)
-    forces = _read_forces(report, geometry, types, functions, joints)
-    _report_twins(report, "joints", joints)
-    _report_twins(report, "forces", forces)
+    forces = read_elements(report, geometry, "forces", types, functions)
+    _report_twins(report, joints=joints, forces=forces)
     contacts = _read_contacts(report, geometry, types, functions, (joints, forces))
-    forces = [force for force in forces if not force.type_info.type.is_contact]
     collisions = _check_shapes_and_outputs(report, bodies, joints)
+    left = bool(contacts or collisions)
+    forces = _acting_forces(report, geometry, types, (joints, forces), left=left)
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
     report.raise_mistakes()
@@ -112,20 +112,23 @@ def _read_signals(
     return inputs, functions
 
 
-def _read_forces(
-    report: Collector,
-    geometry: "Geometry",
-    types: "Types",
-    functions: list[Instance],
-    joints: list[Instance],
-) -> list[Instance]:
-    """Forces, then those that joints bring."""
+def _acting_forces(
+    report: Collector, geometry: "Geometry", types: "Types",
+    others: tuple[list[Instance], list[Instance]], *, left: bool,
+) -> list[Instance]:  # fmt: skip
+    """Forces that are no contacts, and those that joints bring; others: joints and forces.
+
+    left: those that joints bring are left out, with a note, beside contacts.
+    """
+    joints, forces = others
+    forces = [force for force in forces if not force.type_info.type.is_contact]
+    if not any(joint.type_info.type.brings for joint in joints):  # type: ignore[attr-defined]
+        return forces
     from dap3d_core.scene.validate.elements import read_elements
     from dap3d_core.scene.validate.joint_fields import brought_forces
 
-    forces = read_elements(report, geometry, "forces", types, functions)
-    if brought := brought_forces(report, joints, types.known):
-        forces += read_elements(report, geometry, "forces", types, functions, brought)
+    if brought := brought_forces(report, joints, types.known, left=left):
+        forces += read_elements(report, geometry, "forces", types, elements=brought)
     return forces
 
 
@@ -204,10 +207,10 @@ def _note_unused_signals(
         note_unread_inputs(report, elements)
 
 
-def _report_twins(report: Collector, table: str, instances: Iterable[Instance]) -> None:
+def _report_twins(report: Collector, **tables: Iterable[Instance]) -> None:
     """Equal joints are mistakes; equal forces, or joints with other numbers, are noted."""
     seen: dict[Any, Instance] = {}
-    for instance in instances:
+    for table, instance in ((table, one) for table, some in tables.items() for one in some):
         references = tuple(
             v for v in instance.values.values() if not isinstance(v, (float, type(None)))
         )
