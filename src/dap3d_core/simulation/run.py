@@ -28,12 +28,7 @@ from dap3d_core.simulation.handover import (
 from dap3d_core.simulation.initial.singular_start import SingularStart
 from dap3d_core.simulation.initial.tolerances import motion_notes, rounding_notes
 from dap3d_core.simulation.initial_state import InitialState, start_notes
-from dap3d_core.simulation.output.error_estimate import (
-    QUICK,
-    StepLimits,
-    add_error,
-    ending_after,
-)
+from dap3d_core.simulation.output.error_estimate import QUICK, StepLimits, add_error, ending_after
 from dap3d_core.simulation.output.termination import accuracy_warnings, event_notes, why_stopped
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.redundancy.redundancy import Redundancy

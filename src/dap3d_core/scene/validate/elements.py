@@ -11,12 +11,7 @@ from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
 from dap3d_core.scene.tables import GROUND, LIMITS, ZERO, Element
-from dap3d_core.scene.validate.coerce_values import (
-    READERS,
-    Fault,
-    unread,
-    unusual_value_note,
-)
+from dap3d_core.scene.validate.coerce_values import READERS, Fault, unread, unusual_value_note
 from dap3d_core.scene.validate.geometry import (
     BAD,
     Geometry,
