@@ -18,7 +18,7 @@ from dap3d_core.testing import checks_for
 
 REGISTRY = load_registry()
 INSTALLED = {(t.kind, t.keyword): t.distribution for t in REGISTRY.listing() if t.state == "ok"}
-#: One pose: e2e/test_check_plugin.py runs ``dap3d check-plugin`` over all types.
+#: At one pose; plugins/dap3d-example checks its types at more.
 CHECKS = [(key, check) for key in INSTALLED for check in checks_for(REGISTRY.get(*key), poses=1)]
 #: Those of another package are run by its own tests.
 OWN = [(key, check) for key, check in CHECKS if INSTALLED[key] == "dap3d"]
