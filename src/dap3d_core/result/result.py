@@ -287,8 +287,8 @@ class Result(ResultDisplay, ResultContacts):
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
         """Reaction of a joint on each of its bodies, ground included: D^T lambda (spec 2).
 
-        What a joint brings besides is part of it, as the pressure angle of a ``gear``; friction
-        that a force element adds to a joint is not.
+        What a joint brings besides, such as the pressure angle of a ``gear``, is part of it; the
+        friction of a force element is not.
 
         Args:
             joint: name of the joint.
@@ -430,13 +430,12 @@ class Result(ResultDisplay, ResultContacts):
         Raises:
             ResultError: the scene in a file has some that are wrong.
         """
-        table = self.record.outputs
-        if not table:
+        if not self.record.outputs:
             return {}
         from dap3d_core.scene.expressions.outputs import outputs_of
 
         try:
-            return outputs_of(table, self.record.parameters)
+            return outputs_of(self.record.outputs, self.record.parameters)
         except SceneError as error:
             raise ResultError(f"the outputs of the scene are wrong: {error}") from error
 

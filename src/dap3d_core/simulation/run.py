@@ -337,7 +337,7 @@ class Run(RunState):
         """That a long run whose method was left to auto would be quicker by method joint."""
         model, work = self.evaluator.model, self.statistics().rhs * self.evaluator.model.body_count
         is_left_open = self.compiled.requested_method == "auto" and model.row_count > 0
-        if not is_left_open or self.evaluator.formulation.has_own_coordinates:
+        if not is_left_open or not self.evaluator.coordinates.are_of_bodies:
             return []
         if work < MUCH_WORK or any(i.implicit for i in self.integrations):
             return []

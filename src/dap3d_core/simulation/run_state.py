@@ -249,9 +249,7 @@ class RunState:
 
         In coordinates of a formulation it is that of other rates, and not recorded.
         """
-        if self.evaluator.formulation.has_own_coordinates:
-            return {}
-        part = self.evaluator.model.integrated_layout["velocities"]
+        part = self.evaluator.coordinates.body_velocities
         noise = np.zeros(6)
         for integration in self.integrations:
             rows = integration.rate_noise[part].reshape(-1, 6)

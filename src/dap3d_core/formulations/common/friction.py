@@ -18,6 +18,7 @@ import numpy as np
 from dap3d_core.assembly.arrays import FRICTION, JAMS, UNSETTLED, Floats, System
 from dap3d_core.assembly.evaluate import call_kinds, zero
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import where
 
 #: The multipliers have settled where a pass changes them by less than this part of the largest.
 SETTLED = 1e-10
@@ -95,8 +96,9 @@ def accelerate_fixed_point(system: System, passes: int) -> bool:
         return False
     size, largest_change, is_read = 0.0, 0.0, memory[(3 + 2 * DEPTH) * rows :]
     for k in range(rows):
-        size = max(size, abs(x[k]))
-        largest_change = max(largest_change, is_read[k] * abs(x[k] - guess[k]))
+        of_all, of_change = abs(x[k]), is_read[k] * abs(x[k] - guess[k])
+        size = where(of_all > size, of_all, size)
+        largest_change = where(of_change > largest_change, of_change, largest_change)
     if not largest_change > SETTLED * size:
         return True
     if passes == PASSES:

@@ -321,7 +321,7 @@ class _Quantities:
         place, first, size = {"r": (0, R, 3), "p": (3, P, 4), "rd": (0, V, 3), "w": (0, W, 3)}[
             attribute
         ]
-        if attribute == "w" or self._prepared.evaluator.formulation.has_own_coordinates:
+        if attribute == "w" or not self._prepared.evaluator.coordinates.are_of_bodies:
             return self._vector(body, first, size)
         # of the state as it is: that of the arrays is of unit length
         place += VELOCITIES * (body - 1) if attribute == "rd" else COORDINATES * (body - 1)

@@ -491,10 +491,9 @@ def read_elements(
         keyword: Reader(type_info, table, geometry, report, arguments, types.known)
         for keyword, type_info in types.of(table, elements).items()
     }
-    instances = []
-    for element in elements.values():
-        reader = readers.get(element.type) if type(element.type) is str else None
-        instance = reader.read(element) if reader is not None else None
-        if instance is not None:
-            instances.append(instance)
-    return instances
+    read = (
+        readers[element.type].read(element)
+        for element in elements.values()
+        if type(element.type) is str and element.type in readers
+    )
+    return [instance for instance in read if instance is not None]

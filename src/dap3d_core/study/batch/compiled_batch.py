@@ -190,7 +190,7 @@ class CompiledBatch:
         """
         work, count = self.integration.work, len(table)
         nt, width = len(work.rows), self.evaluator.model.row_layout["inputs"].start
-        own = self.evaluator.formulation.has_own_coordinates
+        own = not self.evaluator.coordinates.are_of_bodies
         diagnostics = np.zeros((count, driver.COLUMNS))
         points = driver.Points(
             at=np.array([0, 0, start, own], dtype=np.int64),

@@ -423,7 +423,8 @@ def wide_rates(
         reason = f"it has more than {MOST_BODIES_OF_PROGRAM} bodies"
     except (CompileError, TraceError) as error:
         reason = str(error)
-    is_tree = evaluator.formulation.has_own_coordinates and not evaluator.coordinates.kept
+    tree = evaluator.system.tree
+    is_tree = tree is not None and tree.kept is None
     if not is_tree or evaluator.model.state_count or evaluator.model.body_count > MOST_BODIES:
         return reason
     from dap3d_core.formulations.joint.lanes import tree_rates

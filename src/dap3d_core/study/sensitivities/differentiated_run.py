@@ -85,7 +85,7 @@ class DifferentiatedRun(Run):
         raw = work.rows[:count].copy()
         slopes = self._slopes_of(work.rows)[: count * work.rows.shape[1]]
         slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
-        if self.evaluator.formulation.has_own_coordinates and count:
+        if count and not self.evaluator.coordinates.are_of_bodies:
             slopes = self._derivative(lambda run, rows: run.evaluator.body_rows(rows), raw, slopes)
         if count:
             self.slopes.append(slopes)

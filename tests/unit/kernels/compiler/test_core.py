@@ -129,7 +129,13 @@ NOT_CALLED = {
         "assembly.collisions.solids": "clamp local put ball_box sphere_cylinder capsule_box slope "
         "_lowest",
         "assembly.collisions.boxes": "dot_axis apart boxes _edges _face _facing _clip",
-        "assembly.collisions.broad_phase": "sweep",
+        "assembly.collisions.supports": "radius_of put_global support curvature near_support",
+        "assembly.collisions.distance": "dot _weigh _volume _holds_origin _reduce _scaled nearest",
+        "assembly.collisions.convex": "gap_along unit cross attempt edges_of climb "
+        "bend flat_directions part_best touch_convex",
+        "assembly.collisions.manifold": "turn outline clip tangents spread inside crossing "
+        "at_plane_along put_points points_within",
+        "assembly.collisions.broad_phase": "meet place_of grid_pairs",
         "assembly.collisions.find": "touch",
         "integrators.moreau.dense": "solve_dense",
         "integrators.moreau.gauss_seidel": "sweep_bodies change_of",
