@@ -28,6 +28,17 @@ PASSES = 25
 DEPTH = 8
 
 
+def forces_by(t: float, system: System, loops: Any, Lam: Floats) -> Floats:
+    """(6 (n + 1),) the forces that depend on multipliers, for some (rows,), at the current poses.
+
+    Force and moment about the mass centre of each body, ground first, global axes.
+    """
+    force, minus = np.zeros_like(system.force), np.zeros_like(system.multipliers)
+    minus[system.row] = -Lam
+    call_kinds(FRICTION, FRICTION, t, system, loops, force, minus, minus)
+    return force
+
+
 @compiled
 def has_friction(system: System) -> bool:
     """True if forces of the scene depend on multipliers."""
@@ -67,15 +78,15 @@ def apply_friction(t: float, system: System, loops: Any) -> float:
 def memory_size(bodies: int, rows: int, matrix: int) -> int:
     """Numbers of ``System.friction``.
 
-    They are forces of the bodies (ground too), passes of the rows; then weights of the rows and a
-    copy of ``K`` (regularised.py).
+    They are forces of the bodies (ground too), passes of the rows, 1.0 for each row that is read,
+    0.0 for others; then weights of the rows and a copy of ``K`` (regularised.py).
     """
-    return 12 * bodies + (4 + 2 * DEPTH) * rows + matrix
+    return 12 * bodies + (5 + 2 * DEPTH) * rows + matrix
 
 
 @compiled
 def accelerate_fixed_point(system: System, passes: int) -> bool:
-    """True if ``multipliers`` have settled; else they become the start of the next pass."""
+    """True if ``multipliers`` that are read have settled; else they start the next pass."""
     x, rows = system.multipliers, system.multipliers.shape[0]
     memory = system.friction[2 * system.force.shape[0] :]
     guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows : 3 * rows]
@@ -83,9 +94,9 @@ def accelerate_fixed_point(system: System, passes: int) -> bool:
         for k in range(rows):
             guess[k] = x[k]
         return False
-    size, largest_change = 0.0, 0.0
+    size, largest_change, is_read = 0.0, 0.0, memory[(3 + 2 * DEPTH) * rows :]
     for k in range(rows):
-        of_all, of_change = abs(x[k]), abs(x[k] - guess[k])
+        of_all, of_change = abs(x[k]), is_read[k] * abs(x[k] - guess[k])
         size = where(of_all > size, of_all, size)
         largest_change = where(of_change > largest_change, of_change, largest_change)
     if not largest_change > SETTLED * size:

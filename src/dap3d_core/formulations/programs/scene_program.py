@@ -9,7 +9,6 @@ of its state left, computes that itself.
 import ctypes
 import inspect
 from collections.abc import Callable, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +16,6 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
 from dap3d_core.formulations import OUTCOMES, PROJECT, RHS, WATCH
-from dap3d_core.formulations.common import switching_functions
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, Varied, constants
 from dap3d_core.formulations.programs.ways import Results, merged
@@ -95,13 +93,6 @@ class Program(NamedTuple):
     failures: Callable[[], int]
 
 
-def formulation_module(evaluator: Evaluator) -> Any:
-    """The module that has the functions of an evaluator's formulation."""
-    own = evaluator.formulation.has_own_coordinates
-    name = evaluator.coordinates.equations if own else evaluator.formulation.name
-    return import_module(f"dap3d_core.formulations.{name}")
-
-
 def reads_rates(evaluator: Evaluator) -> bool:
     """True if a projection reads what the right-hand side leaves: where there are rows."""
     return evaluator.formulation.needs_joints and evaluator.length_count > 0
@@ -113,17 +104,16 @@ def results(evaluator: Evaluator, k: int, t_now: Any, y: Any, outcome: Any, stru
     outcome: of a projection, which is behind the right-hand side of its state.
     """
     with run_with_symbols():
-        module, loops = formulation_module(evaluator), python_loops(evaluator)
+        function, loops = evaluator.coordinates.function, python_loops(evaluator)
         if k == WATCH:
-            own = evaluator.formulation.has_own_coordinates
             values = np.zeros(len(evaluator.switches), dtype=object)
-            (module if own else switching_functions).watch(t_now, y, values, struct, loops)
+            function(WATCH)(t_now, y, values, struct, loops)
             return values
         rates = np.zeros(y.size, dtype=object)
-        module.rhs(t_now, y, rates, struct, loops)
+        function(RHS)(t_now, y, rates, struct, loops)
         if k == RHS:
             return rates
-        module.project(t_now, y, outcome, struct, loops)
+        function(PROJECT)(t_now, y, outcome, struct, loops)
         return outcome
 
 
@@ -204,7 +194,7 @@ def name_of(evaluator: Evaluator, size: int, numbers: bytes, varied: Varied = No
     for name, array in evaluator.system.walk():
         parts += [f"{name} {array.shape}", b"" if array.dtype == float else array.tobytes()]
     parts += [f"{name} {places.tolist()}" for name, places in (varied or {}).items()]
-    plain = inspect.unwrap(formulation_module(evaluator).rhs)
+    plain = inspect.unwrap(evaluator.coordinates.function(RHS))
     return names_of("program", [plain], *parts, *origin([write_program, constants]))[1]
 
 
