@@ -7,6 +7,7 @@ programs are made before.
 import time
 from functools import partial
 
+import loops
 import numpy as np
 import scenes
 from timing import wait_for_good_code
@@ -21,12 +22,13 @@ from dap3d_core.simulation.settings import integration_options
 ROUNDS = 15
 #: Scene, method, seconds of motion.
 CASES = (
-    ("pen1", "standard", 2.0),
-    ("bodies2", "unconstrained", 2.0),
+    ("pen1", "standard", 20.0),
+    ("bodies2", "unconstrained", 20.0),
     ("pen2", "standard", 2.0),
     ("fourbar3", "standard", 2.0),
     ("tri", "standard", 2.0),
     ("A03", "standard", 0.03),
+    ("ten four-bars", "standard", 0.3),
     ("chain of 8", "joint", 1.0),
 )
 
@@ -36,7 +38,7 @@ def measure():
     return [_row(*case, rtol) for case in CASES for rtol in (1e-6, 1e-9)]
 
 
-def _integration(compiled, t_end, rtol):
+def integration_of(compiled, t_end, rtol):
     """An integration at its start, and its evaluator."""
     start, evaluator = compiled.start(True, ()), compiled.evaluator
     store_reference_pivots(evaluator, 0.0, start.u)
@@ -48,16 +50,15 @@ def _integration(compiled, t_end, rtol):
 
 
 def _row(name, method, t_end, rtol):
-    scene = scenes.chain(8, "rev") if name == "chain of 8" else dap.load(_path(name))
-    compiled = dap.compile(scene, method=method)
-    _integration(compiled, t_end, rtol)[1].advance(10**15)
+    compiled = dap.compile(scene_of(name), method=method)
+    integration_of(compiled, t_end, rtol)[1].advance(10**15)
     wait_for_good_code()
     change_over.MAKE_AFTER, change_over.BESIDE = 0.0, False
     seconds, rows = {}, {}
     for k in range(ROUNDS):
         for way, least in (("general", np.inf), ("program", 0.0)):
             change_over.LOAD_AFTER = least
-            evaluator, integration = _integration(compiled, t_end, rtol)
+            evaluator, integration = integration_of(compiled, t_end, rtol)
             programs = change_over.ChangeOver(evaluator)
             programs.during(integration, lambda: None)  # makes and names the program
             begun = time.thread_time()
@@ -77,5 +78,8 @@ def _row(name, method, t_end, rtol):
     }
 
 
-def _path(name):
-    return name  # of a shipped model
+def scene_of(name):
+    """One made here, or a shipped model."""
+    made = {"chain of 8": lambda: scenes.chain(8, "rev"), "free body": lambda: scenes.free(1),
+            "ten four-bars": lambda: loops.fourbars(10, "sph")}  # fmt: skip
+    return made[name]() if name in made else dap.load(name)

@@ -38,6 +38,7 @@ import right_hand_side
 import scale
 import start
 import states
+import step_parts
 import streaming
 import study
 import tree_loops
@@ -115,6 +116,7 @@ def main():
         "contact": contact.measure,
         "lanes": lanes.measure,
         "programs": programs.measure,
+        "step_parts": step_parts.measure,
         "joint_motions": joint_motions.measure,
         "hard_cases": hard.measure,
         "long_time": hard.long_time.measure,

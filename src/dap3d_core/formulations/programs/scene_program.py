@@ -35,7 +35,7 @@ BEHIND = -1
 #: Among the indices of what was written: projections take all ways (ways.py).
 ALL_WAYS = -2
 #: Instructions of a program at most: larger scenes gain less, and take long to compile.
-MOST_INSTRUCTIONS = 20_000
+MOST_INSTRUCTIONS = 22_000
 ARGUMENTS = "double %t, ptr %y, i64 %y.1, ptr %out, i64 %out.1, ptr %system, ptr %loops"
 
 _PROGRAM = """
