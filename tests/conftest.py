@@ -20,13 +20,13 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 def pytest_collection(session):
     """As for threads of BLAS, no core is left for a second process that optimises code.
 
-    Slow tests need that code; quick ones have ended before it is there.
+    It would optimise all that is compiled, for as long as the tests themselves take. So a process
+    optimises once its unoptimised code has run for as long as that takes.
     """
-    gc.disable()  # nothing that is imported or collected is garbage
-    if "not slow" in session.config.option.markexpr:
-        from dap3d_core.kernels.compiler import background
+    from dap3d_core.kernels.compiler import background
 
-        background.core_count = lambda: 1
+    gc.disable()  # nothing that is imported or collected is garbage
+    background.core_count = lambda: 1
 
 
 @pytest.hookimpl(tryfirst=True)

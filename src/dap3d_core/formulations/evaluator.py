@@ -37,7 +37,13 @@ from dap3d_core.assembly.turns import (
     report_turns,
 )
 from dap3d_core.formulations import ACCEPTED, FORMULATIONS, REPORT, RHS, WATCH
-from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers, regrouped
+from dap3d_core.formulations.arrays import (
+    build_loops,
+    build_system,
+    load_numbers,
+    regrouped,
+    rows_read,
+)
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
 from dap3d_core.formulations.coordinates import Coordinates
 from dap3d_core.formulations.switches import Switch, switches_of
@@ -443,8 +449,9 @@ class Evaluator:
         )
         turns_alone = moving <= 1e-12 * turning / model.part_size**2
         w = np.where(turns_alone, turning / model.part_size**2, moving)
-        last = s.friction.size - s.K.size
-        s.friction[last - s.total.size : last][s.row] = np.where(np.isfinite(w) & (w > 0.0), w, 1.0)
+        last, size = s.friction.size - s.K.size, s.total.size
+        s.friction[last - size : last][s.row] = np.where(np.isfinite(w) & (w > 0.0), w, 1.0)
+        s.friction[last - 2 * size : last - size][s.row] = rows_read(model, self.loop_groups)
 
     @IGNORE_FLOAT_ERRORS
     def place(self, t: float, u: ArrayLike) -> None:

@@ -79,10 +79,9 @@ class ContactTable:
         for name in (shape,) if other is None else (shape, other):
             if canonical(name) not in self.names:
                 raise unknown("shape", name, self.names)
-            places.append(self.names.index(canonical(name)))
-        chosen = np.all([np.any(self.pair == k, axis=1) for k in places], axis=0)
-        found = self._part(chosen)
-        turned = found.pair[:, 0] != places[0]
+            places.append([k for k, one in enumerate(self.names) if one == canonical(name)])
+        found = self._part(np.all([np.isin(self.pair, k).any(axis=1) for k in places], axis=0))
+        turned = ~np.isin(found.pair[:, 0], places[0])
         sign = np.where(turned, -1.0, 1.0)[:, None]
         pair = np.where(turned[:, None], found.pair[:, ::-1], found.pair)
         return attrs.evolve(found, pair=pair, normal=sign * found.normal, force=sign * found.force)

@@ -118,9 +118,9 @@ class Scene(SceneTables, SceneDisplay, ContactTables):
         return self._add("inputs", name, {"value": value} | unknown)
 
     def add_shape(self, type: str, name: str | None = None, **fields: Any) -> str:
-        """Add a shape (box, sphere, capsule, cylinder, plane, cone, disk, line, mesh); its name.
+        """Add a shape (box, sphere, plane, mesh and others); its name.
 
-        It is drawn; with ``collides=True`` one of the first five meets others that do.
+        It is drawn; with ``collides=True`` it meets others that do, but lines, cones and disks.
 
         Raises:
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.

@@ -8,7 +8,7 @@ from dap3d_core.kernels.runtime.cache import jit_is_on
 
 
 @pytest.fixture(autouse=True)
-def _compiler():
+def _compiler(quick_libraries):
     if not jit_is_on():
         pytest.skip("compiled code is exported")
     if not any(shutil.which(name) for name in ("cc", "gcc", "clang")):

@@ -49,6 +49,7 @@ from dap3d_core.formulations.joint_loops.profile import (
 )
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import R, V, W
+from dap3d_core.kernels.scalar_math import where
 
 #: Pivots of dependent rows fall by LESS where compliances do; where they fall by less than HELD,
 #: the rows hold something themselves.
@@ -77,7 +78,7 @@ def size_of_positions(y: Floats, system: System) -> float:
     body, largest = system.body, 0.0
     for b in range(1, body.shape[0]):
         for c in range(R, R + 3):
-            largest = max(largest, abs(body[b, c]))
+            largest = where(abs(body[b, c]) > largest, abs(body[b, c]), largest)
     return system.settings[LENGTH] + largest
 
 
@@ -122,7 +123,9 @@ def size_of_velocities(y: Floats, system: System) -> float:
     body, largest, length = system.body, 0.0, system.settings[LENGTH]
     for b in range(1, body.shape[0]):
         for c in range(3):
-            largest = max(largest, abs(body[b, V + c]), length * abs(body[b, W + c]))
+            v, w = abs(body[b, V + c]), length * abs(body[b, W + c])
+            largest = where(v > largest, v, largest)
+            largest = where(w > largest, w, largest)
     return length + largest
 
 
@@ -227,6 +230,5 @@ def largest_lacking(system: System) -> float:
         first, place = kept.cuts[q, FIRST], kept.cuts[q, FIRST_ROW]
         for r in range(kept.cuts[q, ROW_COUNT]):
             size = abs(kept.right[first + r]) * system.weight[place + r]
-            if not size <= worst:
-                worst = size
+            worst = where((size > worst) | (size != size), size, worst)
     return worst

@@ -115,7 +115,7 @@ class MoreauIntegration(Integration):
     def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
         """As ``Integration.own_arrays``."""
         model = self._evaluator.model
-        shapes = 0 if model.collisions is None else len(model.collisions.names)
+        shapes = 0 if model.collisions is None else np.count_nonzero(model.collisions.body)
         return {"memory": np.full((KEPT * shapes + model.contact_count, 4), -1.0)}
 
     @IGNORE_FLOAT_ERRORS

@@ -1,6 +1,6 @@
 """A type that passed its examination, with everything its group loops are generated from."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import attrs
@@ -9,6 +9,9 @@ from dap3d_core.interface.codegen.instance_layout import InstanceLayout
 from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.types import TypeBase
+
+#: Condition of a variant: a field of a number names an input.
+INPUT = "input"
 
 
 @attrs.frozen
@@ -72,11 +75,16 @@ class TypeInfo:
         """Rows of a joint that constrain the bodies; 0 of other types."""
         return int(getattr(self.type, "rows", 0)) - len(self.layout.unknowns)
 
-    def chosen(self, values: Mapping[str, Any]) -> "TypeInfo":
-        """The variant for the values of an instance's fields; itself where none fits."""
+    def chosen(self, values: Mapping[str, Any], inputs: Collection[str] = ()) -> "TypeInfo":
+        """The variant for the values of an instance's fields; itself where none fits.
+
+        inputs: fields of numbers that name an input.
+        """
         specs = specs_of(self.type)
 
         def holds(name: str, wanted: Any) -> bool:
+            if wanted == INPUT and specs[name].by_name:
+                return name in inputs
             value = values[name]
             is_given = value is not None
             return is_given == wanted if specs[name].asks_presence else bool(value == wanted)

@@ -7,6 +7,7 @@ placed them, and the reported row.
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
+from operator import add
 from typing import Any
 
 import attrs
@@ -215,7 +216,12 @@ class _Quantities:
                 element = self.elements.joint(owner)
                 if element is None:
                     raise NotExportedError(name)
-                return self._action(element, slot, attribute, self._reaction(element, slot, joint))
+                wrench = self._reaction(element, slot, joint)
+                if owner in self._model.brought_forces:
+                    brought = self.elements.force(self._model.brought_forces[owner])
+                    assert brought is not None  # as every force
+                    wrench = tuple(map(add, wrench, self._wrench(brought, slot)))
+                return self._action(element, slot, attribute, wrench)
             found = self._coordinate(owner, joint, attribute)
             if found is not None:
                 return found

@@ -138,7 +138,12 @@ class Reader:
             if values[field.name] is None:
                 is_point = field.spec.kind == "point"
                 values[field.name] = ZERO if is_point else self.body_names[bodies[field.slot]]
-        type_info = self.type_info.chosen(values) if self.type_info.variants else self.type_info
+        type_info = self.type_info
+        if type_info.variants:
+            type_info = type_info.chosen(values, reading.inputs)
+            own = specs_of(type_info.type)  # with those of states that the variant has
+            added = own.keys() - specs_of(self.type_info.type).keys()
+            values |= {name: own[name].default for name in added}
         if shape is not None:
             from dap3d_core.interface.examine.examine import examine
             from dap3d_core.interface.examine.sized_types import sized
@@ -174,6 +179,12 @@ class _Reading:
         self.places: dict[str, Sequence[Located]] = {}  # of the entries of lists
         self.rows: dict[str, int] = {}  # of F, of fields that name functions and inputs
         self.good = True
+
+    @property
+    def inputs(self) -> set[str]:
+        """Fields that name an input: their rows follow those of functions."""
+        count = len(self.reader.function_index)
+        return {name for name, row in self.rows.items() if row > count}
 
     def refuse(self, name: str, what: str, nearest: str = "", remedy: str = "") -> None:
         """Report a mistake of a field, or of the element where the name is empty."""
@@ -481,14 +492,14 @@ def read_elements(
         elements: in place of those of the scene's table, by name.
     """
     arguments = arguments_of(functions)
+    elements = elements or getattr(report.scene, table)
     readers = {
         keyword: Reader(type_info, table, geometry, report, arguments, types.known)
         for keyword, type_info in types.of(table, elements).items()
     }
-    instances = []
-    for element in (elements or getattr(report.scene, table)).values():
-        reader = readers.get(element.type) if type(element.type) is str else None
-        instance = reader.read(element) if reader is not None else None
-        if instance is not None:
-            instances.append(instance)
-    return instances
+    read = (
+        readers[element.type].read(element)
+        for element in elements.values()
+        if type(element.type) is str and element.type in readers
+    )
+    return [instance for instance in read if instance is not None]

@@ -167,7 +167,7 @@ class BatchRunner:
         others = [o for o in reduction.outputs if not reduction.of_rows[o.name]]
         for k, point, of_run in zip(index, values, rows, strict=True) if others else ():
             _, model = self._rebuilder.load(point)
-            result = reduction.result(model, of_run, self.compiled_batch.evaluator)
+            result = reduction.result(model, of_run, self.compiled_batch.evaluator, point)
             batch.store(int(k), result, others)
 
     def _note_corrections(

@@ -47,7 +47,8 @@ def programs(records):
 
 
 @pytest.mark.parametrize(("model", "method"), [("pen1", "standard"), ("pen1", "joint"),
-                         ("fourbar2", "lsq"), ("bodies2", "unconstrained")])  # fmt: skip
+                         ("fourbar3", "joint"), ("fourbar2", "lsq"),
+                         ("bodies2", "unconstrained")])  # fmt: skip
 def test_bits_are_those_of_general_code(model, method, at_once):
     """And guards hold."""
     result = dap.simulate(model, method=method, **SETTINGS)
