@@ -9,30 +9,11 @@ import textwrap
 import pytest
 from hypothesis import settings
 
-from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.native import build
 
 if not jit_is_on():
     settings.register_profile("plain Python", max_examples=20)
     settings.load_profile("plain Python")
-
-
-@pytest.fixture(scope="session")
-def cache_of_libraries(tmp_path_factory):
-    return tmp_path_factory.mktemp("libraries")
-
-
-@pytest.fixture
-def quick_libraries(request, monkeypatch, cache_of_libraries):
-    """Quick tests export unoptimised code, which is made in a fraction of the time: the same bits.
-
-    Slow tests and verification/test_exported_models.py have optimised code.
-    """
-    if request.node.get_closest_marker("slow"):
-        return
-    monkeypatch.setattr(build, "OPTIMISED", objects.UNOPTIMISED)
-    monkeypatch.setattr(build, "cache_folder", lambda: cache_of_libraries)
 
 
 @pytest.fixture

@@ -31,6 +31,7 @@ class Scene(SceneTables, SceneDisplay, ContactTables):
         faults: mistakes found in reading (unknown keys, wrong tables); ``check`` reports them.
         notes: information about the choice of the file.
         included: the files of its sub-assemblies, by their names.
+        files: meshes that lie elsewhere until the scene is saved with them, as of an import.
     """
 
     def resolved(self) -> "Scene":

@@ -35,7 +35,7 @@ from dap3d_core.interface.codegen.kernel_arguments import (
 )
 from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.codegen.return_shapes import ShapeError, checked_shape, value_at
-from dap3d_core.interface.codegen.type_info import INPUT, TypeInfo
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.element_unknowns import unknown_names
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
@@ -307,11 +307,9 @@ def _check_conditions(type_: type[TypeBase], conditions: Mapping[str, Any], vari
     specs = specs_of(type_)
     for name, wanted in conditions.items():
         spec = specs.get(name)
-        if spec is not None and wanted == INPUT in spec.by_name:
-            continue
         allowed = spec.choices if spec is not None and spec.kind == "choice" else (True, False)
         known = spec is not None and (spec.kind == "choice" or spec.asks_presence)
-        if not known or wanted not in allowed:
+        if not known or wanted not in (*allowed, *(spec.by_name if spec else ())):
             raise PluginError(
                 f"{where_is(variant)} is the variant for {name} = {wanted!r}, "
                 f"which no choice, function, input or optional number of {type_.__name__} can be"

@@ -11,7 +11,13 @@ from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
 from dap3d_core.scene.tables import GROUND, LIMITS, ZERO, Element
-from dap3d_core.scene.validate.coerce_values import READERS, Fault, unread, unusual_value_note
+from dap3d_core.scene.validate.coerce_values import (
+    READERS,
+    Fault,
+    in_words,
+    unread,
+    unusual_value_note,
+)
 from dap3d_core.scene.validate.geometry import (
     BAD,
     Geometry,
@@ -125,7 +131,7 @@ class Reader:
             value = element.fields.get(field.name, _ABSENT)
             if value is _ABSENT and not (self.ends and field.spec.kind == "vector2"):
                 if field.spec.required:
-                    reading.refuse(field.name, f"is required{_of(field)}")
+                    reading.refuse(field.name, f"is required{in_words(field.spec)}")
                     continue
                 value = field.spec.default
             field.read(reading, field, value)
@@ -140,7 +146,7 @@ class Reader:
                 values[field.name] = ZERO if is_point else self.body_names[bodies[field.slot]]
         type_info = self.type_info
         if type_info.variants:
-            type_info = type_info.chosen(values, reading.inputs)
+            type_info = type_info.chosen(values, reading.named)
             own = specs_of(type_info.type)  # with those of states that the variant has
             added = own.keys() - specs_of(self.type_info.type).keys()
             values |= {name: own[name].default for name in added}
@@ -181,10 +187,10 @@ class _Reading:
         self.good = True
 
     @property
-    def inputs(self) -> set[str]:
-        """Fields that name an input: their rows follow those of functions."""
+    def named(self) -> dict[str, str]:
+        """Fields that name functions or inputs, whose rows follow those of functions."""
         count = len(self.reader.function_index)
-        return {name for name, row in self.rows.items() if row > count}
+        return {n: "input" if row > count else "function" for n, row in self.rows.items()}
 
     def refuse(self, name: str, what: str, nearest: str = "", remedy: str = "") -> None:
         """Report a mistake of a field, or of the element where the name is empty."""
@@ -242,7 +248,9 @@ class _Reading:
             P_i, P_j = fields.get("P_i"), fields.get("P_j")
             ends = two_ends(self.report, reader.geometry, self.key, P_i, P_j)
         else:
-            self.refuse(field.name, f"is required, by name or by its ends P_i and P_j{_of(field)}")
+            self.refuse(
+                field.name, f"is required, by name or by its ends P_i and P_j{in_words(field.spec)}"
+            )
         if ends is None:
             self.good = False
             return
@@ -455,22 +463,6 @@ _FIELD_READERS = {
 def counted(count: int) -> str:
     """A number of arguments, in words."""
     return "one argument" if count == 1 else "two arguments"
-
-
-def _of(field: _Field) -> str:
-    """The kind and the description of a field, for the message that it is missing."""
-    kinds = {
-        "vec3": "3 numbers",
-        "numbers": f"{field.spec.columns} numbers",
-        "matrix": "3x3 numbers",
-        "square": f"{field.spec.columns} numbers, or as many rows of as many",
-        "choice": "a word",
-        "table": "rows of numbers" if field.spec.by_rows else "numbers",
-        "functions": "names",
-        "input": "an input",
-    }
-    kind = kinds.get(field.spec.kind, f"a {field.spec.kind}")
-    return f" ({kind}: {field.spec.doc})" if field.spec.doc else f" ({kind})"
 
 
 def read_elements(

@@ -3,32 +3,17 @@
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
-from dap3d_core.formulations import RHS
 from dap3d_core.formulations.common.friction import PASSES
-from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.integrators import IMPLICIT, Integration, Status
-from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping.event_location import CHATTER
 from dap3d_core.integrators.stepping.integration_state import LOGGED
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.result import EventRecord, information
 from dap3d_core.simulation.failure.diagnosis import AHEAD, fastest_body, find_offender
+from dap3d_core.simulation.failure.refused_steps import describe_refusals
+from dap3d_core.simulation.failure.stall import describe_stall
 from dap3d_core.simulation.redundancy.contradictory_joints import find_contradiction
-
-#: What components are, by their letters in tolerances.
-WORDS = {
-    "r": "position",
-    "p": "orientation",
-    "v": "velocity",
-    "w": "angular velocity",
-    "z": "state of an element",
-}
-#: An iteration that converges slower than this limits the steps.
-SLOW = 0.3
-#: ``rounding_state`` where errors are rounding.
-AT_ROUNDING = 2
 
 REASONS = {
     Status.STEP_FLOOR: "the step size fell to the resolution of time",
@@ -72,6 +57,9 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
             f"{head}: a step of {step:g} s, as given, cannot be taken there; give a shorter step, "
             "or none, and rtol chooses the steps"
         )
+    words = describe_refusals(evaluator, integration)
+    if integration.status is Status.STEP_FLOOR and words:
+        message = f"{message} (refused so far: {words})"
     if integration.status is not Status.NOT_FINITE:
         culprit = find_contradiction(evaluator, t, y, rank)
         if culprit:
@@ -158,53 +146,3 @@ def _chatter(evaluator: Evaluator, integration: Integration) -> str:
         "of the run end it). On either side its law drives the motion back to the other; let the "
         "law change over a small range, as tanh does, or give it a range in which it stays as it is"
     )
-
-
-def describe_stall(evaluator: Evaluator, integration: Integration) -> str:
-    """What limits the steps of an integration that stalled, and what would change that."""
-    work = integration.work
-    what = _fastest(evaluator, integration)
-    if work.rounding_state == AT_ROUNDING:
-        limit = f"rounding of the rates limits them, first that of {what}"
-        remedy = (
-            "Larger tolerances (rtol, atol) let longer steps pass; inertias that differ less, or "
-            "a place nearer to the origin, make the rounding smaller"
-        )
-    elif not integration.implicit:
-        limit = f"what changes fastest is {what}"
-        remedy = (
-            f"Where that is stiff, as contact and friction at rest are, integrator {IMPLICIT.name} "
-            "or auto takes longer steps; else larger tolerances (rtol, atol) do"
-        )
-    elif work.convergence_rate > SLOW or work.last_rejected:
-        limit = (
-            "the iteration for the stages of a longer step does not converge, for a force or a row "
-            f"changes within it; what changes fastest is {what}"
-        )
-        remedy = (
-            "Let forces there change over a wider range (v_tol, w_tol of friction, k of contact), "
-            "or give a smaller rtol where rtol times a velocity is more than v_tol"
-        )
-    else:
-        limit = f"the error limits them, first that of {what}"
-        remedy = "Give larger tolerances (rtol, atol), or a larger atol for that quantity alone"
-    return f"At {work.h:.2g} s, {limit}. {remedy}"
-
-
-@IGNORE_FLOAT_ERRORS
-def _fastest(evaluator: Evaluator, integration: Integration) -> str:
-    """Quantity and body whose rate changes most in a step, by the tolerances."""
-    work, y, h = integration.work, integration.y, float(integration.work.h)
-    rates = np.zeros((2, len(y)))
-    for k in range(2):
-        argument = y + k * h * rates[0]
-        evaluator.functions[RHS](
-            integration.t + k * h, argument, rates[k], evaluator.system, evaluator.loops
-        )
-    size = work.error_size
-    scale = work.tolerance[at.ABSOLUTE, :size] + work.rtol * np.abs(y[:size])
-    change = np.abs(rates[1] - rates[0])[:size] / scale
-    worst = int(np.argmax(np.where(np.isfinite(change), change, np.inf)))
-    coordinates = evaluator.coordinates
-    name, body = WORDS[coordinates.quantities[worst]], int(coordinates.bodies[worst])
-    return f"the {name} of body {evaluator.model.body_names[body]}" if body >= 0 else f"a {name}"
