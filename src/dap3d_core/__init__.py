@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from dap3d_core.exchange import export
     from dap3d_core.formats.import_model import import_matlab, import_model
     from dap3d_core.interface import PluginError
-    from dap3d_core.native.export_model import export_model
+    from dap3d_core.native.export import export_model
     from dap3d_core.native.library import load_native
     from dap3d_core.plot import animate, plot
     from dap3d_core.registry import load_registry
@@ -74,7 +74,7 @@ _HOMES = {
     "equilibrium": ("simulation.equilibrium.equilibrium", "equilibrium"),
     "equilibrium_path": ("study.equilibrium_path", "equilibrium_path"),
     "export": ("exchange", "export"),
-    "export_model": ("native.export_model", "export_model"),
+    "export_model": ("native.export", "export_model"),
     "fit": ("study.fit.fit", "fit"),
     "import_matlab": ("formats.import_model", "import_matlab"),
     "import_model": ("formats.import_model", "import_model"),

@@ -36,7 +36,6 @@ OF_SEVERAL = {
     "docs/test_complete.py", "docs/test_contributing.py", "kernels/compiler/test_bits.py",
     "kernels/compiler/test_complex.py", "kernels/compiler/test_core.py",
     "kernels/compiler/test_refusals.py", "simulation/test_only_what_is_needed.py",
-    "study/sensitivities/test_adapters.py",
 }  # fmt: skip
 
 

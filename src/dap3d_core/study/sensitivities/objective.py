@@ -104,7 +104,7 @@ class Objective:
         Raises:
             ImportError: JAX is not installed.
         """
-        from dap3d_core.study.sensitivities.in_jax import in_jax
+        from dap3d_core.study.sensitivities.adapters import in_jax
 
         return in_jax(self, self.value_and_gradient)
 
@@ -114,7 +114,7 @@ class Objective:
         Raises:
             ImportError: PyTorch is not installed.
         """
-        from dap3d_core.study.sensitivities.in_torch import in_torch
+        from dap3d_core.study.sensitivities.adapters import in_torch
 
         return in_torch(self, self.value_and_gradient)
 
