@@ -214,6 +214,43 @@ def test_wheels_on_springs_are_refused_by_statics():
         dap.equilibrium(scene)
 
 
+def test_redundant_planets_share_their_load_evenly():
+    """Four planets, three rows too many: Willis for a held ring, no load of the sun's bearing."""
+    scene = wheels(sun=(0.0, 0.0), carrier=(0.0, 0.0))
+    for k in range(4):
+        at, planet = (
+            (0.06 * math.cos(k * math.pi / 2.0), 0.06 * math.sin(k * math.pi / 2.0)),
+            f"p{k}",
+        )
+        scene.add_body(planet, mass=0.4, Jp=(3e-4, 3e-4, 5e-4), r=(*at, 0.0))
+        hinge(scene, planet, "carrier", (*at, 0.0))
+        pair(scene, "sun", planet, f"inner{k}", teeth_i=20, teeth_j=40)
+        scene.add_joint("gear", f"outer{k}", joint_i=f"hinge_{planet}", P_j="ground.O",
+                        a_j="ground.z", teeth_i=40, teeth_j=100, internal=True)  # fmt: skip
+    torque(scene, "sun", 0.3)
+    result = dap.simulate(scene, t_end=0.5, dt=0.5, **TIGHT)
+    assert turned(result, "carrier") == pytest.approx(turned(result, "sun") / 6.0, rel=1e-9)
+    assert load(result, "hinge_sun") == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+    sizes = [np.linalg.norm(load(result, f"hinge_p{k}")) for k in range(4)]
+    assert sizes == pytest.approx([sizes[0]] * 4, rel=1e-9)
+
+
+def test_a_pressure_angle_is_varied_and_left_out_beside_contacts():
+    """30 N tan of it at each point of a sweep; a note where contacts leave it out."""
+    scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
+    pair(scene, "a", "b", teeth_i=20, teeth_j=40)
+    torque(scene, "a", 3.0)
+    torque(scene, "b", 6.0)
+    angles = [0.0, 0.2, 0.4]
+    found = dap.sweep(scene, {"joints.mesh.pressure_angle": angles},
+                      outputs="hinge_a.i.force.x", t_end=0.1, dt=0.1)  # fmt: skip
+    wanted = 30.0 * np.tan(angles)
+    assert found["hinge_a.i.force.x"].values == pytest.approx(wanted, abs=1e-9)
+    scene.add_shape("sphere", "tip", body="a", radius=0.01, collides=True)
+    notes = dap.compile(scene).notes
+    assert any("joints.mesh.pressure_angle is left out beside contacts" in note for note in notes)
+
+
 def test_helical_teeth_push_along_the_axis():
     """By tan(helix) of the tangential force, on both wheels."""
     scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))

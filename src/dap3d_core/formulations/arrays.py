@@ -157,6 +157,7 @@ def _contacts_of(
         rows[:, equations.ROW] = integers[:, layout.integers]
         rows[:, equations.BODY_I : equations.BODY_I + slots] = integers[:, :slots]
         rows[:, equations.STATE] = integers[:, layout.integers - 1]
+        rows[:, equations.LOADED] = group.type_info.type.along is not None  # type: ignore[attr-defined]
         table[group.members - first] = rows
     return table
 

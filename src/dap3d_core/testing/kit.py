@@ -173,8 +173,10 @@ def _of_joint(subject: SampledType) -> list[Check]:
     no_position = "" if subject.type.position_rows() else "it has no row at position level"
     no_form = "" if "C_dot" in subject.kernels.names() else "it defines no C_dot"
     ground = joints.against_ground(subject)
-    turns = ""
-    if subject.type.is_contact and subject.type.at is None:
+    turns = fewer = ""
+    if subject.type.is_contact and subject.type.along is not None:
+        fewer = "it has one row, and two that stay zero"
+    elif subject.type.is_contact and subject.type.at is None:
         turns = "its gap is an angle, whose rows are those of bodies that turn about its normal"
     checks = [
         Check("J", subject, no_position or turns, joints.jacobian),
@@ -183,7 +185,7 @@ def _of_joint(subject: SampledType) -> list[Check]:
         Check("gamma", subject, turns, joints.acceleration_side),
         Check("virtual power", subject, no_position or turns, joints.virtual_power),
         Check("assembly", subject, no_position or turns, joints.assembly),
-        Check("rank", subject, turns, joints.rank),
+        Check("rank", subject, turns or fewer, joints.rank),
         Check("frame", subject, ground, joints.frame),
         Check("action and reaction", subject, ground, joints.action_and_reaction),
     ]

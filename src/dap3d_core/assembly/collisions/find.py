@@ -138,6 +138,8 @@ class ShapeFinder:
         if len(s.apart):
             i, j = np.sort(s.body[pairs], axis=1).T
             pairs = pairs[~np.isin(i * (len(r) + 1) + j, s.apart)]
+        group, meets = s.bits[pairs].transpose(2, 0, 1)
+        pairs = pairs[((group & meets[:, ::-1]) != 0).any(axis=1)]
         convex = without_formula(s.kind[pairs])
         pairs, others = np.ascontiguousarray(pairs), pairs[convex]
         room = USUAL_POINTS * len(pairs) + 1

@@ -146,7 +146,7 @@ def _matrix(
     for k, c in enumerate(closed):
         if c in ways:
             A[:, 3 * k] -= table.mu[c] * full[:, 3 * k + 1 : 3 * k + 3] @ ways[c]
-            if A[3 * k, 3 * k] <= 0.0:
+            if A[3 * k, 3 * k] <= 0.0 and not table.load[c]:
                 raise JamError(table.names[c])
     return A, ways
 
@@ -156,16 +156,19 @@ def _solve(
     part: float = 1.0, *, loose: bool = False, **more: Any,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Forces (3 k,) with sliding friction, and accelerations; A, ways: of ``_matrix``."""
-    b = rows.free[rows.rows_of(closed)]
+    b, load = rows.free[rows.rows_of(closed)].copy(), table.load[closed]
+    for k, c in enumerate(closed):
+        if c in ways and load[k]:  # the column of its normal row is what a load of one does
+            b += A[:, 3 * k]
     mu = LOOSE * table.mu[closed] if loose else part * table.mu_s[closed]
     mu[[c in ways for c in closed]] = 0.0
-    x, left = solve_cone(A, b, mu, **more)
+    x, left = solve_cone(A, b, mu, load, **more)
     if left > 1e-6 and not more:
         raise JamError(table.names[closed[0]])
     a = A @ x + b
     for k, c in enumerate(closed):
         if c in ways:
-            x[3 * k + 1 : 3 * k + 3] = -table.mu[c] * x[3 * k] * ways[c]
+            x[3 * k + 1 : 3 * k + 3] = -table.mu[c] * (x[3 * k] + load[k]) * ways[c]
     return x, a
 
 
@@ -188,7 +191,8 @@ def _put(
     x = x if inner is None else inner
     for k, c in enumerate(closed):
         force, rate, frame = x[3 * k : 3 * k + 3], a[3 * k : 3 * k + 3], rows.frames[c]
-        if force[0] <= 0.0 and (rate[0] > ZERO * big or (len(closed) == 1 and rate[0] > -ZERO)):
+        is_pushed = force[0] > 0.0 or table.load[c]
+        if not is_pushed and (rate[0] > ZERO * big or (len(closed) == 1 and rate[0] > -ZERO)):
             continue  # it opens
         if c in ways:
             mode, way = 1.0, ways[c]
@@ -200,7 +204,7 @@ def _put(
         else:
             mode, way = 2.0, np.zeros(2)
         found.mode[c], found.way[c] = mode, way @ frame[1:]
-        if shares:
+        if shares or table.load[c]:  # what its row adds has next to no rounding then
             found.near[c] = force @ frame if mode == 2.0 else force[0] * frame[0]
 
 
@@ -212,9 +216,10 @@ def _share(table: ContactTable, closed: list[int], A: Floats) -> bool:
 
 
 def _own_rows(table: ContactTable, closed: list[int]) -> Integers:
-    """Rows along which contacts act: of smooth ones the normal alone."""
+    """Rows along which contacts act: of smooth ones the normal, of friction alone the second."""
     acts = np.ones((len(closed), 3), dtype=bool)
     acts[:, 1:] = (table.mu_s[closed] > 0.0)[:, None]
+    acts[table.load[closed] > 0.0] = False, True, False
     return np.flatnonzero(acts)
 
 

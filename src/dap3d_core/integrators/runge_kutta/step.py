@@ -46,12 +46,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Function,
     Y,
 )
-from dap3d_core.integrators.stepping.output import (
-    dense_state,
-    may_step,
-    needs_dense,
-    project_state,
-)
+from dap3d_core.integrators.stepping.output import dense_state, may_step, needs_dense, project_state
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.singular_poses import (
     is_approaching,

@@ -40,6 +40,15 @@ class StepCounts(NamedTuple):
     reports: int  # calls of report
 
 
+class Refusals(NamedTuple):
+    """Steps that an implicit integration refused so far, by the reason."""
+
+    error: int  # larger than the tolerance
+    iteration: int  # the iteration for the stages did not converge
+    singular: int  # its matrix was singular
+    worst: int  # component that changed most where the iteration did not converge, most often
+
+
 def off_constraints(y: Floats) -> Floats:
     """A state (n,) a little off its constraints: one pass of a projection brings it back."""
     noise = np.random.default_rng(0).standard_normal(y.size)
@@ -114,8 +123,9 @@ class Integration(Restorable):
     #: Whether its formulas are implicit; whether it goes on with its step where rates jump.
     implicit = False
     keeps_step = True
-    #: The compiled loop of the integrator.
+    #: The compiled loop of the integrator; its state at an instant within the last step.
     loop: Callable[..., None]
+    dense: Callable[[Any, float, Floats], None] = staticmethod(dense_state)
     #: (k, 14) contacts of shapes at reported instants: t, i, j, mode, gap, point, normal, force.
     contact_rows: Floats = np.zeros((0, 14))
     #: Whether programs of a scene's own may take the place of its functions.
@@ -281,7 +291,7 @@ class Integration(Restorable):
         work = self.work
         if not work.t_dense < t <= work.t_dense + work.h_dense:
             return None
-        return self._interpolated(dense_state, t)
+        return self._interpolated(type(self).dense, t)
 
     def _interpolated(self, state_at: Any, t: float) -> Floats:
         y = self.y
@@ -341,6 +351,11 @@ class Integration(Restorable):
             return None
         slope: Floats = self.work.k[0].copy()
         return slope
+
+    @property
+    def refusals(self) -> Refusals | None:
+        """Steps that an implicit integration refused; None of an explicit one."""
+        return None
 
     @property
     def largest_work(self) -> float:

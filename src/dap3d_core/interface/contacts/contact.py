@@ -9,7 +9,7 @@ from dap3d_core.interface.types import Joint, TypeBase
 #: What authors define.
 DECLARED = ("gap", "normal")
 #: What they may define besides.
-OPTIONAL = ("at", "reach")
+OPTIONAL = ("at", "reach", "along")
 #: Fields that a material gives.
 MATERIAL = ("mu", "mu_s", "e", "law")
 #: Values of ``law``.
@@ -43,6 +43,11 @@ class Contact(Joint):
     which alone acts: the rate of the gap is the angular velocity of body i less that of body j
     along it.
 
+    Dry friction of a size of its own, as of seals, has no gap and no normal, but ``along``: the
+    unit vector that body i slides along at the point ``at``, or without that turns about.
+    ``prepare`` returns what it is where it slides, ``mu``, and the most where it sticks, ``mu_s``,
+    N or N m.
+
     Rows, right-hand sides, slip and friction follow from them: one of the normal, two across it, of
     the velocity of body i at the point of contact less that of body j. The gap must be such that
     its rate is that velocity along the normal, as of every distance between smooth surfaces
@@ -64,12 +69,13 @@ class Contact(Joint):
     points: ClassVar[int] = 1
     is_smooth: ClassVar[bool] = False
     at: ClassVar[Any] = None
+    along: ClassVar[Any] = None
 
     def __init_subclass__(cls, of: type[TypeBase] | None = None, **conditions: Any) -> None:
         if "kernel_names" not in vars(cls):
             cls.states = {"mode": 1, "way": 3, "near": 3}
             _add_material(cls)
-            if all(hasattr(cls, name) for name in DECLARED):
+            if cls.along is not None or all(hasattr(cls, name) for name in DECLARED):
                 for name, kernel in _kernels(cls).items():
                     setattr(cls, name, kernel)
         if of is not None:  # class RigidStop(Contact, of=SpringStop, k=False): without a stiffness
@@ -97,8 +103,9 @@ def _add_material(class_: type) -> None:
         "law": choice(LAWS, "poisson", doc="of impacts: whose coefficient e is"),
         "touch": choice((False, True), False, doc="the bodies are moved until they touch at t = 0"),
     }
-    if class_.is_smooth:  # type: ignore[attr-defined]
-        fields = {"e": e} | {name: hidden(SMOOTH[name]) for name in ("mu", "mu_s")}
+    if class_.is_smooth or class_.along is not None:  # type: ignore[attr-defined]
+        fields = {name: hidden(0.0) for name in ("e", "mu", "mu_s")}
+        fields |= {} if class_.along is not None else {"e": e}  # type: ignore[attr-defined]
     fields |= {name: hidden(value) for name, value in HIDDEN.items()}
     own = dict(vars(class_).get("__annotations__", {}))
     for name, field in fields.items():
@@ -125,15 +132,15 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     # imported here: finding types by keyword does not need kernels
     from dap3d_core.interface.codegen.kernel_arguments import parameters
     from dap3d_core.interface.codegen.specialise import bound_kernel
-    from dap3d_core.interface.contacts import rates, rows, turning
+    from dap3d_core.interface.contacts import grips, rates, rows, turning
 
-    names_of = [*DECLARED, *(n for n in OPTIONAL if getattr(class_, n, None) is not None)]
+    names_of = [n for n in (*DECLARED, *OPTIONAL) if getattr(class_, n, None) is not None]
     declared = {name: getattr(class_, name) for name in names_of}
     specs = _specs(class_)
     kinds = {name: spec.kind for name, spec in specs.items()}
     has_j = any(slot_of(name) == "j" or spec.kind == "vector2" for name, spec in specs.items())
     calls, wanted = {}, {}
-    for short, name in {"gap": "gap", "c": "at", "n": "normal"}.items():
+    for short, name in {"gap": "gap", "c": "at", "n": "normal", "e": "along"}.items():
         if name not in declared:
             continue
         names = parameters(declared[name])
@@ -159,9 +166,11 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         needed = dict.fromkeys(n for short in given for n in wanted.get(short, ()))
         return bound_kernel(kernel, given, needed, every)
 
-    if "at" not in declared:
-        moments: dict[str, Any] = turning.KERNELS
-        return {name: bound(kernel) for name, kernel in moments.items()}
+    special: dict[str, Any] = turning.KERNELS if "at" not in declared else {}
+    if "along" in declared:
+        special = grips.KERNELS if "at" in declared else grips.TURNING
+    if special:
+        return {name: bound(kernel) for name, kernel in special.items()}
     return {
         "C": bound(rows.position),
         "J": bound(rows.blocks if has_j else rows.block),

@@ -28,6 +28,7 @@ class CollisionShapes:
         corners: (m, 2) first row in ``vertices`` and number of the vertices of a hull.
         vertices: (k, 3) m, about the centres of their hulls.
         material: (m,) index.
+        bits: (m, 2) groups that each is in, and that it meets.
         mu, e: (materials, materials) coefficients of pairs.
         apart: (k,) i (n + 1) + j, i < j, ascending, of bodies that do not meet.
     """
@@ -41,6 +42,7 @@ class CollisionShapes:
     corners: "Integers"
     vertices: "Floats"
     material: "Integers"
+    bits: "Integers"
     mu: "Floats"
     e: "Floats"
     apart: "Integers"

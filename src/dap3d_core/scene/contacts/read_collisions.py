@@ -56,6 +56,7 @@ def read_collisions(
         kind=np.array([KINDS[s.type] for s in meeting]), body=np.array([s.body for s in meeting]),
         at=at, p=p, size=size, corners=np.column_stack([np.cumsum(counts) - counts, counts]),
         vertices=np.concatenate(hulls), material=material, mu=mu, e=e,
+        bits=np.array([[s.values["group"], s.values["meets"]] for s in meeting]),
         apart=np.array(keys, dtype=np.int64),
     )  # fmt: skip
 
@@ -167,7 +168,7 @@ def _hull(report: Collector, shape: Shape) -> Floats:
     from scipy.spatial import ConvexHull, QhullError
 
     name = shape.values["file"]
-    path = mesh_file(report.scene.folder, name)
+    path = report.scene.files.get(name) or mesh_file(report.scene.folder, name)
     found = path.what if isinstance(path, Fault) else read_mesh(path, name)
     if not isinstance(found, str):
         try:

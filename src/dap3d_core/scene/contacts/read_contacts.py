@@ -98,7 +98,7 @@ def read_rigid(report: Collector, types: Types, stops: Sequence[Instance]) -> li
             what = "is of the spring that carries the stop, which is rigid without k"
             report.add(("forces", stop.name, field), element.fields[field], what,
                        remedy="give k, or leave it out")  # fmt: skip
-        found.append(attrs.evolve(stop, values=stop.values | SMOOTH | HIDDEN))
+        found.append(attrs.evolve(stop, values={"e": 0.0} | stop.values | SMOOTH | HIDDEN))
     return found
 
 

@@ -63,6 +63,11 @@ def _axis(value: Any) -> Any:
     return axis
 
 
+def _bits(value: Any) -> Any:
+    fits = type(value) is int and 0 <= value < 2**32
+    return value if fits else Fault("should be a whole number from 0 to 2^32 - 1")
+
+
 def _heights(value: Any) -> Any:
     rows = value if isinstance(value, tuple) else ()
     sizes = {len(row) if isinstance(row, tuple) else 0 for row in rows}
@@ -99,6 +104,8 @@ _ROD = {"radius": _NUMBER, "length": _NUMBER, "at": _AT, "axis": _AXIS, "color":
 _MEETS = {
     "collides": Field(truth_of, False, "whether it meets other shapes that collide"),
     "material": Field(text_of, "", "of its surface; that of [collisions] when left out"),
+    "group": Field(_bits, 1, "bits of the groups that it is in"),
+    "meets": Field(_bits, 1, "bits of the groups that it meets; one of both has to"),
 }
 
 #: Type -> its fields, besides body.

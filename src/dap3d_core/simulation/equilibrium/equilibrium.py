@@ -55,7 +55,7 @@ class Equilibrium:
         self, compiled: CompiledModel, rest: EquilibriumSolution, notes: tuple[str, ...] = ()
     ) -> None:
         """Compose an equilibrium of a model and what was found."""
-        self.compiled, self._rest = compiled, rest
+        self.compiled = compiled
         self.u, self.Lam = read_only(rest.u), read_only(rest.multipliers)
         self.r, self.p, _, _ = split(self.u)
         self.angles = read_only(rest.angles)

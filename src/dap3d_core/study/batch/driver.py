@@ -24,7 +24,7 @@ from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, STARTING
 
 # Entries of ``at``: the current point, whether its run has begun, how to start; whether states are
 # in coordinates of the formulation's own, and rows have to be brought to those of bodies.
-POINT, BEGUN, START, OWN, AT_SIZE = range(5)
+POINT, BEGUN, START, OWN = range(4)
 # Start from the state as given, from the corrected state, or correct it and do not run.
 UNCORRECTED, CORRECT, CORRECT_ONLY = range(3)
 # Columns of ``diagnostics`` after those of the start: status, rows, steps, right-hand sides, and
@@ -47,7 +47,7 @@ class Points(Arrays):
         **dict.fromkeys(("first_switches", "first_lengths"), MATRIX),
     }
 
-    at: Integers  # (AT_SIZE,)
+    at: Integers  # (4,)
     places: Integers  # (w,) indices in par, body, metric and constants of a tree, concatenated
     table: Floats  # (k, w) the numbers at these indices
     y0: Floats  # (k, n) states to start from

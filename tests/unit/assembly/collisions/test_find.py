@@ -32,7 +32,8 @@ def finder(kinds, sizes):
     return ShapeFinder(CollisionShapes(
         tuple(map(str, range(m))), np.array(kinds), np.arange(1, m + 1), np.zeros((m, 3)),
         np.tile([1.0, 0.0, 0.0, 0.0], (m, 1)), sizes, corners, np.concatenate(hulls),
-        np.zeros(m, dtype=np.int64), *np.zeros((2, 1, 1)), np.zeros(0, dtype=np.int64),
+        np.zeros(m, dtype=np.int64), np.ones((m, 2), dtype=np.int64), *np.zeros((2, 1, 1)),
+        np.zeros(0, dtype=np.int64),
     ))  # fmt: skip
 
 

@@ -144,7 +144,7 @@ NOT_CALLED = {
         "formulations.jumps.multipliers": "rotate seek_active",
         "formulations.jumps.rounds": "kick has_crossed stop",
         "formulations.jumps.held_joints": "place_alone solve_free",
-        "formulations.contacts.cone": "residual_of sweep",
+        "formulations.contacts.cone": "residual_of shorten sweep",
         "formulations.contacts.equations": (
             "accelerate add_columns add_friction column force_of friction_of_one has_settled "
             "inverse invert is_given is_sliding mode_of row_of "

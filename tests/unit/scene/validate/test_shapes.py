@@ -110,6 +110,8 @@ def test_good_shapes_are_read_with_their_defaults(tmp_path):
         "color": "tab:blue",
         "collides": False,
         "material": "",
+        "group": 1,
+        "meets": 1,
     }
     assert (floor.body, floor.values["axis"]) == (0, (0.0, 0.0, 1.0))
 
