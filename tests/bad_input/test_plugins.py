@@ -14,13 +14,13 @@ import textwrap
 import numpy as np
 import pytest
 from support.own_types import registry_of
+from support.plain import jit_is_on
 from tests.e2e.conftest import COMMAND, environment
 
 import dap3d_core as dap
 from dap3d_core.cli import main
 from dap3d_core.interface import Joint, PluginError, Point, point
 from dap3d_core.kernels import row, sub
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 HEAD = """
 import os, random, sys, time

@@ -13,9 +13,9 @@ import threading
 
 import numpy as np
 import pytest
+from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 compiling = pytest.mark.skipif(not jit_is_on(), reason="plain Python takes long for this")
 

@@ -5,6 +5,7 @@ import pytest
 from support.motions import Motion
 from support.scenes import case_names, cases, scene_for
 
+import dap3d_core as dap
 from dap3d_core.assembly.arrays import FRICTION
 from dap3d_core.assembly.evaluate import call_kinds
 from dap3d_core.formulations.evaluator import Evaluator
@@ -12,11 +13,10 @@ from dap3d_core.interface.fields import specs_of
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation
 from dap3d_core.model.state_layout import join, split
-from dap3d_core.registry import load_registry
 from dap3d_core.scene import check as checked
 from dap3d_core.simulation.linearization.tangent import tangent_matrices
 
-REGISTRY = load_registry()
+REGISTRY = dap.load_registry()
 #: Those that read reactions need a joint; of friction see below.
 FORCES = [
     (keyword, values)

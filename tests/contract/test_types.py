@@ -10,13 +10,13 @@ import pytest
 from support.motions import Motion, derivative
 from support.scenes import case_names, cases, scene_for
 
+import dap3d_core as dap
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
-from dap3d_core.registry import load_registry
 from dap3d_core.scene import check as checked
 from dap3d_core.testing import checks_for
 
-REGISTRY = load_registry()
+REGISTRY = dap.load_registry()
 INSTALLED = {(t.kind, t.keyword): t.distribution for t in REGISTRY.listing() if t.state == "ok"}
 #: At one pose; plugins/dap3d-example checks its types at more.
 CHECKS = {key: checks_for(REGISTRY.get(*key), poses=1) for key in INSTALLED}

@@ -12,9 +12,9 @@ from click.testing import CliRunner
 from support.outside import isolated, pip
 from support.process import environment
 
+import dap3d_core as dap
 from dap3d_core.cli.app import dap3d as group
 from dap3d_core.interface.hooks import EXTENSIONS, GROUPS
-from dap3d_core.registry import load_registry
 
 #: Kind -> the file that the package brings to try it.
 SAMPLES = dict.fromkeys((*GROUPS, *EXTENSIONS), "scene.toml") | {"importer": "model.type"}
@@ -46,7 +46,7 @@ def test_the_package_is_complete(kind, tmp_path):
     (dependency,) = project["project"]["dependencies"]
     source = folder / "src" / module / "__init__.py"
     if kind in GROUPS:
-        type_info = load_registry().with_file(source).get(kind, "My.own-Type")
+        type_info = dap.load_registry().with_file(source).get(kind, "My.own-Type")
         assert bool(type_info.derived) == dependency.startswith("dap3d[derive]>=")
         assert type_info.type.__name__ == "MyOwnType"
         assert "My.own-Type" in (folder / "scene.toml").read_text()
@@ -133,7 +133,7 @@ def test_every_keyword_makes_a_class(name, class_name, tmp_path):
     """Also those that start with a digit, or whose class would hide a name."""
     new_plugin(tmp_path / "p", name)
     file = tmp_path / "p" / "src" / f"dap3d_{name}" / "__init__.py"
-    assert load_registry().with_file(file).get("joint", name).type.__name__ == class_name
+    assert dap.load_registry().with_file(file).get("joint", name).type.__name__ == class_name
 
 
 def test_a_keyword_that_is_taken_is_refused_and_may_be_forced(refuse, dap3d):

@@ -13,10 +13,8 @@ from pathlib import Path
 import numpy as np
 
 import dap3d_core as dap
-from dap3d_core.registry import load_registry
-from dap3d_core.scene import SceneError, check, parse
+from dap3d_core.scene import check, parse
 from dap3d_core.scene.files.line_numbers import lines_of
-from dap3d_core.simulation import SimulationError
 from fuzz.scenes import events_of
 
 #: A case that computes for longer hangs, s; kernels that are not cached are compiled in it, too.
@@ -67,7 +65,7 @@ def file_of(data, name="scene.toml"):
 @functools.cache
 def registry():
     """The installed types, found once."""
-    return load_registry()
+    return dap.load_registry()
 
 
 def read(path):
@@ -75,7 +73,7 @@ def read(path):
     try:
         scene = dap.load(path)
         return scene, check(scene, registry())
-    except SceneError as error:
+    except dap.SceneError as error:
         examine_mistakes(error, path)
         return None, error
 
@@ -136,7 +134,7 @@ def run(scene, events=()):
         return result.status, result
     except _Enough:
         return "went on", None
-    except SimulationError as error:
+    except dap.SimulationError as error:
         examine_words(str(error), scene)
         return str(error), error.result
 
@@ -201,7 +199,7 @@ def check_any_scene(data):
         examine_text(scene)
         try:
             words, result = run(scene)
-        except SceneError as error:  # settings that a run alone can judge
+        except dap.SceneError as error:  # settings that a run alone can judge
             examine_mistakes(error, path)
             return "refused"
         if result is not None:

@@ -9,8 +9,8 @@ import numpy as np
 from hypothesis import strategies as st
 from support.matlab import MODELS, SMALL
 
-from dap3d_core.formats.import_model import import_matlab
-from dap3d_core.scene import SceneError, check, parse
+import dap3d_core as dap
+from dap3d_core.scene import check, parse
 from fuzz.acceptable import registry, strict
 from fuzz.damage import flipped, seeds
 
@@ -117,8 +117,8 @@ def check_model(data):
         for name, text in files.items():
             Path(folder, name).write_bytes(text.encode("utf-8", "surrogatepass"))
         try:
-            scene, report = import_matlab(folder, registry())
-        except SceneError as error:
+            scene, report = dap.import_matlab(folder, registry())
+        except dap.SceneError as error:
             _examine(error, folder)
             return "refused"
         finally:

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 from support.process import REPOSITORY
 
-from dap3d_core.formats.import_model import import_model
-from dap3d_core.scene import SceneError
+import dap3d_core as dap
 from fuzz.acceptable import registry, strict
 from fuzz.damage import seeds
 
@@ -129,11 +128,11 @@ def check_model_file(data):
         _watched[:] = [Path(folder)]
         try:
             with strict(HANG):
-                scene, report = import_model(path, registry=registry())
+                scene, report = dap.import_model(path, registry=registry())
                 assert scene.bodies
                 assert str(list(report.translated)) is not None
                 words = "read"
-        except SceneError as error:
+        except dap.SceneError as error:
             for mistake in error.mistakes:
                 assert mistake.what, mistake
                 assert mistake.file, mistake

@@ -21,7 +21,6 @@ from support.ended import EndedError
 import dap3d_core as dap
 from dap3d_core.result import ResultError
 from dap3d_core.result.file.checksum import write_checksums
-from dap3d_core.simulation import SimulationError
 from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
 from fuzz.acceptable import examine_result, strict
 from fuzz.damage import seeds
@@ -241,7 +240,7 @@ def _resume(path):
             return "went on"
         except ResultError as error:
             return _refused(error, path)
-        except SimulationError as error:
+        except dap.SimulationError as error:
             if error.result is not None:
                 examine_result(error.result)
             return "failed"

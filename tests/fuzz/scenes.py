@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 import dap3d_core as dap
 from dap3d_core.model.rotations import rotation
-from dap3d_core.simulation.events.event import Event
 
 EVENT = "# event: "
 METHODS = ("auto", "auto", "standard", "penalty", "lsq", "unconstrained")
@@ -282,4 +281,4 @@ def scenes(draw, bodies=6):
 def events_of(text):
     """The events in the comments at the top of a text."""
     lines = [line for line in text.splitlines() if line.startswith(EVENT)]
-    return [Event(**json.loads(line.removeprefix(EVENT))) for line in lines]
+    return [dap.Event(**json.loads(line.removeprefix(EVENT))) for line in lines]

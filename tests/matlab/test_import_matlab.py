@@ -11,8 +11,6 @@ from support.matlab import write
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
 from dap3d_core.model.rotations import rotation
-from dap3d_core.registry import load_registry
-from dap3d_core.scene import SceneError
 from dap3d_matlab.import_matlab import translate
 from dap3d_matlab.translate.bodies import parameters_of, rotation_of
 
@@ -35,7 +33,7 @@ def mistakes(tmp_path):
 
     def call(**files):
         folder = write(tmp_path / "small", **files)
-        with pytest.raises(SceneError) as caught:
+        with pytest.raises(dap.SceneError) as caught:
             dap.import_matlab(folder)
         return [str(m).replace(f"{folder}/", "") for m in caught.value.mistakes]
 
@@ -214,7 +212,7 @@ def test_joints_are_accepted_by_their_types(tmp_path, word):
     text = f"J = Joint_struct; J.type = '{word}'; J.{given};\nJoints = [J];\n"
     if word == "tran":
         text = text.replace("[0 -1 0 1 0 0 0 0 1]", "eye(3)")
-    if word not in load_registry().keywords("joint"):
+    if word not in dap.load_registry().keywords("joint"):
         pytest.fail(f"the type {word} is not installed")
     scene, _ = dap.import_matlab(write(tmp_path, inJoints=text))
     assert scene.joints["J1"].type == word
@@ -255,7 +253,7 @@ def test_forces(read, word):
 @pytest.mark.parametrize("word", FORCES)
 def test_forces_are_accepted_by_their_types(tmp_path, word):
     given, _ = FORCES[word]
-    if word not in load_registry().keywords("force"):
+    if word not in dap.load_registry().keywords("force"):
         pytest.fail(f"the type {word} is not installed")
     text = f"S = Force_struct; S.type = '{word}'; S.{given};\nForces = [S];\n"
     scene, _ = dap.import_matlab(write(tmp_path, inForces=text))
@@ -429,10 +427,10 @@ def test_a_stub_for_the_force_of_the_user(tmp_path):
     assert report.user_force == text
     (tmp_path / "plugin.py").write_text(report.stub)
     with pytest.raises(PluginError, match="write it here"):
-        load_registry().with_file(tmp_path / "plugin.py").get("force", "user")
+        dap.load_registry().with_file(tmp_path / "plugin.py").get("force", "user")
     filled = report.stub.replace('        raise NotImplementedError("write it here")\n', "")
     (tmp_path / "plugin.py").write_text(filled)
-    type_info = load_registry().with_file(tmp_path / "plugin.py").get("force", "user")
+    type_info = dap.load_registry().with_file(tmp_path / "plugin.py").get("force", "user")
     assert type_info.layout.slots == ("i", "j")
 
 
@@ -483,13 +481,13 @@ def test_import_model_knows_the_folder_by_its_file(tmp_path):
     scene, report = dap.import_model(folder)
     assert (scene, report) == dap.import_matlab(folder)
     assert dap.import_model(folder, format="matlab") == (scene, report)
-    with pytest.raises(SceneError, match="takes no options of packages, links, joints"):
+    with pytest.raises(dap.SceneError, match="takes no options of packages, links, joints"):
         dap.import_model(folder, positions={"J1": 1.0})
     more = write(tmp_path / "more", user_force="x = 1;")
-    with pytest.raises(SceneError, match=r"user_force\.m.*would be left out"):
+    with pytest.raises(dap.SceneError, match=r"user_force\.m.*would be left out"):
         dap.import_model(more, strict=True)
-    with pytest.raises(SceneError, match="is a file; a MATLAB model is a folder"):
+    with pytest.raises(dap.SceneError, match="is a file; a MATLAB model is a folder"):
         dap.import_model(folder / "inBodies.m", format="matlab")
     (folder / "inBodies.m").unlink()
-    with pytest.raises(SceneError, match="is a folder"):
+    with pytest.raises(dap.SceneError, match="is a folder"):
         dap.import_model(folder)

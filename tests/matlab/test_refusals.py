@@ -7,7 +7,7 @@ from support.matlab import SMALL, write
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.scene import MISSING, SceneError
+from dap3d_core.scene import MISSING
 from dap3d_matlab.language.parse import LARGEST_FILE
 
 
@@ -22,7 +22,7 @@ def refused(tmp_path, registry):
 
     def call(**files):
         folder = write(tmp_path / "small", **files)
-        with pytest.raises(SceneError) as caught:
+        with pytest.raises(dap.SceneError) as caught:
             dap.import_matlab(folder, registry)
         return [str(m).replace(f"{folder}/", "") for m in caught.value.mistakes]
 
@@ -53,7 +53,7 @@ def test_folders_that_hold_no_model(tmp_path):
         "a\0b": "there is no such folder",
         "n" * 300: "cannot be read",
     }.items():
-        with pytest.raises(SceneError) as caught:
+        with pytest.raises(dap.SceneError) as caught:
             dap.import_matlab(tmp_path / name)
         assert words in str(caught.value), name
     with pytest.raises(TypeError, match="folder should be text or a path, not 3"):
@@ -126,13 +126,13 @@ def test_all_mistakes_of_all_files_at_once(refused):
 
 def test_mistakes_carry_file_line_key_and_value(tmp_path):
     folder = write(tmp_path, **changed("inPoints", "P3.Bindex = 2", "P3.Bindex = 7"))
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         dap.import_matlab(folder)
     (mistake,) = caught.value.mistakes
     assert (mistake.file, mistake.line) == (str(folder / "inPoints.m"), 3)
     assert (mistake.key, mistake.value) == ("P3.Bindex", 7)
     folder = write(tmp_path, **changed("inJoints", "J1.iPindex = 1; ", ""))
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         dap.import_matlab(folder)
     assert caught.value.mistakes[0].value is MISSING
 

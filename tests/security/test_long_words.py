@@ -10,7 +10,7 @@ from support.matlab import SMALL
 from support.matlab import write as write_matlab
 
 import dap3d_core as dap
-from dap3d_core.scene import SceneError, parse
+from dap3d_core.scene import parse
 
 LENGTH = 900_000
 
@@ -21,7 +21,7 @@ LENGTH = 900_000
 def test_a_text_of_digits_in_place_of_a_number(word):
     text = SCENE.replace("mass = 2.0", f'mass = "{word}"')
     assert text != SCENE
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         dap.compile(parse(text))
     (mistake,) = caught.value.mistakes
     assert (mistake.key, mistake.what) == ("bodies.stone.mass", "should be a number, not text")
@@ -40,5 +40,5 @@ def test_a_chain_of_names_is_refused_wherever_it_begins(tmp_path):
     for before in ("", "1", "x" * 1000 + " ", "y."):
         text = f"{SMALL['inBodies.m']}\nz = {before}{'a.' * 120}b;\n"
         folder = write_matlab(tmp_path / f"chain{len(before)}", inBodies=text)
-        with pytest.raises(SceneError, match="joins more than 100 names by dots"):
+        with pytest.raises(dap.SceneError, match="joins more than 100 names by dots"):
             dap.import_matlab(folder)

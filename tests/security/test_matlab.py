@@ -8,7 +8,6 @@ from support.matlab import SMALL, write
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.scene import SceneError
 
 pytest.importorskip("tree_sitter_matlab")
 
@@ -27,7 +26,7 @@ def test_what_acts_is_reported_and_not_done(tmp_path, monkeypatch, line):
     """With file and line; the rest of the folder is read."""
     monkeypatch.chdir(tmp_path)
     folder = write(tmp_path / "model", inBodies=f"{SMALL['inBodies.m']}{line}\n")
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         dap.import_matlab(folder)
     assert any("inBodies.m:4" in str(m) for m in caught.value.mistakes), str(caught.value)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["model"]
@@ -45,14 +44,14 @@ LONG = {
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["brackets", "nested"])
 def test_a_file_that_takes_for_ever(tmp_path, name):
-    with pytest.raises(SceneError):
+    with pytest.raises(dap.SceneError):
         dap.import_matlab(write(tmp_path / "model", inBodies=LONG[name]))
 
 
 @pytest.mark.parametrize(("name", "said"), [("products", "1000000"), ("comments", "comments of")])
 def test_a_file_that_takes_for_ever_is_refused_at_once(tmp_path, name, said):
     folder = write(tmp_path / "model", inBodies=LONG[name][: 4 * 1024].rpartition("\n")[0])
-    with pytest.raises(SceneError, match=said):
+    with pytest.raises(dap.SceneError, match=said):
         dap.import_matlab(folder)
 
 
@@ -79,7 +78,7 @@ def test_pipes_and_devices(tmp_path):
     folder = write(tmp_path / "model", inPoints=None, inForces=None)
     os.mkfifo(folder / "inPoints.m")
     (folder / "inForces.m").symlink_to("/dev/zero")
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         dap.import_matlab(folder)
     assert sum("not a regular file" in str(m) for m in caught.value.mistakes) == 2
 

@@ -15,7 +15,7 @@ from support.process import REPOSITORY, environment, run
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.scene import SceneError, check
+from dap3d_core.scene import check
 
 #: Runs a job under an audit hook and prints the events.
 WATCHED = """
@@ -121,11 +121,11 @@ def test_nothing_of_a_scene_a_result_or_a_matlab_folder_is_run(folder):
 def test_a_models_own_file_is_named_and_not_run(folder):
     text = hostile.text_of_scene() + '[forces.own]\ntype = "trap"\n'
     scene = dap.load(hostile.write(folder / "model", text))
-    with pytest.raises(SceneError, match=r"plugin\.py.*not run unless it is allowed") as caught:
+    with pytest.raises(dap.SceneError, match=r"plugin\.py.*not run unless it is allowed") as caught:
         check(scene, dap.load_registry())
     assert "--allow-code" in str(caught.value)
     assert not (folder / "trapped").exists()
-    with pytest.raises((SceneError, PluginError), match="trap"):
+    with pytest.raises((dap.SceneError, PluginError), match="trap"):
         check(scene, dap.load_registry(), allow_code=True)
     assert (folder / "trapped").exists()  # the trap works
 

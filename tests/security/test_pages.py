@@ -12,7 +12,7 @@ from support import hostile
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.result import EventRecord, Result
+from dap3d_core.result import EventRecord
 
 VENDOR = REPOSITORY / "src" / "dap3d_core" / "view" / "vendor"
 #: sha256 of the file that tools/vendor_three.py made of three.js 0.187.0.
@@ -35,7 +35,7 @@ def result(tmp_path_factory):
         settings={**run.settings, bad: bad, "__proto__": {"x": bad}},
         known_versions={bad: bad},
     )
-    return Result(run.summary, run.arrays, record, run._make_origin)
+    return dap.Result(run.summary, run.arrays, record, run._make_origin)
 
 
 class Page(HTMLParser):

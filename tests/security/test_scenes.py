@@ -8,7 +8,7 @@ import os
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.scene import SceneError, check
+from dap3d_core.scene import check
 from dap3d_core.scene.files.read_toml import LARGEST_FILE
 
 BODY = "[bodies.b]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n"
@@ -18,7 +18,7 @@ def refusal(path, text=None):
     """What is said of a scene; without the limits it would take minutes."""
     if text is not None:
         path.write_text(text, encoding="utf-8")
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         check(dap.load(path), dap.load_registry())
     return str(caught.value)
 
@@ -43,7 +43,7 @@ def test_what_is_no_file_is_not_opened(tmp_path):
     (tmp_path / "zero.toml").symlink_to("/dev/zero")
     assert "not a regular file" in refusal(tmp_path / "zero.toml")
     for name in ("https://example.org/scene.toml", "file:///etc/passwd", "a\0b"):
-        with pytest.raises(SceneError):
+        with pytest.raises(dap.SceneError):
             dap.load(name)
 
 
@@ -55,7 +55,7 @@ def test_very_many_names_are_refused_before_the_memory_is_gone(tmp_path):
     text = "".join(f"[bodies.k{k}]\nmass = -1\n" for k in range(count))
     (tmp_path / "scene.toml").write_text(text)
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         check(dap.load(tmp_path / "scene.toml"), dap.load_registry())
     assert len(caught.value.mistakes) == count
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss < most + 2**18  # kB: 7 kB a body

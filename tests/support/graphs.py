@@ -8,10 +8,10 @@ share). The static order relies on that.
 
 import numpy as np
 
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.linear.ldlt.factor import assemble, factor
 from dap3d_core.linear.ldlt.plan import make_plan
 from dap3d_core.linear.ldlt.saddle_point import solve_saddle
+from support.plain import jit_is_on
 
 # ------------------------------------------------------------------ graphs
 

@@ -1,12 +1,13 @@
 """Types that a test makes for itself, without a package or a file for them."""
 
-from dap3d_core.registry import Registry, load_registry
+import dap3d_core as dap
+from dap3d_core.registry import Registry
 from dap3d_core.registry.discovery import Source
 
 
 def registry_of(*types):
     """The installed types and these, as if a package brought them."""
-    sources = {key: list(found) for key, found in load_registry().sources.items()}
+    sources = {key: list(found) for key, found in dap.load_registry().sources.items()}
     for type_ in types:
         key = (type_.kind, type_.keyword)
         sources.setdefault(key, []).append(Source(*key, type_.__module__, type=type_))

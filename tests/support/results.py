@@ -2,19 +2,19 @@
 
 import numpy as np
 
+import dap3d_core as dap
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
 from dap3d_core.model.state_layout import join, y_from_u
-from dap3d_core.registry import load_registry
-from dap3d_core.result import Result, ResultWriter, RunMetadata
+from dap3d_core.result import ResultWriter, RunMetadata
 from dap3d_core.result.arrays import COLUMNS
-from dap3d_core.scene import Scene, check
+from dap3d_core.scene import check
 
 CONTROLLED = dict(rtol=1e-8, atol=1e-10, step=None, project=True, correct=True, conservative=True)
 
 
 def model_of(scene):
-    return build_model(check(scene, load_registry()))
+    return build_model(check(scene, dap.load_registry()))
 
 
 def about_z(angle):
@@ -40,7 +40,7 @@ def result_of(scene, rows, model=None, method="standard", **more):
     model = model or model_of(scene)
     given = dict(settings=CONTROLLED, integrator="dop853", method=method) | more
     record = RunMetadata(scene_text=scene.to_toml(), **given)
-    return Result.of_run(model, rows, record, lambda: Evaluator(model, method))
+    return dap.Result.of_run(model, rows, record, lambda: Evaluator(model, method))
 
 
 MASS, ARM, RATE, PIVOT = 3.0, 0.4, 2.5, np.array([0.3, -0.2, 0.5])
@@ -49,7 +49,7 @@ X = np.array([1.0, 0.0, 0.0])
 
 def circling_scene():
     """A bob on a ball joint away from the origin, without gravity; P is beyond its mass centre."""
-    scene = Scene(name="circling")
+    scene = dap.Scene(name="circling")
     scene.add_body("bob", mass=MASS, Jp=[0.2, 0.3, 0.4], r=PIVOT + ARM * X, w=[0, 0, RATE],
                    r_dot=[0, RATE * ARM, 0])  # fmt: skip
     scene.add_point("Q", body="ground", sPp=PIVOT)
@@ -77,7 +77,7 @@ def circling(nt=21, outputs=None, **more):
 
 def drifting(nt=11, joint=False, **more):
     """Two free bodies, each with constant velocity and a spin about a principal axis."""
-    scene = Scene(name="drifting")
+    scene = dap.Scene(name="drifting")
     scene.add_body("a", mass=2.0, Jp=[1.0, 2.0, 3.0], r=[1, 0, 0])
     scene.add_body("b", mass=5.0, Jp=[0.1, 0.2, 0.3], r=[0, -2, 1])
     if joint:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
+import dap3d_core as dap
 from dap3d_core.interface.fields import slot_of, specs_of
 from dap3d_core.model.rotations import rotation
-from dap3d_core.scene import Scene
 from dap3d_core.testing.samples.sampled_type import own_values
 
 
@@ -38,7 +38,7 @@ def scene_for(type_info, rng, *, ground=None, values=None):
         values: of choices, and whether functions are given, for a variant of the type.
     """
     values = values or {}
-    scene = Scene(name="contract")
+    scene = dap.Scene(name="contract")
     owner = {"i": "b1", "j": "b2", "k": "b3"}
     for name in owner.values():
         L = rng.uniform(-0.3, 0.3, (3, 3))

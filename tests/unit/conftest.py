@@ -8,8 +8,7 @@ import textwrap
 
 import pytest
 from hypothesis import settings
-
-from dap3d_core.kernels.runtime.cache import jit_is_on
+from support.plain import jit_is_on
 
 if not jit_is_on():
     settings.register_profile("plain Python", max_examples=20)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.scene import Scene
 
 M = np.array([[80.81722, 2.31941332208709], [2.31941332208709, 0.29784188199686]])
 K0 = np.array([[-80.95, -2.59951685249872], [-2.59951685249872, -0.80329488458618]])
@@ -25,7 +24,7 @@ PRINTED = {
 
 def bicycle(speed):
     """The bicycle, upright at a forward speed; x forward, y to the left, z up."""
-    scene = Scene(name="bicycle")
+    scene = dap.Scene(name="bicycle")
     v = {"r_dot": [speed, 0, 0]}
     scene.add_body("rear", mass=2.0, Jp=np.diag([0.0603, 0.12, 0.0603]), r=[0, 0, 0.3],
                    w=[0, speed / 0.3, 0], **v)  # fmt: skip

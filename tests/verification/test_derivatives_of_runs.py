@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
 from support.bouncing import bouncing
+from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}

@@ -7,7 +7,7 @@ from support.own_types import registry_of
 from support.unknown_types import OnCurve
 
 import dap3d_core as dap
-from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation import CompiledModel
 
 G = 9.81
 REGISTRY = registry_of(*ON_REACTIONS, WornBrake, OnCurve)
@@ -127,14 +127,14 @@ def test_sliders_that_load_themselves(integrator):
 @pytest.mark.parametrize("integrator", ["dop853", "adams", "radau"])
 def test_a_brake_that_loads_itself_too_much_jams(integrator):
     """With k > 1 no load fits: the run ends, and names the force."""
-    with pytest.raises(SimulationError, match=r"force s0: the reactions .* jams"):
+    with pytest.raises(dap.SimulationError, match=r"force s0: the reactions .* jams"):
         dap.simulate(compiled(sliders(1.5), "standard"), integrator=integrator, **SETTINGS)
 
 
 def test_a_jam_in_the_course_of_a_run_keeps_what_was_computed():
     """An event sets the gain beyond one at 0.2 s: the run ends there, and names the force."""
     event = dap.Event(lambda t, _: t - 0.2, action=lambda instant: instant.set("s0", k=1.5))
-    with pytest.raises(SimulationError, match="force s0") as caught:
+    with pytest.raises(dap.SimulationError, match="force s0") as caught:
         dap.simulate(compiled(sliders(0.5), "standard"), events=[event], **SETTINGS)
     assert caught.value.result.t[-1] == pytest.approx(0.2)
 
@@ -161,9 +161,9 @@ def test_reactions_that_only_their_joint_knows_are_refused():
 def test_analyses_that_know_no_reactions_refuse_them():
     """Statics and inverse dynamics name the forces that they cannot take."""
     model = compiled(drum())
-    with pytest.raises(SimulationError, match="reactions of joints: leave brake"):
+    with pytest.raises(dap.SimulationError, match="reactions of joints: leave brake"):
         dap.equilibrium(model)
-    with pytest.raises(SimulationError, match="leave brake out"):
+    with pytest.raises(dap.SimulationError, match="leave brake out"):
         dap.inverse(model, dap.simulate(model, **SETTINGS), actuators=["press"])
 
 

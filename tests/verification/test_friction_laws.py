@@ -5,10 +5,10 @@ from inspect import signature
 import numpy as np
 import pytest
 
-from dap3d_core.registry import load_registry
+import dap3d_core as dap
 from dap3d_joints.coulomb import fading
 
-REGISTRY = load_registry()
+REGISTRY = dap.load_registry()
 MU, V_TOL, RADIUS = 0.3, 1e-3, 0.2
 
 

@@ -9,11 +9,11 @@ first term left out is below 1e-12 within the guard.
 import numpy as np
 import pytest
 from support.own_types import registry_of
+from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.interface import Body, Force, Function, Joint, Point, body, function, number, point
 from dap3d_core.kernels import atan2, cos, log, norm2, scale, sin, sqrt, sub, where
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.testing import check_type
 
 pytest.importorskip("sympy")

@@ -10,8 +10,6 @@ from scipy.linalg import eigvals
 
 import dap3d_core as dap
 from dap3d_core.model.rotations import rotation
-from dap3d_core.scene import Scene
-from dap3d_core.simulation.linearization.linearization import Linearization
 from dap3d_core.simulation.linearization.operating_point import operating_point
 from dap3d_core.simulation.linearization.sparse_modes import lowest_eigenvalues
 
@@ -35,7 +33,7 @@ def hinge(scene, name, P_i, P_j):
 
 def rods(count, name="rods"):
     """A chain of uniform rods of 1 m and 1 kg that hangs on hinges about y."""
-    scene = Scene(name=name)
+    scene = dap.Scene(name=name)
     for k in range(count):
         scene.add_body(f"b{k}", mass=1.0, Jp=np.diag(ROD), r=[0, 0, -k - 0.5])
         scene.add_point(f"top{k}", f"b{k}", [0, 0, 0.5])
@@ -59,7 +57,7 @@ def test_weights_that_springs_carry():
     A ball under two springs of 40 N/m and 1 m, drawn out by m g / k each: up and down
     sqrt(k_sum / m), sideways sqrt(g / length) of the drawn length, as a pendulum.
     """
-    scene = Scene(name="balance")
+    scene = dap.Scene(name="balance")
     scene.add_body("ball", mass=2.0, Jp=[0.06] * 3, r=[0, 0, -1.0 - 2.0 * G / 80.0])
     for name in ("one", "other"):
         scene.add_force("ptp", name, P_i="ball.O", P_j="ground.O", k=40.0, l0=1.0)
@@ -73,7 +71,7 @@ def test_weights_that_springs_carry():
 
 def test_inverted_pendulum():
     """Standing on its hinge the same rod falls at the same rate, and dap3d says that it does."""
-    scene = Scene(name="inverted")
+    scene = dap.Scene(name="inverted")
     scene.add_body("b", mass=1.0, Jp=np.diag(ROD), r=[0, 0, 0.5])
     scene.add_point("foot", "b", [0, 0, -0.5])
     hinge(scene, "J", "foot", "ground.O")
@@ -88,7 +86,7 @@ def test_parallelogram():
 
     Lagrange: (2/3 m + m) l^2 phi'' = -(2 m l / 2 + m l) g phi.
     """
-    scene = Scene(name="parallelogram")
+    scene = dap.Scene(name="parallelogram")
     scene.add_body("left", mass=1.0, Jp=np.diag(ROD), r=[0, 0, -0.5])
     scene.add_body("right", mass=1.0, Jp=np.diag(ROD), r=[1, 0, -0.5])
     scene.add_body("bar", mass=1.0, Jp=np.diag(ROD[::-1]), r=[0.5, 0, -1])
@@ -132,7 +130,7 @@ def test_double_pendulum_with_springs_and_dampers():
 def test_furuta_pendulum():
     """An arm that turns freely about z carries a pendulum: a zero pair and one frequency."""
     m, L, h, Ja, J, Jz = 0.4, 0.3, 0.2, 0.05, 0.007, 0.001
-    scene = Scene(name="Furuta")
+    scene = dap.Scene(name="Furuta")
     scene.add_body("arm", mass=1.0, Jp=np.diag([0.01, 0.05, Ja]), r=[0, 0, 0])
     scene.add_body("pendulum", mass=m, Jp=np.diag([J, J, Jz]), r=[L, 0, -h])
     scene.add_point("tip", "arm", [L, 0, 0])
@@ -152,7 +150,7 @@ def test_chain_of_point_masses(count):
 
     Each frequency is there in both planes. Masses spin freely: 3 n zero pairs besides.
     """
-    scene = Scene(name="string")
+    scene = dap.Scene(name="string")
     for k in range(count):
         scene.add_body(f"b{k}", mass=1.0, Jp=0.1 * np.eye(3), r=[0, 0, -k - 1.0])
         scene.add_joint("sph-sph", f"J{k}", P_i=f"b{k}.O", P_j=f"b{k - 1}.O" if k else "ground.O",
@@ -167,7 +165,7 @@ def test_chain_of_point_masses(count):
 
 def line_of_masses(count):
     """Masses on a rail, springs between them and to both ends."""
-    scene = Scene(name="line")
+    scene = dap.Scene(name="line")
     scene.add_point("end", "ground", [count + 1.0, 0, 0])
     for k in range(count):
         scene.add_body(f"b{k}", mass=1.0, Jp=0.1 * np.eye(3), r=[k + 1.0, 0, 0])
@@ -207,7 +205,7 @@ def test_sparse_modes_are_the_dense_ones():
                         k=10.0, c=2.0)  # fmt: skip
     point = operating_point(scene, None, 0.0, False)
     sparse = lowest_eigenvalues(point.equations, point.redundancy.rank.dependencies, 8)
-    dense = Linearization(point)
+    dense = dap.Linearization(point)
     np.testing.assert_allclose(sparse.values, dense.eigenvalues[:8], rtol=RTOL)
     shapes = (point.equations.U @ sparse.vectors)[:, ::2]
     of_dense = dense.modes[:, :4]
@@ -218,7 +216,7 @@ def test_sparse_modes_are_the_dense_ones():
 
 def disk(R, m, spin):
     A, C = m * R * R / 4, m * R * R / 2
-    scene = Scene(name="disk")
+    scene = dap.Scene(name="disk")
     scene.add_body("disk", mass=m, Jp=np.diag([A, C, A]), r=[0, 0, R], w=[0, spin, 0],
                    r_dot=[spin * R, 0, 0])  # fmt: skip
     scene.add_joint("disk", "road", body_i="disk", radius=R)
@@ -249,7 +247,7 @@ def test_rolling_disk(factor):
 
 def top(spin, tilt=0.0, turn=0.0):
     """A heavy top on its tip; spin about its axis beside the precession ``turn`` about z."""
-    scene = Scene(name="top")
+    scene = dap.Scene(name="top")
     p = np.array([np.cos(tilt / 2), np.sin(tilt / 2), 0, 0])
     axis = rotation(p)[:, 2]
     w = spin * axis + [0, 0, turn]
@@ -303,7 +301,7 @@ def test_satellite(axis):
     """
     J, spin = np.array([1.0, 2.0, 3.0]), 5.0
     p = np.array([0.9, 0.1, 0.3, -0.2]) / np.linalg.norm([0.9, 0.1, 0.3, -0.2])
-    scene = Scene(name="satellite")
+    scene = dap.Scene(name="satellite")
     scene.add_body("b", mass=3.0, Jp=np.diag(J), p=p, r=[1, 2, 3], r_dot=[0.3, 0, -1],
                    w=rotation(p) @ (spin * np.eye(3)[axis]))  # fmt: skip
     a, b = (axis + 1) % 3, (axis + 2) % 3
@@ -323,7 +321,7 @@ def test_spinning_structure():
     """
     m, k, l0, spin = 2.0, 50.0, 1.0, 3.0
     length = k * l0 / (k - 0.5 * m * spin**2)
-    scene = Scene(name="dumb-bell")
+    scene = dap.Scene(name="dumb-bell")
     for name, side in (("a", -0.5), ("b", 0.5)):
         scene.add_body(name, mass=m, Jp=0.1 * np.eye(3), r=[side * length, 0, 0],
                        r_dot=[0, side * length * spin, 0], w=[0, 0, spin])  # fmt: skip
@@ -347,7 +345,7 @@ def test_governor():
     tilt = np.arccos(c)
     p = np.array([np.cos(tilt / 2), 0, -np.sin(tilt / 2), 0])
     r = rotation(p) @ [0, 0, -half]
-    scene = Scene(name="governor")
+    scene = dap.Scene(name="governor")
     scene.add_body("shaft", mass=1.0, Jp=np.diag([0.1, 0.1, 0.2]), w=[0, 0, turn])
     scene.add_body("rod", mass=m, Jp=np.diag(ROD), p=p, r=r, w=[0, 0, turn],
                    r_dot=np.cross([0, 0, turn], r))  # fmt: skip

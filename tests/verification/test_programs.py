@@ -1,18 +1,21 @@
 """Programs of scenes: every shipped model, formulation and integrator has the bits of general code.
 
 Elements with unknowns, states, friction and tables among them, as far as the scenes of the example
-package have them. Rows are compared as numbers: 0.0 equals -0.0.
+package have them. Rows are compared as numbers: 0.0 equals -0.0. Programs are optimised in the long
+verification, and in unit/formulations/programs.
 """
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.plain import jit_is_on
 from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.formulations.programs import change_over, scene_program
-from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.simulation import SimulationError
+from dap3d_core.kernels.compiler import objects
 
 pytestmark = [
     pytest.mark.slow,
@@ -28,9 +31,16 @@ BRANCHING = {"A02-1", "A02-2", "A04"}
 NAMES = ("r", "p", "rd", "w", "rdd", "wd", "Lam")
 
 
+def unoptimised(text, results, path):
+    return objects.compile_ir(text, objects.UNOPTIMISED)
+
+
 @pytest.fixture(autouse=True)
-def at_once(monkeypatch):
+def at_once(monkeypatch, request):
     """Programs are made at the first call, in this process."""
+    if not request.node.get_closest_marker("long"):
+        monkeypatch.setattr(scene_program, "path_of", lambda name: None)
+        monkeypatch.setattr(change_over, "objects", SimpleNamespace(optimised=unoptimised))
     monkeypatch.setattr(change_over, "MAKE_AFTER", 0.0)
     monkeypatch.setattr(change_over, "BESIDE", False)
     monkeypatch.setattr(change_over, "_records", {})
@@ -38,12 +48,14 @@ def at_once(monkeypatch):
     return monkeypatch
 
 
-#: Each model is of a kind of its own, but for those of engineers, whose elements others have too.
+#: Each model is of a kind of its own, but for those of engineers, whose elements others have too,
+#: and the row of forty loops.
+LONG = {"engineering", "A02-40"}
 RUN = [
     pytest.param(
         path,
         id=path.stem + path.parent.name,
-        marks=[pytest.mark.long] if path.parent.name == "engineering" else [],
+        marks=[pytest.mark.long] if LONG & {path.parent.name, path.name} else [],
     )
     for path in MODELS
 ]
@@ -60,7 +72,7 @@ def test_bits_are_those_of_general_code(model, at_once):
             at_once.setattr(change_over, "LOAD_AFTER", np.inf)
             try:
                 general = dap.simulate(scene, t_end=end, dt=end / 5, **settings)
-            except SimulationError:  # it does not take the scene
+            except dap.SimulationError:  # it does not take the scene
                 continue
             at_once.setattr(change_over, "LOAD_AFTER", 0.0)
             result = dap.simulate(scene, t_end=end, dt=end / 5, **settings)

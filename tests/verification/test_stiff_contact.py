@@ -193,7 +193,7 @@ def by_scipy(sigma_0, sigma_1, t):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("integrator", ["radau", "auto"])
+@pytest.mark.parametrize("integrator", ["radau", pytest.param("auto", marks=pytest.mark.long)])
 @pytest.mark.parametrize(("sigma_0", "zeta"), [
     (1e5, 0.3), (1e6, 1.0), (1e7, 0.1), (1e7, 2.0), (1e8, 0.3), (1e9, 1.0),
 ])  # fmt: skip

@@ -9,9 +9,7 @@ from support.process import REPOSITORY
 from unit.formulations.joint_loops.test_equations import differences
 
 import dap3d_core as dap
-from dap3d_core.registry import load_registry
 from dap3d_core.simulation import CompiledModel
-from dap3d_core.simulation.errors import AssemblyError
 
 pytestmark = pytest.mark.slow
 
@@ -19,7 +17,7 @@ pytestmark = pytest.mark.slow
 ACCELERATIONS, MULTIPLIERS = 1e-11, 1e-10
 #: Scenes of the example package, and types of the standard one that bend.
 #: First seeds of the trees, twenty from each.
-SEEDS = [*range(0, 60, 20), *(pytest.param(k, marks=pytest.mark.long) for k in range(60, 200, 20))]
+SEEDS = [0, *(pytest.param(k, marks=pytest.mark.long) for k in range(20, 200, 20))]
 EXAMPLES = sorted((REPOSITORY / "plugins/dap3d-example/scenes").glob("*.toml"))
 DERIVED = ("rev", "sph", "cyl", "tran", "univ")
 
@@ -32,7 +30,7 @@ def test_200_trees_with_loops_have_the_accelerations_of_a_dense_solution(first):
         tree = trees.random_tree(n, 2000 + seed, free=0.05, lag=1 + seed % 10)
         try:
             a, multipliers = differences(loops.add_loops(tree, seed, 1 + n // 8))
-        except AssemblyError:  # two of the 200: no velocities near the random ones, or no pose
+        except dap.AssemblyError:  # two of the 200: no velocities near the random ones, or no pose
             continue
         assert a < ACCELERATIONS, seed
         assert multipliers < MULTIPLIERS, seed
@@ -60,7 +58,7 @@ def test_types_of_the_example_package_move_as_in_other_methods(scene):
 def test_types_by_C_alone_move_as_the_standard_ones(seed):
     """A random tree with a loop; the types have no J and gamma of their own, and other names."""
     pytest.importorskip("sympy")
-    registry = load_registry()
+    registry = dap.load_registry()
     own = [from_C_alone(registry.get("joint", name).type, f"own-{name}") for name in DERIVED]
     usual, other = (
         loops.add_loops(trees.random_tree(6, seed), seed, 1, ("sph",)) for _ in range(2)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.result import Result
 
 SPEED, STIFFNESS = 100.0, 1.0
 
@@ -47,7 +46,7 @@ def test_a_spring_between_two_reports_winds_up(tmp_path):
 
 def test_a_file_of_an_older_program_has_no_turns_and_says_so(tmp_path):
     result = dap.simulate(winding(), dt=0.02)  # less than half a turn between two
-    older = Result(
+    older = dap.Result(
         attrs.evolve(result.summary, angle_count=0, angle_names=()),
         attrs.evolve(result.arrays, angles=np.zeros((len(result.t), 0))),
         result.record,

@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 from support.levels import quickly
 
 import dap3d_core as dap
-from dap3d_core.result import Result
 
 SPEED, DECAY = 100.0, 0.8
 AMPLITUDE, FREQUENCY = 300.0, 5.0
@@ -293,7 +292,7 @@ def test_resumed_saved_and_opened_runs_have_their_turns(method, tmp_path):
 def test_a_file_without_counts_is_opened_and_its_guess_is_named(tmp_path):
     """As an older program wrote it: right where reports are near, with a note in any case."""
     result = dap.simulate(wheel(), t_end=6.0, dt=0.01)
-    older = Result(
+    older = dap.Result(
         attrs.evolve(result.summary, angle_count=0, angle_names=()),
         attrs.evolve(result.arrays, angles=np.zeros((len(result.t), 0))),
         result.record,

@@ -12,7 +12,7 @@ from support.own_types import registry_of
 from support.unknown_types import WITH_UNKNOWNS
 
 import dap3d_core as dap
-from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation import CompiledModel
 
 G = 9.81
 REGISTRY = registry_of(*WITH_UNKNOWNS)
@@ -92,7 +92,7 @@ def test_an_unknown_that_leaves_its_bounds_ends_the_run(integrator):
     """At the instant, with the joint, the unknown, the bound."""
     model = compiled(bead(speed=6.0, s_max=1.0))
     with pytest.raises(
-        SimulationError, match=r"wire .* s passed its greatest .* s_max = 1"
+        dap.SimulationError, match=r"wire .* s passed its greatest .* s_max = 1"
     ) as caught:
         dap.simulate(model, integrator=integrator, t_end=2.0, dt=0.5, **SETTINGS)
     instant = caught.value.result.t[-1]
@@ -252,5 +252,5 @@ def test_a_start_from_which_no_unknown_is_found_is_told():
     """Where the rows cannot close, the joint is named."""
     scene = bead()
     scene.add_joint("sph", "pin", P_i="bead.O", P_j="ground.O")  # at the centre, off the curve
-    with pytest.raises(SimulationError, match="wire"):
+    with pytest.raises(dap.SimulationError, match="wire"):
         dap.simulate(compiled(scene), t_end=0.1)

@@ -16,7 +16,6 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation, to_body
 from dap3d_core.model.state_layout import join, split
-from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.simulation.initial.assemble import correct_initial
 
@@ -86,7 +85,7 @@ def carousel_reference(kkt):
 
 def evaluator_of(scene):
     """The machine of a scene, which need not be assembled."""
-    model = build_model(check(scene, load_registry()))
+    model = build_model(check(scene, dap.load_registry()))
     return Evaluator(model, "standard" if model.row_count else "unconstrained")
 
 
@@ -284,7 +283,7 @@ def test_power_of_forces_and_drivers_is_the_rate_of_kinetic_energy(name, machine
 
 def test_without_joints_both_formulations_agree():
     """The standard formulation of a scene without rows gives the unconstrained accelerations."""
-    model = build_model(check(dap.load("bodies2"), load_registry()))
+    model = build_model(check(dap.load("bodies2"), dap.load_registry()))
     u = Motion(2, np.random.default_rng(1)).u(0.1)
     free, standard = (Evaluator(model, method) for method in ("unconstrained", "standard"))
     assert close(free.rhs(0.0, u), standard.rhs(0.0, u), 1e-15)

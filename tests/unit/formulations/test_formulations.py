@@ -14,7 +14,6 @@ from dap3d_core.interface import Joint, Point, Vector, number, point, vector
 from dap3d_core.kernels import cross, dot, eye, hstack, neg, normals, row, scale, skew, sub
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation
-from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.simulation.initial.assemble import correct_initial
 
@@ -28,7 +27,7 @@ INDEPENDENT = {name: lambda name=name: dap.load(name) for name in ("pen2", "four
 
 
 def machines_of(scene, *methods, registry=None):
-    model = build_model(check(scene, registry or load_registry()))
+    model = build_model(check(scene, registry or dap.load_registry()))
     return [Evaluator(model, method) for method in methods]
 
 

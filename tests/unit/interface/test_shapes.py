@@ -6,7 +6,7 @@ import pytest
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
 from dap3d_core.registry.extensions import extensions
-from dap3d_core.scene import SceneError, check
+from dap3d_core.scene import check
 from dap3d_core.view.scene3d.shapes import scene_shapes
 
 KINDS = """
@@ -99,7 +99,7 @@ def test_a_kind_is_drawn_where_its_scene_has_it():
 )
 def test_mistakes_are_named(type_, fields, words):
     """In a scene, and in the package, where a scene uses its kind."""
-    with pytest.raises(SceneError, match=f"(?s){words}"):
+    with pytest.raises(dap.SceneError, match=f"(?s){words}"):
         check(scene_with(type_, **fields), dap.load_registry())
 
 

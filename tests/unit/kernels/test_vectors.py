@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from support.plain import jit_is_on
 
 from dap3d_core import kernels
 from dap3d_core.kernels import (
@@ -53,7 +54,6 @@ from dap3d_core.kernels import (
     transpose,
     where,
 )
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_modules import Loop, build
 

@@ -10,7 +10,6 @@ from dap3d_core.kernels import row
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation, to_body, to_global
 from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
-from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.scene.tables import AnimationPoint
 
@@ -43,7 +42,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def model():
-    return build_model(check(scene(), load_registry()))
+    return build_model(check(scene(), dap.load_registry()))
 
 
 def test_pointers_of_bodies_are_those_of_the_manual(model):
@@ -126,7 +125,7 @@ def test_a_scene_without_elements_has_empty_groups():
     """Nothing is allocated for what is not there."""
     s = dap.Scene(name="bare")
     s.add_body("a", mass=1.0, Jp=(1, 1, 1))
-    model = build_model(check(s, load_registry()))
+    model = build_model(check(s, dap.load_registry()))
     assert model.joints == model.forces == model.functions == ()
     assert model.row_count == model.function_count == 0
     assert model.joint_start.tolist() == [0]

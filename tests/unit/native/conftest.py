@@ -6,8 +6,7 @@ Slow tests build optimised libraries.
 import shutil
 
 import pytest
-
-from dap3d_core.kernels.runtime.cache import jit_is_on
+from support.plain import jit_is_on
 
 
 @pytest.fixture(autouse=True)

@@ -15,7 +15,6 @@ import dap3d_core as dap
 from dap3d_core.plot import plot, save_plot
 from dap3d_core.plot.curves import curve_picture
 from dap3d_core.result import UnknownNameError
-from dap3d_core.scene import Scene
 
 
 def lines(ax):
@@ -241,7 +240,7 @@ def test_a_result_without_instants_cannot_be_drawn():
 
 
 def scene_with(name="b"):
-    scene = Scene(name="$x_2$ and _")
+    scene = dap.Scene(name="$x_2$ and _")
     scene.add_body(name, mass=1.0, Jp=[1, 1, 1])
     return scene
 

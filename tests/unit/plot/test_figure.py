@@ -12,7 +12,7 @@ import pytest
 from support.plain import in_another_process
 
 import dap3d_core as dap
-from dap3d_core.plot import FORMATS, animate, plot, save_plot, show_plot
+from dap3d_core.plot import FORMATS, plot, save_plot, show_plot
 from dap3d_core.plot.work_precision import Mark, save_work_precision
 from dap3d_core.result import ResultError, UnknownNameError
 
@@ -133,7 +133,7 @@ def test_saving_needs_no_window_and_the_module_can_be_called(tmp_path):
     "write",
     [
         lambda result, path, **force: save_plot(result, "work", path, **force),
-        lambda result, path, **force: animate(result, path, **force),
+        lambda result, path, **force: dap.animate(result, path, **force),
         lambda result, path, **force: dap.view(result).save(path, **force),
         lambda _, path, **force: save_work_precision(
             [Mark("lsq", "rk4", 1.0, 1.0, True)], path, **force

@@ -15,8 +15,9 @@ from pathlib import Path
 import pytest
 from support.plain import in_another_process
 
+import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.registry import UnknownTypeError, discovery, load_registry
+from dap3d_core.registry import UnknownTypeError, discovery
 
 GOOD = """
     from dap3d_core.interface import Body, Force, body, hookimpl, number
@@ -42,7 +43,7 @@ GOOD = """
 
 def message(kind="force", keyword="push", registry=None):
     """What ``get`` says against a type."""
-    registry = registry or load_registry()
+    registry = registry or dap.load_registry()
     with pytest.raises(PluginError) as caught:
         registry.get(kind, keyword)
     with pytest.raises(PluginError) as again:
@@ -53,7 +54,7 @@ def message(kind="force", keyword="push", registry=None):
 
 def test_a_type_is_imported_when_asked_for_and_not_before(install):
     module = install("dap3d-push", GOOD)
-    registry = load_registry()
+    registry = dap.load_registry()
     assert "push" in registry.keywords("force")
     assert "push" not in registry.keywords("joint")
     assert module not in sys.modules
@@ -67,18 +68,18 @@ def test_a_type_is_imported_when_asked_for_and_not_before(install):
 
 def test_listing_says_ok_with_distribution_and_version(install):
     module = install("dap3d-push", GOOD)
-    (info,) = [i for i in load_registry().listing() if i.keyword == "push"]
+    (info,) = [i for i in dap.load_registry().listing() if i.keyword == "push"]
     assert (info.kind, info.distribution, info.version) == ("force", "dap3d-push", "1.2")
     assert (info.module, info.state, info.reason) == (module, "ok", "")
 
 
 def test_two_registries_share_nothing(install):
-    before = load_registry()
+    before = dap.load_registry()
     install("dap3d-push", GOOD)
     assert "push" not in before.keywords("force")
-    assert "push" in load_registry().keywords("force")
-    assert load_registry(groups=()).listing() == []
-    assert "push" not in load_registry(groups=["dap3d.joints"]).keywords("force")
+    assert "push" in dap.load_registry().keywords("force")
+    assert dap.load_registry(groups=()).listing() == []
+    assert "push" not in dap.load_registry(groups=["dap3d.joints"]).keywords("force")
 
 
 BROKEN = {
@@ -175,7 +176,7 @@ def test_a_broken_plugin_breaks_no_other_and_is_listed(install, case):
     text, words = BROKEN[case]
     install("dap3d-push", text)
     install("dap3d-pull", GOOD.replace('"push"', '"pull"'), "pull")
-    registry = load_registry()
+    registry = dap.load_registry()
     listing = {i.keyword: i for i in registry.listing()}
     assert listing["push"].state == "broken"
     assert words[0] in listing["push"].reason
@@ -187,7 +188,7 @@ def test_ctrl_c_at_import_is_not_swallowed(install):
     """And says which plugin was being loaded: it may be the one that takes so long."""
     install("dap3d-push", "raise KeyboardInterrupt\n")
     with pytest.raises(KeyboardInterrupt, match=r"while force type 'push' of .*dap3d-push"):
-        load_registry().get("force", "push")
+        dap.load_registry().get("force", "push")
 
 
 @pytest.mark.parametrize(
@@ -207,7 +208,7 @@ def test_a_plugin_that_never_ends_loading_is_named_and_stops_no_other(install, l
     install("dap3d-pull", GOOD.replace('"push"', '"pull"'), "pull")
     signal.setitimer(signal.ITIMER_REAL, 1000.0)
     try:
-        listing = {i.keyword: i for i in load_registry().listing(limit_s=0.3)}
+        listing = {i.keyword: i for i in dap.load_registry().listing(limit_s=0.3)}
         assert 0.0 < signal.getitimer(signal.ITIMER_REAL)[0] < 1000.0
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
@@ -229,10 +230,10 @@ def test_what_was_declared_since_an_editable_install_says_to_install_again(insta
     origin = {"url": source.as_uri(), "dir_info": {"editable": True}}
     (tmp_path / "dap3d_push-1.2.dist-info" / "direct_url.json").write_text(json.dumps(origin))
     with pytest.raises(UnknownTypeError) as caught:
-        load_registry().get("force", "shove")
+        dap.load_registry().get("force", "shove")
     assert f"run pip install -e '{source}' again" in str(caught.value)
     with pytest.raises(UnknownTypeError) as caught:
-        load_registry().get("force", "drag")
+        dap.load_registry().get("force", "drag")
     assert "pip install" not in str(caught.value)
 
 
@@ -242,12 +243,12 @@ def test_two_distributions_with_one_keyword_are_both_named(install, monkeypatch)
     said = message()
     for word in ["dap3d-push 1.2", "Other.Push 1.2", "uninstall one", "DAP3D_BLOCK=Other.Push"]:
         assert word in said
-    states = [i for i in load_registry().listing() if i.keyword == "push"]
+    states = [i for i in dap.load_registry().listing() if i.keyword == "push"]
     assert [i.state for i in states] == ["duplicate", "duplicate"]
     assert all("Other.Push" in i.reason and "dap3d-push" in i.reason for i in states)
 
     monkeypatch.setenv("DAP3D_BLOCK", "something, other_push")
-    registry = load_registry()
+    registry = dap.load_registry()
     assert registry.get("force", "push").type.__module__ == "dap3d_push_module"
     states = {i.distribution: i.state for i in registry.listing() if i.keyword == "push"}
     assert states == {"dap3d-push": "ok", "Other.Push": "blocked"}
@@ -258,7 +259,7 @@ def test_a_keyword_with_its_package_names_one_of_two(install):
     install("dap3d-push", GOOD)
     install("Other-Push", GOOD)
     assert 'type = "Other-Push:push" or "dap3d-push:push"' in message()
-    registry = load_registry()
+    registry = dap.load_registry()
     words = ("dap3d-push:push", "other_push:push", "Other-Push:push")
     modules = [registry.get("force", word).type.__module__ for word in words]
     assert modules == ["dap3d_push_module", "Other_Push_module", "Other_Push_module"]
@@ -282,9 +283,9 @@ def test_a_name_that_shadows_a_standard_type_is_a_collision(install):
 def test_the_advice_on_a_collision_works_and_costs_no_other_type(install, monkeypatch, left_out):
     """Either of the two types may be left out; all others of its distribution stay."""
     install("dap3d-mine", GOOD.replace('"push"', '"weight"'), "weight")
-    before = set(load_registry().keywords("force"))
+    before = set(dap.load_registry().keywords("force"))
     monkeypatch.setenv("DAP3D_BLOCK", f"{left_out}:weight")
-    registry = load_registry()
+    registry = dap.load_registry()
     assert set(registry.keywords("force")) == before
     assert registry.get("force", "ptp").type.keyword == "ptp"
     distribution = {"dap3d": "dap3d-mine", "DAP3D_mine": "dap3d"}[left_out]
@@ -295,7 +296,7 @@ def test_the_advice_on_a_collision_works_and_costs_no_other_type(install, monkey
 def test_a_blocked_type_says_who_blocked_it(install, monkeypatch):
     install("dap3d-push", GOOD)
     monkeypatch.setenv("DAP3D_BLOCK", "dap3d-push")
-    registry = load_registry()
+    registry = dap.load_registry()
     assert "push" not in registry.keywords("force")
     with pytest.raises(UnknownTypeError, match="DAP3D_BLOCK leaves dap3d-push out"):
         registry.get("force", "push")
@@ -303,7 +304,7 @@ def test_a_blocked_type_says_who_blocked_it(install, monkeypatch):
 
 def test_an_unknown_keyword_names_the_nearest_and_all(install):
     install("dap3d-push", GOOD)
-    registry = load_registry()
+    registry = dap.load_registry()
     with pytest.raises(LookupError) as caught:
         registry.get("force", "pusch")
     assert isinstance(caught.value, PluginError)
@@ -318,12 +319,12 @@ def test_an_unknown_keyword_names_the_nearest_and_all(install):
 def test_a_keyword_of_another_kind_says_where_it_belongs(install):
     install("dap3d-push", GOOD)
     with pytest.raises(LookupError, match="'push' is a force type and belongs under forces"):
-        load_registry().get("joint", "push")
+        dap.load_registry().get("joint", "push")
 
 
 def test_an_unknown_kind_is_an_error_of_the_caller():
     with pytest.raises(ValueError, match="joint, force, function"):
-        load_registry().get("joints", "sph")
+        dap.load_registry().get("joints", "sph")
 
 
 def test_an_entry_point_that_names_no_module_is_broken(install):
@@ -334,7 +335,7 @@ def test_an_entry_point_that_names_no_module_is_broken(install):
 def test_a_damaged_entry_point_file_stops_nobody_else(install):
     install("dap3d-broken", "", entry_points="[dap3d.forces]\nthis is not an entry point\n")
     install("dap3d-push", GOOD)
-    registry = load_registry()
+    registry = dap.load_registry()
     assert registry.get("force", "push").type.keyword == "push"
     broken = [i for i in registry.listing() if i.distribution == "dap3d-broken"]
     assert [i.state for i in broken] == ["broken"]
@@ -342,13 +343,13 @@ def test_a_damaged_entry_point_file_stops_nobody_else(install):
 
 
 def test_what_is_installed_meanwhile_is_found_and_what_is_removed_is_not(install, tmp_path):
-    before = load_registry().keywords("force")
+    before = dap.load_registry().keywords("force")
     for _ in range(2):
         time.sleep(0.02)  # Python's own list of a folder is as old as a tick of the file system
         install("dap3d-push", GOOD)
-        assert set(load_registry().keywords("force")) == {*before, "push"}
+        assert set(dap.load_registry().keywords("force")) == {*before, "push"}
         shutil.rmtree(tmp_path / "dap3d_push-1.2.dist-info")
-        assert load_registry().keywords("force") == before
+        assert dap.load_registry().keywords("force") == before
 
 
 def test_of_two_distributions_of_one_name_the_one_that_is_imported_counts(
@@ -362,20 +363,20 @@ def test_of_two_distributions_of_one_name_the_one_that_is_imported_counts(
     shutil.copytree(tmp_path / "dap3d_push-1.2.dist-info", first / "dap3d_push-1.3.dist-info")
     info = first / "dap3d_push-1.3.dist-info"
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: dap3d_push\nVersion: 1.3\n")
-    (found,) = [t for t in load_registry().listing() if t.keyword == "push"]
+    (found,) = [t for t in dap.load_registry().listing() if t.keyword == "push"]
     assert (found.version, found.state) == ("1.3", "ok")
     shutil.rmtree(info)
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: dap3d_push\nVersion: 1.3\n")
-    assert "push" not in load_registry().keywords("force")
+    assert "push" not in dap.load_registry().keywords("force")
 
 
 def test_to_know_what_is_installed_costs_once(monkeypatch):
     """Not once for each of many runs: nothing is looked for where no folder has changed."""
     monkeypatch.setattr(discovery, "SETTLED", 0)
-    before, asked = load_registry(), []
+    before, asked = dap.load_registry(), []
     monkeypatch.setattr(discovery, "distributions", lambda **names: asked.append(names) or [])
-    assert load_registry().sources == before.sources
+    assert dap.load_registry().sources == before.sources
     assert asked == []
 
 
@@ -391,7 +392,7 @@ def test_what_a_plugin_changes_in_the_process_is_put_back(install, tmp_path, cap
     """
     install("dap3d-push", textwrap.dedent(changes) + textwrap.dedent(GOOD))
     before, state = os.getcwd(), np.geterr()
-    registry = load_registry()
+    registry = dap.load_registry()
     registry.get("force", "push")
     assert os.getcwd() == before
     assert np.geterr() == state
@@ -427,7 +428,7 @@ def write(folder: Path, text: str = GOOD) -> Path:
 def test_a_model_file_adds_its_types_to_a_new_registry(tmp_path):
     import inspect
 
-    registry = load_registry()
+    registry = dap.load_registry()
     more = registry.with_file(write(tmp_path))
     type_info = more.get("force", "push")
     assert type_info.type.__doc__ == "A constant push along x."
@@ -441,11 +442,11 @@ def test_a_model_file_adds_its_types_to_a_new_registry(tmp_path):
 
 
 def test_a_model_file_that_changed_is_another_module(tmp_path):
-    first = load_registry().with_file(write(tmp_path)).get("force", "push").type
-    again = load_registry().with_file(write(tmp_path)).get("force", "push").type
+    first = dap.load_registry().with_file(write(tmp_path)).get("force", "push").type
+    again = dap.load_registry().with_file(write(tmp_path)).get("force", "push").type
     assert again is first
     changed = GOOD.replace("default=1.0", "default=2.0")
-    other = load_registry().with_file(write(tmp_path, changed)).get("force", "push").type
+    other = dap.load_registry().with_file(write(tmp_path, changed)).get("force", "push").type
     assert other.__module__ != first.__module__
     assert other(body_i="a").k == 2.0
 
@@ -455,16 +456,16 @@ def test_a_broken_model_file_is_named(tmp_path, case):
     text, words = BROKEN[case]
     file = write(tmp_path, text)
     with pytest.raises(PluginError) as caught:
-        load_registry().with_file(file)
+        dap.load_registry().with_file(file)
     for word in [str(file), "Repair the file", *words]:
         assert word.replace("_module.py", "plugin.py") in str(caught.value)
 
 
 def test_a_model_file_without_types_or_missing_is_refused(tmp_path):
     with pytest.raises(PluginError, match="brings no type"):
-        load_registry().with_file(write(tmp_path, "interface_version = 1\n"))
+        dap.load_registry().with_file(write(tmp_path, "interface_version = 1\n"))
     with pytest.raises(PluginError, match="cannot be read"):
-        load_registry().with_file(tmp_path / "nothing.py")
+        dap.load_registry().with_file(tmp_path / "nothing.py")
 
 
 def test_hooks_are_called_once_for_each_module(install):
@@ -473,11 +474,11 @@ def test_hooks_are_called_once_for_each_module(install):
     module = install(
         "dap3d-push", text.replace("interface_version", "calls = []\n    interface_version")
     )
-    types = [load_registry().get("force", "push") for _ in range(3)]
+    types = [dap.load_registry().get("force", "push") for _ in range(3)]
     assert types[0] is types[1] is types[2]
     assert len(sys.modules[module].calls) == 1
     del sys.modules[module]
-    again = load_registry().get("force", "push")
+    again = dap.load_registry().get("force", "push")
     assert again is not types[0]
     assert again.type is sys.modules[module].Push
 
@@ -495,19 +496,19 @@ def test_hooks_are_called_once_for_each_module(install):
 )
 def test_other_names_of_a_type_lead_to_its_keyword(kind, word, keyword):
     with pytest.raises(UnknownTypeError, match=f"did you mean '{keyword}'") as caught:
-        load_registry().get(kind, word)
+        dap.load_registry().get(kind, word)
     assert caught.value.nearest == keyword
 
 
 def test_names_of_blocked_types_lead_nowhere(monkeypatch):
     monkeypatch.setenv("DAP3D_BLOCK", "dap3d")
     with pytest.raises(UnknownTypeError) as caught:
-        load_registry().get("joint", "hinge")
+        dap.load_registry().get("joint", "hinge")
     assert caught.value.nearest is None
 
 
 def test_no_two_types_of_a_kind_share_another_name():
-    registry = load_registry()
+    registry = dap.load_registry()
     for kind in ("joint", "force", "function"):
         own = [registry.get(kind, k).type for k in registry.keywords(kind)]
         words = [word for type_ in own for word in (*type_.synonyms, type_.keyword)]

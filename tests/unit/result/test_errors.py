@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
+import dap3d_core as dap
 from dap3d_core.result import Computed, ResultError
-from dap3d_core.simulation import SimulationError
 
 
 def test_any_exception_carries_what_was_computed():
@@ -17,7 +17,7 @@ def test_any_exception_carries_what_was_computed():
 
 
 def test_nothing_that_is_carried_is_lost():
-    error = SimulationError("stopped", "rows")
+    error = dap.SimulationError("stopped", "rows")
     Computed(part=Path("a.part")).attach(error)
     assert (Computed.of(error).result, error.part) == ("rows", Path("a.part"))
     assert Computed.of(ResultError("full")).part is None

@@ -18,9 +18,9 @@ from support.results import (
     same_bits,
 )
 
+import dap3d_core as dap
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.result import Result, ResultError, RunMetadata, RunStatistics, open_result
-from dap3d_core.scene import load
+from dap3d_core.result import ResultError, RunMetadata, RunStatistics, open_result
 from dap3d_core.scene.files.read_toml import scene_of
 
 ABOUT = dict(
@@ -41,10 +41,10 @@ def rebuild(text):
 
 @pytest.mark.parametrize("name", ["pen1", "bodies2", "fourbar3"])
 def test_round_trip_is_bit_for_bit(tmp_path, name):
-    scene = load(name)
+    scene = dap.load(name)
     model = model_of(scene)
     record = RunMetadata(scene_text=scene.to_toml(), settings=CONTROLLED, **ABOUT)
-    result = Result.of_run(model, noisy(model), record, lambda: None)
+    result = dap.Result.of_run(model, noisy(model), record, lambda: None)
     result.save(tmp_path / "run.nc")
     found = open_result(tmp_path / "run.nc")
     assert same_bits(found, result)
@@ -88,7 +88,7 @@ def test_another_model_than_was_run_is_refused(tmp_path):
 def test_results_of_no_or_one_instant(tmp_path, nt):
     model = model_of(circling_scene())
     rows = noisy(model, 2)[:nt]
-    result = Result.of_run(model, rows, RunMetadata(scene_text="[scene]\n"), lambda: None)
+    result = dap.Result.of_run(model, rows, RunMetadata(scene_text="[scene]\n"), lambda: None)
     result.save(tmp_path / "run.nc")
     assert same_bits(open_result(tmp_path / "run.nc"), result)
 
@@ -100,7 +100,7 @@ def test_text_of_a_large_scene_and_odd_names(tmp_path):
     scene.add_body("Kurbel ä 手", mass=1.0, Jp=[1, 1, 1], r=[9, 9, 9])
     model = model_of(scene)
     record = RunMetadata(scene_text=scene.to_toml())
-    result = Result.of_run(model, noisy(model), record, lambda: None)
+    result = dap.Result.of_run(model, noisy(model), record, lambda: None)
     result.save(tmp_path / "räder.nc")
     found = open_result(tmp_path / "räder.nc")
     assert found.scene_text == result.scene_text

@@ -20,11 +20,11 @@ from support.results import (
     result_of,
 )
 
+import dap3d_core as dap
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.rotations import to_global
 from dap3d_core.model.state_layout import join, y_from_u
 from dap3d_core.result import ResultError, RunStatistics, UnknownNameError
-from dap3d_core.scene import Scene, load
 
 # ---------------------------------------------------------------------------- motion
 
@@ -42,7 +42,7 @@ def test_stored_arrays_are_those_of_the_rows():
 
 
 def test_angular_velocity_of_the_rows_is_in_body_axes_and_of_the_result_in_global_ones():
-    scene = Scene(name="tumbling")
+    scene = dap.Scene(name="tumbling")
     scene.add_body("top", mass=1.0, Jp=[1.0, 2.0, 3.0])
     model = model_of(scene)
     rng = np.random.default_rng(5)
@@ -135,7 +135,7 @@ def test_jacobian_of_many_rows_is_sparse(monkeypatch):
 @pytest.fixture(scope="module", params=["pen2", "fourbar2", "fourbar3"])
 def thrown(request):
     """A shipped model at its start, its velocities thrown at random: no constraint level holds."""
-    scene = load(request.param)
+    scene = dap.load(request.param)
     evaluator = Evaluator(model_of(scene), "standard")
     model = evaluator.model  # with the angles of its joints
     rng = np.random.default_rng(11)

@@ -2,7 +2,8 @@
 
 import pytest
 
-from dap3d_core.scene import SceneError, check, load
+import dap3d_core as dap
+from dap3d_core.scene import check
 
 BASE = """\
 [scene]
@@ -99,7 +100,7 @@ hold = ["crank"]
 
 def mistakes_of(scene, registry, **options):
     """The mistakes that the check finds in a scene."""
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         check(scene, registry, **options)
     return caught.value.mistakes
 
@@ -107,4 +108,4 @@ def mistakes_of(scene, registry, **options):
 def scene_of(folder, text):
     """A scene read from a file of this text in a folder."""
     (folder / "scene.toml").write_text(text)
-    return load(folder)
+    return dap.load(folder)

@@ -5,7 +5,7 @@ from importlib.metadata import version
 import pytest
 from unit.scene.base import BASE, mistakes_of, scene_of
 
-from dap3d_core.registry import load_registry
+import dap3d_core as dap
 from dap3d_core.scene import check
 from dap3d_core.scene.files.read_toml import parse
 
@@ -14,7 +14,7 @@ SPRING = '[forces.spring]\ntype = "ptp"'
 
 @pytest.fixture(scope="module")
 def registry():
-    return load_registry()
+    return dap.load_registry()
 
 
 def test_a_missing_keyword_says_what_to_install(tmp_path, registry):

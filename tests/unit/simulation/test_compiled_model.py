@@ -5,9 +5,9 @@ import time
 
 import pytest
 from support import problems
+from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.simulation.compiled_model import log_first_compilation
 
 PLUGIN = """

@@ -11,13 +11,12 @@ from support.bouncing import bouncing, swinging
 from support.ended import EndedError, ended_at, leave, shorten_chunks
 from support.levels import quickly
 from support.on_axles import driven, stone, wheel
+from support.plain import jit_is_on
 from support.results import same_bits
 from support.state_types import stated
 
 import dap3d_core as dap
-from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.scene import SceneError
-from dap3d_core.simulation import CheckpointError, SimulationError
+from dap3d_core.simulation import CheckpointError
 from dap3d_core.simulation.checkpoint.file import (
     FORMAT,
     Checkpoint,
@@ -194,7 +193,7 @@ def test_of_a_run_that_fails_at_its_start_nothing_is_left(tmp_path):
     """Neither a checkpoint that would fail in the same way, nor a part without rows."""
     scene = stone()
     scene.add_force("ptp", "stuck", P_i="stone.O", P_j="stone.O", k=1.0, l0=1.0)
-    with pytest.raises((SceneError, SimulationError)):
+    with pytest.raises((dap.SceneError, dap.SimulationError)):
         dap.simulate(scene, output=tmp_path / "run.nc", checkpoint=1e6, **SHORT)
     assert not list(tmp_path.iterdir())
 
@@ -274,7 +273,7 @@ def test_a_checkpoint_of_another_run_is_not_overwritten(tmp_path):
 )
 def test_settings_that_make_no_sense_are_refused(settings, words, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with pytest.raises((SceneError, TypeError), match=words):
+    with pytest.raises((dap.SceneError, TypeError), match=words):
         dap.simulate(problems.pendulum(), **SHORT, **settings)
     assert not list(tmp_path.iterdir())
 

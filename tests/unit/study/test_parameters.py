@@ -4,7 +4,6 @@ import attrs
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.study import (
     all_parameters,
@@ -51,7 +50,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def checked(scene):
-    return check(scene, load_registry())
+    return check(scene, dap.load_registry())
 
 
 def test_numbers_are_found_with_what_stands_there(checked):

@@ -6,7 +6,7 @@ import textwrap
 import pytest
 from support.plain import in_another_process
 
-from dap3d_core.registry import load_registry
+import dap3d_core as dap
 from dap3d_core.testing import packages
 
 pytestmark = in_another_process
@@ -97,7 +97,7 @@ def test_two_packages_that_share_a_keyword_are_both_checked(install, monkeypatch
     install("right", {})
     install("wrong", {}, energy="0.25")
     said = []
-    right, wrong = packages.check_packages(load_registry(), said.append)
+    right, wrong = packages.check_packages(dap.load_registry(), said.append)
     assert (right.name, right.ok, right.types[0].keyword) == ("right", True, "push")
     assert not wrong.ok
     assert wrong.tests.state == "none"

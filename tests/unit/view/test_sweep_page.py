@@ -5,10 +5,9 @@ import json
 
 import numpy as np
 import pytest
+from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.scene import SceneError
 from dap3d_core.view import sweep_page
 from dap3d_core.view.sweep_page import SweepPoints
 
@@ -168,8 +167,8 @@ def test_types_of_the_models_own_need_leave():
     """As elsewhere: the model is named and its code is allowed."""
     data = dap.sweep("ball1", {"bodies.ball.mass": [1.0, 2.0]}, outputs="ball.r.z", t_end=0.05,
                      dt=0.01, allow_code=True)  # fmt: skip
-    with pytest.raises(SceneError, match="--model MODEL --allow-code"):
+    with pytest.raises(dap.SceneError, match="--model MODEL --allow-code"):
         dap.view(data)
-    with pytest.raises(SceneError, match="is not run unless it is allowed"):
+    with pytest.raises(dap.SceneError, match="is not run unless it is allowed"):
         dap.view(data, model="ball1")
     assert len(dap.view(data, model="ball1", allow_code=True).data["sweep"]["points"]) == 2

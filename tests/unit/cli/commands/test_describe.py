@@ -13,9 +13,8 @@ import dap3d_core as dap
 from dap3d_core.cli.app import dap3d
 from dap3d_core.cli.commands.describe_example import example_of
 from dap3d_core.interface.fields import specs_of
-from dap3d_core.registry import load_registry
 
-TYPES = sorted(load_registry().sources)
+TYPES = sorted(dap.load_registry().sources)
 each = pytest.mark.parametrize(("kind", "keyword"), TYPES, ids=["-".join(t) for t in TYPES])
 
 
@@ -30,7 +29,7 @@ def described(keyword, *options, width=80):
 @each
 def test_the_example_of_every_type_runs(kind, keyword, tmp_path):
     """Written to a file as it is shown, it is simulated to its end; its element is of the type."""
-    registry = load_registry()
+    registry = dap.load_registry()
     text = example_of(registry.get(kind, keyword), registry)
     path = tmp_path / "example.toml"
     path.write_text(text)
@@ -46,7 +45,7 @@ def test_every_type_is_described(kind, keyword):
     """Fields with unit, default and meaning, in 60 columns; the docstring; where it is; in JSON."""
     types = json.loads(described(keyword, "--json"))["types"]
     (found,) = (t for t in types if t["kind"] == kind)
-    type_info = load_registry().get(kind, keyword)
+    type_info = dap.load_registry().get(kind, keyword)
     specs = {n: s for n, s in specs_of(type_info.type).items() if s.given}
     assert [f["name"] for f in found["fields"]] == list(specs)
     for field in found["fields"]:
@@ -119,7 +118,7 @@ def test_a_required_function_is_in_the_example():
     text = example_of(registry.get("joint", "cam"), registry)
     scene = tomllib.loads(text)
     assert scene["joints"]["J1"]["function"] in scene["functions"]
-    registry = load_registry()
+    registry = dap.load_registry()
     text = example_of(registry.get("force", "ptp"), registry)
     assert "function" not in next(iter(tomllib.loads(text)["forces"].values()))
 

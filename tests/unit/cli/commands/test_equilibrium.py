@@ -12,21 +12,21 @@ from unit.study.test_equilibrium_path import pendulum
 import dap3d_core as dap
 from dap3d_core.cli import main
 from dap3d_core.simulation.equilibrium import continuation
-from dap3d_core.study.equilibrium_path import equilibrium_path
 
 pytestmark = long_in_plain_python
+follow = dap.equilibrium_path
 
 
 @functools.cache
 def path_of_pendulum():
     """Followed once for all tests; it turns at the largest torque and comes back."""
-    return equilibrium_path(pendulum(), "parameters.torque", "0:12:4")
+    return follow(pendulum(), "parameters.torque", "0:12:4")
 
 
 def known(scene, parameter, values, **_):
     if parameter == "parameters.torque":
         return path_of_pendulum()
-    return equilibrium_path(scene, parameter, values)
+    return follow(scene, parameter, values)
 
 
 @pytest.fixture

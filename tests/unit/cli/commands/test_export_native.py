@@ -5,9 +5,9 @@ import shutil
 import zipfile
 
 import pytest
+from support.plain import jit_is_on
 
 from dap3d_core.cli import main
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = [
     pytest.mark.usefixtures("quick_libraries"),

@@ -5,10 +5,10 @@ import json
 import numpy as np
 import pytest
 import xarray
+from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 G, T, V0 = 9.81, 0.5, 2.0

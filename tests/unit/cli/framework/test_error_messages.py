@@ -6,10 +6,11 @@ import click
 import pytest
 from click.testing import CliRunner
 
+import dap3d_core as dap
 from dap3d_core.cli.framework import error_messages
 from dap3d_core.cli.framework.error_messages import report_error
 from dap3d_core.cli.process.exit_codes import Refused, Terminated
-from dap3d_core.scene import Mistake, SceneError
+from dap3d_core.scene import Mistake
 
 
 def reported(error, debug=False):
@@ -59,7 +60,7 @@ def test_all_mistakes_of_a_scene_are_listed():
         Mistake("a.b", float("nan"), "wrong", "ab", "do", "f.toml", 3),
         Mistake("c", 1, "x"),
     ]
-    code, data, err = reported(SceneError(mistakes))
+    code, data, err = reported(dap.SceneError(mistakes))
     assert code == 2
     assert data["mistakes"][0] == {
         "file": "f.toml", "line": 3, "key": "a.b", "value": None, "what": "wrong",

@@ -11,7 +11,7 @@ from dap3d_core.assembly.arrays import TOLERANCE_C, TOLERANCE_V
 from dap3d_core.formulations import PROJECT
 from dap3d_core.interface.body_pose import pose
 from dap3d_core.model.state_layout import u_from_y
-from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation import CompiledModel
 from dap3d_core.simulation.initial.assemble import correct_initial
 
 #: Accelerations and multipliers of two factorisations of equations with condition numbers up to
@@ -159,7 +159,7 @@ def test_a_state_at_a_knot_is_refused_by_linearisation(method):
     """It looks at switches through the state of the formulation, also after a run."""
     compiled = dap.compile(hinged_spring(theta_0=-1.0), method=method)
     dap.simulate(compiled, t_end=0.1, dt=0.1)
-    with pytest.raises(SimulationError, match="at a switch of spring"):
+    with pytest.raises(dap.SimulationError, match="at a switch of spring"):
         dap.linearize(compiled)
 
 
@@ -172,7 +172,7 @@ def test_the_explanation_has_the_tree():
 
 def test_radau_says_that_it_keeps_body_coordinates():
     """It is refused, with what fits."""
-    with pytest.raises(SimulationError, match="body coordinates; use method standard"):
+    with pytest.raises(dap.SimulationError, match="body coordinates; use method standard"):
         dap.simulate("pen1", t_end=0.1, method="joint", integrator="radau")
 
 

@@ -12,7 +12,7 @@ import dap3d_core as dap
 from dap3d_core.formulations.joint_loops import tables
 from dap3d_core.model.rigid_motion import matrices
 from dap3d_core.model.state_layout import split
-from dap3d_core.simulation import CompiledModel, SimulationError
+from dap3d_core.simulation import CompiledModel
 
 #: Singular values of the scaled Jacobian below this part of the largest belong to dependent rows:
 #: those of these scenes are below 1e-12 or above 1e-4.
@@ -248,20 +248,22 @@ def ladder(rungs):
 def test_rows_of_too_many_meetings_are_refused(monkeypatch):
     """Where their arrays would take gigabytes; here from a hundred numbers on."""
     monkeypatch.setattr(tables, "MOST_NUMBERS", 100)
-    with pytest.raises(SimulationError, match=r"kept rows would take .* GB. Use method standard"):
+    with pytest.raises(
+        dap.SimulationError, match=r"kept rows would take .* GB. Use method standard"
+    ):
         dap.compile(ladder(3), method="joint")
 
 
 @long_in_plain_python
 def test_redundant_rows_that_come_to_hold_a_motion_end_the_run():
     """A car whose front wheels are steered by equal angles: they contradict each other."""
-    with pytest.raises(SimulationError, match="have come to hold a motion that they left free"):
+    with pytest.raises(dap.SimulationError, match="have come to hold a motion that they left free"):
         dap.simulate(singular.car(), method="joint", t_end=0.01, dt=0.005, rtol=1e-8)
 
 
 def test_a_singular_start_is_refused():
     """Rows depend on each other at this pose alone; joint does not find the rates there."""
-    with pytest.raises(SimulationError, match="singular pose, from which method joint"):
+    with pytest.raises(dap.SimulationError, match="singular pose, from which method joint"):
         dap.simulate(singular.flat_parallelogram(), method="joint", t_end=0.1, dt=0.1)
 
 
@@ -281,7 +283,7 @@ def test_rows_that_contradict_each_other_are_refused():
     scene.add_function("a", "other", coeff=(0.0, 1.0, 0.0))
     driver = scene.joints["J5"]
     scene.add_joint(driver.type, "J6", **driver.fields | {"function": "other"})
-    with pytest.raises(SimulationError, match="No motion satisfies them all"):
+    with pytest.raises(dap.SimulationError, match="No motion satisfies them all"):
         dap.simulate(scene, method="joint", t_end=0.1, dt=0.1)
 
 

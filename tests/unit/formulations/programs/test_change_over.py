@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.formulations import PROJECT, RHS, WATCH
@@ -9,7 +10,6 @@ from dap3d_core.formulations.programs import change_over, scene_program
 from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.formulations.programs.scene_program import BEHIND
 from dap3d_core.integrators import EXPLICIT
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 SETTINGS = {"t_end": 0.3, "rtol": 1e-9, "atol": 1e-11}

@@ -4,7 +4,6 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 import dap3d_core as dap
-from dap3d_core.scene import Scene
 
 
 def test_springs_by_tables():
@@ -14,7 +13,7 @@ def test_springs_by_tables():
     """
     x, y = np.linspace(-0.5, 0.5, 7), np.array([-9.0, -5.0, -2.0, 0.0, 3.0, 4.0, 8.0])
     curve, elongations = CubicSpline(x, y, bc_type="natural"), (-0.31, 0.07, 0.44)
-    scene = Scene(name="splines")
+    scene = dap.Scene(name="splines")
     scene.add_function("spline", "curve", x=x, y=y)
     for k, elongation in enumerate(elongations):
         scene.add_body(f"b{k}", mass=1.0, Jp=np.eye(3), r=[1.0 + elongation, 0, 0])

@@ -9,15 +9,14 @@ from dap3d_contacts.box_box import BoxBox, part_of
 from dap3d_core.interface import Contact, PluginError, Point, examine, number, point
 from dap3d_core.interface.contacts.rates import rate_of
 from dap3d_core.kernels import acos, asin, atan, cos, exp, log, scale, sin, sqrt, tan, where
-from dap3d_core.registry import load_registry
 from dap3d_core.testing.kit import checks_for
 
 
 @pytest.mark.every(7)
-@pytest.mark.parametrize("keyword", load_registry().keywords("contact"))
+@pytest.mark.parametrize("keyword", dap.load_registry().keywords("contact"))
 def test_rows_of_the_standard_types_are_exact_derivatives(keyword):
     """Rate of the gap and normal velocity, J, gamma of a moving point, friction, compiled code."""
-    failed = [str(outcome) for check in checks_for(load_registry().get("contact", keyword))
+    failed = [str(outcome) for check in checks_for(dap.load_registry().get("contact", keyword))
               if not (outcome := check.run()).ok]  # fmt: skip
     assert not failed
 

@@ -30,6 +30,7 @@ from support.plain import in_another_process
 from support.process import REPOSITORY, run
 from support.scenes import scene_for
 
+import dap3d_core as dap
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface import (
     Function,
@@ -46,8 +47,7 @@ from dap3d_core.kernels import acos, asin, dot, exp, floor, log
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation
 from dap3d_core.model.state_layout import split
-from dap3d_core.registry import load_registry
-from dap3d_core.scene import Scene, check
+from dap3d_core.scene import check
 from dap3d_core.testing import check_type
 
 pytest.importorskip("sympy")
@@ -91,7 +91,7 @@ def assert_same_rows(one, other, seed):
 
 @pytest.mark.parametrize(("keyword", "values"), BY_HAND)
 def test_joints_from_C_alone_are_those_by_hand(keyword, values):
-    found = load_registry().get("joint", keyword)
+    found = dap.load_registry().get("joint", keyword)
     by_hand = next((e.type for conditions, e in found.variants if conditions == values), found.type)
     derived = from_C_alone(by_hand, f"derived-{keyword}")
     one, type_info = evaluator_of(derived, 7)
@@ -111,7 +111,7 @@ def test_rows_of_the_velocity_level_are_derived_from_C_dot():
     assert registry.get("joint", "rolling").derived == ("J", "gamma")
     machines = []
     for keyword in ("rolling", "disk"):
-        scene = Scene()
+        scene = dap.Scene()
         for name in ("b1", "b2", "b3"):
             scene.add_body(name, mass=1.0, Jp=[0.1, 0.2, 0.3], r=[0.0, 0.0, 1.0])
         scene.add_joint(keyword, "wheel", body_i="b2", radius=0.7)

@@ -6,9 +6,8 @@ Each function of them, also made quickly and without FMA: test_core.py, test_tra
 import json
 
 import pytest
+from support.plain import jit_is_on
 from support.process import run
-
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = [
     pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled"),

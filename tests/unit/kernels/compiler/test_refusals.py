@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from support.at_all_levels import function_of
 from support.own_types import registry_of
+from support.plain import jit_is_on
 
-from dap3d_core.interface import Body, Force, PluginError, body, number
+from dap3d_core.interface import Body, Force, PluginError, body, examine, number
 from dap3d_core.interface.codegen.compile_loops import compile_all
-from dap3d_core.interface.examine.examine import examine
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.types import FLOAT, INT, Array, CompileError, Signature, Table
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 VECTOR, MATRIX = Array(FLOAT, 1), Array(FLOAT, 2)

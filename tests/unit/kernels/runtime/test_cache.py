@@ -7,9 +7,8 @@ import shutil
 import time
 
 import pytest
+from support.plain import jit_is_on
 from support.process import REPOSITORY, run, start
-
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled with DAP3D_PLAIN=1")
 

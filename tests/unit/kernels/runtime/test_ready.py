@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pytest
+from support.plain import jit_is_on
 from support.process import REPOSITORY
 
 from dap3d_core.kernels.compiler import objects, units
@@ -11,7 +12,6 @@ from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.types import FLOAT, Array, Signature
 from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime import ready
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.kernels.scalar_math import atan2, sin, sqrt
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")

@@ -21,13 +21,11 @@ from support.results import (
 )
 
 import dap3d_core as dap
-from dap3d_core.plot import animate
 from dap3d_core.plot.film.animation import frame_times, usual_speed
 from dap3d_core.plot.film.frame import Stage
 from dap3d_core.plot.film.projection import camera_of, visible_rectangle, with_margin
 from dap3d_core.plot.film.stick_figure import SHADES, pose_at, shapes_of, sticks_of
 from dap3d_core.result import ResultError
-from dap3d_core.scene import Scene
 from dap3d_core.scene.tables import AnimationPoint
 from dap3d_core.view.scene3d.shapes import GROUND_COLOR
 
@@ -39,7 +37,7 @@ def result():
 
 def hung():
     """A body on a spring, with an animation point and limits: poses at one instant."""
-    scene = Scene(name="hung")
+    scene = dap.Scene(name="hung")
     scene.add_body("bob", mass=1.0, Jp=[1, 1, 1], color="tab:green")
     scene.add_body("other", mass=1.0, Jp=[1, 1, 1], r=[1, 0, 0])
     scene.add_point("hook", body="ground", sPp=[0, 0, 2])
@@ -77,7 +75,7 @@ def test_lines_run_from_mass_centres_to_points():
 
 def test_a_disk_is_a_circle_with_a_spoke():
     """About the axis of the disk, where the body is; one with a shape is drawn by that alone."""
-    scene = Scene(name="disk")
+    scene = dap.Scene(name="disk")
     scene.add_body("coin", r=[0.0, 0.0, 0.5], color="tab:green")
     scene.add_body("other", r=[3.0, 0.0, 1.0])
     scene.add_joint("disk", "rolls", body_i="coin", radius=0.5)
@@ -97,7 +95,7 @@ def test_a_disk_is_a_circle_with_a_spoke():
 
 
 def test_every_body_has_a_colour_and_a_marker_of_its_own():
-    scene = Scene()
+    scene = dap.Scene()
     for k in range(7):
         scene.add_body(f"b{k}", mass=1.0, Jp=[1, 1, 1])
     sticks = sticks_of(at_rest(scene))
@@ -210,7 +208,7 @@ def test_all_of_the_motion_is_inside_at_one_scale(result, view, size):
 def test_a_gif_has_a_frame_for_every_instant_of_the_film(result, tmp_path):
     """1.7 s in real time at 10 a second: 18 pictures of 100 ms; the bob moves."""
     seen = []
-    film = animate(result, tmp_path / "a.gif", fps=10, speed=1.0, size=(200, 160),
+    film = dap.animate(result, tmp_path / "a.gif", fps=10, speed=1.0, size=(200, 160),
                    progress=lambda *a: seen.append(a))  # fmt: skip
     assert seen == [(k + 1, 18) for k in range(18)]
     assert (film.frames, film.fps, film.speed, film.size) == (18, 10.0, 1.0, (200, 160))
@@ -223,7 +221,7 @@ def test_a_gif_has_a_frame_for_every_instant_of_the_film(result, tmp_path):
             pictures.append(np.asarray(image.convert("RGB")).copy())
     assert all((a != b).any() for a, b in itertools.pairwise(pictures))
     assert all((picture[0, 0] == 255).all() for picture in pictures)  # white is white
-    again = animate(result, tmp_path / "b.gif", fps=10, speed=1.0, size=(200, 160))
+    again = dap.animate(result, tmp_path / "b.gif", fps=10, speed=1.0, size=(200, 160))
     assert again.path.read_bytes() == film.path.read_bytes()
     assert film._repr_html_().startswith('<img src="data:image/gif;base64,R0lGOD')
 
@@ -231,7 +229,7 @@ def test_a_gif_has_a_frame_for_every_instant_of_the_film(result, tmp_path):
 def test_what_is_drawn_is_where_the_body_is(result, tmp_path):
     """Pixels of the body's colour fill the box that its line spans, to within the marker."""
     for t in (0.0, 0.6, 1.3):
-        film = animate(result, tmp_path / "a.png", at=t, view="z", size=(600, 600), force=True)
+        film = dap.animate(result, tmp_path / "a.png", at=t, view="z", size=(600, 600), force=True)
         pixels = matplotlib.image.imread(film.path)[:520, :, :3]  # the legend left out
         rows, columns = np.nonzero(np.all(np.abs(pixels - to_rgb("#0072B2")) < 0.02, axis=-1))
         drawn = np.array([np.ptp(columns), np.ptp(rows)])
@@ -247,7 +245,7 @@ SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n"
 def shaped(folder):
     """A body with a red box to the left and a mesh, blue, to the right; one without a shape."""
     (folder / "square.obj").write_text(SQUARE)
-    scene = Scene(name="shaped")
+    scene = dap.Scene(name="shaped")
     scene.add_body("a", r=[0.0, 0.0, 0.0])
     scene.add_body("b", r=[0.0, 2.0, 0.0])
     scene.add_shape("box", "box", body="a", size=[1.0, 1.0, 0.5], at=[-2.0, 0, 0], color="#d62728")
@@ -269,7 +267,7 @@ def hues(path):
 def test_shapes_are_drawn_where_they_are(tmp_path):
     """Seen from above both are squares with edges of 1 m, their middles 4.5 m apart."""
     result = shaped(tmp_path)
-    film = animate(result, tmp_path / "a.png", view="z", size=(600, 480), model=tmp_path)
+    film = dap.animate(result, tmp_path / "a.png", view="z", size=(600, 480), model=tmp_path)
     assert film.notes == ()
     shapes = sticks_of(result, tmp_path).shapes
     assert set(shapes.hues) == {1}
@@ -283,33 +281,33 @@ def test_shapes_are_drawn_where_they_are(tmp_path):
 
 
 def test_meshes_that_are_not_at_hand_are_told(tmp_path):
-    film = animate(shaped(tmp_path), tmp_path / "a.png")
+    film = dap.animate(shaped(tmp_path), tmp_path / "a.png")
     assert ["square" in note and "--model" in note for note in film.notes] == [True]
 
 
 def test_a_line_is_drawn_in_its_colour(tmp_path):
-    scene = Scene(name="line")
+    scene = dap.Scene(name="line")
     scene.add_body("a")
     scene.add_shape("line", "l", body="a", points=[[0, 0, 0], [1, 0, 0], [1, 1, 0]],
                     color="#0000ff")  # fmt: skip
-    film = animate(dap.simulate(scene, t_end=0.0, dt=1.0), tmp_path / "a.png", view="z")
+    film = dap.animate(dap.simulate(scene, t_end=0.0, dt=1.0), tmp_path / "a.png", view="z")
     pixels = matplotlib.image.imread(film.path)[..., :3]
     assert ((pixels[..., 2] > 0.4) & (pixels[..., 0] < 0.2)).sum() > 50
 
 
 def test_a_colour_that_is_none_is_grey(tmp_path):
     """A scene may write any word there; pages leave it to the browser."""
-    scene = Scene(name="odd")
+    scene = dap.Scene(name="odd")
     scene.add_body("a")
     scene.add_shape("box", "box", body="a", size=[1.0, 1.0, 1.0], color="nocolour")
     result = dap.simulate(scene, t_end=0.0, dt=1.0)
-    assert animate(result, tmp_path / "a.png").frames == 1
+    assert dap.animate(result, tmp_path / "a.png").frames == 1
     assert sticks_of(result).colors == (GROUND_COLOR,)
 
 
 def test_bodies_in_one_place_keep_their_markers():
     """Markers shrink once, for want of room, and not from picture to picture."""
-    scene = Scene(name="pile")
+    scene = dap.Scene(name="pile")
     for name in "abc":
         scene.add_body(name)
     result = dap.simulate(scene, t_end=0.0, dt=1.0)
@@ -327,7 +325,7 @@ def test_bodies_in_one_place_keep_their_markers():
 
 def test_what_is_in_front_hides_what_is_behind():
     """Of two boxes one over the other the upper one is seen, also where the lower one is large."""
-    scene = Scene(name="pile")
+    scene = dap.Scene(name="pile")
     scene.add_body("a")
     scene.add_shape("box", "floor", body="a", size=[9.0, 9.0, 0.2], color="#ff0000")
     scene.add_shape("box", "roof", body="a", size=[0.5, 0.5, 0.2], at=[4.0, 4.0, 0.5],
@@ -342,7 +340,7 @@ def test_what_is_in_front_hides_what_is_behind():
 
 @pytest.mark.parametrize("suffix", [".png", ".svg", ".pdf"])
 def test_snapshots(result, tmp_path, suffix):
-    film = animate(result, tmp_path / f"a{suffix}", at=0.5)
+    film = dap.animate(result, tmp_path / f"a{suffix}", at=0.5)
     assert film.frames == 1
     begin = {".png": b"\x89PNG", ".svg": b"<?xml", ".pdf": b"%PDF"}[suffix]
     assert film.path.read_bytes().startswith(begin)
@@ -353,8 +351,8 @@ def test_snapshots(result, tmp_path, suffix):
 
 def test_a_run_at_t_0_alone_gives_one_picture(tmp_path):
     single = circling(nt=1)[0]
-    assert animate(single, tmp_path / "a.gif").frames == 1
-    assert animate(single, tmp_path / "a.png").frames == 1
+    assert dap.animate(single, tmp_path / "a.gif").frames == 1
+    assert dap.animate(single, tmp_path / "a.png").frames == 1
 
 
 def test_limits_of_the_scene_that_the_motion_leaves_are_told(tmp_path):
@@ -363,8 +361,8 @@ def test_limits_of_the_scene_that_the_motion_leaves_are_told(tmp_path):
     moving, model = circling()[0], model_of(scene)
     rows = rows_of(model, moving.t, moving.u, moving.v_dot, moving.Lam)
     result = result_of(scene, rows, model)
-    assert re.search("leaves the limits", animate(result, tmp_path / "a.png").notes[0])
-    assert animate(result, tmp_path / "b.png", fit=True).notes == ()
+    assert re.search("leaves the limits", dap.animate(result, tmp_path / "a.png").notes[0])
+    assert dap.animate(result, tmp_path / "b.png", fit=True).notes == ()
 
 
 @pytest.mark.parametrize(
@@ -384,7 +382,7 @@ def test_limits_of_the_scene_that_the_motion_leaves_are_told(tmp_path):
 def test_what_cannot_be_is_refused(result, tmp_path, options, words):
     given = dict(path="a.gif") | options
     with pytest.raises(ValueError, match=words):
-        animate(result, tmp_path / given.pop("path"), **given)
+        dap.animate(result, tmp_path / given.pop("path"), **given)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -394,14 +392,14 @@ def test_an_interrupted_film_leaves_no_file(result, tmp_path):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        animate(result, tmp_path / "a.gif", size=(100, 100), progress=interrupt)
+        dap.animate(result, tmp_path / "a.gif", size=(100, 100), progress=interrupt)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_without_ffmpeg_there_is_no_mp4(result, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(ResultError, match=r"needs the program ffmpeg.*or name a \.gif file"):
-        animate(result, tmp_path / "a.mp4")
+        dap.animate(result, tmp_path / "a.mp4")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -413,5 +411,5 @@ def test_an_encoder_that_fails_is_quoted(result, tmp_path, monkeypatch):
     program.chmod(program.stat().st_mode | stat.S_IXUSR)
     monkeypatch.setenv("PATH", f"{program.parent}:/bin:/usr/bin")
     with pytest.raises(ResultError, match="ffmpeg failed with exit code 3: Unknown encoder"):
-        animate(result, tmp_path / "a.mp4")
+        dap.animate(result, tmp_path / "a.mp4")
     assert [p.name for p in tmp_path.iterdir()] == ["bin"]

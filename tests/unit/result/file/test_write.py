@@ -14,10 +14,10 @@ from support.plain import in_another_process
 from support.process import REPOSITORY, run
 from support.results import circling, grown, model_of, noisy, same_bits
 
-from dap3d_core.result import Result, ResultError, ResultWriter, RunMetadata, open_result
+import dap3d_core as dap
+from dap3d_core.result import ResultError, ResultWriter, RunMetadata, open_result
 from dap3d_core.result.arrays import COLUMNS, arrays_of
 from dap3d_core.result.file.schema import write_rows
-from dap3d_core.scene import load
 
 TESTS = str(REPOSITORY / "tests")
 
@@ -27,9 +27,9 @@ TESTS = str(REPOSITORY / "tests")
     [("pen1", (1,) * 9), ("pen2", (4, 5)), ("bodies2", (9,)), ("pen2", (0, 8, 1))],
 )
 def test_a_file_grown_in_pieces_is_that_of_the_whole(tmp_path, pieces, name):
-    model = model_of(load(name))
+    model = model_of(dap.load(name))
     rows = noisy(model)
-    whole = Result.of_run(model, rows, RunMetadata(scene_text="[scene]\n"), lambda: None)
+    whole = dap.Result.of_run(model, rows, RunMetadata(scene_text="[scene]\n"), lambda: None)
     with closing(grown(tmp_path / "run.nc", whole, most=12)) as writer:
         first = 0
         for count in pieces:

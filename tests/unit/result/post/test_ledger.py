@@ -13,8 +13,8 @@ from support.results import (
     rows_of,
 )
 
+import dap3d_core as dap
 from dap3d_core.model.state_layout import join, split
-from dap3d_core.scene import Scene
 
 
 def test_kinetic_energy_of_bodies_that_slide_and_spin():
@@ -51,7 +51,7 @@ def test_energy_that_no_work_accounts_for_is_found():
 
 def test_work_balances_kinetic_energy():
     """A body that falls: work m g h from the start, lost potential energy the same."""
-    scene = Scene(name="falling")
+    scene = dap.Scene(name="falling")
     scene.add_body("stone", mass=2.0, Jp=[1.0, 1.0, 1.0], r=[0, 0, 10])
     scene.add_force("weight", "g", gravity=9.81, wgt=[0, 0, -1])
     model = model_of(scene)
@@ -141,7 +141,7 @@ def test_momentum_that_is_not_conserved_is_found(column):
     else:
         w[4:, 0, 2] += 1e-3
     rows = rows_of(result.model, result.t, wrong, result.v_dot, result.Lam)
-    entry = result_of(Scene(), rows, result.model, "unconstrained").ledger["momentum"]
+    entry = result_of(dap.Scene(), rows, result.model, "unconstrained").ledger["momentum"]
     assert entry.ok is False
     assert 1e-5 < entry.value < 1e-2
 

@@ -6,15 +6,14 @@ from support.motions import Motion
 from support.results import ARM, MASS, PIVOT, RATE, about_z, circling, model_of, result_of, rows_of
 from support.scenes import scene_for
 
+import dap3d_core as dap
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model.rotations import rotation
 from dap3d_core.model.state_layout import split
-from dap3d_core.registry import load_registry
 from dap3d_core.result import ResultError, UnknownNameError
-from dap3d_core.scene import Scene
 from dap3d_core.simulation.initial.assemble import correct_initial
 
-REGISTRY = load_registry()
+REGISTRY = dap.load_registry()
 SEVERAL = [
     i.keyword
     for i in REGISTRY.listing()
@@ -106,7 +105,7 @@ K, C, L0, FA = 30.0, 0.7, 0.4, 1.5
 def sprung():
     """A bob that circles as in ``circling``, a spring and damper from it to a post, and weight."""
     result, out, ahead = circling()
-    scene = Scene(name="sprung")
+    scene = dap.Scene(name="sprung")
     scene.add_body("bob", mass=MASS, Jp=[0.2, 0.3, 0.4], r=result.r[0, 0], w=[0, 0, RATE])
     scene.add_point("E", body="bob", sPp=[0.1, 0, 0])
     scene.add_point("post", body="ground", sPp=[1.0, 0.5, -0.2])
@@ -143,7 +142,7 @@ def test_a_spring_and_damper_element():
 
 def test_turns_are_counted_again_from_the_start():
     """A wheel that turns four times against a torsion spring: k times the whole angle (spec 6)."""
-    scene = Scene(name="wound")
+    scene = dap.Scene(name="wound")
     scene.add_body("wheel", mass=1.0, Jp=[1, 1, 1])
     scene.add_force("rot_sda", "coil", v_i="wheel.x", v_j="ground.x", axis="ground.z", k=2.0,
                     turns=True)  # fmt: skip
@@ -167,7 +166,7 @@ def test_turns_are_counted_again_from_the_start():
 
 
 def test_friction_in_a_joint_has_no_quantities():
-    scene = Scene(name="rubbing")
+    scene = dap.Scene(name="rubbing")
     scene.add_body("wheel", mass=1.0, Jp=[1, 1, 1])
     scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
     scene.add_force("friction", "rub", joint="axle", mu=0.2, radius=0.1)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from support.results import circling, model_of, result_of
 
+import dap3d_core as dap
 from dap3d_core.result import ResultError
 from dap3d_core.result.quantities.csv_table import columns_of, jacobian_columns, selected, write_csv
-from dap3d_core.scene import Scene
 
 
 def test_a_jacobian_of_many_rows_does_not_go_into_a_table(monkeypatch):
@@ -36,7 +36,7 @@ def test_numbers_keep_all_their_digits(tmp_path):
 def test_names_with_commas_and_quotes_survive_a_table(tmp_path):
     import csv
 
-    scene = Scene(name="odd")
+    scene = dap.Scene(name="odd")
     scene.add_body('a "b", c', mass=1.0, Jp=[1, 1, 1])
     rows = np.zeros((1, 25))
     rows[0, 4] = 1.0

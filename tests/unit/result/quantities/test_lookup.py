@@ -7,7 +7,7 @@ from support.state_types import REGISTRY, pulled
 
 import dap3d_core as dap
 from dap3d_core.result import UnknownNameError, find
-from dap3d_core.scene import AnimationPoint, Scene
+from dap3d_core.scene import AnimationPoint
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def test_roll_pitch_and_yaw_count_turns_from_one_reported_instant_to_the_next(re
 
 def test_roll_and_yaw_count_turns_between_reports_far_apart():
     """A free body at 40 rad/s, reported ten times a second: 4 rad from one report to the next."""
-    scene = Scene(name="spun")
+    scene = dap.Scene(name="spun")
     scene.add_body("rotor", mass=1.0, Jp=[1.0, 1.0, 1.0], w=[0.0, 0.0, -40.0])
     result = dap.simulate(scene, t_end=3.0, dt=0.1)
     np.testing.assert_allclose(result.quantity("rotor.yaw").values, -40.0 * result.t, atol=1e-9)
@@ -65,7 +65,7 @@ def test_points(result):
 
 
 def test_animation_points_have_a_dot_in_their_names():
-    scene = Scene(name="drawn")
+    scene = dap.Scene(name="drawn")
     scene.add_body("b", mass=1.0, Jp=[1, 1, 1])
     scene.animation.points.append(AnimationPoint(body="b", sPp=[1.0, 2.0, 3.0]))
     model = model_of(scene)
@@ -109,7 +109,7 @@ def test_quantities_of_the_whole(result):
 
 
 def test_a_name_that_a_body_and_a_point_share_means_the_body_where_it_can():
-    scene = Scene(name="twins")
+    scene = dap.Scene(name="twins")
     scene.add_body("b", mass=1.0, Jp=[1, 1, 1])
     scene.add_point("b", body="b", sPp=[1.0, 0.0, 0.0])
     rows = np.zeros((1, 25))

@@ -8,10 +8,10 @@ import pytest
 import xarray
 from support.results import circling, model_of, result_of
 
+import dap3d_core as dap
 from dap3d_core.result import ResultError
 from dap3d_core.result.quantities.csv_table import columns_of, write_csv
 from dap3d_core.result.quantities.netcdf_export import dataset_to_write, selection_of, write_netcdf
-from dap3d_core.scene import Scene
 
 
 def test_a_jacobian_of_many_rows_is_written_by_its_entries(tmp_path, monkeypatch):
@@ -27,7 +27,7 @@ def test_a_jacobian_of_many_rows_is_written_by_its_entries(tmp_path, monkeypatch
 
 
 def test_a_slash_in_a_name_is_no_group_of_netcdf():
-    scene = Scene(name="odd")
+    scene = dap.Scene(name="odd")
     scene.add_body("a/b", mass=1.0, Jp=[1, 1, 1])
     rows = np.zeros((1, 25))
     rows[0, 4] = 1.0

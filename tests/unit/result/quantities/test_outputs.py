@@ -10,7 +10,7 @@ from support.process import run
 from support.results import ARM, MASS, RATE, circling
 
 import dap3d_core as dap
-from dap3d_core.result import Result, ResultError, UnknownNameError, find, names_of
+from dap3d_core.result import ResultError, UnknownNameError, find, names_of
 from dap3d_core.result.open import open_result
 from dap3d_core.result.quantities.csv_table import columns_of, selected, write_csv
 from dap3d_core.result.quantities.netcdf_export import dataset_to_write
@@ -123,7 +123,7 @@ def test_an_output_named_like_an_array_does_not_hide_it():
 def test_outputs_of_a_result_without_instants():
     whole, _, _ = circling(outputs={"late": "1 / t", "arm": "bob.r - Q.r"})
     arrays = whole.arrays.part(slice(0, 0))
-    result = Result(whole.summary, arrays, whole.record, lambda: whole._origin)
+    result = dap.Result(whole.summary, arrays, whole.record, lambda: whole._origin)
     assert result.quantity("late").values.shape == (0,)
     assert result.quantity("arm").values.shape == (0, 3)
     assert result.coordinates("J1").q.shape == (0, 3)

@@ -3,7 +3,7 @@
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.scene import SceneError, check
+from dap3d_core.scene import check
 
 
 def hinge(**limits):
@@ -43,28 +43,28 @@ def test_a_stop_is_a_contact_where_it_has_no_stiffness():
     ],
 )
 def test_limits_that_are_none(limits, words):
-    with pytest.raises(SceneError, match=words):
+    with pytest.raises(dap.SceneError, match=words):
         read(hinge(**limits))
 
 
 def test_names_of_limits_are_those_of_contacts():
     scene = hinge(lower=0.0)
     scene.add_contact("ball_plane", "axle_lower", P_i="wheel.O")
-    with pytest.raises(SceneError, match="is the name of the lower limit of joint axle"):
+    with pytest.raises(dap.SceneError, match="is the name of the lower limit of joint axle"):
         read(scene)
 
 
 def test_fields_of_the_spring_need_its_stiffness():
     scene = hinge()
     scene.add_force("rot_stop", "stop", joint="axle", theta_stop=-1.0, zeta=0.5)
-    with pytest.raises(SceneError, match=r"forces\.stop\.zeta = 0.5.*rigid without k\s+give k"):
+    with pytest.raises(dap.SceneError, match=r"forces\.stop\.zeta = 0.5.*rigid without k\s+give k"):
         read(scene)
 
 
 def test_a_rigid_stop_has_a_name_of_its_own():
     scene = hinge()
     scene.add_force("rot_stop", "axle", joint="axle", theta_stop=-1.0)
-    with pytest.raises(SceneError, match=r"its name is one of \[joints\] as well"):
+    with pytest.raises(dap.SceneError, match=r"its name is one of \[joints\] as well"):
         read(scene)
 
 
@@ -72,5 +72,5 @@ def test_a_joint_without_a_coordinate_takes_no_limits():
     scene = hinge()
     scene.joints["axle"].type = "sph"
     scene.joints["axle"].fields = {"P_i": "wheel.O", "P_j": "ground.O", "lower": 1.0}
-    with pytest.raises(SceneError, match=r"joints\.axle\.lower"):
+    with pytest.raises(dap.SceneError, match=r"joints\.axle\.lower"):
         read(scene)

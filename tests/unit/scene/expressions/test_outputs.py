@@ -3,7 +3,7 @@
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.scene import Scene, parse
+from dap3d_core.scene import parse
 from dap3d_core.scene.expressions.outputs import LONGEST_CHAIN, outputs_of
 
 FALLING = """\
@@ -90,7 +90,7 @@ def test_outputs_survive_copies_and_files(tmp_path):
 
 
 def test_add_output_refuses_a_name_twice():
-    scene = Scene()
+    scene = dap.Scene()
     assert scene.add_output("camber", "t") == "camber"
     with pytest.raises(dap.SceneError, match="one of this name in outputs already"):
         scene.add_output("camber", "t")

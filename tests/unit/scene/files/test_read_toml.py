@@ -8,15 +8,15 @@ import textwrap
 import pytest
 from support.plain import in_another_process
 
-from dap3d_core.scene import SceneError, load, shipped_models
+import dap3d_core as dap
 from dap3d_core.scene.files.read_toml import group_of
 
 TEXT = '[scene]\nname = "small"\n\n[bodies.a]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n'
 
 
 def refused(source):
-    with pytest.raises(SceneError) as caught:
-        load(source)
+    with pytest.raises(dap.SceneError) as caught:
+        dap.load(source)
     assert len(caught.value.mistakes) == 1
     return str(caught.value)
 
@@ -25,7 +25,7 @@ def test_a_folder_and_a_file_are_read(tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text(TEXT)
     for source in (tmp_path, str(tmp_path), file, str(file), os.fsencode(file)):
-        scene = load(source)
+        scene = dap.load(source)
         assert scene.name == "small"
         assert (scene.path, scene.folder) == (file, tmp_path)
 
@@ -34,47 +34,47 @@ def test_a_folder_and_a_file_are_read(tmp_path):
 def test_odd_file_names_are_read(tmp_path, monkeypatch, name):
     (tmp_path / name).write_text(TEXT)
     monkeypatch.chdir(tmp_path)
-    assert load(name).name == "small"
+    assert dap.load(name).name == "small"
 
 
 def test_shipped_models_are_read_by_name(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    models = shipped_models()
+    models = dap.shipped_models()
     assert models, "there are some"
     for name, folder in models.items():
-        assert load(name).path == folder / "scene.toml"
+        assert dap.load(name).path == folder / "scene.toml"
 
 
 def test_models_of_a_group_are_read_with_and_without_it(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    models = shipped_models()
+    models = dap.shipped_models()
     groups = [group_of(folder) for folder in models.values()]
     assert groups == sorted(groups), "models without a group come first"
     assert set(groups) == {"", "benchmarks", "engineering"}
-    assert load("benchmarks/A04").path == load("A04").path == models["A04"] / "scene.toml"
+    assert dap.load("benchmarks/A04").path == dap.load("A04").path == models["A04"] / "scene.toml"
     for name in ("benchmarks/pen1", "models/pen1", "other/A04", "/A04", "/pen1", "benchmarks"):
         refused(name)
 
 
 def test_a_folder_of_the_users_own_goes_before_a_shipped_model_and_says_so(monkeypatch, tmp_path):
-    name = next(iter(shipped_models()))
+    name = next(iter(dap.shipped_models()))
     monkeypatch.chdir(tmp_path)
     (tmp_path / name).mkdir()
-    assert load(name).name != "small", "a folder without a scene is not meant"
+    assert dap.load(name).name != "small", "a folder without a scene is not meant"
     (tmp_path / name / "scene.toml").write_text(TEXT)
-    scene = load(name)
+    scene = dap.load(name)
     assert scene.name == "small"
     assert "also the name of a shipped model" in scene.notes[0]
 
 
 def test_a_missing_model_names_the_nearest():
-    name = max(shipped_models(), key=len)
+    name = max(dap.shipped_models(), key=len)
     said = refused(name[:-1])
     assert "there is no file or folder" in said
     assert f"did you mean {name!r}" in said or any(
-        f"did you mean {n!r}" in said for n in shipped_models()
+        f"did you mean {n!r}" in said for n in dap.shipped_models()
     )
-    assert ", ".join(shipped_models()) in said
+    assert ", ".join(dap.shipped_models()) in said
 
 
 def test_a_missing_file_names_the_nearest_in_its_folder(tmp_path, monkeypatch):
@@ -168,7 +168,7 @@ def test_a_matlab_file_names_the_importer(tmp_path):
 def test_a_byte_order_mark_and_mixed_line_ends_are_read(tmp_path):
     file = tmp_path / "scene.toml"
     file.write_bytes(b"\xef\xbb\xbf" + TEXT.replace("\n", "\r\n", 3).encode())
-    assert load(file).bodies["a"].mass == 1.0
+    assert dap.load(file).bodies["a"].mass == 1.0
 
 
 @in_another_process
@@ -209,4 +209,4 @@ def test_what_looks_like_a_long_key_is_read_quickly(tmp_path):
     file = tmp_path / "scene.toml"
     words = "a" * 1_000_000 + '"' * 100_000 + "0.1, " * 100_000 + "a.b.c " * 100_000 + "." * 999
     file.write_text(TEXT.replace("\n", f"\ndescription = '{words}'\n", 1))
-    assert load(file).description == words
+    assert dap.load(file).description == words

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dap3d_core.registry import load_registry
-from dap3d_core.scene import Scene, SceneError, check, load, shipped_models
+import dap3d_core as dap
+from dap3d_core.scene import check
 from dap3d_core.scene.files.line_numbers import lines_of
 from dap3d_core.scene.files.read_toml import scene_of
 from dap3d_core.scene.tables import Element, fault_of_name
@@ -33,7 +33,7 @@ values = st.recursive(
 @st.composite
 def scenes(draw, good=True):
     """A scene that may be checked (good), or with any values at all."""
-    scene = Scene(name=draw(st.text(max_size=5)), description=draw(st.text(max_size=20)))
+    scene = dap.Scene(name=draw(st.text(max_size=5)), description=draw(st.text(max_size=20)))
     number, vector = (positive, st.tuples(positive, positive, positive)) if good else (values,) * 2
     bodies = draw(st.lists(names, min_size=1, max_size=4, unique=True))
     for name in bodies:
@@ -95,12 +95,12 @@ def test_even_a_scene_of_nonsense_is_written_without_loss(scene):
 @settings(deadline=None, max_examples=50)
 @given(scenes())
 def test_what_was_read_back_is_checked_alike(scene):
-    registry = load_registry()
+    registry = dap.load_registry()
 
     def answer(s):
         try:
             return [], check(s, registry).notes
-        except SceneError as error:
+        except dap.SceneError as error:
             return [m.key for m in error.mistakes], []
 
     assert answer(scene) == answer(scene_of(tomllib.loads(scene.to_toml())))
@@ -143,25 +143,25 @@ def _tables(value, key):
             yield from _tables(v, (*key, n))
 
 
-@pytest.mark.parametrize("name", shipped_models())
+@pytest.mark.parametrize("name", dap.shipped_models())
 def test_shipped_models_survive_writing(tmp_path, name):
-    scene = load(name)
+    scene = dap.load(name)
     file = scene.save(tmp_path / "again.toml")
     assert file == tmp_path / "again.toml"
-    again = load(file)
+    again = dap.load(file)
     assert bits(again) == bits(scene)
     assert list(tmp_path.iterdir()) == [file], "nothing is left beside it"
 
 
 def test_infinity_and_nan_survive_until_the_check():
-    scene = Scene()
+    scene = dap.Scene()
     scene.add_body("a", mass=math.inf, r=[math.nan, -math.inf, 0.0])
     again = scene_of(tomllib.loads(scene.to_toml()))
     assert bits(again) == bits(scene)
 
 
 def test_the_layout_is_that_of_a_scene_file():
-    scene = Scene(name="demo")
+    scene = dap.Scene(name="demo")
     scene.add_body("crank", mass=1.0, Jp=[0.5, 0.5, 0.1], color="tab:blue")
     scene.add_point("A 1", "crank", [0.0, 0.0, -1.0])
     scene.add_joint("sph", "J1", P_i="A 1", P_j="ground.O")
@@ -176,19 +176,19 @@ def test_the_layout_is_that_of_a_scene_file():
 
 
 def test_a_folder_gets_a_scene_file(tmp_path):
-    scene = Scene(name="x")
+    scene = dap.Scene(name="x")
     assert scene.save(tmp_path) == tmp_path / "scene.toml"
-    assert load(tmp_path) == scene
+    assert dap.load(tmp_path) == scene
 
 
 def test_what_a_file_cannot_hold_is_refused_and_nothing_is_written(tmp_path):
-    scene = Scene()
+    scene = dap.Scene()
     scene.add_body("a", mass=1.0)
     scene.joints["J"] = Element("J", "sph", {"P_i": object()})
-    with pytest.raises(SceneError, match=r"joints.J.P_i.*cannot hold object"):
+    with pytest.raises(dap.SceneError, match=r"joints.J.P_i.*cannot hold object"):
         scene.save(tmp_path / "scene.toml")
-    scene = Scene(name="\ud800")
-    with pytest.raises(SceneError, match="UTF-8"):
+    scene = dap.Scene(name="\ud800")
+    with pytest.raises(dap.SceneError, match="UTF-8"):
         scene.save(tmp_path / "scene.toml")
     assert list(tmp_path.iterdir()) == []
 
@@ -196,8 +196,8 @@ def test_what_a_file_cannot_hold_is_refused_and_nothing_is_written(tmp_path):
 def test_a_scene_with_unknown_keys_is_not_written_without_them(tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text("[bodies.a]\nmas = 1.0\n")
-    with pytest.raises(SceneError, match="mas"):
-        load(file).save(tmp_path / "again.toml")
+    with pytest.raises(dap.SceneError, match="mas"):
+        dap.load(file).save(tmp_path / "again.toml")
 
 
 @pytest.mark.parametrize(
@@ -205,12 +205,12 @@ def test_a_scene_with_unknown_keys_is_not_written_without_them(tmp_path):
 )
 def test_a_file_that_cannot_be_written_is_an_error(tmp_path, where):
     (tmp_path / "file").write_text("")
-    with pytest.raises(SceneError, match="cannot be written"):
-        Scene().save(str(tmp_path / where))
+    with pytest.raises(dap.SceneError, match="cannot be written"):
+        dap.Scene().save(str(tmp_path / where))
 
 
 def test_saving_over_a_file_replaces_it_whole(tmp_path):
     file = tmp_path / "scene.toml"
     file.write_text("old")
-    Scene(name="new").save(file)
-    assert load(file).name == "new"
+    dap.Scene(name="new").save(file)
+    assert dap.load(file).name == "new"

@@ -3,8 +3,7 @@
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.registry import load_registry
-from dap3d_core.scene import SceneError, check
+from dap3d_core.scene import check
 from dap3d_core.scene.signals.combinations import MOST_TERMS
 
 
@@ -23,7 +22,7 @@ def scene_with(**combinations):
 def test_terms_are_found_whatever_their_order_in_the_file():
     """A sum may name a product that comes after it; what a combination uses is used."""
     scene = scene_with(all=("sum", ["both", "swing"]), both=("product", ["swing", "ramp"]))
-    checked = check(scene, load_registry())
+    checked = check(scene, dap.load_registry())
     (total,) = (f for f in checked.functions if f.name == "all")
     assert [term.name for term in total.terms] == ["both", "swing"]
     assert [term.name for term in total.terms[0].terms] == ["swing", "ramp"]
@@ -47,8 +46,8 @@ def test_terms_are_found_whatever_their_order_in_the_file():
 )
 def test_what_cannot_be_combined_is_refused(combinations, words):
     """A circle, an unknown function, no list of names: each is one clear mistake."""
-    with pytest.raises(SceneError, match=f"(?s){words}") as caught:
-        check(scene_with(**combinations), load_registry())
+    with pytest.raises(dap.SceneError, match=f"(?s){words}") as caught:
+        check(scene_with(**combinations), dap.load_registry())
     assert len(caught.value.mistakes) == 1
 
 
@@ -56,19 +55,19 @@ def test_functions_are_given_as_many_arguments_as_they_take():
     """A map over two arguments is no function of time, no spring curve and no term of a sum."""
     scene = scene_with(all=("sum", ["map", "swing"]))
     scene.add_function("grid", "map", x=[0.0, 1.0], y=[0.0, 1.0], z=[[0.0, 1.0], [1.0, 3.0]])
-    with pytest.raises(SceneError, match=r"functions.all.* of one argument; map takes two"):
-        check(scene, load_registry())
+    with pytest.raises(dap.SceneError, match=r"functions.all.* of one argument; map takes two"):
+        check(scene, dap.load_registry())
     scene.functions["all"].fields["functions"] = ("swing",)
     scene.forces["push"].fields["function"] = "map"
     ends = {"P_i": "block.O", "P_j": "ground.O"}
     scene.add_point("away", "block", (1.0, 0.0, 0.0))
     scene.add_force("ptp", "curve", **(ends | {"P_i": "away"}), l0=0.0, function="map")
-    with pytest.raises(SceneError) as caught:
-        check(scene, load_registry())
+    with pytest.raises(dap.SceneError) as caught:
+        check(scene, dap.load_registry())
     time, length = caught.value.mistakes
     scene.forces["push"].fields["function"] = {"x": 1.0}
-    with pytest.raises(SceneError, match=r"push.function.*should be the name of a function"):
-        check(scene, load_registry())
+    with pytest.raises(dap.SceneError, match=r"push.function.*should be the name of a function"):
+        check(scene, dap.load_registry())
     assert "push.function" in str(time)
     assert "a function of time" in str(time)
     assert "takes two arguments, and is to be a function of" in str(length)
@@ -79,5 +78,5 @@ def test_combinations_that_multiply_are_refused():
     count = MOST_TERMS.bit_length()
     pairs = {f"s{k}": ("sum", [f"s{k - 1}", f"s{k - 1}"] if k else ["swing"]) for k in range(count)}
     pairs["all"] = ("sum", [f"s{count - 1}", f"s{count - 1}"])
-    with pytest.raises(SceneError, match=f"combines {2**count} functions"):
-        check(scene_with(**pairs), load_registry())
+    with pytest.raises(dap.SceneError, match=f"combines {2**count} functions"):
+        check(scene_with(**pairs), dap.load_registry())

@@ -3,9 +3,8 @@
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.registry import load_registry
 from dap3d_core.result.quantities.catalogue import SYSTEM
-from dap3d_core.scene import SceneError, check
+from dap3d_core.scene import check
 from dap3d_core.scene.signals.inputs import SYSTEM_NAMES
 
 
@@ -23,17 +22,17 @@ def test_an_input_is_written_and_read(tmp_path):
     """A table of its own; its value is an expression where there are parameters."""
     scene = scene_with(0.25)
     assert dap.load(scene.save(tmp_path / "scene.toml")) == scene
-    assert dict(check(scene, load_registry()).inputs) == {"motor": 0.25}
+    assert dict(check(scene, dap.load_registry()).inputs) == {"motor": 0.25}
     scene.add_parameter("L", 3.0)
     scene.inputs["motor"].value = "= 2 * L"
-    assert dict(check(scene, load_registry()).inputs) == {"motor": 6.0}
+    assert dict(check(scene, dap.load_registry()).inputs) == {"motor": 6.0}
 
 
 def test_an_input_that_nothing_reads_is_noted():
     """As a function that nothing uses."""
-    notes = check(scene_with(function="swing"), load_registry()).notes
+    notes = check(scene_with(function="swing"), dap.load_registry()).notes
     assert "inputs.motor: no joint and no force reads it" in notes
-    assert not any("inputs" in note for note in check(scene_with(), load_registry()).notes)
+    assert not any("inputs" in note for note in check(scene_with(), dap.load_registry()).notes)
 
 
 @pytest.mark.parametrize(
@@ -51,8 +50,8 @@ def test_an_input_that_nothing_reads_is_noted():
 )
 def test_inputs_that_make_no_sense_are_refused(scene, words):
     """Each is one mistake that names the key."""
-    with pytest.raises(SceneError, match=f"(?s){words}") as caught:
-        check(scene, load_registry())
+    with pytest.raises(dap.SceneError, match=f"(?s){words}") as caught:
+        check(scene, dap.load_registry())
     assert len(caught.value.mistakes) == 1
 
 
@@ -63,7 +62,7 @@ def test_names_of_the_quantities_of_every_result_are_known():
 
 def test_keys_of_an_input_are_known():
     """In Python as in a file."""
-    with pytest.raises(SceneError, match=r"motor\.start"):
+    with pytest.raises(dap.SceneError, match=r"motor\.start"):
         dap.Scene().add_input("motor", start=1.0)
-    with pytest.raises(SceneError, match="there is one of this name in inputs"):
+    with pytest.raises(dap.SceneError, match="there is one of this name in inputs"):
         scene_with().add_input("motor")

@@ -3,12 +3,12 @@
 import pytest
 from unit.scene.base import scene_of as read_scene
 
-from dap3d_core.registry import load_registry
+import dap3d_core as dap
 
 
 @pytest.fixture(scope="package")
 def registry():
-    return load_registry()
+    return dap.load_registry()
 
 
 @pytest.fixture

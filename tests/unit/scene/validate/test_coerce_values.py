@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from unit.scene.base import BASE
 
-from dap3d_core.registry import load_registry
-from dap3d_core.scene import Scene, SceneError, check
+import dap3d_core as dap
+from dap3d_core.scene import check
 
 
 @pytest.mark.parametrize(
@@ -47,7 +47,7 @@ def test_rounding_of_unit_lengths_is_not_noted(scene_of, registry):
 
 def test_functions_of_time_and_of_other_arguments_are_used(registry):
     """A motor's, of time, and a spring's, of its elongation; the third is not."""
-    scene = Scene()
+    scene = dap.Scene()
     scene.add_body("a", mass=1.0, Jp=[1.0, 1.0, 1.0])
     for name in ("motor", "curve", "spare"):
         scene.add_function("a", name, coeff=[0.0, 1.0, 0.0])
@@ -58,7 +58,7 @@ def test_functions_of_time_and_of_other_arguments_are_used(registry):
 
 
 def test_a_body_without_joint_or_force_is_noted(registry):
-    scene = Scene()
+    scene = dap.Scene()
     scene.add_body("free", mass=1.0, Jp=[1.0, 1.0, 1.0])
     assert check(scene, registry).notes == ["bodies.free: no joint and no force acts on it"]
     scene.add_force("weight")
@@ -66,7 +66,7 @@ def test_a_body_without_joint_or_force_is_noted(registry):
 
 
 def test_many_notes_of_a_kind_are_counted(registry):
-    scene = Scene()
+    scene = dap.Scene()
     for k in range(50):
         scene.add_body(f"b{k}", mass=1.0, Jp=[1.0, 1.0, 1.0])
     notes = check(scene, registry).notes
@@ -75,17 +75,17 @@ def test_many_notes_of_a_kind_are_counted(registry):
 
 
 def test_many_mistakes_are_all_kept_and_partly_printed(registry):
-    scene = Scene()
+    scene = dap.Scene()
     for k in range(1500):
         scene.add_body(f"b{k}", mass=-1.0, Jp=[1.0, 1.0, 1.0])
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         check(scene, registry)
     assert len(caught.value.mistakes) == 1500
     assert str(caught.value).endswith("... and 500 more mistakes")
 
 
 def test_the_triangle_inequality_has_room_for_rounding(registry):
-    scene = Scene()
+    scene = dap.Scene()
     scene.add_body("plate", mass=1.0, Jp=[0.1, 0.2, 0.1 + 0.2])
     scene.add_body("disc", mass=1.0, Jp=[0.01, 0.02, 0.01])
     check(scene, registry)
@@ -107,10 +107,10 @@ TURNED = [
 @pytest.mark.parametrize(("given", "wanted"), TURNED)
 def test_orientations_are_those_of_scipy(given, wanted):
     """Roll, pitch, yaw are turns about fixed axes; an axis may have any length."""
-    scene = Scene(name="turned")
+    scene = dap.Scene(name="turned")
     scene.add_body("b", mass=1.0, Jp=(1.0, 1.0, 1.0), **given)
     x, y, z, e0 = wanted.as_quat()
-    found = check(scene, load_registry()).p[0]
+    found = check(scene, dap.load_registry()).p[0]
     assert abs(found @ (e0, x, y, z)) == pytest.approx(1.0, abs=1e-10)
     assert np.linalg.norm(found) == pytest.approx(1.0, abs=1e-15)
 
@@ -129,21 +129,21 @@ def test_orientations_are_those_of_scipy(given, wanted):
 )
 def test_orientations_that_mean_nothing_are_refused(given, words):
     """With what is allowed."""
-    scene = Scene(name="turned")
+    scene = dap.Scene(name="turned")
     scene.add_body("b", mass=1.0, Jp=(1.0, 1.0, 1.0), **given)
-    with pytest.raises(SceneError, match=words):
-        check(scene, load_registry())
+    with pytest.raises(dap.SceneError, match=words):
+        check(scene, dap.load_registry())
 
 
 def test_angles_of_types_may_be_given_in_degrees_and_rates_in_turns():
     """Numbers whose unit is rad or rad/s; no others."""
-    scene = Scene(name="turned")
+    scene = dap.Scene(name="turned")
     for name in ("a", "b"):
         scene.add_body(name, mass=1.0, Jp=(1.0, 1.0, 1.0))
     scene.add_force("rot_sda", "coil", v_i="a.x", v_j="b.x", axis="b.z", k=1.0, theta_0="90 deg")
-    assert check(scene, load_registry()).forces[0].values["theta_0"] == pytest.approx(
+    assert check(scene, dap.load_registry()).forces[0].values["theta_0"] == pytest.approx(
         np.pi / 2, rel=1e-15
     )
     scene.forces["coil"].fields["k"] = "3 deg"
-    with pytest.raises(SceneError, match='k = "3 deg": should be a number'):
-        check(scene, load_registry())
+    with pytest.raises(dap.SceneError, match='k = "3 deg": should be a number'):
+        check(scene, dap.load_registry())

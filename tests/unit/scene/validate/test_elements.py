@@ -5,7 +5,6 @@ from support.own_types import registry_of
 
 import dap3d_core as dap
 from dap3d_core.interface import Body, Force, body, number
-from dap3d_core.scene import SceneError
 from dap3d_core.scene.validate.validate import check
 
 ZERO = (0.0, 0.0, 0.0)
@@ -41,6 +40,6 @@ def test_a_whole_number_is_taken(count):
 
 @pytest.mark.parametrize(("count", "words"), [(2.5, "a whole number"), (5, "at most 4")])
 def test_any_other_is_refused(count, words):
-    with pytest.raises(SceneError, match=words) as caught:
+    with pytest.raises(dap.SceneError, match=words) as caught:
         check(scene(count), registry_of(Blades))
     assert "count" in str(caught.value)

@@ -8,7 +8,7 @@ import dap3d_core as dap
 from dap3d_core import settings
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.integrators import INTEGRATORS
-from dap3d_core.scene import Scene, SceneError, Simulation, check_simulation, mistake_at
+from dap3d_core.scene import Simulation, check_simulation, mistake_at
 
 
 def test_the_defaults_are_good():
@@ -18,7 +18,7 @@ def test_the_defaults_are_good():
 
 def test_mistakes_carry_the_names_of_the_settings():
     settings = attrs.evolve(Simulation(), t_end=-1.0, rtol=0, method="fast", hold=("b",))
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         check_simulation(settings, ("a",))
     assert [m.key for m in caught.value.mistakes] == ["t_end", "method", "rtol", "hold.1"]
 
@@ -30,7 +30,7 @@ def test_a_mistake_of_a_higher_floor_finds_its_line(tmp_path):
     file.write_text('[bodies.a]\n\n[joints.J1]\ntype = "sph"\n')
     mistake = mistake_at(load(file), ("joints", "J1"), "cannot be assembled", "move it")
     assert str(mistake) == f"{file}:3: joints.J1: cannot be assembled\n    move it"
-    assert mistake_at(Scene(), ("joints", "J1"), "bad").line is None
+    assert mistake_at(dap.Scene(), ("joints", "J1"), "bad").line is None
 
 
 def test_names_of_formulations_and_integrators_are_those_of_their_tables():

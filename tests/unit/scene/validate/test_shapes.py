@@ -2,8 +2,8 @@
 
 import pytest
 
-from dap3d_core.registry import load_registry
-from dap3d_core.scene import Scene, SceneError, check, load, parse
+import dap3d_core as dap
+from dap3d_core.scene import check, parse
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.shapes import SHAPES, mesh_file, read_shapes
 
@@ -82,12 +82,12 @@ MISTAKES = [
 def written(tmp_path, text):
     path = tmp_path / "scene.toml"
     path.write_text(text)
-    return load(path)
+    return dap.load(path)
 
 
 def test_every_mistake_is_told_with_its_line(tmp_path):
-    with pytest.raises(SceneError) as caught:
-        check(written(tmp_path, BAD), load_registry())
+    with pytest.raises(dap.SceneError) as caught:
+        check(written(tmp_path, BAD), dap.load_registry())
     found = {m.key: m for m in caught.value.mistakes}
     assert sorted(found) == sorted(key for key, *_ in MISTAKES)
     for key, line, words in MISTAKES:
@@ -99,7 +99,7 @@ def test_every_mistake_is_told_with_its_line(tmp_path):
 
 def test_good_shapes_are_read_with_their_defaults(tmp_path):
     scene = written(tmp_path, GOOD)
-    checked = check(scene, load_registry())
+    checked = check(scene, dap.load_registry())
     assert checked.notes == []
     arm, floor = read_shapes(Collector(scene), checked.body_index)
     assert (arm.name, arm.type, arm.body) == ("arm", "box", 1)
@@ -117,7 +117,7 @@ def test_good_shapes_are_read_with_their_defaults(tmp_path):
 
 
 def test_a_scene_with_every_shape_reads_back_as_it_was_written():
-    scene = Scene(name="all")
+    scene = dap.Scene(name="all")
     scene.add_body("b")
     fields = {
         "box": {"size": (1.0, 2.0, 3.0), "p": (0.6, 0.8, 0.0, 0.0)},
@@ -135,9 +135,9 @@ def test_a_scene_with_every_shape_reads_back_as_it_was_written():
     assert fields.keys() == SHAPES.keys()
     names = [scene.add_shape(type_, body="b", **given) for type_, given in fields.items()]
     assert names == [f"{type_}1" for type_ in fields]
-    check(scene, load_registry())
+    check(scene, dap.load_registry())
     assert parse(scene.to_toml()) == scene
-    with pytest.raises(SceneError, match="one of this name in shapes already"):
+    with pytest.raises(dap.SceneError, match="one of this name in shapes already"):
         scene.add_shape("box", "box1", body="b", size=(1, 1, 1))
 
 

@@ -7,7 +7,8 @@ import pytest
 from unit.scene.base import BASE, mistakes_of
 from unit.scene.mistakes import ALL
 
-from dap3d_core.scene import MISSING, SceneError, check, load
+import dap3d_core as dap
+from dap3d_core.scene import MISSING, check
 
 
 def test_a_good_scene_becomes_arrays_and_instances(scene_of, registry):
@@ -121,7 +122,7 @@ def test_all_mistakes_are_reported_at_once_in_the_order_of_the_file(scene_of, re
         "simulation.dt",
     ]
     assert [m.line for m in mistakes] == sorted(m.line for m in mistakes)
-    error = SceneError(mistakes)
+    error = dap.SceneError(mistakes)
     assert str(error).count("scene.toml:") == 7
 
 
@@ -175,7 +176,7 @@ def test_an_inline_table_and_dotted_keys_have_lines(scene_of, registry):
 def test_crlf_files_are_read_and_lines_counted(tmp_path, registry):
     text = BASE.replace("dt = 0.05", "dt = -1").replace("\n", "\r\n")
     (tmp_path / "scene.toml").write_bytes(text.encode())
-    (mistake,) = mistakes_of(load(tmp_path), registry)
+    (mistake,) = mistakes_of(dap.load(tmp_path), registry)
     assert (mistake.key, mistake.line) == ("simulation.dt", text.split("\r\n").index("dt = -1") + 1)
 
 
@@ -195,7 +196,7 @@ def test_a_number_that_python_will_not_write_is_shown(scene_of, registry):
     (mistake,) = mistakes_of(scene, registry)
     assert str(mistake).startswith(f"{scene.path}:6: bodies.crank.mass = 0xffff")
     assert len(str(mistake).splitlines()[0]) < 300
-    with pytest.raises(SceneError, match="cannot hold so large a number"):
+    with pytest.raises(dap.SceneError, match="cannot hold so large a number"):
         scene.to_toml()
 
 

@@ -8,13 +8,12 @@ import pytest
 from support import mechanisms, problems, trees
 from support.ended import leave, shorten_chunks
 from support.levels import quickly
-from support.plain import long_in_plain_python
+from support.plain import jit_is_on, long_in_plain_python
 from support.results import same_bits
 
 import dap3d_core as dap
 from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators.radau.state import RadauState
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.simulation.checkpoint.file import read_checkpoint
 
 RUN = import_module("dap3d_core.simulation.run")

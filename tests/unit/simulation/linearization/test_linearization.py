@@ -9,12 +9,11 @@ from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result import UnknownNameError
-from dap3d_core.scene import Scene
 
 
 def cart(**start):
     """A cart of 2 kg on a rail with spring and damper, a pendulum of 1 kg below, three inputs."""
-    scene = Scene(name="cart")
+    scene = dap.Scene(name="cart")
     scene.add_body("cart", mass=2.0, Jp=np.diag([0.1, 0.1, 0.1]), r=[0, 0, 0], **start)
     scene.add_body("bob", mass=1.0, Jp=np.diag([0.02, 0.02, 0.01]), r=[0, 0, -0.5])
     scene.add_point("pin", "bob", [0, 0, 0.5])
@@ -101,7 +100,7 @@ def test_counted_turns_of_a_result():
     """A spring that counts whole turns has the moment there that the run has there."""
 
     def wound():
-        scene = Scene(name="wound")
+        scene = dap.Scene(name="wound")
         scene.add_body("b", mass=1.0, Jp=np.eye(3), w=[0, 0, 10.0])
         scene.add_joint("rev", "J", P_i="b.O", P_j="ground.O", a_i="b.z", a_j="ground.z")
         scene.add_force("rot_sda", "S", v_i="b.x", v_j="ground.x", axis="b.z", k=0.1, turns=True)
@@ -161,7 +160,7 @@ def test_state_off_the_constraints():
 
 def test_state_at_a_switch():
     """Where a spring's table has a kink there is no derivative; beside it there is."""
-    scene = Scene(name="kink")
+    scene = dap.Scene(name="kink")
     scene.add_body("b", mass=1.0, Jp=np.eye(3), r=[1.0, 0, 0])
     scene.add_function("b", "curve", x_start=0.0, x_end=1.0, f_start=0.0, f_end=5.0)
     scene.add_force("ptp", "S", P_i="b.O", P_j="ground.O", l0=1.0, function="curve")
@@ -195,7 +194,7 @@ def test_motion_of_a_mode():
 
 def test_damped_modes():
     """Real eigenvalues are modes of their own, with damping ratio one."""
-    scene = Scene(name="overdamped")
+    scene = dap.Scene(name="overdamped")
     scene.add_body("b", mass=1.0, Jp=np.eye(3), r=[1.0, 0, 0])
     scene.add_joint("tran", "rail", P_i="b.O", P_j="ground.O", a_j="ground.x")
     scene.add_force("ptp", "S", P_i="b.O", P_j="ground.O", k=2.0, c=3.0, l0=1.0)
@@ -208,7 +207,7 @@ def test_damped_modes():
 
 def test_friction_is_a_damper_at_rest():
     """Smooth friction at rest damps with mu N / v_tol, and a note says what that means."""
-    scene = Scene(name="sledge")
+    scene = dap.Scene(name="sledge")
     scene.add_body("b", mass=2.0, Jp=np.eye(3))
     scene.add_joint("tran", "rail", P_i="b.O", P_j="ground.O", a_j="ground.x")
     scene.add_force("weight", "gravity")
@@ -226,7 +225,7 @@ def test_friction_follows_the_load():
     -mu N: the linear equation is m x'' = Fx' x - mu N' x.
     """
     m, k, l0, mu, d, h, speed = 1.0, 50.0, 0.5, 0.2, 0.6, 0.8, 1.0
-    scene = Scene(name="pressed")
+    scene = dap.Scene(name="pressed")
     scene.add_body("b", mass=m, Jp=np.eye(3), r_dot=[speed, 0, 0])
     scene.add_point("hook", "ground", [d, 0, h])
     scene.add_joint("tran", "rail", P_i="b.O", P_j="ground.O", a_j="ground.x")
@@ -278,7 +277,7 @@ def test_driver_as_input(level, sense):
 
 def test_driver_at_a_later_time():
     """Without a state the start is brought onto the constraints of the time: drivers have moved."""
-    scene = Scene(name="crank")
+    scene = dap.Scene(name="crank")
     scene.add_body("crank", mass=1.0, Jp=np.eye(3), r=[1.0, 0, 0], w=[0, 0, 2.0],
                    r_dot=[0, 2.0, 0])  # fmt: skip
     scene.add_point("pin", "crank", [-1.0, 0, 0])

@@ -6,7 +6,6 @@ from types import SimpleNamespace
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.scene import SceneError
 from dap3d_core.simulation.output import free_space
 
 
@@ -23,7 +22,7 @@ def test_what_fits_is_taken(small, tmp_path):
 
 
 def test_memory_bounds_a_run_without_a_file(small):
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(dap.SceneError) as caught:
         free_space.check_room(10_000, 100_000, 1e-3, None)
     (mistake,) = caught.value.mistakes
     assert mistake.key == "dt"
@@ -34,7 +33,7 @@ def test_memory_bounds_a_run_without_a_file(small):
 
 
 def test_the_disk_bounds_a_run_with_a_file(small, tmp_path):
-    with pytest.raises(SceneError, match=r"14\.9 GiB; there is room for 2 GiB on the disk"):
+    with pytest.raises(dap.SceneError, match=r"14\.9 GiB; there is room for 2 GiB on the disk"):
         free_space.check_room(10_000, 100_000, None, tmp_path / "x.nc")
 
 
@@ -43,7 +42,7 @@ def test_a_run_is_refused_before_it_begins(small, tmp_path, monkeypatch):
     scene = dap.Scene(name="fall")
     scene.add_body("stone", mass=1.0, Jp=(1.0, 1.0, 1.0))
     monkeypatch.setattr(free_space, "_free_memory", lambda: 2**25)
-    with pytest.raises(SceneError, match="there is room for"):
+    with pytest.raises(dap.SceneError, match="there is room for"):
         dap.simulate(scene, t_end=1.0, dt=1e-6)
     scene.save(tmp_path / "scene.toml")
     monkeypatch.setattr(shutil, "disk_usage", lambda folder: SimpleNamespace(free=1))

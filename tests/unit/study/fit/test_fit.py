@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 import xarray
+from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 #: Each fit is some 30 runs, which take long where nothing is compiled.
 compiled = pytest.mark.skipif(not jit_is_on(), reason="many runs without compilation")

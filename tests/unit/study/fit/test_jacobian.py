@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+import dap3d_core as dap
 from dap3d_core import SimulationError
-from dap3d_core.study.fit.fit_parameters import Parameter
 from dap3d_core.study.fit.jacobian import Differences
 
 
@@ -58,7 +58,7 @@ def test_steps_are_short_where_a_parameter_acts_fast():
 
 
 def test_the_size_of_a_parameter():
-    assert Parameter(-3.0).size == 3.0
-    assert Parameter(0.0).size == 1.0
-    assert Parameter(0.0, -1.0, 4.0).size == 0.5
-    assert Parameter(0.0, -1.0, 4.0, 7.0).size == 7.0
+    assert dap.Parameter(-3.0).size == 3.0
+    assert dap.Parameter(0.0).size == 1.0
+    assert dap.Parameter(0.0, -1.0, 4.0).size == 0.5
+    assert dap.Parameter(0.0, -1.0, 4.0, 7.0).size == 7.0

@@ -4,9 +4,9 @@ import sys
 
 import numpy as np
 import pytest
+from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 

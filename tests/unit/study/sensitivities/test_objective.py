@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from scipy.optimize import minimize
+from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.kernels.runtime.cache import jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 SETTINGS = {"t_end": 1.0, "dt": 0.01, "rtol": 1e-11, "atol": 1e-13}

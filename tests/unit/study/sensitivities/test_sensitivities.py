@@ -5,9 +5,9 @@ import pytest
 import xarray
 from support.bouncing import swinging
 from support.on_axles import wheel
+from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import ResultError
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")

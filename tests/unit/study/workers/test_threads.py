@@ -9,11 +9,10 @@ import time
 import attrs
 import numpy as np
 import pytest
-from support.plain import in_another_process, long_in_plain_python
+from support.plain import in_another_process, jit_is_on, long_in_plain_python
 from support.studies import POINTS, bob, collected, same
 
 import dap3d_core as dap
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.study import Batch, Ensemble, PointStatus
 from dap3d_core.study.workers import threads as local
 from dap3d_core.study.workers.threads import ChunkSize, run_here

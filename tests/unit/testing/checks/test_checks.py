@@ -12,6 +12,7 @@ import sys
 
 import pytest
 from scipy.special import jv
+from support.plain import jit_is_on
 
 from dap3d_core.interface import (
     REQUIRED,
@@ -44,7 +45,6 @@ from dap3d_core.kernels import (
     sub,
     where,
 )
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.testing import check_type, checks_for
 from dap3d_forces.point_to_point import PointToPoint, pull
 from dap3d_functions.harmonic import Harmonic

@@ -3,9 +3,8 @@
 import pytest
 from support.on_reactions import ON_REACTIONS, ZERO, Brake, PinFriction, Tyre
 
-from dap3d_core.interface import joint, number
-from dap3d_core.interface.errors import PluginError
-from dap3d_core.interface.examine.examine import examine
+import dap3d_core as dap
+from dap3d_core.interface import examine, joint, number
 from dap3d_core.kernels import dot, neg, scale, sqrt, sub, tanh
 from dap3d_core.testing import check_type
 
@@ -99,5 +98,5 @@ def misspelt(lam_contakt):
 )
 def test_a_type_that_misuses_reactions_is_refused(members, words):
     """With the class, the kernel, and what to do."""
-    with pytest.raises(PluginError, match=words):
+    with pytest.raises(dap.PluginError, match=words):
         examine(a_type(**members))

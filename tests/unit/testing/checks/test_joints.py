@@ -3,9 +3,8 @@
 import pytest
 from support.unknown_types import WITH_UNKNOWNS, OnCurve, RollingEllipsoid
 
-from dap3d_core.interface import number
-from dap3d_core.interface.errors import PluginError
-from dap3d_core.interface.examine.examine import examine
+import dap3d_core as dap
+from dap3d_core.interface import examine, number
 from dap3d_core.kernels import add, cos, cross, eye, hstack, neg, rotate, scale, sin, skew, sub
 from dap3d_core.testing import check_type
 from dap3d_joints.spherical import Spherical
@@ -125,13 +124,13 @@ def short(s):
 def test_a_type_with_impossible_unknowns_is_refused(members, words):
     """With the class, the unknown, and what to do."""
     type_ = type("Own", (OnCurve,), {"__module__": __name__, **members})
-    with pytest.raises(PluginError, match=words):
+    with pytest.raises(dap.PluginError, match=words):
         examine(type_)
 
 
 def test_a_gradient_without_unknowns_is_refused():
     type_ = type("Own", (Spherical,), {"__module__": __name__, "G": short})
-    with pytest.raises(PluginError, match="defines G, but no unknowns"):
+    with pytest.raises(dap.PluginError, match="defines G, but no unknowns"):
         examine(type_)
 
 
@@ -142,5 +141,5 @@ def test_rows_of_velocities_are_linear_in_them():
         return v_i[0] * x_dot, v_i[1]
 
     type_ = type("Own", (RollingEllipsoid,), {"__module__": __name__, "C_dot": C_dot})
-    with pytest.raises(PluginError, match="it names x_dot"):
+    with pytest.raises(dap.PluginError, match="it names x_dot"):
         examine(type_)

@@ -8,12 +8,11 @@ import random
 
 import pytest
 from support.jumping import Bounce, Clutch, Stage
+from support.plain import jit_is_on
 
-from dap3d_core.interface import Force, Point, Vector, number, point, vector
-from dap3d_core.interface.errors import PluginError
-from dap3d_core.interface.examine.examine import examine
+import dap3d_core as dap
+from dap3d_core.interface import Force, Point, Vector, examine, number, point, vector
 from dap3d_core.kernels import cross, neg, scale, where
-from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.testing import check_type
 from dap3d_forces.plane_stop import PlaneStop
 from dap3d_forces.point_to_point_stop import PointToPointStop
@@ -172,6 +171,6 @@ def stop(**members):
     ],
 )
 def test_a_type_that_breaks_a_rule_of_jumps_is_refused(members, words):
-    with pytest.raises(PluginError) as error:
+    with pytest.raises(dap.PluginError) as error:
         examine(stop(**members))
     assert words in str(error.value)

@@ -13,10 +13,9 @@ from support.joint_types import (
     Upright,
 )
 
-from dap3d_core.interface import Joint, Point, choice, point
-from dap3d_core.interface.examine.examine import examine
+import dap3d_core as dap
+from dap3d_core.interface import Joint, Point, choice, examine, point
 from dap3d_core.kernels import dot, sub
-from dap3d_core.registry import load_registry
 from dap3d_core.testing import check_type
 from dap3d_core.testing.kit import type_motions
 from dap3d_forces.weight import Weight
@@ -75,13 +74,13 @@ OWN = {
 
 
 def test_every_installed_joint_is_in_the_list():
-    assert set(INSTALLED) == set(load_registry().keywords("joint"))
+    assert set(INSTALLED) == set(dap.load_registry().keywords("joint"))
 
 
 @pytest.mark.every(5)
 @pytest.mark.parametrize("keyword", INSTALLED)
 def test_motion_of_installed_types(keyword):
-    motions = type_motions(load_registry().get("joint", keyword))
+    motions = type_motions(dap.load_registry().get("joint", keyword))
     assert [motion.words for motion in motions] == INSTALLED[keyword]
     assert [motion.parts is None for motion in motions] == [
         words.startswith("refused") for words in INSTALLED[keyword]

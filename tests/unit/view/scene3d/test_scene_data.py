@@ -8,14 +8,12 @@ from support.scenes import scene_for
 from unit.view.test_page import numbers, shaped
 
 import dap3d_core as dap
-from dap3d_core.interface import Body, Force, Joint, Point, Vector, body, point, vector
-from dap3d_core.interface.examine.examine import PluginError, examine
+from dap3d_core.interface import Body, Force, Joint, Point, Vector, body, examine, point, vector
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.types import SYMBOLS
 from dap3d_core.kernels import dot, sub
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import to_global
-from dap3d_core.registry import load_registry
 from dap3d_core.scene import check
 from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import CYCLE, chains_of, colors
@@ -32,7 +30,7 @@ from dap3d_core.view.scene3d.scene_data import (
 
 TYPES = [
     (row.kind, row.keyword)
-    for row in load_registry().listing()
+    for row in dap.load_registry().listing()
     if row.kind in ("joint", "force") and row.state == "ok"
 ]
 #: Forces without fields that could be drawn: these are arrows alone.
@@ -266,7 +264,7 @@ def test_a_rail_is_as_long_as_the_motion():
 @pytest.mark.parametrize(("kind", "keyword"), TYPES)
 def test_every_installed_type_is_drawn_with_finite_sizes(kind, keyword, ground):
     """In any pose, free or tied to ground: numbers are finite, axes of unit length."""
-    type_info = load_registry().get(kind, keyword)
+    type_info = dap.load_registry().get(kind, keyword)
     if any(spec.kind == "joint" for spec in specs_of(type_info.type).values()):
         pytest.skip("it acts in a joint, which is drawn itself")
     scene = scene_for(type_info, np.random.default_rng(5), ground=ground)
@@ -352,7 +350,7 @@ def test_each_symbol_has_a_drawing():
 )
 def test_a_symbol_that_cannot_be_drawn_is_refused(symbol, words):
     type_ = type("Odd", (Hook,), {"symbol": symbol, "keyword": "odd", "__doc__": "A hook."})
-    with pytest.raises(PluginError, match=words):
+    with pytest.raises(dap.PluginError, match=words):
         examine(type_)
 
 
