@@ -265,6 +265,18 @@ def rows_of(model: Model, plan: Plan) -> Integers:
     return first + np.arange(model.row_count) - np.repeat(model.joint_start[:-1], model.joint_rows)
 
 
+def rows_read(model: Model, what: list[tuple[str, Group]]) -> Floats:
+    """(rows,) 1.0 for each constraint row of the model that forces read, 0.0 for others."""
+    read = np.zeros(len(model.joint_names))
+    for kind, group in what:
+        if kind == "friction":
+            joints = [of_force.members for of_force in group.read]
+            own = group.members if group.joints is None else group.joints
+            for places in joints or [own]:
+                read[places] = 1.0
+    return np.repeat(read, model.joint_rows)
+
+
 def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[Any, Any, Any, Any]:
     """Integers and numbers of all instances; a group that serves two loops is stored once."""
     idx: list[Integers] = []

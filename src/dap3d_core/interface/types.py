@@ -147,6 +147,9 @@ class Joint(TypeBase):
         states: names of states of its own, or name -> length; with them come the fields ``NAME_0``,
             initial values, and ``NAME_atol``, absolute tolerances.
         symbol: symbol in pictures, one of SYMBOLS; "": drawn from the declared fields.
+        brings: a field, the keyword of a force and the field by which that names a joint: where the
+            first is not zero the joint brings such a force, with its own fields of the same names.
+            Its wrench is part of the joint's reaction, and moves nothing where joints carry it.
     """
 
     kind = "joint"
@@ -159,6 +162,7 @@ class Joint(TypeBase):
     coordinate: ClassVar[str] = ""
     limit: ClassVar[str] = ""
     drives: ClassVar[bool] = False
+    brings: ClassVar[tuple[str, ...]] = ()
     unilateral: ClassVar[tuple[int, ...]] = ()
     unilateral_words: ClassVar[str] = ""
     unknowns: ClassVar[tuple[str, ...]] = ()

@@ -194,6 +194,7 @@ class SceneTables:
     faults: list[tuple[Key, Mistake]] = attrs.field(factory=list, eq=False)
     notes: list[str] = attrs.field(factory=list, eq=False)
     included: dict[str, Path] = attrs.field(factory=dict, eq=False)
+    files: dict[str, Path] = attrs.field(factory=dict, eq=False)
     _counts: dict[str, int] = attrs.field(factory=dict, eq=False, init=False)
 
     @property
@@ -218,6 +219,7 @@ class SceneTables:
             faults=list(self.faults),
             notes=list(self.notes),
             included=dict(self.included),
+            files=dict(self.files),
             **named,
         )
         scene._counts = dict(self._counts)

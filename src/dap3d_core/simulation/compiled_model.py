@@ -388,7 +388,7 @@ class CompiledModel:
             return None
         with suppress(SimulationError):  # too many rows to keep, or no start
             evaluator = self.new_evaluator(announce, "joint")
-            if not evaluator.coordinates.kept:
+            if not evaluator.length_count:  # no rows are kept
                 evaluator.set_inputs(self.model.input_values)
                 start = self._find_start(evaluator, self._usual_start)
                 if start.redundancy.singular is None:

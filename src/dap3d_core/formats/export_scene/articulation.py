@@ -164,6 +164,9 @@ def geometries_of(builder: ModelBuilder, scene: Scene, body: str) -> list[Geomet
         elif element.type == "cylinder":
             size = (float(fields["radius"]), float(fields["length"]))
             geometries.append(Geometry("cylinder", size, pose, color=color))
+        elif element.type == "ellipsoid":
+            size = tuple(0.5 * float(edge) for edge in fields["size"])
+            geometries.append(Geometry("ellipsoid", size, pose, color=color))
         elif element.type == "mesh":
             scale = (float(fields.get("scale", 1.0)),) * 3
             geometries.append(Geometry("mesh", (), pose, fields["file"], scale, color))

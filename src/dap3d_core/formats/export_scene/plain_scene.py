@@ -24,7 +24,7 @@ def plain_scene(checked: ValidatedScene) -> Scene:
         (scene.joints, checked.joints),
         (scene.forces, [*checked.forces, *rigid]),
     ):
-        for instance in instances:
+        for instance in (i for i in instances if i.name in elements):  # joints bring others
             elements[instance.name] = _plain(elements[instance.name], instance, scene, checked)
     return scene
 

@@ -28,16 +28,17 @@ from dap3d_core.assembly.evaluate import (
     state_rates,
     zero,
 )
+from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     evaluate_forces,
     factorise,
     linearise,
     power_of_drivers,
-    project_onto,
     report_levels,
     report_multipliers,
     solve_rows,
 )
+from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import is_differentiated
@@ -318,7 +319,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto its constraints; out as in ``project_onto``."""
-    project_onto(t, y, out, system, loops, PART, True)
+    project_onto(t, y, out, system, loops, constraints, PART, True, True)
 
 
 @compiled

@@ -303,13 +303,13 @@ def _joint_of_friction(type_: type[TypeBase]) -> str:
 
 
 def _check_conditions(type_: type[TypeBase], conditions: Mapping[str, Any], variant: type) -> None:
-    """The condition of a variant is a word of a choice, or the presence of another field."""
+    """A variant is for a word of a choice, the presence of another field, or an input."""
     specs = specs_of(type_)
     for name, wanted in conditions.items():
         spec = specs.get(name)
         allowed = spec.choices if spec is not None and spec.kind == "choice" else (True, False)
         known = spec is not None and (spec.kind == "choice" or spec.asks_presence)
-        if not known or wanted not in allowed:
+        if not known or wanted not in (*allowed, *(spec.by_name if spec else ())):
             raise PluginError(
                 f"{where_is(variant)} is the variant for {name} = {wanted!r}, "
                 f"which no choice, function, input or optional number of {type_.__name__} can be"

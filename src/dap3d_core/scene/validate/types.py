@@ -42,13 +42,10 @@ class Types:
         self._refused = ""  # the reason why the model's own file gave no types
         self._installed: list[tuple[str, str]] = []  # types taken from packages
 
-    def of(self, table: str, members: Mapping[str, Element] | None = None) -> dict[str, TypeInfo]:
-        """The types of a table's elements by keyword; unusable ones are reported.
-
-        members: elements, by name, in place of those of the scene's table.
-        """
-        elements: dict[str, list[str]] = {}
-        for name, element in (members or getattr(self.report.scene, table)).items():
+    def of(self, table: str, elements: Mapping[str, Element]) -> dict[str, TypeInfo]:
+        """The types of elements of a table by keyword; unusable ones are reported."""
+        named: dict[str, list[str]] = {}
+        for name, element in elements.items():
             key = (table, name, "type")
             if element.type is None:
                 known = ", ".join(self.registry.keywords(KINDS[table]))
@@ -57,8 +54,8 @@ class Types:
                 continue
             keyword = self.report.read(key, element.type, text_of)
             if not isinstance(keyword, Fault):
-                elements.setdefault(keyword, []).append(name)
-        types = {keyword: self._get(table, keyword, names) for keyword, names in elements.items()}
+                named.setdefault(keyword, []).append(name)
+        types = {keyword: self._get(table, keyword, names) for keyword, names in named.items()}
         return {keyword: type_ for keyword, type_ in types.items() if type_ is not None}
 
     def known(self, kind: str, keyword: Any) -> TypeInfo | None:

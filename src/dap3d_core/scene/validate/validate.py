@@ -49,7 +49,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     types = Types(report, registry, allow_code=allow_code, to_install=_check_requires(report))
     inputs, functions = _read_signals(report, geometry, types)
     joints = read_elements(report, geometry, "joints", types, functions)
-    forces = read_elements(report, geometry, "forces", types, functions)
+    forces = _read_forces(report, geometry, types, functions, joints)
     _report_twins(report, "joints", joints)
     _report_twins(report, "forces", forces)
     contacts = _read_contacts(report, geometry, types, functions, (joints, forces))
@@ -110,6 +110,23 @@ def _read_signals(
 
         functions = combine_functions(report, functions)
     return inputs, functions
+
+
+def _read_forces(
+    report: Collector,
+    geometry: "Geometry",
+    types: "Types",
+    functions: list[Instance],
+    joints: list[Instance],
+) -> list[Instance]:
+    """Forces, then those that joints bring."""
+    from dap3d_core.scene.validate.elements import read_elements
+    from dap3d_core.scene.validate.joint_fields import brought_forces
+
+    forces = read_elements(report, geometry, "forces", types, functions)
+    if brought := brought_forces(report, joints, types.known):
+        forces += read_elements(report, geometry, "forces", types, functions, brought)
+    return forces
 
 
 def _read_contacts(
