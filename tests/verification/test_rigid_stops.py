@@ -108,3 +108,27 @@ def test_two_stops_share_what_they_carry():
     assert min(forces) > 0.0
     assert sum(forces) == pytest.approx(m * g, rel=1e-13)
     assert np.abs(result.r).max() < 1e-15
+
+
+def test_a_hinge_that_stops_at_a_limit_is_led_off_by_a_moment():
+    """It stops there, e = 0, and turns back at once: one impact, then n t^2 / (2 I)."""
+    scene, n, inertia = hinge(lower=-1.2345, upper=0.777), 0.5, 0.3
+    scene.add_force("motor", "push", joint="axle", torque=-n)
+    result = dap.simulate(scene, t_end=1.5, dt=0.25, **TIGHT)
+    a = n / inertia
+    strikes = (2.0 - np.sqrt(4.0 - 2.0 * a * 0.777)) / a
+    assert [event.kind for event in result.events] == ["impact"]
+    assert result.events[0].t == pytest.approx(strikes, rel=0, abs=1e-12)
+    expected = 0.777 - 0.5 * a * (1.5 - strikes) ** 2
+    assert result.quantity("axle.angle").values[-1] == pytest.approx(expected, abs=1e-12)
+
+
+def test_gaps_of_a_hinge_are_those_of_its_turns_between_reports():
+    """Of a hinge that turns at 14 rad/s between -4 and 4, some three times from end to end."""
+    scene = hinge(lower=-4.0, upper=4.0, e=1.0)
+    scene.bodies["wheel"].w = (0.0, 0.0, 14.0)
+    result = dap.simulate(scene, t_end=2.0, dt=0.2, **TIGHT)
+    angle = result.quantity("axle.angle").values
+    for side, sign in (("lower", 1.0), ("upper", -1.0)):
+        gap = result.contact(f"axle_{side}").gap
+        np.testing.assert_allclose(gap, 4.0 + sign * angle, rtol=0, atol=1e-11)

@@ -61,7 +61,4 @@ class ResultContacts:
     @cached_property
     def _contact_outputs(self) -> dict[str, ContactOutput]:
         result: Any = self
-        arrays = result.arrays
-        return contact_outputs(
-            result.evaluator, result.t, result.u, result.Lam, arrays.states, arrays.inputs
-        )
+        return contact_outputs(result.evaluator, result.arrays)

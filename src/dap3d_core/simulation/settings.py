@@ -64,12 +64,18 @@ def _with_contact_engine(compiled: CompiledModel, settings: Simulation) -> Simul
 
 def _refuse_sticking(model: Model) -> None:
     """SceneError: friction of joints sticks, which steps of contacts do not know."""
+    if name := _sticking(model):
+        what = "sticks, which events follow, and time stepping of contacts does not"
+        remedy = "give it a w_tol, or v_tol, below which it fades"
+        raise SceneError([Mistake(f"forces.{name}", MISSING, what, remedy=remedy)])
+
+
+def _sticking(model: Model) -> str:
+    """A friction of joints that sticks; "" where there is none."""
     for group in model.contacts:
         if group.type_info.type.along is not None:  # type: ignore[attr-defined]
-            name = model.joint_names[int(group.members[0])]
-            what = "sticks, which events follow, and time stepping of contacts does not"
-            remedy = "give it a w_tol, or v_tol, below which it fades"
-            raise SceneError([Mistake(f"forces.{name}", MISSING, what, remedy=remedy)])
+            return model.joint_names[int(group.members[0])]
+    return ""
 
 
 def contact_engine_reason(model: Model, contact: str) -> str:
@@ -80,7 +86,7 @@ def contact_engine_reason(model: Model, contact: str) -> str:
         return f"{len(set(model.collisions.names))} shapes may meet anywhere"
     points = Counter(name.partition("#")[0] for name in model.contact_names)
     closed = sum(min(count, MOST_CLOSED) for count in points.values())
-    if contact == "auto" and closed > MOST_BY_EVENTS:
+    if contact == "auto" and closed > MOST_BY_EVENTS and not _sticking(model):
         return f"{closed} points may touch at once, more than {MOST_BY_EVENTS}"
     return ""
 

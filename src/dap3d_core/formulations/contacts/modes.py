@@ -184,7 +184,8 @@ def _put(
         return
     A, ways = _matrix(table, rows, closed, sliding, limit)
     x, a = _solve(table, rows, closed, A, ways, loose=loose)
-    big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
+    still = [c for c in closed if c not in ways] or closed  # what slides may turn far faster
+    big = float(np.abs(rows.free[rows.rows_of(still)]).max()) + 1e-300
     shares = _share(table, closed, A)
     if inner is None and not loose:
         inner = _inside(table, rows, closed, sliding, limit)

@@ -10,6 +10,7 @@ from dap3d_core.model.groups import Floats, Integers
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
+    from dap3d_core.result.arrays import Arrays
 
 #: Separates the name of a contact from the number of one of its points.
 POINT = "#"
@@ -50,25 +51,26 @@ def contact_names(state_names: Sequence[str]) -> dict[str, list[str]]:
     return found
 
 
-def contact_outputs(
-    evaluator: "Evaluator", t: Floats, u: Floats, Lam: Floats, states: Floats, inputs: Floats
-) -> dict[str, ContactOutput]:
+def contact_outputs(evaluator: "Evaluator", arrays: "Arrays") -> dict[str, ContactOutput]:
     """Outputs of all points of contacts of a model, by their names.
 
     Args:
         evaluator: evaluates the model.
-        t, u, Lam, states, inputs: (nt,) s, (nt, 13 n), (nt, m), (nt, s), (nt, k) of a result.
+        arrays: of a result.
     """
     from dap3d_core.formulations.contacts import contact_rows as rows
 
     table = rows.ContactTable(evaluator)
+    t, u, states = arrays.t, arrays.u, arrays.states
     values = np.zeros((len(t), table.count, rows.WIDTH))
     with evaluator.held_inputs():
         before = evaluator.states
         for k, time in enumerate(t):
             evaluator.states = states[k]
-            evaluator.set_inputs(inputs[k])
-            values[k] = table.outputs(float(time), u[k], Lam[k])
+            evaluator.set_inputs(arrays.inputs[k])
+            if evaluator.has_own_angles:
+                evaluator.begin_turns(float(time), u[k], arrays.angles[k])
+            values[k] = table.outputs(float(time), u[k], arrays.Lam[k])
         evaluator.states = before
     modes: Any = states[:, table.mode]  # unknown at an instant of which the poses are known alone
     modes = modes.astype(np.int64) if np.isfinite(modes).all() else modes

@@ -17,7 +17,7 @@ from dap3d_core.formulations.contacts.contact_rows import (
     ContactRows,
     ContactTable,
 )
-from dap3d_core.formulations.contacts.impacts import Impact, collide, repeat
+from dap3d_core.formulations.contacts.impacts import AT_REST, Impact, collide, repeat
 from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.switches import POSITION_ROUNDING
@@ -108,7 +108,7 @@ class ContactJumps(Jumps):
         gaps = self._gaps(integration)
         mistakes = [
             Mistake(
-                f"contacts.{name}", MISSING, f"its bodies overlap by {-gap:.6g} m at the start",
+                name, MISSING, f"its bodies overlap by {-gap:.6g} m at the start",
                 remedy="move them apart by that along the normal, or have them moved until they "
                 f"touch (touch = true); a gap of up to {TOUCHING_AT_START * length:g} m counts as "
                 "touching",
@@ -256,7 +256,7 @@ class ContactJumps(Jumps):
         others = [c for c in closed if modes.mode[c] < 0.5]
         rows.change(rows.lifted(rows.slip[:, 0], held, others))
         gaps = np.where(np.abs(outputs[:, GAP]) < touching, outputs[:, GAP], 0.0)
-        moved = rows.lifted(gaps, held, others, 2.0 * POSITION_ROUNDING * evaluator.model.length)
+        moved = self._apart(rows, gaps, held, others)
         states = evaluator.states.copy()
         states[table.mode], states[table.way], states[table.near] = (
             modes.mode, modes.way, modes.near
@@ -275,6 +275,16 @@ class ContactJumps(Jumps):
         ):
             if (kind := CHANGES.get((int(old), int(new)), "")) and (old or not table.load[c]):
                 self._note(c, t, kind, u)
+
+    def _apart(self, rows: ContactRows, gaps: Floats, held: list[int], others: list[int]) -> Floats:
+        """(6 n,) changes of positions that close the gaps of what holds, and part what overlaps.
+
+        What opens from rest would stop the run again where its gap is as deep as a switch passes.
+        """
+        rounding = POSITION_ROUNDING * self._evaluator.model.length
+        still = AT_REST * self._evaluator.model.length
+        deep = [c for c in others if rows.slip[c, 0] < still and gaps[c] < -0.5 * rounding]
+        return rows.lifted(gaps, [*held, *deep], others, 2.0 * rounding)
 
     def _outputs(self, t: float, u: Floats) -> Floats:
         evaluator = self._evaluator
