@@ -12,7 +12,7 @@ from dap3d_core.kernels.runtime.cache import compiled
 @compiled
 def sweep_bodies(
     bodies: Integers, J: Floats, moved: Floats, own: Floats, bias: Floats, mu: Floats,
-    x: Floats, v: Floats, sweeps: int, tolerance: float,
+    x: Floats, v: Floats, sweeps: int, tolerance: float, relax: float,
 ) -> int:  # fmt: skip
     """Sweep until no impulse changes by more than a part of the largest; sweeps done.
 
@@ -24,6 +24,7 @@ def sweep_bodies(
         mu: (m,).
         x: (m, 3) impulses, N s, changed in place.
         v: (n + 1, 6) velocities with these impulses, changed with them.
+        relax: 1, or more to go beyond what each contact asks for by itself.
     """
     for done in range(sweeps):
         change, largest = 0.0, 1e-300
@@ -35,7 +36,7 @@ def sweep_bodies(
                 u0 += rows[k] * a[k] + rows[6 + k] * b[k]
                 u1 += rows[12 + k] * a[k] + rows[18 + k] * b[k]
                 u2 += rows[24 + k] * a[k] + rows[30 + k] * b[k]
-            d0, d1, d2 = change_of(own[c], mu[c], x[c], u0, u1, u2)
+            d0, d1, d2 = change_of(own[c], mu[c], x[c], relax * u0, relax * u1, relax * u2)
             for k in range(6):
                 a[k] += moves[k] * d0 + moves[12 + k] * d1 + moves[24 + k] * d2
                 b[k] += moves[6 + k] * d0 + moves[18 + k] * d1 + moves[30 + k] * d2

@@ -13,6 +13,9 @@ from dap3d_core.kernels.array_types import Floats, Integers
 
 #: Residual from which Newton's method begins, and sweeps of Gauss-Seidel that lead there.
 NEAR, SWEEPS = 1e-4, 200
+#: Over-relaxation of sweeps: piles of spheres took 1250 sweeps with 1, 720 with 1.5, and more than
+#: 4000 with 1.7. It ends where a round of sweeps has not helped.
+RELAX = 1.4
 #: Sweeps at most, where Newton's method does not end.
 MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
@@ -87,7 +90,7 @@ class Problem:
             if self._judge() <= tolerance or len(self.y):
                 return v + self.change()
         if self._judge() > tolerance:
-            self._sweep(SWEEPS, max(tolerance, NEAR))
+            self._sweep(SWEEPS, max(tolerance, NEAR), RELAX)
             self._finish(tolerance)
         return v + self.change()
 
@@ -104,22 +107,26 @@ class Problem:
         found: Floats = left / (np.abs(self.x).max() + TINY)
         return found
 
-    def _sweep(self, sweeps: int, tolerance: float) -> None:
+    def _sweep(self, sweeps: int, tolerance: float, relax: float) -> None:
         state = np.ascontiguousarray(self._free + self.change())
         sweep_bodies(self._bodies, self._J, self._MJ, self._W, self._bias, self._mu,
-                     self.x, state, sweeps, 0.1 * tolerance)  # fmt: skip
+                     self.x, state, sweeps, 0.1 * tolerance, relax)  # fmt: skip
 
     def _finish(self, tolerance: float) -> None:
         """Newton's method on groups that are not solved; more sweeps where it does not end."""
-        done = SWEEPS
+        done, sweeps, relax, least = SWEEPS, SWEEPS, RELAX, np.inf
         while self._judge() > tolerance:
+            relax = relax if self.residual < least else 1.0
+            least = min(least, self.residual)
             if tolerance < NEAR:
                 for group in self._groups(tolerance):
                     self._refine(group, tolerance)
             if self._judge() <= tolerance or done >= MOST_SWEEPS:
                 return
-            self._sweep(done, tolerance)
-            done *= 2
+            if tolerance < NEAR:  # rounds of Newton's method cost more
+                sweeps = done
+            self._sweep(sweeps, tolerance, relax)
+            done += sweeps
 
     def _refine(self, group: Integers, tolerance: float) -> None:
         """Newton's method on one group of contacts."""
