@@ -46,7 +46,7 @@ class Record:
         reason: why there are none and will be none; "" while there may be.
         is_requested: True if they are being compiled by another process.
         takes_all_ways: True if projections do (ways.py).
-        first: the states at which the first ones were made here.
+        first: the state at which the first ones were made here, where it fits right-hand sides.
         anew: time and state at which they are made anew, as guards of the first ones failed.
     """
 
@@ -209,6 +209,7 @@ def _give_up(record: Record, program: Any, k: int, place: "tuple[float, Floats]"
         others = {q: one for q, one in record.programs.items() if q != k}
         if record.anew is None:
             record.programs, record.anew, record.is_requested = {}, place, False
+            record.first = record.first if k == PROJECT else ()
         elif k == RHS:
             record.programs, record.reason = {}, "guards fail: branches depend on the motion"
         else:
