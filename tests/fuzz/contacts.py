@@ -120,7 +120,7 @@ def check_contacts(data: bytes) -> str:
     except dap.SimulationError as error:
         said, result = str(error), error.result
     assert result is not None, said
-    names = result.contacts
+    names = result.contact_names
     words = next((w for w in ENDINGS if w in said), "")
     assert not said or (words and any(name in said for name in names)), said
     assert np.isfinite(result.u).all()
