@@ -34,6 +34,7 @@ COUNTS = {
     "near_singular_landings", "cut_attempts", "stiff_steps", "nonstiff_steps", "stalled_steps",
     "equal_steps", "failure_count", "attempt_count", "stall_start",
     "iteration_count", "last_iterations", "jacobian_count", "factorisation_count",
+    "steps_at_order", "patience", "error_refusals", "iteration_refusals", "singular_refusals",
 }  # fmt: skip
 
 

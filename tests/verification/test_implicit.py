@@ -1,13 +1,20 @@
 """Radau IIA against closed forms and published digits: stiff scenes, observed orders."""
 
+import sys
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support import problems
+from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.radau.integration import RadauIntegration
+
+sys.path.append(str(REPOSITORY / "benchmarks"))
+
+from hard import references
 
 G = 9.81
 
@@ -96,6 +103,35 @@ def test_order_on_the_pendulum():
         difference = np.abs(now - PENDULUM)
         found.append([max(difference[:2]), max(difference[2:4]), difference[4]])
     assert order_of(np.array(found)) == pytest.approx(5.0, abs=0.2)
+
+
+@pytest.mark.parametrize(("rtol", "steps"), [(1e-10, 400), (1e-12, 500)])
+def test_the_order_rises_where_the_error_limits_the_steps(rtol, steps):
+    """A01 over 10 s at 100 instants, nearly all within steps, by Jacobi's functions. Three stages
+    alone take 1774 and 8400 steps: a hundredth of the tolerance is 10^(4/3 / 4) = 3.2 to 4.6 times
+    the steps of order 5, and 1.8 times those of order 13.
+    """
+    result = radau(problems.pendulum(), 10.0, dt=0.1, rtol=rtol, atol=rtol / 100)
+    x, y, vx, vy = references.pendulum(result.t).T
+    found = np.column_stack([result.r[:, 0, :2], result.rd[:, 0, :2]])
+    # a tenth of the tolerance a step, and velocities of up to 4 m/s
+    assert np.max(np.abs(found - np.column_stack([x, y, vx, vy]))) < 20.0 * rtol
+    assert result.stats.steps < steps
+
+
+def test_fixed_steps_are_of_order_five():
+    """The order of steps of a given length is the caller's to know, whatever the tolerances."""
+    compiled = dap.compile(problems.pendulum())
+    u = compiled.start(True, ()).u
+    evaluator = compiled.evaluator
+    evaluator.start(0.0, u)
+    run = RadauIntegration(evaluator, evaluator.integrated(u), [0.0, 1.0], step=0.01,
+                           report_size=evaluator.report_size)  # fmt: skip
+    while run.status is Status.RUNNING:
+        run.advance(10**9)
+        run.rows()
+    assert run.work.stages == 3
+    assert run.work.Z.shape[0] == 3
 
 
 def test_order_of_the_multipliers_of_the_stages():

@@ -110,10 +110,11 @@ def thin_rod(inertia):
     return scene
 
 
-@pytest.mark.parametrize(("integrator", "factor"), [("dop853", 3), ("adams", 6), ("radau", 3)])
+@pytest.mark.parametrize(("integrator", "factor"), [("dop853", 3), ("adams", 6), ("radau", 6)])
 def test_rounding_over_a_small_inertia_does_not_drive_the_steps(integrator, factor):
     """Steps of a rod of 1e-12 kg m^2 about its axis are nearly those of 1e-7, whose motion is the
-    same but for that part, 1e-6 of 1/12; the high differences of adams have more of the noise.
+    same but for that part, 1e-6 of 1/12; the high differences of adams, and the weights of the
+    stages of radau where its order is high, have more of the noise.
     Without a remedy they are a thousand times as many."""
     thin, thick = (dap.simulate(thin_rod(J), t_end=2.0, integrator=integrator)
                    for J in (1e-12, 1e-7))  # fmt: skip

@@ -142,13 +142,21 @@ class RunMetadata:
     @property
     def outputs(self) -> dict[str, Any]:
         """Expressions of the outputs of the scene by name, or tables of them, as written."""
-        if "[outputs" not in self.scene_text:  # reading the text of a large scene takes time
+        return self._table("outputs")
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The parameters of the scene by name, numbers or expressions, as written."""
+        return self._table("parameters")
+
+    def _table(self, name: str) -> dict[str, Any]:
+        if f"[{name}" not in self.scene_text:  # reading the text of a large scene takes time
             return {}
         try:
-            outputs = tables_of(self.scene_text).get("outputs", {})
+            table = tables_of(self.scene_text).get(name, {})
         except SceneError:
             return {}
-        return outputs if isinstance(outputs, dict) else {}
+        return table if isinstance(table, dict) else {}
 
     @property
     def tolerances(self) -> tuple[float, dict[str, float]] | None:

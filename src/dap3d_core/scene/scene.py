@@ -10,13 +10,7 @@ from dap3d_core.scene.coerce import entry_of, keys_of, plain, with_identifiers
 from dap3d_core.scene.contacts.tables import ContactTables
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Mistake, MistakeList, SceneError
-from dap3d_core.scene.tables import (
-    NAMED,
-    AnimationPoint,
-    Element,
-    SceneTables,
-    fault_of_name,
-)
+from dap3d_core.scene.tables import NAMED, AnimationPoint, Element, SceneTables, fault_of_name
 
 
 @attrs.define(repr=False)

@@ -136,6 +136,8 @@ class Simulation:
     mu: Any = attrs.field(default=SETTINGS["mu"].default, converter=plain)
 
 
+#: Keys of joints whose coordinate a contact limits (contacts/read_contacts.py).
+LIMITS = ("lower", "upper", "e")
 HEADER_KEYS = frozenset({"name", "description", "schema"})
 #: Tables of the scene file with named entries, and the class of an entry.
 NAMED: dict[str, type] = {

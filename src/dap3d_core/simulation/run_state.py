@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -156,11 +157,15 @@ class RunState:
         """The integration that the run is in."""
         return self.integrations[-1]
 
+    @cached_property
+    def stops(self) -> Sequence[tuple[float, bool]]:
+        """Break points of functions of time: as the argument of ``Integration``."""
+        stops = self.compiled.breakpoints(self.t_end).stops
+        return stops if self.limits is None else with_midpoints(stops)
+
     def begin(self, integration: Integration) -> None:
         """Make an integration the present one; it is compiled first, off the clock of the run."""
-        integration.tstops = self.compiled.breakpoints(self.t_end).stops
         if self.limits is not None:
-            integration.tstops = with_midpoints(integration.tstops)
             integration.work.longest_step = self.limits.longest
         if self.event_locator is not None:
             integration.follow_steps()
@@ -244,9 +249,7 @@ class RunState:
 
         In coordinates of a formulation it is that of other rates, and not recorded.
         """
-        if self.evaluator.formulation.has_own_coordinates:
-            return {}
-        part = self.evaluator.model.integrated_layout["velocities"]
+        part = self.evaluator.coordinates.body_velocities
         noise = np.zeros(6)
         for integration in self.integrations:
             rows = integration.rate_noise[part].reshape(-1, 6)

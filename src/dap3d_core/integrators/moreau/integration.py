@@ -128,7 +128,7 @@ class MoreauIntegration(Integration):
             self._complete(rows)
             if not again:
                 return
-            self._step(min(float(end_of_step(work)), float(work.t_limit)))
+            self._step(min(float(end_of_step(work)), float(work.step_limit)))
 
     def _complete(self, first: int) -> None:
         """Put mean accelerations and forces of the last step, and modes, into rows of reports."""

@@ -3,8 +3,6 @@
 # What a compiled function returns is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-import math
-
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, MOST, NOISE, Y
 from dap3d_core.integrators.stepping.step_control import EPSILON
@@ -26,12 +24,6 @@ STALLED, MOST_ROUNDINGS = 10.0, 1e6
 
 
 @compiled
-def newton_limit(work: RadauState) -> float:
-    """Norm of a change at which the iteration ends (HW IV.8)."""
-    return min(0.03, math.sqrt(work.rtol))
-
-
-@compiled
 def size_of_change(change: Floats, h: float, work: RadauState) -> float:
     """Norm of a change of the state, as ``scaled_largest``.
 
@@ -40,7 +32,7 @@ def size_of_change(change: Floats, h: float, work: RadauState) -> float:
     as exactly as they would be without.
     """
     y, rtol, tolerance = work.state[Y], work.rtol, work.tolerance
-    n, rounding = work.frames.shape[1] - 1, ROUNDINGS * EPSILON / newton_limit(work)
+    n, rounding = work.frames.shape[1] - 1, ROUNDINGS * EPSILON / work.newton_limit
     first, largest = 0, 0.0
     for count in (COORDINATES * n, VELOCITIES * n, work.error_size):
         last, least = min(first + count, work.error_size), 0.0

@@ -1,10 +1,15 @@
-"""Dense output of a Radau step: as exact as its end points, not as its inner stages.
+"""Dense output of a Radau step.
 
-The collocation polynomial through the stages is of order 3 only. The end points of steps are of
-order 5, so dense output is the polynomial of degree 5 with the values and slopes of three of them:
+With three stages the collocation polynomial is of order 3 only, while end points of steps are of
+order 5. So dense output is the polynomial of degree 5 with the values and slopes of three of them:
 both ends of the step, and the start of the step before. The first step has its collocation
 polynomial. Slopes of positions follow from the velocities. Those of velocities are the collocation
 polynomial's, moved onto D v_dot = gamma, since the multipliers of the stages are of order 3.
+
+With more stages it is the collocation polynomial, whose rates are off by a multiple of
+(x - c_1) ... (x - c_s) and higher terms; that multiple is known at the start of the step, where the
+rates are known, and its integral is taken away. What is left is what the error of such steps is
+held to (integration.py).
 """
 
 # An element of an array is Any to mypy.
@@ -24,8 +29,10 @@ from dap3d_core.formulations.common.constraints import (
 )
 from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
+from dap3d_core.integrators.radau.newton import method_index
 from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, RadauState
-from dap3d_core.integrators.stepping.integration_state import TRIAL, Y
+from dap3d_core.integrators.radau.tableau import FEWEST
+from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, TRIAL, Y
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: A step before that was shorter than this part of the present one says nothing: rounding, divided
@@ -50,14 +57,14 @@ def find_slope(
     """dy/dt at the trial state, at t + h, into TRIAL_SLOPE."""
     t1 = t + h
     y, out = work.state[TRIAL], work.state[TRIAL_SLOPE]
-    inverse, stages = work.method.inverse, work.Z
+    inverse = work.method.inverse[method_index(work.stages), work.stages - 1]
     metric, force = system.metric, system.force
     n = metric.shape[0] - 1
     place_state(y, system)
     if system.row.shape[0] > 0:
         call_kinds(VALUE, VALUE, t1, system, loops, force, force, force)
         linearise(t1, system, loops)
-        scale_slopes(inverse, stages, h, metric, system.acceleration)
+        scale_slopes(inverse, h, work, metric, system.acceleration)
         acceleration_residual(system)
         factorise(system, PART)
         correct(system)
@@ -68,21 +75,29 @@ def find_slope(
     for k in range(states_offset(n), last):
         out[k] = 0.0
     for k in range(velocity_offset(1, n), last):
-        out[k] += (inverse[2, 0] * stages[0, k] + inverse[2, 1] * stages[1, k]
-                   + inverse[2, 2] * stages[2, k]) / h  # fmt: skip
-    out[last] = work.F[2, last]
+        out[k] += end_rate(inverse, h, work, k)
+    out[last] = work.F[work.stages - 1, last]
     return 0.0
 
 
 @compiled
-def scale_slopes(inverse: Floats, stages: Floats, h: float, metric: Floats, force: Floats) -> None:
+def end_rate(inverse: Floats, h: float, work: RadauState, k: int) -> float:
+    """Rate of component k of the collocation polynomial at the end of the step."""
+    rate = 0.0
+    for i in range(work.stages):
+        rate += inverse[i] * work.Z[i, k]
+    return rate / h
+
+
+@compiled
+def scale_slopes(inverse: Floats, h: float, work: RadauState, metric: Floats,
+                 force: Floats) -> None:  # fmt: skip
     """The collocation polynomial's accelerations at the end of the step, scaled, into force."""
     n = metric.shape[0] - 1
     for b in range(1, n + 1):
         f, o, k = velocity_offset(b, n), 6 * b, metric[b]
         for c in range(6):
-            force[o + c] = (inverse[2, 0] * stages[0, f + c] + inverse[2, 1] * stages[1, f + c]
-                            + inverse[2, 2] * stages[2, f + c]) / h  # fmt: skip
+            force[o + c] = end_rate(inverse, h, work, f + c)
         for c in range(3):
             force[o + c] /= k[0]
         z2 = force[o + 5] / k[6]
@@ -93,9 +108,49 @@ def scale_slopes(inverse: Floats, stages: Floats, h: float, metric: Floats, forc
 
 @compiled
 def prepare_dense(h: float, work: RadauState) -> None:
-    """Terms of dense output from t to the trial state, for combination.interpolate."""
-    state, terms, stages, c = work.state, work.terms, work.Z, work.method.c
+    """Terms of dense output from t to the trial state, for ``dense_state``."""
     work.t_dense, work.h_dense = work.t, h
+    if work.stages > FEWEST:
+        of_collocation(h, work)
+    else:
+        of_three_ends(h, work)
+
+
+@compiled
+def of_collocation(h: float, work: RadauState) -> None:
+    """The collocation polynomial with the rates at the start of the step as well."""
+    stages, m = work.stages, method_index(work.stages)
+    terms, nodes = work.terms, work.nodes
+    c, e, bulge = work.method.c[m], work.method.e[m], work.method.bulge[m]
+    work.dense_degree, leading, gamma = stages + 1, 1.0 / (stages + 1), work.method.poles[m, 0]
+    nodes[0] = 0.0
+    for i in range(stages):
+        nodes[1 + i] = c[i]
+        leading /= -c[i]
+    for k in range(terms.shape[1]):
+        off, size = h * work.state[SLOPE, k], max(abs(work.state[Y, k]), abs(work.state[TRIAL, k]))
+        for i in range(stages):
+            off += e[i] * work.Z[i, k]
+        if not abs(off) <= gamma * (work.tolerance[ABSOLUTE, k] + work.rtol * size):
+            off = 0.0  # not the error of the step: a stiff part, whose rates say nothing
+        terms[0, k], terms[stages + 1, k] = 0.0, off * leading
+        for i in range(stages):
+            terms[1 + i, k] = work.Z[i, k] + off * bulge[i]
+        for order in range(1, stages + 1):  # differences, divided
+            for i in range(stages, order - 1, -1):
+                gap = nodes[i] - nodes[i - order]
+                terms[i, k] = (terms[i, k] - terms[i - 1, k]) / gap
+        terms[0, k] = work.state[Y, k]
+
+
+@compiled
+def of_three_ends(h: float, work: RadauState) -> None:
+    """The polynomial through both ends of the step, and the start of the step before."""
+    state, terms, stages = work.state, work.terms, work.Z
+    c, nodes = work.method.c[method_index(FEWEST)], work.nodes
+    work.dense_degree = 5
+    for k in range(6):
+        nodes[k] = float(k % 2)
     q = work.accepted_step / h
     first = work.has_last_step == 0 or q < NEGLIGIBLE
     for k in range(state.shape[1]):
@@ -104,8 +159,8 @@ def prepare_dense(h: float, work: RadauState) -> None:
         terms[4, k] = terms[5, k] = 0.0
         a = (stages[0, k] / c[0] - rise) / (1.0 - c[0])
         b = (stages[1, k] / c[1] - rise) / (1.0 - c[1])
-        terms[3, k] = (b - a) / (c[1] - c[0])
-        terms[2, k] = a - c[0] * terms[3, k]
+        slope3 = (b - a) / (c[1] - c[0])
+        terms[2, k], terms[3, k] = c[0] * slope3 - a, -slope3
         if first:
             continue
         r2 = h * state[SLOPE, k] - rise
@@ -123,4 +178,16 @@ def prepare_dense(h: float, work: RadauState) -> None:
             abs(r2 + c[1] * (r3 + (1.0 - c[1]) * (r4 + c[1] * r5)) - b),
         )
         if off <= STRAY * max(abs(stages[0, k]), max(abs(stages[1, k]), abs(rise))):
-            terms[2, k], terms[3, k], terms[4, k], terms[5, k] = r2, r3, r4, r5
+            terms[2, k], terms[3, k], terms[4, k], terms[5, k] = -r2, -r3, r4, r5
+
+
+@compiled
+def dense_state(work: RadauState, t: float, y: Floats) -> None:
+    """The state at an instant of the last step, by Newton's form of its dense output."""
+    terms, nodes, theta = work.terms, work.nodes, (t - work.t_dense) / work.h_dense
+    for i in range(y.shape[0]):
+        y[i] = terms[work.dense_degree, i]
+    for row in range(work.dense_degree - 1, -1, -1):
+        factor = theta - nodes[row]
+        for i in range(y.shape[0]):
+            y[i] = terms[row, i] + factor * y[i]

@@ -1,4 +1,4 @@
-"""An integration by Radau IIA of order 5."""
+"""An integration by Radau IIA of orders 5, 9 and 13."""
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 from functools import cached_property
@@ -17,7 +17,7 @@ from dap3d_core.formulations.stabilized_index2.jacobian_tables import (
 )
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau import state as at
-from dap3d_core.integrators.radau.dense_output import find_slope
+from dap3d_core.integrators.radau.dense_output import dense_state, find_slope
 from dap3d_core.integrators.radau.newton import (
     estimate_error,
     factorise_both,
@@ -25,11 +25,18 @@ from dap3d_core.integrators.radau.newton import (
     find_tangent,
     find_work,
 )
+from dap3d_core.integrators.radau.order import set_tolerances
 from dap3d_core.integrators.radau.rounding import measure_stage_noise
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.step import advance
-from dap3d_core.integrators.radau.tableau import ORDER, radau_method
-from dap3d_core.integrators.stepping.integration import Integration
+from dap3d_core.integrators.radau.tableau import (
+    FEWEST,
+    MOST_STAGES,
+    ORDERS,
+    STAGES,
+    radau_method,
+)
+from dap3d_core.integrators.stepping.integration import Integration, Refusals
 from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, restored
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
 from dap3d_core.kernels.array_types import Integers
@@ -50,6 +57,8 @@ from dap3d_core.model import Model
 REGULAR = 1e-6
 
 
+#: The error estimate of steps with five and seven stages may be so many times the tolerance.
+LOOSER = 3.0
 #: Arrays of states of elements, which a scene without any has not in its checkpoints.
 OF_STATES = ("tangent.states.", "matrix.state_")
 #: Arrays that each tangent writes before it reads them.
@@ -163,7 +172,7 @@ def _state_tables(
 
 
 class RadauIntegration(Integration):
-    """An initial value problem, integrated by Radau IIA of order 5.
+    """An initial value problem, integrated by Radau IIA of orders 5, 9 and 13.
 
     Parameters
     ----------
@@ -185,11 +194,15 @@ class RadauIntegration(Integration):
     state_rows = at.RADAU_STATES
     unscaled_size = 1  # the work done
     loop = staticmethod(advance)
+    dense = staticmethod(dense_state)
 
     def __init__(
         self, evaluator: Evaluator, y0: ArrayLike, times: ArrayLike, **options: Any
     ) -> None:
         self.evaluator = evaluator
+        self._y0 = y0
+        #: Steps of fixed length are of order 5: their order is the caller's to know.
+        self.most_stages = FEWEST if options.get("step") else MOST_STAGES
         super().__init__(
             evaluator.functions, evaluator.system, evaluator.loops, y0, times,
             length_count=evaluator.length_count, watched=evaluator.watched, **options,
@@ -197,7 +210,9 @@ class RadauIntegration(Integration):
         work = self.work
         work.convergence_factor = work.accepted_error = 1.0
         work.regularisation = REGULAR if evaluator.formulation.accepts_redundant else 0.0
-        work.order, work.has_dense_output = ORDER, 1
+        work.order, work.has_dense_output = ORDERS[0], 1
+        work.stages = work.last_stages = FEWEST
+        work.newton_limit = work.tolerances[0, at.LIMIT]
 
     def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
         """As ``Integration.own_arrays``; makes the tangent and the matrix, too."""
@@ -205,27 +220,38 @@ class RadauIntegration(Integration):
         self.tangent, self.own_loops = make_tangent(evaluator)
         self.matrix, self.lu_plan = make_matrix(evaluator, self.tangent)
         lu, rows, bodies = self.lu_plan, evaluator.plan.row_size, evaluator.model.body_count + 1
+        most, pairs = self.most_stages, self.most_stages // 2
         shapes: dict[str, Any] = {
             "own": len(RadauState.indices("own")),
             "k": (2, size),
             "terms": (at.TERMS, size),
-            **dict.fromkeys(("Z", "Z_old", "F", "R"), (3, size)),
-            **dict.fromkeys(("multipliers", "last_multipliers", "G"), (3, 2, rows)),
-            "frames": (3, bodies, 13),
-            "x": (3, lu.size),
-            "along": (3, bodies),
-            **dict.fromkeys(("xr", "xc", "pivots", "pivotsc"), lu.size),
-            **dict.fromkeys(("alongr", "alongc"), bodies),
-            **dict.fromkeys(("K", "Kc"), lu.matrix_size),
+            "nodes": at.TERMS,
+            "blamed": size,
+            **dict.fromkeys(("Z", "Z_old", "F", "R"), (most, size)),
+            **dict.fromkeys(("multipliers", "last_multipliers", "G"), (most, 2, rows)),
+            "frames": (most, bodies, 13),
+            "x": (most, lu.size),
+            "along": (most, bodies),
+            **dict.fromkeys(("xr", "pivots"), lu.size),
+            **dict.fromkeys(("xc", "pivotsc"), (pairs, lu.size)),
+            "alongr": bodies,
+            "alongc": (pairs, bodies),
+            "K": lu.matrix_size,
+            "Kc": (pairs, lu.matrix_size),
         }
         dtypes: dict[str, Any] = dict.fromkeys(("xc", "alongc", "Kc"), np.complex128)
         dtypes |= dict.fromkeys(("pivots", "pivotsc"), np.int64)
         arrays = {name: np.zeros(s, dtypes.get(name, np.float64)) for name, s in shapes.items()}
-        return arrays | {"method": radau_method()}
+        return arrays | {"method": radau_method(), "tolerances": self._tolerances}
 
     def error_tolerances(self, rtol: float, atol: ArrayLike) -> tuple[float, Any]:
-        """As ``Integration.error_tolerances``."""
-        return estimate_tolerances(rtol, atol)
+        """As ``Integration.error_tolerances``: those of order 5; ``tolerances`` has all."""
+        size = np.size(self._y0)
+        found = [estimate_tolerances(rtol, atol, s) for s in STAGES if s <= self.most_stages]
+        self._tolerances = np.array(
+            [[r, limit, *np.broadcast_to(a, size)] for r, limit, a in found]
+        )
+        return found[0][0], found[0][2]
 
     @cached_property
     def _parts(self) -> Any:
@@ -253,10 +279,6 @@ class RadauIntegration(Integration):
         return (self.work, evaluator.functions, *self._parts, evaluator.system, self.own_loops,
                 self.tangent, self.matrix)  # fmt: skip
 
-    def _project(self) -> bool:
-        """Nothing to do: ``start`` projects the state."""
-        return True
-
     def state_arrays(self) -> list[Any]:
         """As ``Integration.state_arrays``."""
         matrix = self.matrix
@@ -275,15 +297,24 @@ class RadauIntegration(Integration):
             return restored(name, array, found, self.indices("own", ("regularisation",)))
         if name.startswith("method.") or (array.dtype.kind == "i" and "." in name):
             return restored(name, array, found, range(len(array)))
+        if name == "tolerances":
+            return restored(name, array, found, range(len(array)))
         if name in ("pivots", "pivotsc"):
             check_alike(name, found, array)
             sizes = self.lu_plan.nodes[:-1, 0]
             check_pivots(name, found, np.repeat(sizes, sizes))
         return super().restored(name, array, found)
 
+    def restore(self, found: Mapping[str, Any]) -> None:
+        """As ``Integration.restore``."""
+        super().restore(found)
+        set_tolerances(self.work)
+
     def allowed_integers(self, found: Mapping[str, int]) -> dict[str, Container[int]]:
         """As ``Integration.allowed_integers``."""
-        return super().allowed_integers(found) | at.ALLOWED
+        stages = [s for s in STAGES if s <= self.most_stages]
+        of_order = dict.fromkeys(("stages", "last_stages"), stages)
+        return super().allowed_integers(found) | at.ALLOWED | of_order
 
     @property
     def dy_dt(self) -> Any:
@@ -299,15 +330,33 @@ class RadauIntegration(Integration):
         )
 
     @property
+    def refusals(self) -> Refusals:
+        """As of ``Integration.refusals``."""
+        w = self.work
+        return Refusals(
+            int(w.error_refusals), int(w.iteration_refusals), int(w.singular_refusals),
+            int(np.argmax(w.blamed)),
+        )  # fmt: skip
+
+    @property
     def multipliers(self) -> tuple[Any, Any]:
         """(rows,) mu and lambda of the last stage, in the order of the model."""
         row = self.evaluator.system.row
-        last = self.work.last_multipliers[2]
+        last = self.work.last_multipliers[self.work.last_stages - 1]
         return last[0, row].copy(), last[1, row].copy()
 
 
-def estimate_tolerances(rtol: float, atol: ArrayLike) -> tuple[float, Any]:
-    """Tolerances of the error estimate, which is of order 3, for those of the result (RADAU5)."""
-    leading = rtol if rtol > 0.0 else np.max(atol)
-    factor = 0.1 * leading ** (2.0 / 3.0) / leading
-    return rtol * factor, np.maximum(np.multiply(atol, factor), SMALLEST_ATOL)
+def estimate_tolerances(rtol: float, atol: ArrayLike, stages: int) -> tuple[float, float, Any]:
+    """Relative tolerance of the error estimate, limit of the iteration, absolute tolerances.
+
+    The estimate is of order s, the step's end of 2 s - 1: it is compared with a tenth of the
+    tolerance to the power (s + 1) / (2 s) (RADAU). With more than three stages dense output has
+    order s + 1 only (dense_output.py): it is held to the tolerance by LOOSER of it at most. The
+    iteration ends with a change of a thirtieth of the tolerance.
+    """
+    leading = rtol if rtol > 0.0 else float(np.max(atol))
+    factor = 0.1 * leading ** ((stages + 1.0) / (2.0 * stages)) / leading
+    if stages > FEWEST:
+        factor = min(factor, LOOSER)
+    limit = min(0.03, 0.1**1.5 / factor)
+    return rtol * factor, limit, np.maximum(np.multiply(atol, factor), SMALLEST_ATOL)

@@ -1,7 +1,7 @@
 """The stages of a Radau step by simplified Newton iteration, and its error estimate.
 
 Source: Hairer, Wanner, Solving Ordinary Differential Equations II (HW), IV.8, VII.4, and their code
-RADAU5. The three stages are decoupled by T into one real and one complex system with the same
+RADAU. The stages are decoupled by T into one real and one to three complex systems with the same
 tangent. Norms are the largest scaled component, as in stepping/step_control.py.
 """
 
@@ -39,18 +39,19 @@ from dap3d_core.integrators.radau.convergence import (
     is_exact,
     is_settling,
     is_stalled,
-    newton_limit,
     size_of_change,
 )
 from dap3d_core.integrators.radau.state import RadauState
+from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.integration_state import SCRATCH, TRIAL, Y
 from dap3d_core.integrators.stepping.vector_ops import scaled_largest
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.lu.factor import factor_lu, solve_lu
 
 EPSILON = 2.220446049250313e-16
-#: Iterations at most; more where the step is fixed, for a shorter one is no choice there.
-MOST, MOST_FIXED = 10, 40
+#: Iterations at most with 3 stages, more for each further two; more where the step is fixed, for
+#: a shorter one is no choice there.
+MOST, MORE, MOST_FIXED = 10, 5, 40
 #: Slow iterations that a fixed step, or multipliers on their way, are left.
 PATIENCE = 5
 #: Factors that belong to a step this near the present one are used for it.
@@ -77,13 +78,13 @@ def find_tangent(
     """
     argument = work.state[SCRATCH]
     for k in range(argument.shape[0]):
-        argument[k] = work.state[Y, k] + work.Z[2, k]
+        argument[k] = work.state[Y, k] + work.Z[work.stages - 1, k]
     at = work.t + work.tangent_step if work.has_last_step != 0 else work.t
     place(at, argument, system, loops)
     linearise(at, system, loops)
     keep_state(system, matrix, work.regularisation)
     for k in range(system.multipliers.shape[0]):
-        system.multipliers[k] = -work.multipliers[2, 1, k]
+        system.multipliers[k] = -work.multipliers[work.stages - 1, 1, k]
     work.jacobian_count += 1
     work.tangent_needed, work.tangent_is_current = 0, 1
     work.factored_step = 0.0
@@ -96,9 +97,21 @@ def find_tangent(
 
 
 @compiled
-def pole(poles: Floats, h: float) -> Any:
-    """The complex pole of a step h, 1/s; of numpy, with the arithmetic of compiled code."""
-    return np.complex128(complex(poles[1] / h, poles[2] / h))
+def method_index(stages: int) -> int:
+    """Index of the method of so many stages in the tables of ``RadauMethod``."""
+    return (stages - FEWEST) // 2
+
+
+@compiled
+def pair_count(stages: int) -> int:
+    """Number of pairs of complex poles."""
+    return (stages - 1) // 2
+
+
+@compiled
+def pole(poles: Floats, p: int, h: float) -> Any:
+    """Complex pole p of a step h, 1/s; of numpy, with the arithmetic of compiled code."""
+    return np.complex128(complex(poles[1 + 2 * p] / h, poles[2 + 2 * p] / h))
 
 
 @compiled
@@ -111,17 +124,30 @@ def factorise_both(
     tangent: Tangent,
     matrix: StageMatrix,
 ) -> float:
-    """Factors of the real and the complex system of a step h; 0, or UNFOUND if one is singular."""
-    poles = work.method.poles
+    """Factors of the real and the complex systems of a step h; 0, or UNFOUND if one is singular."""
+    poles = work.method.poles[method_index(work.stages)]
     work.factorisation_count += 1
     work.factored_step = h
     fill_matrix(poles[0] / h, work.K, system.blocks, matrix, tangent)
-    fill_matrix(pole(poles, h), work.Kc, system.blocks, matrix, tangent)
     nodes, columns, updates = matrix.nodes, matrix.columns, matrix.updates
     regular = factor_lu(nodes, columns, updates, work.K, work.pivots)
-    if regular and factor_lu(nodes, columns, updates, work.Kc, work.pivotsc):
+    for p in range(pair_count(work.stages) if regular else 0):
+        fill_matrix(pole(poles, p, h), work.Kc[p], system.blocks, matrix, tangent)
+        regular = regular and factor_lu(nodes, columns, updates, work.Kc[p], work.pivotsc[p])
+    if regular:
         return 0.0
+    work.factored_step = 0.0
     return UNFOUND
+
+
+@compiled
+def lagrange(c: Floats, stages: int, j: int, u: float) -> float:
+    """At u the polynomial that is one at c_j and zero at the other stages."""
+    value = 1.0
+    for k in range(stages):
+        if k != j:
+            value *= (u - c[k]) / (c[j] - c[k])
+    return value
 
 
 @compiled
@@ -130,35 +156,41 @@ def predict(h: float, work: RadauState, prolong: bool) -> None:
 
     Or the state as it is, where they are not to be prolonged, or there was no step before.
 
-    mu is no smooth function: it has the same values at the stages of each step, but for h^3.
+    mu is no smooth function: it has the same values at the stages of each step, but for a power of
+    h; where the number of stages has changed it starts from zero.
     """
-    c, stages, old, now = work.method.c, work.Z, work.Z_old, work.multipliers
-    if work.has_last_step == 0 or not prolong:
-        for i in range(3):
-            zero(stages[i])
+    stages, old, now = work.Z, work.Z_old, work.multipliers
+    before, last = work.last_stages, work.last_multipliers
+    c, c_old = work.method.c[method_index(work.stages)], work.method.c[method_index(before)]
+    for i in range(work.stages):
+        zero(stages[i])
+        for r in range(2):
+            zero(now[i, r])
+        if work.has_last_step == 0 or not prolong:
             for k in range(now.shape[2]):
-                now[i, 0, k], now[i, 1, k] = 0.0, work.last_multipliers[2, 1, k]
-        return
-    ratio, last = h / work.accepted_step, work.last_multipliers
-    for i in range(3):
+                now[i, 1, k] = last[before - 1, 1, k]
+            continue
+        ratio = h / work.accepted_step
         u = 1.0 + c[i] * ratio
-        v0 = (u - c[1]) * (u - 1.0) / ((c[0] - c[1]) * (c[0] - 1.0))
-        v1 = (u - c[0]) * (u - 1.0) / ((c[1] - c[0]) * (c[1] - 1.0))
-        v2 = (u - c[0]) * (u - c[1]) / ((1.0 - c[0]) * (1.0 - c[1]))
+        of_mu = ratio**before if before == work.stages else 0.0
         for k in range(now.shape[2]):
-            now[i, 0, k] = ratio * ratio * ratio * last[i, 0, k]
-            now[i, 1, k] = v0 * last[0, 1, k] + v1 * last[1, 1, k] + v2 * last[2, 1, k]
-        w0 = u * (u - c[1]) * (u - 1.0) / (c[0] * (c[0] - c[1]) * (c[0] - 1.0))
-        w1 = u * (u - c[0]) * (u - 1.0) / (c[1] * (c[1] - c[0]) * (c[1] - 1.0))
-        w2 = u * (u - c[0]) * (u - c[1]) / ((1.0 - c[0]) * (1.0 - c[1])) - 1.0
-        for k in range(stages.shape[1]):
-            stages[i, k] = w0 * old[0, k] + w1 * old[1, k] + w2 * old[2, k]
+            now[i, 0, k] = of_mu * last[i, 0, k]
+        for j in range(before):
+            v = lagrange(c_old, before, j, u)
+            for k in range(now.shape[2]):
+                now[i, 1, k] += v * last[j, 1, k]
+            w = v * u / c_old[j]
+            if j == before - 1:
+                w -= 1.0
+            for k in range(stages.shape[1]):
+                stages[i, k] += w * old[j, k]
 
 
 @compiled
 def solve_first(h: float, work: RadauState, system: System, matrix: StageMatrix) -> None:
     """R[0], G[0] from the residual of one equation with the real matrix to the change."""
-    x, along, s = work.x[0], work.along[0], work.method.poles[0] / h
+    x, along = work.x[0], work.along[0]
+    s = work.method.poles[method_index(work.stages), 0] / h
     scale_residual(work.R[0], work.G[0], system.blocks, system.metric, matrix, work.frames[0],
                    x, along)  # fmt: skip
     couple_length(s, x, along, matrix)
@@ -169,42 +201,55 @@ def solve_first(h: float, work: RadauState, system: System, matrix: StageMatrix)
 
 
 @compiled
-def separate(inverse: Floats, x: Floats, real: Floats, pair: Any) -> None:
-    """T^-1 x for three rows x: its first row, and the other two as one complex row."""
-    for k in range(real.shape[0]):
-        a, b, c = x[0, k], x[1, k], x[2, k]
-        real[k] = inverse[0, 0] * a + inverse[0, 1] * b + inverse[0, 2] * c
-        pair[k] = complex(inverse[1, 0] * a + inverse[1, 1] * b + inverse[1, 2] * c,
-                          inverse[2, 0] * a + inverse[2, 1] * b + inverse[2, 2] * c)  # fmt: skip
+def separate(inverse: Floats, stages: int, x: Floats, real: Floats, pairs: Any) -> None:
+    """T^-1 x for the rows x: its first row, and pairs of the others as complex rows."""
+    zero(real)
+    for p in range(pair_count(stages)):
+        for k in range(real.shape[0]):
+            pairs[p, k] = 0.0
+    for j in range(stages):
+        for k in range(real.shape[0]):
+            real[k] += inverse[0, j] * x[j, k]
+        for p in range(pair_count(stages)):
+            a, b = inverse[1 + 2 * p, j], inverse[2 + 2 * p, j]
+            for k in range(real.shape[0]):
+                pairs[p, k] += complex(a * x[j, k], b * x[j, k])
 
 
 @compiled
-def unite(T: Floats, real: Floats, pair: Any, x: Floats) -> None:
+def unite(T: Floats, stages: int, real: Floats, pairs: Any, x: Floats) -> None:
     """The inverse of ``separate``."""
-    for i in range(3):
+    for i in range(stages):
         for k in range(real.shape[0]):
-            x[i, k] = T[i, 0] * real[k] + T[i, 1] * pair[k].real + T[i, 2] * pair[k].imag
+            x[i, k] = T[i, 0] * real[k]
+        for p in range(pair_count(stages)):
+            a, b = T[i, 1 + 2 * p], T[i, 2 + 2 * p]
+            for k in range(real.shape[0]):
+                x[i, k] += a * pairs[p, k].real + b * pairs[p, k].imag
 
 
 @compiled
 def solve_stages(h: float, work: RadauState, system: System, matrix: StageMatrix) -> None:
-    """R, G from the residuals of the three stages to the changes."""
-    x, along, poles = work.x, work.along, work.method.poles
-    s, sc = poles[0] / h, pole(poles, h)
-    for i in range(3):
+    """R, G from the residuals of the stages to the changes."""
+    x, along, stages, m = work.x, work.along, work.stages, method_index(work.stages)
+    poles, T, inverse = work.method.poles[m], work.method.T[m], work.method.T_inverse[m]
+    for i in range(stages):
         scale_residual(work.R[i], work.G[i], system.blocks, system.metric, matrix, work.frames[i],
                        x[i], along[i])  # fmt: skip
-    separate(work.method.T_inverse, x, work.xr, work.xc)
-    separate(work.method.T_inverse, along, work.alongr, work.alongc)
+    separate(inverse, stages, x, work.xr, work.xc)
+    separate(inverse, stages, along, work.alongr, work.alongc)
+    s = poles[0] / h
     couple_length(s, work.xr, work.alongr, matrix)
-    couple_length(sc, work.xc, work.alongc, matrix)
     solve_lu(matrix.nodes, matrix.columns, work.K, work.pivots, work.xr)
-    solve_lu(matrix.nodes, matrix.columns, work.Kc, work.pivotsc, work.xc)
     find_length(s, work.xr, work.alongr, matrix)
-    find_length(sc, work.xc, work.alongc, matrix)
-    unite(work.method.T, work.xr, work.xc, x)
-    unite(work.method.T, work.alongr, work.alongc, along)
-    for i in range(3):
+    for p in range(pair_count(stages)):
+        sc = pole(poles, p, h)
+        couple_length(sc, work.xc[p], work.alongc[p], matrix)
+        solve_lu(matrix.nodes, matrix.columns, work.Kc[p], work.pivotsc[p], work.xc[p])
+        find_length(sc, work.xc[p], work.alongc[p], matrix)
+    unite(T, stages, work.xr, work.xc, x)
+    unite(T, stages, work.alongr, work.alongc, along)
+    for i in range(stages):
         unscale_solution(x[i], along[i], system.blocks, system.metric, matrix, work.frames[i],
                          work.R[i], work.G[i])  # fmt: skip
 
@@ -213,20 +258,23 @@ def solve_stages(h: float, work: RadauState, system: System, matrix: StageMatrix
 def evaluate_stages(
     t: float, h: float, work: RadauState, system: System, loops: Any, matrix: StageMatrix
 ) -> None:
-    """Residuals of the three stages: F - A^-1 Z / h into R, those of the rows into G."""
-    y, argument, c = work.state[Y], work.state[SCRATCH], work.method.c
-    stages, inverse = work.Z, work.method.inverse
-    for i in range(3):
+    """Residuals of the stages: F - A^-1 Z / h into R, those of the rows into G."""
+    y, argument, m = work.state[Y], work.state[SCRATCH], method_index(work.stages)
+    stages, inverse, c = work.Z, work.method.inverse[m], work.method.c[m]
+    for i in range(work.stages):
         for k in range(y.shape[0]):
             argument[k] = y[k] + stages[i, k]
         evaluate_stage(t + c[i] * h, argument, work.multipliers[i], matrix.held, work.F[i],
                        work.G[i], system, loops)  # fmt: skip
         keep_frames(system.body, work.frames[i])
-        a0, a1, a2 = inverse[i, 0] / h, inverse[i, 1] / h, inverse[i, 2] / h
+        zero(work.R[i])
+        for j in range(work.stages):
+            a = inverse[i, j] / h
+            for k in range(y.shape[0]):
+                work.R[i, k] += a * stages[j, k]
         for k in range(y.shape[0]):
-            rate = a0 * stages[0, k] + a1 * stages[1, k] + a2 * stages[2, k]
-            work.R[i, k] = work.F[i, k] - rate
-    work.rhs_count += 3
+            work.R[i, k] = work.F[i, k] - work.R[i, k]
+    work.rhs_count += work.stages
 
 
 @compiled
@@ -253,7 +301,7 @@ def change_stages(h: float, work: RadauState, system: System) -> float:
     """
     y = work.state[Y]
     work.state_change = work.multiplier_change = 0.0
-    for i in range(3):
+    for i in range(work.stages):
         size = size_of_change(work.R[i], h, work)
         other = size_of_multipliers(h, work.G[i], work, system)
         if not size <= work.state_change:
@@ -271,6 +319,12 @@ def change_stages(h: float, work: RadauState, system: System) -> float:
 
 
 @compiled
+def most_iterations(stages: int) -> int:
+    """Iterations that the stages of a step are found in, at most."""
+    return MOST + MORE * method_index(stages)
+
+
+@compiled
 def find_stages(
     t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Tangent,
     matrix: StageMatrix,
@@ -281,12 +335,12 @@ def find_stages(
         0 where they are found; else the factor on the step that is to be tried; NaN where a number
         is not finite.
     """
-    limit = newton_limit(work)
+    limit = work.newton_limit
     stale = abs(h - work.factored_step) / h  # factors of another step converge at this rate
     work.convergence_factor = max(max(work.convergence_factor, EPSILON) ** 0.8, stale)
     before = ratio = ratio_before = states = multipliers = 1.0
     fixed = work.fixed_step != 0.0
-    most = MOST_FIXED if fixed else MOST
+    most = MOST_FIXED if fixed else most_iterations(work.stages)
     least = 2 if tangent.bends[0] == BENT else 1  # rates of other steps say nothing across a bend
     for done in range(1, most + 1):
         evaluate_stages(t, h, work, system, loops, matrix)
@@ -349,8 +403,8 @@ def estimate_error(
     away only as far as its own D is that of the state.
     """
     again = work.has_last_step == 0 or work.last_rejected != 0
-    y, argument, e = work.state[Y], work.state[SCRATCH], work.method.e
-    multipliers, error = work.last_multipliers[2], 0.0
+    y, argument, e = work.state[Y], work.state[SCRATCH], work.method.e[method_index(work.stages)]
+    multipliers, error = work.last_multipliers[work.last_stages - 1], 0.0
     zero(multipliers[0])
     for attempt in range(2 if again else 1):
         for k in range(y.shape[0]):
@@ -359,9 +413,9 @@ def estimate_error(
                        loops)  # fmt: skip
         keep_frames(system.body, work.frames[0])
         work.rhs_count += 1
-        for k in range(y.shape[0]):
-            total = e[0] * work.Z[0, k] + e[1] * work.Z[1, k] + e[2] * work.Z[2, k]
-            work.R[0, k] += total / h
+        for i in range(work.stages):
+            for k in range(y.shape[0]):
+                work.R[0, k] += e[i] * work.Z[i, k] / h
         for r in range(2):
             zero(work.G[0, r])
         solve_first(h, work, system, matrix)
@@ -388,9 +442,10 @@ def find_work(
     work, so its powers are evaluated once more, at the stages as found.
     """
     evaluate_stages(t, h, work, system, loops, matrix)
-    last, A = work.state.shape[1] - 1, work.method.A
-    for i in range(3):
-        work.Z[i, last] = h * (A[i, 0] * work.F[0, last] + A[i, 1] * work.F[1, last]
-                               + A[i, 2] * work.F[2, last])  # fmt: skip
-    work.state[TRIAL, last] = work.state[Y, last] + work.Z[2, last]
+    last, A = work.state.shape[1] - 1, work.method.A[method_index(work.stages)]
+    for i in range(work.stages):
+        work.Z[i, last] = 0.0
+        for j in range(work.stages):
+            work.Z[i, last] += h * A[i, j] * work.F[j, last]
+    work.state[TRIAL, last] = work.state[Y, last] + work.Z[work.stages - 1, last]
     return 0.0

@@ -3,7 +3,7 @@
 A change of the residuals of a stage by delta changes the stage by (gamma / h - J)^-1 delta. Where
 a direction is soft that is h / gamma times delta, as in an explicit method; in a stiff one it is
 J^-1 delta, of the size of the last digits of the state that made it, however long the step. In the
-estimate of the error the stages have weights e of 12 in all (newton.py).
+estimate of the error the stages have weights e of 12 in all for three, 66 for seven (newton.py).
 """
 
 # An element of an array is Any to mypy.
@@ -19,7 +19,7 @@ from dap3d_core.formulations.stabilized_index2.stage_equations import (
     evaluate_stage,
     keep_frames,
 )
-from dap3d_core.integrators.radau.newton import solve_first
+from dap3d_core.integrators.radau.newton import method_index, solve_first
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration_state import NOISE, SCRATCH, Function, Y
 from dap3d_core.integrators.stepping.rounding import (
@@ -44,8 +44,10 @@ def measure_stage_noise(
 ) -> float:
     """Uncertainty of dy/dt at (t, y) in a step h, the factors of which are known."""
     y, argument, noise = work.state[Y], work.state[SCRATCH], work.tolerance[NOISE]
-    now, changed, e = work.last_multipliers[2], work.multipliers[0], work.method.e
-    size = ROUNDINGS * (abs(e[0]) + abs(e[1]) + abs(e[2])) / h
+    now, changed = work.last_multipliers[work.last_stages - 1], work.multipliers[0]
+    e, size = work.method.e[method_index(work.stages)], 0.0
+    for i in range(work.stages):
+        size += ROUNDINGS * abs(e[i]) / h
     zero(noise)
     zero(now[0])
     zero(changed[0])

@@ -5,26 +5,46 @@ from typing import Any, ClassVar
 
 import attrs
 
-from dap3d_core.integrators.radau.tableau import RadauMethod
+from dap3d_core.integrators.radau.tableau import MOST_STAGES, RadauMethod
 from dap3d_core.integrators.stepping.integration_state import MOST_COUNTED, STATES, IntegrationState
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import COMPLEX_VECTOR, MATRIX, TENSOR, Scalar
+from dap3d_core.kernels.runtime.array_struct import (
+    COMPLEX_MATRIX,
+    INTEGER_MATRIX,
+    MATRIX,
+    TENSOR,
+    Scalar,
+)
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 
 # Rows of ``state`` behind those of stepping/integration_state.py: state before the last step, dy/dt
 # at Y, there, and at the trial state.
 OLD, SLOPE, OLD_SLOPE, TRIAL_SLOPE, RADAU_STATES = range(STATES, STATES + 5)
-#: Rows of ``terms``: dense output is a polynomial of degree 5.
-TERMS = 6
+#: Rows of ``terms``: dense output is a polynomial of degree 5, or of one more than the stages.
+TERMS = MOST_STAGES + 2
+#: Columns of ``tolerances``: relative tolerance of the error estimate, limit of the iteration, and
+#: from there on absolute tolerances.
+RTOL, LIMIT, ATOL = range(3)
 
 
 #: Values of its integers between two chunks of a run, as ``allowed_integers`` has them.
 ALLOWED: dict[str, Container[int]] = {
     **dict.fromkeys(("tangent_needed", "tangent_is_current", "has_last_step"), (0, 1)),
     **dict.fromkeys(
-        ("iteration_count", "last_iterations", "jacobian_count", "factorisation_count"),
+        (
+            "iteration_count",
+            "last_iterations",
+            "jacobian_count",
+            "factorisation_count",
+            "steps_at_order",
+            "patience",
+            "error_refusals",
+            "iteration_refusals",
+            "singular_refusals",
+        ),
         range(MOST_COUNTED),
     ),
+    "dense_degree": range(TERMS),
 }
 
 
@@ -40,16 +60,18 @@ def _integer() -> Scalar[int]:
 class RadauState(IntegrationState):
     """State of an implicit integration, besides system, tangent and matrix.
 
-    n = 13 bodies + 1 components, R rows, N unknowns; mu and lambda are the two multipliers of each
-    row, C and D v - nu its two residuals.
+    n = 13 bodies + 1 components, R rows, N unknowns, up to S stages, P pairs of complex poles; mu
+    and lambda are the two multipliers of each row, C and D v - nu its two residuals.
     """
 
     types: ClassVar[dict[str, Any]] = {
         **IntegrationState.types,
-        **dict.fromkeys(("pivots", "pivotsc"), INTEGER_VECTOR),
+        "pivots": INTEGER_VECTOR,
+        "pivotsc": INTEGER_MATRIX,
         **dict.fromkeys(("k", "terms", "Z", "Z_old", "F", "R", "x", "along"), MATRIX),
+        "tolerances": MATRIX,
         **dict.fromkeys(("multipliers", "last_multipliers", "G", "frames"), TENSOR),
-        **dict.fromkeys(("xc", "alongc", "Kc"), COMPLEX_VECTOR),
+        **dict.fromkeys(("xc", "alongc", "Kc"), COMPLEX_MATRIX),
         "method": RadauMethod.type_of(),
     }
 
@@ -60,6 +82,7 @@ class RadauState(IntegrationState):
     tangent_step = _own()  # length of the step that the tangent is asked for
     accepted_error = _own()  # of the last accepted step
     regularisation = _own()  # of the rows; 0: none
+    newton_limit = _own()  # norm of a change at which the iteration ends
     state_change = _own()  # norms of the last change of the stages and of their multipliers
     multiplier_change = _own()
 
@@ -70,26 +93,37 @@ class RadauState(IntegrationState):
     last_iterations = _integer()
     jacobian_count = _integer()
     factorisation_count = _integer()
+    stages = _integer()
+    last_stages = _integer()  # of the last accepted step
+    steps_at_order = _integer()  # accepted since the order changed
+    patience = _integer()  # steps of an order before it may rise again
+    dense_degree = _integer()
+    error_refusals = _integer()  # steps refused for their error, as the iteration did not converge,
+    iteration_refusals = _integer()  # and as a matrix was singular
+    singular_refusals = _integer()
 
     own: Floats  # scalars
     k: Floats  # (2, n) for the first step
     terms: Floats  # (TERMS, n)
-    Z: Floats  # (3, n) stages less the state
-    Z_old: Floats  # (3, n) of the last accepted step
-    F: Floats  # (3, n) rates at the stages
-    R: Floats  # (3, n) residuals; then changes
-    multipliers: Floats  # (3, 2, R) at the stages
-    last_multipliers: Floats  # (3, 2, R) of the last accepted step
-    G: Floats  # (3, 2, R) residuals of the rows; then changes
-    frames: Floats  # (3, bodies + 1, 13) axes and Euler parameters of the bodies at the stages
-    x: Floats  # (3, N) residuals, changes in the unknowns of the matrix
-    along: Floats  # (3, bodies + 1) their parts along the Euler parameters
+    nodes: Floats  # (TERMS,) of dense output, in Newton's form
+    tolerances: Floats  # (orders, ATOL + n) RTOL, ...
+    blamed: Floats  # (n,) how often each changed most where the iteration did not converge
+    Z: Floats  # (S, n) stages less the state
+    Z_old: Floats  # (S, n) of the last accepted step
+    F: Floats  # (S, n) rates at the stages
+    R: Floats  # (S, n) residuals; then changes
+    multipliers: Floats  # (S, 2, R) at the stages
+    last_multipliers: Floats  # (S, 2, R) of the last accepted step
+    G: Floats  # (S, 2, R) residuals of the rows; then changes
+    frames: Floats  # (S, bodies + 1, 13) axes and Euler parameters of the bodies at the stages
+    x: Floats  # (S, N) residuals, changes in the unknowns of the matrix
+    along: Floats  # (S, bodies + 1) their parts along the Euler parameters
     xr: Floats  # (N,) of the real system
     alongr: Floats  # (bodies + 1,)
-    xc: Any  # (N,) complex
-    alongc: Any  # (bodies + 1,) complex
+    xc: Any  # (P, N) complex
+    alongc: Any  # (P, bodies + 1) complex
     K: Floats  # (matrix_size,)
-    Kc: Any  # (matrix_size,) complex
+    Kc: Any  # (P, matrix_size) complex
     pivots: Integers  # (N,)
-    pivotsc: Integers  # (N,)
+    pivotsc: Integers  # (P, N)
     method: RadauMethod

@@ -1,9 +1,9 @@
-"""Radau IIA of order 5 on the stabilised equations of index 2: a compiled loop that can stop.
+"""Radau IIA on the stabilised equations of index 2: a compiled loop that can stop.
 
 It works as runge_kutta/step.py does, chunk by chunk, with the same functions and the same arrays;
 what it knows of mechanics is in formulations/stabilized_index2/stage_equations.py and tangent.py.
 Source: Hairer, Wanner, Solving Ordinary Differential Equations II, IV.8, VII.4, and their code
-RADAU5.
+RADAU.
 """
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
@@ -16,11 +16,13 @@ from typing import Any
 from dap3d_core.assembly.arrays import System
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND, Tangent
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
-from dap3d_core.integrators.radau.convergence import is_at_rounding, newton_limit
-from dap3d_core.integrators.radau.dense_output import prepare_dense
-from dap3d_core.integrators.radau.newton import MOST, SAME_STEP, predict
+from dap3d_core.integrators.radau.convergence import is_at_rounding
+from dap3d_core.integrators.radau.dense_output import dense_state, prepare_dense
+from dap3d_core.integrators.radau.newton import SAME_STEP, method_index, most_iterations, predict
+from dap3d_core.integrators.radau.order import change_order, lower_order, raise_order
 from dap3d_core.integrators.radau.rounding import bound_stage_noise
 from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, RadauState
+from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     is_sample_across,
@@ -28,6 +30,7 @@ from dap3d_core.integrators.stepping.event_location import (
     update_switches_after_step,
 )
 from dap3d_core.integrators.stepping.integration_state import (
+    ABSOLUTE,
     NOT_FINITE,
     RUNNING,
     SCRATCH,
@@ -37,7 +40,6 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.integrators.stepping.output import (
-    dense_state,
     may_step,
     needs_dense,
     project_state,
@@ -90,7 +92,7 @@ def advance(
     watch = functions[4] if work.switch_count != 0 else rhs
     accepted = functions[3] if work.calls_accepted != 0 else rhs
     limit = work.rhs_count + budget
-    while may_step(work, dense_state, limit, project, report, system, loops):
+    while may_step(work, dense_state, limit, project, report, system, loops, True):
         steps, rejected = work.step_count, work.rejected_count
         if work.first_stage_valid == 0:
             tangent.bends[0] = 0.0
@@ -119,8 +121,10 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
     if failure != RUNNING:
         work.t_stop, work.status = work.t, failure
         return
+    change_order(work, FEWEST)
+    work.last_stages = FEWEST
     for k in range(system.multipliers.shape[0]):
-        work.last_multipliers[2, 1, k] = -system.multipliers[k]
+        work.last_multipliers[FEWEST - 1, 1, k] = -system.multipliers[k]
     for k in range(y.shape[0]):
         work.state[SLOPE, k] = work.k[0, k]
     work.first_stage_valid = work.tangent_needed = 1
@@ -147,7 +151,7 @@ def step(
     state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
     end = t1 = end_of_step(work)
     longest = h = t1 - t
-    if work.switch_count != 0 or min(work.t_limit, t + work.step_limit_at_switch) < t1:
+    if work.switch_count != 0 or min(work.step_limit, t + work.step_limit_at_switch) < t1:
         h = next_length(work, t1, state[SLOPE], project, watch, system, loops)
         if h == 0.0:
             return
@@ -159,7 +163,7 @@ def step(
     if work.switch_count != 0 and stage_is_across(work, t, h, watch, system, loops):
         return
     for k in range(state.shape[1]):
-        state[TRIAL, k] = state[Y, k] + work.Z[2, k]
+        state[TRIAL, k] = state[Y, k] + work.Z[work.stages - 1, k]
     error = estimate_error(t, h, work, system, loops, tangent, matrix) if adaptive else 0.0
     if error < 1.0:
         find_work(t, h, work, system, loops, tangent, matrix)
@@ -181,12 +185,7 @@ def step(
         else:
             reject(work, t1, h * STEP_AFTER_FAILURE, failure)
     elif error <= LARGEST:
-        record_failure(work, error, h, work.last_rejected != 0)
-        factor = max(SHRINKAGE, safety_factor(work) / error**0.25)
-        reject(work, t1, h * factor, STEP_FLOOR)
-        if work.has_last_step == 0:
-            work.h = min(work.h, 0.1 * h)
-        work.tangent_needed = max(work.tangent_needed, 1 - work.tangent_is_current)
+        reject_error(work, t1, h, error)
     else:
         reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
 
@@ -196,11 +195,11 @@ def stage_is_across(
     work: RadauState, t: float, h: float, watch: Function, system: System, loops: Any
 ) -> bool:
     """True if an inner stage lies beyond a switch; then the step is cut."""
-    x = work.state[SCRATCH]
-    for i in range(2):
+    x, c = work.state[SCRATCH], work.method.c[method_index(work.stages)]
+    for i in range(work.stages - 1):
         for k in range(x.shape[0]):
             x[k] = work.state[Y, k] + work.Z[i, k]
-        if is_sample_across(work, t + work.method.c[i] * h, x, watch, system, loops):
+        if is_sample_across(work, t + c[i] * h, x, watch, system, loops):
             return True
     return False
 
@@ -266,15 +265,50 @@ def reject_iteration(work: RadauState, t1: float, h: float, shorter: float) -> N
     if not shorter > 0.0:  # NaN
         reject(work, t1, h * STEP_AFTER_FAILURE, NOT_FINITE)
     elif work.fixed_step == 0.0 or not stale:
-        if not is_at_rounding(work.state_change, newton_limit(work), work):
+        if not is_at_rounding(work.state_change, work.newton_limit, work):
             record_failure(work, work.state_change, h, work.last_rejected != 0)
+        blame(work, h)
+        again = work.last_rejected
         reject(work, t1, h * shorter, STEP_FLOOR)
+        if work.status == RUNNING and lower_order(work, again) and work.regularisation != 0.0:
+            # off the constraints dependent rows hold the motion, and their multipliers are no start
+            work.first_stage_valid, work.h = 0, 0.0
+
+
+@compiled
+def reject_error(work: RadauState, t1: float, h: float, error: float) -> None:
+    """Shorten a step whose error is too large."""
+    record_failure(work, error, h, work.last_rejected != 0)
+    work.error_refusals += 1
+    factor = max(SHRINKAGE, safety_factor(work) / error ** (1.0 / (work.stages + 1)))
+    lower_order(work, work.last_rejected)
+    reject(work, t1, h * factor, STEP_FLOOR)
+    if work.has_last_step == 0:
+        work.h = min(work.h, 0.1 * h)
+    work.tangent_needed = max(work.tangent_needed, 1 - work.tangent_is_current)
+
+
+@compiled
+def blame(work: RadauState, h: float) -> None:
+    """Count a step whose stages were not found, and the component that changed most at the last."""
+    if work.factored_step != h:
+        work.singular_refusals += 1
+        return
+    work.iteration_refusals += 1
+    worst, largest = 0, -1.0
+    for i in range(work.stages):
+        for k in range(work.error_size):
+            scale = work.tolerance[ABSOLUTE, k] + work.rtol * abs(work.state[Y, k])
+            size = abs(work.R[i, k]) / scale
+            if size > largest:
+                worst, largest = k, size
+    work.blamed[worst] += 1.0
 
 
 @compiled
 def safety_factor(work: RadauState) -> float:
     """Safety factor of the next step: smaller where the iteration took long (HW IV.8)."""
-    most = 2.0 * MOST
+    most = 2.0 * most_iterations(work.stages)
     return min(SAFETY, SAFETY * (1.0 + most) / (work.last_iterations + most))
 
 
@@ -300,12 +334,13 @@ def accept(work: RadauState, t1: float, h: float, error: float) -> None:
     for k in range(state.shape[1]):
         state[OLD, k], state[Y, k] = state[Y, k], state[TRIAL, k]
         state[OLD_SLOPE, k], state[SLOPE, k] = state[SLOPE, k], state[TRIAL_SLOPE, k]
-        for i in range(3):
+        for i in range(work.stages):
             work.Z_old[i, k] = work.Z[i, k]
-    for i in range(3):
+    for i in range(work.stages):
         for r in range(2):
             for k in range(work.multipliers.shape[2]):
                 work.last_multipliers[i, r, k] = work.multipliers[i, r, k]
+    work.last_stages = work.stages
     work.step_count += 1
     work.tangent_is_current = 0
     good = work.convergence_rate <= GOOD_TANGENT
@@ -316,15 +351,18 @@ def accept(work: RadauState, t1: float, h: float, error: float) -> None:
     if not good:
         work.tangent_needed = 1
     work.t, work.accepted_step = t1, h
+    if work.fixed_step == 0.0:
+        raise_order(work)
     work.has_last_step, work.last_rejected = 1, 0
 
 
 @compiled
 def choose_next(work: RadauState, h: float, error: float, good: bool) -> None:
     """The next step, after an accepted one."""
-    divisor = error**0.25 / safety_factor(work)
-    if work.has_last_step != 0:
-        trend = (error * error / work.accepted_error) ** 0.25
+    exponent = 1.0 / (work.stages + 1)
+    divisor = error**exponent / safety_factor(work)
+    if work.has_last_step != 0 and work.steps_at_order > 0:
+        trend = (error * error / work.accepted_error) ** exponent
         divisor = max(divisor, work.accepted_step / h * trend / SAFETY)
     if work.last_iterations > 1:
         divisor = max(divisor, (work.convergence_rate / BEST_RATE) ** RATE_EXPONENT)

@@ -24,7 +24,7 @@ from dap3d_core.kernels.compiler.units import address_of
 
 VECTOR, MATRIX, TENSOR = Array(FLOAT, 1), Array(FLOAT, 2), Array(FLOAT, 3)
 INTEGERS, INTEGER_MATRIX = Array(INT, 1), Array(INT, 2)
-COMPLEX_VECTOR = Array(COMPLEX, 1)
+COMPLEX_VECTOR, COMPLEX_MATRIX = Array(COMPLEX, 1), Array(COMPLEX, 2)
 Number = TypeVar("Number", float, int)
 
 

@@ -66,6 +66,11 @@ def _fastest(evaluator: Evaluator, integration: Integration) -> str:
     scale = work.tolerance[at.ABSOLUTE, :size] + work.rtol * np.abs(y[:size])
     change = np.abs(rates[1] - rates[0])[:size] / scale
     worst = int(np.argmax(np.where(np.isfinite(change), change, np.inf)))
+    return component_words(evaluator, worst)
+
+
+def component_words(evaluator: Evaluator, component: int) -> str:
+    """Quantity and body of a component of the integrated state."""
     coordinates = evaluator.coordinates
-    name, body = WORDS[coordinates.quantities[worst]], int(coordinates.bodies[worst])
+    name, body = WORDS[coordinates.quantities[component]], int(coordinates.bodies[component])
     return f"the {name} of body {evaluator.model.body_names[body]}" if body >= 0 else f"a {name}"

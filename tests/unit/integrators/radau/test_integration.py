@@ -110,7 +110,7 @@ def test_tangent_is_that_of_all_equations(scene, h):
 
     nothing, none = np.zeros_like(change), np.zeros_like(multipliers)
     terms = [along(change, none), along(nothing, multipliers)]
-    s = run.work.method.poles[0] / h
+    s = run.work.method.poles[0, 0] / h
     left = np.concatenate([s * change, np.zeros(2 * rows)]) - terms[0] - terms[1]
     expected = np.concatenate([residual, of_rows.ravel()])
     size = max(np.max(np.abs(term)) for term in (s * change, *terms, expected))
@@ -121,9 +121,13 @@ def test_tangent_is_that_of_all_equations(scene, h):
 
 
 def test_tolerances_of_the_estimate_keep_their_ratio():
-    rtol, atol = estimate_tolerances(1e-6, 1e-8)
-    assert (rtol, atol / rtol) == pytest.approx((1e-5, 1e-2))
-    assert estimate_tolerances(0.0, 1e-6) == pytest.approx((0.0, 1e-5))
+    rtol, limit, atol = estimate_tolerances(1e-6, 1e-8, 3)
+    assert (rtol, atol / rtol, limit) == pytest.approx((1e-5, 1e-2, 1e-5**0.5))
+    assert estimate_tolerances(0.0, 1e-6, 3) == pytest.approx((0.0, 1e-5**0.5, 1e-5))
+    for stages in (5, 7):  # three times the tolerance; the iteration ends at the same change
+        more, less, _ = estimate_tolerances(1e-9, 1e-11, stages)
+        rtol, limit, _ = estimate_tolerances(1e-9, 1e-11, 3)
+        assert (more, less * more) == pytest.approx((3e-9, limit * rtol))
 
 
 def rows_of(run, budget):

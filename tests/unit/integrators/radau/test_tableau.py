@@ -1,22 +1,94 @@
-"""Coefficients of Radau IIA: order conditions, its transformation, its error estimate."""
+"""Coefficients of Radau IIA: order conditions, transformation, error estimate, dense output."""
+
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from dap3d_core.integrators.radau.tableau import radau_method
+from dap3d_core.integrators.radau.tableau import ABSCISSAE, STAGES, radau_method
 
 
-def test_coefficients_have_order_five():
-    """B(5) and C(3) of Radau IIA, b the last row of A; its transformation; HW II, IV.5."""
-    m = radau_method()
-    for q in range(1, 6):
-        assert m.A[2] @ m.c ** (q - 1) == pytest.approx(1.0 / q, abs=1e-15)
-    for q in range(1, 4):
-        assert m.A @ m.c ** (q - 1) == pytest.approx(m.c**q / q, abs=1e-15)
-    gamma, alpha, beta = m.poles
-    blocks = np.array([[gamma, 0, 0], [0, alpha, -beta], [0, beta, alpha]])
-    assert m.T_inverse @ m.inverse @ m.T == pytest.approx(blocks, abs=1e-13)
-    # the error estimate is zero for polynomials up to degree 3: gamma h f(0) + e Z, scaled
-    for q in range(1, 4):
+def of(k):
+    """The tables of a method, without what pads them."""
+    m, s = radau_method(), STAGES[k]
+    tables = {name: getattr(m, name)[k] for name in (*m.types, "c")}
+    for table in tables.values():
+        assert not table[s:].any()
+        assert not table[..., s:].any()
+    return s, {name: table[(slice(s),) * table.ndim] for name, table in tables.items()}
+
+
+def radau_polynomial(s):
+    """Coefficients, from the constant on, of d^(s-1)/dx^(s-1) [x^(s-1) (x - 1)^s]."""
+    p = [Fraction(1)]
+    for root in [0] * (s - 1) + [1] * s:
+        p = [a - root * b for a, b in zip([Fraction(0), *p], [*p, Fraction(0)], strict=True)]
+    for _ in range(s - 1):
+        p = [k * a for k, a in enumerate(p)][1:]
+    return p
+
+
+@pytest.mark.parametrize("k", range(3))
+def test_abscissae_are_roots_to_their_last_digits(k):
+    """Between the neighbours of each the polynomial changes its sign, in exact arithmetic."""
+    p = radau_polynomial(STAGES[k])
+
+    def value(x):
+        total = Fraction(0)
+        for a in reversed(p):
+            total = total * x + a
+        return total
+
+    assert value(Fraction(1)) == 0
+    for c in ABSCISSAE[k][:-1]:
+        below, above = (Fraction(float(np.nextafter(c, to))) for to in (0.0, 1.0))
+        assert value(below) * value(above) < 0
+
+
+@pytest.mark.parametrize("k", range(3))
+def test_coefficients_have_order_2s_minus_1(k):
+    """B(2 s - 1) and C(s), b the last row of A; A^-1 and its transformation; HW II, IV.5."""
+    s, m = of(k)
+    A, c = m["A"], m["c"]
+    for q in range(1, 2 * s):
+        assert A[-1] @ c ** (q - 1) == pytest.approx(1.0 / q, abs=4e-16)
+    for q in range(1, s + 1):
+        assert A @ c ** (q - 1) == pytest.approx(c**q / q, abs=1e-15)
+        # relative to entries of up to 40: A^-1 c^q = q c^(q-1)
+        assert m["inverse"] @ c**q == pytest.approx(q * c ** (q - 1), abs=2e-14)
+    poles = m["poles"]
+    blocks = np.zeros((s, s))
+    blocks[0, 0] = poles[0]
+    for p in range(1, s, 2):
+        alpha, beta = poles[p], poles[p + 1]
+        blocks[p : p + 2, p : p + 2] = [[alpha, -beta], [beta, alpha]]
+    # T has a condition of up to 1100, A^-1 entries of up to 40
+    assert m["T_inverse"] @ m["inverse"] @ m["T"] == pytest.approx(blocks, abs=2e-11)
+    assert poles[0] > 0.0
+    assert (poles[1::2] > 0.0).all()
+
+
+@pytest.mark.parametrize("k", range(3))
+def test_error_estimate_is_zero_for_polynomials(k):
+    """gamma h f(0) + e Z, scaled, up to degree s; of the next one it gives all that is off."""
+    s, m = of(k)
+    c, e = m["c"], m["e"]
+    for q in range(1, s + 1):
         f0 = 1.0 if q == 1 else 0.0
-        assert f0 + m.e @ m.c**q == pytest.approx(0.0, abs=1e-13)
+        assert f0 + e @ c**q == pytest.approx(0.0, abs=2e-13)
+    # rates x^s: the stages of a quadrature are off by a multiple of ``bulge``
+    z = m["A"] @ c**s
+    assert z + (e @ z) * m["bulge"] == pytest.approx(c ** (s + 1) / (s + 1), abs=1e-14)
+
+
+def test_published_weights():
+    """DD of Hairer's RADAU, of 5 and 7 stages, and of RADAU5."""
+    root = np.sqrt(6.0)
+    assert of(0)[1]["e"] == pytest.approx([-(13 + 7 * root) / 3, (-13 + 7 * root) / 3, -1 / 3])
+    assert of(1)[1]["e"] == pytest.approx(
+        [-27.78093394406463, 3.641478498049213, -1.252547721169118, 0.5920031671845429, -0.2]
+    )
+    assert of(2)[1]["e"] == pytest.approx(
+        [-54.37443689412861, 7.000024004259187, -2.355661091987557, 1.132289066106134,
+         -0.6468913267673587, 0.3875333853753524, -0.1428571428571429]
+    )  # fmt: skip
