@@ -17,7 +17,7 @@ from dap3d_core.kernels.runtime.cache import compiled
 #: new; a unit vector.
 A, B, W, V, WEIGHTS, UNIT = 0, 4, 8, 12, 13, 15
 #: Supports at most; parts of the distance, and of the sizes, that it is known to.
-ROUNDS, NEAR, ROUNDING = 60, 1e-13, 1e-15
+ROUNDS, NEAR, DISTANCE_ROUNDING = 60, 1e-13, 1e-15
 #: Distances, parts of the sizes, below which solids are taken smaller, and the parts taken.
 CLOSE = 1e-12
 FAR_APART, APART, INSIDE = 0, 1, 2
@@ -154,7 +154,7 @@ def nearest(
         along = dot(w, n)
         if along > most + radii:
             return FAR_APART, count
-        if count and length - along <= NEAR * length + ROUNDING * math.sqrt(reach):
+        if count and length - along <= NEAR * length + DISTANCE_ROUNDING * math.sqrt(reach):
             return APART, count
         for c in range(count):
             same = True
