@@ -18,15 +18,13 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection(session):
-    """As for threads of BLAS, no core is left for a second process that optimises code.
-
-    Slow tests need that code; quick ones have ended before it is there.
-    """
+    """Quick tests have ended before optimised code is there: none is made beside them, as for
+    threads of BLAS, and none is asked for, which is hundreds of files fifty times a second."""
     gc.disable()  # nothing that is imported or collected is garbage
     if "not slow" in session.config.option.markexpr:
         from dap3d_core.kernels.compiler import background
 
-        background.core_count = lambda: 1
+        background.optimiser.add = lambda unit: None
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -48,3 +46,19 @@ def pytest_collection_finish():
     """Thousands of tests are no garbage: each collection would go through them again."""
     gc.freeze()
     gc.enable()
+
+
+@pytest.fixture(scope="session")
+def cache_of_libraries(tmp_path_factory):
+    """A folder for unoptimised objects: those of users are optimised."""
+    return tmp_path_factory.mktemp("libraries")
+
+
+@pytest.fixture
+def quick_libraries(monkeypatch, cache_of_libraries):
+    """Export unoptimised code, which has the same bits and is made in a hundredth of the time."""
+    from dap3d_core.kernels.compiler.objects import UNOPTIMISED
+    from dap3d_core.native import build
+
+    monkeypatch.setattr(build, "OPTIMISED", UNOPTIMISED)
+    monkeypatch.setattr(build, "cache_folder", lambda: cache_of_libraries)

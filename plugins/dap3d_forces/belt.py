@@ -19,11 +19,11 @@ from dap3d_core.kernels import (
     by_body,
     cross,
     maximum,
-    neg,
     scale,
+    sub,
     where,
 )
-from dap3d_joints.belt import runs, signed_radii, speed
+from dap3d_joints.belt import runs, signed_radii, speeds
 
 interface_version = 1
 
@@ -68,40 +68,37 @@ class Belt(Force):
 
     def wrench(r_points, s_points, v_points, w_points, on_points, body_count, rho, axis_i, k, c,
                pretension, x):  # fmt: skip
-        parts, on = [], []
-        for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i):
-            rate = speed(e, arm_a, arm_b, v_points, w_points, a, b)
-            F = scale(maximum(pretension + k * x[a] + c * rate, 0.0), e)
-            parts.append((F, cross(add(s_points[a], arm_a), F)))
-            parts.append((neg(F), neg(cross(add(s_points[b], arm_b), F))))
-            on += [on_points[a], on_points[b]]
-        return by_body(on, parts, body_count)
+        spans = runs(r_points, rho, axis_i)
+        T = [maximum(p, 0.0) for p in pulls(spans, v_points, w_points, rho, k, c, pretension, x)]
+        along = [scale(T_k, span[2]) for T_k, span in zip(T, spans, strict=True)]
+        about = [scale(T_k, span[4]) for T_k, span in zip(T, spans, strict=True)]
+        parts = []
+        for b, s in enumerate(s_points):  # the span that begins on the pulley, less that which ends
+            F = sub(along[b], along[b - 1])
+            parts.append((F, add(cross(s, F), scale(rho[b], sub(about[b], about[b - 1])))))
+        return by_body(on_points, parts, body_count)
 
     def tension(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x):
+        spans = runs(r_points, rho, axis_i)
         return tuple(
             maximum(pull, 0.0)
-            for pull in pulls(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x)
+            for pull in pulls(spans, v_points, w_points, rho, k, c, pretension, x)
         )
 
     def energy(k, pretension, x):
         return sum(stored(k, pretension, x_k) for x_k in x)
 
     def rate(r_points, v_points, w_points, rho, axis_i):
-        return (tuple(
-            speed(e, arm_a, arm_b, v_points, w_points, a, b)
-            for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i)
-        ),)  # fmt: skip
+        return (speeds(runs(r_points, rho, axis_i), v_points, w_points, rho),)
 
     def switch(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x):
-        return pulls(r_points, v_points, w_points, rho, axis_i, k, c, pretension, x)
+        return pulls(runs(r_points, rho, axis_i), v_points, w_points, rho, k, c, pretension, x)
 
 
-def pulls(r, v, w, rho, axis, k, c, pretension, x):
+def pulls(spans, v, w, rho, k, c, pretension, x):
     """The tension of each span, N; negative where it is slack."""
-    return tuple(
-        pretension + k * x[a] + c * speed(e, arm_a, arm_b, v, w, a, b)
-        for a, b, e, arm_a, arm_b in runs(r, rho, axis)
-    )
+    rates = speeds(spans, v, w, rho)
+    return tuple(pretension + k * x_k + c * rate for x_k, rate in zip(x, rates, strict=True))
 
 
 def stored(k, pretension, x):

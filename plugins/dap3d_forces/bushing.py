@@ -1,9 +1,9 @@
 """Bushing: an elastic joint, stiff and damped in all six directions."""
 
 from dap3d_core.interface import Force, Point, hookimpl, point, square
-from dap3d_core.kernels import abs as magnitude
 from dap3d_core.kernels import (
     add,
+    atan2,
     conjugate,
     cross,
     dot,
@@ -60,20 +60,21 @@ class Bushing(Force):
         }  # fmt: skip
 
     def wrench(
-        r_P_i, r_P_j, v_P_i, v_P_j, s_P_i, s_P_j, A_i, p_i, p_j, w_i, w_j,
+        r_P_i, r_P_j, v_P_j, v_i, s_P_i, s_P_j, A_i, p_i, p_j, w_i, w_j,
         home, K_t, K_tr, K_r, C_t, C_tr, C_r,
     ):  # fmt: skip
         d, to_i = sub(r_P_j, r_P_i), transpose(A_i)
-        x, q = rotate(to_i, d), turned(p_i, p_j, home)
-        phi = rotation_vector(q)
-        x_dot = rotate(to_i, sub(sub(v_P_j, v_P_i), cross(w_i, d)))
+        x, arm = rotate(to_i, d), add(s_P_i, d)
+        e, f, h = turning(turned(p_i, p_j, home))
+        x_dot = rotate(to_i, sub(v_P_j, add(v_i, cross(w_i, arm))))
         w = rotate(to_i, sub(w_j, w_i))
-        mu = add(rotate(transpose(K_tr), x), rotate(K_r, phi))
-        F = add(rotate(K_t, x), rotate(K_tr, phi))
+        mu = add(rotate(transpose(K_tr), x), scale(f, rotate(K_r, e)))
+        F = add(rotate(K_t, x), scale(f, rotate(K_tr, e)))
         F = rotate(A_i, add(F, add(rotate(C_t, x_dot), rotate(C_tr, w))))
         damping = add(rotate(transpose(C_tr), x_dot), rotate(C_r, w))
-        M = rotate(A_i, add(gradient(q, phi, mu), damping))
-        return (F, add(M, cross(add(s_P_i, d), F))), (neg(F), neg(add(M, cross(s_P_j, F))))
+        bent = cross(e, add(scale(0.5 * f, mu), scale(h, cross(e, mu))))
+        M = rotate(A_i, add(add(mu, damping), bent))
+        return (F, add(M, cross(arm, F))), (neg(F), neg(add(M, cross(s_P_j, F))))
 
     def energy(r_P_i, r_P_j, A_i, p_i, p_j, home, K_t, K_tr, K_r):
         x, phi = rotate(transpose(A_i), sub(r_P_j, r_P_i)), turn(p_i, p_j, home)
@@ -102,17 +103,21 @@ def turned(p_i, p_j, home):
     return quaternion_product(quaternion_product(conjugate(p_i), p_j), conjugate(home))
 
 
-def gradient(q, phi, mu):
-    """G mu: the moment whose power is mu . phi_dot; q are the Euler parameters of phi."""
-    square = norm2(phi)
-    small = square < 1e-2
-    sine = norm2((q[1], q[2], q[3]))  # of half the angle, squared
-    cot = magnitude(q[0]) / sqrt(where(small, 1.0, sine))
-    series = 1.0 / 12.0 + square * (1.0 / 720.0 + square * (1.0 / 30240.0 + square / 1209600.0))
+def turning(q):
+    """E, f, h of Euler parameters q, with e the sine of a along the axis.
+
+    phi = f e, and G mu = mu + f e x mu / 2 + h e x (e x mu).
+    """
+    e = (q[1], q[2], q[3])
+    square, sense = norm2(e), where(q[0] < 0.0, -1.0, 1.0)
+    small = square < 1e-4  # where what is left of the series is below 1e-17
     squared = where(small, 1.0, square)
-    exact = (1.0 - 0.5 * sqrt(squared) * cot) / squared
-    across = cross(phi, mu)
-    return add(add(mu, scale(0.5, across)), scale(where(small, series, exact), cross(phi, across)))
+    sine, inverse = sqrt(squared), 1.0 / squared
+    half = atan2(sine, sense * q[0])
+    f = sense * (2.0 + square * (1.0 / 3.0 + square * (3.0 / 20.0 + square * (5.0 / 56.0))))
+    h = 1.0 / 3.0 + square * (2.0 / 15.0 + square * (8.0 / 105.0 + square * (16.0 / 315.0)))
+    exact = half * (2.0 * sense * sine * inverse)
+    return e, where(small, f, exact), where(small, h, (1.0 - 0.5 * q[0] * exact) * inverse)
 
 
 @hookimpl

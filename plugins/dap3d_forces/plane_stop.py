@@ -1,6 +1,19 @@
 """Stop of a ball, or a point, at a plane."""
 
-from dap3d_core.interface import Force, Point, Vector, choice, hookimpl, number, point, vector
+from collections.abc import Mapping
+from typing import ClassVar
+
+from dap3d_core.interface import (
+    Contact,
+    Force,
+    Point,
+    Vector,
+    choice,
+    hookimpl,
+    number,
+    point,
+    vector,
+)
 from dap3d_core.kernels import cross, dot, neg, scale, sub, where
 from dap3d_forces.rebound import carried, rebound, reduced, stored
 
@@ -14,12 +27,14 @@ class PlaneStop(Force):
     along a_j makes g_dot of it -e g_dot, the joints of the bodies held (docs/how-to/jumps.md);
     slower contact is carried by a spring and damper, of stiffness k and of the damping ratio
     zeta, that pushes and does not pull. zeta is that of the mass ``m_c`` on the spring, by default
-    of the two bodies alone. Without ``rebound`` all contact is carried.
+    of the two bodies alone. Without ``rebound`` all contact is carried. Without k the stop is
+    rigid, a contact without friction (docs/concepts/contact.md): what rests at it stays there.
     """
 
     keyword = "plane_stop"
     synonyms = ("contact", "floor", "bumper")
     symbol = "plate"
+    example: ClassVar[Mapping[str, str]] = {"k": "1e5"}
     unilateral = (0,)
     restitution = "e"
     P_i: Point = point(doc="centre of the ball")
@@ -27,7 +42,9 @@ class PlaneStop(Force):
     a_j: Vector = vector(default="ground.z", doc="normal of the plane, to the side of the ball")
     radius: float = number(default=0.0, unit="m", minimum=0.0, doc="of the ball")
     e: float = number(default=0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution")
-    k: float = number(unit="N/m", positive=True, doc="stiffness of contact at rest")
+    k: float = number(
+        None, unit="N/m", positive=True, doc="stiffness of contact at rest; rigid without it"
+    )
     zeta: float = number(default=1.0, minimum=0.0, doc="damping ratio of contact at rest")
     v_rest: float = number(
         default=1e-3, unit="m/s", minimum=0.0, doc="speed below which contact does not rebound"
@@ -57,6 +74,25 @@ class PlaneStop(Force):
 
     def energy(r_P_i, r_P_j, a_j, radius, k):
         return stored(dot(a_j, sub(r_P_i, r_P_j)) - radius, k)
+
+
+class RigidPlaneStop(Contact, of=PlaneStop, k=False):
+    """The plane carries, without a stiffness."""
+
+    keyword, symbol, is_smooth = "plane_stop", "plate", True
+    P_i: Point = point(doc="centre of the ball")
+    P_j: Point = point(default="ground.O", doc="a point of the plane")
+    a_j: Vector = vector(default="ground.z", doc="normal of the plane, to the side of the ball")
+    radius: float = number(default=0.0, unit="m", minimum=0.0, doc="of the ball")
+
+    def gap(r_P_i, r_P_j, a_j, radius):
+        return dot(a_j, sub(r_P_i, r_P_j)) - radius
+
+    def at(r_P_i, a_j, radius):
+        return sub(r_P_i, scale(radius, a_j))
+
+    def normal(a_j):
+        return a_j
 
 
 class SoftPlaneStop(PlaneStop, rebound=False):

@@ -1,7 +1,11 @@
 """Stop of the angle between two bodies."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from dap3d_core.interface import (
     Body,
+    Contact,
     Force,
     Vector,
     angle,
@@ -31,11 +35,13 @@ class RotationStop(Force):
     along u makes g_dot of it -e g_dot, the joints of the bodies held (docs/how-to/jumps.md); slower
     contact is carried by a spring and damper, of stiffness k and of the damping ratio zeta, that
     pushes and does not pull. zeta is that of the inertia ``J_c``, by default of the two bodies
-    alone. Without ``rebound`` all contact is carried.
+    alone. Without ``rebound`` all contact is carried. Without k the stop is rigid, a contact
+    without friction (docs/concepts/contact.md).
     """
 
     keyword = "rot_stop"
     symbol = "ring"
+    example: ClassVar[Mapping[str, str]] = {"k": "1e4"}
     unilateral = (0,)
     restitution = "e"
     energy_where = "where the bodies turn about the common axis"
@@ -49,7 +55,9 @@ class RotationStop(Force):
     theta_stop: float = number(unit="rad", doc="least or greatest angle")
     side: str = choice(("min", "max"), default="min", doc="whether it is the least or the greatest")
     e: float = number(default=0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution")
-    k: float = number(unit="N m/rad", positive=True, doc="stiffness of contact at rest")
+    k: float = number(
+        None, unit="N m/rad", positive=True, doc="stiffness of contact at rest; rigid without it"
+    )
     zeta: float = number(default=1.0, minimum=0.0, doc="damping ratio of contact at rest")
     w_rest: float = number(
         default=1e-3, unit="rad/s", minimum=0.0, doc="speed below which contact does not rebound"
@@ -80,6 +88,30 @@ class RotationStop(Force):
 
     def energy(theta, theta_stop, way, k):
         return stored(way * (theta - theta_stop), k)
+
+
+class RigidRotationStop(Contact, of=RotationStop, k=False):
+    """The stop carries, without a stiffness."""
+
+    keyword, symbol, is_smooth = "rot_stop", "ring", True
+    joint: str = joint_fields("body_i", "body_j", axis="a_j", doc="the hinge that it stops")
+    body_i: Body = body(default=None, doc="body i; that of v_i")
+    body_j: Body = body(default=None, doc="body j; that of v_j")
+    v_i: Vector = vector(None, across="axis", doc="direction it is measured from, on body i")
+    v_j: Vector = vector(None, across="axis", doc="direction it is measured to, on body j")
+    axis: Vector = vector(doc="common axis, on either body")
+    theta: float = angle("v_i", "v_j", "axis")
+    theta_stop: float = number(unit="rad", doc="least or greatest angle")
+    side: str = choice(("min", "max"), default="min", doc="whether it is the least or the greatest")
+
+    def prepare(self, bodies):
+        return {"sense": 1.0 if self.side == "min" else -1.0} | marks(self, bodies)
+
+    def gap(theta, theta_stop, sense):
+        return sense * (theta - theta_stop)
+
+    def normal(axis, sense):
+        return scale(-sense, axis)
 
 
 class SoftRotationStop(RotationStop, rebound=False):

@@ -2,7 +2,7 @@
 
 from dap3d_core.interface import Function, choice, hookimpl, table
 from dap3d_core.kernels import lookup
-from dap3d_functions.points import increasing, wrapped
+from dap3d_functions.points import increasing, pieces, wrapped
 
 interface_version = 1
 
@@ -96,34 +96,6 @@ def powers(c, u):
     """A cubic of coefficients c_0 to c_3 and its first two derivatives."""
     f = c[0] + u * (c[1] + u * (c[2] + u * c[3]))
     return f, c[1] + u * (2.0 * c[2] + u * 3.0 * c[3]), 2.0 * c[2] + u * 6.0 * c[3]
-
-
-def pieces(x, values, *, periodic):
-    """Pieces of cubic splines of x through columns of values, without a period with straight ends.
-
-    Args:
-        x: (n,) places, increasing.
-        values: (n, ...), the first again as the last where they are periodic.
-
-    Returns:
-        (k,) where the pieces begin, and (4, k, ...) their coefficients, of powers 0 to 3.
-    """
-    import numpy as np
-    from scipy.interpolate import CubicSpline
-
-    if periodic:
-        return x[:-1], CubicSpline(x, values, bc_type="periodic").c[::-1]
-    c = CubicSpline(x, values, bc_type="natural").c[::-1]
-    a, b = c[:2]
-    last = x[-1] - x[-2]
-    slope = b[-1] + last * (2.0 * c[2, -1] + last * 3.0 * c[3, -1])
-    straight = np.zeros((4, 2, *values.shape[1:]))  # before and behind
-    straight[0] = a[0] - b[0] * last, values[-1]
-    straight[1] = b[0], slope
-    return (
-        np.array([x[0] - last, *x]),
-        np.concatenate([straight[:, :1], c, straight[:, 1:]], axis=1),
-    )
 
 
 def points_of(grid):

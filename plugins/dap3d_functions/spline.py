@@ -2,7 +2,7 @@
 
 from dap3d_core.interface import Function, choice, hookimpl, table
 from dap3d_core.kernels import lookup
-from dap3d_functions.points import increasing, wrapped
+from dap3d_functions.points import increasing, pieces, wrapped
 
 interface_version = 1
 
@@ -34,16 +34,8 @@ class Spline(Function):
     pieces: tuple = table(columns=5, given=False)
 
     def prepare(self, bodies):
-        import numpy as np
-        from scipy.interpolate import CubicSpline
-
-        x, y = points_of(self.x, self.y)
-        d, c, b, a = CubicSpline(x, y, bc_type="natural").c
-        inner = np.stack([x[:-1], a, b, c, d], axis=1)
-        last = x[-1] - x[-2]
-        slope = b[-1] + last * (2.0 * c[-1] + last * 3.0 * d[-1])
-        before, after = (x[0] - last, y[0] - b[0] * last, b[0]), (x[-1], y[-1], slope)
-        return {"pieces": [[*before, 0.0, 0.0], *inner.tolist(), [*after, 0.0, 0.0]]}
+        starts, c = pieces(*points_of(self.x, self.y), periodic=False)
+        return {"pieces": [list(piece) for piece in zip(starts, *c, strict=True)]}
 
     def breaks(self):
         """Both ends, and where a straight line begins to bend or ends it: a bump between them."""
@@ -71,15 +63,13 @@ class Periodic(Spline, periodic=True):
     """
 
     def prepare(self, bodies):
-        from scipy.interpolate import CubicSpline
-
         x, y = points_of(self.x, self.y)
         period = x[-1] - x[0]
         slope = (y[-1] - y[0]) / period
         rest = y - slope * (x - x[0])
         rest[-1] = rest[0]  # but for rounding
-        d, c, b, a = CubicSpline(x, rest, bc_type="periodic").c
-        return {"pieces": [list(piece) for piece in zip(x[:-1], a, b, c, d, strict=True)],
+        starts, c = pieces(x, rest, periodic=True)
+        return {"pieces": [list(piece) for piece in zip(starts, *c, strict=True)],
                 "first": x[0], "period": period, "slope": slope}  # fmt: skip
 
     def breaks(self):

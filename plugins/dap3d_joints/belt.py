@@ -63,16 +63,14 @@ class Belt(Joint):
         return {"rho": signed_radii(self, bodies)}
 
     def C_dot(r_points, v_points, w_points, rho, axis_i, n):
-        return tuple(
-            -speed(e, arm_a, arm_b, v_points, w_points, a, b)
-            for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i)[: n - 1]
-        )
+        spans = runs(r_points, rho, axis_i)[: n - 1]
+        return tuple(-rate for rate in speeds(spans, v_points, w_points, rho))
 
     def J(r_points, s_points, on_points, body_count, rho, axis_i, n):
         rows = []
-        for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i)[: n - 1]:
-            of_a = row(e, cross(add(s_points[a], arm_a), e))
-            of_b = row(neg(e), neg(cross(add(s_points[b], arm_b), e)))
+        for a, b, e, _, moment in runs(r_points, rho, axis_i)[: n - 1]:
+            of_a = row(e, add(cross(s_points[a], e), scale(rho[a], moment)))
+            of_b = row(neg(e), neg(add(cross(s_points[b], e), scale(rho[b], moment))))
             rows.append(by_body((on_points[a], on_points[b]), ((of_a,), (of_b,)), body_count))
         return tuple(tuple(of_row[body][0] for of_row in rows) for body in range(body_count))
 
@@ -80,18 +78,16 @@ class Belt(Joint):
         r_points, v_points, s_points_dot, w_points, rho, axis_i, axis_i_dot, n,
     ):  # fmt: skip
         found = []
-        for a, b, e, arm_a, arm_b in runs(r_points, rho, axis_i)[: n - 1]:
+        for a, b, e, m, _ in runs(r_points, rho, axis_i)[: n - 1]:
             d, d_dot = sub(r_points[b], r_points[a]), sub(v_points[b], v_points[a])
-            n_dot = contact_rate(d, d_dot, axis_i, axis_i_dot, rho[a] - rho[b])
-            q = sub(add(d, arm_b), arm_a)
-            q_dot = add(d_dot, scale(rho[b] - rho[a], n_dot))
+            less = rho[b] - rho[a]
+            m_dot = contact_rate(d, d_dot, axis_i, axis_i_dot, -less)
+            q, q_dot = add(d, scale(less, m)), add(d_dot, scale(less, m_dot))
             e_dot = scale(1.0 / sqrt(norm2(q)), sub(q_dot, scale(dot(e, q_dot), e)))
-            v = sub(
-                add(v_points[b], cross(w_points[b], arm_b)),
-                add(v_points[a], cross(w_points[a], arm_a)),
-            )
-            on_a = cross(w_points[a], add(s_points_dot[a], scale(rho[a], n_dot)))
-            on_b = cross(w_points[b], add(s_points_dot[b], scale(rho[b], n_dot)))
+            w_a, w_b = scale(rho[a], w_points[a]), scale(rho[b], w_points[b])
+            v = add(d_dot, cross(sub(w_b, w_a), m))
+            on_a = cross(w_points[a], add(s_points_dot[a], scale(rho[a], m_dot)))
+            on_b = cross(w_points[b], add(s_points_dot[b], scale(rho[b], m_dot)))
             found.append(dot(e_dot, v) + dot(e, sub(on_b, on_a)))
         return tuple(found)
 
@@ -125,20 +121,24 @@ def across(d, axis):
 
 
 def runs(r, rho, axis):
-    """Of each span: its pulleys, its direction, the arms from their centres to where it ends."""
-    spans = []
-    for a in range(len(r)):
-        b = (a + 1) % len(r)
-        d = across(sub(r[b], r[a]), axis)
-        l = sqrt(norm2(d))
-        u = scale(1.0 / l, d)
-        m = cross(axis, u)
-        s = (rho[a] - rho[b]) / l
-        z = sqrt(1.0 - s * s)
-        n = sub(scale(s, u), scale(z, m))
-        arm_a, arm_b = scale(rho[a], n), scale(rho[b], n)
-        e = sub(add(r[b], arm_b), add(r[a], arm_a))
-        spans.append((a, b, scale(1.0 / sqrt(norm2(e)), e), arm_a, arm_b))
+    """Of each span: its pulleys, its direction e, n towards where it touches them, and n x e."""
+    spans, count = [], len(r)
+    for a in range(count):
+        b = (a + 1) % count
+        if count > 2 or a == 0:
+            d, difference = sub(r[b], r[a]), rho[a] - rho[b]
+            along = dot(d, axis)
+            flat = sub(d, scale(along, axis))
+            square, less = norm2(flat), difference * difference
+            free = square - less
+            part, length = 1.0 / square, 1.0 / sqrt(free + along * along)
+            out = scale(part * difference, flat)
+            side = scale(part * sqrt(free), cross(axis, flat))
+        else:  # the way back between two pulleys
+            d, difference, side = neg(d), -difference, neg(side)
+        n = sub(out, side)
+        e = scale(length, sub(d, scale(difference, n)))
+        spans.append((a, b, e, n, cross(n, e)))
     return spans
 
 
@@ -160,10 +160,13 @@ def contact_rate(d, d_dot, axis, axis_dot, difference):
     return sub(turned, sub(scale(z, m_dot), scale(s * s_dot / z, m)))
 
 
-def speed(e, arm_a, arm_b, v, w, a, b):
-    """The rate at which a span becomes longer, m/s."""
-    v_a, v_b = add(v[a], cross(w[a], arm_a)), add(v[b], cross(w[b], arm_b))
-    return dot(e, sub(v_b, v_a))
+def speeds(spans, v, w, rho):
+    """The rates at which spans become longer, m/s."""
+    turning = [scale(rho_k, w_k) for rho_k, w_k in zip(rho, w, strict=True)]
+    return tuple(
+        dot(e, sub(v[b], v[a])) + dot(moment, sub(turning[b], turning[a]))
+        for a, b, e, _, moment in spans
+    )
 
 
 @hookimpl

@@ -37,6 +37,8 @@ interface_version = 1
 MOST_TEETH = 1000
 #: Radii may miss the distance of the axes, and axes be askew, by this part.
 MISFIT = 1e-6
+#: 20 deg, in rad.
+PRESSURE_ANGLE = 0.3490658503988659
 
 
 class Gear(Joint):
@@ -60,9 +62,17 @@ class Gear(Joint):
     radius a length of one's choice: the larger end's, as the tooth force is the torque over it.
 
     Radii follow from the numbers of teeth and the distance of the axes, or are given in their
-    place. The radial force of a pressure angle always presses the wheels apart, whichever flank is
-    in touch; a multiplier has both signs, so it is no part of the row. The force
-    ``gear_separation`` adds it; the force ``gear``, an elastic mesh, has it.
+    place. The row has the part of the tooth force along the tangent, its multiplier lambda. With a
+    ``pressure_angle`` it lies at that angle: besides, a force presses the wheels apart, whichever
+    flank is in touch, which the bearings carry and the reaction of the joint contains:
+
+        |lambda| tan(pressure_angle) / cos(helix)
+
+    away from wheel j on wheel i, with a ring away from the teeth in touch; of bevel gears normal to
+    the line in which the pitch cones touch, which loads the bearings along the axes, too. Where
+    joints hold the axes it moves nothing. Beside contacts it is left out. Axes held by springs move
+    apart by it, and then have play: take the force ``gear``, an elastic mesh. 0 is the force along
+    the tangent alone, and costs less.
 
     phi_i changes at the rate -k_i . g_dot + e_i . w_i, with k_i = a_i x g / |a_i x g|^2 and
     e_i = g x k_i, which give J and gamma (turning.py).
@@ -71,6 +81,7 @@ class Gear(Joint):
     keyword, rows = "gear", 1
     synonyms = ("gears", "gearpair", "spur", "bevel", "spur-gear", "bevel-gear")
     symbol = "link"
+    brings = ("pressure_angle", "gear_separation", "mesh")
     example: ClassVar[Mapping[str, str]] = {
         "P_i": '"crank.O"',
         "P_j": '"rod.O"',
@@ -89,31 +100,14 @@ class Gear(Joint):
     teeth_j: float = number(default=None, minimum=1.0, whole=True, doc="teeth of wheel j")
     radius_i: float = number(default=None, unit="m", positive=True, doc="pitch radius of wheel i")
     radius_j: float = number(default=None, unit="m", positive=True, doc="pitch radius of wheel j")
+    pressure_angle: float = number(PRESSURE_ANGLE, unit="rad", minimum=0.0, maximum=1.0,
+                                   doc="of the teeth, 20 deg by default")  # fmt: skip
     helix: float = number(0.0, unit="rad", usual=(-0.8, 0.8), doc="helix angle of wheel i")
     internal: bool = choice((False, True), False, doc="one wheel is a ring with teeth inside")
     bevel: bool = choice((False, True), False, doc="the axes meet")
 
     def prepare(self, bodies):
-        i, j = bodies["i"], bodies["j"]
-        a, b = i.to_global(self.a_i), j.to_global(self.a_j)
-        g = sub(j.place(self.P_j), i.place(self.P_i))
-        sizes = sizes_of(self, length(across(g, a)))
-        if self.bevel:
-            if length(g) > MISFIT * sizes["radius_i"]:
-                warn(
-                    "P_i and P_j are apart; of bevel gears both are the point where the axes meet",
-                    stacklevel=2,
-                )
-            if self.helix:
-                warn("helix is not used by bevel gears", stacklevel=2)
-            sizes |= marks(a, b, i, "i") | marks(b, a, j, "j")
-            return sizes | {"x_0": 0.0, "lever": 1.0 / length(cross(a, b))}
-        if length(cross(a, b)) > MISFIT:
-            warn("a_i and a_j are not parallel; where the axes meet write bevel = true, and name "
-                 "the point where they do", stacklevel=2)  # fmt: skip
-        sizes["sense"] *= 1.0 if dot(a, b) > 0.0 else -1.0
-        sizes |= marks(a, g, i, "i") | marks(b, g, j, "j")
-        return sizes | {"x_0": dot(a, g), "lever": 0.0}
+        return meshing(self, bodies)
 
     def C(
         r_P_i, r_P_j, a_i, u_i, m_i, u_j, m_j, teeth_i, teeth_j, radius_i, sense, helix, x_0
@@ -190,6 +184,60 @@ class BevelGear(Gear, bevel=True):
         )
         apex = dot(t_dot, g_dot) + dot(t, bend) + dot(n_i, w_i) + dot(n_j, w_j)
         return lever * apex - dot(e_dot, sub(w_i, w_j))
+
+
+def meshing(gear, bodies):
+    """Constants of a pair of wheels: sizes, marks, x_0, and of bevel gears the lever.
+
+    The lever times a_i x a_j is the tangent in the pitch point.
+    """
+    i, j = bodies["i"], bodies["j"]
+    a, b = i.to_global(gear.a_i), j.to_global(gear.a_j)
+    g = sub(j.place(gear.P_j), i.place(gear.P_i))
+    sizes = sizes_of(gear, length(across(g, a)))
+    if gear.bevel:
+        if length(g) > MISFIT * sizes["radius_i"]:
+            warn(
+                "P_i and P_j are apart; of bevel gears both are the point where the axes meet",
+                stacklevel=2,
+            )
+        if gear.helix:
+            warn("helix is not used by bevel gears", stacklevel=2)
+        lever = pitch_of(a, b, sizes["radius_i"], sizes["radius_j"], sizes["sense"])["lever"]
+        return sizes | marks(a, b, i, "i") | marks(b, a, j, "j") | {"x_0": 0.0, "lever": lever}
+    if length(cross(a, b)) > MISFIT:
+        warn("a_i and a_j are not parallel; where the axes meet write bevel = true, and name "
+             "the point where they do", stacklevel=2)  # fmt: skip
+    sizes["sense"] *= 1.0 if dot(a, b) > 0.0 else -1.0
+    sizes |= marks(a, g, i, "i") | marks(b, g, j, "j")
+    return sizes | {"x_0": dot(a, g), "lever": 0.0}
+
+
+def pitch_of(a, b, r_i, r_j, side):
+    """Of bevel gears with axes a, b that meet: what tooth forces need, by parts of a_i and a_j.
+
+    The lever; ``at``, where the pitch cones touch, from the point where the axes meet; ``apart``,
+    the unit vector across that line by which a tooth force presses wheel i away from wheel j.
+
+    Args:
+        a, b: unit vectors along the axes, towards the wheels.
+        r_i, r_j: pitch radii.
+        side: 1, or -1 where one wheel is a ring.
+
+    Raises:
+        ValueError: the axes are parallel.
+    """
+    c, s = dot(a, b), length(cross(a, b))
+    if not s > MISFIT:
+        raise ValueError("the axes of bevel gears meet, and these are parallel: bevel = false")
+    lever = (side if r_j + side * r_i > 0.0 else -side) / s
+    cone = sqrt(r_i * r_i + r_j * r_j + 2.0 * side * r_i * r_j * c)
+    across_it = side * lever / cone
+    return {
+        "lever": lever,
+        "at": (lever * side * r_j, lever * r_i),
+        "apart": (across_it * (side * r_j * c + r_i), -across_it * (side * r_j + r_i * c)),
+    }
 
 
 def turn_of(a_i, a_j, r_i, r_j):

@@ -8,6 +8,7 @@ from dap3d_core.interface import (
     Joint,
     Point,
     Vector,
+    angle,
     body,
     choice,
     hookimpl,
@@ -36,13 +37,15 @@ class Motor(Joint):
         nu = speed
 
     C of an angle is brought into (-pi, pi]; of a speed there is no C, the row is one of the
-    velocity level alone. A ``position`` is a number or the name of a function of time, a ``speed``
-    also that of an input, held between settings, where velocities jump. A position is not an input,
-    which steps: bodies would have to jump.
+    velocity level alone. Both are a number, or the name of a function of time or of an input, held
+    between settings. Where a speed is set velocities jump. Where a position is set bodies do not:
+    the motor takes them there as a servo does, without an error that stays, critically damped by
+    the time constant ``lag``; its ``pace`` is a state:
 
-    The multiplier is the moment or force of the motor on body i, of any size. One with a largest
-    moment is the force ``motor``, which takes a speed or a position with a ``limit``, and a
-    position that is an input.
+        nu = pace,  pace_dot = (position - q) / lag^2 - 2 pace / lag
+
+    q then counts turns. The multiplier is the moment or force of the motor on body i, of any size.
+    One with a largest moment is the force ``motor``, with a ``limit``.
     """
 
     keyword, rows = "motor", 1
@@ -60,7 +63,10 @@ class Motor(Joint):
     a_j: Vector = vector(doc="axis, on body j")
     coordinate: str = choice(("angle", "length"), None, doc="the joint's when left out, else angle")
     position: float = number(
-        default=None, unit="rad or m", by_name=("function",), doc="of body i, from where it is"
+        default=None,
+        unit="rad or m",
+        by_name=("function", "input"),
+        doc="of body i, from where it is",
     )
     speed: float = number(
         default=None,
@@ -68,6 +74,9 @@ class Motor(Joint):
         by_name=("function", "input"),
         instead_of=("position",),
         doc="rate of the coordinate",
+    )
+    lag: float = number(
+        0.05, unit="s", positive=True, doc="time constant of a position that is an input"
     )
 
     def prepare(self, bodies):
@@ -91,6 +100,50 @@ class Motor(Joint):
 
     def gamma(a_j, u_i, a_j_dot, u_i_dot, w_i, w_j, position_ddot):
         return position_ddot - dot(turning_rate(a_j, u_i, a_j_dot, u_i_dot), sub(w_i, w_j))
+
+
+class MovedTo(Motor, position="input", coordinate="length"):
+    """It moves along its axis to a place that is set."""
+
+    holonomic = False
+    C = None
+    states = ("pace",)
+
+    def J(a_j, s_P_i, r_P_i, r_j):
+        return offset_rows(a_j, s_P_i, r_P_i, r_j)
+
+    def nu(pace):
+        return pace
+
+    def gamma(
+        a_j, a_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j, x_0, position,
+        lag, pace,
+    ):  # fmt: skip
+        d, d_dot = sub(r_P_i, r_P_j), sub(v_P_i, v_P_j)
+        bend = offset_gamma(a_j, a_j_dot, d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j)
+        return quickening(position + x_0 - dot(a_j, d), pace, lag) + bend
+
+    def rate(a_j, r_P_i, r_P_j, x_0, position, lag, pace):
+        return quickening(position + x_0 - dot(a_j, sub(r_P_i, r_P_j)), pace, lag)
+
+
+class TurnedTo(Motor, position="input"):
+    """It turns to an angle that is set."""
+
+    holonomic = False
+    C = None
+    states = ("pace",)
+    theta: float = angle("n_j", "u_i", "a_j")
+
+    def nu(pace):
+        return pace
+
+    def gamma(a_j, u_i, a_j_dot, u_i_dot, w_i, w_j, theta, position, lag, pace):
+        bend = dot(turning_rate(a_j, u_i, a_j_dot, u_i_dot), sub(w_i, w_j))
+        return quickening(position - theta, pace, lag) - bend
+
+    def rate(theta, position, lag, pace):
+        return quickening(position - theta, pace, lag)
 
 
 class Moved(Motor, speed=False, coordinate="length"):
@@ -136,6 +189,11 @@ class TurningAt(Motor, speed=True):
 
     def gamma(a_j, u_i, a_j_dot, u_i_dot, w_i, w_j, speed_dot):
         return speed_dot - dot(turning_rate(a_j, u_i, a_j_dot, u_i_dot), sub(w_i, w_j))
+
+
+def quickening(error, pace, lag):
+    """The rate of the pace of a servo, critically damped."""
+    return (error / lag - 2.0 * pace) / lag
 
 
 @hookimpl

@@ -39,7 +39,7 @@ class Revolute(Joint):
 
     keyword, rows = "rev", 5
     synonyms = ("revolute", "hinge", "pin")
-    coordinate = "angle"
+    coordinate, limit = "angle", "joint_limit"
     symbol = "hinge"
     P_i: Point = point(doc="point on the axis, on body i")
     P_j: Point = point(doc="point on the axis, on body j")

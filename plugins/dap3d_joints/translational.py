@@ -46,7 +46,7 @@ class Translational(Joint):
 
     keyword, rows = "tran", 5
     synonyms = ("translational", "prismatic", "slider", "slide")
-    coordinate = "length"
+    coordinate, limit = "length", "joint_limit"
     symbol = "slider"
     a_j: Vector = vector(doc="direction of sliding, on body j")
     d: Vector2 = vector2(doc="from a point of the axis on body i to one on body j")

@@ -132,9 +132,9 @@ def test_force(case):
 def test_separation_of_gears():
     """A force on the reaction of a joint has its derivatives by poses."""
     gear = REGISTRY.get("joint", "gear")
-    values = {"bevel": False, "internal": False, "helix": 0.2}
+    values = {"bevel": False, "internal": False, "helix": 0.2, "pressure_angle": 0.0}
     scene = scene_for(gear, np.random.default_rng(0), values=values)
-    fields = {name: scene.joints["element"].fields[name] for name in ("P_i", "P_j", "a_i")}
+    fields = {name: scene.joints["element"].fields[name] for name in ("P_i", "P_j", "a_i", "a_j")}
     scene.add_force("gear_separation", "flanks", mesh="element", helix=0.2, **fields)
     compare(scene)
 

@@ -67,18 +67,28 @@ def alone():
 def another_worker(client, **variables):
     """One more worker, with other variables of the environment; its address."""
     there = set(client.nthreads())
-    command = [sys.executable, "-m", "distributed.cli.dask_worker", client.scheduler.address]
-    options = ["--no-dashboard", "--no-nanny", "--nthreads", "1"]
-    process = subprocess.Popen(
-        [*command, *options], env=os.environ | variables, stderr=subprocess.DEVNULL
-    )
-    try:
+    with worker_of(client.scheduler.address, **variables):
         client.wait_for_workers(len(there) + 1, timeout=60)
         yield (set(client.nthreads()) - there).pop()
+    wait_until(lambda: set(client.nthreads()) <= there)
+
+
+@contextmanager
+def worker_of(address, **variables):
+    """A worker of a scheduler; in the end it is killed.
+
+    As clusters lose workers; SIGTERM waits for a loop that may be busy.
+    """
+    command = [sys.executable, "-m", "distributed.cli.dask_worker", address]
+    process = subprocess.Popen(
+        [*command, "--no-dashboard", "--no-nanny", "--nthreads", "1"],
+        env=os.environ | variables, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        yield
     finally:
-        process.kill()  # as clusters lose workers; SIGTERM waits for a loop that may be busy
-        process.wait()
-        wait_until(lambda: set(client.nthreads()) <= there)
+        process.kill()
+        process.wait(30)
 
 
 def wait_until(condition, seconds=30.0):
@@ -252,13 +262,18 @@ def test_where_all_workers_are_lost_others_are_waited_for():
 
 
 def test_points_that_kill_their_workers_are_named():
-    """Dask gives up after some workers; the message says which points and where to look."""
+    """Dask gives up after some workers, here one; the message says which points, where to look."""
+    import dask
 
     def deadly(result):
         os.kill(os.getpid(), signal.SIGKILL)
 
     words = "a task of 1 points, from index 4 on, has ended each worker that ran it"
-    with two_workers() as client, pytest.raises(ClusterError, match=words):
+    with (
+        dask.config.set({"distributed.scheduler.allowed-failures": 0}),
+        two_workers() as client,
+        pytest.raises(ClusterError, match=words),
+    ):
         collected(run_on(client, bob({"none": deadly}), POINTS, np.array([4])))
 
 
@@ -452,13 +467,13 @@ def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):
         with connect(address) as client:
             with pytest.raises(ClusterError, match=f"has no workers.*dask worker {address}"):
                 run_on(client, bob(), POINTS, PLACES)
-            with another_worker_of(address):
+            with worker_of(address):
                 client.wait_for_workers(1, timeout=60)
                 found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
                 next(found)
             with pytest.raises(ClusterError, match=f"{address} has lost all its workers"):
                 collected(found)
-            with another_worker_of(address):
+            with worker_of(address):
                 client.wait_for_workers(1, timeout=60)
                 found = run_on(client, bob(), POINTS, np.arange(200), chunk=1)
                 next(found)
@@ -466,19 +481,6 @@ def test_workers_and_schedulers_that_are_gone(tmp_path, monkeypatch):
                 process.kill()
                 with pytest.raises(ClusterError, match=f"the scheduler at {address} is gone"):
                     collected(found)
-    finally:
-        process.kill()
-        process.wait(30)
-
-
-@contextmanager
-def another_worker_of(address):
-    command = [sys.executable, "-m", "distributed.cli.dask_worker", address]
-    process = subprocess.Popen(
-        [*command, "--no-dashboard", "--no-nanny", "--nthreads", "1"], stderr=subprocess.DEVNULL
-    )
-    try:
-        yield
     finally:
         process.kill()
         process.wait(30)

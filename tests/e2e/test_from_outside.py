@@ -27,7 +27,8 @@ def environment_of_a_user(folder):
     The wheel of dap3d has ready-made objects for this machine, where there are such.
     """
     there = Outside(folder)
-    build(REPOSITORY, there.wheels, **({"DAP3D_READY_OBJECTS": TARGET} if TARGET else {}))
+    ready_made = {"DAP3D_READY_OBJECTS": TARGET, "DAP3D_READY_LEVEL": "0"} if TARGET else {}
+    build(REPOSITORY, there.wheels, **ready_made)
     build(REPOSITORY / "plugins" / "dap3d-example", there.wheels)
     there.install(*there.wheels.iterdir())
     # a user writes one more

@@ -42,13 +42,19 @@ def steps(text, programs=("dap3d",)):
             yield Step("python", block, line)
 
 
-def follow(page: Path, folder: Path):
+def follow(page: Path, folder: Path, changes=()):
     """Do what a page says, in a folder; returns the steps that were done.
+
+    Args:
+        changes: pairs of words of the page and what is taken for them.
 
     Raises:
         AssertionError: a command fails; says which, on which line.
     """
     text = page.read_text(encoding="utf-8")
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
     names = {"__name__": "__main__"}
     done = list(steps(text))
     before = Path.cwd()

@@ -6,6 +6,7 @@ and compares each call in all bits. For a process of its own: it switches the co
 """
 
 import importlib
+import inspect
 import os
 import pkgutil
 import sys
@@ -140,11 +141,16 @@ def arrays_in(value):
             yield from arrays_in(member)
 
 
+def is_code(value):
+    """True for a function, and a module of functions."""
+    return inspect.ismodule(value) or (callable(value) and not isinstance(value, Arrays))
+
+
 def compiled_type(value, parameter):
     """The type of a recorded argument."""
     if isinstance(value, PlainTable):
         return Table(value.signature)
-    if callable(value) and not isinstance(value, Arrays):
+    if is_code(value):
         return Known(value)
     if isinstance(value, tuple) and all(map(callable, value)):
         return Tuple(tuple(map(Known, value)))
@@ -337,7 +343,7 @@ def kind(value):
     """What tells arguments apart that need another compilation."""
     if isinstance(value, PlainTable):
         return value.signature
-    if callable(value) and not isinstance(value, Arrays):
+    if is_code(value):
         return value
     if isinstance(value, tuple):
         return tuple(map(kind, value))

@@ -1,4 +1,7 @@
-"""All shipped models as C libraries: with every integrator the bits of runs in Python."""
+"""All shipped models as C libraries: with every integrator the bits of runs in Python.
+
+The long verification has optimised code; so have slow tests of unit/native.
+"""
 
 import shutil
 
@@ -24,7 +27,9 @@ PAIRS = [
 
 
 @pytest.mark.parametrize(("model", "integrator"), PAIRS)
-def test_a_shipped_model_has_the_bits_of_simulate(tmp_path, model, integrator):
+def test_a_shipped_model_has_the_bits_of_simulate(tmp_path, request, model, integrator):
+    if not request.node.get_closest_marker("long"):
+        request.getfixturevalue("quick_libraries")
     scene = dap.load(model)
     t_end = min(1.0, float(scene.simulation.t_end or 1.0))
     step = 1e-3 if integrator == "rk4" else None

@@ -38,7 +38,8 @@ def test_a_hinge_stops_after_the_angle_of_constant_friction():
     """At t = I w / n, after I w^2 / (2 n), and pi^2 / 12 I w_tol^2 / n of creep more."""
     inertia, spin, n, w_tol = 0.3, 2.0, 0.4, 1e-3
     scene = hinge(inertia, spin)
-    scene.add_force("rot_friction", "rub", body_i="wheel", body_j="ground", axis="wheel.z", n_c=n)
+    scene.add_force("rot_friction", "rub", body_i="wheel", body_j="ground", axis="wheel.z", n_c=n,
+                    w_tol=w_tol)  # fmt: skip
     result = dap.simulate(scene, t_end=3.0, dt=0.25, integrator="radau", **TIGHT)
     expected = np.maximum(spin - n / inertia * result.t, 0.0)  # it stops at 1.5 s
     far = np.abs(result.t - 1.5) > 0.1
@@ -61,7 +62,8 @@ def test_a_block_on_a_slope_creeps_where_it_should_stick():
                          (np.sin(slope), 0, np.cos(slope))))  # fmt: skip
     scene.add_force("weight", "g", gravity=9.81, wgt=(0.0, 0.0, -1.0))
     load = 2.0 * 9.81 * np.sin(slope)
-    scene.add_force("tran_friction", "rub", P_i="block.O", a_j="down", f_c=load / 0.43)
+    scene.add_force("tran_friction", "rub", P_i="block.O", a_j="down", f_c=load / 0.43,
+                    v_tol=1e-3)  # fmt: skip
     result = dap.simulate(scene, t_end=1.0, dt=0.5, integrator="radau", rtol=1e-10, atol=1e-13)
     creep = 1e-3 * np.arctanh(0.43)
     speed = np.linalg.norm(result.r[2, 0] - result.r[1, 0]) / 0.5

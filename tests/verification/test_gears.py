@@ -56,8 +56,8 @@ def load(result, joint):
 def test_an_idler_bears_twice_the_tooth_force(method):
     """3 N m on a wheel of 0.1 m, and on the last one so that nothing moves: 2 T / r."""
     scene = wheels(a=(0.0, 0.0), idler=(0.3, 0.0), c=(0.6, 0.0))
-    pair(scene, "a", "idler", "ab", teeth_i=20, teeth_j=40)
-    pair(scene, "idler", "c", "bc", radius_i=0.2, radius_j=0.1)
+    pair(scene, "a", "idler", "ab", teeth_i=20, teeth_j=40, pressure_angle=0.0)
+    pair(scene, "idler", "c", "bc", radius_i=0.2, radius_j=0.1, pressure_angle=0.0)
     torque(scene, "a", 3.0)
     torque(scene, "c", -3.0)
     result = dap.simulate(scene, t_end=0.1, dt=0.1, method=method)
@@ -101,17 +101,23 @@ def test_the_pin_of_a_planet_carries_both_tooth_forces():
     assert abs(load(result, "hinge_planet")[1]) == pytest.approx(2.0 * 0.3 / 0.02, rel=1e-6)
 
 
-def test_bevel_gears_turn_by_the_ratio_and_bear_the_tooth_force():
-    """A wheel about x drives one about z, 15 to 30 teeth, 0.05 to 0.1 m; T / r on the bearings."""
+def bevel(kind="joint", **fields):
+    """A wheel about x drives one about z: 15 and 30 teeth, 0.05 and 0.1 m."""
     scene = dap.Scene(name="bevel")
     for name, axis, r in (("a", "x", (0.1, 0.0, 0.0)), ("b", "z", (0.0, 0.0, 0.05))):
         scene.add_body(name, mass=1.0, Jp=(J, J, J), r=r)
         hinge(scene, name, "ground", r, axis)
         scene.add_point(f"apex_{name}", name, [-x for x in r])
-    scene.add_joint("gear", "mesh", P_i="apex_a", P_j="apex_b", a_i="a.x", a_j="b.z", teeth_i=15,
-                    teeth_j=30, radius_i=0.05, radius_j=0.1, bevel=True)  # fmt: skip
+    add = scene.add_joint if kind == "joint" else scene.add_force
+    add("gear", "mesh", P_i="apex_a", P_j="apex_b", a_i="a.x", a_j="b.z", teeth_i=15, teeth_j=30,
+        radius_i=0.05, radius_j=0.1, bevel=True, **fields)  # fmt: skip
     torque(scene, "a", 2.0, axis=0)
-    result = dap.simulate(scene, t_end=2.0, dt=0.02, **TIGHT)
+    return scene
+
+
+def test_bevel_gears_turn_by_the_ratio_and_bear_the_tooth_force():
+    """The driven wheel is accelerated by the tooth force; T / r on the bearings."""
+    result = dap.simulate(bevel(pressure_angle=0.0), t_end=2.0, dt=0.02, **TIGHT)
     faster, slower = turned(result, "a", 0), turned(result, "b")
     assert slower == pytest.approx(-faster / 2.0, rel=1e-9)
     assert faster == pytest.approx(2.0 * 2.0 / (J + J / 4.0), rel=1e-8)
@@ -124,6 +130,24 @@ def test_bevel_gears_turn_by_the_ratio_and_bear_the_tooth_force():
     assert moment == pytest.approx(np.cross([0.1, 0.0, 0.0], force), abs=1e-9)
 
 
+@pytest.mark.parametrize("kind", ["joint", "force"])
+def test_teeth_of_bevel_gears_press_out_of_the_cone(kind):
+    """F tan(20 deg) normal to the cone of atan(0.05 / 0.1): Shigley, radial and axial forces."""
+    scene = bevel(kind, **({} if kind == "joint" else {"k": 1e5, "c": 100.0}))
+    torque(scene, "b", 4.0)
+    result = dap.simulate(scene, t_end=1.0, dt=1.0, **TIGHT)
+    apart, cone = 40.0 * math.tan(math.radians(20.0)), math.atan(0.5)
+    wanted = [-apart * math.sin(cone), -40.0, apart * math.cos(cone)]
+    assert load(result, "hinge_a") == pytest.approx(wanted, abs=1e-7)
+    assert load(result, "hinge_b") == pytest.approx([-x for x in wanted], abs=1e-7)
+    action = (result.reaction("mesh") if kind == "joint" else result.force("mesh").on)["i"]
+    arm = np.array([0.0, 0.0, 0.05])  # from the mass centre to where the cones touch
+    assert action.moment[-1] == pytest.approx(np.cross(arm, action.force[-1]), abs=1e-7)
+    if kind == "force":  # the wheels give way by F / k along the tangent
+        a, b = (result.coordinates(f"hinge_{w}").q[-1, 0] for w in "ab")
+        assert 0.05 * a + 0.1 * b == pytest.approx(40.0 / 1e5, rel=1e-6)
+
+
 @pytest.mark.parametrize("method", ["standard", "lsq", "joint"])
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_a_pressure_angle_presses_rigid_wheels_apart(method, sign):
@@ -131,8 +155,6 @@ def test_a_pressure_angle_presses_rigid_wheels_apart(method, sign):
     for helix in (0.0, 0.4):
         scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
         pair(scene, "a", "b", teeth_i=20, teeth_j=40, helix=helix)
-        scene.add_force("gear_separation", "flanks", mesh="mesh", joint_i="hinge_a",
-                        joint_j="hinge_b", pressure_angle="20 deg", helix=helix)  # fmt: skip
         torque(scene, "a", 3.0 * sign)
         torque(scene, "b", 6.0 * sign)
         result = dap.simulate(scene, t_end=0.1, dt=0.1, method=method)
@@ -140,16 +162,14 @@ def test_a_pressure_angle_presses_rigid_wheels_apart(method, sign):
         for wheel, side in (("a", 1.0), ("b", -1.0)):  # what the hinges do to the wheels
             x, y, _ = load(result, f"hinge_{wheel}")
             assert (x, y) == pytest.approx((side * apart, side * sign * 30.0), abs=1e-9)
-        moment = result.force("flanks").on["j"].moment[-1]
-        assert moment == pytest.approx([0.0, 0.0, 0.0], abs=1e-12)
+        x, y, _ = load(result, "mesh")
+        assert (x, y) == pytest.approx((-apart, -sign * 30.0), abs=1e-9)
 
 
 def test_a_pressure_angle_presses_a_wheel_in_a_ring_inwards():
     """A wheel of 0.1 m in a ring of 0.3 m, held by a torque of 2 N m: 20 N tan(25 deg)."""
     scene = wheels(a=(0.2, 0.0), ring=(0.0, 0.0))
-    pair(scene, "a", "ring", teeth_i=20, teeth_j=60, internal=True)
-    scene.add_force("gear_separation", "flanks", mesh="mesh", joint_i="hinge_a",
-                    joint_j="hinge_ring", pressure_angle="25 deg", internal=True)  # fmt: skip
+    pair(scene, "a", "ring", teeth_i=20, teeth_j=60, internal=True, pressure_angle="25 deg")
     torque(scene, "a", 2.0)
     torque(scene, "ring", -6.0)
     result = dap.simulate(scene, t_end=0.1, dt=0.1)
@@ -157,10 +177,84 @@ def test_a_pressure_angle_presses_a_wheel_in_a_ring_inwards():
     assert (x, abs(y)) == pytest.approx((20.0 * math.tan(math.radians(25.0)), 20.0), abs=1e-9)
 
 
+def held():
+    """Two wheels, one of them held by a spring, the other under 3 N m."""
+    scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
+    pair(scene, "a", "b", teeth_i=20, teeth_j=40)
+    scene.add_force("rot_sda", "spring", joint="hinge_b", k=1e3, c=10.0)
+    torque(scene, "a", 3.0)
+    return scene
+
+
+def test_statics_and_inverse_dynamics_know_the_pressure_angle():
+    """30 N and 30 N tan(20 deg) on the hinge: at rest, and where a driver holds the wheels."""
+    wanted = [30.0 * math.tan(math.radians(20.0)), 30.0]
+    rest = dap.equilibrium(held())
+    x, y, _ = rest.reaction("hinge_a")["i"].force
+    assert (x, abs(y)) == pytest.approx(wanted, abs=1e-6)
+    scene = held()
+    del scene.forces["spring"]
+    scene.add_joint("motor", "drive", joint="hinge_b", position=0.0)
+    run = dap.simulate(scene, t_end=0.1, dt=0.1)
+    for result in (run, dap.inverse(scene, run)):
+        x, y, _ = load(result, "hinge_a")
+        assert (x, abs(y)) == pytest.approx(wanted, abs=1e-9)
+    assert result.quantity("drive.actuation").values == pytest.approx([6.0, 6.0])
+
+
+def test_wheels_on_springs_are_refused_by_statics():
+    """The pressure angle would move them apart; the elastic mesh knows how."""
+    scene = held()
+    del scene.joints["hinge_b"], scene.forces["spring"]
+    scene.add_force("bushing", "spring", P_i="b.O", P_j="at_b", k=[1e5] * 6)
+    mesh = scene.joints["mesh"].fields
+    del mesh["joint_j"]
+    mesh |= {"P_j": "b.O", "a_j": "b.z"}
+    with pytest.raises(dap.SimulationError, match=r"mesh\.pressure_angle .* press apart"):
+        dap.equilibrium(scene)
+
+
+def test_redundant_planets_share_their_load_evenly():
+    """Four planets, three rows too many: Willis for a held ring, no load of the sun's bearing."""
+    scene = wheels(sun=(0.0, 0.0), carrier=(0.0, 0.0))
+    for k in range(4):
+        at, planet = (
+            (0.06 * math.cos(k * math.pi / 2.0), 0.06 * math.sin(k * math.pi / 2.0)),
+            f"p{k}",
+        )
+        scene.add_body(planet, mass=0.4, Jp=(3e-4, 3e-4, 5e-4), r=(*at, 0.0))
+        hinge(scene, planet, "carrier", (*at, 0.0))
+        pair(scene, "sun", planet, f"inner{k}", teeth_i=20, teeth_j=40)
+        scene.add_joint("gear", f"outer{k}", joint_i=f"hinge_{planet}", P_j="ground.O",
+                        a_j="ground.z", teeth_i=40, teeth_j=100, internal=True)  # fmt: skip
+    torque(scene, "sun", 0.3)
+    result = dap.simulate(scene, t_end=0.5, dt=0.5, **TIGHT)
+    assert turned(result, "carrier") == pytest.approx(turned(result, "sun") / 6.0, rel=1e-9)
+    assert load(result, "hinge_sun") == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+    sizes = [np.linalg.norm(load(result, f"hinge_p{k}")) for k in range(4)]
+    assert sizes == pytest.approx([sizes[0]] * 4, rel=1e-9)
+
+
+def test_a_pressure_angle_is_varied_and_left_out_beside_contacts():
+    """30 N tan of it at each point of a sweep; a note where contacts leave it out."""
+    scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
+    pair(scene, "a", "b", teeth_i=20, teeth_j=40)
+    torque(scene, "a", 3.0)
+    torque(scene, "b", 6.0)
+    angles = [0.0, 0.2, 0.4]
+    found = dap.sweep(scene, {"joints.mesh.pressure_angle": angles},
+                      outputs="hinge_a.i.force.x", t_end=0.1, dt=0.1)  # fmt: skip
+    wanted = 30.0 * np.tan(angles)
+    assert found["hinge_a.i.force.x"].values == pytest.approx(wanted, abs=1e-9)
+    scene.add_shape("sphere", "tip", body="a", radius=0.01, collides=True)
+    notes = dap.compile(scene).notes
+    assert any("joints.mesh.pressure_angle is left out beside contacts" in note for note in notes)
+
+
 def test_helical_teeth_push_along_the_axis():
     """By tan(helix) of the tangential force, on both wheels."""
     scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
-    pair(scene, "a", "b", teeth_i=20, teeth_j=40, helix=0.4)
+    pair(scene, "a", "b", teeth_i=20, teeth_j=40, helix=0.4, pressure_angle=0.0)
     torque(scene, "a", 3.0)
     torque(scene, "b", 6.0)
     result = dap.simulate(scene, t_end=0.1, dt=0.1)

@@ -73,6 +73,25 @@ def test_a_position_is_sought(way, kind, name, inertia):
     np.testing.assert_allclose(coordinate(result, name)[0], place + rate * t - error, atol=1e-7)
 
 
+@pytest.mark.parametrize(("kind", "name"), [("rev", "angle"), ("tran", "length")])
+def test_a_position_that_is_set_is_reached_whatever_it_takes(kind, name):
+    """e = e_0 (1 + t / lag) exp(-t / lag) after each setting, over turns, under any load."""
+    scene, lag = machine(kind), 0.1
+    scene.inputs["signal"].value = 9.0
+    scene.add_joint("motor", "motor", joint="guide", position="signal", lag=lag)
+    load = scene.add_force
+    load("n", "load", body_i="part", n=(0.0, 0.0, 5.0)) if kind == "rev" else load(
+        "f", "load", body_i="part", f=(5.0, 5.0, 5.0))  # fmt: skip
+    back = dap.Controller(every=2.0, update=lambda t, state: {"signal": 9.0 if t < 1.0 else 2.0})
+    result = dap.simulate(scene, t_end=4.0, dt=0.25, rtol=1e-9, atol=1e-11, controllers=[back])
+    t = result.t
+    fading = [(1.0 + s / lag) * np.exp(-s / lag) for s in (t, np.maximum(t - 2.0, 0.0))]
+    left = 9.0 * fading[0][8] * fading[1]  # and its rate, below the tolerance after 20 lag
+    expected = np.where(t < 2.0, 9.0 * (1.0 - fading[0]), 2.0 + 7.0 * fading[1] - left)
+    np.testing.assert_allclose(coordinate(result, name)[0], expected, atol=1e-6)
+    assert result.ledger["energy"].ok
+
+
 def test_a_position_is_sought_within_a_limit():
     """Far from it the motor gives its limit: q = limit t^2 / (2 I) while k (position - q) is more;
     then about it, sqrt(k / I), from where it is."""
@@ -247,7 +266,6 @@ def test_kinematics_over_the_coordinate_of_a_motor():
     ("table", "fields", "words"),
     [
         ("joint", {}, "give position or speed; a motor of a given torque is a force motor"),
-        ("joint", {"position": "signal"}, "is an input, which steps from value to value"),
         ("joint", {"position": 1.0, "speed": 1.0}, "give position or speed, not both"),
         ("joint", {"speed": "rampe"}, "no function or input 'rampe'.*'ramp'"),
         ("joint", {"speed": "12"}, "no function or input '12'.*write 12 without quotes"),

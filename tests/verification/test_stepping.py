@@ -86,6 +86,54 @@ def test_a_ball_that_slides_then_rolls_has_the_second_order(declared):
     assert took == pytest.approx(2.0 * v0**2 / 7.0, rel=2e-6)  # what is lost; six digits are told
 
 
+def on_slab(shape, Jp, angle, mu, **fields):
+    """A shape of 2 kg, whose centre is 0.1 m above the face of a slanted box of ground."""
+    scene, n = dap.Scene(name="slab"), np.array([np.sin(angle), 0.0, np.cos(angle)])
+    p = [np.cos(0.5 * angle), 0.0, np.sin(0.5 * angle), 0.0]
+    scene.add_body("body", mass=2.0, Jp=Jp, r=0.1 * n, p=p)
+    scene.add_shape(shape, body="body", collides=True, **fields)
+    scene.add_shape("box", body="ground", size=[40, 4, 1], at=-0.5 * n, p=p, collides=True)
+    scene.add_material("surface", mu=mu)
+    scene.add_collisions(material="surface")
+    scene.add_force("weight", "gravity")
+    return scene, np.array([np.cos(angle), 0.0, -np.sin(angle)])
+
+
+def test_a_cylinder_rolls_down_a_box():
+    """Along its side, without slip: two thirds of g sin a."""
+    scene, down = on_slab("cylinder", [0.03, 0.01, 0.03], 0.3, 0.5,
+                          radius=0.1, length=0.4, axis=[0, 1, 0])  # fmt: skip
+    result = dap.simulate(scene, t_end=0.3, dt=0.3, contact_step=5e-3)
+    assert down @ result.rd[-1, 0] == pytest.approx(2 / 3 * G * np.sin(0.3) * 0.3, rel=1e-13)
+    assert len(result.contacts) == 2  # the ends of the line along which it touches
+
+
+def test_a_cylinder_that_stands_on_a_slanted_box_stays():
+    scene, _ = on_slab("cylinder", [0.03, 0.03, 0.04], 0.3, 0.5, radius=0.2, length=0.2)
+    result = dap.simulate(scene, t_end=0.5, dt=0.5, contact_step=5e-3)
+    assert np.abs(result.r - result.r[0]).max() < 1e-14
+
+
+def test_a_ball_rolls_over_the_seams_of_a_height_field():
+    """5/7 g sin a, as on a plane, less what seams cost, which are edges: of the order of h."""
+    scene, slope = dap.Scene(name="field"), 0.3
+    down = np.array([np.cos(slope), 0.0, -np.sin(slope)])
+    scene.add_body(
+        "ball", mass=2.0, Jp=[0.008] * 3, r=[0.1 * np.sin(slope), 0, 0.1 * np.cos(slope)]
+    )
+    scene.add_shape("sphere", body="ball", radius=0.1, collides=True)
+    heights = [[-np.tan(slope) * x] * 9 for x in np.linspace(-1.0, 1.0, 21)]
+    scene.add_shape("height_field", "land", body="ground", heights=heights, size=[2.0, 0.83],
+                    collides=True)  # fmt: skip
+    scene.add_material("surface", mu=0.5)
+    scene.add_collisions(material="surface")
+    scene.add_force("weight", "gravity")
+    h = 2e-3
+    result = dap.simulate(scene, t_end=0.5, dt=0.25, contact_step=h)
+    assert down @ result.rd[-1, 0] == pytest.approx(5 / 7 * G * np.sin(slope) * 0.5, rel=h)
+    assert {result.contacts.names[k] for k in result.contacts.pair.ravel()} == {"sphere1", "land"}
+
+
 def test_forces_and_modes_of_declared_contacts_are_those_of_the_step():
     """The ball of before slides for 2 v0 / (7 mu G), then rolls without friction."""
     scene, mu = dap.Scene(name="declared"), 0.3

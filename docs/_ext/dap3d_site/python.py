@@ -28,8 +28,9 @@ SECTIONS = {
     "Results": (
         ("Result", "open", "plot", "view", "animate", "export"),
         ("result.Reaction", "result.Energy", "result.Entry", "result.ErrorEstimate",
-         "result.EventRecord", "result.Note", "result.Quantity",
-         "result.post.joint_coordinates.JointCoordinates", "result.RunStatistics", "plot.Film"),
+         "result.EventRecord", "result.contact_table.ContactTable", "result.Note",
+         "result.Quantity", "result.post.joint_coordinates.JointCoordinates",
+         "result.RunStatistics", "plot.Film"),
     ),
     "Studies": (
         ("sweep", "open_sweep", "fit", "Fit", "Parameter", "sensitivities", "Sensitivities",

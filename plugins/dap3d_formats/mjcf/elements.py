@@ -149,3 +149,14 @@ MJCF: Table = {
     "sensor": noted("", "sensors"),
     "keyframe": noted("", "poses; --position gives the start"),
 }  # fmt: skip
+
+#: Where shapes are to meet each other.
+CONTACTS: Table = {
+    **MJCF,
+    "geom": dict(MJCF["geom"]) | taken("contype conaffinity friction")
+    | translated("condim", "of 1 smooth, else friction along the surface alone")
+    | moves("priority solmix solref solimp margin gap", "contacts are rigid"),
+    "contact": taken(),
+    "exclude": taken() | taken("name body1 body2"),
+    "pair": moves("", "pairs of geoms of their own"),
+}  # fmt: skip

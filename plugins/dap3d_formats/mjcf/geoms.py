@@ -7,6 +7,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.formats import (
+    Contact,
     FormatError,
     Frame,
     Geometry,
@@ -68,13 +69,26 @@ class Geoms:
         color = color or self.colors.get(geom.get("material") or "", "")
         hidden = geom.number("group", 0.0) >= HIDDEN
         common: dict[str, Any] = {"color": color, "collision": hidden, "place": geom.place}
+        common["contact"] = self._contact(geom)
         if kind == "mesh":
             return self._mesh_shape(geom, frame, common)
+        if kind == "plane" and common["contact"] is not None:
+            return Geometry(kind, pose=frame @ self.document.frame(geom), **common)
         if kind in FLAT:
-            self.document.source.remarks.leave_out(geom.place, f"a geom {kind} is not drawn")
+            meets = common["contact"] is not None
+            text = f"a geom {kind} is not drawn{', and meets no others' if meets else ''}"
+            self.document.source.remarks.leave_out(geom.place, text, motion=meets)
             return None
         size, pose = self.solid(geom, kind)
         return Geometry(kind, size, frame @ pose, **common)
+
+    def _contact(self, geom: XmlElement) -> Contact | None:
+        """How a geom meets others; None where contacts are not asked for, or it meets none."""
+        bits = [int(geom.number(name, 1.0)) for name in ("contype", "conaffinity")]
+        if not self.document.source.contacts or not any(bits):
+            return None
+        friction = geom.numbers("friction", None, (1.0,))
+        return Contact(friction[0], geom.number("condim", 3.0) < 3.0, *bits)
 
     def _mesh_shape(self, geom: XmlElement, frame: Frame, common: Any) -> Geometry | None:
         asset = self._asset(geom)

@@ -15,12 +15,13 @@ class MjcfImporter(Importer):
         from dap3d_formats.mjcf.actuators import read_actuators
         from dap3d_formats.mjcf.constraints import read_equalities
         from dap3d_formats.mjcf.document import Document
-        from dap3d_formats.mjcf.elements import MJCF
+        from dap3d_formats.mjcf.elements import CONTACTS, MJCF
         from dap3d_formats.mjcf.reader import MjcfReader
         from dap3d_formats.mjcf.replicate import expand_replicas
 
         document = Document.of(source)
-        note_elements(document.root, MJCF, source.remarks)
+        table = CONTACTS if source.contacts else MJCF
+        note_elements(document.root, table, source.remarks)
         expand_replicas(document)
         reader = MjcfReader(document)
         reader.read_bodies()

@@ -78,6 +78,13 @@ class MjcfReader:
             raise FormatError("holds no <body>", document.root.place)
         for world in document.root.all("worldbody"):
             self._world_shapes(world)
+        for contact in document.root.all("contact"):
+            for pair in contact.all("exclude"):
+                ends = pair.require("body1"), pair.require("body2")
+                for name in ends:
+                    if name not in model.links and document.source.contacts:
+                        raise FormatError(f"there is no body {name}", pair.place)
+                model.excluded.append(ends)
 
     def _world_shapes(self, world: XmlElement) -> None:
         """The geoms of the world, as a link that is fixed to it."""

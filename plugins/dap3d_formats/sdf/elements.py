@@ -91,3 +91,9 @@ SDF: Table = {
     "density": noted("", "give mass and inertia"), "auto_inertia_params": noted("", "not read"),
     "fluid_added_mass": moves("", "added mass of a fluid"),
 }  # fmt: skip
+
+#: Where shapes are to meet each other.
+CONTACTS: Table = {
+    **SDF,
+    "surface": moves("", "but mu of ode: contacts are rigid"), "plane": taken(), "normal": taken(),
+}  # fmt: skip

@@ -6,6 +6,7 @@ from typing import Any
 from dap3d_core.interface.formats import (
     WORLD,
     Articulation,
+    Contact,
     FormatError,
     Frame,
     Geometry,
@@ -18,7 +19,8 @@ from dap3d_core.interface.formats import (
     rpy,
 )
 from dap3d_formats.element_table import note_elements
-from dap3d_formats.sdf.elements import SDF
+from dap3d_formats.mjcf.document import along
+from dap3d_formats.sdf.elements import CONTACTS, SDF
 from dap3d_formats.sdf.frames import FrameGraph
 
 
@@ -36,7 +38,7 @@ class SdfReader:
 
     def read_links(self) -> None:
         """Read links and frames; joints are gathered in ``elements``."""
-        note_elements(self.root, SDF, self.remarks)
+        note_elements(self.root, CONTACTS if self.source.contacts else SDF, self.remarks)
         self.frames.add(WORLD, "", Frame(), self.root.place)
         world = self.root.first("world")
         holder = self.root if world is None else world
@@ -83,7 +85,7 @@ class SdfReader:
             raise FormatError("<include> has no <uri>; it is required", element.place)
         file = name if name.endswith((".sdf", ".world")) else f"{name.rstrip('/')}/model.sdf"
         root = self.source.include(file, element.place)
-        note_elements(root, SDF, self.remarks)
+        note_elements(root, CONTACTS if self.source.contacts else SDF, self.remarks)
         inner = root.first("model")
         if inner is None:
             raise FormatError(f"{name} holds no <model>", element.place)
@@ -187,6 +189,8 @@ class SdfReader:
         pose, _ = self.pose(element)
         common: dict[str, Any] = {"pose": pose, "collision": collision, "place": shape.place}
         common["color"] = _color(element.first("material"))
+        if collision and self.source.contacts:
+            common["contact"] = _contact(element)
         if shape.name == "box":
             return Geometry("box", numbers(shape, "size", 3), **common)
         if shape.name == "sphere":
@@ -200,6 +204,10 @@ class SdfReader:
             path = self.source.locate(text_of(shape, "uri"), shape.place)
             scale = numbers(shape, "scale", 3, (1.0, 1.0, 1.0))
             return None if path is None else Geometry("mesh", mesh=path, scale=scale, **common)
+        if shape.name == "plane" and "contact" in common:
+            x, y, z = numbers(shape, "normal", 3, (0.0, 0.0, 1.0))
+            turned = Frame((0.0, 0.0, 0.0), along((x, y, z)))
+            return Geometry("plane", **common | {"pose": pose @ turned})
         return None  # a plane, a height map, ...: remarked by their elements
 
     def pose(self, element: XmlElement) -> tuple[Frame, str]:
@@ -251,6 +259,14 @@ def _version(root: XmlElement) -> tuple[int, ...]:
         return tuple(int(part) for part in (root.get("version") or "1.7").split("."))
     except ValueError:
         raise FormatError(f"version {root.get('version')!r} is no version", root.place) from None
+
+
+def _contact(collision: XmlElement) -> Contact:
+    """How a collision meets others: its coefficient of friction, 1 where none is given."""
+    found: XmlElement | None = collision
+    for name in ("surface", "friction", "ode", "mu"):
+        found = None if found is None else found.first(name)
+    return Contact() if found is None else Contact(found.content(1)[0])
 
 
 def _color(material: XmlElement | None) -> str:

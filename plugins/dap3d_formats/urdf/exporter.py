@@ -37,7 +37,7 @@ class UrdfExporter(Exporter):
         _note(model, remarks)
         text.empty("link", name=WORLD)
         for link in model.links.values():
-            _write_link(text, link)
+            _write_link(text, link, remarks)
         mimics = {coupling.joint: coupling for coupling in model.couplings}
         for joint in model.joints.values():
             if joint.closes:
@@ -63,7 +63,7 @@ def _note(model: Articulation, remarks: Remarks) -> None:
         remarks.translate(NOWHERE, text, motion=True)
 
 
-def _write_link(text: XmlText, link: Link) -> None:
+def _write_link(text: XmlText, link: Link, remarks: Remarks) -> None:
     text.open("link", name=link.name)
     if link.inertial is not None:
         J = link.inertial.inertia
@@ -75,7 +75,10 @@ def _write_link(text: XmlText, link: Link) -> None:
         text.empty("inertia", **{key: words([value]) for key, value in parts.items()})
         text.close("inertial")
     for geometry in link.geometries:
-        _write_shape(text, geometry)
+        if geometry.kind == "ellipsoid":
+            remarks.leave_out(NOWHERE, "shapes of type ellipsoid: URDF has none")
+        else:
+            _write_shape(text, geometry)
     text.close("link")
 
 

@@ -6,6 +6,7 @@ from typing import Any
 from dap3d_core.interface.formats import (
     WORLD,
     Articulation,
+    Contact,
     Coupling,
     FormatError,
     Frame,
@@ -114,6 +115,10 @@ class UrdfReader:
             "collision": collision,
             "place": place,
         }
+        if collision and self.source.contacts:
+            common["contact"] = Contact()
+            text = "URDF knows no friction: mu = 1, as MuJoCo takes"
+            self.remarks.translate(element.place, text, motion=True)
         if shape.name == "box":
             return Geometry("box", shape.numbers("size", 3), **common)
         if shape.name == "sphere":

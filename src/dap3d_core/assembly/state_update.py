@@ -1,8 +1,11 @@
 """Changes of a state: displacements, changes of velocity, in the bodies' scaled coordinates."""
 
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
 import numpy as np
 
-from dap3d_core.assembly.arrays import Floats
+from dap3d_core.assembly.arrays import LENGTH, Floats, System
 from dap3d_core.assembly.metric import unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.cache import compiled
@@ -10,9 +13,9 @@ from dap3d_core.kernels.scalar_math import where
 
 
 @compiled
-def normalise(y: Floats, n: int) -> None:
-    """Bring the Euler parameters of n bodies to unit length."""
-    for b in range(1, n + 1):
+def normalise(y: Floats, system: System) -> None:
+    """Bring the Euler parameters of the bodies to unit length."""
+    for b in range(1, system.body.shape[0]):
         c = coordinate_offset(b) + 3
         e0, e1, e2, e3 = y[c], y[c + 1], y[c + 2], y[c + 3]
         h = 1.0 / np.sqrt(e0 * e0 + e1 * e1 + e2 * e2 + e3 * e3)
@@ -50,10 +53,10 @@ def add_velocity(metric: Floats, change: Floats, out: Floats) -> None:
 
 
 @compiled
-def apply_displacement(y: Floats, metric: Floats, change: Floats) -> None:
-    """Add a scaled displacement: r += dr, p += 1/2 L^T dtheta', of unit length again."""
-    add_displacement(y, metric, change, y)
-    normalise(y, metric.shape[0] - 1)
+def apply_displacement(y: Floats, system: System) -> None:
+    """Add the scaled ``change``: r += dr, p += 1/2 L^T dtheta', of unit length again."""
+    add_displacement(y, system.metric, system.change, y)
+    normalise(y, system)
 
 
 @compiled
@@ -63,20 +66,20 @@ def apply_velocity_change(y: Floats, metric: Floats, change: Floats) -> None:
 
 
 @compiled
-def size_of_positions(y: Floats, n: int, length: float) -> float:
-    """The length of the scene and the largest coordinate of n bodies: scale of a tolerance, m."""
+def size_of_positions(y: Floats, system: System) -> float:
+    """The length of the scene and the largest coordinate of bodies: scale of a tolerance, m."""
     found = 0.0
-    for b in range(1, n + 1):
+    for b in range(1, system.body.shape[0]):
         first = coordinate_offset(b)
         for c in range(first, first + 3):
             found = where(abs(y[c]) > found, abs(y[c]), found)
-    return length + found
+    return system.settings[LENGTH] + found
 
 
 @compiled
-def size_of_velocities(y: Floats, n: int, length: float) -> float:
+def size_of_velocities(y: Floats, system: System) -> float:
     """The same of velocities, m/s: of a radian that length."""
-    found = 0.0
+    n, length, found = system.body.shape[0] - 1, system.settings[LENGTH], 0.0
     for b in range(1, n + 1):
         f = velocity_offset(b, n)
         for c in range(3):

@@ -81,6 +81,7 @@ def import_model(
     keep_fixed: bool = False,
     balance_inertia: bool = False,
     limits: str = "soft",
+    contacts: bool = False,
     shapes: bool = True,
     strict: bool = False,
     allow_code: bool = False,
@@ -99,14 +100,13 @@ def import_model(
         free_base: links without a joint to a parent are free, where the format leaves it open.
         keep_fixed: fixed joints between moving links stay joints.
         balance_inertia: principal moments of inertia that no body has are replaced by their mean.
-        limits: of joints: "soft", springs critically damped for the inertia that they see; "hard",
-            stops at which a rate ends at once; "off", none.
+        limits: of joints: "soft", critically damped springs; "hard", where a rate ends; "off".
+        contacts: shapes that meet others in the file do, by time stepping; else none does.
         shapes: links have their shapes; without, files of meshes are not looked for.
         strict: refuse a model of which something would be left out.
         allow_code: evaluate the expressions of a xacro file.
         arguments: of a xacro file, by name.
-        positions, rates: of joints where the scene starts, by name, as the file counts them; joints
-            that are coupled with these follow.
+        positions, rates: of joints at the start, by name, as the file counts; coupled ones follow.
         registry: the installed types; by default all.
 
     Returns:
@@ -121,10 +121,10 @@ def import_model(
             (packages, root, free_base, keep_fixed, balance_inertia, arguments, positions, rates))
         )  # fmt: skip
     try:
-        options = ImportOptions(free_base, keep_fixed, balance_inertia, limits)
+        options = ImportOptions(free_base, keep_fixed, balance_inertia, limits, contacts=contacts)
         model, source, keyword = read_articulation(
             file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes,
-            arguments=arguments)  # fmt: skip
+            contacts=contacts, arguments=arguments)  # fmt: skip
         options.positions.update(_coordinates(positions, model, positions=True))
         options.rates.update(_coordinates(rates, model, positions=False))
         return _checked_scene(model, source, keyword, options, registry, strict)
@@ -249,6 +249,7 @@ def read_articulation(
     root: str | os.PathLike[str] | None = None,
     allow_code: bool = False,
     shapes: bool = True,
+    contacts: bool = False,
     arguments: Mapping[str, Any] | None = None,
 ) -> tuple[Articulation, SourceFiles, str]:
     """The model in a file before it becomes a scene, its files, and the importer's keyword.
@@ -266,7 +267,7 @@ def read_articulation(
     if not os.path.isdir(folder):
         raise FormatError(f"root: {folder} is no folder")
     given = {name: str(value) for name, value in _named("arguments", arguments).items()}
-    source = SourceFiles(file, folder, folders, allow_code, shapes, given)
+    source = SourceFiles(file, folder, folders, allow_code, shapes, contacts, given)
     importer, keyword = _importer(source, format)
     try:
         model = importer.read(source)

@@ -9,9 +9,8 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.assembly.arrays import step_functions
-
-#: Indices of a formulation's functions in the list that an integrator takes.
+#: Indices of a formulation's functions in the list that an integrator takes, and their names.
+FUNCTIONS = ("rhs", "project", "report", "accepted", "watch")
 RHS, PROJECT, REPORT, ACCEPTED, WATCH = range(5)
 #: What a projection gives besides lengths (integrators/runge_kutta/step.py).
 OUTCOMES = 4
@@ -32,8 +31,7 @@ class Formulation:
         accepts_redundant: constraint rows may depend on each other.
         is_exact: its accelerations satisfy the constraints, as implicit and multistep integrators
             require.
-        has_own_coordinates: its state is not that of bodies, but of the class ``Coordinates`` of
-            its module coordinates.py; it has ``accepted`` and ``watch`` of its own, and no factors.
+        has_own_coordinates: its state is not that of bodies, but of its module coordinates.py.
     """
 
     name: str
@@ -47,36 +45,16 @@ class Formulation:
         """Kinds of the group loops that it calls."""
         return (*_ALL, *_OF_JOINTS) if self.needs_joints else _ALL
 
-    def functions(
-        self, *, turns: bool, switches: bool, contacts: bool = False, equations: str = ""
-    ) -> Any:
-        """Its compiled functions as the list that an integrator takes.
-
-        They are rhs, project, report; accepted where ``turns`` are counted; watch for ``switches``,
-        of ``contacts`` the one that finds multipliers.
-
-        equations: the module that has them, where it is not the one of the formulation's name.
-        """
-        name = "contacts.equations" if contacts else equations or self.name
-        module: Any = import_module(f"dap3d_core.formulations.{name}")
-        of_switches = module
-        functions = [module.rhs, module.project, module.report]
-        if turns or switches:
-            if not self.has_own_coordinates:
-                module = import_module("dap3d_core.formulations.common.switching_functions")
-            functions.append(module.accepted)
-            if switches:
-                functions.append(of_switches.watch if contacts else module.watch)
-        return step_functions(*functions)
-
     def coordinates(self, evaluator: Any) -> Any:
-        """The coordinates that it integrates, for an evaluator.
+        """The coordinates that it integrates (coordinates.py), for an evaluator.
 
         Raises:
             UnsuitableError: the model does not suit it.
         """
-        package = f"dap3d_core.formulations{f'.{self.name}' if self.has_own_coordinates else ''}"
-        return import_module(f"{package}.coordinates").Coordinates(evaluator)
+        if self.has_own_coordinates:
+            module = import_module(f"dap3d_core.formulations.{self.name}.coordinates")
+            return module.TreeCoordinates(evaluator)
+        return import_module("dap3d_core.formulations.coordinates").BodyCoordinates(evaluator)
 
 
 #: By name. Where a scene leaves the choice open, the first that fits it is taken.

@@ -157,6 +157,7 @@ def _contacts_of(
         rows[:, equations.ROW] = integers[:, layout.integers]
         rows[:, equations.BODY_I : equations.BODY_I + slots] = integers[:, :slots]
         rows[:, equations.STATE] = integers[:, layout.integers - 1]
+        rows[:, equations.LOADED] = group.type_info.type.along is not None  # type: ignore[attr-defined]
         table[group.members - first] = rows
     return table
 
@@ -262,6 +263,18 @@ def rows_of(model: Model, plan: Plan) -> Integers:
     """(rows,) place of each constraint row of the model in the row vectors."""
     first = np.repeat(plan.joint_row, model.joint_rows)
     return first + np.arange(model.row_count) - np.repeat(model.joint_start[:-1], model.joint_rows)
+
+
+def rows_read(model: Model, what: list[tuple[str, Group]]) -> Floats:
+    """(rows,) 1.0 for each constraint row of the model that forces read, 0.0 for others."""
+    read = np.zeros(len(model.joint_names))
+    for kind, group in what:
+        if kind == "friction":
+            joints = [of_force.members for of_force in group.read]
+            own = group.members if group.joints is None else group.joints
+            for places in joints or [own]:
+                read[places] = 1.0
+    return np.repeat(read, model.joint_rows)
 
 
 def _tables(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> tuple[Any, Any, Any, Any]:

@@ -23,6 +23,7 @@ from dap3d_core.assembly.arrays import (
     Floats,
     Integers,
     System,
+    step_functions,
 )
 from dap3d_core.assembly.evaluate import call_kinds, place_state
 from dap3d_core.assembly.motion.joint_angles import with_motions
@@ -35,16 +36,23 @@ from dap3d_core.assembly.turns import (
     follow_poses,
     report_turns,
 )
-from dap3d_core.formulations import FORMULATIONS, REPORT, RHS
-from dap3d_core.formulations.arrays import build_loops, build_system, load_numbers, regrouped
+from dap3d_core.formulations import ACCEPTED, FORMULATIONS, REPORT, RHS, WATCH
+from dap3d_core.formulations.arrays import (
+    build_loops,
+    build_system,
+    load_numbers,
+    regrouped,
+    rows_read,
+)
 from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pattern, scaled_rows
+from dap3d_core.formulations.coordinates import Coordinates
 from dap3d_core.formulations.switches import Switch, switches_of
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
 from dap3d_core.interface.element_unknowns import START
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
-from dap3d_core.model.rotations import euler_rates, to_body, to_global
-from dap3d_core.model.state_layout import bodies_of, join, split, u_from_y, velocities_of, y_from_u
+from dap3d_core.model.rotations import to_body
+from dap3d_core.model.state_layout import bodies_of, split, u_from_y, velocities_of, y_from_u
 
 #: Plain Python divides by zero without a warning, as compiled code does: NaN is looked for after.
 IGNORE_FLOAT_ERRORS = np.errstate(all="ignore")
@@ -97,13 +105,7 @@ class Evaluator:
         self._seek_unknowns()
         self._weigh_rows()
         self.report_size = model.report_layout["inputs"].start
-        if self.formulation.has_own_coordinates:
-            _ = self.coordinates  # its arrays take the place of those so far
-
-    @cached_property
-    def coordinates(self) -> Any:
-        """What the formulation integrates (formulations/coordinates.py)."""
-        return self.formulation.coordinates(self)
+        self.coordinates: Coordinates = self.formulation.coordinates(self)
 
     @property
     def length_count(self) -> int:
@@ -165,9 +167,9 @@ class Evaluator:
         self.store_initial_function_values()
         self._seek_unknowns()
         self._weigh_rows()
-        if self.formulation.has_own_coordinates:
-            self.coordinates = self.formulation.coordinates(self)
-            self.__dict__.pop("functions", None)  # other joints may be in the tree
+        before, self.coordinates = self.coordinates, self.formulation.coordinates(self)
+        if self.coordinates.function(RHS) is not before.function(RHS):
+            self.__dict__.pop("functions", None)
 
     @IGNORE_FLOAT_ERRORS
     def start(
@@ -310,12 +312,8 @@ class Evaluator:
     @cached_property
     def functions(self) -> Any:
         """The compiled functions (rhs, project, report, ...) that an integrator takes."""
-        turns, switches = self.counts_turns, bool(self.switches)
-        equations = self.coordinates.equations if self.formulation.has_own_coordinates else ""
-        contacts = bool(self.model.contact_count)
-        return self.formulation.functions(
-            turns=turns, switches=switches, contacts=contacts, equations=equations
-        )
+        last = WATCH if self.switches else ACCEPTED if self.counts_turns else REPORT
+        return step_functions(*map(self.coordinates.function, range(last + 1)))
 
     def integrated(self, u: ArrayLike) -> Floats:
         """The integrated state y of a state u (13 n,) and ``states``, in coordinates of bodies."""
@@ -341,7 +339,7 @@ class Evaluator:
 
     def body_rows(self, rows: Floats) -> Floats:
         """Reported rows (k, 1 + y + report_size) with y in coordinates of bodies."""
-        if not self.formulation.has_own_coordinates:
+        if self.coordinates.are_of_bodies:
             return rows
         end = rows.shape[1] - self.report_size
         states = self.coordinates.body_states(np.ascontiguousarray(rows[:, 1:end]))
@@ -363,18 +361,7 @@ class Evaluator:
 
         In the order of u: r_dot, p_dot of each body, then r_ddot, omega_dot of each.
         """
-        if self.formulation.has_own_coordinates:
-            _, p, v, w = split(u)
-            a, alpha = np.hsplit(self.report(t, u)[: w.size * 2].reshape(-1, 6), 2)
-            return join(v, euler_rates(p, w), a, alpha)
-        y = self.integrated(u)
-        out = np.zeros_like(y)
-        self.functions[RHS](float(t), y, out, self.system, self.loops)
-        u_dot = self.bodies_of(out)
-        w_dot = split(u_dot)[3]
-        p = split(self.bodies_of(y))[1]
-        w_dot[:] = to_global(p, w_dot)  # omega_dot = A omega'_dot, no extra term
-        return u_dot
+        return self.coordinates.u_dot(float(t), np.asarray(u, dtype=float))
 
     @IGNORE_FLOAT_ERRORS
     def state_rates(self, t: float, u: ArrayLike) -> Floats:
@@ -404,11 +391,7 @@ class Evaluator:
         v_dot, lambda, angles whose turns are counted, potential energy, the largest residuals of
         the three levels, and inputs.
         """
-        out = np.zeros(self.report_size)
-        with self.coordinates.at(np.asarray(u, dtype=float)) as y:
-            self.functions[REPORT](float(t), y, out, self.system, self.loops)
-        if self.formulation.has_own_coordinates:  # the coordinates are not those of the run
-            out[self.model.report_layout["angles"]] = self.counted_angles(t, u)
+        out = self.coordinates.report(float(t), np.asarray(u, dtype=float))
         whole: Floats = self.with_inputs(out[None])[0]
         return whole
 
@@ -466,8 +449,9 @@ class Evaluator:
         )
         turns_alone = moving <= 1e-12 * turning / model.part_size**2
         w = np.where(turns_alone, turning / model.part_size**2, moving)
-        last = s.friction.size - s.K.size
-        s.friction[last - s.total.size : last][s.row] = np.where(np.isfinite(w) & (w > 0.0), w, 1.0)
+        last, size = s.friction.size - s.K.size, s.total.size
+        s.friction[last - size : last][s.row] = np.where(np.isfinite(w) & (w > 0.0), w, 1.0)
+        s.friction[last - 2 * size : last - size][s.row] = rows_read(model, self.loop_groups)
 
     @IGNORE_FLOAT_ERRORS
     def place(self, t: float, u: ArrayLike) -> None:

@@ -22,14 +22,15 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import global_accelerations, largest, rates, state_rates, zero
+from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     PART,
-    project_onto,
     report_levels,
     report_multipliers,
     solve_rows,
 )
 from dap3d_core.formulations.common.friction import has_friction
+from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.formulations.regularised import accelerate
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.ldlt.factor import assemble, factor, regularise, weigh_rows
@@ -104,7 +105,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto its constraints; out as in ``project_onto``."""
-    project_onto(t, y, out, system, loops, PART, True)
+    project_onto(t, y, out, system, loops, constraints, PART, True, True)
 
 
 @compiled

@@ -24,11 +24,11 @@ from dap3d_core.assembly.evaluate import (
     state_rates,
     zero,
 )
+from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     PART,
     linearise,
     power_of_drivers,
-    project_onto,
     report_levels,
     report_multipliers,
     residuals,
@@ -36,6 +36,7 @@ from dap3d_core.formulations.common.constraints import (
     velocity_residuals,
 )
 from dap3d_core.formulations.common.friction import solve_with_friction
+from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.ldlt.factor import assemble, factor, regularise
 
@@ -85,7 +86,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto its constraints; out as in ``project_onto``."""
-    project_onto(t, y, out, system, loops, PART, False)
+    project_onto(t, y, out, system, loops, constraints, PART, True, False)
 
 
 @compiled

@@ -21,7 +21,7 @@ def store_reference_pivots(evaluator: Evaluator, t: float, u: ArrayLike) -> None
     formulation, system = evaluator.formulation, evaluator.system
     if not formulation.needs_joints or not evaluator.model.row_count:
         return
-    if formulation.has_own_coordinates:
+    if not evaluator.coordinates.are_of_bodies:
         return
     evaluator.place(t, u)
     system.smallest[:] = 0.0

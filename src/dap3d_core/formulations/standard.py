@@ -16,16 +16,17 @@ from typing import Any
 from dap3d_core.assembly.arrays import EVEN, LENGTH, SINGULAR, Floats, System
 from dap3d_core.assembly.evaluate import global_accelerations, rates, state_rates
 from dap3d_core.formulations import regularised
+from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     acceleration_residual,
     correct,
     power_of_drivers,
-    project_onto,
     report_levels,
     report_multipliers,
     solve_equations,
     solve_rows,
 )
+from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.linear.ldlt.factor import have_pivots
 
@@ -106,7 +107,7 @@ def report_accelerations(t: float, y: Floats, out: Floats, system: System, loops
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto its constraints; out as in ``project_onto``."""
-    project_onto(t, y, out, system, loops, None, True)
+    project_onto(t, y, out, system, loops, constraints, None, False, True)
 
 
 @compiled

@@ -42,7 +42,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Nothing but unit Euler parameters."""
     out[0] = out[1] = out[2] = out[3] = 0.0
-    normalise(y, system.body.shape[0] - 1)
+    normalise(y, system)
 
 
 @compiled

@@ -28,15 +28,13 @@ class PreparedRun:
         """Args: an integration at its start, whose buffer takes all rows of a run.
 
         Raises:
-            ValueError: it has begun, its buffer is too small, or it stops at break points.
+            ValueError: it has begun, or its buffer is too small.
         """
         work = integration.work
         if work.step_count or work.next_report:
             raise ValueError("the integration has begun: prepare a new one")
         if len(work.rows) < len(work.times):
             raise ValueError(f"the buffer takes {len(work.rows)} of {len(work.times)} rows")
-        if integration.tstops:
-            raise ValueError("break points are not put back to the start")
         self.integration = integration
         arrays = integration.state_arrays()
         if isinstance(integration, RungeKutta):  # what else it has is written before it is read

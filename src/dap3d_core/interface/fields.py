@@ -99,8 +99,18 @@ class FieldSpec:
 
     @property
     def is_reference(self) -> bool:
-        """True if it names a function or input, so that variants may ask for its presence."""
+        """True if it names a function or input."""
         return self.kind in ("function", "input") or bool(self.by_name)
+
+    @property
+    def is_optional(self) -> bool:
+        """True if it is a number that may be left out."""
+        return self.kind == "number" and self.default is None and not self.by_name
+
+    @property
+    def asks_presence(self) -> bool:
+        """True if variants ask whether the field is given, not for its value."""
+        return self.is_reference or self.is_optional
 
     @property
     def required(self) -> bool:

@@ -131,6 +131,8 @@ class Joint(TypeBase):
             "n - 1".
         holonomic: True, False, or one truth value a row: the rows of the position level.
         coordinate: "angle" or "length", what a motor in this joint acts on; "" for what it says.
+        limit: keyword of the contact that limits that coordinate where the scene gives ``lower`` or
+            ``upper``; "" for none.
         drives: it prescribes a freedom that other joints leave; where there are none between its
             bodies a scene gets a note.
         unilateral: rows, from 0, with multipliers that are not negative in a valid motion: ground
@@ -145,6 +147,9 @@ class Joint(TypeBase):
         states: names of states of its own, or name -> length; with them come the fields ``NAME_0``,
             initial values, and ``NAME_atol``, absolute tolerances.
         symbol: symbol in pictures, one of SYMBOLS; "": drawn from the declared fields.
+        brings: a field, the keyword of a force and the field by which that names a joint: where the
+            first is not zero the joint brings such a force, with its own fields of the same names.
+            Its wrench is part of the joint's reaction, and moves nothing where joints carry it.
     """
 
     kind = "joint"
@@ -155,7 +160,9 @@ class Joint(TypeBase):
     rows: ClassVar[int] = 0
     holonomic: ClassVar[bool | tuple[bool, ...]] = True
     coordinate: ClassVar[str] = ""
+    limit: ClassVar[str] = ""
     drives: ClassVar[bool] = False
+    brings: ClassVar[tuple[str, ...]] = ()
     unilateral: ClassVar[tuple[int, ...]] = ()
     unilateral_words: ClassVar[str] = ""
     unknowns: ClassVar[tuple[str, ...]] = ()

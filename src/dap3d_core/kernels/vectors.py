@@ -75,10 +75,10 @@ def by_body(on, parts, count):
         parts: numbers, or nested tuples of one form: (force, moment), or rows of six.
         count: number of bodies, ``body_count``.
     """
-    sums = [zeros(parts[0])] * count
+    sums = {}
     for body, part in zip(on, parts, strict=True):
-        sums[body] = added(sums[body], part)
-    return tuple(sums)
+        sums[body] = added(sums[body], part) if body in sums else part
+    return tuple(sums.get(body, zeros(parts[0])) for body in range(count))
 
 
 def zeros(a):

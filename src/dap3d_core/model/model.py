@@ -214,6 +214,11 @@ class Model:
         first = len(self.joint_names) - self.contact_count
         return (*names, *self.joint_names[first:])
 
+    @cached_property
+    def brought_forces(self) -> dict[str, str]:
+        """Joint -> the force that it brings (``Joint.brings``), whose name holds a dot."""
+        return {name.partition(".")[0]: name for name in self.force_names if "." in name}
+
     @property
     def integrated_layout(self) -> Layout:
         """Layout of the integrated state y, in coordinates of bodies."""

@@ -229,8 +229,8 @@ def _memory(prepared: PreparedRun) -> list[str]:
         lines += _loop(prepared, k, one)
     rows = [_integration(prepared, k, one) for k, one in enumerate(prepared.advances)]
     return lines + _table(
-        "static const struct {\n    int64_t real, integer, state, times, rows, sides;\n"
-        "    int implicit, keeps_step;\n    void (*advance)(int64_t *, int64_t);\n} integrations[]",
+        "static const struct {\n    int64_t real, integer, state, times, rows, sides, stops;\n"
+        "    int keeps_step;\n    void (*advance)(int64_t *, int64_t);\n} integrations[]",
         rows,
     )
 
@@ -370,8 +370,8 @@ def _integration(prepared: PreparedRun, k: int, one: Advance) -> str:
     arrays: list[Any] = [work.real, work.integer, work.state, work.times, work.rows]
     words = [str(place(array)) for array in arrays]
     words.append(str(place(work.switches[at.SIDE]) if work.switch_count else 0))
-    flags = int(one.integration.implicit), int(one.integration.keeps_step)
-    return f"{{{', '.join(words)}, {flags[0]}, {flags[1]}, advance_{k}}}"
+    words.append(str(place(work.stops) if prepared.stops else 0))
+    return f"{{{', '.join(words)}, {int(one.integration.keeps_step)}, advance_{k}}}"
 
 
 def variables_header(prepared: PreparedRun, variables: Sequence[Variable]) -> str:

@@ -10,6 +10,38 @@ from typing import Any, NamedTuple
 MANY_WORDS, NEIGHBOURS = 200, 25
 #: Nothing is similar to a longer word.
 LONGEST = 80
+#: Names in a scene -> what other programs and textbooks call them.
+_OTHER_NAMES = {
+    "Jp": "inertia moment_of_inertia moments_of_inertia inertia_tensor J I",
+    "mass": "m",
+    "r": "position pos xyz origin location x",
+    "p": "orientation quaternion quat euler_parameters q rotation",
+    "rpy": "euler euler_angles angles",
+    "r_dot": "velocity vel v",
+    "w": "angular_velocity angvel omega",
+    "k": "stiffness spring_constant spring_rate",
+    "c": "damping damping_coefficient",
+    "l0": "free_length rest_length natural_length",
+    "gravity": "g gravitational_acceleration",
+    "body": "parent link",
+    "sPp": "offset coordinates",
+    "name": "title",
+    "scene": "title model header",
+    "bodies": "links parts body link part",
+    "points": "markers frames sites marker frame site",
+    "joints": "constraints joint constraint",
+    "forces": "gravity actuators springs force",
+    "simulation": "solver options run settings integration",
+    "parameters": "variables constants",
+    "t_end": "duration end_time stop_time tend tfinal",
+    "dt": "timestep time_step",
+    "rtol": "tolerance tol reltol",
+    "atol": "abstol",
+}
+_NAMES_OF_OTHER: dict[str, list[str]] = {}
+for _name, _others in _OTHER_NAMES.items():
+    for _other in _others.split():
+        _NAMES_OF_OTHER.setdefault(_other.casefold(), []).append(_name.casefold())
 
 
 class _Words(NamedTuple):
@@ -23,13 +55,17 @@ class _Words(NamedTuple):
 def nearest(word: Any, allowed: Collection[str]) -> str:
     """The allowed word most similar to ``word``, regardless of case; "" where none is similar.
 
-    An abbreviation is similar to its word: ``rev`` to ``revolute``.
+    What other programs call an allowed word is similar to it: ``inertia`` to ``Jp``. So is an
+    abbreviation: ``rev`` to ``revolute``.
     """
     if not isinstance(word, str) or not 0 < len(word) <= LONGEST:
         return ""
     wanted, words = word.casefold(), _sorted_words(tuple(allowed))
     if wanted in words.word_of:
         return words.word_of[wanted]
+    for name in _NAMES_OF_OTHER.get(wanted, ()):
+        if name in words.word_of:
+            return words.word_of[name]
     forms = _alike(wanted, words) if len(words.word_of) > MANY_WORDS else list(words.word_of)
     near = get_close_matches(wanted, forms, 1)
     near = near or sorted((f for f in forms if _abbreviates(f, wanted)), key=len)[-1:]

@@ -4,6 +4,7 @@ from functools import cached_property
 from typing import Any
 
 from dap3d_core.registry.arguments import checked
+from dap3d_core.result.contact_table import ContactTable
 from dap3d_core.result.errors import unknown
 from dap3d_core.result.post.contact_output import (
     ContactOutput,
@@ -24,9 +25,16 @@ class ResultContacts:
         return contact_names(result.summary.state_names)
 
     @property
-    def contacts(self) -> tuple[str, ...]:
-        """Names of the contacts, in the order of the scene."""
+    def contact_names(self) -> tuple[str, ...]:
+        """Names of the declared contacts, in the order of the scene."""
         return tuple(self._points)
+
+    @cached_property
+    def contacts(self) -> ContactTable:
+        """Points of shapes that push on each other at the reported instants after the start."""
+        result: Any = self
+        table: ContactTable = result.record.contacts
+        return table.at(result.t)
 
     @checked
     def contact(self, name: str) -> ContactOutput:
@@ -47,7 +55,7 @@ class ResultContacts:
         name, every = canonical(name), self._points.values()
         points = self._points.get(name) or [p for of in every for p in of if p == name]
         if not points:
-            raise unknown("contact", name, self.contacts)
+            raise unknown("contact", name, self.contact_names)
         return together([self._contact_outputs[point] for point in points])
 
     @cached_property

@@ -9,6 +9,7 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.result.contact_table import ContactTable, no_contacts
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.note import Note
 from dap3d_core.scene import SceneError, tables_of
@@ -79,7 +80,7 @@ def to_json(value: Any) -> str:
 
 @attrs.frozen(kw_only=True)
 class RunMetadata:
-    """Everything about a run that is not an array.
+    """Everything about a run that is not an array over its instants.
 
     Attributes:
         scene_text: the scene that was run, as the text of a scene file.
@@ -89,6 +90,7 @@ class RunMetadata:
         settings: rtol, atol, step, project, correct and the like, as they were used.
         stats: what it cost.
         events: what happened at instants that were located, in their order.
+        contacts: of shapes that meet anywhere.
         run: by which a checkpoint knows the rows that belong to it; "" where there is none.
         actuation: name of an actuator -> (nt,) its force as inverse dynamics finds it, N or N m,
             which takes the place of that in the scene.
@@ -105,6 +107,7 @@ class RunMetadata:
     settings: dict[str, Any] = attrs.field(factory=dict, converter=_plain)
     stats: RunStatistics = attrs.Factory(RunStatistics)
     events: tuple[EventRecord, ...] = attrs.field(default=(), converter=_occurrences)
+    contacts: ContactTable = attrs.Factory(no_contacts)
     run: str = attrs.field(default="", eq=False)
     actuation: Mapping[str, tuple[float, ...]] = attrs.field(factory=dict, converter=_by_actuator)
     types: Mapping[str, Mapping[str, str]] | None = None
@@ -139,13 +142,21 @@ class RunMetadata:
     @property
     def outputs(self) -> dict[str, Any]:
         """Expressions of the outputs of the scene by name, or tables of them, as written."""
-        if "[outputs" not in self.scene_text:  # reading the text of a large scene takes time
+        return self._table("outputs")
+
+    @property
+    def parameters(self) -> dict[str, Any]:
+        """The parameters of the scene by name, numbers or expressions, as written."""
+        return self._table("parameters")
+
+    def _table(self, name: str) -> dict[str, Any]:
+        if f"[{name}" not in self.scene_text:  # reading the text of a large scene takes time
             return {}
         try:
-            outputs = tables_of(self.scene_text).get("outputs", {})
+            table = tables_of(self.scene_text).get(name, {})
         except SceneError:
             return {}
-        return outputs if isinstance(outputs, dict) else {}
+        return table if isinstance(table, dict) else {}
 
     @property
     def tolerances(self) -> tuple[float, dict[str, float]] | None:

@@ -14,7 +14,14 @@ from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.checksum import check_checksums, check_signature
 from dap3d_core.result.file.lazy_arrays import LazyArrays
 from dap3d_core.result.file.library import reading, shared
-from dap3d_core.result.file.schema import CONSTANTS, CONVENTIONS, FORMAT, SWEEP, record_of
+from dap3d_core.result.file.schema import (
+    CONSTANTS,
+    CONVENTIONS,
+    FORMAT,
+    SWEEP,
+    contacts_of,
+    record_of,
+)
 from dap3d_core.result.file.validate import check_attributes, check_claims, check_subject
 from dap3d_core.result.metadata import RUNNING, RunMetadata
 from dap3d_core.result.model_summary import ModelSummary, is_summary_of
@@ -88,7 +95,8 @@ def _read(dataset: Any) -> tuple[ModelSummary, RunMetadata, int]:
     for name in _JSON:
         values[name] = json.loads(values[name])
     check_attributes(values)
-    summary, record = _subject(dataset, values), record_of(values)
+    summary = _subject(dataset, values)
+    record = record_of(values, contacts_of(dataset))
     check_subject(summary)
     count = len(dataset.dimensions["time"])
     if record.status == RUNNING:

@@ -21,11 +21,11 @@ from dap3d_core.result.metadata import RunMetadata, RunStatistics
 from dap3d_core.result.model_summary import ModelSummary, summary_of
 from dap3d_core.result.note import Note
 from dap3d_core.result.post.contact_output import POINT
-from dap3d_core.result.post.force_output import ForceOutput, force_output
+from dap3d_core.result.post.force_output import ForceOutput, force_output, reactions_of
 from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of
 from dap3d_core.result.post.ledger import Entry, ledger_of
 from dap3d_core.result.post.point_motion import Energy, kinetic_energy
-from dap3d_core.result.post.reactions import Reaction, jacobians, reactions
+from dap3d_core.result.post.reactions import Reaction, jacobians
 from dap3d_core.result.quantities.catalogue import MOTION, Quantity
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.scene import SceneError
@@ -287,7 +287,8 @@ class Result(ResultDisplay, ResultContacts):
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
         """Reaction of a joint on each of its bodies, ground included: D^T lambda (spec 2).
 
-        Friction that a force element adds to a joint is not part of it.
+        What a joint brings besides, such as the pressure angle of a ``gear``, is part of it; the
+        friction of a force element is not.
 
         Args:
             joint: name of the joint.
@@ -305,14 +306,16 @@ class Result(ResultDisplay, ResultContacts):
         joint = canonical(joint)
         if joint not in self.summary.joint_index:
             raise unknown("joint", joint, self.summary.joint_names)
-        if joint.partition(POINT)[0] in self.contacts:
+        if joint.partition(POINT)[0] in self.contact_names:
             raise UnknownNameError(f"{joint!r} is a contact: its forces are those of .contact()")
         self._compute_reactions([joint])
         return dict(self._reactions[joint])
 
     def reactions(self) -> dict[str, Mapping[str, Reaction]]:
         """Reactions of all joints by name, computed in one pass; otherwise as ``reaction``."""
-        names = [n for n in self.summary.joint_names if n.partition(POINT)[0] not in self.contacts]
+        names = [
+            n for n in self.summary.joint_names if n.partition(POINT)[0] not in self.contact_names
+        ]
         self._compute_reactions(names)
         return {name: dict(self._reactions[name]) for name in names}
 
@@ -363,7 +366,7 @@ class Result(ResultDisplay, ResultContacts):
         missing = {index[name]: name for name in names if name not in self._reactions}
         if missing:
             evaluator, angles = self.evaluator, self._angles()
-            by_joint = reactions(
+            by_joint = reactions_of(
                 evaluator, self.t, self.u, self.Lam, missing, angles, self._states(), self.inputs
             )
             self._reactions |= {missing[joint]: actions for joint, actions in by_joint.items()}
@@ -427,13 +430,12 @@ class Result(ResultDisplay, ResultContacts):
         Raises:
             ResultError: the scene in a file has some that are wrong.
         """
-        table = self.record.outputs
-        if not table:
+        if not self.record.outputs:
             return {}
         from dap3d_core.scene.expressions.outputs import outputs_of
 
         try:
-            return outputs_of(table)
+            return outputs_of(self.record.outputs, self.record.parameters)
         except SceneError as error:
             raise ResultError(f"the outputs of the scene are wrong: {error}") from error
 

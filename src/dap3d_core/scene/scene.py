@@ -10,13 +10,7 @@ from dap3d_core.scene.coerce import entry_of, keys_of, plain, with_identifiers
 from dap3d_core.scene.contacts.tables import ContactTables
 from dap3d_core.scene.display import SceneDisplay
 from dap3d_core.scene.errors import Mistake, MistakeList, SceneError
-from dap3d_core.scene.tables import (
-    NAMED,
-    AnimationPoint,
-    Element,
-    SceneTables,
-    fault_of_name,
-)
+from dap3d_core.scene.tables import NAMED, AnimationPoint, Element, SceneTables, fault_of_name
 
 
 @attrs.define(repr=False)
@@ -37,6 +31,7 @@ class Scene(SceneTables, SceneDisplay, ContactTables):
         faults: mistakes found in reading (unknown keys, wrong tables); ``check`` reports them.
         notes: information about the choice of the file.
         included: the files of its sub-assemblies, by their names.
+        files: meshes that lie elsewhere until the scene is saved with them, as of an import.
     """
 
     def resolved(self) -> "Scene":
@@ -124,9 +119,9 @@ class Scene(SceneTables, SceneDisplay, ContactTables):
         return self._add("inputs", name, {"value": value} | unknown)
 
     def add_shape(self, type: str, name: str | None = None, **fields: Any) -> str:
-        """Add a shape (box, sphere, capsule, cylinder, plane, cone, disk, line, mesh); its name.
+        """Add a shape (box, sphere, plane, mesh and others); its name.
 
-        It is drawn; with ``collides=True`` one of the first five meets others that do.
+        It is drawn; with ``collides=True`` it meets others that do, but lines, cones and disks.
 
         Raises:
             SceneError: the name is taken or illegal. Fields are checked with the whole scene.

@@ -136,6 +136,8 @@ class Simulation:
     mu: Any = attrs.field(default=SETTINGS["mu"].default, converter=plain)
 
 
+#: Keys of joints whose coordinate a contact limits (contacts/read_contacts.py).
+LIMITS = ("lower", "upper", "e")
 HEADER_KEYS = frozenset({"name", "description", "schema"})
 #: Tables of the scene file with named entries, and the class of an entry.
 NAMED: dict[str, type] = {
@@ -192,6 +194,7 @@ class SceneTables:
     faults: list[tuple[Key, Mistake]] = attrs.field(factory=list, eq=False)
     notes: list[str] = attrs.field(factory=list, eq=False)
     included: dict[str, Path] = attrs.field(factory=dict, eq=False)
+    files: dict[str, Path] = attrs.field(factory=dict, eq=False)
     _counts: dict[str, int] = attrs.field(factory=dict, eq=False, init=False)
 
     @property
@@ -216,6 +219,7 @@ class SceneTables:
             faults=list(self.faults),
             notes=list(self.notes),
             included=dict(self.included),
+            files=dict(self.files),
             **named,
         )
         scene._counts = dict(self._counts)

@@ -388,7 +388,7 @@ class CompiledModel:
             return None
         with suppress(SimulationError):  # too many rows to keep, or no start
             evaluator = self.new_evaluator(announce, "joint")
-            if not evaluator.coordinates.kept:
+            if not evaluator.length_count:  # no rows are kept
                 evaluator.set_inputs(self.model.input_values)
                 start = self._find_start(evaluator, self._usual_start)
                 if start.redundancy.singular is None:
@@ -439,8 +439,15 @@ def _modelled(checked: ValidatedScene) -> Model:
     try:
         return build_model(checked)
     except ModelError as error:
+        scene = checked.scene
+        # contacts are elements of the kind of joints, rigid stops and friction among the forces
+        tables = {name: table for table in ("forces", "contacts", "joints")
+                  for name in getattr(scene, table)}  # fmt: skip
         found = [
-            mistake_at(checked.scene, (f"{k}s", name), words) for k, name, words in error.faults
+            mistake_at(
+                scene, (f"{k}s" if k != "joint" else tables.get(name, "joints"), name), words
+            )
+            for k, name, words in error.faults
         ]
         raise SceneError(sorted(found, key=lambda m: m.line or 0)) from error
 

@@ -27,8 +27,9 @@ def refuse_contacts(model: Any, what: str) -> None:
     if model.contact_count:
         raise SimulationError(
             f"{what} does not take contacts yet, and the scene has some "
-            f"({model.contact_names[0].partition('#')[0]}): take them out of "
-            "[contacts], or run the scene (simulate), which does"
+            f"({model.contact_names[0].partition('#')[0]}): take them out, or run the scene "
+            "(simulate), which does. Stops with a stiffness k, and friction with a w_tol or v_tol, "
+            "are no contacts"
         )
     refuse_collisions(model, what)
 

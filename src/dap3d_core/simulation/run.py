@@ -28,12 +28,7 @@ from dap3d_core.simulation.handover import (
 from dap3d_core.simulation.initial.singular_start import SingularStart
 from dap3d_core.simulation.initial.tolerances import motion_notes, rounding_notes
 from dap3d_core.simulation.initial_state import InitialState, start_notes
-from dap3d_core.simulation.output.error_estimate import (
-    QUICK,
-    StepLimits,
-    add_error,
-    ending_after,
-)
+from dap3d_core.simulation.output.error_estimate import QUICK, StepLimits, add_error, ending_after
 from dap3d_core.simulation.output.termination import accuracy_warnings, event_notes, why_stopped
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 from dap3d_core.simulation.redundancy.redundancy import Redundancy
@@ -232,6 +227,7 @@ class Run(RunState):
         width = 1 + len(y0) + evaluator.report_size
         self.options = options = integration_options(evaluator, settings) | {
             "first_step": None if self.limits is None else self.limits.first,
+            "stops": self.stops,
             "buffer_rows": max(1, min(len(self.times), BUFFER_NUMBERS // width)),
         }
         integrator = integrator_named(settings.integrator)
@@ -336,7 +332,7 @@ class Run(RunState):
         """That a long run whose method was left to auto would be quicker by method joint."""
         model, work = self.evaluator.model, self.statistics().rhs * self.evaluator.model.body_count
         is_left_open = self.compiled.requested_method == "auto" and model.row_count > 0
-        if not is_left_open or self.evaluator.formulation.has_own_coordinates:
+        if not is_left_open or not self.evaluator.coordinates.are_of_bodies:
             return []
         if work < MUCH_WORK or any(i.implicit for i in self.integrations):
             return []

@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import attrs
@@ -13,6 +14,7 @@ from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import Integration, StepCounts
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.result import EventRecord, RunMetadata, RunStatistics, information
+from dap3d_core.result.contact_table import ContactTable, no_contacts
 from dap3d_core.scene import MISSING, Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, check_every
@@ -155,11 +157,15 @@ class RunState:
         """The integration that the run is in."""
         return self.integrations[-1]
 
+    @cached_property
+    def stops(self) -> Sequence[tuple[float, bool]]:
+        """Break points of functions of time: as the argument of ``Integration``."""
+        stops = self.compiled.breakpoints(self.t_end).stops
+        return stops if self.limits is None else with_midpoints(stops)
+
     def begin(self, integration: Integration) -> None:
         """Make an integration the present one; it is compiled first, off the clock of the run."""
-        integration.tstops = self.compiled.breakpoints(self.t_end).stops
         if self.limits is not None:
-            integration.tstops = with_midpoints(integration.tstops)
             integration.work.longest_step = self.limits.longest
         if self.event_locator is not None:
             integration.follow_steps()
@@ -187,6 +193,14 @@ class RunState:
             others = [*others, *self.jumps.records]
         return occurrences(self.evaluator, self.integrations, others)
 
+    def _contacts(self) -> ContactTable:
+        """Contacts of shapes at the instants reported so far."""
+        shapes = self.evaluator.model.collisions
+        if shapes is None:
+            return no_contacts()
+        every = [one.contact_rows for one in self.integrations]
+        return ContactTable.of_rows(shapes.names, np.concatenate(every))
+
     def record(self, status: str, more_notes: Sequence[str] = ()) -> RunMetadata:
         """The metadata of the result so far."""
         counts, events = self.statistics(), self.events()
@@ -207,6 +221,7 @@ class RunState:
             integrator=self.settings.integrator,
             notes=[*self.notes, *more_notes],
             events=events,
+            contacts=self._contacts(),
             types=self.compiled.types,
             settings={
                 "t_end": self.t_end,
@@ -234,9 +249,7 @@ class RunState:
 
         In coordinates of a formulation it is that of other rates, and not recorded.
         """
-        if self.evaluator.formulation.has_own_coordinates:
-            return {}
-        part = self.evaluator.model.integrated_layout["velocities"]
+        part = self.evaluator.coordinates.body_velocities
         noise = np.zeros(6)
         for integration in self.integrations:
             rows = integration.rate_noise[part].reshape(-1, 6)

@@ -46,10 +46,11 @@ def _with_contact_engine(compiled: CompiledModel, settings: Simulation) -> Simul
     """The settings with the integrator that steps contacts, where that is chosen.
 
     Raises:
-        SceneError: events are to follow shapes that collide.
+        SceneError: events are to follow shapes that collide, or steps friction that sticks.
     """
     model = compiled.model
     if integrator_named(settings.integrator).steps_contacts:
+        _refuse_sticking(model)
         return settings
     if model.collisions is not None and settings.contact == "events":
         what = "shapes that collide are followed by stepping, and not by events"
@@ -57,7 +58,18 @@ def _with_contact_engine(compiled: CompiledModel, settings: Simulation) -> Simul
         raise SceneError([Mistake("contact", "events", what, remedy=remedy)])
     if not contact_engine_reason(model, settings.contact):
         return settings
+    _refuse_sticking(model)
     return attrs.evolve(settings, integrator=STEPPING.name, step=settings.contact_step)
+
+
+def _refuse_sticking(model: Model) -> None:
+    """SceneError: friction of joints sticks, which steps of contacts do not know."""
+    for group in model.contacts:
+        if group.type_info.type.along is not None:  # type: ignore[attr-defined]
+            name = model.joint_names[int(group.members[0])]
+            what = "sticks, which events follow, and time stepping of contacts does not"
+            remedy = "give it a w_tol, or v_tol, below which it fades"
+            raise SceneError([Mistake(f"forces.{name}", MISSING, what, remedy=remedy)])
 
 
 def contact_engine_reason(model: Model, contact: str) -> str:
@@ -65,7 +77,7 @@ def contact_engine_reason(model: Model, contact: str) -> str:
     if contact == "stepping" and (model.contact_count or model.collisions is not None):
         return "asked for"
     if contact == "auto" and model.collisions is not None:
-        return f"{len(model.collisions.names)} shapes may meet anywhere"
+        return f"{len(set(model.collisions.names))} shapes may meet anywhere"
     points = Counter(name.partition("#")[0] for name in model.contact_names)
     closed = sum(min(count, MOST_CLOSED) for count in points.values())
     if contact == "auto" and closed > MOST_BY_EVENTS:

@@ -383,6 +383,7 @@ class _Family:
         values = []
         for point, row in zip(points, rows, strict=True):
             self.load(point.s, point)
-            one = reduction.result(self.evaluator.model, row[None], self.evaluator)
+            value = [self.value_of(point.s)]
+            one = reduction.result(self.evaluator.model, row[None], self.evaluator, value)
             values.append(one.quantity(name).values[0])
         return quantity._replace(values=np.array(values))

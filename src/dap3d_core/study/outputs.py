@@ -16,7 +16,7 @@ from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.errors import shown
 from dap3d_core.simulation import CompiledModel, SimulationError
 from dap3d_core.simulation.output.check_outputs import probe_of
-from dap3d_core.study.parameters import TABLES, SceneParameter
+from dap3d_core.study.parameters import TABLES, SceneParameter, with_values
 
 
 def _mean(values: Floats, t: Floats) -> Any:
@@ -214,9 +214,21 @@ class Reduction:
             values_of[output.name] = REDUCTIONS[output.reduction](values, times)
         return values_of
 
-    def result(self, model: Model, rows: Floats, evaluator: Evaluator | None = None) -> Result:
-        """A result in memory, of rows of a model that an evaluator evaluates."""
-        record = RunMetadata(scene_text=self.compiled.scene_text)
+    def result(
+        self,
+        model: Model,
+        rows: Floats,
+        evaluator: Evaluator | None = None,
+        point: Sequence[float] | None = None,
+    ) -> Result:
+        """A result in memory, of rows of a model that an evaluator evaluates.
+
+        point: values of the parameters; by default those of the scene.
+        """
+        text = self.compiled.scene_text
+        if point is not None and "parameters" in text and "outputs" in text:  # which may read them
+            text = with_values(self.compiled.scene, self.parameters, point).to_toml()
+        record = RunMetadata(scene_text=text)
         evaluator = evaluator or self.compiled.evaluator
         rows = evaluator.with_inputs(rows, model.input_values)
         return Result.of_run(model, rows, record, lambda: evaluator)
@@ -238,6 +250,8 @@ class Reduction:
                 components = output.components(quantity.components)
                 label, unit = quantity.label, quantity.unit
                 of_rows = all(map(self._is_of_rows, _sources(probe, quantity)))
+                if quantity.owner == "output" and self._tables == set(TABLES):
+                    of_rows &= not any(e.parameters for e in probe.outputs.values())
             expanded += components
             for name in (component.name for component in components):
                 self.labels[name], self.units[name], self.of_rows[name] = label, unit, of_rows

@@ -173,14 +173,19 @@ def _of_joint(subject: SampledType) -> list[Check]:
     no_position = "" if subject.type.position_rows() else "it has no row at position level"
     no_form = "" if "C_dot" in subject.kernels.names() else "it defines no C_dot"
     ground = joints.against_ground(subject)
+    turns = fewer = ""
+    if subject.type.is_contact and subject.type.along is not None:
+        fewer = "it has one row, and two that stay zero"
+    elif subject.type.is_contact and subject.type.at is None:
+        turns = "its gap is an angle, whose rows are those of bodies that turn about its normal"
     checks = [
-        Check("J", subject, no_position, joints.jacobian),
+        Check("J", subject, no_position or turns, joints.jacobian),
         Check("nu", subject, no_position, joints.velocity_side),
         Check("velocity form", subject, no_form, joints.velocity_form),
-        Check("gamma", subject, "", joints.acceleration_side),
-        Check("virtual power", subject, no_position, joints.virtual_power),
-        Check("assembly", subject, no_position, joints.assembly),
-        Check("rank", subject, "", joints.rank),
+        Check("gamma", subject, turns, joints.acceleration_side),
+        Check("virtual power", subject, no_position or turns, joints.virtual_power),
+        Check("assembly", subject, no_position or turns, joints.assembly),
+        Check("rank", subject, turns or fewer, joints.rank),
         Check("frame", subject, ground, joints.frame),
         Check("action and reaction", subject, ground, joints.action_and_reaction),
     ]

@@ -2,7 +2,8 @@
 
 All wheels turn in fixed ratios, so the torque on the sun accelerates one inertia: the sum of
 J ratio^2, and of m (d ratio)^2 for the planet, which the carrier takes along. The tooth force of
-the ring is what accelerates the planet about its centre, beside that of the sun.
+the ring is what accelerates the planet about its centre, beside that of the sun. At the pressure
+angle each tooth presses besides: sun and planet apart, the planet from the ring towards the axis.
 """
 
 import numpy as np
@@ -17,6 +18,7 @@ RATE = TORQUE / INERTIA  # of the sun, rad/s^2
 #: Tooth forces on the planet along the direction in which its centre moves.
 OF_SUN = (TORQUE - J_SUN * RATE) / R_SUN
 OF_RING = OF_SUN + J_PLANET * OF_PLANET * RATE / R_PLANET
+APART = np.tan(np.radians(20.0))
 
 
 def quantities(t: float) -> dict[str, Array]:
@@ -28,9 +30,9 @@ def quantities(t: float) -> dict[str, Array]:
     speeds = {"sun": sun, "carrier": OF_CARRIER * sun, "planet": OF_PLANET * sun}
     found = {f"w.{name}": np.array([0.0, 0.0, w]) for name, w in speeds.items()}
     acceleration = D * (OF_CARRIER * RATE * along - (OF_CARRIER * sun) ** 2 * out)
-    pin = M_PLANET * acceleration - (OF_SUN + OF_RING) * along
+    pin = M_PLANET * acceleration - (OF_SUN + OF_RING) * along - APART * (OF_SUN - OF_RING) * out
     return found | {
         "r.planet": D * out,
         "reaction.bearing_of_planet.i.force": pin,
-        "reaction.bearing_of_sun.i.force": OF_SUN * along,
+        "reaction.bearing_of_sun.i.force": OF_SUN * (along + APART * out),
     }

@@ -148,8 +148,10 @@ def test_dry_friction_and_a_spring_of_a_slider_read_back(tmp_path, format):
     scene.add_joint("rev", "pin", P_i="wheel.O", P_j="P", a_i="wheel.y", a_j="block.y")
     k = 0.0 if format == "urdf" else 30.0
     scene.add_force("tran_sda", "spring", P_i="block.O", P_j="Q", a_j="back", k=k, c=0.5, x_0=-0.3)
-    scene.add_force("tran_friction", "rub", P_i="P", a_j="back", f_c=0.8)
-    scene.add_force("rot_friction", "drag", body_i="block", body_j="wheel", axis="wheel.y", n_c=0.6)
+    scene.add_force("tran_friction", "rub", P_i="P", a_j="back", f_c=0.8,
+                    v_tol=1e-3)  # fmt: skip
+    scene.add_force("rot_friction", "drag", body_i="block", body_j="wheel", axis="wheel.y", n_c=0.6,
+                    w_tol=1e-3)  # fmt: skip
     report = dap.export_model(scene, tmp_path / f"a{SUFFIX[format]}", format=format)
     assert {one.text for one in report.left_out} <= {"initial velocities", GRAVITY}
     back, _ = dap.import_model(tmp_path / f"a{SUFFIX[format]}")
@@ -187,9 +189,9 @@ def test_joints_that_slide_may_start_anywhere_on_their_axis(tmp_path, keyword, f
     ("joint", "keyword", "fields"),
     [
         ("axle", "rot_sda", {"k": 3.0, "c": 0.1, "theta_0": "-20 deg"}),
-        ("axle", "rot_friction", {"n_c": 0.3}),
+        ("axle", "rot_friction", {"n_c": 0.3, "w_tol": 1e-3}),
         ("way", "tran_sda", {"k": 30.0, "c": 0.1, "x_0": 0.2}),
-        ("way", "tran_friction", {"f_c": 0.3}),
+        ("way", "tran_friction", {"f_c": 0.3, "v_tol": 1e-3}),
     ],
 )
 def test_angles_in_degrees_and_forces_that_name_a_joint_read_back(tmp_path, joint, keyword, fields):

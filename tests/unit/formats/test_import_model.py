@@ -211,6 +211,45 @@ def test_shapes_of_the_world_are_drawn_on_ground(tmp_path):
     assert any("plane is not drawn" in one.text for one in report.left_out)
 
 
+CONTACTS = """
+<worldbody><geom type="plane" size="1 1 1" friction="0.2"/>
+<body name="a" pos="0 0 0.1"><freejoint/><geom type="box" size="0.2 0.1 0.1" friction="0.4"/></body>
+<body name="b" pos="2 0 0.1"><freejoint/><geom size="0.1" condim="1" contype="2"/>
+<body name="c" pos="0 0 1"><joint type="hinge"/><joint type="hinge" axis="0 1 0"/>
+<geom type="capsule" size="0.1 0.2" conaffinity="0" contype="0"/>
+<geom type="ellipsoid" size="0.1 0.2 0.3" density="0"/></body></body></worldbody>
+<contact><exclude body1="a" body2="b"/></contact>"""
+
+
+def test_geoms_meet_as_in_the_file(tmp_path):
+    """The larger friction of a pair holds, as in MuJoCo; geoms of joints in a row do not meet."""
+    scene, report = imported(tmp_path, CONTACTS, contacts=True)
+    meeting = {n: s.fields for n, s in scene.shapes.items() if s.fields.get("collides")}
+    assert list(meeting) == ["world_shapes_plane", "a_box", "b_sphere", "c_ellipsoid"]
+    assert meeting["b_sphere"]["group"] == 2
+    assert scene.shapes["c_cylinder"].fields["length"] == 0.4  # drawn alone
+    assert {("a", "b"), ("b", "c")} <= set(scene.collisions.exclude)
+    named = {name: shape["material"] for name, shape in meeting.items()}
+    pairs = scene.materials[named["world_shapes_plane"]].with_
+    assert pairs[named["a_box"]]["mu"] == 0.4
+    assert pairs[named["b_sphere"]]["mu"] == 1.0
+    assert scene.materials[named["b_sphere"]].mu == 0.0
+    assert not any("do not touch" in one.text for one in report.left_out)
+    first = report.translated[0]
+    assert first.motion
+    assert "1e-06 of the mass that it carries" in first.text
+    with pytest.raises(dap.SceneError, match="hard"):
+        imported(tmp_path, CONTACTS, contacts=True, limits="hard")
+
+
+def test_a_box_of_a_file_slides_by_the_friction_of_its_pair(tmp_path):
+    """mu = 0.4 of the box and 0.2 of the floor: it ends after v^2 / (2 mu g)."""
+    scene, _ = imported(tmp_path, CONTACTS, contacts=True)
+    scene.bodies["a"].r_dot = (1.0, 0.0, 0.0)
+    result = dap.simulate(scene, t_end=0.3, dt=0.3, contact_step=5e-3)
+    assert result.r[-1, 0, 0] == pytest.approx(1.0 / (2 * 0.4 * 9.81), abs=1e-4)
+
+
 def test_actuators_of_a_group_that_is_disabled_are_left_out(tmp_path):
     """A servo would otherwise hold the joint by a spring."""
     hinge = '<body><joint name="j"/><geom size="1"/></body>'

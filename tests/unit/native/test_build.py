@@ -119,6 +119,7 @@ def test_it_runs_in_an_empty_root(tmp_path):
     assert len(done.stdout.splitlines()) == 6
 
 
+@pytest.mark.slow
 def test_the_shared_library_needs_the_c_library_alone(tmp_path):
     if shutil.which("readelf") is None:
         pytest.skip("there is no readelf")

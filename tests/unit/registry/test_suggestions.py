@@ -26,6 +26,21 @@ def test_an_abbreviation_among_many_words_is_found():
     assert nearest("crank", [*MANY, "crankshaft"]) == "crankshaft"
 
 
+@pytest.mark.parametrize(
+    ("word", "allowed", "meant"),
+    [
+        ("inertia", ["Jp", "mass", "r"], "Jp"),
+        ("Quaternion", ["p", "r"], "p"),
+        ("title", ["bodies", "scene"], "scene"),
+        ("title", ["name", "schema"], "name"),
+        ("velocity", ["velocity_x", "r_dot"], "r_dot"),
+        ("inertia", ["mass"], ""),
+    ],
+)
+def test_what_other_programs_call_a_name_is_known(word, allowed, meant):
+    assert nearest(word, allowed) == meant
+
+
 def test_two_words_of_other_case_are_the_first():
     assert nearest("ROD", ["Rod", "rod"]) == "Rod"
 

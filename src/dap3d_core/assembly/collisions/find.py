@@ -3,11 +3,14 @@
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from typing import Any
+
 import attrs
 import numpy as np
 
 from dap3d_core.assembly.collisions.boxes import CORNERS, boxes
 from dap3d_core.assembly.collisions.broad_phase import near_pairs
+from dap3d_core.assembly.collisions.convex import ROWS, touch_convex
 from dap3d_core.assembly.collisions.planes import at_plane
 from dap3d_core.assembly.collisions.records import GAP, NORMAL, POINT, WIDTH
 from dap3d_core.assembly.collisions.rods import balls, capsules, sphere_capsule
@@ -19,6 +22,7 @@ from dap3d_core.scene.contacts.collision_shapes import (
     BOX,
     CAPSULE,
     CYLINDER,
+    ELLIPSOID,
     PLANE,
     SPHERE,
     CollisionShapes,
@@ -26,6 +30,17 @@ from dap3d_core.scene.contacts.collision_shapes import (
 
 #: Points of a pair that there is room for at first.
 USUAL_POINTS = 4
+
+
+def without_formula(kinds: Integers) -> Any:
+    """(k,) whether pairs of kinds (k, 2) are those of ``touch_convex``."""
+    low, high = np.sort(kinds, axis=1).T
+    return (high >= ELLIPSOID) | (
+        (low >= CAPSULE)
+        & (low <= CYLINDER)
+        & (high >= CYLINDER)
+        & ~((low == CAPSULE) & (high == BOX))
+    )
 
 
 @attrs.frozen(eq=False)
@@ -103,7 +118,7 @@ class ShapeFinder:
         self._is_plane = shapes.kind == PLANE
         self._solids = np.flatnonzero(~self._is_plane)
         self._planes = np.flatnonzero(self._is_plane)
-        self._scratch = np.zeros((CORNERS + 2, 3))
+        self._scratch, self._work = np.zeros((CORNERS + 2, 3)), np.zeros((ROWS, 3))
 
     def find(self, r: Floats, p: Floats, margin: Floats) -> Touches:
         """Points nearer than the margins of the bodies, (n + 1,) m, allow.
@@ -123,11 +138,21 @@ class ShapeFinder:
         if len(s.apart):
             i, j = np.sort(s.body[pairs], axis=1).T
             pairs = pairs[~np.isin(i * (len(r) + 1) + j, s.apart)]
-        pairs = np.ascontiguousarray(pairs)
+        group, meets = s.bits[pairs].transpose(2, 0, 1)
+        pairs = pairs[((group & meets[:, ::-1]) != 0).any(axis=1)]
+        convex = without_formula(s.kind[pairs])
+        pairs, others = np.ascontiguousarray(pairs), pairs[convex]
         room = USUAL_POINTS * len(pairs) + 1
         while True:
             which, found = np.zeros((room, 3), dtype=np.int64), np.zeros((room, WIDTH))
-            count = touch(pairs, s.kind, centre, axes, s.size, near, self._scratch, which, found)
+            count = touch(
+                pairs[~convex], s.kind, centre, axes, s.size, near, self._scratch, which, found
+            )
+            if len(others):
+                count = touch_convex(
+                    others, s.kind, centre, axes, s.size, s.corners, s.vertices, near, self._work,
+                    which, found, count,
+                )  # fmt: skip
             if count <= room:
                 break
             room = count

@@ -34,6 +34,8 @@ if TYPE_CHECKING:
     click.option("--limits", type=click.Choice(["off", "soft", "hard"]), default="soft",
                  help="Limits of joints: soft stops, by default; hard ones, at which a rate ends "
                  "at once; or off."),
+    click.option("--contacts", is_flag=True,
+                 help="Let shapes meet each other, by time stepping."),
     click.option("--free-base", is_flag=True,
                  help="Free the base, where the format leaves open whether it is fixed."),
     click.option("--keep-fixed", is_flag=True, help="Keep fixed joints; do not merge their links."),
@@ -59,6 +61,7 @@ def import_model(
     root: str | None,
     positions: tuple[str, ...],
     limits: str,
+    contacts: bool,
     free_base: bool,
     keep_fixed: bool,
     balance_inertia: bool,
@@ -89,7 +92,7 @@ def import_model(
     scene, report = dap.import_model(
         file, format=kind, packages=_pairs("--package", packages), root=root, free_base=free_base,
         keep_fixed=keep_fixed, balance_inertia=balance_inertia, limits=limits,
-        shapes=not no_shapes, strict=strict, allow_code=allow_code,
+        contacts=contacts, shapes=not no_shapes, strict=strict, allow_code=allow_code,
         arguments=_pairs("--arg", arguments, ":="), positions=_numbers(positions),
     )  # fmt: skip
     folder = Path(output or Path(file).resolve().stem)

@@ -22,7 +22,7 @@ from dap3d_core.interface.formats.frames import Frame, axis_angle, from_quaterni
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import Scene
-from dap3d_core.scene.tables import GROUND, Element
+from dap3d_core.scene.tables import GROUND, LIMITS, Element
 
 #: Kinds of joints whose points may be apart along the axis.
 SLIDERS = ("prismatic", "cylindrical")
@@ -62,6 +62,13 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
         _add_joint(builder, joint, closes=True)
     add_gravity(builder, scene)
     add_forces(builder, scene)
+    for limited in scene.joints.values():
+        if not limited.fields.keys().isdisjoint(LIMITS):
+            leave_out(
+                remarks,
+                limited,
+                "lower and upper of a joint, where a rot_stop or plane_stop is written",
+            )
     for contact in scene.contacts.values():
         leave_out(remarks, contact, "contacts of other programs yield")
     for body in elements.bodies:
@@ -157,6 +164,9 @@ def geometries_of(builder: ModelBuilder, scene: Scene, body: str) -> list[Geomet
         elif element.type == "cylinder":
             size = (float(fields["radius"]), float(fields["length"]))
             geometries.append(Geometry("cylinder", size, pose, color=color))
+        elif element.type == "ellipsoid":
+            size = tuple(0.5 * float(edge) for edge in fields["size"])
+            geometries.append(Geometry("ellipsoid", size, pose, color=color))
         elif element.type == "mesh":
             scale = (float(fields.get("scale", 1.0)),) * 3
             geometries.append(Geometry("mesh", (), pose, fields["file"], scale, color))
@@ -357,7 +367,7 @@ def _add_stop(builder: ModelBuilder, element: Element) -> None:
     bound, is_least = sense * (at - zero) + 0.0, fields.get("side", "min") == "min"
     low, high = joint.limits[0].lower, joint.limits[0].upper
     ends = (max(low, bound), high) if is_least == (sense > 0.0) else (low, min(high, bound))
-    joint.limits = (Limits(*ends, float(fields["k"])),)
+    joint.limits = (Limits(*ends, float(fields["k"]) if "k" in fields else None),)
 
 
 def _of_plane(builder: ModelBuilder, element: Element) -> tuple[Joint, float, float] | None:

@@ -19,11 +19,12 @@ def plain_scene(checked: ValidatedScene) -> Scene:
     for name, p in zip(checked.body_names, checked.p.tolist(), strict=True):
         body = scene.bodies[name]
         body.p, body.rpy, body.axis_angle = tuple(p), None, None
+    rigid = [contact for contact in checked.contacts if contact.name in scene.forces]
     for elements, instances in (
         (scene.joints, checked.joints),
-        (scene.forces, checked.forces),
+        (scene.forces, [*checked.forces, *rigid]),
     ):
-        for instance in instances:
+        for instance in (i for i in instances if i.name in elements):  # joints bring others
             elements[instance.name] = _plain(elements[instance.name], instance, scene, checked)
     return scene
 

@@ -11,6 +11,8 @@ from dap3d_core.interface.formats.solids import inertia_moved, total_inertia
 
 #: Mass and inertia of a link without any that moves, as a part of what its joint carries.
 STAND_IN = 1e-11
+#: The same where contacts are to be stepped, which takes the equations of bodies.
+STEPPED = 1e-6
 #: Inertias below this part of that of what the joint carries are lost to rounding in a matrix that
 #: holds their reciprocals.
 LIGHT = 1e-9
@@ -45,6 +47,7 @@ def rigid_groups(
     fixed_base: bool,
     keep_fixed: bool,
     balance_inertia: bool = False,
+    stand_in: float = STAND_IN,
 ) -> tuple[dict[str, RigidGroup], dict[str, tuple[str, Frame]]]:
     """The groups of a model, and of each link its group and its frame in it.
 
@@ -54,6 +57,7 @@ def rigid_groups(
         fixed_base: links without a joint to a parent belong to the world.
         keep_fixed: fixed joints between moving links stay joints.
         balance_inertia: principal moments that no body has are replaced by their mean.
+        stand_in: STAND_IN or STEPPED.
 
     Raises:
         FormatError: a mass or an inertia is impossible.
@@ -88,7 +92,7 @@ def rigid_groups(
                 if link.inertial
             ]
             group_.inertial = total_inertia(parts) if parts else Inertial(0.0)
-    _stand_in(tree, groups, member, remarks)
+    _stand_in(tree, groups, member, stand_in, remarks)
     return groups, member
 
 
@@ -124,6 +128,7 @@ def _stand_in(
     tree: SpanningTree,
     groups: dict[str, RigidGroup],
     member: dict[str, tuple[str, Frame]],
+    stand_in: float,
     remarks: Remarks,
 ) -> None:
     """Give groups that move without mass, or without inertia, the least that can be computed.
@@ -140,7 +145,7 @@ def _stand_in(
             above = scales[WORLD if joint is None else member[joint.parent][0]]
             own = carried[name]
             scales[name] = (own[0] or above[0], own[1] or above[1])
-            _complete(groups[name], scales[name], remarks)
+            _complete(groups[name], scales[name], stand_in, remarks)
 
 
 def _carried(
@@ -163,19 +168,21 @@ def _carried(
     return carried
 
 
-def _complete(group: RigidGroup, scale: tuple[float, float], remarks: Remarks) -> None:
+def _complete(
+    group: RigidGroup, scale: tuple[float, float], stand_in: float, remarks: Remarks
+) -> None:
     """Complete mass and inertia of a group by parts of a mass and a moment of inertia."""
     place, old = group.links[0][0].place, group.inertial
     inertia = old.inertia
     least, _, most = np.linalg.eigvalsh(inertia).tolist()
-    moment = STAND_IN * max(scale[1], most)
-    if least <= max(SMALLEST * most, LOST * scale[1]):
+    moment, is_stepped = stand_in * max(scale[1], most), stand_in > STAND_IN
+    if least <= max(SMALLEST * most, (stand_in if is_stepped else LOST) * scale[1]):
         inertia = inertia + (moment - min(least, 0.0)) * np.eye(3)
     if not old.mass:
-        text = f"a link without mass that moves has {STAND_IN:g} of the mass that it carries"
-        remarks.translate(place, text)
+        text = f"a link without mass that moves has {stand_in:g} of the mass that it carries"
+        remarks.translate(place, text, motion=is_stepped)
     elif inertia is not old.inertia:
-        text = f"a moment of inertia of 0 is {STAND_IN:g} of that of what the joint carries"
-        remarks.translate(place, text)
-    group.light = not old.mass or most < LIGHT * scale[1]
-    group.inertial = Inertial(old.mass or STAND_IN * scale[0], old.com, inertia)
+        text = f"a moment of inertia of 0 is {stand_in:g} of that of what the joint carries"
+        remarks.translate(place, text, motion=is_stepped)
+    group.light = not is_stepped and (not old.mass or most < LIGHT * scale[1])
+    group.inertial = Inertial(old.mass or stand_in * scale[0], old.com, inertia)

@@ -23,6 +23,7 @@ class SceneBuilder:
         member: link -> its group, and its frame in it.
         groups: by name.
         bodies: group -> name of its body.
+        surfaces: coefficient of friction, and whether a shape is smooth -> name of a material.
         names: names in the scene.
         inertia: the inertias that joints see.
         limits: what becomes of limits of joints: "off", "soft" or "hard".
@@ -36,6 +37,7 @@ class SceneBuilder:
     limits: str
     names: Names = attrs.Factory(Names)
     bodies: dict[str, str] = attrs.Factory(dict)
+    surfaces: dict[tuple[float, bool], str] = attrs.Factory(dict)
 
     def attached(self, link: str, frame: Frame) -> tuple[str, Frame]:
         """A frame of a link as body and frame in its axes at its mass centre."""

@@ -10,9 +10,14 @@ from dap3d_core.formats.import_scene.couplings import add_couplings
 from dap3d_core.formats.import_scene.joint_forces import add_inputs, add_joint_forces
 from dap3d_core.formats.import_scene.joints import add_joint
 from dap3d_core.formats.import_scene.names import Names
-from dap3d_core.formats.import_scene.rigid_groups import RigidGroup, rigid_groups
+from dap3d_core.formats.import_scene.rigid_groups import (
+    STAND_IN,
+    STEPPED,
+    RigidGroup,
+    rigid_groups,
+)
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
-from dap3d_core.formats.import_scene.shapes import MeshFiles, add_shapes
+from dap3d_core.formats.import_scene.shapes import MeshFiles, add_collisions, add_shapes
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.formats.import_scene.start import couples, start_of
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Link
@@ -34,6 +39,12 @@ def _checked_limits(_: Any, __: Any, value: Any) -> None:
         raise FormatError(f"limits = {value!r}: should be one of {', '.join(LIMITS)}")
 
 
+def _checked_contacts(options: "ImportOptions", _: Any, contacts: bool) -> None:
+    if contacts and options.limits == "hard":
+        what = "contacts do not go with limits = hard, at which velocities jump by another law"
+        raise FormatError(what, remedy="take soft limits, or none")
+
+
 @attrs.frozen
 class ImportOptions:
     """Choices of the user that a model leaves open.
@@ -44,6 +55,7 @@ class ImportOptions:
         balance_inertia: principal moments that no body has are replaced by their mean.
         limits: of joints: one of LIMITS.
         positions, rates: of joints where the scene starts, by name, as the file counts them.
+        contacts: shapes meet each other.
     """
 
     free_base: bool = False
@@ -52,6 +64,7 @@ class ImportOptions:
     limits: str = attrs.field(default="soft", validator=_checked_limits)
     positions: dict[str, Sequence[float]] = attrs.Factory(dict)
     rates: dict[str, Sequence[float]] = attrs.Factory(dict)
+    contacts: bool = attrs.field(default=False, validator=_checked_contacts)
 
 
 def scene_of(
@@ -83,6 +96,7 @@ def scene_of(
     groups, member = rigid_groups(
         tree, remarks, fixed_base=base_fixed, keep_fixed=options.keep_fixed,
         balance_inertia=options.balance_inertia,
+        stand_in=STEPPED if options.contacts else STAND_IN,
     )  # fmt: skip
     if len(groups) == 1:
         raise FormatError("no link of the model moves", model.place)
@@ -108,6 +122,8 @@ def scene_of(
     for group in groups.values():
         for link, _ in group.links:
             add_shapes(builder, link, MeshFiles() if meshes is None else meshes)
+    if options.contacts:
+        add_collisions(builder, model)
     return scene
 
 

@@ -1,5 +1,6 @@
 """Shapes of links as shapes of a scene."""
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -7,7 +8,13 @@ import attrs
 
 from dap3d_core.formats.import_scene.names import usable
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
-from dap3d_core.interface.formats.articulation import Geometry, Link
+from dap3d_core.interface.formats.articulation import (
+    WORLD,
+    Articulation,
+    Contact,
+    Geometry,
+    Link,
+)
 from dap3d_core.interface.formats.frames import Frame, quaternion
 from dap3d_core.scene.validate.shapes import MESHES
 
@@ -43,13 +50,58 @@ def _plain(stem: str) -> str:
 
 
 def add_shapes(builder: SceneBuilder, link: Link, meshes: MeshFiles) -> None:
-    """Add the shapes of a link: those that are seen, or of contacts where it has no others."""
-    seen = [shape for shape in link.geometries if not shape.collision]
-    for shape in seen or link.geometries:
+    """Add the shapes of a link: those that are seen, or of contacts where it has no others.
+
+    And those that meet others.
+    """
+    seen = [shape for shape in link.geometries if not shape.collision] or link.geometries
+    for shape in link.geometries:
+        if shape not in seen and shape.contact is None:
+            continue
         body, at = builder.attached(link.name, shape.pose)
         for keyword, fields in _shapes(builder, shape, at, meshes):
             name = builder.names.free("shapes", f"{usable(link.name)}_{keyword}")
-            builder.scene.add_shape(keyword, name, body=body, color=shape.color or None, **fields)
+            given = fields | _meeting(builder, shape.contact)
+            builder.scene.add_shape(keyword, name, body=body, color=shape.color or None, **given)
+
+
+def _meeting(builder: SceneBuilder, contact: Contact | None) -> dict[str, Any]:
+    """Fields of a shape that meets others."""
+    if contact is None:
+        return {}
+    key = (contact.mu, contact.smooth)
+    name = builder.surfaces.setdefault(key, f"surface{len(builder.surfaces) + 1}")
+    bits = {"group": contact.group, "meets": contact.meets}
+    return {"collides": True, "material": name} | {n: x for n, x in bits.items() if x != 1}
+
+
+def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
+    """Add the materials of the shapes that meet, and pairs of bodies that do not."""
+    surfaces = list(builder.surfaces.items())
+    for k, ((mu, smooth), name) in enumerate(surfaces):
+        pairs = {
+            other: {"mu": 0.0 if smooth and and_smooth else max(mu, mu_other)}
+            for (mu_other, and_smooth), other in surfaces[k + 1 :]
+        }
+        given: dict[str, Any] = {"with_": pairs} if pairs else {}
+        builder.scene.add_material(name, mu=0.0 if smooth else mu, **given)
+    bodies = [tuple(builder.bodies[builder.member[link][0]] for link in pair)
+              for pair in (*model.excluded, *_beyond_rows(model))]  # fmt: skip
+    apart = dict.fromkeys(tuple(sorted(pair)) for pair in bodies if pair[0] != pair[1])
+    builder.scene.add_collisions(exclude=tuple(apart))
+
+
+def _beyond_rows(model: Articulation) -> Iterator[tuple[str, str]]:
+    """Links that joints in a row, with links between them that have nothing, hold together."""
+    above = {joint.child: joint.parent for joint in model.joints.values() if not joint.closes}
+    for name, link in model.links.items():
+        parent = above.get(name, WORLD) if link.geometries else WORLD
+        while parent != WORLD and not model.links[parent].geometries:
+            if model.links[parent].inertial is not None:
+                break
+            parent = above.get(parent, WORLD)
+            if parent != WORLD:
+                yield name, parent
 
 
 def _shapes(
@@ -58,8 +110,13 @@ def _shapes(
     """Keyword and fields of the shapes that draw a geometry."""
     at, z = float_tuple(frame.r), frame.A[:, 2]
     if shape.size and min(shape.size) <= 0.0:
-        builder.remarks.leave_out(shape.place, "a shape of size 0 is not drawn")
+        _leave_out(builder, shape, "a shape of size 0")
         return []
+    if shape.kind == "plane":
+        return [("plane", {"at": at, "normal": float_tuple(z)})]
+    if shape.kind == "ellipsoid":
+        size = tuple(2.0 * half for half in shape.size)
+        return [("ellipsoid", {"size": size, "at": at, "p": quaternion(frame.A)})]
     if shape.kind == "box":
         return [("box", {"size": shape.size, "at": at, "p": quaternion(frame.A)})]
     if shape.kind == "sphere":
@@ -67,6 +124,8 @@ def _shapes(
     if shape.kind in ("cylinder", "capsule"):
         radius, length = shape.size
         tube = {"radius": radius, "length": length, "at": at, "axis": float_tuple(z)}
+        if shape.contact is not None:
+            return [(shape.kind, tube)]
         caps = [
             ("sphere", {"radius": radius, "at": float_tuple(frame.r + side * z * length / 2.0)})
             for side in (1.0, -1.0)
@@ -75,23 +134,30 @@ def _shapes(
     if shape.kind == "mesh" and shape.mesh is not None:
         return _mesh(builder, shape, frame, meshes)
     if shape.kind != "mesh":
-        builder.remarks.leave_out(shape.place, f"a shape {shape.kind} is not drawn")
+        _leave_out(builder, shape, f"a shape {shape.kind}")
     return []
+
+
+def _leave_out(builder: SceneBuilder, shape: Geometry, what: str) -> None:
+    """Remark that a shape is left out."""
+    if shape.contact is None:
+        builder.remarks.leave_out(shape.place, f"{what} is not drawn")
+    else:
+        builder.remarks.leave_out(shape.place, f"{what} meets no others", motion=True)
 
 
 def _mesh(
     builder: SceneBuilder, shape: Geometry, frame: Frame, meshes: MeshFiles
 ) -> list[tuple[str, dict[str, Any]]]:
     if shape.mesh.suffix.lower() not in MESHES:
-        text = f"meshes other than {', '.join(MESHES)} are not drawn"
-        builder.remarks.leave_out(shape.place, text)
+        _leave_out(builder, shape, f"a mesh other than {', '.join(MESHES)}")
         return []
     uniform = len(set(shape.scale)) == 1 and shape.scale[0] > 0.0
     if not uniform:
-        text = "meshes with different or negative factors along their axes are not drawn"
-        builder.remarks.leave_out(shape.place, text)
+        _leave_out(builder, shape, "a mesh with different or negative factors along its axes")
         return []
     name = meshes.name(shape.mesh, (1.0, 1.0, 1.0))
+    builder.scene.files[name] = shape.mesh
     factor = shape.scale[0]
     fields = {"file": name, "at": float_tuple(frame.r), "p": quaternion(frame.A)}
     return [("mesh", fields | ({} if factor == 1.0 else {"scale": factor}))]

@@ -31,6 +31,7 @@ class SourceFiles:
         packages: name of a package -> its folder.
         allow_code: whether the user allows that code of the file is run.
         shapes: whether files of shapes are looked for.
+        contacts: whether shapes are to meet each other.
         arguments: of macros, by name.
         unused: names of arguments that the file has not asked for.
         remarks: of the import.
@@ -42,6 +43,7 @@ class SourceFiles:
     packages: Mapping[str, Path] = attrs.Factory(dict)
     allow_code: bool = False
     shapes: bool = True
+    contacts: bool = False
     arguments: Mapping[str, str] = attrs.Factory(dict)
     unused: set[str] = attrs.Factory(lambda self: set(self.arguments), takes_self=True)
     remarks: Remarks = attrs.Factory(Remarks)

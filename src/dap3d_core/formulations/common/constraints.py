@@ -1,4 +1,4 @@
-"""Common parts of formulations with joints: rows, factors, projection onto constraints, reports.
+"""Common parts of formulations with joints: rows, factors, residuals, reports.
 
 Each formulation compiles what it uses of them. ``part`` says which matrix is factored: None for
 [I D^^T; D^ 0], which needs independent rows, a number for [I D^^T; D^ -E] with e_i = part |D^_i|^2.
@@ -18,15 +18,13 @@ from dap3d_core.assembly.arrays import (
     LENGTH,
     POSITION,
     SCRATCH,
-    TOLERANCE_C,
-    TOLERANCE_V,
     TURNED,
     VALUE,
     WRENCH,
     Floats,
     System,
 )
-from dap3d_core.assembly.evaluate import (
+from dap3d_core.assembly.evaluate import (  # noqa: F401  read by projection.py
     call_kinds,
     largest_weighted,
     place,
@@ -36,7 +34,7 @@ from dap3d_core.assembly.evaluate import (
     scale_velocities,
     zero,
 )
-from dap3d_core.assembly.state_update import (
+from dap3d_core.assembly.state_update import (  # noqa: F401  read by projection.py
     apply_displacement,
     apply_velocity_change,
     normalise,
@@ -56,21 +54,9 @@ from dap3d_core.linear.ldlt.factor import (
 )
 from dap3d_core.linear.ldlt.saddle_point import add_product, scale_blocks, solve_saddle
 
-#: Newton passes of one projection; the second already reaches rounding.
-PASSES = 5
-
 #: e_i of regularised factors as part of the squared length of row i: far above rounding, and small
 #: enough that two passes leave nothing of a row that is a tenth independent of the others.
 PART = 1e-9
-
-#: Where a pass with the factors of another pose leaves more than this part of the residual, the
-#: next has new ones: with very different masses a small turn changes which body gives way.
-REFACTOR_RATIO = 0.1
-
-#: A residual that stays above this many times the tolerance means that the projection did not find
-#: the constraints: with independent rows, and where redundant ones may misfit (by FIT of
-#: simulation/initial/assemble.py).
-PROJECTION_FAILURE_FACTOR, REDUNDANT_FAILURE_FACTOR = 1e6, 1e8
 
 
 @compiled_into
@@ -207,64 +193,20 @@ def correct(system: System) -> None:
 
 
 @compiled_into
-def project_onto(
-    t: float,
-    y: Floats,
-    out: Floats,
-    system: System,
-    loops: Any,
-    part: float | None,
-    kept: bool,
-) -> None:
-    """Move a state onto its constraints, by the least change in the metric of the masses.
+def displace(y: Floats, system: System) -> None:
+    """Move bodies by the least change that removes C, ``residual``."""
+    correct(system)
+    apply_displacement(y, system)
+    place_bodies(y, system.body, system.metric)
 
-    With regularised factors the passes are those of the proximal method as well: each leaves a
-    ``part`` of what the one before has left.
 
-    out: on entry 1.0 where rhs was evaluated last at this very t and y: D^ is valid,
-    and the factors, too, if rhs leaves those of ``part`` (``kept``). Then: 1.0 if y changed beyond
-    rounding; 1.0 if it did not converge, 2.0 if the pose is close to a singular one; largest
-    residuals of position and velocity; lengths (nodes) that go linearly through zero at a singular
-    pose.
-    """
-    metric = system.metric
-    n = metric.shape[0] - 1
-    lost = PROJECTION_FAILURE_FACTOR if part is None else REDUNDANT_FAILURE_FACTOR
-    linear = out[0] == 1.0
-    factored = linear and kept
-    stale = False
-    out[0] = out[1] = 0.0
-    normalise(y, n)
-    if not linear:
-        place(t, y, system, loops)
-    worst = residuals(t, system, loops)
-    limit = system.settings[TOLERANCE_C] * size_of_positions(y, n, system.settings[LENGTH])
-    if not worst <= limit:
-        if not linear:
-            linearise(t, system, loops)
-        if not factored:
-            factorise_anyway(system, part)
-        for _ in range(PASSES):
-            before = worst
-            correct(system)
-            apply_displacement(y, metric, system.change)
-            place_bodies(y, system.body, metric)
-            worst = residuals(t, system, loops)
-            if not worst > limit or not worst < 0.5 * before:
-                break
-        linear, factored = False, part is None  # of old factors the null space would be wrong
-        stale = factored
-        out[0] = 1.0
-        if not worst <= lost * limit:
-            out[1] = 1.0
-    out[2] = worst
-    if not linear:
-        linearise(t, system, loops)
-    if not factored:
-        factorise_anyway(system, part)
-    project_velocities(y, out, system, part, stale)
-    if is_poor(t, system, loops, part, out[4:]) and out[1] == 0.0:
-        out[1] = 2.0
+@compiled_into
+def change_velocities(y: Floats, system: System) -> float:
+    """Change velocities by the least that removes D v - nu; the largest that is left."""
+    correct(system)
+    apply_velocity_change(y, system.metric, system.change)
+    add_product(system.blocks, system.D, system.change, system.residual)
+    return largest_weighted(system.residual, system.weight)
 
 
 @compiled_into
@@ -274,38 +216,6 @@ def is_poor(t: float, system: System, loops: Any, part: float | None, lengths: F
         linearise_evenly(t, system, loops)
         factorise(system, part)
     return pivot_lengths(system.nodes, system.K, system.smallest, lengths) > 0
-
-
-@compiled_into
-def project_velocities(
-    y: Floats, out: Floats, system: System, part: float | None, stale: bool
-) -> None:
-    """The velocities' part of ``project_onto``, at D^ of this pose.
-
-    stale: the factors are those of the pose before positions moved.
-    """
-    n = system.metric.shape[0] - 1
-    worst = velocity_residuals(system)
-    limit = system.settings[TOLERANCE_V] * size_of_velocities(y, n, system.settings[LENGTH])
-    if not worst <= limit:
-        for _ in range(PASSES):
-            before = worst
-            correct(system)
-            apply_velocity_change(y, system.metric, system.change)
-            add_product(system.blocks, system.D, system.change, system.residual)
-            worst = largest_weighted(system.residual, system.weight)
-            if not worst > limit or not (stale or worst < 0.5 * before):
-                break
-            if stale and not worst < REFACTOR_RATIO * before:
-                factorise_anyway(system, part)
-                stale = False
-        out[0] = 1.0
-        if (
-            not worst
-            <= (PROJECTION_FAILURE_FACTOR if part is None else REDUNDANT_FAILURE_FACTOR) * limit
-        ):
-            out[1] = 1.0
-    out[3] = worst
 
 
 @compiled

@@ -18,6 +18,7 @@ import numpy as np
 from dap3d_core.assembly.arrays import FRICTION, JAMS, UNSETTLED, Floats, System
 from dap3d_core.assembly.evaluate import call_kinds, zero
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import where
 
 #: The multipliers have settled where a pass changes them by less than this part of the largest.
 SETTLED = 1e-10
@@ -25,6 +26,17 @@ SETTLED = 1e-10
 PASSES = 25
 #: Differences of passes that are kept of forces on reactions; then they begin anew.
 DEPTH = 8
+
+
+def forces_by(t: float, system: System, loops: Any, Lam: Floats) -> Floats:
+    """(6 (n + 1),) the forces that depend on multipliers, for some (rows,), at the current poses.
+
+    Force and moment about the mass centre of each body, ground first, global axes.
+    """
+    force, minus = np.zeros_like(system.force), np.zeros_like(system.multipliers)
+    minus[system.row] = -Lam
+    call_kinds(FRICTION, FRICTION, t, system, loops, force, minus, minus)
+    return force
 
 
 @compiled
@@ -66,15 +78,15 @@ def apply_friction(t: float, system: System, loops: Any) -> float:
 def memory_size(bodies: int, rows: int, matrix: int) -> int:
     """Numbers of ``System.friction``.
 
-    They are forces of the bodies (ground too), passes of the rows; then weights of the rows and a
-    copy of ``K`` (regularised.py).
+    They are forces of the bodies (ground too), passes of the rows, 1.0 for each row that is read,
+    0.0 for others; then weights of the rows and a copy of ``K`` (regularised.py).
     """
-    return 12 * bodies + (4 + 2 * DEPTH) * rows + matrix
+    return 12 * bodies + (5 + 2 * DEPTH) * rows + matrix
 
 
 @compiled
 def accelerate_fixed_point(system: System, passes: int) -> bool:
-    """True if ``multipliers`` have settled; else they become the start of the next pass."""
+    """True if ``multipliers`` that are read have settled; else they start the next pass."""
     x, rows = system.multipliers, system.multipliers.shape[0]
     memory = system.friction[2 * system.force.shape[0] :]
     guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows : 3 * rows]
@@ -82,10 +94,11 @@ def accelerate_fixed_point(system: System, passes: int) -> bool:
         for k in range(rows):
             guess[k] = x[k]
         return False
-    size, largest_change = 0.0, 0.0
+    size, largest_change, is_read = 0.0, 0.0, memory[(3 + 2 * DEPTH) * rows :]
     for k in range(rows):
-        size = max(size, abs(x[k]))
-        largest_change = max(largest_change, abs(x[k] - guess[k]))
+        of_all, of_change = abs(x[k]), is_read[k] * abs(x[k] - guess[k])
+        size = where(of_all > size, of_all, size)
+        largest_change = where(of_change > largest_change, of_change, largest_change)
     if not largest_change > SETTLED * size:
         return True
     if passes == PASSES:

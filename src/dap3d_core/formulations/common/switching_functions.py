@@ -5,15 +5,7 @@
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import (
-    ANGLE,
-    DOUBTFUL,
-    KNOT,
-    SCRATCH,
-    SWITCH,
-    Floats,
-    System,
-)
+from dap3d_core.assembly.arrays import ANGLE, DOUBTFUL, KNOT, SCRATCH, SWITCH, Floats, System
 from dap3d_core.assembly.evaluate import call_kinds, place, place_state
 from dap3d_core.assembly.turns import (
     doubtful_angles,

@@ -115,6 +115,29 @@ def sweep(
             break
 
 
+@compiled
+def shorten(
+    A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats, F: Floats, none: Floats,
+    step: Floats, new: Floats, best: float,
+) -> float:  # fmt: skip
+    """The residual at ``new``, which is x and the first part of a step that makes it less.
+
+    The parts are 1, 1/2, ...; infinite where none does.
+    """
+    part = 1.0
+    for _ in range(CUTS):
+        for q in range(x.shape[0]):
+            new[q] = x[q] + step[q] * part
+        residual_of(A, b, mu, new, r, more, F, none)
+        size = total = 0.0
+        for q in range(x.shape[0]):
+            size, total = max(size, abs(F[q])), total + abs(F[q])
+        if (size < best) & (total < np.inf):  # else not numbers
+            return size
+        part *= 0.5
+    return np.inf
+
+
 def _newton(
     A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats
 ) -> tuple[Floats, float]:
@@ -128,13 +151,9 @@ def _newton(
             break
         residual_of(A, b, mu, x, r, more, F, S)
         step = np.linalg.lstsq(S, -F, rcond=1e-13)[0]
-        for cut in range(CUTS):
-            new = x + step * 0.5**cut
-            residual_of(A, b, mu, new, r, more, F, none)
-            size = float(np.abs(F).max())
-            if size < best:
-                x, best = new, size
-                break
-        else:
+        new = np.empty_like(x)
+        size = shorten(A, b, mu, x, r, more, F, none, step, new, best)
+        if not size < best:
             break
+        x, best = new, size
     return x, best

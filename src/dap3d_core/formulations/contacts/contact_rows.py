@@ -1,6 +1,7 @@
 """The contacts of a model at one state: gaps, rows, forces, as arrays of Python."""
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,8 @@ class ContactTable:
         names: of each point of contact.
         mu, mu_s, e: (m,) coefficients of friction and restitution.
         newton: (m,) True where the law of impact is Newton's.
+        turns: (m,) 1 of those whose gap or slip is an angle, 0 of others.
+        load: (m,) 1 of friction that is the same under any load, of which mu is the size; else 0.
         mode, way, near: (m,), (m, 3), (m, 3) where each has them among the states of elements.
     """
 
@@ -34,6 +37,7 @@ class ContactTable:
         self.evaluator, self.count = evaluator, model.contact_count
         first = len(model.joint_names) - self.count
         self.names = model.contact_names
+        self.turns, self.load = np.zeros((2, self.count))
         self.newton = np.array([law == "newton" for law in model.contact_laws], dtype=bool)
         self.numbers = {name: np.zeros(self.count) for name in ("mu", "mu_s", "e")}
         self.mode = np.zeros(self.count, dtype=np.int64)
@@ -42,6 +46,8 @@ class ContactTable:
         places = {(s.element, s.name): s.first for s in model.element_states if s.kind == "joint"}
         for group in model.contacts:
             which, layout = group.members - first, group.type_info.layout
+            type_: Any = group.type_info.type
+            self.turns[which], self.load[which] = type_.at is None, type_.along is not None
             for name, values in self.numbers.items():
                 values[which] = group.numbers[:, layout.numbers[name][0]]
             self.mode[which] = [places[self.names[k], "mode"] for k in which]
@@ -116,8 +122,9 @@ class ContactRows:
 
     @cached_property
     def frames(self) -> Floats:
-        """(m, 3, 3) normal and tangents of each contact, global axes."""
-        blocks = self.G.reshape(-1, 3, len(self.v) // 6, 6)[..., :3]
+        """(m, 3, 3) normal and tangents of each contact, or the axis of a moment; global axes."""
+        blocks = self.G.reshape(-1, 3, len(self.v) // 6, 6)
+        blocks = blocks[..., :3] + blocks[..., 3:] * self._table.turns[:, None, None, None]
         found = np.zeros((len(blocks), 3, 3))
         slots = self._table.evaluator.model.joint_slots[-len(blocks) :]
         for k, bodies in enumerate(slots):

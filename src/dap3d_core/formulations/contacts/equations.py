@@ -28,16 +28,17 @@ from dap3d_core.assembly.evaluate import (
     state_rates,
     zero,
 )
+from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     evaluate_forces,
     factorise,
     linearise,
     power_of_drivers,
-    project_onto,
     report_levels,
     report_multipliers,
     solve_rows,
 )
+from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import is_differentiated
@@ -50,8 +51,8 @@ PART, SMALLER, LEAST = 1e-4, 1e-3, 1e-11
 #: rounding alone, which rows that depend on each other enlarge.
 PASSES, FALLING, SETTLED, NOISE = 12, 0.1, 1e-12, 1e-9
 #: Columns of ``System.contacts``: of each point its loop and where its integers and numbers begin,
-#: its first row, its bodies, its first state.
-LOOP, INTEGERS, NUMBERS, ROW, BODY_I, BODY_J, STATE, COLUMNS = range(8)
+#: its first row, its bodies, its first state; 1 of friction that is the same under any load.
+LOOP, INTEGERS, NUMBERS, ROW, BODY_I, BODY_J, STATE, LOADED, COLUMNS = range(9)
 #: Places in a column, from its end.
 PLACE, FORCE, POWER = 1, 2, 3
 #: Of a contact's states: mode; then the direction of sliding, and from here on what it is given.
@@ -79,7 +80,7 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     force, closed = system.friction[size : 2 * size], 0
     for c in range(contacts.shape[0]):
         closed |= mode_of(system, c) > _OPEN
-        if is_given(system, c):
+        if is_given(system, c) or (contacts[c, LOADED] == 1 and is_sliding(system, c)):
             power += force_of(t, c, force, system.acceleration, system, loops)
     if closed == 0 and system.row.shape[0] == 3 * contacts.shape[0]:
         return power
@@ -198,7 +199,7 @@ def add_columns(t: float, system: System, loops: Any) -> int:
     """
     size, count, contacts, x = system.acceleration.shape[0], 0, system.contacts, system.multipliers
     for c in range(contacts.shape[0]):
-        if is_sliding(system, c):
+        if is_sliding(system, c) and contacts[c, LOADED] == 0:
             own = column(system, count)
             friction_of_one(t, c, own, system, loops)
             zero(x)
@@ -318,7 +319,7 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 @compiled
 def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """Move a state onto its constraints; out as in ``project_onto``."""
-    project_onto(t, y, out, system, loops, PART, True)
+    project_onto(t, y, out, system, loops, constraints, PART, True, True)
 
 
 @compiled

@@ -7,7 +7,7 @@ import numpy as np
 
 from dap3d_core.formulations.contacts.cone import solve_cone
 from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.array_types import Floats, Integers
 
 #: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
 #: is zero; part of the largest entry of A below which rows depend on each other.
@@ -96,7 +96,7 @@ def _put_modes(
             _put(table, rows, closed, {}, limit, found, inner)
             return
         which = rows.rows_of(closed)
-        if not left and _share(rows.W[np.ix_(which, which)]):
+        if not left and _share(table, closed, rows.W[np.ix_(which, which)]):
             # what each of them carried was a choice, and so is the direction of it
             _put(table, rows, closed, {}, limit, found, loose=True)
             return
@@ -146,7 +146,7 @@ def _matrix(
     for k, c in enumerate(closed):
         if c in ways:
             A[:, 3 * k] -= table.mu[c] * full[:, 3 * k + 1 : 3 * k + 3] @ ways[c]
-            if A[3 * k, 3 * k] <= 0.0:
+            if A[3 * k, 3 * k] <= 0.0 and not table.load[c]:
                 raise JamError(table.names[c])
     return A, ways
 
@@ -156,16 +156,19 @@ def _solve(
     part: float = 1.0, *, loose: bool = False, **more: Any,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Forces (3 k,) with sliding friction, and accelerations; A, ways: of ``_matrix``."""
-    b = rows.free[rows.rows_of(closed)]
+    b, load = rows.free[rows.rows_of(closed)].copy(), table.load[closed]
+    for k, c in enumerate(closed):
+        if c in ways and load[k]:  # the column of its normal row is what a load of one does
+            b += A[:, 3 * k]
     mu = LOOSE * table.mu[closed] if loose else part * table.mu_s[closed]
     mu[[c in ways for c in closed]] = 0.0
-    x, left = solve_cone(A, b, mu, **more)
+    x, left = solve_cone(A, b, mu, load, **more)
     if left > 1e-6 and not more:
         raise JamError(table.names[closed[0]])
     a = A @ x + b
     for k, c in enumerate(closed):
         if c in ways:
-            x[3 * k + 1 : 3 * k + 3] = -table.mu[c] * x[3 * k] * ways[c]
+            x[3 * k + 1 : 3 * k + 3] = -table.mu[c] * (x[3 * k] + load[k]) * ways[c]
     return x, a
 
 
@@ -182,13 +185,14 @@ def _put(
     A, ways = _matrix(table, rows, closed, sliding, limit)
     x, a = _solve(table, rows, closed, A, ways, loose=loose)
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
-    shares = _share(A)
+    shares = _share(table, closed, A)
     if inner is None and not loose:
         inner = _inside(table, rows, closed, sliding, limit)
     x = x if inner is None else inner
     for k, c in enumerate(closed):
         force, rate, frame = x[3 * k : 3 * k + 3], a[3 * k : 3 * k + 3], rows.frames[c]
-        if force[0] <= 0.0 and (rate[0] > ZERO * big or (len(closed) == 1 and rate[0] > -ZERO)):
+        is_pushed = force[0] > 0.0 or table.load[c]
+        if not is_pushed and (rate[0] > ZERO * big or (len(closed) == 1 and rate[0] > -ZERO)):
             continue  # it opens
         if c in ways:
             mode, way = 1.0, ways[c]
@@ -200,13 +204,23 @@ def _put(
         else:
             mode, way = 2.0, np.zeros(2)
         found.mode[c], found.way[c] = mode, way @ frame[1:]
-        if shares:
+        if shares or table.load[c]:  # what its row adds has next to no rounding then
             found.near[c] = force @ frame if mode == 2.0 else force[0] * frame[0]
 
 
-def _share(A: Floats) -> bool:
+def _share(table: ContactTable, closed: list[int], A: Floats) -> bool:
     """True if forces of contacts may change without a change of the motion."""
-    return bool(np.linalg.matrix_rank(A, tol=DEPENDENT * np.abs(A).max()) < len(A))
+    own = _own_rows(table, closed)
+    block = A[np.ix_(own, own)]
+    return bool(np.linalg.matrix_rank(block, tol=DEPENDENT * np.abs(A).max()) < len(own))
+
+
+def _own_rows(table: ContactTable, closed: list[int]) -> Integers:
+    """Rows along which contacts act: of smooth ones the normal, of friction alone the second."""
+    acts = np.ones((len(closed), 3), dtype=bool)
+    acts[:, 1:] = (table.mu_s[closed] > 0.0)[:, None]
+    acts[table.load[closed] > 0.0] = False, True, False
+    return np.flatnonzero(acts)
 
 
 def _inside(
@@ -220,12 +234,13 @@ def _inside(
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
     best, low, high = None, 0, len(INSIDE) - 1
     A, ways = _matrix(table, rows, closed, sliding, limit)
-    if not _share(A):
+    if not _share(table, closed, A):
         return None
+    own = _own_rows(table, closed)
     while low <= high:  # what one part allows, so does every larger one
         k = high if best is None else (low + high) // 2
         x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=best, tries=3)
-        if np.abs(a).max() <= min(HELD, OF_REST * (1.0 - INSIDE[k])) * big:
+        if np.abs(a[own]).max() <= min(HELD, OF_REST * (1.0 - INSIDE[k])) * big:
             best, high = x, k - 1
         elif best is None:
             return None

@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -12,6 +13,8 @@ from dap3d_core.assembly.arrays import Floats, Integers, System
 from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.joint_motion import ModelMotions
 from dap3d_core.assembly.tree_arrays import KeptRowArrays, TreeArrays
+from dap3d_core.formulations import FUNCTIONS
+from dap3d_core.formulations.coordinates import Coordinates
 from dap3d_core.formulations.joint.equations import body_state
 from dap3d_core.formulations.joint.node_layout import (
     CENTRE,
@@ -47,7 +50,8 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.ordering.spanning_forest import SpanningForest, spanning_forest
 from dap3d_core.model import Model
-from dap3d_core.model.state_layout import split, u_from_y, velocities_of
+from dap3d_core.model.rotations import euler_rates
+from dap3d_core.model.state_layout import join, split, u_from_y, velocities_of
 from dap3d_core.registry.suggestions import some
 
 if TYPE_CHECKING:
@@ -72,15 +76,15 @@ NOUNS = {
 RATES = ("angle_rates", "length_rates", "rotation_rates", "pose_rates")
 
 
-class Coordinates:
+class TreeCoordinates(Coordinates):
     """Joint coordinates of a model on a spanning tree of its joints, with their rates.
 
     Attributes:
-        size, length_count: as of ``formulations.coordinates.Coordinates``.
-        equations: the package of formulations that has the compiled functions.
         nodes: of the tree.
         kept: joints that are not in the tree, whose rows are kept, and the reasons in words.
     """
+
+    are_of_bodies = False
 
     def __init__(self, evaluator: "Evaluator") -> None:
         """Give an evaluator the arrays of a tree.
@@ -98,16 +102,21 @@ class Coordinates:
         self.length_count = len(self.kept)
         if self.kept:  # their loads pass a body with the factors of its inertia
             self.nodes.table[:, FLAGS] &= ~IS_ALONE
-        self.equations = "joint_loops" if self.kept else "joint"
         #: The last start of a run: u, the constants of the tree, y.
         self._last: tuple[Floats, Floats, Floats] | None = None
         rows = _kept_rows(evaluator, self.nodes, tuple(self.kept)) if self.kept else None
         self._cost_ratio = rows[1] if rows else 0.0
         evaluator.system = _with_tree(evaluator, self.nodes, tree, rows[0] if rows else None)
+        self.reference = (self._tree.constants,)
+
+    def function(self, k: int) -> Any:
+        """As of ``Coordinates``."""
+        name = "joint_loops" if self.kept else "joint"
+        return getattr(import_module(f"dap3d_core.formulations.{name}"), FUNCTIONS[k])
 
     @property
     def quantities(self) -> list[str]:
-        """As of ``formulations.coordinates.Coordinates``."""
+        """As of ``Coordinates``."""
         found: list[str] = []
         for name, letters in QUANTITIES.items():
             found += letters * (self.nodes.layout.length(name) // len(letters))
@@ -115,7 +124,7 @@ class Coordinates:
 
     @property
     def bodies(self) -> Integers:
-        """(size,) body that each component moves, from 0; -1 of states of elements."""
+        """As of ``Coordinates``."""
         table, found = self.nodes.table, np.full(self.size, -1)
         for motion, (_, _, size, rate_size) in SEGMENTS.items():
             nodes = 1 + np.flatnonzero(table[1:, MOTION] == motion)
@@ -124,8 +133,18 @@ class Coordinates:
                 found[places] = self.nodes.frame[nodes][:, None] - 1
         return found
 
+    @property
+    def names(self) -> list[str]:
+        """As of ``Coordinates``."""
+        return [str(1 + k) for k in range(self.size)]
+
+    @property
+    def suits_batches(self) -> bool:
+        """As of ``Coordinates``: numbers of kept rows and of elements' states are of one run."""
+        return not self.kept and not self.evaluator.model.state_count
+
     def structure(self) -> tuple[str, str]:
-        """As of ``formulations.coordinates.Coordinates``."""
+        """As of ``Coordinates``."""
         table = self.nodes.table[1:, MOTION]
         counts = {motion: int(np.count_nonzero(table == motion)) for motion in NOUNS}
         parts = [f"{n} {NOUNS[motion][n > 1]}" for motion, n in counts.items() if n]
@@ -135,7 +154,7 @@ class Coordinates:
 
     @property
     def notes(self) -> list[str]:
-        """As of ``formulations.coordinates.Coordinates``."""
+        """As of ``Coordinates``."""
         notes = [f"method joint: {self._kept_words()}"] if self.kept else []
         if self._cost_ratio > COSTLY:
             notes.append(
@@ -194,7 +213,7 @@ class Coordinates:
         return reference.state()
 
     def inertia_places(self, bodies: Integers) -> Integers:
-        """(7 b,) indices in the tree's constants of the mass and inertia of bodies, from 1."""
+        """(7 b,) indices in the tree's constants of the mass and inertia of each."""
         first = CONSTANT_WIDTH * self._node_of[bodies] + MASS
         places: Integers = (first[:, None] + np.arange(7)).ravel()
         return places
@@ -206,14 +225,14 @@ class Coordinates:
         return inertias_about(centre, mass, Jp).reshape(len(mass), -1)
 
     def body_states(self, y: Floats) -> Floats:
-        """States (k, ...) in coordinates of bodies of states (k, size + 1)."""
+        """As of ``Coordinates``."""
         out = np.empty((len(y), self.evaluator.model.integrated_layout.size))
         for state, row in zip(y, out, strict=True):
             body_state(state, row, self.evaluator.system)
         return out
 
     def placer(self, y: Floats) -> Callable[[], object]:
-        """As of ``formulations.coordinates.Coordinates``."""
+        """As of ``Coordinates``."""
         out = np.empty(self.evaluator.model.u0.size + 1)
         return prepared(body_state, y, out, self.evaluator.system)
 
@@ -225,7 +244,7 @@ class Coordinates:
         return continued
 
     def with_jump(self, y: Floats, dv: Floats, states: Floats, work: float) -> Floats:
-        """As of ``formulations.coordinates.Coordinates``."""
+        """As of ``Coordinates``."""
         u = u_from_y(self.body_states(y[None]), len(states))[0]
         velocities_of(u)[:] += dv
         moved = Reference(self.nodes, self.evaluator.model, u).state()
@@ -237,9 +256,22 @@ class Coordinates:
         after[-1] += work
         return after
 
+    def u_dot(self, t: float, u: Floats) -> Floats:
+        """As of ``Coordinates``."""
+        _, p, v, w = split(u)
+        a, alpha = np.hsplit(self.report(t, u)[: w.size * 2].reshape(-1, 6), 2)
+        return join(v, euler_rates(p, w), a, alpha)
+
+    def report(self, t: float, u: Floats) -> Floats:
+        """As of ``Coordinates``; its coordinates are not those of the run, whose turns count."""
+        out = super().report(t, u)
+        angles = self.evaluator.model.report_layout["angles"]
+        out[angles] = self.evaluator.counted_angles(t, u)
+        return out
+
     @contextmanager
     def at(self, u: Floats) -> Iterator[Floats]:
-        """The state y of a state u; the reference of a run is restored afterwards."""
+        """As of ``Coordinates``; the reference of a run is restored afterwards."""
         tree = self._tree
         arrays = [tree.constants, *([tree.kept.smallest, tree.kept.settings] if self.kept else [])]
         before = [array.copy() for array in arrays]

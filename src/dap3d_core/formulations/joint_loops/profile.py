@@ -25,6 +25,7 @@ from dap3d_core.formulations.joint_loops.layout import (
 )
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import where
 from dap3d_core.linear.ldlt.factor import SINGULAR_NODE_RATIO, SINGULAR_PIVOT_RATIO
 
 #: Solutions at most where rows may depend on each other. One leaves some ``PART`` of what lacked
@@ -65,7 +66,8 @@ def weigh_kept_rows(system: System, part: float) -> None:
                 kept.compliance[cuts[c + FIRST] + r] += shift + x * x + y * y + z * z
     for j in range(kept.compliance.shape[0]):
         diagonal = kept.matrix[kept.profile[j, PLACE] + j]
-        kept.compliance[j] = part * max(diagonal, LEAST_FREE * kept.compliance[j])
+        least = LEAST_FREE * kept.compliance[j]
+        kept.compliance[j] = part * where(least > diagonal, least, diagonal)
 
 
 @compiled
@@ -111,8 +113,9 @@ def solve_profile(system: System) -> None:
         substitute(system, z)
         change, total = 0.0, 0.0
         for k in range(size):
-            change = max(change, E[k] * (z[k] - x[k]) * (z[k] - x[k]))
-            total = max(total, E[k] * z[k] * z[k])
+            of_change, of_all = E[k] * (z[k] - x[k]) * (z[k] - x[k]), E[k] * z[k] * z[k]
+            change = where(of_change > change, of_change, change)
+            total = where(of_all > total, of_all, total)
             x[k] = z[k]
         if not change > PROFILE_ROUNDING * total or not change < FALLING * before:
             return

@@ -19,12 +19,7 @@ from dap3d_core.formulations.joint.node_layout import (
     SPHERICAL,
 )
 from dap3d_core.formulations.joint.tree_nodes import TreeNodes
-from dap3d_core.formulations.joint_loops.layout import (
-    CUT_WIDTH,
-    END_WIDTH,
-    PAIR_WIDTH,
-    STEP_WIDTH,
-)
+from dap3d_core.formulations.joint_loops.layout import CUT_WIDTH, END_WIDTH, PAIR_WIDTH, STEP_WIDTH
 from dap3d_core.interface.codegen.loop_source import stride
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.ordering.spanning_forest import CARRY

@@ -75,7 +75,7 @@ class JumpLaw:
         """Args: the evaluator of the model."""
         self._evaluator = in_bodies = evaluator
         self.elements = JumpElements(evaluator)
-        if evaluator.formulation.has_own_coordinates:  # it has no factors
+        if not evaluator.coordinates.are_of_bodies:  # they have no factors
             in_bodies = Evaluator(evaluator.model, "lsq")
         self._held = in_bodies
         has_rows, redundant = evaluator.model.row_count > 0, in_bodies.formulation.accepts_redundant

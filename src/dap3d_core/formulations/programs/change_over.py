@@ -33,6 +33,8 @@ MOST_BODIES = 64
 #: Programs whose guards fail more often are given up: by the function, as parts of the right-hand
 #: sides, or projections, of the call.
 MOST_FAILURES = {WATCH: 0.5, PROJECT: 0.5, RHS: 0.05}
+#: At most, where projections take one way: made anew they take all.
+MOST_OF_ONE_WAY = 0.2
 
 
 @attrs.define
@@ -43,12 +45,16 @@ class Record:
         programs: as ``load_programs`` returns them; empty as long as there are none.
         reason: why there are none and will be none; "" while there may be.
         is_requested: True if they are being compiled by another process.
+        takes_all_ways: True if projections do (ways.py).
+        first: the states at which the first ones were made here.
         anew: time and state at which they are made anew, as guards of the first ones failed.
     """
 
     programs: dict[int, Any] = attrs.field(factory=dict)
     reason: str = ""
     is_requested: bool = False
+    takes_all_ways: bool = False
+    first: "tuple[Floats, ...]" = ()
     anew: "tuple[float, Floats] | None" = None
 
 
@@ -131,7 +137,9 @@ class ChangeOver:
             addresses[:] = general
         rhs, projections = (after - before for after, before in zip(counts(), done, strict=True))
         for (k, program), before in zip(replaced, failures, strict=True):
-            most = MOST_FAILURES[k] * (projections if k == PROJECT else rhs)
+            is_final = record.takes_all_ways or record.anew is not None
+            most = MOST_FAILURES[k] if is_final else min(MOST_FAILURES[k], MOST_OF_ONE_WAY)
+            most *= projections if k == PROJECT else rhs
             if program.failures() - before > 1 + most:
                 _give_up(record, program, k, start())
 
@@ -173,13 +181,17 @@ class ChangeOver:
         if stored is None:
             if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
                 return
+            place = record.anew or start()
+            others = record.first if record.anew else None
+            record.first = (place[1],)
             text, written = scene_program.write_programs(
-                evaluator, name, *(record.anew or start()), self._varied
+                evaluator, name, *place, self._varied, others
             )
             if BESIDE and path is not None and optimiser.request(text, written, path):
                 record.is_requested = True
                 return
             stored = written, objects.optimised(text, written, path)
+        record.takes_all_ways = scene_program.ALL_WAYS in stored[0]
         record.programs = scene_program.load_programs(evaluator, name, *stored)
 
 
@@ -187,9 +199,9 @@ def _give_up(record: Record, program: Any, k: int, place: "tuple[float, Floats]"
     """Take other code from here on where guards of a program fail too often.
 
     First programs made at a state as they are now, whose branches may be others: those of a
-    projection follow from the tolerances. Then general code; of a projection the general one
-    behind a right-hand side of its own: one alone would read what programs of right-hand sides do
-    not leave.
+    projection, which then takes all ways, follow from the tolerances. Then general code; of a
+    projection the general one behind a right-hand side of its own: one alone would read what
+    programs of right-hand sides do not leave.
     """
     with _making:
         if record.programs.get(k) is not program:  # another thread was faster

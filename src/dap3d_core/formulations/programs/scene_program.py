@@ -8,8 +8,7 @@ of its state left, computes that itself.
 
 import ctypes
 import inspect
-from collections.abc import Callable
-from importlib import import_module
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,9 +16,9 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
 from dap3d_core.formulations import OUTCOMES, PROJECT, RHS, WATCH
-from dap3d_core.formulations.common import switching_functions
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, Varied, constants
+from dap3d_core.formulations.programs.ways import Results, merged
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler import types as t
@@ -33,6 +32,8 @@ from dap3d_core.kernels.runtime.source_digest import origin
 #: Behind the indices of functions: the general projection behind a right-hand side of its own, for
 #: where guards of that program fail.
 BEHIND = -1
+#: Among the indices of what was written: projections take all ways (ways.py).
+ALL_WAYS = -2
 #: Instructions of a program at most: larger scenes gain less, and take long to compile.
 MOST_INSTRUCTIONS = 20_000
 ARGUMENTS = "double %t, ptr %y, i64 %y.1, ptr %out, i64 %out.1, ptr %system, ptr %loops"
@@ -92,13 +93,6 @@ class Program(NamedTuple):
     failures: Callable[[], int]
 
 
-def formulation_module(evaluator: Evaluator) -> Any:
-    """The module that has the functions of an evaluator's formulation."""
-    own = evaluator.formulation.has_own_coordinates
-    name = evaluator.coordinates.equations if own else evaluator.formulation.name
-    return import_module(f"dap3d_core.formulations.{name}")
-
-
 def reads_rates(evaluator: Evaluator) -> bool:
     """True if a projection reads what the right-hand side leaves: where there are rows."""
     return evaluator.formulation.needs_joints and evaluator.length_count > 0
@@ -110,17 +104,16 @@ def results(evaluator: Evaluator, k: int, t_now: Any, y: Any, outcome: Any, stru
     outcome: of a projection, which is behind the right-hand side of its state.
     """
     with run_with_symbols():
-        module, loops = formulation_module(evaluator), python_loops(evaluator)
+        function, loops = evaluator.coordinates.function, python_loops(evaluator)
         if k == WATCH:
-            own = evaluator.formulation.has_own_coordinates
             values = np.zeros(len(evaluator.switches), dtype=object)
-            (module if own else switching_functions).watch(t_now, y, values, struct, loops)
+            function(WATCH)(t_now, y, values, struct, loops)
             return values
         rates = np.zeros(y.size, dtype=object)
-        module.rhs(t_now, y, rates, struct, loops)
+        function(RHS)(t_now, y, rates, struct, loops)
         if k == RHS:
             return rates
-        module.project(t_now, y, outcome, struct, loops)
+        function(PROJECT)(t_now, y, outcome, struct, loops)
         return outcome
 
 
@@ -134,6 +127,7 @@ def write_program(
     head: str = _HEAD,
     varied: Varied = None,
     tracer: StraightLine | None = None,
+    others: Sequence[Floats] | None = None,
 ) -> tuple[str, dict[str, str]]:
     """LLVM IR of the program of one function, and the declarations that it needs.
 
@@ -145,22 +139,30 @@ def write_program(
         head: the first block of its code.
         varied: as of ``constants``.
         tracer: records the program; left out, one of at most ``MOST_INSTRUCTIONS``.
+        others: of a projection, as of ``merged`` (ways.py).
 
     Raises:
         TraceError: the program would be too long.
     """
     tracer = tracer or StraightLine(MOST_INSTRUCTIONS)
-    system = SymbolicSystem(evaluator, tracer, varied)
     first = np.array([1.0, *np.zeros(OUTCOMES - 1 + evaluator.length_count)])
-    y, outcome = _items(tracer, "%y", state), _items(tracer, "%out", first)
-    t_now = Symbol(tracer, tracer.at(t.Value(t.FLOAT, ("%t",)), time))
-    out = results(evaluator, k, t_now, y, outcome, system.struct)
-    guard, body = tracer.guard(), tracer.taken_lines()
-    for base, numbers in (("%out", out), ("%y", y if k == PROJECT else ())):
-        for place, x in enumerate(numbers):
-            tracer.store(base, place, x)
-    for pointer, place, x in system.stores():
-        tracer.store(pointer(), place, x)
+
+    def trace(state: Floats) -> tuple[Results, Any]:
+        system = SymbolicSystem(evaluator, tracer, varied)
+        y, outcome = _items(tracer, "%y", state), _items(tracer, "%out", first)
+        t_now = Symbol(tracer, tracer.at(t.Value(t.FLOAT, ("%t",)), time))
+        out = results(evaluator, k, t_now, y, outcome, system.struct)
+        stores: list[tuple[Callable[[], str], int, Any]] = [
+            *((lambda: "%out", place, x) for place, x in enumerate(out)),
+            *((lambda: "%y", place, x) for place, x in enumerate(y if k == PROJECT else ())),
+            *system.stores(),
+        ]
+        return Results([(base, place) for base, place, _ in stores], [x for *_, x in stores]), y
+
+    found, guard = merged(evaluator, tracer, trace, state, others if k == PROJECT else None)
+    body = tracer.taken_lines()
+    for (base, place), x in zip(found.places, found.numbers, strict=True):
+        tracer.store(base(), place, x)
     text = _PROGRAM.format(head=head, arguments=ARGUMENTS, body=body, guard=guard,
                            stores=tracer.taken_lines(), **names)  # fmt: skip
     return text, tracer.needs
@@ -192,7 +194,7 @@ def name_of(evaluator: Evaluator, size: int, numbers: bytes, varied: Varied = No
     for name, array in evaluator.system.walk():
         parts += [f"{name} {array.shape}", b"" if array.dtype == float else array.tobytes()]
     parts += [f"{name} {places.tolist()}" for name, places in (varied or {}).items()]
-    plain = inspect.unwrap(formulation_module(evaluator).rhs)
+    plain = inspect.unwrap(evaluator.coordinates.function(RHS))
     return names_of("program", [plain], *parts, *origin([write_program, constants]))[1]
 
 
@@ -228,7 +230,12 @@ def programmed(evaluator: Evaluator) -> list[int]:
 
 
 def write_programs(
-    evaluator: Evaluator, name: str, time: float, state: Floats, varied: Varied = None
+    evaluator: Evaluator,
+    name: str,
+    time: float,
+    state: Floats,
+    varied: Varied = None,
+    others: Sequence[Floats] | None = None,
 ) -> tuple[str, list[int]]:
     """LLVM IR of the programs of a scene, and the indices of their functions.
 
@@ -240,6 +247,7 @@ def write_programs(
         name: of the programs.
         time, state: where branches are decided.
         varied: as of ``constants``.
+        others: of projections, as of ``merged`` (ways.py), unless that were too long.
 
     Raises:
         TypeError, ValueError, ArithmeticError: the scene has none; says why.
@@ -260,15 +268,18 @@ def write_programs(
             texts.append(_BEHIND.format(name=behind, head=head, rhs=general[RHS], size=state.size,
                                         **given))  # fmt: skip
             written.append(BEHIND)
-        try:
-            text, needed = write_program(evaluator, k, time, state, names, head, varied)
-        except TraceError:
-            if k == RHS:
-                raise
-            continue
-        texts.append(text)
-        written.append(k)
-        needs |= needed
+        of = evaluator, k, time, state, names, head, varied, None
+        for ways in (None,) if others is None or k != PROJECT else (others, None):
+            try:
+                text, needed = write_program(*of, ways)
+            except TraceError:
+                if k == RHS:
+                    raise
+                continue
+            texts.append(text)
+            written += [k] if ways is None else [k, ALL_WAYS]
+            needs |= needed
+            break
     declared = [f"declare void @{symbol}({ARGUMENTS})" for symbol in general.values()]
     return "\n".join([*needs.values(), *declared, *texts, _WEIGHTS]), written
 
@@ -279,6 +290,7 @@ def load_programs(
     """Programs from their object code, by the indices that were written."""
     for k in programmed(evaluator):
         _named(evaluator.functions.entries[k])
+    written = [k for k in written if k != ALL_WAYS]
     symbols = [symbols_of(name, k) for k in written]
     addresses = iter(objects.load(code, [symbol for pair in symbols for symbol in pair]))
     programs = {}

@@ -59,7 +59,7 @@ def _constants(evaluator: Evaluator, of_start: bool) -> Iterator[tuple[str, Inte
         yield "tree.places", _of_rows(system.tree.places, masses)
         yield "tree.constants", np.arange(system.tree.constants.size)
         if system.tree.kept is not None:
-            for name in ("compliance", "settings", *(("smallest",) if of_start else ())):
+            for name in ("settings", *(("smallest",) if of_start else ())):
                 yield f"tree.kept.{name}", np.arange(getattr(system.tree.kept, name).size)
 
 

@@ -6,6 +6,7 @@ guard fails, the results of that lane are not valid, which ``bound`` says.
 
 from contextlib import nullcontext, suppress
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from dap3d_core.formulations.programs.scene_program import (
     results,
 )
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, Varied
+from dap3d_core.formulations.programs.ways import Results, merged
 from dap3d_core.formulations.wide_rates import SIGNATURE, Rates, WideRates
 from dap3d_core.kernels.compiler import types as t
 from dap3d_core.kernels.compiler.straight_line import StraightLine
@@ -53,24 +55,30 @@ def write_wide(
         CompileError: an evaluation leaves something to the next one.
     """
     tracer = StraightLine(MOST_INSTRUCTIONS)
-    system = SymbolicSystem(evaluator, tracer, varied)
-    given = Rates.of(time, state, evaluator)
-    rates = system.symbolic(given, lambda: "%rates", "rates.")
-    outcome = np.array([1.0, *np.zeros(given.outcome.size - 1)], dtype=object)
-    found = {RESULTS[k]: results(evaluator, k, rates.t[0], rates.y, outcome, system.struct)}
-    if k == PROJECT:
-        found["y"] = rates.y
-    if system.stores():
-        raise CompileError("an evaluation leaves something to the next one")
+    members = [name for name, _ in Rates.type_of().members]
+
+    def trace(state: Floats) -> tuple[Results, Any]:
+        system = SymbolicSystem(evaluator, tracer, varied)
+        given = Rates.of(time, state, evaluator)
+        rates = system.symbolic(given, lambda: "%rates", "rates.")
+        outcome = np.array([1.0, *np.zeros(given.outcome.size - 1)], dtype=object)
+        out = results(evaluator, k, rates.t[0], rates.y, outcome, system.struct)
+        if system.stores():
+            raise CompileError("an evaluation leaves something to the next one")
+        found, places = {RESULTS[k]: out} | ({"y": rates.y} if k == PROJECT else {}), []
+        for name, numbers in found.items():
+            pointer = system.pointer(lambda: "%rates", 2 * members.index(name))
+            places += [(pointer, place) for place in range(len(numbers))]
+        return Results(places, [x for numbers in found.values() for x in numbers]), rates.y
+
+    (places, numbers), guard = merged(evaluator, tracer, trace, state, () if k == PROJECT else None)
     valid: Symbol | float = VALID
-    if (guard := tracer.guard()) != "true":
+    if guard != "true":
         word = tracer.new(f"select i1 {guard}, double {VALID}, double {INVALID}")
         valid = Symbol(tracer, t.Value(t.FLOAT, (word,)))
-    members = [name for name, _ in Rates.type_of().members]
-    for name, numbers in {**found, "bound": [valid]}.items():
-        pointer = system.pointer(lambda: "%rates", 2 * members.index(name))
-        for place, x in enumerate(numbers):
-            tracer.store(pointer(), place, x)
+    bound = SymbolicSystem(evaluator, tracer).pointer(lambda: "%rates", 2 * members.index("bound"))
+    for (pointer, place), x in zip([*places, (bound, 0)], [*numbers, valid], strict=True):
+        tracer.store(pointer(), place, x)
     text = _PROGRAM.format(name=symbol, lines=tracer.taken_lines())
     return "\n".join([*tracer.needs.values(), text])
 

@@ -128,7 +128,7 @@ def step(work: AdamsState, functions: Any, system: Any, loops: Any) -> None:
     t, t_end, k = work.t, work.times[-1], work.next_order
     h = with_slopes(min(work.h, work.longest_step), 0.0)  # chosen: not to be differentiated
     end = t_end if t + STRETCH * h >= t_end else t + h
-    t1 = min(end, work.t_limit)
+    t1 = min(end, work.step_limit)
     h = t1 - t
     if work.switch_count != 0:
         h = min(h, next_length(work, end, work.differences[0], project, watch, system, loops))

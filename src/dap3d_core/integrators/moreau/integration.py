@@ -13,6 +13,7 @@ rule, second order, or by v+ for bodies that collide; then what overlaps is move
 # What a compiled function returns is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
+from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import attrs
@@ -108,11 +109,13 @@ class MoreauIntegration(Integration):
         model = evaluator.model
         self._mean = np.zeros(6 * model.body_count)
         self._inverse = np.linalg.inv(model.Jp)
+        self._contact_rows: list[Floats] = [Integration.contact_rows]
+        self._shapes_met: Floats = self._contact_rows[0]
 
     def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
         """As ``Integration.own_arrays``."""
         model = self._evaluator.model
-        shapes = 0 if model.collisions is None else len(model.collisions.names)
+        shapes = 0 if model.collisions is None else np.count_nonzero(model.collisions.body)
         return {"memory": np.full((KEPT * shapes + model.contact_count, 4), -1.0)}
 
     @IGNORE_FLOAT_ERRORS
@@ -125,7 +128,7 @@ class MoreauIntegration(Integration):
             self._complete(rows)
             if not again:
                 return
-            self._step(min(float(end_of_step(work)), float(work.t_limit)))
+            self._step(min(float(end_of_step(work)), float(work.step_limit)))
 
     def _complete(self, first: int) -> None:
         """Put mean accelerations and forces of the last step, and modes, into rows of reports."""
@@ -137,6 +140,9 @@ class MoreauIntegration(Integration):
         rows[:, layout["v_dot"]] = self._mean
         if self.problem is None:
             return
+        for t in rows[:, 0]:
+            self._contact_rows.append(self._shapes_met.copy())
+            self._contact_rows[-1][:, 0] = t
         forces = rows[:, layout["Lam"]]
         forces[:, :own] += self.problem.y / self.step_length
         if table is not None:  # their forces are the last
@@ -234,6 +240,7 @@ class MoreauIntegration(Integration):
         self.largest_residual = max(self.largest_residual, problem.residual)
         mean = problem.velocity(0.5 * (v + end))
         works = problem.x * mean
+        self._meet(contacts, problem.x / h)
         self.friction_work += float(works[:, 1:].sum())
         moved = 0.5 * h * (end - v)
         impact = np.zeros(len(before), dtype=bool)
@@ -252,6 +259,16 @@ class MoreauIntegration(Integration):
         v1[:], w1[:] = end[1:, :3], end[1:, 3:]
         self._part(t + h, after)
         return after, float(works.sum())
+
+    def _meet(self, contacts: ContactSet, force: Floats) -> None:
+        """Keep what shapes push with, (m, 3) N in the frames of contacts, for a report."""
+        closed = np.flatnonzero(force[: len(contacts.shapes), 0] > 0.0)
+        frame = contacts.J[closed, :, :3]
+        self._shapes_met = np.column_stack([
+            np.zeros(len(closed)), contacts.shapes[closed],
+            self._modes(force[closed], contacts.mu[closed]), contacts.gap[closed],
+            contacts.point[closed], frame[:, 0], np.einsum("mr,mrk->mk", force[closed], frame),
+        ])  # fmt: skip
 
     def _part(self, t: float, u: Floats) -> None:
         """Move bodies that overlap apart, by the least change in the metric of their masses."""
@@ -303,6 +320,30 @@ class MoreauIntegration(Integration):
             return None
         part = (t - work.t_dense) / work.h_dense
         found: Floats = (1.0 - part) * work.state[OTHER] + part * work.state[Y]
+        return found
+
+    @property
+    def contact_rows(self) -> Floats:  # type: ignore[override]
+        """As of ``Integration``."""
+        found: Floats = np.concatenate(self._contact_rows)
+        found.flags.writeable = False
+        return found
+
+    def all_arrays(self) -> Iterator[tuple[str, Any]]:
+        """As ``Restorable.all_arrays``."""
+        yield from super().all_arrays()
+        yield "contacts", self.contact_rows
+
+    def restored(self, name: str, array: Any, found: Any) -> Any:
+        """As ``Restorable.restored``."""
+        if name != "contacts":
+            return super().restored(name, array, found)
+        shapes = 0 if self._finder.shapes is None else len(self._finder.shapes.names)
+        if found is None or found.shape[1:] != array.shape[1:] or found.dtype != array.dtype:
+            raise ValueError("contacts: no such table can be")
+        if not np.isfinite(found).all() or not np.isin(found[:, 1:3], np.arange(shapes)).all():
+            raise ValueError("contacts: they are of other shapes")
+        self._contact_rows = [found]
         return found
 
     @property

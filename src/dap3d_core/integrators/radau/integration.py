@@ -291,10 +291,6 @@ class RadauIntegration(Integration):
         return (self.work, evaluator.functions, *self._parts, evaluator.system, self.own_loops,
                 self.tangent, self.matrix)  # fmt: skip
 
-    def _project(self) -> bool:
-        """Nothing to do: ``start`` projects the state."""
-        return True
-
     def state_arrays(self) -> list[Any]:
         """As ``Integration.state_arrays``."""
         matrix = self.matrix

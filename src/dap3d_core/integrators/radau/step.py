@@ -92,7 +92,7 @@ def advance(
     watch = functions[4] if work.switch_count != 0 else rhs
     accepted = functions[3] if work.calls_accepted != 0 else rhs
     limit = work.rhs_count + budget
-    while may_step(work, dense_state, limit, project, report, system, loops):
+    while may_step(work, dense_state, limit, project, report, system, loops, True):
         steps, rejected = work.step_count, work.rejected_count
         if work.first_stage_valid == 0:
             tangent.bends[0] = 0.0
@@ -151,7 +151,7 @@ def step(
     state, adaptive, t = work.state, work.fixed_step == 0.0, work.t
     end = t1 = end_of_step(work)
     longest = h = t1 - t
-    if work.switch_count != 0 or min(work.t_limit, t + work.step_limit_at_switch) < t1:
+    if work.switch_count != 0 or min(work.step_limit, t + work.step_limit_at_switch) < t1:
         h = next_length(work, t1, state[SLOPE], project, watch, system, loops)
         if h == 0.0:
             return

@@ -53,9 +53,7 @@ class RungeKutta(Integration):
 
     def prepared(self) -> Callable[[int], Any]:
         """As ``Integration.prepared``; types and addresses of arguments are looked up once."""
-        if self.tstops or not jit_is_on():
-            return super().prepared()
-        return prepared(advance, self.work, *self._arguments)
+        return prepared(advance, *self.loop_arguments) if jit_is_on() else self.advance
 
 
 @cache

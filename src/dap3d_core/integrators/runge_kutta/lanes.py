@@ -101,7 +101,7 @@ def plan_step(
             accepted = functions[3] if work.calls_accepted != 0 else rhs
             step(work, (rhs, project, accepted, watch), system, loops)
         else:
-            limit = min(work.t_limit, work.t + work.step_limit_at_switch)
+            limit = min(work.step_limit, work.t + work.step_limit_at_switch)
             if work.switch_count != 0 or limit < end:
                 h = min(h, next_length(work, end, work.k[0], project, watch, system, loops))
             if h != 0.0:

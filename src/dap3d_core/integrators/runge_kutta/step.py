@@ -46,12 +46,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Function,
     Y,
 )
-from dap3d_core.integrators.stepping.output import (
-    dense_state,
-    may_step,
-    needs_dense,
-    project_state,
-)
+from dap3d_core.integrators.stepping.output import dense_state, may_step, needs_dense, project_state
 from dap3d_core.integrators.stepping.rounding import record_failure, update_rounding
 from dap3d_core.integrators.stepping.singular_poses import (
     is_approaching,
@@ -132,7 +127,7 @@ def step(work: RungeKuttaState, functions: Any, system: Any, loops: Any) -> None
     h = longest
     if adaptive:
         h = min(h, with_slopes(limit_step_at_singularity(work, longest), 0.0))
-    if work.switch_count != 0 or min(work.t_limit, work.t + work.step_limit_at_switch) < t1:
+    if work.switch_count != 0 or min(work.step_limit, work.t + work.step_limit_at_switch) < t1:
         h = min(h, next_length(work, t1, work.k[0], project, watch, system, loops))
         if h == 0.0:
             return
@@ -308,7 +303,7 @@ def cut_at_stage(work: RungeKuttaState, t: float, t1: float) -> bool:
     if not jump <= 1.0:
         reject(work, t1, h * max(work.factor_min, work.safety / math.sqrt(jump)), STEP_FLOOR)
         return True
-    has_choice = t1 + step_floor(work) < work.t_limit
+    has_choice = t1 + step_floor(work) < work.step_limit
     if work.near_singular_landings >= SINGULAR_END_ATTEMPTS or not has_choice:
         return False
     if not record_singularity(work, t - work.t):

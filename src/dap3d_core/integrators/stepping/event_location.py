@@ -92,7 +92,7 @@ def next_length(
 
     slope: dy/dt at the state.
     """
-    longest = min(end, work.t_limit) - work.t
+    longest = min(end, work.step_limit) - work.t
     h = longest
     short = max(EULER_STEP_FRACTION * usual_step(work), 4.0 * FLOOR * time_span(work))
     short = with_slopes(short, 0.0)  # as all lengths that are chosen

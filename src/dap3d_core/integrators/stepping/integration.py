@@ -1,6 +1,5 @@
 """An integration seen from Python: set up, advanced in chunks, drained of its rows, restored."""
 
-from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -9,9 +8,10 @@ from numpy.typing import ArrayLike
 
 from dap3d_core.assembly.arrays import UNSEEN
 from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.integrators.stepping.break_points import restart, stop_table
 from dap3d_core.integrators.stepping.integration_state import Function, IntegrationState, Status
 from dap3d_core.integrators.stepping.output import FAILED, dense_state
-from dap3d_core.integrators.stepping.restore import Restorable
+from dap3d_core.integrators.stepping.restore import GIVEN, Restorable
 from dap3d_core.integrators.stepping.rounding import tolerance_of
 from dap3d_core.integrators.stepping.step_control import FLOOR
 from dap3d_core.kernels.array_types import Floats
@@ -99,6 +99,9 @@ class Integration(Restorable):
         becomes negative; the integration BEGINS anew where it changes its sign
         (stepping/event_location.py), which is noted down, or UNSEEN. And how far beyond zero it may
         be until that is so.
+    stops
+        Times in ascending order that no step goes over, and whether the right-hand side may jump
+        there, so that the integration starts anew (stepping/break_points.py).
     kinds
         (n - 1,) for each component the first one of its kind: what its rounding is small against
         (stepping/rounding.py). Each is a kind of its own by default.
@@ -117,15 +120,14 @@ class Integration(Restorable):
     state_rows = at.STATES
     #: Trailing components that never steer the step.
     unscaled_size = 0
-    #: Times in ascending order that no step goes over, and whether the right-hand side may jump
-    #: there, so that the integration starts anew.
-    tstops: Sequence[tuple[float, bool]] = ()
     #: Whether its formulas are implicit; whether it goes on with its step where rates jump.
     implicit = False
     keeps_step = True
     #: The compiled loop of the integrator; its state at an instant within the last step.
     loop: Callable[..., None]
     dense: Callable[[Any, float, Floats], None] = staticmethod(dense_state)
+    #: (k, 14) contacts of shapes at reported instants: t, i, j, mode, gap, point, normal, force.
+    contact_rows: Floats = np.zeros((0, 14))
     #: Whether programs of a scene's own may take the place of its functions.
     takes_programs = False
 
@@ -148,6 +150,7 @@ class Integration(Restorable):
         length_count: int = 0,
         watched: int = 0,
         ends: ArrayLike = (),
+        stops: Sequence[tuple[float, bool]] = (),
         kinds: ArrayLike = (),
     ) -> None:
         self._arguments = (functions, system, loops)
@@ -171,6 +174,8 @@ class Integration(Restorable):
             switches=np.zeros((at.SWITCH_ROWS, count)),
             crossings=np.zeros((at.LOGGED if count else 0, 3)),
             tolerance=tolerance_of(y.size, atol, kinds),
+            stops=stop_table(stops, is_adaptive=step is None),
+            limits=np.full(1, np.inf),
             **self.own_arrays(y.size, length_count),
         )
         work = self.work
@@ -218,7 +223,7 @@ class Integration(Restorable):
 
     def prepared(self) -> Callable[[int], Any]:
         """``advance`` for many short calls; of an integration whose rows are taken in time."""
-        return self.advance if self.tstops or not jit_is_on() else self._advance
+        return self._advance if jit_is_on() else self.advance
 
     def advance(self, budget: int) -> Status:
         """Integrate until more than ``budget`` calls of rhs are spent, or the buffer is full.
@@ -232,11 +237,7 @@ class Integration(Restorable):
         """
         if self.rows_are_full and self.status is Status.RUNNING:
             raise RuntimeError("the row buffer is full: take rows() before advancing")
-        requested = self.work.t_limit
-        if self.tstops:
-            self.work.t_limit = min(requested, self._next_stop())
         self._call_compiled(budget)
-        self.work.t_limit = requested
         return self.status
 
     def _call_compiled(self, budget: int) -> None:
@@ -245,36 +246,6 @@ class Integration(Restorable):
         else:
             with np.errstate(all="ignore"):  # as in compiled code, which tests what matters
                 self._advance(budget)
-
-    def _next_stop(self) -> float:
-        """The time that the next step may not go over.
-
-        Where the right-hand side may jump steps end just before and start just behind, so that none
-        has samples of both sides; the state stays, which is right to the rounding of time, but for
-        what the constraints make of it there. Fixed steps end on their grid, and on what jumps.
-        """
-        work, is_adaptive = self.work, self.work.fixed_step == 0.0
-        for t, jumps in self.tstops[bisect_left(self.tstops, (self.t, False)) :]:
-            before = float(np.nextafter(t, -np.inf)) if jumps and is_adaptive else t
-            if self.t < before:
-                return before
-            if before < t:
-                work.t = work.t_limit = t
-                self._call_compiled(0)  # no step: reports what is due at t
-                if self.rows_are_full or self.status is not Status.RUNNING:
-                    return t
-                work.t = np.nextafter(t, np.inf)
-                self.restart()
-                if not self._project():
-                    return t
-        return np.inf
-
-    def _project(self) -> bool:
-        """Bring the state onto its constraints where they have moved, if that is on.
-
-        Returns False if that failed.
-        """
-        return True if self.work.projects == 0 else self.project()
 
     def project(self) -> bool:
         """Bring the state onto its constraints; False if that failed."""
@@ -299,19 +270,14 @@ class Integration(Restorable):
 
         What ``functions`` keep in ``system`` is not among them.
         """
-        same = ("times", "rows", "table", "crossings")
+        same = (*GIVEN, "table", "crossings")
         names = [name for name, _ in self.work.type_of().members if name not in same]
         arrays = [getattr(self.work, name) for name in names]
         return [array for array in arrays if isinstance(array, np.ndarray)]
 
     def restart(self) -> None:
         """Let the next step start anew: what the functions compute has changed."""
-        work = self.work
-        work.h = 0.0
-        work.last_error, work.step_limit_at_switch = 1e-4, np.inf
-        work.first_stage_valid = work.switch_rates_valid = 0
-        work.last_rejected = work.cut_attempts = 0
-        work.switches[at.SIDE] = 0.0
+        restart(self.work)
 
     def follow_steps(self) -> None:
         """Prepare dense output of each step, for ``state_within``."""

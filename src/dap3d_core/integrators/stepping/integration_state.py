@@ -41,6 +41,8 @@ STALLED = int(Status.STALLED)
 # Rows of ``state``: y at t; the state that a step tries to reach, or an interpolated one; scratch;
 # the projected trial state, where it is known before (runge_kutta/lanes.py).
 Y, TRIAL, SCRATCH, OTHER, GIVEN, STATES = range(6)
+# Rows of ``stops``: the last instant before, the instant itself, the first one behind it.
+BEFORE, INSTANT, BEHIND, STOP_ROWS = range(4)
 # Rows of ``tolerance``: absolute tolerance; change of dy/dt by the rounding of y, most that a step
 # may be off by for that, first of the components that are of the same kind (rounding.py).
 ABSOLUTE, NOISE, MOST, KIND, TOLERANCES = range(5)
@@ -74,7 +76,7 @@ class IntegrationState(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         "integer": INTEGER_VECTOR,
-        **dict.fromkeys(("state", "rows", "switches", "crossings", "tolerance"), MATRIX),
+        **dict.fromkeys(("state", "rows", "switches", "crossings", "tolerance", "stops"), MATRIX),
     }
 
     # settings
@@ -95,7 +97,7 @@ class IntegrationState(Arrays):
     segment_start = _real()  # of the present segment of equal steps
     t_stop = _real()  # of what stopped the run
     error_across_singularity = _real()  # of the last step that was to cross a singular state
-    t_limit = _real()  # no step goes beyond
+    t_limit = _real()  # no step goes beyond, by whoever advances it
     step_limit_at_switch = _real()  # since a step met the other side, or was too long for turns
     t_stiff = _real()  # when the scene became stiff
     largest_work = _real()  # magnitude of the last component at an accepted state
@@ -149,6 +151,9 @@ class IntegrationState(Arrays):
     is_projected = _integer()  # the row GIVEN, and its outcome, are of the trial state
     follows_steps = _integer()  # a setting: dense output of each step, not of reports alone
 
+    # found anew before each step
+    step_limit = Scalar[float]("limits")  # no step goes beyond: t_limit, or the next stop
+
     real: Floats  # (MEASURES + m,) scalars; m singularity measures that project gives
     integer: Integers  # scalars
     times: Floats  # (nt,) reporting times, increasing, t0 first and t_end last
@@ -157,6 +162,8 @@ class IntegrationState(Arrays):
     switches: Floats  # (SWITCH_ROWS, q) of q switches of the model (event_location.py)
     crossings: Floats  # (LOGGED, 3) where they changed their sign; no row without switches
     tolerance: Floats  # (TOLERANCES, n)
+    stops: Floats  # (STOP_ROWS, s) instants that no step crosses (break_points.py)
+    limits: Floats  # scalars
 
 
 #: Indices in ``real``: of the first number that project gives, and of the singularity measures.
@@ -208,7 +215,7 @@ def allowed_integers(work: Any, found: Any) -> dict[str, Container[int]]:
 
 def allowed_reals(work: Any) -> dict[str, tuple[float, float]]:
     """Least and greatest value of each such number in ``real``, without those of ``project``."""
-    # a step may start just behind the last instant (Integration.tstops)
+    # a step may start just behind the last instant (``stops``)
     first, last = float(work.times[0]), math.nextafter(float(work.times[-1]), math.inf)
     largest = 1.7976931348623157e308
     return {

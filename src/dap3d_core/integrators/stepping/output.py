@@ -6,9 +6,13 @@
 from collections.abc import Callable
 from typing import Any
 
+from dap3d_core.integrators.stepping.break_points import next_stop, restart
 from dap3d_core.integrators.stepping.integration_state import (
+    BEFORE,
+    BEHIND,
     FINISHED,
     GIVEN,
+    INSTANT,
     NOT_FINITE,
     PROJECTED,
     PROJECTION_FAILED,
@@ -84,11 +88,13 @@ def may_step(
     report: Function,
     system: Any,
     loops: Any,
+    starts_projected: bool = False,
 ) -> bool:
     """Report what is reached and end what is over; True if a step is to be tried now.
 
     state_at: as for ``report_reached``. limit: right-hand sides after which this call of the
-    integration is left.
+    integration is left. starts_projected: the integration itself projects a state that it starts
+    from.
     """
     times = work.times
     while work.status == RUNNING:
@@ -103,7 +109,11 @@ def may_step(
         else:
             work_done = abs(work.state[Y, work.state.shape[1] - 1])
             work.largest_work = max(work.largest_work, work_done)
-            if work.rhs_count > limit or work.t >= work.t_limit:
+            if work.rhs_count > limit:
+                return False
+            if pass_stop(work, starts_projected, project, system, loops):
+                continue
+            if work.t >= work.step_limit:
                 return False
             if not is_stalled(work):
                 return True
@@ -114,17 +124,46 @@ def may_step(
 
 
 @compiled
+def pass_stop(
+    work: Any, starts_projected: bool, project: Function, system: Any, loops: Any
+) -> bool:
+    """Set ``step_limit``; True where the run has come to a stop, or behind it, without a step.
+
+    On it reports that are due come first. Behind it the integration starts anew, from a state on
+    the constraints as they are there.
+    """
+    stops = work.stops
+    work.step_limit = work.t_limit
+    for k in range(next_stop(work), stops.shape[1]):
+        if work.t < stops[BEFORE, k]:
+            work.step_limit = min(work.t_limit, stops[BEFORE, k])
+            return False
+        if work.t < stops[INSTANT, k]:
+            work.t = stops[INSTANT, k]
+            return True
+        if work.t < stops[BEHIND, k]:
+            work.t = stops[BEHIND, k]
+            restart(work)
+            if not starts_projected:
+                failure = project_state(work, work.t, work.state[Y], project, system, loops)
+                if failure != RUNNING:
+                    work.t_stop, work.status = work.t, failure
+            return True
+    return False
+
+
+@compiled
 def is_stalled(work: Any) -> bool:
     """True if steps are so short that the run would not end, for about a second of work.
 
-    Called before each attempt. What is to be reached is ``t_limit``, or the end of the run.
+    Called before each attempt. What is to be reached is ``step_limit``, or the end of the run.
     """
     work.attempt_count += 1
     if work.attempt_count < ATTEMPTS:
         return False
     work.attempt_count = 0
     done, work.t_attempted = work.t - work.t_attempted, work.t
-    asked = min(work.times[-1] - work.times[0], work.t_limit - work.t)
+    asked = min(work.times[-1] - work.times[0], work.step_limit - work.t)
     if done > ATTEMPTS * STALLED_STEP * asked or work.fixed_step != 0.0:
         work.stall_start = work.rhs_count
     return (work.rhs_count - work.stall_start) * work.state.shape[1] > STALL_WORK

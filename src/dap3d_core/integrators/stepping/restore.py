@@ -13,6 +13,9 @@ import numpy as np
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats, Integers
 
+#: Arrays that the set-up gives, or that are found anew before each step.
+GIVEN = ("times", "rows", "stops", "limits")
+
 
 class Restorable:
     """Base of integrations: takes over the state of one that was saved.
@@ -28,7 +31,7 @@ class Restorable:
 
         What ``functions`` keep in ``system`` is not among them.
         """
-        return ((name, a) for name, a in self.work.walk() if name not in ("times", "rows"))
+        return ((name, a) for name, a in self.work.walk() if name not in GIVEN)
 
     def restore(self, found: Mapping[str, Any]) -> None:
         """Continue from arrays of a file, which ``all_arrays`` of the same run once named.

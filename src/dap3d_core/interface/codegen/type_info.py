@@ -1,6 +1,7 @@
 """A type that passed its examination, with everything its group loops are generated from."""
 
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 import attrs
@@ -9,6 +10,9 @@ from dap3d_core.interface.codegen.instance_layout import InstanceLayout
 from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.types import TypeBase
+
+#: Fields that name nothing.
+NONE: Mapping[str, str] = MappingProxyType({})
 
 
 @attrs.frozen
@@ -72,14 +76,19 @@ class TypeInfo:
         """Rows of a joint that constrain the bodies; 0 of other types."""
         return int(getattr(self.type, "rows", 0)) - len(self.layout.unknowns)
 
-    def chosen(self, values: Mapping[str, Any]) -> "TypeInfo":
-        """The variant for the values of an instance's fields; itself where none fits."""
+    def chosen(self, values: Mapping[str, Any], named: Mapping[str, str] = NONE) -> "TypeInfo":
+        """The variant for the values of an instance's fields; itself where none fits.
+
+        named: of fields that name a function or an input, which of these.
+        """
         specs = specs_of(self.type)
 
         def holds(name: str, wanted: Any) -> bool:
+            if wanted in specs[name].by_name:
+                return bool(named.get(name) == wanted)
             value = values[name]
             is_given = value is not None
-            return is_given == wanted if specs[name].is_reference else bool(value == wanted)
+            return is_given == wanted if specs[name].asks_presence else bool(value == wanted)
 
         for conditions, type_info in self.variants:
             if all(holds(name, wanted) for name, wanted in conditions.items()):

@@ -4,12 +4,12 @@ from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from dap3d_core.interface.fields import FieldSpec, choice, field_of, number, slot_of
-from dap3d_core.interface.types import Joint
+from dap3d_core.interface.types import Joint, TypeBase
 
 #: What authors define.
-DECLARED = ("gap", "at", "normal")
+DECLARED = ("gap", "normal")
 #: What they may define besides.
-OPTIONAL = ("reach",)
+OPTIONAL = ("at", "reach", "along")
 #: Fields that a material gives.
 MATERIAL = ("mu", "mu_s", "e", "law")
 #: Values of ``law``.
@@ -22,6 +22,8 @@ HIDDEN: dict[str, Any] = {
     "part": 0.0, "mode_0": 0.0, "way_0": _ZERO, "near_0": _ZERO,
     "mode_atol": 0.0, "way_atol": 0.0, "near_atol": 0.0,
 }  # fmt: skip
+#: What a contact without friction has in place of a material.
+SMOOTH: dict[str, Any] = {"mu": 0.0, "mu_s": 0.0, "law": "poisson", "touch": False}
 
 
 class Contact(Joint):
@@ -37,6 +39,15 @@ class Contact(Joint):
     contact is on both of them. Where it becomes negative the contact opens, whatever its force, and
     beyond it nothing touches.
 
+    Without ``at`` the gap is an angle, m being rad, and the normal the axis of a moment on body i,
+    which alone acts: the rate of the gap is the angular velocity of body i less that of body j
+    along it.
+
+    Dry friction of a size of its own, as of seals, has no gap and no normal, but ``along``: the
+    unit vector that body i slides along at the point ``at``, or without that turns about.
+    ``prepare`` returns what it is where it slides, ``mu``, and the most where it sticks, ``mu_s``,
+    N or N m.
+
     Rows, right-hand sides, slip and friction follow from them: one of the normal, two across it, of
     the velocity of body i at the point of contact less that of body j. The gap must be such that
     its rate is that velocity along the normal, as of every distance between smooth surfaces
@@ -46,6 +57,7 @@ class Contact(Joint):
     Attributes:
         points: at how many points the bodies may touch. Each is a contact of its own, whose
             ``part``, 0 and so on, ``prepare`` reads: it returns what differs between them.
+        is_smooth: without friction, and without fields of a material but ``e``.
     """
 
     kernel_names: ClassVar[tuple[str, ...]] = (  # type: ignore[assignment]
@@ -55,14 +67,19 @@ class Contact(Joint):
     is_contact: ClassVar[bool] = True
     declared: ClassVar[tuple[str, ...]] = (*DECLARED, *OPTIONAL)
     points: ClassVar[int] = 1
+    is_smooth: ClassVar[bool] = False
+    at: ClassVar[Any] = None
+    along: ClassVar[Any] = None
 
-    def __init_subclass__(cls, **conditions: Any) -> None:
+    def __init_subclass__(cls, of: type[TypeBase] | None = None, **conditions: Any) -> None:
         if "kernel_names" not in vars(cls):
             cls.states = {"mode": 1, "way": 3, "near": 3}
             _add_material(cls)
-            if all(hasattr(cls, name) for name in DECLARED):
+            if cls.along is not None or all(hasattr(cls, name) for name in DECLARED):
                 for name, kernel in _kernels(cls).items():
                     setattr(cls, name, kernel)
+        if of is not None:  # class RigidStop(Contact, of=SpringStop, k=False): without a stiffness
+            of.variants, conditions = (*of.variants, (conditions, cls)), {}
         super().__init_subclass__(**conditions)
 
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
@@ -78,13 +95,17 @@ def hidden(value: Any) -> Any:
 
 def _add_material(class_: type) -> None:
     """Give a class the fields of its material, unless it has them."""
+    e = number(0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution")
     fields = {
         "mu": number(0.0, minimum=0.0, doc="coefficient of friction of sliding"),
         "mu_s": number(None, minimum=0.0, doc="the same of sticking; mu where it is left out"),
-        "e": number(0.0, minimum=0.0, maximum=1.0, doc="coefficient of restitution"),
+        "e": e,
         "law": choice(LAWS, "poisson", doc="of impacts: whose coefficient e is"),
         "touch": choice((False, True), False, doc="the bodies are moved until they touch at t = 0"),
     }
+    if class_.is_smooth or class_.along is not None:  # type: ignore[attr-defined]
+        fields = {name: hidden(0.0) for name in ("e", "mu", "mu_s")}
+        fields |= {} if class_.along is not None else {"e": e}  # type: ignore[attr-defined]
     fields |= {name: hidden(value) for name, value in HIDDEN.items()}
     own = dict(vars(class_).get("__annotations__", {}))
     for name, field in fields.items():
@@ -107,19 +128,21 @@ def _specs(class_: type) -> dict[str, FieldSpec]:
 
 
 def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
-    """The kernels of a type of contact, from the three that it declares."""
+    """The kernels of a type of contact, from those that it declares."""
     # imported here: finding types by keyword does not need kernels
     from dap3d_core.interface.codegen.kernel_arguments import parameters
     from dap3d_core.interface.codegen.specialise import bound_kernel
-    from dap3d_core.interface.contacts import rates, rows
+    from dap3d_core.interface.contacts import grips, rates, rows, turning
 
-    names_of = [*DECLARED, *(n for n in OPTIONAL if getattr(class_, n, None) is not None)]
+    names_of = [n for n in (*DECLARED, *OPTIONAL) if getattr(class_, n, None) is not None]
     declared = {name: getattr(class_, name) for name in names_of}
     specs = _specs(class_)
     kinds = {name: spec.kind for name, spec in specs.items()}
-    has_j = any(slot_of(name) == "j" for name in specs)
+    has_j = any(slot_of(name) == "j" or spec.kind == "vector2" for name, spec in specs.items())
     calls, wanted = {}, {}
-    for short, name in {"gap": "gap", "c": "at", "n": "normal"}.items():
+    for short, name in {"gap": "gap", "c": "at", "n": "normal", "e": "along"}.items():
+        if name not in declared:
+            continue
         names = parameters(declared[name])
         changes = [_rate_name(n, kinds) for n in names]
         calls[short] = f"{name}__({', '.join(names)})"
@@ -143,6 +166,11 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         needed = dict.fromkeys(n for short in given for n in wanted.get(short, ()))
         return bound_kernel(kernel, given, needed, every)
 
+    special: dict[str, Any] = turning.KERNELS if "at" not in declared else {}
+    if "along" in declared:
+        special = grips.KERNELS if "at" in declared else grips.TURNING
+    if special:
+        return {name: bound(kernel) for name, kernel in special.items()}
     return {
         "C": bound(rows.position),
         "J": bound(rows.blocks if has_j else rows.block),
@@ -164,6 +192,8 @@ def _rate_name(name: str, kinds: Mapping[str, str]) -> str:
     if name == "t":
         return "1.0"
     if kinds.get(name) in ("vector", "vector2"):
+        return f"{name}_dot"
+    if kinds.get(name) == "angle":
         return f"{name}_dot"
     if name in kinds:
         return "None"

@@ -9,17 +9,7 @@ given besides: of contacts that share what they carry, the one that all cones al
 # Kernels take numbers of any kind: floats, and symbols of a trace.
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
-from dap3d_core.kernels import (
-    add,
-    cross,
-    dot,
-    neg,
-    row,
-    scale,
-    sqrt,
-    sub,
-    where,
-)
+from dap3d_core.kernels import add, cross, dot, neg, row, scale, sqrt, sub, where
 
 #: Modes of a contact.
 OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0

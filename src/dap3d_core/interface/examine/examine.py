@@ -303,16 +303,16 @@ def _joint_of_friction(type_: type[TypeBase]) -> str:
 
 
 def _check_conditions(type_: type[TypeBase], conditions: Mapping[str, Any], variant: type) -> None:
-    """The condition of a variant is a word of a choice, or the presence of a function."""
+    """A variant is for a word of a choice, the presence of another field, or an input."""
     specs = specs_of(type_)
     for name, wanted in conditions.items():
         spec = specs.get(name)
         allowed = spec.choices if spec is not None and spec.kind == "choice" else (True, False)
-        known = spec is not None and (spec.kind == "choice" or spec.is_reference)
-        if not known or wanted not in allowed:
+        known = spec is not None and (spec.kind == "choice" or spec.asks_presence)
+        if not known or wanted not in (*allowed, *(spec.by_name if spec else ())):
             raise PluginError(
                 f"{where_is(variant)} is the variant for {name} = {wanted!r}, "
-                f"which no choice, function or input of {type_.__name__} can be"
+                f"which no choice, function, input or optional number of {type_.__name__} can be"
             )
 
 
@@ -485,8 +485,8 @@ def _expected(
     if issubclass(type_, Function):
         shape, words = VALUES[type_.arguments]
         return shape if isinstance(value, (tuple, list)) else (), words
-    if not issubclass(type_, Joint) or kernel in ("gap", "at", "normal", "reach"):  # of contacts
-        return ((3,), "3 numbers") if kernel in ("at", "normal") else ((), "one number")
+    if not issubclass(type_, Joint) or kernel in type_.declared:  # of contacts
+        return ((3,), "3 numbers") if kernel in ("at", "normal", "along") else ((), "one number")
     if kernel == "G":
         n, k = len(type_.position_rows()), len(unknown_names(type_))
         return (n, k), f"{n} rows of the derivatives of C by its {k} unknowns"

@@ -51,7 +51,7 @@ class Geometry:
     """A shape of a link, which is drawn.
 
     Attributes:
-        kind: box, sphere, cylinder, capsule, ellipsoid or mesh.
+        kind: box, sphere, cylinder, capsule, ellipsoid, mesh, or plane, whose normal is z.
         size: edges of a box; radius of a sphere; radius and length of a cylinder and (without its
             caps) a capsule, along z; semi-axes of an ellipsoid.
         pose: its frame in the link.
@@ -59,6 +59,7 @@ class Geometry:
         scale: (3,) factors of a mesh.
         color: "#rrggbb", or "".
         collision: True for the shape of contacts, which is drawn where a link has no other.
+        contact: how it meets others, where contacts are imported; None if it does not.
         place: its place in the file.
     """
 
@@ -69,7 +70,25 @@ class Geometry:
     scale: tuple[float, ...] = (1.0, 1.0, 1.0)
     color: str = ""
     collision: bool = False
+    contact: "Contact | None" = None
     place: Place = NOWHERE
+
+
+@attrs.frozen
+class Contact:
+    """How a shape meets others.
+
+    Attributes:
+        mu: coefficient of friction; that of a pair is the larger one.
+        smooth: without friction, but with shapes that are not smooth.
+        group, meets: bits; a pair meets where ``group`` of one and ``meets`` of the other have one
+            in common.
+    """
+
+    mu: float = 1.0
+    smooth: bool = False
+    group: int = 1
+    meets: int = 1
 
 
 @attrs.define(eq=False)
@@ -218,6 +237,7 @@ class Articulation:
         name: of the model.
         links, joints: by name, in the order of the file.
         couplings, actuators: in the order of the file.
+        excluded: pairs of links whose shapes do not meet.
         gravity: (3,) m/s^2.
         fixed_base: whether links without a joint to a parent are fixed to the world, rather than
             free; None where the format leaves it open.
@@ -230,6 +250,7 @@ class Articulation:
     joints: dict[str, Joint] = attrs.Factory(dict)
     couplings: list[Coupling] = attrs.Factory(list)
     actuators: list[Actuator] = attrs.Factory(list)
+    excluded: list[tuple[str, str]] = attrs.Factory(list)
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     fixed_base: bool | None = None
     place: Place = NOWHERE

@@ -26,6 +26,7 @@ class Source(Protocol):
         path: the file.
         remarks: takes what is translated with a difference and what is left out.
         allow_code: whether the user allows that code of the file is run.
+        contacts: whether shapes are to meet each other.
         packages: name of a package -> its folder.
         arguments: values that the user gives for names in the file, as those of macros.
         unused: names of arguments; an importer removes those that the file has, and what is left is
@@ -35,6 +36,7 @@ class Source(Protocol):
     path: Path
     remarks: Remarks
     allow_code: bool
+    contacts: bool
     packages: Mapping[str, Path]
     arguments: Mapping[str, str]
     unused: set[str]

@@ -231,15 +231,11 @@ class DifferentiatedArrays(WideArrays):
 
 
 class Differentiation:
-    """Calls of compiled functions with derivatives of all that their arrays hold.
-
-    Attributes:
-        taken: called before each call, where numbers that Python has changed are known.
-    """
+    """Calls of compiled functions with derivatives of all that their arrays hold."""
 
     def __init__(self, count: int) -> None:
         """Args: numbers for each of the arrays' (value and slopes)."""
-        self.count, self.taken = count, lambda: None
+        self.count = count
         self._buffers: Buffers = {}
         self._wide: dict[int, tuple[Any, Any]] = {}
 
@@ -249,7 +245,6 @@ class Differentiation:
         entry = differentiated(function.compile(types), self.count)
         wide = [self.wide(argument) for argument in arguments]
         self.take()
-        self.taken()
         entry(*wide)
         self._any.give()
 

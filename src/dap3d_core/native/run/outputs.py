@@ -7,6 +7,7 @@ placed them, and the reported row.
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
+from operator import add
 from typing import Any
 
 import attrs
@@ -215,7 +216,12 @@ class _Quantities:
                 element = self.elements.joint(owner)
                 if element is None:
                     raise NotExportedError(name)
-                return self._action(element, slot, attribute, self._reaction(element, slot, joint))
+                wrench = self._reaction(element, slot, joint)
+                if owner in self._model.brought_forces:
+                    brought = self.elements.force(self._model.brought_forces[owner])
+                    assert brought is not None  # as every force
+                    wrench = tuple(map(add, wrench, self._wrench(brought, slot)))
+                return self._action(element, slot, attribute, wrench)
             found = self._coordinate(owner, joint, attribute)
             if found is not None:
                 return found
@@ -315,7 +321,7 @@ class _Quantities:
         place, first, size = {"r": (0, R, 3), "p": (3, P, 4), "rd": (0, V, 3), "w": (0, W, 3)}[
             attribute
         ]
-        if attribute == "w" or self._prepared.evaluator.formulation.has_own_coordinates:
+        if attribute == "w" or not self._prepared.evaluator.coordinates.are_of_bodies:
             return self._vector(body, first, size)
         # of the state as it is: that of the arrays is of unit length
         place += VELOCITIES * (body - 1) if attribute == "rd" else COORDINATES * (body - 1)

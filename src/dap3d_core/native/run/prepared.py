@@ -18,7 +18,6 @@ from dap3d_core.integrators.radau.integration import RadauIntegration
 from dap3d_core.integrators.radau.step import advance as advance_radau
 from dap3d_core.integrators.runge_kutta.integration import RungeKutta
 from dap3d_core.integrators.runge_kutta.step import advance
-from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler.types import FLOAT, INT
 from dap3d_core.kernels.compiler.units import Entry, type_of
@@ -116,7 +115,7 @@ class JumpCode:
         Raises:
             SceneError: it cannot be exported.
         """
-        if evaluator.formulation.has_own_coordinates:
+        if not evaluator.coordinates.are_of_bodies:
             raise refusal(
                 f"velocities jump, which exported models of method {evaluator.method} do not",
                 "export it by method standard or lsq",
@@ -232,6 +231,7 @@ class PreparedRun:
             self.evaluator: Evaluator = compiled.new_evaluator()
             run.evaluator = self.evaluator
             self._refuse_jumps()
+            run.stops = [(stop.t, stop.jumps) for stop in self.stops]
             run.initialise()
             integrations = [run.present]
             if run.present.work.stops_when_stiff:
@@ -285,15 +285,4 @@ class PreparedRun:
     @property
     def state_names(self) -> list[str]:
         """Names of the components of the integrated state, the work last."""
-        evaluator, model = self.evaluator, self.evaluator.model
-        size = len(self.run.present.work.state[at.Y]) - 1
-        if evaluator.formulation.has_own_coordinates:
-            return [*(f"state.{k + 1}" for k in range(size)), "state.work"]
-        axes = ("x", "y", "z")
-        poses = [*(f"r.{a}" for a in axes), *(f"p.e{k}" for k in range(4))]
-        rates = [*(f"rd.{a}" for a in axes), *(f"wp.{a}" for a in axes)]
-        names = [
-            f"state.{b}.{q}" for part in (poses, rates) for b in model.body_names for q in part
-        ]
-        own = [f"state.{label}" for s in model.element_states for label in s.labels]
-        return [*names, *own, "state.work"]
+        return [f"state.{name}" for name in (*self.evaluator.coordinates.names, "work")]

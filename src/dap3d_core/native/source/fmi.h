@@ -90,6 +90,7 @@ static fmi_status fmi_setup(fmu *f, double start, bool has_stop, double stop)
     f->model->t_end = f->model->span = has_stop && stop > 0.0 ? stop : HORIZON;
     for (int k = 0; k < INTEGRATIONS; k++)
         numbers(f->model, integrations[k].times)[2] = f->model->t_end;
+    set_stops(f->model);
     return fmi_ok;
 }
 

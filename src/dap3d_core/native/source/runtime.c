@@ -1,9 +1,8 @@
 /* The run of a model: time, inputs, outputs, states. What it runs is in data.h: memory of a run as it
    begins, and compiled functions; the integrators and equations are those that Python runs.
 
-   It does what integrators/stepping/integration.py (break points), integrators/stepping/hold.py
-   (inputs), simulation/handover.py (stiff scenes) and simulation/events/jumps.py (velocities that
-   jump) do, in the same order, for the same bits. */
+   It does what integrators/stepping/hold.py (inputs), simulation/handover.py (stiff scenes) and
+   simulation/events/jumps.py (velocities that jump) do, in the same order, for the same bits. */
 
 #define DAP3D_BUILD
 #include <math.h>
@@ -79,6 +78,22 @@ static int fail(dap3d_model *m, int result, const char *words)
 
 /* ---------------------------------------------------------------------- instances */
 
+/* As stop_table of stepping/break_points.py, of a run to t_end: no stop behind it is needed. */
+static void set_stops(dap3d_model *m)
+{
+    for (int i = 0; i < INTEGRATIONS; i++) {
+        double *table = numbers(m, integrations[i].stops);
+        int adaptive = numbers(m, integrations[i].real)[R_fixed_step] == 0.0;
+        for (int k = 0; k < STOPS; k++) {
+            int needed = stops[k].needs < m->t_end, jumps = needed && adaptive && stops[k].jumps;
+            double t = needed ? stops[k].t : INFINITY;
+            table[k] = jumps ? nextafter(t, -INFINITY) : t;
+            table[STOPS + k] = t;
+            table[2 * STOPS + k] = jumps ? nextafter(t, INFINITY) : t;
+        }
+    }
+}
+
 static void begin(dap3d_model *m, double t_end)
 {
     const int64_t *next = content;
@@ -96,6 +111,7 @@ static void begin(dap3d_model *m, double t_end)
         times[1] = times[2] = t_end;
         m->w[integrations[k].integer + I_next_report] = 1;
     }
+    set_stops(m);
 }
 
 dap3d_model *dap3d_create(double t_end)
@@ -304,45 +320,9 @@ static int project(dap3d_model *m)
     return 0;
 }
 
-static void advance_once(dap3d_model *m, int64_t budget)
-{
-    integrations[m->which].advance(m->w, budget);
-}
-
-/* As Integration._next_stop: the time that the next step may not go over. */
-static double next_stop(dap3d_model *m)
-{
-    double *real = real_of(m);
-    int64_t *integer = integer_of(m);
-    int adaptive = real[R_fixed_step] == 0.0;
-    for (int k = 0; k < STOPS; k++) {
-        double t = stops[k].t;
-        if (t < real[R_t] || stops[k].needs >= m->t_end)
-            continue;
-        double before = stops[k].jumps && adaptive ? nextafter(t, -INFINITY) : t;
-        if (real[R_t] < before)
-            return before;
-        if (before < t) {
-            real[R_t] = real[R_t_limit] = t;
-            advance_once(m, 0); /* no step: reports what is due at t */
-            if (integer[I_row_count] == CAPACITY || integer[I_status] != RUNNING)
-                return t;
-            real[R_t] = nextafter(t, INFINITY);
-            restart(m);
-            if (!integrations[m->which].implicit && integer[I_projects] && !project(m))
-                return t;
-        }
-    }
-    return INFINITY;
-}
-
-/* As Integration.advance. */
 static void advance(dap3d_model *m, int64_t budget)
 {
-    double *real = real_of(m), requested = real[R_t_limit], stop = next_stop(m);
-    real[R_t_limit] = stop < requested ? stop : requested;
-    advance_once(m, budget);
-    real[R_t_limit] = requested;
+    integrations[m->which].advance(m->w, budget);
 }
 
 /* As hand_over of a scene that has become stiff: the implicit integration goes on. */
@@ -574,7 +554,7 @@ static int step_freely(dap3d_model *m, double t)
     if (integer_of(m)[I_status] == JUMPED && !apply_jump(m))
         return stopped(m);
     if (real_of(m)[R_t] >= t)
-        advance_once(m, -1); /* no step */
+        advance(m, -1); /* no step */
     while (integer_of(m)[I_row_count] == 0) {
         if (integer_of(m)[I_status] != RUNNING && !apply_jump(m))
             return stopped(m);

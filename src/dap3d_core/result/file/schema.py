@@ -7,8 +7,9 @@ import attrs
 import numpy as np
 
 from dap3d_core.result.arrays import AXES, COLUMNS, EULER, U_ERROR, Arrays, Column, column_sizes
+from dap3d_core.result.contact_table import FIELDS, ContactTable, no_contacts
 from dap3d_core.result.event_record import EventRecord
-from dap3d_core.result.metadata import RunMetadata, RunStatistics, to_json
+from dap3d_core.result.metadata import RUNNING, RunMetadata, RunStatistics, to_json
 from dap3d_core.result.model_summary import ModelSummary
 
 #: Version of this layout, raised when an older reader would misread it.
@@ -82,8 +83,8 @@ def attributes(summary: ModelSummary, record: RunMetadata) -> dict[str, Any]:
     )
 
 
-def record_of(values: dict[str, Any]) -> RunMetadata:
-    """The record in a file's ``attributes``, with JSON decoded."""
+def record_of(values: dict[str, Any], contacts: ContactTable) -> RunMetadata:
+    """The record in a file's ``attributes``, with JSON decoded, and its contacts."""
     texts = {name: str(values[name]) for name in ("status", "method", "integrator", "run")}
     return RunMetadata(
         scene_text=str(values["scene"]),
@@ -93,6 +94,7 @@ def record_of(values: dict[str, Any]) -> RunMetadata:
         actuation=values["actuation"],
         stats=RunStatistics(**values["statistics"]),
         events=[EventRecord(**event) for event in values["events"]],
+        contacts=contacts,
         known_versions=values["versions"],
         **texts,
     )
@@ -148,10 +150,47 @@ def define(
             )
             write_attributes(variable, about(constant.unit, constant.meaning))
             variable[:] = array
+    if record.status != RUNNING and record.contacts.names:
+        _write_contacts(dataset, record.contacts)
     _define_rows(dataset, (*COLUMNS, U_ERROR) if with_error else COLUMNS, is_sized=bool(nt))
     write_attributes(dataset, attributes(summary, record))
     dataset.sync()
     return os.path.getsize(dataset.filepath())
+
+
+def _write_contacts(dataset: Any, contacts: ContactTable) -> None:
+    """Writes the contacts of shapes; where there is none, the names of the shapes alone."""
+    sizes = {"contact_shape": len(contacts.names), "side": 2, "contact": len(contacts)}
+    for name, size in sizes.items():
+        if size:
+            dataset.createDimension(name, size)
+    names = dataset.createVariable("contact_shape", str, ("contact_shape",))
+    write_attributes(names, about("1", "names of the shapes that collide"))
+    names[:] = np.array(contacts.names, dtype=object)
+    for name, (dimensions, unit, meaning) in FIELDS.items() if len(contacts) else ():
+        values = getattr(contacts, name)
+        kind = "i8" if values.dtype.kind == "i" else "f8"
+        variable = dataset.createVariable(f"contact_{name}", kind, dimensions, fill_value=False)
+        write_attributes(variable, about(unit, meaning))
+        variable[:] = values
+
+
+def contacts_of(dataset: Any) -> ContactTable:
+    """The contacts of shapes of a file.
+
+    Raises:
+        ValueError: a shape is named that there is not, or a number is none that a run leaves.
+    """
+    if "contact_shape" not in dataset.variables:
+        return no_contacts()
+    names = tuple(map(str, dataset.variables["contact_shape"][:]))
+    if "contact" not in dataset.dimensions:
+        return attrs.evolve(no_contacts(), names=names)
+    parts = {name: np.asarray(dataset.variables[f"contact_{name}"][:]) for name in FIELDS}
+    inside = (parts["pair"] >= 0) & (parts["pair"] < len(names))
+    if not inside.all() or not all(np.isfinite(values).all() for values in parts.values()):
+        raise ValueError("contacts are of no run")
+    return ContactTable(names, **parts)
 
 
 def _define_rows(dataset: Any, columns: tuple[Column, ...], *, is_sized: bool) -> None:

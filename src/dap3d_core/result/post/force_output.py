@@ -1,6 +1,6 @@
 """Force elements evaluated at reported states (spec 6)."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING
 
 import attrs
@@ -11,7 +11,13 @@ from dap3d_core.interface.types import acts_on_all
 from dap3d_core.model.groups import Floats, Group
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.post.point_motion import motion_of
-from dap3d_core.result.post.reactions import InstanceParameters, Reaction, actions_of, place_at
+from dap3d_core.result.post.reactions import (
+    InstanceParameters,
+    Reaction,
+    actions_of,
+    place_at,
+    reactions,
+)
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
@@ -97,6 +103,30 @@ def force_output(
         length, rate, tension = _along(group, index, u, v_dot, on["i"].force)
         return attrs.evolve(output, length=length, length_rate=rate, tension=tension)
     return output
+
+
+def reactions_of(
+    evaluator: "Evaluator",
+    t: Floats,
+    u: Floats,
+    Lam: Floats,
+    joints: Collection[int],
+    angles: Floats | None = None,
+    states: Floats | None = None,
+    inputs: Floats | None = None,
+) -> dict[int, dict[str, Reaction]]:
+    """As ``reactions``, with the forces that joints bring."""
+    found = reactions(evaluator, t, u, Lam, joints, angles, states, inputs)
+    model = evaluator.model
+    for joint, actions in found.items():
+        if name := model.brought_forces.get(model.joint_names[joint]):
+            rates, place = np.zeros((len(t), 6 * model.body_count)), model.force_names.index(name)
+            output = force_output(evaluator, t, u, rates, name, place, Lam, angles, states=states,
+                                  inputs=inputs)  # fmt: skip
+            for slot, more in output.on.items():
+                force, moment = actions[slot].force + more.force, actions[slot].moment + more.moment
+                actions[slot] = attrs.evolve(actions[slot], force=force, moment=moment)
+    return found
 
 
 def group_of(evaluator: "Evaluator", name: str, element: int) -> tuple[Group, int]:

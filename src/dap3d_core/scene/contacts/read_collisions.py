@@ -6,24 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from dap3d_core.interface.formats.frames import from_quaternion
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.scene.contacts.collision_shapes import (
-    BOX,
-    CAPSULE,
-    CYLINDER,
-    KINDS,
-    CollisionShapes,
-)
+from dap3d_core.scene.contacts.collision_shapes import KINDS, CollisionShapes
 from dap3d_core.scene.contacts.tables import Collisions, Material
-from dap3d_core.scene.errors import MISSING, Key
+from dap3d_core.scene.errors import Key
+from dap3d_core.scene.files.read_mesh import read_mesh
 from dap3d_core.scene.validate.coerce_values import Fault, bounded, number_of
 from dap3d_core.scene.validate.geometry import missing_words
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.shapes import Shape
+from dap3d_core.scene.validate.shapes import Shape, height_field, mesh_file
 from dap3d_core.scene.validate.validated_scene import Instance
 
-#: Kinds that do not meet cylinders yet.
-NOT_CYLINDERS = (CAPSULE, CYLINDER, BOX)
 COEFFICIENTS = {"mu": None, "e": 1.0}
 
 
@@ -49,16 +43,21 @@ def read_collisions(
     jointed = [sorted({*joint.bodies} - {0}) for joint in joints]
     apart = {pair for bodies in jointed for pair in combinations(bodies, 2)}
     apart |= _excluded(report, given.exclude, index)
-    kind = np.array([KINDS[s.type] for s in meeting])
-    body = np.array([s.body for s in meeting])
+    parts = [(s, part) for s in meeting for part in _parts(report, s)]
+    meeting = [s for s, _ in parts]
     material, mu, e = _materials(report, meeting, given.material)
-    _refuse_cylinders(report, meeting, apart)
     width = len(index)
     keys = sorted(i * width + j for i, j in apart)
-    at, p, size = (np.array(x, dtype=float) for x in zip(*map(_placed, meeting), strict=True))
+    at, p, size = (np.array([part[k] for _, part in parts], dtype=float) for k in range(3))
+    hulls = [part[3] for _, part in parts]
+    counts = np.array([len(hull) for hull in hulls])
     return CollisionShapes(
-        tuple(s.name for s in meeting), kind, body, at, p, size, material, mu, e,
-        np.array(keys, dtype=np.int64),
+        names=tuple(s.name for s in meeting),
+        kind=np.array([KINDS[s.type] for s in meeting]), body=np.array([s.body for s in meeting]),
+        at=at, p=p, size=size, corners=np.column_stack([np.cumsum(counts) - counts, counts]),
+        vertices=np.concatenate(hulls), material=material, mu=mu, e=e,
+        bits=np.array([[s.values["group"], s.values["meets"]] for s in meeting]),
+        apart=np.array(keys, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -139,28 +138,47 @@ def _pair(report: Collector, a: Material, b: Material) -> list[float]:
     return found
 
 
-def _refuse_cylinders(
-    report: Collector, shapes: Sequence[Shape], apart: set[tuple[int, int]]
-) -> None:
-    """Report the first pair of shapes that no kernel knows."""
-    cylinders = [s for s in shapes if s.type == "cylinder"]
-    for a in cylinders:
-        for b in shapes:
-            pair = min(a.body, b.body), max(a.body, b.body)
-            if a.body != b.body and pair not in apart and KINDS[b.type] in NOT_CYLINDERS:
-                what = f"a cylinder may meet spheres and planes, and {b.name} is a {b.type}"
-                remedy = "take a capsule or a box, or exclude the pair in [collisions]"
-                report.add(("shapes", a.name), MISSING, what, remedy=remedy)
-                return
-
-
-def _placed(shape: Shape) -> tuple[Any, Any, Any]:
-    """Centre, Euler parameters and size of a shape, as ``CollisionShapes`` has them."""
+def _parts(report: Collector, shape: Shape) -> list[tuple[Any, Any, Any, Floats]]:
+    """Centre, Euler parameters, size and vertices of all parts, as ``CollisionShapes`` has them."""
     v = shape.values
+    if shape.type == "mesh":
+        return [_about_middle(v, _hull(report, shape))]
+    if shape.type == "height_field":
+        vertices, triangles = height_field(v)
+        tops = vertices[triangles]
+        low, high = tops.min(axis=1, keepdims=True), tops.max(axis=1, keepdims=True)
+        deep = low[:, :, 2:] - (high - low)[:, :, :2].max(axis=2, keepdims=True)  # prisms, as wide
+        below = np.concatenate([tops[:, :, :2], np.repeat(deep, 3, axis=1)], axis=2)
+        return [_about_middle(v, hull) for hull in np.concatenate([tops, below], axis=1)]
     axis = v.get("axis", v.get("normal"))
     p = v.get("p", (1.0, 0.0, 0.0, 0.0)) if axis is None else _turned_to(axis)
     size = (v.get("radius", 0.0), 0.5 * v.get("length", 0.0), 0.0)
-    return v["at"], p, tuple(0.5 * x for x in v["size"]) if "size" in v else size
+    size = tuple(0.5 * x for x in v["size"]) if "size" in v else size
+    return [(v["at"], p, size, np.zeros((0, 3)))]
+
+
+def _about_middle(v: Mapping[str, Any], hull: Floats) -> tuple[Any, Any, Any, Floats]:
+    middle = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
+    at = v["at"] + from_quaternion(v["p"]) @ middle
+    return at, v["p"], np.abs(hull - middle).max(axis=0), hull - middle
+
+
+def _hull(report: Collector, shape: Shape) -> Floats:
+    """Vertices of the convex hull of a mesh, m; one point where a mistake is reported."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    name = shape.values["file"]
+    path = report.scene.files.get(name) or mesh_file(report.scene.folder, name)
+    found = path.what if isinstance(path, Fault) else read_mesh(path, name)
+    if not isinstance(found, str):
+        try:
+            hull: Floats = found[0][ConvexHull(found[0]).vertices] * shape.values["scale"]
+            return hull
+        except QhullError:
+            found = f"{name} is flat: it has no convex hull"
+    remedy = "a mesh that collides is read with the scene: load that from its folder"
+    report.add(("shapes", shape.name, "file"), name, found, remedy=remedy)
+    return np.zeros((1, 3))
 
 
 def _turned_to(axis: Any) -> Floats:

@@ -145,12 +145,21 @@ class Expression:
         root: its tree.
         names: the names in it, each once, in their order.
         unit: the unit that is declared for its value; "" for none.
+        parameters: names that numbers have taken the place of.
     """
 
     text: str
     root: Node = attrs.field(repr=False)
     names: tuple[str, ...]
     unit: str = ""
+    parameters: tuple[str, ...] = ()
+
+    def with_numbers(self, numbers: Mapping[str, float]) -> "Expression":
+        """The expression with numbers in place of some of its names."""
+        names = tuple(name for name in self.names if name not in numbers)
+        given = tuple(name for name in self.names if name in numbers)
+        root = self.fold(lambda name: numbers.get(name, name), lambda w, *a: Call(w, a))
+        return attrs.evolve(self, root=root, names=names, parameters=given) if given else self
 
     def evaluate(self, values: Mapping[str, Any]) -> Any:
         """The value of the expression, NaN where it is not finite.

@@ -25,6 +25,7 @@ LONGEST_CHAIN = 50
 def read_outputs(report: Collector) -> dict[str, Expression]:
     """The outputs of a scene by name, those first that others name; mistakes are reported."""
     expressions = {}
+    numbers = _parameters(report)
     for name, value in report.scene.outputs.items():
         key: Key = ("outputs", str(name))
         if fault := fault_of_quantity(report.scene, name):
@@ -37,8 +38,19 @@ def read_outputs(report: Collector) -> dict[str, Expression]:
             key, value = (*key, "value"), value.get("value", MISSING)
         expression = report.read(key, value, read_expression)
         if not isinstance(expression, Fault) and not isinstance(unit, Fault):
-            expressions[name] = attrs.evolve(expression, unit=unit)
+            expressions[name] = attrs.evolve(expression.with_numbers(numbers), unit=unit)
     return _in_order(report, expressions)
+
+
+def _parameters(report: Collector) -> dict[str, float]:
+    """The parameters that outputs may name: not those with the name of another quantity."""
+    scene = report.scene
+    if not (scene.parameters and scene.outputs):
+        return {}
+    from dap3d_core.scene.expressions.parameters import values_of
+
+    taken = {"t", "work", *scene.inputs, *scene.outputs}
+    return {name: x for name, x in values_of(report).items() if name not in taken}
 
 
 def _read_unit(value: Any) -> str | Fault:
@@ -50,13 +62,13 @@ def _read_unit(value: Any) -> str | Fault:
     return Fault('should be a unit in quotes, such as "deg"', 'write unit = "1" for none')
 
 
-def outputs_of(outputs: Mapping[str, Any]) -> dict[str, Expression]:
-    """The outputs of a table [outputs] alone, such as the one that a result carries.
+def outputs_of(outputs: Mapping[str, Any], parameters: Mapping[str, Any]) -> dict[str, Expression]:
+    """The outputs of tables [outputs] and [parameters] alone, such as those of a result.
 
     Raises:
         SceneError: all mistakes.
     """
-    report = Collector(SceneTables(outputs=dict(outputs)))
+    report = Collector(SceneTables(outputs=dict(outputs), parameters=dict(parameters)))
     expressions = read_outputs(report)
     report.raise_mistakes()
     return expressions

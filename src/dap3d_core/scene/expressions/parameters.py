@@ -32,7 +32,7 @@ def resolve(scene: Tables) -> Tables:
         SceneError: all mistakes in parameters and expressions, located.
     """
     report = Collector(scene)
-    values = _values(report)
+    values = values_of(report)
     report.raise_mistakes()
     result = scene.copy()
     result.parameters = dict(values)
@@ -98,7 +98,7 @@ def _value(
     return number
 
 
-def _values(report: Collector) -> dict[str, float]:
+def values_of(report: Collector) -> dict[str, float]:
     """The values of the parameters, in the order of the scene."""
     values: dict[str, float] = {}
     expressions: dict[str, Expression] = {}

@@ -339,3 +339,19 @@ READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
 def unread(spec: FieldSpec, value: Any) -> Any:
     """The value itself, of a kind without a reader."""
     return value
+
+
+def in_words(spec: FieldSpec) -> str:
+    """The kind and the description of a field, for the message that it is missing."""
+    kinds = {
+        "vec3": "3 numbers",
+        "numbers": f"{spec.columns} numbers",
+        "matrix": "3x3 numbers",
+        "square": f"{spec.columns} numbers, or as many rows of as many",
+        "choice": "a word",
+        "table": "rows of numbers" if spec.by_rows else "numbers",
+        "functions": "names",
+        "input": "an input",
+    }
+    kind = kinds.get(spec.kind, f"a {spec.kind}")
+    return f" ({kind}: {spec.doc})" if spec.doc else f" ({kind})"

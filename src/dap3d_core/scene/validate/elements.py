@@ -10,10 +10,11 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
-from dap3d_core.scene.tables import GROUND, ZERO, Element
+from dap3d_core.scene.tables import GROUND, LIMITS, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     READERS,
     Fault,
+    in_words,
     unread,
     unusual_value_note,
 )
@@ -95,7 +96,8 @@ class Reader:
         self.fields = [self._field(name, spec) for name, spec in specs.items()]
         self.kinds = {name: spec.kind for name, spec in specs.items()}
         self.lists = {name: spec for name, spec in specs.items() if spec.size}
-        self.known = dict.fromkeys([*specs, *self.ends])
+        limits = LIMITS if getattr(type_info.type, "limit", "") else ()
+        self.known = dict.fromkeys([*specs, *self.ends, *limits])
         self.of_joints = {name: spec for name, spec in specs.items() if spec.gives}
         # Bodies and points that may be left out follow from the other fields of their slot.
         self.late = [
@@ -129,7 +131,7 @@ class Reader:
             value = element.fields.get(field.name, _ABSENT)
             if value is _ABSENT and not (self.ends and field.spec.kind == "vector2"):
                 if field.spec.required:
-                    reading.refuse(field.name, f"is required{_of(field)}")
+                    reading.refuse(field.name, f"is required{in_words(field.spec)}")
                     continue
                 value = field.spec.default
             field.read(reading, field, value)
@@ -142,7 +144,12 @@ class Reader:
             if values[field.name] is None:
                 is_point = field.spec.kind == "point"
                 values[field.name] = ZERO if is_point else self.body_names[bodies[field.slot]]
-        type_info = self.type_info.chosen(values) if self.type_info.variants else self.type_info
+        type_info = self.type_info
+        if type_info.variants:
+            type_info = type_info.chosen(values, reading.named)
+            own = specs_of(type_info.type)  # with those of states that the variant has
+            added = own.keys() - specs_of(self.type_info.type).keys()
+            values |= {name: own[name].default for name in added}
         if shape is not None:
             from dap3d_core.interface.examine.examine import examine
             from dap3d_core.interface.examine.sized_types import sized
@@ -178,6 +185,12 @@ class _Reading:
         self.places: dict[str, Sequence[Located]] = {}  # of the entries of lists
         self.rows: dict[str, int] = {}  # of F, of fields that name functions and inputs
         self.good = True
+
+    @property
+    def named(self) -> dict[str, str]:
+        """Fields that name functions or inputs, whose rows follow those of functions."""
+        count = len(self.reader.function_index)
+        return {n: "input" if row > count else "function" for n, row in self.rows.items()}
 
     def refuse(self, name: str, what: str, nearest: str = "", remedy: str = "") -> None:
         """Report a mistake of a field, or of the element where the name is empty."""
@@ -235,7 +248,9 @@ class _Reading:
             P_i, P_j = fields.get("P_i"), fields.get("P_j")
             ends = two_ends(self.report, reader.geometry, self.key, P_i, P_j)
         else:
-            self.refuse(field.name, f"is required, by name or by its ends P_i and P_j{_of(field)}")
+            self.refuse(
+                field.name, f"is required, by name or by its ends P_i and P_j{in_words(field.spec)}"
+            )
         if ends is None:
             self.good = False
             return
@@ -450,22 +465,6 @@ def counted(count: int) -> str:
     return "one argument" if count == 1 else "two arguments"
 
 
-def _of(field: _Field) -> str:
-    """The kind and the description of a field, for the message that it is missing."""
-    kinds = {
-        "vec3": "3 numbers",
-        "numbers": f"{field.spec.columns} numbers",
-        "matrix": "3x3 numbers",
-        "square": f"{field.spec.columns} numbers, or as many rows of as many",
-        "choice": "a word",
-        "table": "rows of numbers" if field.spec.by_rows else "numbers",
-        "functions": "names",
-        "input": "an input",
-    }
-    kind = kinds.get(field.spec.kind, f"a {field.spec.kind}")
-    return f" ({kind}: {field.spec.doc})" if field.spec.doc else f" ({kind})"
-
-
 def read_elements(
     report: Collector,
     geometry: Geometry,
@@ -485,14 +484,14 @@ def read_elements(
         elements: in place of those of the scene's table, by name.
     """
     arguments = arguments_of(functions)
+    elements = elements or getattr(report.scene, table)
     readers = {
         keyword: Reader(type_info, table, geometry, report, arguments, types.known)
-        for keyword, type_info in types.of(table).items()
+        for keyword, type_info in types.of(table, elements).items()
     }
-    instances = []
-    for element in (elements or getattr(report.scene, table)).values():
-        reader = readers.get(element.type) if type(element.type) is str else None
-        instance = reader.read(element) if reader is not None else None
-        if instance is not None:
-            instances.append(instance)
-    return instances
+    read = (
+        readers[element.type].read(element)
+        for element in elements.values()
+        if type(element.type) is str and element.type in readers
+    )
+    return [instance for instance in read if instance is not None]

@@ -1,15 +1,16 @@
-"""Fields that an element takes from a joint which it names: its bodies, points and axes."""
+"""What elements have of joints: fields of one which they name, and the forces that joints bring."""
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any
 
 import attrs
 
 from dap3d_core.interface.codegen.type_info import TypeInfo
-from dap3d_core.interface.fields import FieldSpec, slot_of
+from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.scene.tables import GROUND, Element
 from dap3d_core.scene.validate.geometry import Geometry, missing_words
 from dap3d_core.scene.validate.mistake_collector import Collector
+from dap3d_core.scene.validate.validated_scene import Instance
 
 
 def with_joint_fields(
@@ -95,3 +96,39 @@ def _field(report: Collector, geometry: Geometry, joint: Element, name: str) -> 
         if located is not None:
             return names[located[0]]
     return None
+
+
+def brought_forces(
+    report: Collector, joints: Iterable[Instance], known: Callable[[str, Any], TypeInfo | None]
+) -> dict[str, Element]:
+    """The forces that joints bring, by names that hold a dot, as those of a scene do not.
+
+    Beside contacts, whose modes do not know forces on reactions, they are left out with a note.
+
+    Args:
+        report: takes notes; its scene has the joints as written.
+        joints: the joints.
+        known: the type of a kind and keyword, if there is one.
+    """
+    forces: dict[str, Element] = {}
+    scene = report.scene
+    for joint in joints:
+        brings: tuple[str, ...] = getattr(joint.type_info.type, "brings", ())
+        if not brings or not joint.values[brings[0]]:
+            continue
+        field, keyword, place = brings
+        if scene.contacts or scene.collisions is not None or _any_collides(scene.shapes):
+            report.note(f"joints.{joint.name}.{field} is left out beside contacts: it loads "
+                        "bearings, and moves nothing where joints carry it")  # fmt: skip
+            continue
+        force = known("force", keyword)
+        own = specs_of(force.type) if force else {}
+        written = scene.joints[joint.name].fields
+        fields = {name: value for name, value in written.items() if name in own}
+        name = f"{joint.name}.{field}"
+        forces[name] = Element(name, keyword, fields | {place: joint.name})
+    return forces
+
+
+def _any_collides(shapes: Mapping[str, Element]) -> bool:
+    return any(shape.fields.get("collides") for shape in shapes.values())

@@ -8,7 +8,9 @@ from typing import Any
 from unicodedata import normalize
 
 import attrs
+import numpy as np
 
+from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.errors import MISSING, Key
 from dap3d_core.scene.tables import NO_TURN, ZERO, Element
@@ -61,6 +63,27 @@ def _axis(value: Any) -> Any:
     return axis
 
 
+def _bits(value: Any) -> Any:
+    fits = type(value) is int and 0 <= value < 2**32
+    return value if fits else Fault("should be a whole number from 0 to 2^32 - 1")
+
+
+def _heights(value: Any) -> Any:
+    rows = value if isinstance(value, tuple) else ()
+    sizes = {len(row) if isinstance(row, tuple) else 0 for row in rows}
+    if len(rows) < 2 or len(sizes) > 1 or min(sizes) < 2:
+        return Fault("should be two or more rows of two or more heights, all as long")
+    read = [numbers_of(row, len(row)) for row in rows]
+    return next((row for row in read if isinstance(row, Fault)), tuple(read))
+
+
+def _width(value: Any) -> Any:
+    size = numbers_of(value, 2)
+    if not isinstance(size, Fault) and min(size) <= 0.0:
+        return Fault("should be two edges, greater than 0")
+    return size
+
+
 @attrs.frozen
 class Field:
     """A field of a shape: its reader, its default (None: required), its description."""
@@ -75,17 +98,21 @@ _AT = Field(lambda v: numbers_of(v, 3), ZERO, "centre in the axes of the body, m
 _P = Field(quaternion_of, NO_TURN, "Euler parameters of its axes in those of the body")
 _AXIS = Field(_axis, (0.0, 0.0, 1.0), "direction of its axis in the body")
 _COLOR = Field(text_of, "", "as of a body, whose colour it has when left out")
+_EDGES = Field(_size, None, "edges, 3 numbers, m")
 _ROD = {"radius": _NUMBER, "length": _NUMBER, "at": _AT, "axis": _AXIS, "color": _COLOR}
 #: Fields of shapes that may meet others.
 _MEETS = {
     "collides": Field(truth_of, False, "whether it meets other shapes that collide"),
     "material": Field(text_of, "", "of its surface; that of [collisions] when left out"),
+    "group": Field(_bits, 1, "bits of the groups that it is in"),
+    "meets": Field(_bits, 1, "bits of the groups that it meets; one of both has to"),
 }
 
 #: Type -> its fields, besides body.
 SHAPES: Mapping[str, Mapping[str, Field]] = {
-    "box": {"size": Field(_size, None, "edges, 3 numbers, m"), "at": _AT, "p": _P,
-            "color": _COLOR} | _MEETS,
+    "box": {"size": _EDGES, "at": _AT, "p": _P, "color": _COLOR} | _MEETS,
+    "ellipsoid": {"size": Field(_size, None, "its three axes, whole, 3 numbers, m"), "at": _AT,
+                  "p": _P, "color": _COLOR} | _MEETS,
     "sphere": {"radius": _NUMBER, "at": _AT, "color": _COLOR} | _MEETS,
     "capsule": _ROD | _MEETS,
     "cylinder": _ROD | _MEETS,
@@ -93,6 +120,13 @@ SHAPES: Mapping[str, Mapping[str, Field]] = {
         "at": Field(_AT.read, ZERO, "a point of it in the axes of the body, m"),
         "normal": Field(_axis, (0.0, 0.0, 1.0), "from what is solid outward, in the body"),
         "extent": Field(_NUMBER.read, 2.0, "m, edge of the square that is drawn; it has no end"),
+        "color": _COLOR,
+    } | _MEETS,
+    "height_field": {
+        "heights": Field(_heights, None, "rows along x of heights along y, m"),
+        "size": Field(_width, None, "edges along x and y, m"),
+        "at": Field(_AT.read, ZERO, "below its middle, at height 0, in the body, m"),
+        "p": _P,
         "color": _COLOR,
     } | _MEETS,
     "cone": {
@@ -111,7 +145,7 @@ SHAPES: Mapping[str, Mapping[str, Field]] = {
         "p": _P,
         "scale": Field(_NUMBER.read, 1.0, "m for one unit of the file"),
         "color": _COLOR,
-    },
+    } | _MEETS,
 }  # fmt: skip
 
 
@@ -185,6 +219,19 @@ def _mesh_of(folder: Path | None, value: Any) -> str | Fault:
     name = text_of(value)
     path = name if isinstance(name, Fault) else mesh_file(folder, name)
     return path if isinstance(path, Fault) else name
+
+
+def height_field(values: Mapping[str, Any]) -> tuple[Floats, Integers]:
+    """Vertices (k, 3), m, and triangles (m, 3), upward, of a height field, given its fields."""
+    heights, (x, y) = np.array(values["heights"]), values["size"]
+    nx, ny = heights.shape
+    at = np.meshgrid(np.linspace(-0.5 * x, 0.5 * x, nx), np.linspace(-0.5 * y, 0.5 * y, ny),
+                     indexing="ij")  # fmt: skip
+    number = np.arange(nx * ny).reshape(nx, ny)
+    corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    a, b, c, d = (part.ravel() for part in corners)
+    both = np.stack([np.column_stack([a, b, c]), np.column_stack([a, c, d])], axis=1)
+    return np.column_stack([at[0].ravel(), at[1].ravel(), heights.ravel()]), both.reshape(-1, 3)
 
 
 def mesh_file(folder: Path | None, name: str) -> Path | Fault:

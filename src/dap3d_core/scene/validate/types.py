@@ -1,5 +1,6 @@
 """Types that a scene names, from the registry; the model's own file only where needed."""
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ from dap3d_core.interface.errors import PluginError
 from dap3d_core.registry import Registry, UnknownTypeError
 from dap3d_core.registry.declared_types import declares
 from dap3d_core.scene.errors import MISSING
-from dap3d_core.scene.tables import PLUGIN_FILE
+from dap3d_core.scene.tables import PLUGIN_FILE, Element
 from dap3d_core.scene.validate.coerce_values import Fault, text_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 
@@ -41,10 +42,10 @@ class Types:
         self._refused = ""  # the reason why the model's own file gave no types
         self._installed: list[tuple[str, str]] = []  # types taken from packages
 
-    def of(self, table: str) -> dict[str, TypeInfo]:
-        """The types of a table's elements by keyword; unusable ones are reported."""
-        elements: dict[str, list[str]] = {}
-        for name, element in getattr(self.report.scene, table).items():
+    def of(self, table: str, elements: Mapping[str, Element]) -> dict[str, TypeInfo]:
+        """The types of elements of a table by keyword; unusable ones are reported."""
+        named: dict[str, list[str]] = {}
+        for name, element in elements.items():
             key = (table, name, "type")
             if element.type is None:
                 known = ", ".join(self.registry.keywords(KINDS[table]))
@@ -53,8 +54,8 @@ class Types:
                 continue
             keyword = self.report.read(key, element.type, text_of)
             if not isinstance(keyword, Fault):
-                elements.setdefault(keyword, []).append(name)
-        types = {keyword: self._get(table, keyword, names) for keyword, names in elements.items()}
+                named.setdefault(keyword, []).append(name)
+        types = {keyword: self._get(table, keyword, names) for keyword, names in named.items()}
         return {keyword: type_ for keyword, type_ in types.items() if type_ is not None}
 
     def known(self, kind: str, keyword: Any) -> TypeInfo | None:

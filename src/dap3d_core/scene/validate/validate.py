@@ -9,7 +9,7 @@ from dap3d_core.interface.types import acts_on_all
 from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.scene import Scene
-from dap3d_core.scene.tables import NAMED, fault_of_name
+from dap3d_core.scene.tables import LIMITS, NAMED, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
 
@@ -49,10 +49,11 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     types = Types(report, registry, allow_code=allow_code, to_install=_check_requires(report))
     inputs, functions = _read_signals(report, geometry, types)
     joints = read_elements(report, geometry, "joints", types, functions)
-    forces = read_elements(report, geometry, "forces", types, functions)
+    forces = _read_forces(report, geometry, types, functions, joints)
     _report_twins(report, "joints", joints)
     _report_twins(report, "forces", forces)
-    contacts = _read_contacts(report, geometry, types, functions)
+    contacts = _read_contacts(report, geometry, types, functions, (joints, forces))
+    forces = [force for force in forces if not force.type_info.type.is_contact]
     collisions = _check_shapes_and_outputs(report, bodies, joints)
     check_header(report)
     check_settings(report, scene.simulation, bodies.body_names, ("simulation",))
@@ -111,14 +112,41 @@ def _read_signals(
     return inputs, functions
 
 
-def _read_contacts(
-    report: Collector, geometry: "Geometry", types: "Types", functions: list[Instance]
+def _read_forces(
+    report: Collector,
+    geometry: "Geometry",
+    types: "Types",
+    functions: list[Instance],
+    joints: list[Instance],
 ) -> list[Instance]:
-    if not report.scene.contacts:
-        return []
-    from dap3d_core.scene.contacts.read_contacts import read_contacts
+    """Forces, then those that joints bring."""
+    from dap3d_core.scene.validate.elements import read_elements
+    from dap3d_core.scene.validate.joint_fields import brought_forces
 
-    return read_contacts(report, geometry, types, functions)
+    forces = read_elements(report, geometry, "forces", types, functions)
+    if brought := brought_forces(report, joints, types.known):
+        forces += read_elements(report, geometry, "forces", types, functions, brought)
+    return forces
+
+
+def _read_contacts(
+    report: Collector, geometry: "Geometry", types: "Types", functions: list[Instance],
+    others: tuple[list[Instance], list[Instance]],
+) -> list[Instance]:  # fmt: skip
+    """Contacts, limits of joints, and stops that are rigid; others: joints and forces."""
+    joints, forces = others
+    limited = [j for j in joints if j.type_info.type.limit]  # type: ignore[attr-defined]
+    limited = [
+        j for j in limited if any(key in report.scene.joints[j.name].fields for key in LIMITS)
+    ]
+    rigid = [force for force in forces if force.type_info.type.is_contact]
+    if not (report.scene.contacts or limited or rigid):
+        return []
+    from dap3d_core.scene.contacts.read_contacts import limits_of, read_contacts, read_rigid
+
+    elements = report.scene.contacts | limits_of(report, limited)
+    contacts = read_contacts(report, geometry, types, functions, elements) if elements else []
+    return [*contacts, *read_rigid(report, types, rigid)]
 
 
 def _check_requires(report: Collector) -> str:

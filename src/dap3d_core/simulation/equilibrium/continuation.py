@@ -18,11 +18,7 @@ import numpy as np
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, displacement
-from dap3d_core.simulation.equilibrium.trust_region import (
-    BALANCED,
-    held_solution,
-    zero_stiffness,
-)
+from dap3d_core.simulation.equilibrium.trust_region import BALANCED, held_solution, zero_stiffness
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 
 #: The first step, and the shortest, at which the path ends; at most so many are taken. Lengths are

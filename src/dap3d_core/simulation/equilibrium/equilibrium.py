@@ -13,7 +13,8 @@ from dap3d_core.model.state_layout import split
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import information
 from dap3d_core.result.errors import unknown
-from dap3d_core.result.post.reactions import Reaction, reactions
+from dap3d_core.result.post.force_output import reactions_of
+from dap3d_core.result.post.reactions import Reaction
 from dap3d_core.scene import Scene, check
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.equilibrium.rest import EquilibriumSolution, find_rest
@@ -54,7 +55,7 @@ class Equilibrium:
         self, compiled: CompiledModel, rest: EquilibriumSolution, notes: tuple[str, ...] = ()
     ) -> None:
         """Compose an equilibrium of a model and what was found."""
-        self.compiled, self._rest = compiled, rest
+        self.compiled = compiled
         self.u, self.Lam = read_only(rest.u), read_only(rest.multipliers)
         self.r, self.p, _, _ = split(self.u)
         self.angles = read_only(rest.angles)
@@ -106,8 +107,10 @@ class Equilibrium:
         if joint not in names:
             raise unknown("joint", joint, names)
         k = names.index(joint)
-        found = reactions(self.compiled.evaluator, np.zeros(1), self.u[None], self.Lam[None], [k],
-                          self.angles[None], self.states[None])[k]  # fmt: skip
+        found = reactions_of(
+            self.compiled.evaluator, np.zeros(1), self.u[None], self.Lam[None], [k],
+            self.angles[None], self.states[None],
+        )[k]  # fmt: skip
         return {
             slot: attrs.evolve(r, force=r.force[0], moment=r.moment[0], p=r.p[0])
             for slot, r in found.items()
@@ -195,8 +198,10 @@ def equilibrium(
     state = None
     if start is not None:
         state = start_state(start, compiled.model, compiled.checked.registry)
-    if reading := [compiled.model.force_names[k] for group in compiled.model.forces if group.read
-                   for k in group.members.tolist()]:  # fmt: skip
+    brought = compiled.model.brought_forces.values()
+    if reading := [name for group in compiled.model.forces if group.read
+                   for k in group.members.tolist()
+                   if (name := compiled.model.force_names[k]) not in brought]:  # fmt: skip
         raise SimulationError(
             "statics does not know forces that depend on the reactions of joints: leave "
             f"{', '.join(reading)} out of the scene, or let a damped motion come to rest"

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import attrs
 import numpy as np
 
+from dap3d_core.formulations.common.friction import PASSES, forces_by
 from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
@@ -27,6 +28,9 @@ from dap3d_core.simulation.initial.start_state import StartState
 
 #: Singular values of the Jacobian below this part are left out of the least multipliers.
 RCOND = 1e-10
+#: The forces that joints bring have settled where a pass changes the multipliers by less than this
+#: part; they are carried by joints where less than the second part of them is left.
+PASS_SETTLED, CARRIED = 1e-12, 1e-8
 #: Gap, m of a scene of ordinary size, below which bodies touch.
 TOUCHING = 1e-8
 #: Names that a note lists.
@@ -143,11 +147,46 @@ def least_multipliers(statics: Statics, u: Floats) -> tuple[Floats, Floats]:
     evaluator = statics.evaluator
     D = evaluator.rows(statics.t, u).dense()
     force = evaluator.applied_forces(statics.t, u).ravel()
-    multipliers = np.zeros(len(D))
-    if len(D):
-        multipliers = -np.linalg.lstsq(D.T * statics.scale[:, None], statics.scale * force,
-                                       rcond=RCOND)[0]  # fmt: skip
+    multipliers = _least(statics, D, force)
+    if evaluator.model.brought_forces:
+        multipliers, force = _with_brought(statics, u, D, force, multipliers)
     return multipliers, (force + D.T @ multipliers).reshape(-1, 6)
+
+
+def _least(statics: Statics, D: Floats, force: Floats) -> Floats:
+    """(rows,) multipliers of least norm that balance forces (6 n,)."""
+    if not len(D):
+        return np.zeros(0)
+    least = np.linalg.lstsq(D.T * statics.scale[:, None], statics.scale * force, rcond=RCOND)[0]
+    multipliers: Floats = -least
+    return multipliers
+
+
+def _with_brought(
+    statics: Statics, u: Floats, D: Floats, applied: Floats, multipliers: Floats
+) -> tuple[Floats, Floats]:
+    """Multipliers and forces (6 n,), with the forces that joints bring: in rigid bearings.
+
+    Raises:
+        SimulationError: they move something, which the search for the pose did not know.
+    """
+    evaluator, force = statics.evaluator, applied
+    left = statics.scale * (applied + D.T @ multipliers)
+    for _ in range(PASSES):
+        evaluator.place(statics.t, u)
+        force = applied + forces_by(statics.t, evaluator.system, evaluator.loops, multipliers)[6:]
+        before, multipliers = multipliers, _least(statics, D, force)
+        if np.max(np.abs(multipliers - before)) <= PASS_SETTLED * np.max(np.abs(multipliers)):
+            break
+    moves = statics.scale * (force + D.T @ multipliers) - left
+    if np.max(np.abs(moves)) > CARRIED * np.max(np.abs(statics.scale * (force - applied))):
+        names = some(list(evaluator.model.brought_forces.values()), MOST_NAMES)
+        raise SimulationError(
+            f"statics does not know how forces of {names} move the wheels that they press apart: "
+            "their axes are not held by joints. Take the force gear, an elastic mesh, or "
+            "pressure_angle = 0"
+        )
+    return multipliers, force
 
 
 def _with_states(evaluator: Evaluator, search: Search) -> Search:
@@ -293,7 +332,8 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
 
 def _of_time(group: Group, model: Model) -> Iterator[str]:
     """Names of the forces of a group that depend on time."""
-    always = "t" in parameters(group.type_info.kernels["wrench"])
+    law = "friction" if group.read else "wrench"
+    always = "t" in parameters(group.type_info.kernels[law])
     functions = len(group.type_info.layout.functions)
     for member, columns in zip(group.members, group.functions[:, :functions], strict=True):
         if always or set(columns.tolist()) - {0, *model.input_rows.tolist()}:

@@ -273,7 +273,7 @@ class ContactJumps(Jumps):
         for c, (old, new) in enumerate(
             zip(before.astype(int), modes.mode.astype(int), strict=True)
         ):
-            if kind := CHANGES.get((int(old), int(new)), ""):
+            if (kind := CHANGES.get((int(old), int(new)), "")) and (old or not table.load[c]):
                 self._note(c, t, kind, u)
 
     def _outputs(self, t: float, u: Floats) -> Floats:

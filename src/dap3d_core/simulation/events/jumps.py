@@ -203,7 +203,7 @@ class Jumps:
     def _take(self, integration: Integration, u: Floats, jump: Jump) -> Floats:
         """Make the velocities of an integration those after a jump; its state u (13 n,) then."""
         evaluator, y = self._evaluator, jump.y
-        if evaluator.formulation.has_own_coordinates:
+        if not evaluator.coordinates.are_of_bodies:
             y = evaluator.coordinates.with_jump(integration.y, jump.dv, jump.states, jump.work)
         integration.work.state[at.Y] = y
         integration.restart()

@@ -8,7 +8,7 @@ from dap3d_core.kernels import lookup, where
 from dap3d_core.kernels.runtime.source_digest import reached
 from dap3d_core.model.knots import breaks_are_told
 from dap3d_core.result import information
-from dap3d_core.scene import ValidatedScene
+from dap3d_core.scene import Instance, ValidatedScene
 
 #: Words of kernels that choose between formulas.
 CHOOSING = (where, lookup)
@@ -37,16 +37,21 @@ def notes_on_laws(checked: ValidatedScene) -> list[str]:
         if not breaks_are_told(functions[name])
     ]
     by_type: dict[Any, list[str]] = {}
-    for element in checked.forces:
+    for element in _written(checked):
         by_type.setdefault(element.type_info.type, []).append(element.name)
     type_info = {force.type_info.type: force.type_info for force in checked.forces}
     return [*found, *_branching(by_type, type_info)]
 
 
+def _written(checked: ValidatedScene) -> list[Instance]:
+    """The forces of the scene, without those that joints bring, which move nothing."""
+    return [force for force in checked.forces if "." not in force.name]
+
+
 def notes_on_derivatives(checked: ValidatedScene) -> list[str]:
     """Laws with branches or corners at which no step ends: what derivatives of a run are there."""
     by_type: dict[Any, list[str]] = {}
-    for element in checked.forces:
+    for element in _written(checked):
         info = element.type_info
         if "switch" not in info.kernels and _chooses(info, (*LAWS, *STATES), CORNERS):
             by_type.setdefault(info.type, []).append(element.name)

@@ -8,6 +8,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.formulations.common.friction import PASSES, forces_by
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels.array_types import Floats
@@ -49,6 +50,8 @@ NAME = "inverse dynamics"
 RANK = 1e-9
 #: What actuators leave of the forces of a motion, as a part of these, is not worth a note below.
 PRODUCED = 1e-8
+#: Forces that joints bring have settled where a pass changes multipliers by less than this part.
+PASS_SETTLED = 1e-12
 
 
 @attrs.frozen(eq=False)
@@ -290,10 +293,10 @@ def _solved(
 ) -> Result:
     started, model = time.perf_counter(), evaluator.model
     chosen = actuators_of(compiled, evaluator, names)
-    if model.iterated_forces:
+    if others := [n for n in model.iterated_forces if n not in model.brought_forces.values()]:
         raise SimulationError(
             "inverse dynamics does not know Coulomb friction in joints, nor other forces that "
-            f"depend on their reactions: leave {', '.join(model.iterated_forces)} out of the scene"
+            f"depend on their reactions: leave {', '.join(others)} out of the scene"
         )
     held = np.ones(model.row_count, dtype=bool)
     held[[a.row for a in chosen if isinstance(a, DriverActuator)]] = False
@@ -369,11 +372,14 @@ def _forces(
         out.potential[k] = report[layout["potential_energy"]][0]
         out.potential[k] -= sum(a.potential() for a in actuators)
         needed = needed + wrenches @ [a.given for a in actuators]  # tau takes the place of these
-        out.tau[k], rank, left = _actuation(rows.free, wrenches, rows.free.T @ needed)
-        out.Lam[k, held] = rows.multipliers(needed - wrenches @ out.tau[k])
-        for place, actuator in enumerate(actuators):
-            if isinstance(actuator, DriverActuator):
-                out.Lam[k, actuator.row] = out.tau[k, place] / actuator.size(rows.all_rows)
+        out.tau[k], out.Lam[k], rank, left = _balanced(rows, wrenches, actuators, held, needed)
+        for _ in range(PASSES if model.brought_forces else 0):
+            before = out.Lam[k].copy()
+            evaluator.place(t, u)
+            more = needed - forces_by(t, evaluator.system, evaluator.loops, before)[6:]
+            out.tau[k], out.Lam[k], rank, left = _balanced(rows, wrenches, actuators, held, more)
+            if np.max(np.abs(out.Lam[k] - before)) <= PASS_SETTLED * np.max(np.abs(before)):
+                break
         v = u[-6 * model.body_count :]
         out.residuals[k] = (np.max(np.abs(rows.rows.C[held]), initial=0.0),
                             rows.residual(v, rows.rows.nu),
@@ -389,6 +395,19 @@ def _forces(
         if progress is not None:
             progress(t, float(motion.t[-1]))
     return out
+
+
+def _balanced(
+    rows: ChosenRows, wrenches: Floats, actuators: list[Actuator], held: Flags, needed: Floats
+) -> tuple[Floats, Floats, int, Floats]:
+    """Tau and multipliers (rows,) that give forces (6 n,); rank and remainder of ``_actuation``."""
+    tau, rank, left = _actuation(rows.free, wrenches, rows.free.T @ needed)
+    Lam = np.zeros(len(held))
+    Lam[held] = rows.multipliers(needed - wrenches @ tau)
+    for place, actuator in enumerate(actuators):
+        if isinstance(actuator, DriverActuator):
+            Lam[actuator.row] = tau[place] / actuator.size(rows.all_rows)
+    return tau, Lam, rank, left
 
 
 def _actuation(free: Floats, wrenches: Floats, side: Floats) -> tuple[Floats, int, Floats]:

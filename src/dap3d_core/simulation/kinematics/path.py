@@ -38,8 +38,8 @@ SHORTEST = 1e-10
 #: A pose with a smaller singular value of its scaled rows is no end of a step.
 NEAR_SINGULAR = 1e-7
 #: Closer to a singular pose, positions are interpolated between poses on both sides, this part of a
-#: step away: rounding would be multiplied by the inverse of the singular value there.
-INTERPOLATED, OFFSET_TIME = 1e-4, 0.05
+#: step away and twice as far: rounding would be multiplied by the inverse of the singular value.
+INTERPOLATED, OFFSET_TIME = 1e-4, 0.2
 #: A singular pose is located between poses so many steps aside, which a cubic goes through.
 LOCATED = 2e-3
 #: Tolerances of the integration of rows of the velocity level.
@@ -142,7 +142,14 @@ class KinematicPath:
         if pose.rows.least > INTERPOLATED:
             return pose, False
         h = OFFSET_TIME * abs(self.pose.t - self.before.t)
-        y, y_dot, y_ddot = _interpolated(self._between(t - h), self._between(t + h), t)
+        near, far = (
+            _interpolated(self._between(t - gap), self._between(t + gap), t) for gap in (h, 2.0 * h)
+        )
+        # Midway, positions and rates err by h^6 and second derivatives by h^4: extrapolated.
+        y, y_dot, y_ddot = (
+            x + (x - z) / (ratio - 1.0)
+            for x, z, ratio in zip(near, far, (64.0, 64.0, 16.0), strict=True)
+        )
         r, p = (part.reshape(-1, k) for part, k in zip(_parts(y), (3, 4), strict=True))
         v, a = _velocity(y, y_dot, y_ddot)
         u = join(r, p / np.linalg.norm(p, axis=1, keepdims=True), *_by_body(v))

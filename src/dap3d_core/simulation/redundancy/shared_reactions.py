@@ -10,8 +10,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import FRICTION
-from dap3d_core.assembly.evaluate import call_kinds
+from dap3d_core.formulations.common.friction import forces_by
 from dap3d_core.formulations.constraint_rows import scaled_rows
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.interface.codegen.kernel_arguments import parameters
@@ -89,6 +88,7 @@ def shared_laws(
             checked.forces[k].values.get(SHARED) == LEAST,
         )
         for k in sorted(found)
+        if model.force_names[k] not in model.brought_forces.values()  # which joints carry
     )
 
 
@@ -213,9 +213,7 @@ def _other_shares(evaluator: Evaluator, t: float, u: Floats, Lam: Floats) -> Flo
 
 def _power(evaluator: Evaluator, t: float, Lam: Floats) -> float:
     s = evaluator.system
-    force, minus = np.zeros_like(s.force), np.zeros_like(s.multipliers)
-    minus[s.row] = -Lam
-    call_kinds(FRICTION, FRICTION, t, s, evaluator.loops, force, minus, minus)
+    force = forces_by(t, s, evaluator.loops, Lam)
     return float(np.sum(force.reshape(-1, 6) * s.body[:, V : V + 6]))
 
 

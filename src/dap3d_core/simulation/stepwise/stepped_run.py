@@ -75,8 +75,7 @@ class SteppedRun:
         self._attach()
         system = evaluator.system
         arrays = [*integration.state_arrays(), *(getattr(system, name) for name in CHECKPOINTED)]
-        if evaluator.formulation.has_own_coordinates:
-            arrays.append(system.tree.constants)  # the poses that coordinates count from
+        arrays += evaluator.coordinates.reference
         self._start = [(array, array.copy()) for array in arrays]
 
     @property

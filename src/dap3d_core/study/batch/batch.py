@@ -45,10 +45,8 @@ def batch_runner(reduction: Reduction, times: Floats) -> "BatchRunner | None":
     evaluator, collisions = compiled.evaluator, compiled.model.collisions
     if collisions is not None or integrator_named(settings.integrator).steps_contacts:
         return None  # so are those of contacts by stepping
-    if evaluator.formulation.has_own_coordinates and (
-        evaluator.model.state_count or evaluator.coordinates.kept
-    ):
-        return None  # numbers of kept rows and states of elements are those of one run
+    if not evaluator.coordinates.suits_batches:
+        return None
     try:
         start = compiled.start(bool(settings.correct), settings.hold, str(settings.correct_metric))
     except (AssemblyError, SceneError):
@@ -86,15 +84,14 @@ class BatchRunner:
         self.parameter_map: ParameterMap | None = None
         with contextlib.suppress(NotCopiedError):
             parameter_map = ParameterMap(compiled.checked, evaluator, parameters)
-            is_of_bodies = not evaluator.formulation.has_own_coordinates
-            has_start = is_of_bodies or parameter_map.keeps_poses
+            has_start = evaluator.coordinates.are_of_bodies or parameter_map.keeps_poses
             if has_start and (not parameter_map.moves_start or self._has_compiled_correction()):
                 self.parameter_map = parameter_map
 
     def _point_runs(self, start: InitialState) -> "CompiledBatch | TreePoints":
         """What runs mapped points one by one, from states in coordinates of bodies."""
         batch, compiled = self.compiled_batch, self._compiled
-        if not batch.evaluator.formulation.has_own_coordinates:
+        if batch.evaluator.coordinates.are_of_bodies:
             return batch
         from dap3d_core.study.batch.joint_space_batch import TreePoints
 
@@ -170,7 +167,7 @@ class BatchRunner:
         others = [o for o in reduction.outputs if not reduction.of_rows[o.name]]
         for k, point, of_run in zip(index, values, rows, strict=True) if others else ():
             _, model = self._rebuilder.load(point)
-            result = reduction.result(model, of_run, self.compiled_batch.evaluator)
+            result = reduction.result(model, of_run, self.compiled_batch.evaluator, point)
             batch.store(int(k), result, others)
 
     def _note_corrections(

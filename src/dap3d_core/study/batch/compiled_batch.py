@@ -90,6 +90,7 @@ class CompiledBatch:
                 y0,
                 times,
                 buffer_rows=len(times),
+                stops=stops,
                 stop_when_stiff=may_turn_stiff,  # as Run does
                 **integration_options(evaluator, settings),
             )
@@ -104,7 +105,6 @@ class CompiledBatch:
         self.constants: dict[str, Any] = {
             "metric": evaluator.system.metric.copy(),
             "unit": unit,
-            "stops": np.array(stops, dtype=float).reshape(-1, 2),
             "starting": starting,
             "first_real": work.real.copy(),
             "first_integer": work.integer.copy(),
@@ -137,7 +137,7 @@ class CompiledBatch:
                 found = (
                     wide
                     if isinstance(wide, str)
-                    else LaneBatch(self.evaluator, wide, self._lane_works, _drives(), self._begin)
+                    else LaneBatch(self.evaluator, wide, self._lane_works, self._begin)
                 )
             self._lanes = key, found
         return self._lanes[1]
@@ -190,7 +190,7 @@ class CompiledBatch:
         """
         work, count = self.integration.work, len(table)
         nt, width = len(work.rows), self.evaluator.model.row_layout["inputs"].start
-        own = self.evaluator.formulation.has_own_coordinates
+        own = not self.evaluator.coordinates.are_of_bodies
         diagnostics = np.zeros((count, driver.COLUMNS))
         points = driver.Points(
             at=np.array([0, 0, start, own], dtype=np.int64),

@@ -12,19 +12,10 @@ from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import attrs
-import numpy as np
 
 from dap3d_core.assembly.arrays import UNSETTLED, System
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
-from dap3d_core.integrators.stepping.integration_state import (
-    FINISHED,
-    NOISE,
-    RUNNING,
-    SIDE,
-    Function,
-    Y,
-)
-from dap3d_core.integrators.stepping.output import project_state
+from dap3d_core.integrators.stepping.integration_state import FINISHED, NOISE, RUNNING, Function, Y
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays
 from dap3d_core.kernels.runtime.cache import compiled
@@ -33,7 +24,7 @@ from dap3d_core.study.batch.initial_state import LEAST_PIVOT, OPEN, STARTING
 
 # Entries of ``at``: the current point, whether its run has begun, how to start; whether states are
 # in coordinates of the formulation's own, and rows have to be brought to those of bodies.
-POINT, BEGUN, START, OWN, AT_SIZE = range(5)
+POINT, BEGUN, START, OWN = range(4)
 # Start from the state as given, from the corrected state, or correct it and do not run.
 UNCORRECTED, CORRECT, CORRECT_ONLY = range(3)
 # Columns of ``diagnostics`` after those of the start: status, rows, steps, right-hand sides, and
@@ -52,17 +43,16 @@ class Points(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(("at", "places", "first_integer"), INTEGER_VECTOR),
-        **dict.fromkeys(("table", "y0", "metric", "stops", "rows", "diagnostics"), MATRIX),
+        **dict.fromkeys(("table", "y0", "metric", "rows", "diagnostics"), MATRIX),
         **dict.fromkeys(("first_switches", "first_lengths"), MATRIX),
     }
 
-    at: Integers  # (AT_SIZE,)
+    at: Integers  # (4,)
     places: Integers  # (w,) indices in par, body, metric and constants of a tree, concatenated
     table: Floats  # (k, w) the numbers at these indices
     y0: Floats  # (k, n) states to start from
     metric: Floats  # of the model, where its numbers do not change from point to point
     unit: Floats  # (7,) constants of the metric of displacements at the start
-    stops: Floats  # (s, 2) times that no step crosses, and whether something jumps there
     starting: Floats  # (STARTING + rows,) arguments and results of the start (initial_state.py)
     first_real: Floats  # the work as it is before a run
     first_integer: Integers
@@ -144,49 +134,6 @@ def start(
 
 
 @compiled
-def restart(work: RungeKuttaState) -> None:
-    """Restart the step control, as ``Integration.restart``."""
-    work.h, work.last_error, work.step_limit_at_switch = 0.0, 1e-4, np.inf
-    work.first_stage_valid = work.switch_rates_valid = work.last_rejected = work.cut_attempts = 0
-    for q in range(work.switches.shape[1]):
-        work.switches[SIDE, q] = 0.0
-
-
-@compiled
-def next_stop(
-    stops: Floats,
-    work: RungeKuttaState,
-    functions: Any,
-    drive: Function,
-    system: System,
-    loops: Any,
-) -> float:
-    """The next time that no step crosses, as ``Integration._next_stop``."""
-    adaptive = work.fixed_step == 0.0
-    for k in range(stops.shape[0]):
-        t = stops[k, 0]
-        if t < work.t:
-            continue
-        before = np.nextafter(t, -np.inf) if stops[k, 1] != 0.0 and adaptive else t
-        if work.t < before:
-            return before
-        if before < t:
-            work.t = work.t_limit = t
-            drive(work, functions, system, loops, 0)
-            if work.status != RUNNING:
-                return t
-            work.t = np.nextafter(t, np.inf)
-            restart(work)
-            if work.projects != 0:
-                work.status = project_state(
-                    work, work.t, work.state[Y], functions[1], system, loops
-                )
-                if work.status != RUNNING:
-                    return t
-    return np.inf
-
-
-@compiled
 def store_row(
     target: Floats,
     row: Floats,
@@ -253,10 +200,7 @@ def run_points(
                 continue
             at[BEGUN] = 1
         calls = work.rhs_count
-        if points.stops.shape[0] != 0:
-            work.t_limit = next_stop(points.stops, work, functions, drive, system, loops)
         drive(work, functions, system, loops, budget - spent)
-        work.t_limit = np.inf
         spent += work.rhs_count - calls
         if work.status != RUNNING:
             store_run(points, p, work, starting, system, loops)

@@ -163,7 +163,7 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         factor_positions(system, out[STARTING:])
         correct(system)
         limit_displacement(system, MOST_SHIFT * size / length)
-        apply_displacement(y, system.metric, system.change)
+        apply_displacement(y, system)
         place_with_spin(y, system)
         out[PASSES] += 1.0
     out[C_AFTER] = worst

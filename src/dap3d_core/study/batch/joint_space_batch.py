@@ -9,6 +9,7 @@ from functools import cached_property
 
 import numpy as np
 
+from dap3d_core.formulations.joint.coordinates import TreeCoordinates
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.simulation.initial.assemble import SMALL_CORRECTION, distance
@@ -37,6 +38,7 @@ class TreePoints:
         Points whose correction moves bodies from where they start in the scene are not done.
         """
         coordinates = self._batch.evaluator.coordinates
+        assert isinstance(coordinates, TreeCoordinates)
         first = coordinates.start(self._u)
         if start == driver.UNCORRECTED:
             rows = self._batch.run(table, places, np.repeat(first[None], len(table), axis=0))

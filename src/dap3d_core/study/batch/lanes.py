@@ -32,7 +32,7 @@ from dap3d_core.integrators.runge_kutta.lanes import (
     take_projection,
 )
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
-from dap3d_core.integrators.stepping.integration_state import RUNNING, SAMPLE, Function
+from dap3d_core.integrators.stepping.integration_state import SAMPLE, Function
 from dap3d_core.kernels.compiler.trace import TraceError
 from dap3d_core.kernels.compiler.types import INT, CompileError, Table, Tuple
 from dap3d_core.kernels.compiler.units import Entry
@@ -47,7 +47,6 @@ from dap3d_core.study.batch.driver import (
     NO_START,
     POINT,
     Points,
-    next_stop,
     set_numbers,
     start,
     store_run,
@@ -156,7 +155,6 @@ def next_step(
     work: RungeKuttaState,
     lanes: Lanes,
     functions: Any,
-    drives: Any,
     starting: Sequence[Function],
     system: System,
     loops: Any,
@@ -176,14 +174,10 @@ def next_step(
             set_lane(points, p, lane_points, k, system)
             lane_points.point[k] = p
         load(points, lane_points, k, system)
-        while work.status == RUNNING:
-            if points.stops.shape[0] != 0:
-                work.t_limit = next_stop(points.stops, work, functions, drives[0], system, loops)
-            if plan_step(work, lanes, k, functions, system, loops):
-                exchange_kept(lane_points, k, system, True)  # it may have taken steps
-                lanes.does[k] = TAKES_STEP
-                return 1
-        work.t_limit = np.inf
+        if plan_step(work, lanes, k, functions, system, loops):
+            exchange_kept(lane_points, k, system, True)  # it may have taken steps
+            lanes.does[k] = TAKES_STEP
+            return 1
         store_run(points, lane_points.point[k], work, starting, system, loops)
         lane_points.point[k] = NONE
 
@@ -300,7 +294,6 @@ def run_lanes(
     lanes: Lanes,
     wide: Any,
     functions: Any,
-    drives: Any,
     starting: Any,
     system: System,
     loops: Any,
@@ -317,7 +310,7 @@ def run_lanes(
         active = 0
         for k, work in works:
             active += next_step(
-                points, lane_points, k, work, lanes, functions, drives, starting, system, loops
+                points, lane_points, k, work, lanes, functions, starting, system, loops
             )
         if active > 0:
             take_stages(points, lane_points, works, lanes, wide, functions, system, loops)
@@ -338,13 +331,13 @@ class LaneBatch:
     """
 
     def __init__(
-        self, evaluator: Evaluator, wide: WideRates, make: MakeWorks, drives: Any, starting: Any
+        self, evaluator: Evaluator, wide: WideRates, make: MakeWorks, starting: Any
     ) -> None:
         """Args:
         evaluator: evaluates the model; its arrays stay what they are.
         wide: the right-hand side of all lanes.
         make: makes the states of so many integrations.
-        drives, starting: as of ``run_points``.
+        starting: as of ``run_points``.
         """
         count = self.count = wide.lanes["bound"].shape[1]
         system = evaluator.system
@@ -370,14 +363,14 @@ class LaneBatch:
             kept=np.zeros((count, kept.size + system.settings.size)),
         )
         self._works = tuple(enumerate(make(count)))
-        self._arguments = evaluator.functions, drives, starting, system, evaluator.loops
+        self._arguments = evaluator.functions, starting, system, evaluator.loops
         work = RungeKuttaState.type_of()
         self._run: Entry = run_lanes.compile(
             [
                 Points.type_of(), LanePoints.type_of(), Tuple((Tuple((INT, work)),) * count),
                 Lanes.type_of(),
                 Tuple((Table(SIGNATURE), *SIGNATURE.arguments)),
-                STEPS, Table(drives.signature), STEPS, System.type_of(), LOOP_LIST, INT,
+                STEPS, STEPS, System.type_of(), LOOP_LIST, INT,
             ]
         )  # fmt: skip
 
@@ -430,7 +423,8 @@ def wide_rates(
         reason = f"it has more than {MOST_BODIES_OF_PROGRAM} bodies"
     except (CompileError, TraceError) as error:
         reason = str(error)
-    is_tree = evaluator.formulation.has_own_coordinates and not evaluator.coordinates.kept
+    tree = evaluator.system.tree
+    is_tree = tree is not None and tree.kept is None
     if not is_tree or evaluator.model.state_count or evaluator.model.body_count > MOST_BODIES:
         return reason
     from dap3d_core.formulations.joint.lanes import tree_rates

@@ -152,8 +152,7 @@ class ParameterMap:
             body = np.concatenate([mass[..., None], Jp.reshape(*mass.shape, 9)], axis=-1)
             parts += [part.reshape(len(values), -1)
                       for part in (body, metric[1:, :METRIC_CONSTANTS])]  # fmt: skip
-            if self._evaluator.formulation.has_own_coordinates:
-                parts.append(self._evaluator.coordinates.inertias(1 + self._bodies, mass, Jp))
+            parts.append(self._evaluator.coordinates.inertias(1 + self._bodies, mass, Jp))
         return np.hstack(parts), valid
 
     def states(self, values: Floats, u0: Floats) -> Floats:
@@ -240,7 +239,10 @@ class ParameterMap:
 
     def _of_element(self, parameter: SceneParameter) -> MappedParameter:
         table, name, field = parameter.path
-        instance = next(i for i in getattr(self._checked, table) if i.name == name)
+        named = (i for i in getattr(self._checked, table) if i.name == name)
+        instance = next(named, None)
+        if instance is None:  # a rigid stop, which is a contact
+            raise NotCopiedError
         type_: Any = instance.type_info.type
         spec = specs_of(type_).get(field)
         if spec is None or spec.kind not in ("number", "vec3"):
@@ -320,9 +322,9 @@ class ParameterMap:
                 yield group, int(self._evaluator.system.groups[q, 1])
 
     def _inertia_places(self) -> Iterator[Integers]:
-        """Entries of masses and inertias in the constants of a tree, where there is one."""
+        """Entries of masses and inertias in numbers of the coordinates, where they have some."""
         evaluator = self._evaluator
-        if evaluator.formulation.has_own_coordinates and len(self._bodies):
+        if len(self._bodies):
             system = evaluator.system
             first = system.par.size + system.body.size + system.metric.size
             yield first + evaluator.coordinates.inertia_places(1 + self._bodies)

@@ -36,7 +36,6 @@ class DifferentiatedRun(Run):
         self.reported: list[Floats] = []
         self.slopes: list[Floats] = []
         self.instants: dict[float, Floats] = {}
-        self._stops: Floats = np.zeros((0, lanes))
         return self
 
     def begin(self, integration: Integration) -> None:
@@ -52,7 +51,6 @@ class DifferentiatedRun(Run):
             )
         super().begin(integration)
         self._differentiation = Differentiation(1 + self._lanes)
-        self._differentiation.taken = self._set_instants
         integration.takes_programs = False
         integration.call = self._differentiation.call  # type: ignore[method-assign]
         integration.rows = self._rows  # type: ignore[method-assign]
@@ -73,27 +71,12 @@ class DifferentiatedRun(Run):
             self._differentiation.wide(argument)
         arrays = floats_of(self)
         ends = np.cumsum([array.size for array in arrays.values()])[:-1]
-        self._stops = np.zeros((len(self.present.tstops), len(self.neighbours)))
         for j, beside in enumerate(self.neighbours):
             found = beside.derivative(
                 lambda run: finite(np.concatenate([*floats_of(run).values()]))
             )
             for array, slope in zip(arrays.values(), np.split(found, ends), strict=True):
                 self._slopes_of(array)[:, j] = slope
-            stops = beside.derivative(lambda run: np.array([t for t, _ in run.present.tstops]))
-            self._stops[:, j] = stops
-
-    def _set_instants(self) -> None:
-        """Where a step ends at a break point of a function, that depends on parameters."""
-        if not self._stops.any():
-            return
-        work, slopes = self.present.work, self._slopes_of(self.present.work.real)
-        places = work.indices("real")
-        for (t, _), slope in zip(self.present.tstops, self._stops, strict=True):
-            near = (np.nextafter(t, -np.inf), t, np.nextafter(t, np.inf))
-            for name in ("t", "t_limit"):
-                if getattr(work, name) in near:
-                    slopes[places[name]] = slope
 
     def _rows(self) -> Floats:
         """As ``Integration.rows``; their derivatives are kept."""
@@ -102,7 +85,7 @@ class DifferentiatedRun(Run):
         raw = work.rows[:count].copy()
         slopes = self._slopes_of(work.rows)[: count * work.rows.shape[1]]
         slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
-        if self.evaluator.formulation.has_own_coordinates and count:
+        if count and not self.evaluator.coordinates.are_of_bodies:
             slopes = self._derivative(lambda run, rows: run.evaluator.body_rows(rows), raw, slopes)
         if count:
             self.slopes.append(slopes)

@@ -12,6 +12,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.coordinates import UnsuitableError
+from dap3d_core.integrators.stepping.integration_state import BEFORE, INSTANT
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.scene import Mistake, SceneError
@@ -196,8 +197,11 @@ def floats_of(run: Run) -> dict[str, Floats]:
 def _are_alike(one: Run, other: Run) -> bool:
     """True if the arrays of two runs are of the same sizes, and the same steps end at breaks."""
     shapes = [[(name, array.shape) for name, array in arrays_of(run)] for run in (one, other)]
-    stops = [[jumps for _, jumps in run.present.tstops] for run in (one, other)]
-    return shapes[0] == shapes[1] and stops[0] == stops[1]
+    if shapes[0] != shapes[1]:
+        return False
+    stops = [run.present.work.stops for run in (one, other)]
+    jumps = [table[BEFORE] < table[INSTANT] for table in stops]
+    return bool(np.array_equal(*jumps))
 
 
 def change_along(state: Floats, slopes: Floats) -> float:

@@ -162,8 +162,8 @@ class SampledType:
         specs = specs_of(self.type)
         conditions = dict.fromkeys(self.type_info.argument_functions, True) | dict(self.choices)
         return {n: "cubic" if specs[n].kind == "function" else v for n, v in conditions.items()
-                if not specs[n].by_name and (v is not False or specs[n].kind == "choice")
-                }  # fmt: skip
+                if n in specs and not (specs[n].is_optional or specs[n].by_name)
+                and (v is not False or specs[n].kind == "choice")}  # fmt: skip
 
     @property
     def kernels(self) -> Kernels:
@@ -302,7 +302,7 @@ def own_values(type_info: TypeInfo) -> dict[str, Any] | None:
     """Values of choices for which no variant replaces the type; None where there are none."""
     specs = specs_of(type_info.type)
     names = [n for n in specs if any(n in conditions for conditions, _ in type_info.variants)]
-    without = [(False,) * (not specs[n].required) for n in names]
+    without = [(specs[n].is_optional,) * (not specs[n].required) for n in names]
     ways = [specs[n].choices or way for n, way in zip(names, without, strict=True)]
     for values in (dict(zip(names, way, strict=True)) for way in product(*ways)):
         given = {n: v or None if specs[n].is_reference else v for n, v in values.items()}

@@ -15,6 +15,8 @@ from dap3d_core.view.scene3d.primitives import pack
 SMALLEST = 1e-9
 #: Greatest lengths of the longest arrow and of the usual one, as fractions of the scene's size.
 LONGEST, USUAL = 0.36, 0.16
+#: Pairs of shapes whose forces are drawn at most.
+MOST_PAIRS = 200
 
 
 def arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any]:
@@ -36,7 +38,8 @@ def arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any]
     """
     notes: list[str] = []
     every = [
-        *_reactions(result, elements), *_applied(result, elements, notes), *_contacts(result)
+        *_reactions(result, elements), *_applied(result, elements, notes), *_contacts(result),
+        *_shape_contacts(result, notes),
     ]  # fmt: skip
     scales, arrows, least = {}, [], 0.0
     for what in ("force", "moment"):
@@ -86,13 +89,36 @@ def _applied(result: Result, elements: Elements, notes: list[str]) -> Iterator[d
 
 
 def _contacts(result: Result) -> Iterator[dict[str, Any]]:
-    for name in result.contacts:
+    for name in result.contact_names:
         contact = result.contact(name)
         forces, places = (x.reshape(len(result.t), -1, 3) for x in (contact.force, contact.at))
         for k in range(forces.shape[1]):
             if np.all(np.isfinite(forces[:, k])):
                 yield {"layer": "contacts", "what": "force", "name": name, "body": 0, "at": ORIGIN,
                        "values": forces[:, k], "places": places[:, k]}  # fmt: skip
+
+
+def _shape_contacts(result: Result, notes: list[str]) -> Iterator[dict[str, Any]]:
+    """What each pair of shapes pushes with, all its points together, on shape i."""
+    table = result.contacts
+    pairs, which = np.unique(table.pair, axis=0, return_inverse=True)
+    size = np.linalg.norm(table.force, axis=1)
+    largest = np.argsort(-np.bincount(which.ravel(), size, len(pairs)), kind="stable")[:MOST_PAIRS]
+    if len(pairs) > MOST_PAIRS:
+        notes.append(f"arrows of {MOST_PAIRS} of {len(pairs)} pairs of shapes that touch are drawn")
+    place = np.searchsorted(result.t, table.t)
+    for k in largest:
+        chosen = which.ravel() == k
+        at, weight = place[chosen], size[chosen]
+        forces, places = np.zeros((2, len(result.t), 3))
+        total = np.bincount(at, weight, len(result.t))[:, None]
+        for axis in range(3):
+            forces[:, axis] = np.bincount(at, table.force[chosen, axis], len(result.t))
+            sums = np.bincount(at, weight * table.point[chosen, axis], len(result.t))
+            np.divide(sums, total[:, 0], out=places[:, axis], where=total[:, 0] > 0.0)
+        name = " on ".join(table.names[i] for i in pairs[k][::-1])
+        yield {"layer": "contacts", "what": "force", "name": name, "body": 0,
+               "at": ORIGIN, "values": forces, "places": places}  # fmt: skip
 
 
 def _pair(

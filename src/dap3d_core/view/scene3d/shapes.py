@@ -16,7 +16,13 @@ from dap3d_core.scene.files.read_mesh import read_mesh
 from dap3d_core.scene.scene import Scene
 from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.shapes import SHAPES, Shape, mesh_file, read_shapes
+from dap3d_core.scene.validate.shapes import (
+    SHAPES,
+    Shape,
+    height_field,
+    mesh_file,
+    read_shapes,
+)
 from dap3d_core.view.scene3d.colors import color
 from dap3d_core.view.scene3d.primitives import Located, Mark, floats_of, turned_to
 from dap3d_core.view.scene3d.solids import Triangles, solid
@@ -150,10 +156,13 @@ def _add(shapes: SceneShapes, shape: Shape, hue: str, folder: Path | None) -> st
     values = shape.values
     about: dict[str, Any] = {"body": shape.body, "color": hue, "owner": shape.name}
     piece: Mark | Line | Mesh
-    if shape.type == "mesh" or shape.type not in SHAPES:
+    if shape.type in ("mesh", "height_field") or shape.type not in SHAPES:
         if sum(len(mesh.triangles) for mesh in shapes.meshes) >= MOST_IN_ALL:
             return f"the picture holds {MOST_IN_ALL} triangles already, or more"
-        mesh = _mesh(folder, values["file"]) if shape.type == "mesh" else _own_mesh(shape)
+        if shape.type == "height_field":
+            mesh: Any = height_field(values)
+        else:
+            mesh = _mesh(folder, values["file"]) if shape.type == "mesh" else _own_mesh(shape)
         if isinstance(mesh, str):
             return mesh
         piece = Mesh(at=values["at"], q=values["p"], scale=values.get("scale", 1.0),
@@ -203,12 +212,13 @@ def _solid(shape: Shape, hue: str) -> Mark:
     if shape.type == "plane":
         normal, extent = np.array(v["normal"]), v["extent"]
         at = floats_of(v["at"] - 0.005 * extent * normal / np.linalg.norm(normal))
-        size = (extent, extent, 0.01 * extent)
-        return Mark("shapes", "box", shape.body, at, size, turned_to(normal), hue, shape.name)
+        edges = (extent, extent, 0.01 * extent)
+        return Mark("shapes", "box", shape.body, at, edges, turned_to(normal), hue, shape.name)
     radius = v.get("radius", 0.0)
     thickness = 0.02 * radius if shape.type == "disk" else v.get("length", radius)
-    kind = {"disk": "cylinder"}.get(shape.type, shape.type)
-    size = v["size"] if kind == "box" else (radius, radius, thickness)
+    kind = {"disk": "cylinder", "ellipsoid": "sphere"}.get(shape.type, shape.type)
+    edges = v.get("size", (radius, radius, thickness))
+    size = floats_of(0.5 * np.array(edges)) if shape.type == "ellipsoid" else edges
     q = turned_to(v["axis"]) if "axis" in v else v.get("p", (1.0, 0.0, 0.0, 0.0))
     return Mark("shapes", kind, shape.body, v["at"], size, q, hue, shape.name)
 

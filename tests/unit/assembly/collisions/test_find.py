@@ -9,23 +9,31 @@ from dap3d_core.scene.contacts.collision_shapes import (
     BOX,
     CAPSULE,
     CYLINDER,
+    ELLIPSOID,
+    HULL,
     PLANE,
     SPHERE,
     CollisionShapes,
 )
 
-PAIRS = [(SPHERE, SPHERE), (CAPSULE, SPHERE), (CAPSULE, CAPSULE), (CYLINDER, SPHERE),
-         (BOX, SPHERE), (BOX, CAPSULE)]  # fmt: skip
-SOLIDS = (SPHERE, CAPSULE, CYLINDER, BOX)
+SOLIDS = (SPHERE, CAPSULE, CYLINDER, BOX, ELLIPSOID, HULL)
+#: Those whose surface is smooth wherever it may touch another one of any kind.
+ROUND = (SPHERE, CAPSULE, ELLIPSOID)
+#: Directions of the vertices of hulls, which lie on an ellipsoid.
+WAYS = np.random.default_rng(0).standard_normal((20, 3))
+WAYS /= np.linalg.norm(WAYS, axis=1)[:, None]
 
 
 def finder(kinds, sizes):
     """Shapes of bodies 1, 2, ... about their origins."""
-    m = len(kinds)
+    m, sizes = len(kinds), np.array(sizes, dtype=float)
+    hulls = [size * WAYS for size in sizes]
+    corners = np.array([[len(WAYS) * k, len(WAYS)] for k in range(m)])
     return ShapeFinder(CollisionShapes(
         tuple(map(str, range(m))), np.array(kinds), np.arange(1, m + 1), np.zeros((m, 3)),
-        np.tile([1.0, 0.0, 0.0, 0.0], (m, 1)), np.array(sizes, dtype=float),
-        np.zeros(m, dtype=np.int64), *np.zeros((2, 1, 1)), np.zeros(0, dtype=np.int64),
+        np.tile([1.0, 0.0, 0.0, 0.0], (m, 1)), sizes, corners, np.concatenate(hulls),
+        np.zeros(m, dtype=np.int64), np.ones((m, 2), dtype=np.int64), *np.zeros((2, 1, 1)),
+        np.zeros(0, dtype=np.int64),
     ))  # fmt: skip
 
 
@@ -38,8 +46,17 @@ def support(kind, size, A, centre, d):
         return centre + A[:, 2] * size[1] * np.sign(local[2]) + size[0] * d
     if kind == BOX:
         return centre + A @ (np.sign(local) * size)
-    rim = size[0] * local[:2] / np.hypot(*local[:2])
+    if kind == ELLIPSOID:
+        return centre + A @ (size**2 * local / np.linalg.norm(size * local))
+    if kind == HULL:
+        return centre + A @ max(size * WAYS, key=local.dot)
+    rim = size[0] * local[:2] / max(np.hypot(*local[:2]), 1e-300)
     return centre + A @ np.array([*rim, size[1] * np.sign(local[2])])
+
+
+PAIRS = [
+    (i, j) for i in SOLIDS for j in SOLIDS if i >= j
+]  # fmt: skip
 
 
 def poses(rng, far=1.0):
@@ -47,23 +64,55 @@ def poses(rng, far=1.0):
     return rng.uniform(-far, far, (2, 3)), p / np.linalg.norm(p, axis=1)[:, None]
 
 
-@pytest.mark.parametrize("kinds", PAIRS)
+@pytest.mark.parametrize("kinds", [p for p in PAIRS if p != (BOX, BOX)])
 def test_gaps_are_distances_along_the_normals(kinds):
-    """The nearest point of a pair apart has a gap that parts both solids, to rounding of 1 m."""
+    """Any normal parts solids by no more than their distance, so that one that parts them by the
+    distance of two points of them is theirs; and the same stands as they come near along it."""
     rng, seen = np.random.default_rng(1), 0
-    for _ in range(150):
+    near = (1e-3, 1e-12, 0.0, -1e-9) if set(kinds) & set(ROUND) else (1e-3, 1e-6)
+    for _ in range(25):
         sizes = rng.uniform(0.2, 0.5, (2, 3))
         r, p = poses(rng)
-        found = finder(kinds, sizes).find(r, p, np.array([0.0, 0.5, 0.5]))
+        pair = finder(kinds, sizes)
+        found = pair.find(r, p, np.array([0.0, 0.5, 0.5]))
         if not len(found.gap) or found.gap.min() < 1e-3:
             continue
         k, A = np.argmin(found.gap), rotation(p)
-        (i, j), n = found.shapes[k], found.normal[k]
+        (i, j), n, gap = found.shapes[k], found.normal[k].copy(), found.gap[k]
         ends = [support(kinds[b], sizes[b], A[b], r[b], s * n) for b, s in ((i, -1.0), (j, 1.0))]
-        assert n @ (ends[0] - ends[1]) == pytest.approx(found.gap[k], abs=1e-12)
+        assert n @ (ends[0] - ends[1]) == pytest.approx(gap, abs=1e-12)
         assert np.linalg.norm(n) == pytest.approx(1.0, abs=1e-14)
+        for side, b in ((-0.5, i), (0.5, j)):  # points of both solids: what lies inside of supports
+            point = found.point[k] - side * gap * n
+            ways = rng.standard_normal((50, 3))
+            for way in ways / np.linalg.norm(ways, axis=1)[:, None]:
+                assert way @ (support(kinds[b], sizes[b], A[b], r[b], way) - point) > -1e-12
+        for wanted in near:
+            r[i] -= (gap - wanted) * n
+            again = pair.find(r, p, np.array([0.0, 1e-3, 1e-3]))
+            r[i] += (gap - wanted) * n
+            best = np.argmin(again.gap)
+            assert again.gap[best] == pytest.approx(wanted, abs=1e-14)
+            assert again.normal[best] == pytest.approx(n, abs=1e-9 if wanted == 1e-6 else 1e-12)
         seen += 1
-    assert seen > 50
+    assert seen > 6
+
+
+@pytest.mark.parametrize(("kinds", "sizes", "points"), [
+    ((CYLINDER, BOX), [[0.2, 0.3, 0.0], [0.5, 0.5, 0.5]], 8),
+    ((CYLINDER, CYLINDER), [[0.2, 0.3, 0.0], [0.4, 0.5, 0.0]], 8),
+    ((BOX, CYLINDER), [[0.2, 0.2, 0.3], [0.5, 0.5, 0.0]], 4),
+    ((ELLIPSOID, BOX), [[0.2, 0.1, 0.3], [0.5, 0.5, 0.5]], 1),
+])  # fmt: skip
+def test_what_stands_on_a_face_has_all_its_corners(kinds, sizes, points):
+    """A rim has eight; each with the gap and the normal of the face."""
+    pair = finder(kinds, sizes)
+    r = np.array([[0.1, 0.0, sizes[1][2] or sizes[1][1]], [0.0, 0.0, 0.0]])
+    r[0, 2] += (sizes[0][1] if kinds[0] == CYLINDER else sizes[0][2]) + 1e-9
+    found = pair.find(r, np.tile([1.0, 0.0, 0.0, 0.0], (2, 1)), np.full(3, 1e-3))
+    assert found.gap == pytest.approx([1e-9] * points, abs=1e-15)
+    assert np.abs(found.normal[:, 2]) == pytest.approx([1.0] * points, abs=1e-14)
+    assert found.point[:, :2].mean(axis=0) == pytest.approx([0.1, 0.0], abs=1e-14)
 
 
 def test_boxes_meet_where_their_faces_and_edges_do():
@@ -98,13 +147,15 @@ def test_solids_at_a_plane_have_the_height_of_their_lowest_point(kind):
         assert found.gap.min() == pytest.approx(lowest[2], abs=1e-14)
 
 
-def test_all_pairs_of_near_spheres_are_found():
-    """Compared with all distances; bodies that are apart by joints are left out."""
+@pytest.mark.parametrize("largest", [0.06, 0.3])
+def test_all_pairs_of_near_spheres_are_found(largest):
+    """Compared with all distances; some are larger than a cell of the grid."""
     rng = np.random.default_rng(3)
     r, n = rng.uniform(0.0, 1.0, (60, 3)), 60
-    spheres = finder([SPHERE] * n, [[0.06, 0.0, 0.0]] * n)
+    radii = np.where(np.arange(n) % 20 == 7, largest, 0.06)
+    spheres = finder([SPHERE] * n, radii[:, None] * [1.0, 0.0, 0.0])
     found = spheres.find(r, np.tile([1.0, 0.0, 0.0, 0.0], (n, 1)), np.full(n + 1, 0.01))
     distance = np.linalg.norm(r[:, None] - r[None], axis=2)
-    i, j = np.nonzero(np.triu(distance < 0.14, 1))
-    pairs = {tuple(sorted(pair)) for pair in found.shapes.tolist()}
-    assert pairs == set(zip(i.tolist(), j.tolist(), strict=True))
+    i, j = np.nonzero(np.triu(distance < radii[:, None] + radii + 0.02, 1))
+    pairs = [tuple(sorted(pair)) for pair in found.shapes.tolist()]
+    assert sorted(pairs) == list(zip(i.tolist(), j.tolist(), strict=True))

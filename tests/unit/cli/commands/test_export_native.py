@@ -9,9 +9,12 @@ import pytest
 from dap3d_core.cli import main
 from dap3d_core.kernels.runtime.cache import jit_is_on
 
-pytestmark = pytest.mark.skipif(
-    not (jit_is_on() and (shutil.which("cc") or shutil.which("gcc"))), reason="no C compiler"
-)
+pytestmark = [
+    pytest.mark.usefixtures("quick_libraries"),
+    pytest.mark.skipif(
+        not (jit_is_on() and (shutil.which("cc") or shutil.which("gcc"))), reason="no C compiler"
+    ),
+]
 
 
 def test_a_model_is_written_as_a_folder_and_not_over_another(tmp_path, capfd, monkeypatch):

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
+from dap3d_core.formulations.programs.scene_program import constant_numbers, constant_parts
 from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, constants
+from dap3d_core.integrators import EXPLICIT
 from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
 from dap3d_core.kernels.compiler.trace import Symbol
 from dap3d_core.kernels.runtime.loop_support import MASS
@@ -26,6 +28,21 @@ def test_counted_turns_are_no_constants(evaluator):
     width = evaluator.system.body.shape[1]
     assert width + MASS in body
     assert width not in body
+
+
+@pytest.mark.parametrize(("model", "method"), [("fourbar3", "joint"), ("A02-1", "lsq")])
+def test_no_run_changes_a_constant(model, method):
+    """Steps, projections and reports of general code leave them: programs fit the next call."""
+    evaluator = dap.compile(model, method=method).evaluator
+    y0 = evaluator.coordinates.start(evaluator.model.u0)
+    evaluator.start(0.0, evaluator.model.u0)
+    parts = constant_parts(evaluator)
+    before = constant_numbers(parts)
+    options = {"report_size": evaluator.report_size, "length_count": evaluator.length_count}
+    integration = EXPLICIT.make(evaluator, y0, np.array([0.0, 0.02]), project_on=True, **options)
+    integration.advance(10**6)
+    assert integration.statistics.projections > 0
+    assert constant_numbers(parts) == before
 
 
 def test_arrays_that_share_memory_share_symbols(evaluator):

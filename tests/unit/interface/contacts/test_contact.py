@@ -89,6 +89,7 @@ def test_rates_of_functions(function, slope):
     assert rate_of(function, (x,), (None,)) == 0.0
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("part", [8, 16, 21, 51])
 def test_corners_and_edges_of_boxes_are_exact_derivatives(part):
     class Part(BoxBox):

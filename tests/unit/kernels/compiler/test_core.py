@@ -23,7 +23,11 @@ import dap3d_core as dap
 warnings.simplefilter("ignore")
 recorder = Recorder()
 {scenarios}
-print(json.dumps([len(recorder.calls), differences(recorder.calls, {levels}), recorder.missing()]))
+few = list(recorder.calls)
+{more}
+calls = recorder.calls
+print(json.dumps([[len(few), differences(few, {few})],
+                  [len(calls), {all} and differences(calls, {all})], recorder.missing()]))
 """
 SHORT = {"t_end": 0.002, "dt": 0.001}
 QUICK = [("pen1", SHORT)]
@@ -126,7 +130,13 @@ NOT_CALLED = {
         "assembly.collisions.solids": "clamp local put ball_box sphere_cylinder capsule_box slope "
         "_lowest",
         "assembly.collisions.boxes": "dot_axis apart boxes _edges _face _facing _clip",
-        "assembly.collisions.broad_phase": "sweep",
+        "assembly.collisions.supports": "radius_of put_global support curvature near_support",
+        "assembly.collisions.distance": "dot _weigh _volume _holds_origin _reduce _scaled nearest",
+        "assembly.collisions.convex": "gap_along unit cross attempt edges_of climb "
+        "bend flat_directions part_best touch_convex",
+        "assembly.collisions.manifold": "turn outline clip tangents spread inside crossing "
+        "at_plane_along put_points points_within",
+        "assembly.collisions.broad_phase": "meet place_of grid_pairs",
         "assembly.collisions.find": "touch",
         "integrators.moreau.dense": "solve_dense",
         "integrators.moreau.gauss_seidel": "sweep_bodies change_of",
@@ -135,7 +145,7 @@ NOT_CALLED = {
         "formulations.jumps.multipliers": "rotate seek_active",
         "formulations.jumps.rounds": "kick has_crossed stop",
         "formulations.jumps.held_joints": "place_alone solve_free",
-        "formulations.contacts.cone": "residual_of sweep",
+        "formulations.contacts.cone": "residual_of shorten sweep",
         "formulations.contacts.equations": (
             "accelerate add_columns add_friction column force_of friction_of_one has_settled "
             "inverse invert is_given is_sliding mode_of row_of "
@@ -148,41 +158,50 @@ NOT_CALLED = {
 }
 
 
-def repeated(runs, more="", levels=None):
-    """Number of calls, those that differ, functions that were not called."""
+def repeated(runs, few, more="", every=()):
+    """Of the calls of runs at levels, of these and more at others: number, those that differ.
+
+    And the functions that were not called.
+    """
     lines = [
         f"recorder.record(dap.simulate, {model!r}, **{settings!r})" for model, settings in runs
     ]
-    script = SCRIPT.format(tests=str(REPOSITORY / "tests"), scenarios="\n".join(lines) + more,
-                           levels=levels)  # fmt: skip
+    script = SCRIPT.format(tests=str(REPOSITORY / "tests"), scenarios="\n".join(lines), more=more,
+                           few=few, all=list(every))  # fmt: skip
     return json.loads(run(script, timeout=1200).splitlines()[-1])
 
 
+@pytest.fixture(scope="module")
+def found():
+    """Recorded once: to record takes as long as to compile."""
+    return repeated(RUNS, ["differentiated"], MORE, ["O3"])
+
+
 def test_calls_of_a_short_run_have_the_bits_of_plain_python():
-    count, different, _ = repeated(QUICK, levels=["O0"])
+    (count, different), *_ = repeated(QUICK, ["O0"])
     assert count > 100
     assert different == []
 
 
 @pytest.mark.slow
-def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python():
+def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python(found):
     """Optimised for this processor; functions not called are listed.
 
     Without FMA: `make no-fma`. Unoptimised: a short run, above.
     """
-    count, different, missing = repeated(RUNS, MORE, levels=["O3"])
+    _, (count, different), missing = found
     assert count > 4000
     assert different == []
     assert set(missing) == NOT_CALLED
 
 
 @pytest.mark.slow
-def test_calls_have_the_same_bits_where_their_numbers_carry_derivatives():
+def test_calls_have_the_same_bits_where_their_numbers_carry_derivatives(found):
     """Functions of all formulations and integrators; complex numbers of radau as well.
 
     Where a switch crosses, Newton steps for derivatives leave other numbers in rows of scratch.
     """
-    count, different, _ = repeated(RUNS, levels=["differentiated"])
+    (count, different), *_ = found
     assert count > 2000
     crossing = "dap3d_core.integrators.stepping.event_location."
     assert {name.split()[0].removeprefix(crossing) for name in different} <= {

@@ -1,5 +1,6 @@
 """[collisions], shapes that collide, and materials of pairs: what is read, what is refused."""
 
+import numpy as np
 import pytest
 
 import dap3d_core as dap
@@ -61,8 +62,8 @@ def test_a_scene_file_says_the_same(tmp_path):
         (lambda s: s.add_collisions(bodies=["c"]), "collisions.bodies", "there is no body 'c'"),
         (lambda s: s.add_collisions(exclude=["a"]), "collisions.exclude", "pairs of bodies"),
         (lambda s: s.add_collisions(material="wood"), "collisions.material", "no material 'wood'"),
-        (lambda s: s.add_shape("cylinder", "c", body="b", radius=1.0, length=1.0, collides=True),
-         "shapes.c", "a cylinder may meet spheres and planes"),
+        (lambda s: s.add_shape("mesh", "c", body="b", file="no.stl", collides=True),
+         "shapes.c.file", "a mesh that collides is read with the scene"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_with_its_key(change, key, words):
@@ -84,3 +85,20 @@ def test_a_material_that_there_is_not_is_told_once():
     with pytest.raises(dap.SceneError, match="did you mean 'rubber'") as caught:
         dap.compile(scene)
     assert len(caught.value.mistakes) == 1
+
+
+def test_a_mesh_collides_as_its_hull(tmp_path):
+    """A tetrahedron, and a point within it that the hull leaves out, of millimetres."""
+    corners = [(0, 0, 0), (60, 0, 0), (0, 60, 0), (0, 0, 60), (10, 10, 10)]
+    lines = ["v {} {} {}".format(*v) for v in corners]
+    lines += ["f {} {} {}".format(*f) for f in ((1, 2, 3), (1, 2, 4), (1, 3, 4), (2, 3, 5))]
+    (tmp_path / "t.obj").write_text("\n".join(lines))
+    scene = two_boxes()
+    scene.add_shape("mesh", "t", body="a", file="t.obj", scale=1e-3, at=[0.1, 0, 0], collides=True)
+    found = read(dap.load(scene.save(tmp_path / "scene.toml")))
+    k = found.names.index("t")
+    first, count = found.corners[k]
+    hull = found.vertices[first : first + count] + found.at[k]
+    expected = [[0.1, 0, 0], [0.1, 0, 0.06], [0.1, 0.06, 0], [0.16, 0, 0]]
+    assert np.array(sorted(hull.round(9).tolist())) == pytest.approx(np.array(expected), abs=1e-15)
+    assert found.size[k] == pytest.approx([0.03] * 3, abs=1e-15)

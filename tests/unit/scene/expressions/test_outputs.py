@@ -99,5 +99,38 @@ def test_add_output_refuses_a_name_twice():
 
 
 def test_outputs_come_behind_those_that_they_name():
-    found = outputs_of({"c": "a + b.x", "b": "a * stone.r", "a": "t"})
+    found = outputs_of({"c": "a + b.x", "b": "a * stone.r", "a": "t"}, {})
     assert list(found) == ["a", "b", "c"]
+
+
+def falling_by(g=9.81, **outputs):
+    """A stone, its weight by a parameter that is expressed by another, and outputs."""
+    scene = parse(FALLING.replace("[outputs]", "")).copy()
+    scene.add_parameter("g", g)
+    scene.add_parameter("twice", "= 2 * g")
+    scene.forces["gravity"].fields["gravity"] = "= g"
+    for name, text in outputs.items():
+        scene.add_output(name, text)
+    return scene
+
+
+def test_outputs_read_parameters(tmp_path):
+    """Expressed ones, too; an output of that name comes first; a sweep has those of each point."""
+    scene = falling_by(fallen="-2 * stone.r.z / twice")
+    result = dap.simulate(scene, t_end=1.0, dt=0.5)
+    result.save(tmp_path / "fall.nc")
+    for one in (result, dap.open(tmp_path / "fall.nc")):
+        assert one.quantity("fallen").values == pytest.approx([0.0, 0.125, 0.5], abs=1e-9)
+    vary = {"parameters.g": [2.0, 5.0]}
+    found = dap.sweep(scene, vary, outputs="fallen", t_end=1.0, dt=0.5)
+    assert found["fallen"].values == pytest.approx([0.5, 0.5], abs=1e-9)
+    scene.add_output("g", "stone.r.z + 7 * twice")
+    scene.add_output("by_output", "g / stone.r.z")
+    values = dap.simulate(scene, t_end=1.0, dt=0.5).quantity("by_output").values
+    assert values[-1] == pytest.approx(1.0 - 28.0, abs=1e-6)
+
+
+def test_an_unknown_parameter_of_an_output_is_refused():
+    """As every name that no result has."""
+    with pytest.raises(dap.SceneError, match="twise"):
+        dap.compile(falling_by(fallen="stone.r.z / twise"))

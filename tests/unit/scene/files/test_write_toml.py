@@ -75,7 +75,7 @@ def bits(value):
     return [bits(v) for v in value] if isinstance(value, list) else value
 
 
-@settings(deadline=None)
+@settings(deadline=None, max_examples=50)
 @given(scenes())
 def test_a_scene_that_was_written_is_read_back_bit_for_bit(scene):
     again = scene_of(tomllib.loads(scene.to_toml()))

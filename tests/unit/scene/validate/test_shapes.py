@@ -64,7 +64,7 @@ scale = "2"
 MISTAKES = [
     ("shapes.a.body", 6, ["there is no body 'crnk'", "did you mean 'crank'?"]),
     ("shapes.a.type", 5, ["unknown shape; one of box", "did you mean 'box'?"]),
-    ("shapes.b.type", 7, ["is required; one of box, sphere"]),
+    ("shapes.b.type", 7, ["is required; one of box, ellipsoid"]),
     ("shapes.c.body", 9, ["is required: the name of a body"]),
     ("shapes.c.radius", 11, ["greater than 0"]),
     ("shapes.c.colour", 12, ["unknown key", "did you mean 'color'?"]),
@@ -110,6 +110,8 @@ def test_good_shapes_are_read_with_their_defaults(tmp_path):
         "color": "tab:blue",
         "collides": False,
         "material": "",
+        "group": 1,
+        "meets": 1,
     }
     assert (floor.body, floor.values["axis"]) == (0, (0.0, 0.0, 1.0))
 
@@ -120,6 +122,8 @@ def test_a_scene_with_every_shape_reads_back_as_it_was_written():
     fields = {
         "box": {"size": (1.0, 2.0, 3.0), "p": (0.6, 0.8, 0.0, 0.0)},
         "sphere": {"radius": 0.1, "at": (0.1, 0.2, 1 / 3)},
+        "ellipsoid": {"size": (1.0, 2.0, 3.0)},
+        "height_field": {"heights": ((0.0, 1.0), (0.5, 0.0)), "size": (1.0, 2.0)},
         "cylinder": {"radius": 0.1, "length": 1.0, "axis": (0.0, 1.0, 0.0)},
         "capsule": {"radius": 0.1, "length": 1.0, "collides": True},
         "plane": {"normal": (0.0, 1.0, 0.0), "extent": 5.0},

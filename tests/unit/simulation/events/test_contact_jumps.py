@@ -84,6 +84,7 @@ def test_friction_of_joints_is_refused_beside_contacts():
         dap.simulate(scene)
 
 
+@long_in_plain_python
 def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path, monkeypatch):
     shorten_chunks(monkeypatch)
     settings = {"t_end": 1.0, "dt": 0.01, "integrator": "dop853"}
@@ -93,6 +94,7 @@ def test_a_run_goes_on_from_a_checkpoint_with_the_same_bits(tmp_path, monkeypatc
     assert [(e.kind, e.t) for e in again.events] == [(e.kind, e.t) for e in whole.events]
 
 
+@long_in_plain_python
 def test_a_run_step_by_step_meets_the_same_contacts():
     scene = bouncing()
     whole, run = dap.simulate(scene, dt=0.1), dap.start(scene)
@@ -172,6 +174,7 @@ def test_a_box_that_falls_on_its_face_comes_to_rest_on_four_corners():
     assert result.contact("floor#1").gap == pytest.approx(contact.gap[:, 0])
 
 
+@long_in_plain_python
 def test_a_sweep_runs_contacts_one_by_one():
     scene = bouncing()
     found = dap.sweep(scene, {"contacts.floor.e": [0.0, 0.9]}, outputs=["ball.r.z"])
@@ -191,6 +194,7 @@ def sliding_box(mu=0.3):
     return scene
 
 
+@long_in_plain_python
 def test_a_box_that_slides_and_turns_takes_few_steps():
     """Corners on a plane depend on each other, which makes no pose singular."""
     result = dap.simulate(sliding_box(), t_end=1.0, dt=0.1)
@@ -199,6 +203,7 @@ def test_a_box_that_slides_and_turns_takes_few_steps():
     assert np.max(np.abs(result.rd[-1])) < 1e-9
 
 
+@long_in_plain_python
 def test_a_box_rocks_to_rest():
     """Each rebound of its edges is lower; those too low to be told from rest are left out."""
     scene = sliding_box(mu=0.0)
@@ -219,6 +224,7 @@ def test_changes_without_end_stop_the_run_and_name_the_contact(monkeypatch):
     assert caught.value.result.t[-1] > 0.0
 
 
+@long_in_plain_python
 def test_steps_that_lead_nowhere_stop_the_run_and_name_the_contact(monkeypatch):
     shorten_chunks(monkeypatch)
     monkeypatch.setattr(contact_jumps, "MOST_STEPS", 5)
@@ -238,6 +244,7 @@ def thrown_box():
     return dap.simulate(scene, t_end=0.5, dt=0.05)
 
 
+@long_in_plain_python
 def test_corners_that_strike_together_share_the_work_of_one_jump(tmp_path, recwarn):
     """What all of them do is the change of the kinetic energy; figures and pages have one jump."""
     result = thrown_box()

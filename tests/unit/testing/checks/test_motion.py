@@ -48,7 +48,7 @@ INSTALLED = {
     "inline": ["refused: its 2 rows cost less than 4 joint coordinates"],
     "inplane": [ONE_ROW],
     "cv": ["refused: the axes of its free motions are constant in neither body"],
-    "motor": [ON_TIME, ON_TIME, ON_VELOCITY, ON_VELOCITY],
+    "motor": [ON_TIME, *[ON_VELOCITY] * 2, ON_TIME, *[ON_VELOCITY] * 2],
     "couple": ["refused: it joins three bodies"],
     "gear": [ONE_ROW] * 2,
     "rack": [ONE_ROW],

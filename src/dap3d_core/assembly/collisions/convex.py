@@ -1,0 +1,285 @@
+"""Two convex solids: the direction that parts them best, and the points where they may touch.
+
+The gap of solids along a unit vector n from j to i is s(n) = min n x over i - max n x over j; that
+of the solids is its largest value, also where they overlap a little. There n is the normal of a
+face, or across an edge of each, or across one edge and best along that circle, or s is smooth. All
+of these are tried, the last two by Newton's method from what ``nearest`` finds. Any n has an s that
+is no more than the gap, so that one too many does no harm.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+
+from dap3d_core.assembly.collisions.distance import (
+    APART,
+    FAR_APART,
+    A,
+    B,
+    V,
+    dot,
+    nearest,
+)
+from dap3d_core.assembly.collisions.manifold import E1, E2, POLYGON, put_points, tangents
+from dap3d_core.assembly.collisions.supports import FLAT, curvature, radius_of, support
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.scene.contacts.collision_shapes import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    HULL,
+    PLANE,
+)
+
+#: Rows of scratch behind those of ``nearest``: directions tried and found, start, points, a step,
+#: edges of i and j.
+N, BEST, START, PI, PJ, STEP, EI, EJ = 16, 17, 18, 19, 20, 21, 22, 29
+#: Edges of a solid that there is room for; rows of scratch of all.
+EDGES, ROWS = 7, POLYGON + 80
+#: Parts of the sizes by which a direction has to be better.
+BETTER = 1e-14
+#: Rounds of Newton's method, halvings of a step.
+ROUNDS, HALVINGS = 30, 6
+#: Parts of solids that ``nearest`` takes, one after the other, while they overlap.
+ALL, NEARLY, LESS, HALF = 1.0, 0.999, 0.95, 0.5
+
+
+@compiled
+def gap_along(
+    i: int, j: int, n: Floats, kind: Integers, centre: Floats, axes: Floats, size: Floats,
+    corners: Integers, vertices: Floats, work: Floats,
+) -> float:  # fmt: skip
+    """Gap of the cores of solids along n; puts their points there."""
+    support(i, -1.0, n, kind, centre, axes, size, corners, vertices, work[PI])
+    support(j, 1.0, n, kind, centre, axes, size, corners, vertices, work[PJ])
+    p, q = work[PI], work[PJ]
+    return n[0] * (p[0] - q[0]) + n[1] * (p[1] - q[1]) + n[2] * (p[2] - q[2])
+
+
+@compiled
+def unit(n: Floats) -> bool:
+    """Make a vector a unit one; False where it has no length."""
+    length = math.sqrt(dot(n, n))
+    if length < 1e-150:
+        return False
+    for k in range(3):
+        n[k] /= length
+    return True
+
+
+@compiled
+def cross(a: Floats, b: Floats, out: Floats) -> None:
+    """Vector product."""
+    x, y, z = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+    out[0], out[1], out[2] = x, y, z
+
+
+@compiled
+def attempt(
+    i: int, j: int, best: float, better: float, kind: Integers, centre: Floats, axes: Floats,
+    size: Floats, corners: Integers, vertices: Floats, work: Floats,
+) -> float:  # fmt: skip
+    """Try the direction N and its opposite; the gap of the better one so far."""
+    n = work[N]
+    if not unit(n):
+        return best
+    for _ in range(2):
+        for k in range(3):
+            n[k] = -n[k]
+        s = gap_along(i, j, n, kind, centre, axes, size, corners, vertices, work)
+        if s > best + better:
+            best = s
+            for k in range(3):
+                work[BEST, k] = n[k]
+    return best
+
+
+@compiled
+def edges_of(
+    i: int, kind: Integers, axes: Floats, points: int, count: int, work: Floats, out: int
+) -> int:
+    """Put unit directions of the edges of a solid near its corners in the simplex; their number."""
+    what, found = kind[i], 0
+    if what in (BOX, CYLINDER, CAPSULE):
+        for k in range(3 if what == BOX else 1):
+            along = k if what == BOX else 2
+            for r in range(3):
+                work[out + found, r] = axes[i, 3 * r + along]
+            found += 1
+    elif what == HULL:
+        for a in range(count):
+            for b in range(a + 1, count):
+                for r in range(3):
+                    work[out + found, r] = work[points + a, r] - work[points + b, r]
+                if unit(work[out + found]):
+                    found += 1
+    return found
+
+
+@compiled
+def bend(
+    i: int, j: int, n: Floats, s: Floats, t: Floats, kind: Integers, axes: Floats, size: Floats
+) -> float:
+    """``curvature`` of both solids."""
+    return curvature(i, n, s, t, kind, axes, size) + curvature(j, n, s, t, kind, axes, size)
+
+
+@compiled
+def climb(
+    i: int, j: int, edge: int, best: float, better: float, kind: Integers, centre: Floats,
+    axes: Floats, size: Floats, corners: Integers, vertices: Floats, work: Floats,
+) -> float:  # fmt: skip
+    """Newton's method for the largest gap from START on, across an edge in row ``edge`` or none."""
+    n, p, q, t1, t2 = work[N], work[PI], work[PJ], work[E1], work[E2]
+    along = dot(work[START], work[edge]) if edge >= 0 else 0.0
+    for k in range(3):
+        n[k] = work[START, k] - (along * work[edge, k] if edge >= 0 else 0.0)
+    if not unit(n):
+        return best
+    s = gap_along(i, j, n, kind, centre, axes, size, corners, vertices, work)
+    least = 1e300
+    for _ in range(ROUNDS):
+        tangents(n, work)
+        if edge >= 0:
+            cross(work[edge], n, t1)
+            cross(n, t1, t2)
+        g1, g2 = 0.0, 0.0
+        for k in range(3):
+            g1, g2 = g1 + t1[k] * (p[k] - q[k]), g2 + t2[k] * (p[k] - q[k])
+            work[V, k] = n[k]
+        a, b, d = s + bend(i, j, n, t1, t1, kind, axes, size), 0.0, 1.0
+        if edge < 0:
+            b = bend(i, j, n, t1, t2, kind, axes, size)
+            d = s + bend(i, j, n, t2, t2, kind, axes, size)
+        else:
+            g2 = 0.0
+        slope, det = math.sqrt(g1 * g1 + g2 * g2), a * d - b * b
+        if slope >= least:  # rounding is reached
+            break
+        y, z, most = 0.0, 0.0, 1
+        if a > 0.0 and det > 0.0:
+            y, z, most = (g1 * d - g2 * b) / det, (g2 * a - g1 * b) / det, HALVINGS
+            for k in range(3):
+                work[STEP, k] = y * t1[k] + z * t2[k]
+        else:  # corners, which overlap along n: along what parts them
+            for k in range(3):
+                work[STEP, k] = s * n[k] + g1 * t1[k] + g2 * t2[k] - n[k]
+        new, part = s - 1.0, 1.0
+        for _ in range(most):
+            for k in range(3):
+                n[k] = work[V, k] + part * work[STEP, k]
+            if unit(n):
+                new = gap_along(i, j, n, kind, centre, axes, size, corners, vertices, work)
+            if new >= s - better:
+                break
+            part *= 0.5
+        if new < s - better:
+            for k in range(3):
+                n[k] = work[V, k]
+            break
+        s, least = new, slope if new <= s + better else 1e300
+    return attempt(i, j, best, better, kind, centre, axes, size, corners, vertices, work)
+
+
+@compiled
+def flat_directions(
+    i: int, j: int, edges_i: int, edges_j: int, count: int, best: float, better: float,
+    kind: Integers, centre: Floats, axes: Floats, size: Floats, corners: Integers,
+    vertices: Floats, work: Floats,
+) -> float:  # fmt: skip
+    """Try normals of faces, and of pairs of edges."""
+    for side in range(2):
+        k, first, edges = (i, EI, edges_i) if side == 0 else (j, EJ, edges_j)
+        if kind[k] == BOX or kind[k] == CYLINDER:
+            for e in range(edges):
+                for r in range(3):
+                    work[N, r] = work[first + e, r]
+                best = attempt(
+                    i, j, best, better, kind, centre, axes, size, corners, vertices, work
+                )
+        elif kind[k] == HULL:
+            for e in range(edges):
+                for f in range(e + 1, edges):
+                    cross(work[first + e], work[first + f], work[N])
+                    if dot(work[N], work[N]) > FLAT:
+                        best = attempt(i, j, best, better, kind, centre, axes, size, corners,
+                                       vertices, work)  # fmt: skip
+    for e in range(edges_i):
+        for f in range(edges_j):
+            cross(work[EI + e], work[EJ + f], work[N])
+            if dot(work[N], work[N]) > FLAT:
+                best = attempt(
+                    i, j, best, better, kind, centre, axes, size, corners, vertices, work
+                )
+    return best
+
+
+@compiled
+def part_best(
+    i: int, j: int, most: float, kind: Integers, centre: Floats, axes: Floats, size: Floats,
+    corners: Integers, vertices: Floats, work: Floats,
+) -> float:  # fmt: skip
+    """Put the direction of the largest gap of cores into BEST; the gap, or one beyond ``most``."""
+    best, count, status = -1e300, 0, 0
+    better = BETTER * (math.sqrt(dot(size[i], size[i])) + math.sqrt(dot(size[j], size[j])))
+    for turn in range(4):
+        part = ALL if turn == 0 else NEARLY if turn == 1 else LESS if turn == 2 else HALF
+        far = most if turn == 0 else 1e300
+        status, count = nearest(i, j, part, far, kind, centre, axes, size, corners, vertices, work)
+        if status == FAR_APART:
+            return 1e300
+        if status == APART:
+            break
+    for k in range(3):
+        way = work[V, k] if status == APART else centre[i, k] - centre[j, k]
+        work[START, k] = way
+    if not unit(work[START]):
+        work[START, 2] = 1.0
+    edges_i = edges_of(i, kind, axes, A, count, work, EI)
+    edges_j = edges_of(j, kind, axes, B, count, work, EJ)
+    best = flat_directions(i, j, edges_i, edges_j, count, best, better, kind, centre, axes, size,
+                           corners, vertices, work)  # fmt: skip
+    for side in range(2):
+        for e in range(edges_i if side == 0 else edges_j):
+            edge = (EI if side == 0 else EJ) + e
+            best = climb(
+                i, j, edge, best, better, kind, centre, axes, size, corners, vertices, work
+            )
+    return climb(i, j, -1, best, better, kind, centre, axes, size, corners, vertices, work)
+
+
+@compiled
+def touch_convex(
+    pairs: Integers, kind: Integers, centre: Floats, axes: Floats, size: Floats, corners: Integers,
+    vertices: Floats, margin: Floats, work: Floats, which: Integers, found: Floats, count: int,
+) -> int:  # fmt: skip
+    """As ``touch``, of pairs for which there is no formula.
+
+    Args:
+        pairs, kind, centre, axes, size, margin, which, found: as of ``touch``.
+        corners: (m, 2) first of the vertices of a hull, and their number.
+        vertices: (k, 3) m, in the axes of their shapes.
+        work: (ROWS, 3) scratch.
+        count: of points that there are already.
+    """
+    for k in range(pairs.shape[0]):
+        i, j = pairs[k, 0], pairs[k, 1]
+        if kind[i] < kind[j] or (kind[i] == kind[j] and i > j):
+            i, j = j, i
+        radius, most = radius_of(i, kind, size), margin[i] + margin[j]
+        if kind[j] == PLANE:
+            for r in range(3):
+                work[BEST, r] = axes[j, 3 * r + 2]
+            support(i, -1.0, work[BEST], kind, centre, axes, size, corners, vertices, work[PI])
+            for r in range(3):
+                work[PJ, r] = work[PI, r] - centre[j, r]
+            gap = dot(work[PJ], work[BEST]) - radius
+        else:
+            radius += radius_of(j, kind, size)
+            gap = part_best(i, j, most, kind, centre, axes, size, corners, vertices, work) - radius
+        if gap < most:
+            count = put_points(i, j, gap, most, kind, centre, axes, size, corners, vertices, work,
+                               work[BEST], which, found, count)  # fmt: skip
+    return count

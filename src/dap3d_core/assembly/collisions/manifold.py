@@ -1,0 +1,240 @@
+"""Points where two convex solids may touch, given the direction that parts them best."""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+
+from dap3d_core.assembly.collisions.distance import dot
+from dap3d_core.assembly.collisions.records import GAP, add
+from dap3d_core.assembly.collisions.supports import CORNERS, near_support, radius_of
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.scene.contacts.collision_shapes import PLANE
+
+#: Rows of scratch: polygons of i and j, their points while one is clipped; tangents.
+POLYGON, OTHER, CLIPPED, E1, E2 = 40, 56, 72, 104, 105
+#: Parts of lengths within which corners lie on a line, edges are parallel, or points on a border.
+ON_LINE, PARALLEL, BORDER = 1e-12, 1e-6, 1e-9
+#: Points of solids this part of their size below a support plane are left out, however fast.
+DEEPEST = 0.1
+
+
+@compiled
+def turn(p: Floats, q: Floats, r: Floats, work: Floats) -> float:
+    """Twice the area of a triangle in the plane of the tangents, positive if it turns left."""
+    a, b, c, d = 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        e, f, x, y = work[E1, k], work[E2, k], q[k] - p[k], r[k] - p[k]
+        a, b, c, d = a + e * x, b + f * x, c + e * y, d + f * y
+    far = math.sqrt((a * a + b * b) * (c * c + d * d))
+    area = a * d - b * c
+    return area if abs(area) > ON_LINE * far else 0.0
+
+
+@compiled
+def outline(work: Floats, start: int, count: int) -> int:
+    """Leave of points those that bound them, as seen along the normal, in order; their number."""
+    first, e = start, work[E1]
+    for c in range(start + 1, start + count):
+        if dot(work[c], e) < dot(work[first], e):
+            first = c
+    kept = 0
+    while kept < count:
+        for k in range(3):
+            work[start + kept, k], work[first, k] = work[first, k], work[start + kept, k]
+        kept += 1
+        here, first = work[start + kept - 1], start
+        for c in range(start + kept, start + count):
+            side = turn(here, work[first], work[c], work)
+            if first == start + kept - 1:
+                side = -1.0  # the point itself
+            beyond = 0.0
+            if side == 0.0:
+                for k in range(3):
+                    beyond += (work[c, k] - here[k]) ** 2 - (work[first, k] - here[k]) ** 2
+            if side < 0.0 or beyond > 0.0:
+                first = c
+        if first == start:
+            break
+    return kept
+
+
+@compiled
+def clip(work: Floats, start: int, count: int, x: Floats, limit: float, border: float) -> int:
+    """Clip a polygon, or a line of two points, to where x p <= limit, in place; its corners."""
+    left = 0
+    for k in range(count):
+        for c in range(3):
+            work[CLIPPED + k, c] = work[start + k, c]
+    for k in range(count):
+        p, q = work[CLIPPED + k], work[CLIPPED + (k + 1) % count]
+        a, b = dot(x, p) - limit, dot(x, q) - limit
+        if a <= border and left < CORNERS:
+            for c in range(3):
+                work[start + left, c] = p[c]
+            left += 1
+        crosses = (a < -border and b > border) or (a > border and b < -border)
+        if crosses and left < CORNERS and (count > 2 or k == 0):
+            for c in range(3):
+                work[start + left, c] = p[c] + a / (a - b) * (q[c] - p[c])
+            left += 1
+    return left
+
+
+@compiled
+def tangents(n: Floats, work: Floats) -> None:
+    """Put two unit vectors across n."""
+    e, f = work[E1], work[E2]
+    x, y, z = (0.0, n[2], -n[1]) if abs(n[0]) < 0.6 else (-n[2], 0.0, n[0])
+    length = math.sqrt(x * x + y * y + z * z)
+    e[0], e[1], e[2] = x / length, y / length, z / length
+    f[0], f[1] = n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2]
+    f[2] = n[0] * e[1] - n[1] * e[0]
+
+
+@compiled
+def spread(work: Floats, start: int, count: int, n: Floats) -> float:
+    """Difference of heights of a polygon."""
+    low, high = 1e300, -1e300
+    for c in range(start, start + count):
+        low, high = min(low, dot(work[c], n)), max(high, dot(work[c], n))
+    return high - low
+
+
+@compiled
+def inside(work: Floats, start: int, count: int, other: int, corners: int, size: float) -> int:
+    """Clip a polygon to another one, of two corners to between their ends; its corners."""
+    x = work[E2 + 1]
+    for k in range(corners):
+        p, q = work[other + k], work[other + (k + 1) % corners]
+        a, b = 0.0, 0.0
+        for c in range(3):
+            a, b = a + work[E1, c] * (q[c] - p[c]), b + work[E2, c] * (q[c] - p[c])
+        length = math.sqrt(a * a + b * b)
+        if length > 0.0 and count:
+            a, b = a / length, b / length
+            for c in range(3):
+                if corners > 2:
+                    x[c] = b * work[E1, c] - a * work[E2, c]
+                else:
+                    x[c] = a * work[E1, c] + b * work[E2, c]
+            at = dot(x, p) if corners > 2 else dot(x, q)
+            count = clip(work, start, count, x, at, BORDER * size)
+    return count
+
+
+@compiled
+def crossing(work: Floats) -> bool:
+    """Put where lines of two corners each pass into their first; False if they are parallel."""
+    p, q, r, s = work[POLYGON], work[POLYGON + 1], work[OTHER], work[OTHER + 1]
+    a, b, c, d, e, f = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        x, y = work[E1, k], work[E2, k]
+        a, b = a + x * (q[k] - p[k]), b + y * (q[k] - p[k])
+        c, d = c + x * (s[k] - r[k]), d + y * (s[k] - r[k])
+        e, f = e + x * (r[k] - p[k]), f + y * (r[k] - p[k])
+    det = a * d - b * c
+    if det * det <= PARALLEL * PARALLEL * (a * a + b * b) * (c * c + d * d):
+        return False
+    part = min(max((e * d - f * c) / det, 0.0), 1.0)
+    other = min(max((e * b - f * a) / det, 0.0), 1.0)
+    for k in range(3):
+        p[k] += part * (q[k] - p[k])
+        r[k] += other * (s[k] - r[k])
+    return True
+
+
+@compiled
+def at_plane_along(
+    i: int, j: int, band: float, most: float, kind: Integers, centre: Floats, axes: Floats,
+    size: Floats, corners: Integers, vertices: Floats, work: Floats, n: Floats, which: Integers,
+    found: Floats, count: int,
+) -> int:  # fmt: skip
+    """Append the points of solid i within a band above plane j; the new count."""
+    ri, level = radius_of(i, kind, size), dot(centre[j], n)
+    ni = near_support(i, -1.0, n, band, kind, centre, axes, size, corners, vertices, work, POLYGON)
+    for c in range(ni):
+        p = work[POLYGON + c]
+        high = dot(p, n) - level
+        count = add(which, found, count, i, j, c, p[0] - high * n[0], p[1] - high * n[1],
+                    p[2] - high * n[2], n[0], n[1], n[2], high - ri, most)  # fmt: skip
+    return count
+
+
+@compiled
+def put_points(
+    i: int, j: int, gap: float, most: float, kind: Integers, centre: Floats, axes: Floats,
+    size: Floats, corners: Integers, vertices: Floats, work: Floats, n: Floats, which: Integers,
+    found: Floats, count: int,
+) -> int:  # fmt: skip
+    """Append the points of solids i and j, or of i at plane j, along n; the new count.
+
+    Points that may come to touch are among them, if the nearest one is.
+
+    gap: of the solids, m; corners, vertices, work: as of ``touch_convex``.
+    """
+    extent = math.sqrt(dot(size[i], size[i]))
+    band = min(most - gap, DEEPEST * extent)
+    if kind[j] == PLANE:
+        return at_plane_along(i, j, band, most, kind, centre, axes, size, corners, vertices, work,
+                              n, which, found, count)  # fmt: skip
+    tangents(n, work)
+    before = count
+    for _ in range(2):
+        count = points_within(i, j, band, gap, most, kind, centre, axes, size, corners, vertices,
+                              work, n, which, found, before)  # fmt: skip
+        least = 1e300
+        for c in range(before, min(count, found.shape[0])):
+            least = min(least, found[c, GAP])
+        if count > found.shape[0] or least <= gap + BORDER * band:
+            break
+        band = ON_LINE * extent
+    return count
+
+
+@compiled
+def points_within(
+    i: int, j: int, band: float, gap: float, most: float, kind: Integers, centre: Floats,
+    axes: Floats, size: Floats, corners: Integers, vertices: Floats, work: Floats, n: Floats,
+    which: Integers, found: Floats, count: int,
+) -> int:  # fmt: skip
+    """Append the points of solids i and j within a band of their support planes along n."""
+    ri, rj, extent = (
+        radius_of(i, kind, size),
+        radius_of(j, kind, size),
+        math.sqrt(dot(size[i], size[i])),
+    )
+    ni = near_support(i, -1.0, n, band, kind, centre, axes, size, corners, vertices, work, POLYGON)
+    nj = near_support(j, 1.0, n, band, kind, centre, axes, size, corners, vertices, work, OTHER)
+    single, from_i, left, passing = ni == 1 or nj == 1, ni == 1, 1, gap
+    if not single:
+        ni, nj = outline(work, POLYGON, ni), outline(work, OTHER, nj)
+        from_i = spread(work, OTHER, nj, n) <= spread(work, POLYGON, ni, n)
+        if ni == 2 and nj == 2:
+            single = crossing(work)
+            high = dot(work[POLYGON], n) - dot(work[OTHER], n) - ri - rj
+            passing = max(gap, high) if single else gap
+        elif ni == 2 or nj == 2:
+            from_i = ni == 2
+        other, corners_there = (OTHER, nj) if from_i else (POLYGON, ni)
+        if not single and spread(work, other, corners_there, n) > BORDER * extent:
+            return count  # no face, and no edge, that is touched as a whole
+    level = dot(work[OTHER if from_i else POLYGON], n)
+    for c in range(nj if from_i else ni):  # the support plane of the other one
+        high = dot(work[(OTHER if from_i else POLYGON) + c], n)
+        level = max(level, high) if from_i else min(level, high)
+    first = POLYGON if from_i else OTHER
+    if not single:
+        if from_i:
+            left = inside(work, POLYGON, ni, OTHER, nj, extent)
+        else:
+            left = inside(work, OTHER, nj, POLYGON, ni, extent)
+    for c in range(left):
+        p = work[first + c]
+        high = dot(p, n) - level
+        own = passing if single else (high if from_i else -high) - ri - rj
+        back = ri + own if from_i else -rj  # to the surface of j
+        count = add(which, found, count, i, j, 1 + c, p[0] - back * n[0], p[1] - back * n[1],
+                    p[2] - back * n[2], n[0], n[1], n[2], own, most)  # fmt: skip
+    return count

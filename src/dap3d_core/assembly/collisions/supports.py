@@ -1,0 +1,147 @@
+"""Convex solids by their farthest points: supports, their curvature, points near a support plane.
+
+A capsule is its axis here, a sphere its centre; their radii are added to distances.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+
+from dap3d_core.assembly.collisions.boxes import dot_axis
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.scene.contacts.collision_shapes import (
+    BOX,
+    CAPSULE,
+    CYLINDER,
+    ELLIPSOID,
+    HULL,
+    SPHERE,
+)
+
+#: Sine of the angle between an axis and a direction below which a rim lies flat.
+FLAT = 1e-9
+#: Points of a rim that stand for it, and of a polygon that there is room for.
+RIM, CORNERS = 8, 16
+
+
+@compiled
+def radius_of(k: int, kind: Integers, size: Floats) -> float:
+    """What is added to the core of a solid, m."""
+    return size[k, 0] if kind[k] == SPHERE or kind[k] == CAPSULE else 0.0
+
+
+@compiled
+def put_global(
+    x: float, y: float, z: float, k: int, centre: Floats, axes: Floats, out: Floats
+) -> None:
+    """A point of solid k, given in its axes."""
+    c, u = centre[k], axes[k]
+    for r in range(3):
+        out[r] = c[r] + u[3 * r] * x + u[3 * r + 1] * y + u[3 * r + 2] * z
+
+
+@compiled
+def support(
+    k: int, sign: float, d: Floats, kind: Integers, centre: Floats, axes: Floats, size: Floats,
+    corners: Integers, vertices: Floats, out: Floats,
+) -> None:  # fmt: skip
+    """The point of solid k that lies farthest along sign d."""
+    u, h, what = axes[k], size[k], kind[k]
+    x = sign * dot_axis(u, 0, d[0], d[1], d[2])
+    y = sign * dot_axis(u, 1, d[0], d[1], d[2])
+    z = sign * dot_axis(u, 2, d[0], d[1], d[2])
+    p, q, s = 0.0, 0.0, 0.0
+    if what in (CAPSULE, CYLINDER):
+        s = h[1] if z >= 0.0 else -h[1]
+        across = math.sqrt(x * x + y * y)
+        if what == CYLINDER and across > 0.0:
+            p, q = h[0] * x / across, h[0] * y / across
+    elif what == BOX:
+        p = h[0] if x >= 0.0 else -h[0]
+        q = h[1] if y >= 0.0 else -h[1]
+        s = h[2] if z >= 0.0 else -h[2]
+    elif what == ELLIPSOID:
+        p, q, s = h[0] * h[0] * x, h[1] * h[1] * y, h[2] * h[2] * z
+        length = math.sqrt(p * x + q * y + s * z)
+        p, q, s = p / length, q / length, s / length
+    elif what == HULL:
+        best, at = -1e300, 0
+        for c in range(corners[k, 0], corners[k, 0] + corners[k, 1]):
+            far = vertices[c, 0] * x + vertices[c, 1] * y + vertices[c, 2] * z
+            if far > best:
+                best, at = far, c
+        p, q, s = vertices[at, 0], vertices[at, 1], vertices[at, 2]
+    put_global(p, q, s, k, centre, axes, out)
+
+
+@compiled
+def curvature(
+    k: int, d: Floats, s: Floats, t: Floats, kind: Integers, axes: Floats, size: Floats
+) -> float:
+    """Product s H t, H the derivative of the support of solid k at unit d, even in d; m."""
+    u, h = axes[k], size[k]
+    x, y = dot_axis(u, 0, d[0], d[1], d[2]), dot_axis(u, 1, d[0], d[1], d[2])
+    a, b = dot_axis(u, 0, s[0], s[1], s[2]), dot_axis(u, 1, s[0], s[1], s[2])
+    p, q = dot_axis(u, 0, t[0], t[1], t[2]), dot_axis(u, 1, t[0], t[1], t[2])
+    if kind[k] == CYLINDER:
+        across = x * x + y * y
+        if across < FLAT * FLAT:
+            return 0.0
+        return h[0] * (x * b - y * a) * (x * q - y * p) / (across * math.sqrt(across))
+    if kind[k] == ELLIPSOID:
+        z = dot_axis(u, 2, d[0], d[1], d[2])
+        c, r = dot_axis(u, 2, s[0], s[1], s[2]), dot_axis(u, 2, t[0], t[1], t[2])
+        e, f, g = h[0] * h[0], h[1] * h[1], h[2] * h[2]
+        far = e * x * x + f * y * y + g * z * z
+        one, two = e * a * x + f * b * y + g * c * z, e * p * x + f * q * y + g * r * z
+        return (e * a * p + f * b * q + g * c * r - one * two / far) / math.sqrt(far)
+    return 0.0
+
+
+@compiled
+def near_support(
+    k: int, sign: float, d: Floats, band: float, kind: Integers, centre: Floats, axes: Floats,
+    size: Floats, corners: Integers, vertices: Floats, out: Floats, start: int,
+) -> int:  # fmt: skip
+    """Put the points of solid k within a band below its support plane along sign d; their number.
+
+    out: rows from ``start`` on, CORNERS at most.
+    """
+    u, h, what, count = axes[k], size[k], kind[k], 0
+    if what in (SPHERE, ELLIPSOID):
+        support(k, sign, d, kind, centre, axes, size, corners, vertices, out[start])
+        return 1
+    x = sign * dot_axis(u, 0, d[0], d[1], d[2])
+    y = sign * dot_axis(u, 1, d[0], d[1], d[2])
+    z = sign * dot_axis(u, 2, d[0], d[1], d[2])
+    across = math.sqrt(x * x + y * y)
+    a, b = (x / across, y / across) if across > FLAT else (1.0, 0.0)
+    total = 2 if what == CAPSULE else 2 * RIM if what == CYLINDER else 8
+    if what == HULL:
+        total = corners[k, 1]
+    best = -1e300
+    for turn in range(2):  # the farthest first, then what is nearly as far
+        for c in range(total):
+            p, q, s = 0.0, 0.0, 0.0
+            if what == HULL:
+                v = vertices[corners[k, 0] + c]
+                p, q, s = v[0], v[1], v[2]
+            elif what == BOX:
+                p = h[0] * (2.0 * (c & 1) - 1.0)
+                q = h[1] * (1.0 * (c & 2) - 1.0)
+                s = h[2] * (0.5 * (c & 4) - 1.0)
+            else:
+                s = h[1] * (2.0 * (c & 1) - 1.0)
+                if what == CYLINDER:
+                    angle = 2.0 * math.pi / RIM * (c // 2)
+                    e, f = math.cos(angle), math.sin(angle)
+                    p, q = h[0] * (a * e - b * f), h[0] * (b * e + a * f)
+            far = p * x + q * y + s * z
+            if turn == 0:
+                best = max(best, far)
+            elif far >= best - band and count < CORNERS:
+                put_global(p, q, s, k, centre, axes, out[start + count])
+                count += 1
+    return count

@@ -1,0 +1,110 @@
+"""Stops without a stiffness, and limits of joints, against closed forms.
+
+Tolerances: at rtol 1e-12 a run of a second leaves less than 1e-12 of its coordinates; where bounces
+end is known to 1e-9 s, as the last of them, below 1e-13 of the length, are summed.
+"""
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+
+TIGHT = {"rtol": 1e-12, "atol": 1e-14}
+g, h, e, m = 9.81, 1.0, 0.5, 2.0
+
+
+def falling(**stop):
+    scene = dap.Scene(name="falling")
+    scene.add_body("ball", mass=m, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, h))
+    scene.add_force("weight", "gravity", gravity=g)
+    if stop:
+        scene.add_force("plane_stop", "stop", P_i="ball.O", **stop)
+    return scene
+
+
+def hinge(**limits):
+    scene = dap.Scene(name="hinge")
+    scene.add_body("wheel", mass=m, Jp=(0.5, 0.5, 0.3), w=(0.0, 0.0, 2.0))
+    scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z",
+                    **limits)  # fmt: skip
+    return scene
+
+
+def rests(result):
+    return [event.t for event in result.events if event.kind == "rest"]
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "adams", "radau"])
+def test_a_ball_bounces_to_rest_at_a_rigid_plane(integrator):
+    """At sqrt(2 h / g) (1 + e) / (1 - e), and stays there: its weight is carried."""
+    result = dap.simulate(falling(e=e), t_end=2.0, dt=0.5, integrator=integrator, **TIGHT)
+    expected = np.sqrt(2.0 * h / g) * (1.0 + e) / (1.0 - e)
+    assert rests(result) == pytest.approx([expected], rel=0, abs=1e-9)
+    assert np.abs(result.r[-1]).max() < 1e-15
+    assert result.contact("stop").normal_force[-1] == pytest.approx(m * g, rel=1e-14)
+
+
+def test_a_slider_bounces_to_rest_at_its_lower_limit():
+    """As the ball; the coordinate is counted from the pose of the scene."""
+    scene = falling()
+    scene.add_joint("tran", "way", P_i="ball.O", P_j="ground.O", a_j="ground.z", lower=-0.7, e=e,
+                    upper=0.1)  # fmt: skip
+    result = dap.simulate(scene, t_end=2.0, dt=0.5, **TIGHT)
+    expected = np.sqrt(2.0 * 0.7 / g) * (1.0 + e) / (1.0 - e)
+    assert rests(result) == pytest.approx([expected], rel=0, abs=1e-9)
+    assert result.r[-1, 0] == pytest.approx([0.0, 0.0, h - 0.7], rel=0, abs=1e-15)
+    assert result.contact("way_lower").normal_force[-1] == pytest.approx(m * g, rel=1e-14)
+    assert not result.contact("way_upper").mode.any()
+
+
+def test_a_hinge_turns_to_and_fro_between_its_limits():
+    """At 2, 1 and 0.5 rad/s: to 1 in 0.5 s, back to -0.5 in 1.5 s, and up again."""
+    scene = hinge(lower=-0.5, upper=1.0, e=0.5)
+    result = dap.simulate(scene, t_end=2.5, dt=0.25, **TIGHT)
+    assert [event.t for event in result.events] == pytest.approx([0.5, 2.0], rel=0, abs=1e-12)
+    assert result.quantity("axle.angle").values[-1] == pytest.approx(-0.25, abs=1e-12)
+    lost = 0.5 * 0.3 * (4.0 - 1.0) + 0.5 * 0.3 * (1.0 - 0.25)
+    assert result.work[-1] == pytest.approx(-lost, abs=1e-12)
+
+
+def test_a_moment_holds_a_hinge_at_its_stop():
+    """From theta = -1, its end, where bounces of a rate a = n / I end after 2 v e / (a (1 - e))."""
+    scene, n = hinge(), 1.5
+    scene.add_force("rot_stop", "stop", joint="axle", theta_stop=-1.0, e=0.3)
+    scene.add_force("motor", "push", joint="axle", torque=n)
+    result = dap.simulate(scene, t_end=2.0, dt=0.5, **TIGHT)
+    a = n / 0.3
+    reached = (np.sqrt(4.0 + 2.0 * a) - 2.0) / a
+    expected = reached + 2.0 * (2.0 + a * reached) * 0.3 / (a * 0.7)
+    assert rests(result) == pytest.approx([expected], rel=0, abs=1e-9)
+    assert result.quantity("axle.angle").values[-1] == pytest.approx(1.0, abs=1e-15)
+    assert result.contact("stop").normal_force[-1] == pytest.approx(n, rel=1e-14)
+
+
+def test_a_rope_jerks_and_leads_its_end_along_a_circle():
+    """What the velocity has along the rope is lost, its other part swings on with its energy."""
+    scene = falling()
+    scene.bodies["ball"].r = (0.6, 0.0, 0.0)
+    scene.add_force("ptp_stop", "rope", P_i="ball.O", P_j="ground.O", l_stop=1.0, side="max")
+    result = dap.simulate(scene, t_end=1.0, dt=0.1, **TIGHT)
+    taut = np.sqrt(2.0 * 0.8 / g)
+    assert result.events[0].t == pytest.approx(taut, rel=0, abs=1e-12)
+    energy = 0.5 * (g * taut * 0.6) ** 2 - g * 0.8
+    later = result.t > taut
+    v, z = result.rd[later, 0], result.r[later, 0, 2]
+    np.testing.assert_allclose(0.5 * np.sum(v * v, axis=1) + g * z, energy, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(np.linalg.norm(result.r[later, 0], axis=1), 1.0, rtol=0, atol=1e-14)
+
+
+def test_two_stops_share_what_they_carry():
+    """A plate on four rigid stops: each carries something, all of them its weight; it stays."""
+    scene = falling()
+    scene.bodies["ball"].r = (0.0, 0.0, 0.0)
+    for k, (x, y) in enumerate(((1, 1), (1, -1), (-1, 1), (-1, -1))):
+        scene.add_point(f"P{k}", "ball", (0.5 * x, 0.5 * y, 0.0))
+        scene.add_force("plane_stop", f"foot{k}", P_i=f"P{k}")
+    result = dap.simulate(scene, t_end=1.0, dt=0.5, **TIGHT)
+    forces = [result.contact(f"foot{k}").normal_force[-1] for k in range(4)]
+    assert min(forces) > 0.0
+    assert sum(forces) == pytest.approx(m * g, rel=1e-13)
+    assert np.abs(result.r).max() < 1e-15
