@@ -40,7 +40,8 @@ class JointRadauIntegration(RadauIntegration):
 
     def make_tangent(self) -> tuple[int, int, tuple[int, int, int]]:
         """As of ``RadauIntegration``."""
-        layout, size = self.evaluator.coordinates.nodes.layout, self.evaluator.coordinates.size
+        coordinates: Any = self.evaluator.coordinates
+        layout, size = coordinates.nodes.layout, coordinates.size
         self.lu_plan = make_lu_plan(0, (), (), [StateNode(size, ())])
         lu = self.lu_plan
         self.tangent = RateTangent(
