@@ -48,7 +48,7 @@ BY_ARRAY = (COMPLEX, FLOAT)
 #: Functions that make the tangent of radau: in runs with derivatives they compute values alone.
 OF_TANGENTS = {"find_tangent", "differentiate", "differentiate_element", "differentiate_friction",
                "call_element", "bridge_bends", "differentiate_states", "differentiate_by_states",
-               "differentiate_rate"}  # fmt: skip
+               "differentiate_rate", "find_rate_tangent"}  # fmt: skip
 #: The level of code with derivatives, beside those of ``targets``; numbers for each.
 DIFFERENTIATED, COUNT = "differentiated", 3
 

@@ -4,6 +4,8 @@ Rounding must not excuse errors of stiff directions (docs/decisions/0071), and a
 get on says why. Scenes of thin bodies, for which rounding is measured, are in test_scales.py.
 """
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -91,6 +93,13 @@ def test_explicit_methods_agree(integrator):
     """They take steps of the contact's own time, and the same motion."""
     result = dap.simulate(ball(1e9, 0.3), t_end=1.0, integrator=integrator)
     check_ball(result, 1e9, 0.3)
+
+
+@pytest.mark.parametrize("w_tol", [1e-9, 1e-3])
+def test_a_clutch_meets_in_joint_coordinates(w_tol, monkeypatch):
+    """As by body coordinates, in no more steps."""
+    monkeypatch.setattr(dap, "simulate", partial(dap.simulate, method="joint"))
+    test_a_clutch_meets(w_tol, 1e-8, "radau")
 
 
 @pytest.mark.parametrize("integrator", ["radau", "auto"])

@@ -41,6 +41,10 @@ def _adams(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integra
 
 
 def _radau(evaluator: Evaluator, y0: Any, times: Any, **options: Any) -> Integration:
+    if evaluator.formulation.has_own_coordinates:
+        from dap3d_core.integrators.radau.joint_integration import JointRadauIntegration
+
+        return JointRadauIntegration(evaluator, y0, times, **options)
     from dap3d_core.integrators.radau.integration import RadauIntegration
 
     return RadauIntegration(evaluator, y0, times, **options)
@@ -70,6 +74,7 @@ class Integrator:
         leaves_singular: it can start at a singular pose.
         requires: why it needs a formulation that is exact; "" where it does not.
         needs_body_coordinates: its equations are those of body coordinates.
+        prefers_body_coordinates: in others its time grows with the third power of their number.
         steps_contacts: contacts are followed by impulses over its steps, not by events.
     """
 
@@ -80,6 +85,7 @@ class Integrator:
     leaves_singular: bool = False
     requires: str = ""
     needs_body_coordinates: bool = False
+    prefers_body_coordinates: bool = False
     steps_contacts: bool = False
 
 
@@ -92,7 +98,7 @@ INTEGRATORS = {
         Integrator("adams", _adams, requires="past accelerations on one smooth motion"),
         Integrator("rk4", _explicit("rk4"), adaptive=False, one_step=True),
         Integrator(
-            "radau", _radau, requires="the constraints themselves", needs_body_coordinates=True
+            "radau", _radau, requires="the constraints themselves", prefers_body_coordinates=True
         ),
         Integrator(
             "moreau", _moreau, adaptive=False, requires="the constraints themselves",

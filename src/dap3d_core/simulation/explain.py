@@ -33,12 +33,13 @@ PROGRAM = (
 
 
 def takes_joint_coordinates(integrator: str) -> bool:
-    """True if an integrator takes method ``joint``; "auto" does not, which may go on with radau."""
+    """True if ``auto`` may choose method ``joint``: of "auto" not, which may go on with radau."""
     try:
         found = integrator_named(integrator)
     except PluginError:  # whoever runs it says so
         return False
-    return integrator != "auto" and not found.needs_body_coordinates
+    prefers_bodies = found.needs_body_coordinates or found.prefers_body_coordinates
+    return integrator != "auto" and not prefers_bodies
 
 
 def choose_method(model: Model, requested: str) -> tuple[str, str]:

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dap3d_core.formulations import PROJECT, RHS, Formulation
+from dap3d_core.formulations import PROJECT, RHS
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
@@ -98,9 +98,7 @@ def change_note(t: float) -> str:
     return information(f"integrator auto: {until}, then {IMPLICIT.name}: {WHY_STIFF}")
 
 
-def stiffness_notes(
-    integrations: Sequence[Integration], integrator: str, formulation: Formulation
-) -> list[str]:
+def stiffness_notes(integrations: Sequence[Integration], integrator: str) -> list[str]:
     """That the scene is stiff for the one integration of a run, where it is."""
     t = integrations[0].t_stiff
     if t is None or len(integrations) > 1:
@@ -111,7 +109,6 @@ def stiffness_notes(
             f"the scene is stiff from t = {t:.6g} s on: {WHY_STIFF}. {used} takes small "
             f"steps for that; {IMPLICIT.name}, or auto, takes fewer"
         )
-        + (", with method standard" if formulation.has_own_coordinates else "")
     ]
 
 

@@ -325,9 +325,7 @@ class Run(RunState):
         notes += refusal_notes(self.evaluator, self.integrations)
         notes += crossing_notes(self.crossed)
         notes += stepping_notes(self.integrations, self.evaluator.model.length)
-        notes += stiffness_notes(
-            self.integrations, self.settings.integrator, self.evaluator.formulation
-        )
+        notes += stiffness_notes(self.integrations, self.settings.integrator)
         return notes + self._method_notes()
 
     def _method_notes(self) -> list[str]:

@@ -8,7 +8,6 @@ from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, MOST, NO
 from dap3d_core.integrators.stepping.step_control import EPSILON
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
 
 #: An iteration that converges slower than this does not.
 SLOWEST = 0.99
@@ -32,11 +31,11 @@ def size_of_change(change: Floats, h: float, work: RadauState) -> float:
     as exactly as they would be without.
     """
     y, rtol, tolerance = work.state[Y], work.rtol, work.tolerance
-    n, rounding = work.frames.shape[1] - 1, ROUNDINGS * EPSILON / work.newton_limit
+    counts, rounding = work.counts, ROUNDINGS * EPSILON / work.newton_limit
     first, largest = 0, 0.0
-    for count in (COORDINATES * n, VELOCITIES * n, work.error_size):
-        last, least = min(first + count, work.error_size), 0.0
-        if first < (COORDINATES + VELOCITIES) * n:  # states of elements have units of their own
+    for group in range(3):
+        last, least = min(first + counts[group], work.error_size), 0.0
+        if group < 2:  # states of elements have units of their own
             for k in range(first, last):
                 least = max(least, rounding * abs(y[k]))
         for k in range(first, last):

@@ -18,13 +18,8 @@ from dap3d_core.formulations.stabilized_index2.jacobian_tables import (
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau import state as at
 from dap3d_core.integrators.radau.dense_output import dense_state, find_slope
-from dap3d_core.integrators.radau.newton import (
-    estimate_error,
-    factorise_both,
-    find_stages,
-    find_tangent,
-    find_work,
-)
+from dap3d_core.integrators.radau.error import estimate_error, find_work
+from dap3d_core.integrators.radau.newton import factorise_both, find_stages, find_tangent
 from dap3d_core.integrators.radau.order import set_tolerances
 from dap3d_core.integrators.radau.rounding import measure_stage_noise
 from dap3d_core.integrators.radau.state import RadauState
@@ -49,6 +44,7 @@ from dap3d_core.kernels.runtime.function_lists import (
 from dap3d_core.linear.lu.plan import LuPlan, StateNode, make_lu_plan
 from dap3d_core.linear.ordering.ordering import JointNode
 from dap3d_core.model import Model
+from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
 
 #: e_i of a tangent with dependent rows as part of the squared length of row i. Rows that depend on
 #: others on the constraints alone, as those of Bennett's linkage, are independent by d aside, where
@@ -196,6 +192,14 @@ class RadauIntegration(Integration):
     loop = staticmethod(advance)
     dense = staticmethod(dense_state)
 
+    tangent: Any
+    #: Types of tangent and matrix; the parts of a step, the tangent first.
+    tangent_kinds: tuple[Any, Any] = (Tangent.type_of(), StageMatrix.type_of())
+    parts: tuple[Any, ...] = (
+        find_tangent, factorise_both, find_stages, estimate_error, find_slope, measure_stage_noise,
+        find_work,
+    )  # fmt: skip
+
     def __init__(
         self, evaluator: Evaluator, y0: ArrayLike, times: ArrayLike, **options: Any
     ) -> None:
@@ -209,18 +213,20 @@ class RadauIntegration(Integration):
         )  # fmt: skip
         work = self.work
         work.convergence_factor = work.accepted_error = 1.0
-        work.regularisation = REGULAR if evaluator.formulation.accepts_redundant else 0.0
+        work.regularisation = REGULAR if self._accepts_redundant else 0.0
         work.order, work.has_dense_output = ORDERS[0], 1
         work.stages = work.last_stages = FEWEST
         work.newton_limit = work.tolerances[0, at.LIMIT]
 
+    @property
+    def _accepts_redundant(self) -> bool:
+        """True if rows of the tangent may depend on each other."""
+        return self.evaluator.formulation.accepts_redundant
+
     def own_arrays(self, size: int, length_count: int) -> dict[str, Any]:
         """As ``Integration.own_arrays``; makes the tangent and the matrix, too."""
-        evaluator = self.evaluator
-        self.tangent, self.own_loops = make_tangent(evaluator)
-        self.matrix, self.lu_plan = make_matrix(evaluator, self.tangent)
-        lu, rows, bodies = self.lu_plan, evaluator.plan.row_size, evaluator.model.body_count + 1
-        most, pairs = self.most_stages, self.most_stages // 2
+        rows, bodies, groups = self.make_tangent()
+        lu, most, pairs = self.lu_plan, self.most_stages, self.most_stages // 2
         shapes: dict[str, Any] = {
             "own": len(RadauState.indices("own")),
             "k": (2, size),
@@ -242,7 +248,19 @@ class RadauIntegration(Integration):
         dtypes: dict[str, Any] = dict.fromkeys(("xc", "alongc", "Kc"), np.complex128)
         dtypes |= dict.fromkeys(("pivots", "pivotsc"), np.int64)
         arrays = {name: np.zeros(s, dtypes.get(name, np.float64)) for name, s in shapes.items()}
-        return arrays | {"method": radau_method(), "tolerances": self._tolerances}
+        arrays |= {"tolerances": self._tolerances, "counts": np.array(groups, dtype=np.int64)}
+        return arrays | {"method": radau_method()}
+
+    def make_tangent(self) -> tuple[int, int, tuple[int, int, int]]:
+        """Make tangent, matrix and loops; rows, bodies with ground, and components of each kind.
+
+        The kinds are coordinates, their rates, states of elements.
+        """
+        evaluator = self.evaluator
+        self.tangent, self.own_loops = make_tangent(evaluator)
+        self.matrix, self.lu_plan = make_matrix(evaluator, self.tangent)
+        n, states = evaluator.model.body_count, evaluator.model.state_count
+        return evaluator.plan.row_size, n + 1, (COORDINATES * n, VELOCITIES * n, states)
 
     def error_tolerances(self, rtol: float, atol: ArrayLike) -> tuple[float, Any]:
         """As ``Integration.error_tolerances``: those of order 5; ``tolerances`` has all."""
@@ -262,15 +280,9 @@ class RadauIntegration(Integration):
         tangent stands by itself: no derivative of a run needs its derivatives, as the iteration
         converges to the same stages with any.
         """
-        kinds = (
-            RadauState.type_of(), System.type_of(), LOOP_LIST, Tangent.type_of(),
-            StageMatrix.type_of(),
-        )  # fmt: skip
-        steps = (
-            factorise_both, find_stages, estimate_error, find_slope, measure_stage_noise, find_work,
-        )  # fmt: skip
-        tangents = table_of(procedure_signature(*kinds), (find_tangent,), values_alone=True)
-        return table_of(number_signature(*kinds), steps), tangents
+        kinds = (RadauState.type_of(), System.type_of(), LOOP_LIST, *self.tangent_kinds)
+        tangents = table_of(procedure_signature(*kinds), (self.parts[0],), values_alone=True)
+        return table_of(number_signature(*kinds), self.parts[1:]), tangents
 
     @property
     def loop_arguments(self) -> tuple[Any, ...]:
@@ -297,7 +309,7 @@ class RadauIntegration(Integration):
             return restored(name, array, found, self.indices("own", ("regularisation",)))
         if name.startswith("method.") or (array.dtype.kind == "i" and "." in name):
             return restored(name, array, found, range(len(array)))
-        if name == "tolerances":
+        if name in ("tolerances", "counts"):
             return restored(name, array, found, range(len(array)))
         if name in ("pivots", "pivotsc"):
             check_alike(name, found, array)

@@ -43,9 +43,8 @@ from dap3d_core.integrators.radau.convergence import (
 )
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
-from dap3d_core.integrators.stepping.integration_state import SCRATCH, TRIAL, Y
-from dap3d_core.integrators.stepping.vector_ops import scaled_largest
-from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.integrators.stepping.integration_state import SCRATCH, Y
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.linear.lu.factor import factor_lu, solve_lu
 
 EPSILON = 2.220446049250313e-16
@@ -187,7 +186,9 @@ def predict(h: float, work: RadauState, prolong: bool) -> None:
 
 
 @compiled
-def solve_first(h: float, work: RadauState, system: System, matrix: StageMatrix) -> None:
+def solve_first(
+    h: float, work: RadauState, system: System, tangent: Tangent, matrix: StageMatrix
+) -> None:
     """R[0], G[0] from the residual of one equation with the real matrix to the change."""
     x, along = work.x[0], work.along[0]
     s = work.method.poles[method_index(work.stages), 0] / h
@@ -229,7 +230,9 @@ def unite(T: Floats, stages: int, real: Floats, pairs: Any, x: Floats) -> None:
 
 
 @compiled
-def solve_stages(h: float, work: RadauState, system: System, matrix: StageMatrix) -> None:
+def solve_stages(
+    h: float, work: RadauState, system: System, tangent: Tangent, matrix: StageMatrix
+) -> None:
     """R, G from the residuals of the stages to the changes."""
     x, along, stages, m = work.x, work.along, work.stages, method_index(work.stages)
     poles, T, inverse = work.method.poles[m], work.method.T[m], work.method.T_inverse[m]
@@ -255,9 +258,23 @@ def solve_stages(h: float, work: RadauState, system: System, matrix: StageMatrix
 
 
 @compiled
+def subtract_slope(i: int, h: float, inverse: Floats, work: RadauState) -> None:
+    """F less the slope of the collocation polynomial at stage i, into R."""
+    residual, rates = work.R[i], work.F[i]
+    zero(residual)
+    for j in range(work.stages):
+        a = inverse[i, j] / h
+        for k in range(residual.shape[0]):
+            residual[k] += a * work.Z[j, k]
+    for k in range(residual.shape[0]):
+        residual[k] = rates[k] - residual[k]
+
+
+@compiled
 def evaluate_stages(
-    t: float, h: float, work: RadauState, system: System, loops: Any, matrix: StageMatrix
-) -> None:
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Tangent,
+    matrix: StageMatrix,
+) -> None:  # fmt: skip
     """Residuals of the stages: F - A^-1 Z / h into R, those of the rows into G."""
     y, argument, m = work.state[Y], work.state[SCRATCH], method_index(work.stages)
     stages, inverse, c = work.Z, work.method.inverse[m], work.method.c[m]
@@ -267,13 +284,7 @@ def evaluate_stages(
         evaluate_stage(t + c[i] * h, argument, work.multipliers[i], matrix.held, work.F[i],
                        work.G[i], system, loops)  # fmt: skip
         keep_frames(system.body, work.frames[i])
-        zero(work.R[i])
-        for j in range(work.stages):
-            a = inverse[i, j] / h
-            for k in range(y.shape[0]):
-                work.R[i, k] += a * stages[j, k]
-        for k in range(y.shape[0]):
-            work.R[i, k] = work.F[i, k] - work.R[i, k]
+        subtract_slope(i, h, inverse, work)
     work.rhs_count += work.stages
 
 
@@ -329,25 +340,35 @@ def find_stages(
     t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Tangent,
     matrix: StageMatrix,
 ) -> float:  # fmt: skip
+    """``iterate_stages`` on the equations of bodies."""
+    return iterate_stages(t, h, work, system, loops, tangent, matrix, evaluate_stages, solve_stages,
+                          change_stages)  # fmt: skip
+
+
+@compiled_into
+def iterate_stages(
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Any, matrix: Any,
+    evaluate: Any, solve: Any, change_by: Any,
+) -> float:  # fmt: skip
     """Newton's iteration for the stages of a step h.
+
+    evaluate, solve, change_by: as ``evaluate_stages``, ``solve_stages``, ``change_stages``.
 
     Returns:
         0 where they are found; else the factor on the step that is to be tried; NaN where a number
         is not finite.
     """
-    limit = work.newton_limit
+    limit, fixed = work.newton_limit, work.fixed_step != 0.0
     stale = abs(h - work.factored_step) / h  # factors of another step converge at this rate
     work.convergence_factor = max(max(work.convergence_factor, EPSILON) ** 0.8, stale)
     before = ratio = ratio_before = states = multipliers = 1.0
-    fixed = work.fixed_step != 0.0
     most = MOST_FIXED if fixed else most_iterations(work.stages)
     least = 2 if tangent.bends[0] == BENT else 1  # rates of other steps say nothing across a bend
     for done in range(1, most + 1):
-        evaluate_stages(t, h, work, system, loops, matrix)
-        solve_stages(h, work, system, matrix)
-        change = change_stages(h, work, system)
-        work.iteration_count += 1
-        work.last_iterations = done
+        evaluate(t, h, work, system, loops, tangent, matrix)
+        solve(h, work, system, tangent, matrix)
+        change = change_by(h, work, system)
+        work.iteration_count, work.last_iterations = work.iteration_count + 1, done
         if not change <= LARGEST:
             return math.nan
         if is_exact(change, before if done == least > 1 else LARGEST, limit, work):
@@ -384,68 +405,3 @@ def find_stages(
         if factor * change <= limit and done >= least and (done > 1 or change <= 1.0):
             return 0.0
     return UNFOUND
-
-
-@compiled
-def estimate_error(
-    t: float,
-    h: float,
-    work: RadauState,
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:
-    """Norm of the error estimate (HW IV.8, (8.19), (8.20)); 1 is just good enough.
-
-    The multipliers steer no step: what a run reports of them comes from the reported state. They
-    are those at the end of the last step: an error of theirs acts along D^T, which the matrix takes
-    away only as far as its own D is that of the state.
-    """
-    again = work.has_last_step == 0 or work.last_rejected != 0
-    y, argument, e = work.state[Y], work.state[SCRATCH], work.method.e[method_index(work.stages)]
-    multipliers, error = work.last_multipliers[work.last_stages - 1], 0.0
-    zero(multipliers[0])
-    for attempt in range(2 if again else 1):
-        for k in range(y.shape[0]):
-            argument[k] = y[k] + (work.R[0, k] if attempt == 1 else 0.0)
-        evaluate_stage(t, argument, multipliers, matrix.held, work.R[0], work.G[0], system,
-                       loops)  # fmt: skip
-        keep_frames(system.body, work.frames[0])
-        work.rhs_count += 1
-        for i in range(work.stages):
-            for k in range(y.shape[0]):
-                work.R[0, k] += e[i] * work.Z[i, k] / h
-        for r in range(2):
-            zero(work.G[0, r])
-        solve_first(h, work, system, matrix)
-        error = scaled_largest(work.R[0], y, work.state[TRIAL], work.error_size,
-                               work.rtol, work.tolerance, h)  # fmt: skip
-        if not error >= 1.0:
-            return error
-    return error
-
-
-@compiled
-def find_work(
-    t: float,
-    h: float,
-    work: RadauState,
-    system: System,
-    loops: Any,
-    tangent: Tangent,
-    matrix: StageMatrix,
-) -> float:
-    """Work done up to each stage, into Z, and up to the end of the step, into the trial state.
-
-    The iteration leaves the rates of stages at their last but one values. No error control sees the
-    work, so its powers are evaluated once more, at the stages as found.
-    """
-    evaluate_stages(t, h, work, system, loops, matrix)
-    last, A = work.state.shape[1] - 1, work.method.A[method_index(work.stages)]
-    for i in range(work.stages):
-        work.Z[i, last] = 0.0
-        for j in range(work.stages):
-            work.Z[i, last] += h * A[i, j] * work.F[j, last]
-    work.state[TRIAL, last] = work.state[Y, last] + work.Z[work.stages - 1, last]
-    return 0.0

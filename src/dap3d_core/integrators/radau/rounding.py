@@ -63,7 +63,7 @@ def measure_stage_noise(
         for r in range(2):
             for k in range(work.G.shape[2]):
                 work.G[0, r, k] -= work.G[1, r, k]
-        solve_first(h, work, system, matrix)
+        solve_first(h, work, system, tangent, matrix)
         for k in range(y.shape[0]):
             noise[k] = max(noise[k], size * abs(work.R[0, k]))
     return 0.0

@@ -66,7 +66,7 @@ class RadauState(IntegrationState):
 
     types: ClassVar[dict[str, Any]] = {
         **IntegrationState.types,
-        "pivots": INTEGER_VECTOR,
+        **dict.fromkeys(("pivots", "counts"), INTEGER_VECTOR),
         "pivotsc": INTEGER_MATRIX,
         **dict.fromkeys(("k", "terms", "Z", "Z_old", "F", "R", "x", "along"), MATRIX),
         "tolerances": MATRIX,
@@ -107,6 +107,7 @@ class RadauState(IntegrationState):
     terms: Floats  # (TERMS, n)
     nodes: Floats  # (TERMS,) of dense output, in Newton's form
     tolerances: Floats  # (orders, ATOL + n) RTOL, ...
+    counts: Integers  # (3,) coordinates, their rates, states of elements
     blamed: Floats  # (n,) how often each changed most where the iteration did not converge
     Z: Floats  # (S, n) stages less the state
     Z_old: Floats  # (S, n) of the last accepted step

@@ -123,7 +123,7 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
         return
     change_order(work, FEWEST)
     work.last_stages = FEWEST
-    for k in range(system.multipliers.shape[0]):
+    for k in range(work.last_multipliers.shape[2]):
         work.last_multipliers[FEWEST - 1, 1, k] = -system.multipliers[k]
     for k in range(y.shape[0]):
         work.state[SLOPE, k] = work.k[0, k]

@@ -23,11 +23,11 @@ def evaluate(t, y, multipliers, held, out, rows, system, loops):
 
 
 @compiled
-def solve_at(t, h, y, multipliers, work, system, loops, matrix):
+def solve_at(t, h, y, multipliers, work, system, loops, tangent, matrix):
     """The change that belongs to the residual in R[0], G[0], in the axes of y."""
     evaluate_stage(t, y, multipliers, matrix.held, work.R[1], work.G[1], system, loops)
     keep_frames(system.body, work.frames[0])
-    solve_first(h, work, system, matrix)
+    solve_first(h, work, system, tangent, matrix)
 
 
 # ---------------------------------------------------------------------------- tangent
@@ -92,7 +92,7 @@ def test_tangent_is_that_of_all_equations(scene, h):
     of_rows = rng.normal(size=(2, rows)) * there
     of_rows[0] *= matrix.held  # mu of a row without position level is zero from the start
     work.R[0], work.G[0] = residual, of_rows
-    solve_at(0.0, h, y0, base, work, system, evaluator.loops, matrix)
+    solve_at(0.0, h, y0, base, work, system, evaluator.loops, run.tangent, matrix)
     change, multipliers = work.R[0].copy(), work.G[0].copy()
 
     def equations(y, m):

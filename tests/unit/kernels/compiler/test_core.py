@@ -87,7 +87,8 @@ elimination_order.WIDE, elimination_order.LEAF, supernodes.ZEROS = usual
 from support.state_types import REGISTRY, stated, steered
 recorder.record(dap.simulate, dap.compile(steered(), registry=REGISTRY), t_end=0.1, dt=0.1,
                 integrator="radau")
-for settings in ({"integrator": "radau"}, {"method": "joint"}):
+for settings in ({"integrator": "radau"}, {"method": "joint"},
+                 {"integrator": "radau", "method": "joint"}):
     recorder.record(dap.simulate, stated(), t_end=0.2, dt=0.1, **settings)
 struck = pendulum()
 struck.add_force("plane_stop", "stop", P_i="bob.O", P_j="ground.O", a_j="ground.z", k=1e4, e=0.5)
@@ -106,7 +107,7 @@ NOT_CALLED = {
         "integrators.stepping.step_control": "error_beyond_rounding",
         "integrators.stepping.singular_poses": "predict_measures is_approaching "
         "least_time_to_singularity",
-        "integrators.radau.step": "reject_iteration stage_is_across",
+        "integrators.radau.step": "reject_iteration stage_is_across blame",
         "integrators.stepping.rounding": "measure_noise",
         "assembly.turns": "measure_all follow_poses",
         "formulations.regularised": "least_multipliers take_seen",

@@ -1,0 +1,114 @@
+"""The error estimate of a Radau step, and the work done in it.
+
+Source: as of newton.py.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from typing import Any
+
+from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.evaluate import zero
+from dap3d_core.formulations.stabilized_index2.jacobian import Tangent
+from dap3d_core.formulations.stabilized_index2.stage_equations import (
+    StageMatrix,
+    evaluate_stage,
+    keep_frames,
+)
+from dap3d_core.integrators.radau.newton import evaluate_stages, method_index, solve_first
+from dap3d_core.integrators.radau.state import RadauState
+from dap3d_core.integrators.stepping.integration_state import SCRATCH, TRIAL, Y
+from dap3d_core.integrators.stepping.vector_ops import scaled_largest
+from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+
+
+@compiled
+def estimate_error(
+    t: float,
+    h: float,
+    work: RadauState,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: StageMatrix,
+) -> float:
+    """``filter_error`` on the equations of bodies.
+
+    The multipliers steer no step: what a run reports of them comes from the reported state. They
+    are those at the end of the last step: an error of theirs acts along D^T, which the matrix takes
+    away only as far as its own D is that of the state.
+    """
+    zero(work.last_multipliers[work.last_stages - 1, 0])
+    return filter_error(t, h, work, system, loops, tangent, matrix, evaluate_first, solve_first)
+
+
+@compiled
+def evaluate_first(
+    t: float, y: Floats, work: RadauState, system: System, loops: Any, matrix: StageMatrix
+) -> None:
+    """Rates at a state with the last multipliers into R[0]; G[0] is zero."""
+    evaluate_stage(t, y, work.last_multipliers[work.last_stages - 1], matrix.held, work.R[0],
+                   work.G[0], system, loops)  # fmt: skip
+    keep_frames(system.body, work.frames[0])
+    for r in range(2):
+        zero(work.G[0, r])
+
+
+@compiled_into
+def filter_error(
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: Any, matrix: Any,
+    evaluate: Any, solve: Any,
+) -> float:  # fmt: skip
+    """Norm of the error estimate (HW IV.8, (8.19), (8.20)); 1 is just good enough.
+
+    evaluate, solve: ``evaluate_first``, ``solve_first``, or those of other coordinates.
+    """
+    again = work.has_last_step == 0 or work.last_rejected != 0
+    y, argument, e = work.state[Y], work.state[SCRATCH], work.method.e[method_index(work.stages)]
+    error = 0.0
+    for attempt in range(2 if again else 1):
+        for k in range(y.shape[0]):
+            argument[k] = y[k] + (work.R[0, k] if attempt == 1 else 0.0)
+        evaluate(t, argument, work, system, loops, matrix)
+        work.rhs_count += 1
+        for i in range(work.stages):
+            for k in range(y.shape[0]):
+                work.R[0, k] += e[i] * work.Z[i, k] / h
+        solve(h, work, system, tangent, matrix)
+        error = scaled_largest(work.R[0], y, work.state[TRIAL], work.error_size,
+                               work.rtol, work.tolerance, h)  # fmt: skip
+        if not error >= 1.0:
+            return error
+    return error
+
+
+@compiled
+def find_work(
+    t: float,
+    h: float,
+    work: RadauState,
+    system: System,
+    loops: Any,
+    tangent: Tangent,
+    matrix: StageMatrix,
+) -> float:
+    """Work done up to each stage, into Z, and up to the end of the step, into the trial state.
+
+    The iteration leaves the rates of stages at their last but one values. No error control sees the
+    work, so its powers are evaluated once more, at the stages as found.
+    """
+    evaluate_stages(t, h, work, system, loops, tangent, matrix)
+    sum_work(h, work)
+    return 0.0
+
+
+@compiled
+def sum_work(h: float, work: RadauState) -> None:
+    """Integrals of the powers in F."""
+    last, A = work.state.shape[1] - 1, work.method.A[method_index(work.stages)]
+    for i in range(work.stages):
+        work.Z[i, last] = 0.0
+        for j in range(work.stages):
+            work.Z[i, last] += h * A[i, j] * work.F[j, last]
+    work.state[TRIAL, last] = work.state[Y, last] + work.Z[work.stages - 1, last]
