@@ -46,7 +46,7 @@ class Record:
         reason: why there are none and will be none; "" while there may be.
         is_requested: True if they are being compiled by another process.
         takes_all_ways: True if projections do (ways.py).
-        first: the state at which the first ones were made here, where it fits right-hand sides.
+        first: where the first ones were made here, if projections alone have failed since.
         anew: time and state at which they are made anew, as guards of the first ones failed.
     """
 
@@ -54,7 +54,7 @@ class Record:
     reason: str = ""
     is_requested: bool = False
     takes_all_ways: bool = False
-    first: "tuple[Floats, ...]" = ()
+    first: "tuple[float, Floats] | None" = None
     anew: "tuple[float, Floats] | None" = None
 
 
@@ -181,9 +181,11 @@ class ChangeOver:
         if stored is None:
             if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
                 return
-            place = record.anew or start()
-            others = record.first if record.anew else None
-            record.first = (place[1],)
+            place, others = record.first or record.anew or start(), None
+            if record.anew is None:
+                record.first = place
+            else:
+                others = (record.anew[1],)
             text, written = scene_program.write_programs(
                 evaluator, name, *place, self._varied, others
             )
@@ -209,7 +211,7 @@ def _give_up(record: Record, program: Any, k: int, place: "tuple[float, Floats]"
         others = {q: one for q, one in record.programs.items() if q != k}
         if record.anew is None:
             record.programs, record.anew, record.is_requested = {}, place, False
-            record.first = record.first if k == PROJECT else ()
+            record.first = record.first if k == PROJECT else None
         elif k == RHS:
             record.programs, record.reason = {}, "guards fail: branches depend on the motion"
         else:

@@ -247,8 +247,7 @@ def write_programs(
         name: of the programs.
         time, state: where branches are decided.
         varied: as of ``constants``.
-        others: of projections, as of ``merged`` (ways.py), unless that were too long; all else is
-            decided at the first of them.
+        others: of projections, as of ``merged`` (ways.py), unless that were too long.
 
     Raises:
         TypeError, ValueError, ArithmeticError: the scene has none; says why.
@@ -269,8 +268,7 @@ def write_programs(
             texts.append(_BEHIND.format(name=behind, head=head, rhs=general[RHS], size=state.size,
                                         **given))  # fmt: skip
             written.append(BEHIND)
-        here = others[0] if others and k != PROJECT else state
-        of = evaluator, k, time, here, names, head, varied, None
+        of = evaluator, k, time, state, names, head, varied, None
         for ways in (None,) if others is None or k != PROJECT else (others, None):
             try:
                 text, needed = write_program(*of, ways)
