@@ -1,6 +1,9 @@
-"""Axes of joints."""
+"""Axes of joints and shapes."""
 
-from dap3d_core.interface.formats import FormatError, XmlElement
+from math import atan2, pi
+from typing import Any
+
+from dap3d_core.interface.formats import FormatError, XmlElement, axis_angle
 
 
 def unit(axis: tuple[float, ...], element: XmlElement) -> tuple[float, ...]:
@@ -26,3 +29,12 @@ def across(normal: tuple[float, ...]) -> tuple[tuple[float, ...], tuple[float, .
     y = (y[0] / length, y[1] / length, y[2] / length)
     x = (y[1] * n[2] - y[2] * n[1], y[2] * n[0] - y[0] * n[2], y[0] * n[1] - y[1] * n[0])
     return x, y
+
+
+def along(z: tuple[float, ...]) -> Any:
+    """The least rotation that turns the z axis to a unit vector, as MuJoCo takes it."""
+    x, y = -z[1], z[0]  # (0, 0, 1) x z
+    sine = (x * x + y * y) ** 0.5
+    if sine < 1e-14:
+        return axis_angle((1.0, 0.0, 0.0), 0.0 if z[2] > 0.0 else pi)
+    return axis_angle((x / sine, y / sine, 0.0), atan2(sine, z[2]))

@@ -26,8 +26,9 @@ MODELS = sorted(
     + list((REPOSITORY / "plugins/dap3d-example/scenes").glob("*.toml"))
 )
 INTEGRATORS = {"dop853": {}, "dopri5": {}, "adams": {}, "rk4": {"step": 1e-3}}
-#: Scenes whose programs branch with the motion: pivots among kept rows that depend on each other.
-BRANCHING = {"A02-1", "A02-2", "A04"}
+#: Scenes whose programs branch with the motion: pivots among kept rows that depend on each other,
+#: the number of passes until forces on reactions settle.
+BRANCHING = {"A02-1", "A02-2", "A04", "planetary"}
 NAMES = ("r", "p", "rd", "w", "rdd", "wd", "Lam")
 
 

@@ -1,6 +1,6 @@
 """An MJCF document: included files, settings of the compiler, default classes."""
 
-from math import atan2, pi
+from math import pi
 from typing import Any
 
 import attrs
@@ -14,7 +14,7 @@ from dap3d_core.interface.formats import (
     euler_angles,
     from_quaternion,
 )
-from dap3d_formats.axes import unit
+from dap3d_formats.axes import along, unit
 
 #: Elements that share the defaults of actuators.
 ACTUATORS = (
@@ -185,15 +185,6 @@ def _xyaxes(element: XmlElement) -> Any:
     y = unit(tuple(b - dot * a for a, b in zip(x, numbers[3:], strict=True)), element)
     z = cross(x, y)
     return [[x[k], y[k], z[k]] for k in range(3)]
-
-
-def along(z: tuple[float, ...]) -> Any:
-    """The least rotation that turns the z axis to a unit vector, as MuJoCo takes it."""
-    x, y = -z[1], z[0]  # (0, 0, 1) x z
-    sine = (x * x + y * y) ** 0.5
-    if sine < 1e-14:
-        return axis_angle((1.0, 0.0, 0.0), 0.0 if z[2] > 0.0 else pi)
-    return axis_angle((x / sine, y / sine, 0.0), atan2(sine, z[2]))
 
 
 def cross(a: tuple[float, ...], b: tuple[float, ...]) -> tuple[float, float, float]:

@@ -19,7 +19,8 @@ from dap3d_core.interface.formats import (
     inertia_of_solid,
     total_inertia,
 )
-from dap3d_formats.mjcf.document import Document, along
+from dap3d_formats.axes import along
+from dap3d_formats.mjcf.document import Document
 
 #: Geoms without a volume.
 FLAT = ("plane", "hfield", "sdf")

@@ -18,8 +18,8 @@ from dap3d_core.interface.formats import (
     from_quaternion,
     rpy,
 )
+from dap3d_formats.axes import along
 from dap3d_formats.element_table import note_elements
-from dap3d_formats.mjcf.document import along
 from dap3d_formats.sdf.elements import CONTACTS, SDF
 from dap3d_formats.sdf.frames import FrameGraph
 

@@ -70,9 +70,10 @@ def joints_of(model: Model) -> list[ElementGeometry]:
 
 
 def forces_of(model: Model) -> list[ElementGeometry]:
-    """The forces of a model that act on bodies of their own, in file order."""
+    """The forces that act on bodies of their own, in file order; what joints bring is theirs."""
     groups = [g for g in model.forces if not acts_on_all(g.type_info.type)]
-    return _in_order(groups, model.force_names)
+    brought = model.brought_forces.values()
+    return [one for one in _in_order(groups, model.force_names) if one.name not in brought]
 
 
 def gravity_of(model: Model) -> Point | None:

@@ -6,6 +6,7 @@ from support.state_types import MASS, REGISTRY, C, K, pulled, steered
 
 import dap3d_core as dap
 from dap3d_core.integrators import INTEGRATORS
+from dap3d_core.integrators.radau.tableau import MOST_STAGES
 
 
 def radau_of(compiled):
@@ -39,7 +40,7 @@ def test_newton_converges_at_the_rate_of_an_exact_tangent(make):
     """Some two iterations a step: without a part of the tangent it would be ten and more."""
     compiled = dap.compile(make(), registry=REGISTRY)
     result = dap.simulate(compiled, t_end=1.0, dt=0.5, integrator="radau", rtol=1e-6)
-    assert result.stats.rhs < 10 * result.stats.steps
+    assert result.stats.rhs < 2.5 * MOST_STAGES * result.stats.steps
     assert result.stats.rejected < 0.2 * result.stats.steps
 
 

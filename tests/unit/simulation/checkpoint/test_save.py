@@ -59,7 +59,11 @@ def test_a_tangent_that_is_kept_for_the_next_step(make, t, has_factors, tmp_path
     whole = dap.simulate(make(), **settings)
     checkpoint = leave(make(), tmp_path, t, **settings)
     arrays = read_checkpoint(checkpoint).arrays
-    state = {name: arrays[f"0.{s.array}"][s.index] for name, s in RadauState.scalars.items()}
+    state = {
+        name: arrays[f"0.{s.array}"][s.index]
+        for name, s in RadauState.scalars.items()
+        if s.array != "limits"
+    }  # which holds where this call ends
     assert state["tangent_needed"] == 0
     assert (state["factored_step"] == state["h"]) == has_factors
     assert same_bits(dap.resume(checkpoint), whole)
