@@ -223,6 +223,28 @@ def test_joints_hold_while_shapes_touch():
     assert np.abs(smooth.reaction("J")["i"].force[-1]).max() < 1e-3
 
 
+def test_guided_fingers_lift_a_box():
+    """Four corners on each side, more impulses than there are equations: none may be left over."""
+    scene, press = dap.Scene(name="lift"), 20.0  # N
+    scene.add_body("box", mass=1.0, Jp=[2e-3] * 3, r=[0.0, 0.0, 0.05])
+    scene.add_shape("box", "box", body="box", size=[0.1] * 3, collides=True)
+    scene.add_body("hand", mass=1.0, Jp=[0.01] * 3, r=[0.0, 0.0, 0.3])
+    scene.add_point("rail", "hand", [0.0, 0.0, -0.25])
+    scene.add_joint("tran", "lift", P_i="hand.O", P_j="ground.O", a_j="ground.z")
+    scene.add_function("b", "rise", x_start=0.02, x_end=0.2, f_start=0.3, f_end=0.32)
+    scene.add_joint("drive-tran", joint="lift", function="rise")
+    for name, side in (("left", -1.0), ("right", 1.0)):
+        scene.add_body(name, mass=0.1, Jp=[1e-4] * 3, r=[0.06 * side, 0.0, 0.05])
+        scene.add_shape("box", name, body=name, size=[0.02, 0.04, 0.06], collides=True)
+        scene.add_joint("tran", f"slide_{name}", P_i=f"{name}.O", P_j="rail", a_j="hand.x")
+        scene.add_force("fp", f"press_{name}", P_i=f"{name}.O", fp=[-press * side, 0.0, 0.0])
+    result = dap.simulate(collide(scene, mu=0.6), t_end=0.24, dt=0.12, contact_step=2e-3)
+    held = result.contacts.of("box").at(result.t[-1:]).force
+    assert abs(held[:, 2].sum() - G) < 1e-6
+    assert abs(result.r[-1, 0, 2] - 0.07) < 1e-6
+    assert not [note for note in result.notes if "not to be trusted" in note]
+
+
 def test_an_overlap_at_the_start_is_told():
     told = dap.simulate(ball(-0.02, mu=0.3), t_end=0.01, contact_step=1e-3).notes
     (note,) = (note for note in told if "at the start" in note)

@@ -1,4 +1,4 @@
-"""Projected Gauss-Seidel on contacts whose bodies feel nothing else: impulses and velocities."""
+"""Projected Gauss-Seidel on contacts: impulses and velocities, of bodies or of the contacts."""
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
@@ -40,6 +40,35 @@ def sweep_bodies(
             for k in range(6):
                 a[k] += moves[k] * d0 + moves[12 + k] * d1 + moves[24 + k] * d2
                 b[k] += moves[6 + k] * d0 + moves[18 + k] * d1 + moves[30 + k] * d2
+            change = max(change, abs(d0), abs(d1), abs(d2))
+            largest = max(largest, x[c, 0])
+        if change <= tolerance * largest:
+            return done + 1
+    return sweeps
+
+
+@compiled
+def sweep_contacts(
+    felt: Floats, own: Floats, u: Floats, mu: Floats, x: Floats, sweeps: int, tolerance: float
+) -> int:
+    """The same where joints answer as well: u = felt x + what there is without impulses.
+
+    Args:
+        felt: (3 m, 3 m) how contacts feel each other, symmetric.
+        own: (m, 9) its diagonal blocks; contacts whose first number is zero are left as they are.
+        u: (m, 3) velocities with the impulses x, changed with them.
+        mu, x, sweeps, tolerance: as of ``sweep_bodies``.
+    """
+    for done in range(sweeps):
+        change, largest = 0.0, 1e-300
+        for c in range(mu.size):
+            if own[c, 0] == 0.0:
+                continue
+            d0, d1, d2 = change_of(own[c], mu[c], x[c], u[c, 0], u[c, 1], u[c, 2])
+            p, q, r = felt[3 * c], felt[3 * c + 1], felt[3 * c + 2]
+            for k in range(mu.size):
+                for s in range(3):
+                    u[k, s] += p[3 * k + s] * d0 + q[3 * k + s] * d1 + r[3 * k + s] * d2
             change = max(change, abs(d0), abs(d1), abs(d2))
             largest = max(largest, x[c, 0])
         if change <= tolerance * largest:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.integrators.moreau.contact_set import ContactSet
-from dap3d_core.integrators.moreau.gauss_seidel import sweep_bodies
+from dap3d_core.integrators.moreau.gauss_seidel import sweep_bodies, sweep_contacts
 from dap3d_core.integrators.moreau.newton import SMALL, TINY, Rows, distance, newton
 from dap3d_core.kernels.array_types import Floats, Integers
 
@@ -18,6 +18,9 @@ NEAR, SWEEPS = 1e-4, 200
 RELAX = 1.4
 #: Sweeps at most, where Newton's method does not end.
 MOST_SWEEPS = 2000
+#: Rounds of sweeps and Newton's method, at most, where joints answer; parts of the largest below
+#: which joints depend on each other, and of its own below which a contact cannot move.
+ROUNDS, DEPENDENT, HELD = 3, 1e-12, 1e-12
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
 FEW, RESIDUAL_ROUNDING = 100, 1e-14
 
@@ -86,7 +89,10 @@ class Problem:
         few = len(mu) <= FEW
         if few or len(self.y):
             to_rounding = few and tolerance < NEAR
-            self._refine(np.arange(len(mu)), RESIDUAL_ROUNDING if to_rounding else tolerance)
+            aim = RESIDUAL_ROUNDING if to_rounding else tolerance
+            self._refine(np.arange(len(mu)), aim)
+            if few and len(self.y) and self.residual > tolerance:
+                self._refine_held(tolerance, aim)
             if self._judge() <= tolerance or len(self.y):
                 return v + self.change()
         if self._judge() > tolerance:
@@ -136,6 +142,30 @@ class Problem:
         if left < before:
             self.x[group], self.y = x, y
         self.residual = left
+
+    def _refine_held(self, tolerance: float, aim: float) -> None:
+        """Sweeps that count in what joints answer with, then Newton's method, where it stalled.
+
+        Held between bodies that joints guide, impulses are not unique, and Newton's method has no
+        way from far away: sweeps have one.
+        """
+        rows = self._rows(np.arange(len(self.x)))
+        inverse, J, D = (part if isinstance(part, np.ndarray) else part.toarray()
+                         for part in (rows.inverse, rows.J, rows.D))  # fmt: skip
+        moved, turned = inverse @ J.T, inverse @ D.T
+        answer = np.linalg.pinv(D @ turned, rcond=DEPENDENT, hermitian=True) @ (D @ moved)
+        felt = J @ moved - (J @ turned) @ answer
+        own = np.array([felt[k : k + 3, k : k + 3] for k in range(0, len(felt), 3)]).reshape(-1, 9)
+        own[own[:, 0] * self._r < HELD] = 0.0
+        for _ in range(ROUNDS):
+            x = self.x.copy()
+            u = (rows.J @ rows.free + rows.b + felt @ x.ravel()).reshape(-1, 3)
+            sweep_contacts(felt, own, u, self._mu, x, SWEEPS, aim)
+            x, y, left = newton(rows, x, -answer @ x.ravel(), aim)
+            if left < self.residual:
+                self.x, self.y, self.residual = x, y, left
+            if self.residual <= tolerance:
+                return
 
     def _rows(self, group: Integers) -> Rows:
         """The equations of a group of contacts."""

@@ -139,7 +139,7 @@ NOT_CALLED = {
         "assembly.collisions.broad_phase": "meet place_of grid_pairs",
         "assembly.collisions.find": "touch",
         "integrators.moreau.dense": "solve_dense",
-        "integrators.moreau.gauss_seidel": "sweep_bodies change_of",
+        "integrators.moreau.gauss_seidel": "sweep_bodies sweep_contacts change_of",
         "integrators.moreau.integration": "state_at goes_on take_state",
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",
