@@ -38,7 +38,8 @@ class Event:
         direction: +1 upwards, -1 downwards, 0 both.
         action: "record" notes the instant in ``result.events``; "stop" ends the run there as well;
             a function is called with the ``Instant`` there, and may change numbers of forces,
-            velocities of bodies, states of elements and inputs (``Instant.set``).
+            velocities of bodies, states of elements and inputs (``Instant.set``), and end joints
+            (``Instant.release``).
         name: what it is called in the result; made from the rest where it is left out.
         every: s, the largest distance of two looks at it; by default as its values ask for it.
 
@@ -204,6 +205,8 @@ class Instant:
         self.states: dict[int, Floats] = {}
         #: number of an input -> its new value
         self.inputs: dict[int, float] = {}
+        #: joints that end here
+        self.released: list[str] = []
 
     def __getitem__(self, name: str) -> Any:
         """A quantity by its name in results: a number, or (components,).
@@ -241,6 +244,21 @@ class Instant:
         elif numbers:
             self._numbers.set(name, numbers)
         self.changes.setdefault(name, {}).update(fields)
+
+    def release(self, joint: str) -> None:
+        """End a joint that has ``breaks_at``, for the rest of this run.
+
+        Raises:
+            ValueError: there is no such joint, or it has no ``breaks_at``.
+        """
+        breaks = self._compiled.model.breaks
+        if joint not in breaks:
+            known = f"there are {some(list(breaks), 20)}" if breaks else "there are none"
+            raise ValueError(
+                f"{joint!r} is no joint that may be released: {known}; give it breaks_at, inf "
+                "where it never breaks by itself"
+            )
+        self.released.append(joint)
 
     def _set_state(self, element: str, name: str, value: Any) -> bool:
         """Set a state of an element; False where it has none of this name."""
