@@ -359,7 +359,9 @@ class EventLocator:
         after, work = None, 0.0
         if here.inputs:
             self._set_inputs(here.inputs)
-        if here.velocities or here.states or here.inputs:
+        if here.engaged and self.released is not None:
+            self.released.engage(here.engaged, here.t, integration.y)
+        if here.velocities or here.states or here.inputs or here.engaged:
             after, work = self._set_state(integration, event, here)
         self.occurrences.append(
             EventRecord(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,

@@ -83,6 +83,48 @@ def test_a_script_lets_go():
     assert np.abs(result.r[-1, 0, [0, 2]] - parabola([1.0 - BREAK])[0]).max() < 1e-9
 
 
+def clutch(events, **settings):
+    """Two wheels on an axis turn at 3 rad/s; a torque brakes the first one, of 0.5 kg m^2."""
+    scene = dap.Scene(name="clutch")
+    for name, J_z, z in (("first", 0.5, 0.0), ("second", 1.5, 1.0)):
+        scene.add_body(name, mass=1.0, Jp=(1.0, 1.0, J_z), r=(0.0, 0.0, z), w=(0.0, 0.0, 3.0))
+        scene.add_joint("rev", f"axle_{name}", P_i=f"{name}.O", P_j=f"{name}_seat",
+                        a_i=f"{name}.z", a_j="ground.z")  # fmt: skip
+        scene.add_point(f"{name}_seat", "ground", (0.0, 0.0, z))
+    scene.add_force("n", "brake", body_i="first", n=(0.0, 0.0, -1.0))
+    scene.add_joint("weld", "clutch", body_i="first", body_j="second", breaks_at=np.inf)
+    return dap.simulate(scene, events=events, t_end=4.0, dt=0.5, **settings, **TIGHT)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_a_clutch_that_is_engaged_again_takes_energy(integrator):
+    """From the start on the first wheel is braked alone, until it is a turn behind."""
+    turn = np.sqrt(2.0 * 2.0 * np.pi * 0.5)
+    events = [
+        dap.Event("t", above=1e-300, action=lambda state: state.release("clutch")),
+        dap.Event("t", above=turn, action=lambda state: state.engage("clutch")),
+    ]
+    result = clutch(events, integrator=integrator)
+    lag = turn / 0.5
+    common = 3.0 - 0.5 * lag / 2.0
+    assert result.events[-1].work == pytest.approx(-0.5 * 0.5 * 1.5 / 2.0 * lag**2, abs=1e-9)
+    assert result.events[-1].words.endswith("clutch.engaged = True")
+    ends = np.full(2, common - (4.0 - turn) / 2.0)
+    assert result.w[-1, :, 2] == pytest.approx(ends, abs=1e-9)
+    assert result.ledger["energy"].ok
+    held = result.reaction("clutch")["i"].moment[-1]
+    assert held == pytest.approx([0.0, 0.0, 0.75], abs=1e-9)  # of the brake, for the second wheel
+
+
+def test_a_joint_is_not_engaged_where_it_is_open():
+    events = [
+        dap.Event("t", above=0.1, action=lambda state: state.release("clutch")),
+        dap.Event("t", above=0.5, action=lambda state: state.engage("clutch")),
+    ]
+    with pytest.raises(dap.SimulationError, match=r"joint clutch is engaged where it is open by"):
+        clutch(events)
+
+
 def test_a_joint_that_carries_too_much_from_the_start_breaks_at_once():
     result = dap.simulate(pendulum(0.1 * m * g), t_end=0.5, dt=0.5)
     assert [event.t for event in result.events] == [0.0]
