@@ -1,7 +1,8 @@
 """Runs with derivatives over runs alone, for 3, 7 and 8 derivatives; and compiling them.
 
 CPU time of the compiled loop, general code optimised on both sides, least of many rounds in turn;
-8 derivatives take the lanes that ``sensitivities`` gives them. Directions are of the initial state, drawn at random; what Python does at the start is left out.
+8 derivatives take the lanes that ``sensitivities`` gives them. Directions are of the initial state,
+drawn at random; what Python does at the start is left out.
 """
 
 import math
