@@ -300,6 +300,15 @@ def test_a_pinion_drives_a_rack(side, method):
     assert turned(result, "pinion") == pytest.approx(a * 2.0 / r, rel=1e-9)
 
 
+def test_a_rack_level_with_the_axis_is_on_no_side():
+    """Its direction of motion would be a guess."""
+    scene = wheels(pinion=(0.0, 0.0))
+    scene.add_joint("rack", "teeth", joint_i="hinge_pinion", P_j="ground.O", a_j="ground.x",
+                    radius=0.05)  # fmt: skip
+    with pytest.raises(dap.SceneError, match="on which side the rack lies"):
+        dap.simulate(scene, t_end=0.1)
+
+
 def test_couples_turn_by_the_same_ratio_without_a_tooth_force():
     """The idler bears nothing of 2 T / r."""
     scene = wheels(a=(0.0, 0.0), idler=(0.3, 0.0), c=(0.6, 0.0))
