@@ -32,7 +32,7 @@ class SdfReader:
         self.version = _version(root)
         self.frames = FrameGraph()
         self.model = Articulation(source.path.stem, gravity=(0.0, 0.0, -9.8), fixed_base=False,
-                                  place=root.place)  # fmt: skip
+                                  friction_of_pair=min, place=root.place)  # fmt: skip
         self.elements: list[tuple[XmlElement, str]] = []
         self.static: list[str] = []  # what names of links in static models begin with
 
@@ -151,11 +151,12 @@ class SdfReader:
         self.frames.add(name, scoped(scope, relative or "__model__"), pose, element.place)
         link = Link(name, place=element.place)
         link.inertial = self._inertial(element)
-        tag = "visual" if element.all("visual") else "collision"
-        for shape in element.all(tag):
-            geometry = self._geometry(shape, collision=tag == "collision")
-            if geometry is not None:
-                link.geometries.append(geometry)
+        both = self.source.contacts or not element.all("visual")
+        for tag in ("visual", "collision") if both else ("visual",):
+            for shape in element.all(tag):
+                geometry = self._geometry(shape, collision=tag == "collision")
+                if geometry is not None:
+                    link.geometries.append(geometry)
         self.model.links[name] = link
 
     def _inertial(self, link: XmlElement) -> Inertial:

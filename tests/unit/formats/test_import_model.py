@@ -311,3 +311,27 @@ def test_a_spring_by_a_time_constant_needs_a_mass(tmp_path):
     assert any("springdamper: links without mass" in one.text for one in report.left_out)
     with pytest.raises(dap.SceneError, match="both numbers of springdamper are above 0"):
         imported(tmp_path, LINE.format(first='springdamper="0.1 0"', second=""))
+
+
+SOLID = "<inertial><mass>1</mass></inertial>"
+SDF = f"""<sdf version="1.9"><world name="w">
+<model name="floor"><static>true</static><link name="l">
+<collision name="c"><geometry><plane><normal>0 0 1</normal></plane></geometry>
+<surface><friction><ode><mu>0.4</mu></ode></friction></surface></collision></link></model>
+<model name="ball"><link name="l">{SOLID}
+<visual name="v"><geometry><sphere><radius>2</radius></sphere></geometry></visual>
+<collision name="c"><geometry><sphere><radius>1</radius></sphere></geometry></collision>
+</link></model></world></sdf>"""
+
+
+def test_collisions_of_sdf_meet_beside_what_is_seen(tmp_path):
+    """The smaller friction of a pair holds, as in Gazebo's ODE and in DART."""
+    (tmp_path / "a.sdf").write_text(SDF)
+    scene, _ = dap.import_model(tmp_path / "a.sdf", contacts=True)
+    floor, seen, ball = (shape.fields for shape in scene.shapes.values())
+    assert (seen["radius"], seen.get("collides")) == (2.0, None)
+    assert (ball["radius"], ball["collides"], floor["collides"]) == (1.0, True, True)
+    (pair,) = (m.with_ for m in scene.materials.values() if m.with_)
+    assert [one["mu"] for one in pair.values()] == [0.4]
+    scene, _ = dap.import_model(tmp_path / "a.sdf")
+    assert [shape.fields["radius"] for shape in scene.shapes.values()] == [2.0]

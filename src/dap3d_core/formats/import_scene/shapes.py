@@ -80,7 +80,7 @@ def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
     surfaces = list(builder.surfaces.items())
     for k, ((mu, smooth), name) in enumerate(surfaces):
         pairs = {
-            other: {"mu": 0.0 if smooth and and_smooth else max(mu, mu_other)}
+            other: {"mu": 0.0 if smooth and and_smooth else model.friction_of_pair(mu, mu_other)}
             for (mu_other, and_smooth), other in surfaces[k + 1 :]
         }
         given: dict[str, Any] = {"with_": pairs} if pairs else {}
