@@ -239,6 +239,7 @@ class Articulation:
         links, joints: by name, in the order of the file.
         couplings, actuators: in the order of the file.
         excluded: pairs of links whose shapes do not meet.
+        base_meets: whether links meet those that do not move and that a joint holds them at.
         friction_of_pair: the coefficient of two shapes that meet, of those of both: max or min.
         gravity: (3,) m/s^2.
         fixed_base: whether links without a joint to a parent are fixed to the world, rather than
@@ -253,6 +254,7 @@ class Articulation:
     couplings: list[Coupling] = attrs.Factory(list)
     actuators: list[Actuator] = attrs.Factory(list)
     excluded: list[tuple[str, str]] = attrs.Factory(list)
+    base_meets: bool = False
     friction_of_pair: Callable[[float, float], float] = max
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     fixed_base: bool | None = None

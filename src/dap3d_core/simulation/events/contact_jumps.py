@@ -108,7 +108,7 @@ class ContactJumps(Jumps):
         gaps = self._gaps(integration)
         beyond = np.flatnonzero(gaps < -TOUCHING_AT_START * length)
         if beyond.size:
-            raise SceneError([self._overlap(k, -gaps[k]) for k in beyond])
+            raise SceneError([self._overlap(int(k), -gaps[k]) for k in beyond])
         self._resolve(integration, [], TOUCHING_AT_START * length)
 
     def _overlap(self, k: int, depth: float) -> Mistake:
