@@ -223,6 +223,19 @@ def test_joints_hold_while_shapes_touch():
     assert np.abs(smooth.reaction("J")["i"].force[-1]).max() < 1e-3
 
 
+def test_stiff_dampers_do_not_explode():
+    """A damper of 1e4 N s/m stops 1 kg within 0.1 ms, a tenth of a step, after v m / c."""
+    scene, c = dap.Scene(name="damped"), 1e4
+    scene.add_body("block", mass=1.0, Jp=[0.1] * 3, r=[0.0, 0.0, 1.0], r_dot=[1.0, 0.0, 0.0])
+    scene.add_shape("sphere", body="block", radius=0.1, collides=True)
+    scene.add_point("wall", "ground", [10.0, 0.0, 1.0])
+    scene.add_joint("tran", "rail", P_i="block.O", P_j="wall", a_j="ground.x")
+    scene.add_force("ptp", "damper", P_i="block.O", P_j="wall", c=c)
+    result = dap.simulate(collide(scene, mu=0.1), t_end=0.02, dt=0.01, contact_step=1e-3)
+    assert result.r[-1, 0, 0] == pytest.approx(1.0 / c, rel=1e-3)  # parts are second order
+    assert abs(result.rd[-1, 0, 0]) < 1e-12
+
+
 def test_guided_fingers_lift_a_box():
     """Four corners on each side, more impulses than there are equations: none may be left over."""
     scene, press = dap.Scene(name="lift"), 20.0  # N

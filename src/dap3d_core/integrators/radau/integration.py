@@ -2,7 +2,7 @@
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -59,14 +59,6 @@ LOOSER = 3.0
 OF_STATES = ("tangent.states.", "matrix.state_")
 #: Arrays that each tangent writes before it reads them.
 SCRATCH = ("tangent.wide.", *(f"tangent.{name}" for name in OF_LOOPS))
-
-
-class Effort(NamedTuple):
-    """Counts of an implicit integration besides those of ``Statistics``."""
-
-    iterations: int
-    jacobians: int
-    factorisations: int
 
 
 def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan]:
@@ -332,14 +324,6 @@ class RadauIntegration(Integration):
     def dy_dt(self) -> Any:
         """As ``Integration.dy_dt``."""
         return self.work.state[at.SLOPE].copy() if self.work.first_stage_valid else None
-
-    @property
-    def effort(self) -> Effort:
-        """Counts of iterations, Jacobians and factorisations so far."""
-        work = self.work
-        return Effort(
-            int(work.iteration_count), int(work.jacobian_count), int(work.factorisation_count)
-        )
 
     @property
     def refusals(self) -> Refusals:
