@@ -168,7 +168,7 @@ class RunState:
         if self.limits is not None:
             integration.work.longest_step = self.limits.longest
         if self.event_locator is not None:
-            integration.follow_steps()
+            integration.work.follows_steps = 1  # dense output, for ``state_within``
         before = time.perf_counter()
         integration.compile()
         spent = time.perf_counter() - before

@@ -35,10 +35,10 @@ from dap3d_core.integrators.stepping.integration import Integration, Refusals
 from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, restored
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
 from dap3d_core.kernels.array_types import Integers
+from dap3d_core.kernels.compiler.types import FLOAT, Signature
 from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import (
     LOOP_LIST,
-    number_signature,
     procedure_signature,
 )
 from dap3d_core.linear.lu.plan import LuPlan, StateNode, make_lu_plan
@@ -274,7 +274,8 @@ class RadauIntegration(Integration):
         """
         kinds = (RadauState.type_of(), System.type_of(), LOOP_LIST, *self.tangent_kinds)
         tangents = table_of(procedure_signature(*kinds), (self.parts[0],), values_alone=True)
-        return table_of(number_signature(*kinds), self.parts[1:]), tangents
+        signature = Signature((FLOAT, FLOAT, *kinds), FLOAT)
+        return table_of(signature, self.parts[1:]), tangents
 
     @property
     def loop_arguments(self) -> tuple[Any, ...]:
