@@ -173,8 +173,11 @@ class MoreauIntegration(Integration):
         u, u_free = u_from_y(y[None], states)[0], u_from_y(free[None], states)[0]
         self.step_length = h
         contacts = self._near(t, u, u_free, h)
+        overlap = -float(contacts.gap.min(initial=0.0))
         if work.step_count == 0:
-            self.overlap_at_start = -float(contacts.gap.min(initial=0.0))
+            self.overlap_at_start = overlap
+        else:  # what the projection of the last step has left
+            self.deepest = max(self.deepest, overlap)
         after, worked = self._with_contacts(t, u, u_free, contacts, h)
         self._mean = (after - u)[-len(self._mean) :] / h
         own = free[len(free) - 1 - states : -1]
