@@ -77,9 +77,8 @@ class _Instances:
         self.idx, self._places = idx.copy(), 0
         self.at: dict[tuple[str, int], Integers] = {}
         self.seeds: list[_Seed] = []
-        self._arrays: dict[str, Any] = {
-            n: getattr(arrays, n) for n in ("body", "F", "par", "states")
-        }
+        names = ("body", "F", "par", "states")
+        self._arrays: dict[str, Any] = {name: getattr(arrays, name) for name in names}
         self._arrays["multipliers"] = np.zeros(0) if multipliers is None else multipliers
 
     def part(self, name: str, column: int, length: int = 1) -> None:
@@ -145,7 +144,6 @@ def differentiate_loop(
     arrays: Any,
     group: tuple[int, int, int],
     multipliers: Floats | None = None,
-    numbers: Sequence[int] = (),
     functions: Sequence[tuple[int, int]] = (),
     states: bool = False,
 ) -> LoopDerivatives:
@@ -158,7 +156,6 @@ def differentiate_loop(
         arrays: with ``body``, ``F``, ``idx`` and ``par``, as the compiled loops read them.
         group: first integer in ``idx``, first number in ``par``, number of instances.
         multipliers: (row_size,) -lambda, for friction.
-        numbers: indices of an instance's own numbers by which to differentiate, too.
         functions: by which functions of time as well: index among the type's fields, and 0 for the
             value, 1 and 2 for its rates.
         states: True to differentiate by an instance's own states as well.
@@ -169,18 +166,13 @@ def differentiate_loop(
     """
     layout, (i0, p0, count), width = type_info.layout, group, stride(type_info)
     idx = arrays.idx[i0 : i0 + count * width].reshape(count, width)
-    slots, first, state = (
-        len(layout.slots),
-        len(layout.slots) + len(layout.functions),
-        layout.integers - 1,
-    )
+    slots, state = len(layout.slots), layout.integers - 1
+    first = slots + len(layout.functions)
     read = rows_read(type_info) if what == "friction" else {}
     places = [*range(slots), *range(first, first + len(layout.others))]
     places += body_columns(type_info) if read else []
     own = _Instances(arrays, idx, multipliers)
     own.seed_reading(places, read)
-    for k in numbers:
-        own.seed("par", p0 + layout.par_width * np.arange(count) + k)
     for column in dict.fromkeys(slots + field for field, _ in functions):
         own.part("F", column)
     for field, order in functions:
