@@ -106,19 +106,24 @@ class ContactJumps(Jumps):
             self._repeat(integration)
             return
         gaps = self._gaps(integration)
-        mistakes = [
-            Mistake(
-                name, MISSING, f"its bodies overlap by {-gap:.6g} m at the start",
-                remedy="move them apart by that along the normal, or have them moved until they "
-                f"touch (touch = true); a gap of up to {TOUCHING_AT_START * length:g} m counts as "
-                "touching",
-            )
-            for name, gap in zip(self.table.names, gaps, strict=True)
-            if gap < -TOUCHING_AT_START * length
-        ]  # fmt: skip
-        if mistakes:
-            raise SceneError(mistakes)
+        beyond = np.flatnonzero(gaps < -TOUCHING_AT_START * length)
+        if beyond.size:
+            raise SceneError([self._overlap(int(k), -gaps[k]) for k in beyond])
         self._resolve(integration, [], TOUCHING_AT_START * length)
+
+    def _overlap(self, k: int, depth: float) -> Mistake:
+        """What is said of a contact whose gap is negative at the start."""
+        unit = "rad" if self.table.turns[k] else "m"
+        remedy = "move them apart by that along the normal"
+        if unit == "rad":
+            remedy = "turn them back by that about the axis, or change the bound"
+        elif self.table.movable[k]:
+            remedy += ", or have them moved until they touch (touch = true)"
+        least = TOUCHING_AT_START * self._evaluator.model.length
+        return Mistake(
+            self.table.names[k], MISSING, f"its bodies overlap by {depth:.6g} {unit} at the start",
+            remedy=f"{remedy}; a gap of up to {least:g} {unit} counts as touching",
+        )  # fmt: skip
 
     def apply(self, integration: Integration) -> None:
         """Go on behind the end of a mode."""
