@@ -144,6 +144,7 @@ def differentiate_loop(
     arrays: Any,
     group: tuple[int, int, int],
     multipliers: Floats | None = None,
+    numbers: Sequence[int] = (),
     functions: Sequence[tuple[int, int]] = (),
     states: bool = False,
 ) -> LoopDerivatives:
@@ -156,6 +157,7 @@ def differentiate_loop(
         arrays: with ``body``, ``F``, ``idx`` and ``par``, as the compiled loops read them.
         group: first integer in ``idx``, first number in ``par``, number of instances.
         multipliers: (row_size,) -lambda, for friction.
+        numbers: indices of an instance's own numbers by which to differentiate, too.
         functions: by which functions of time as well: index among the type's fields, and 0 for the
             value, 1 and 2 for its rates.
         states: True to differentiate by an instance's own states as well.
@@ -173,6 +175,8 @@ def differentiate_loop(
     places += body_columns(type_info) if read else []
     own = _Instances(arrays, idx, multipliers)
     own.seed_reading(places, read)
+    for k in numbers:
+        own.seed("par", p0 + layout.par_width * np.arange(count) + k)
     for column in dict.fromkeys(slots + field for field, _ in functions):
         own.part("F", column)
     for field, order in functions:
