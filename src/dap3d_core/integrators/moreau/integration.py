@@ -173,8 +173,11 @@ class MoreauIntegration(Integration):
         u, u_free = u_from_y(y[None], states)[0], u_from_y(free[None], states)[0]
         self.step_length = h
         contacts = self._near(t, u, u_free, h)
+        overlap = -float(contacts.gap.min(initial=0.0))
         if work.step_count == 0:
-            self.overlap_at_start = -float(contacts.gap.min(initial=0.0))
+            self.overlap_at_start = overlap
+        else:  # what the projection of the last step has left
+            self.deepest = max(self.deepest, overlap)
         after, worked = self._with_contacts(t, u, u_free, contacts, h)
         self._mean = (after - u)[-len(self._mean) :] / h
         own = free[len(free) - 1 - states : -1]
@@ -273,8 +276,8 @@ class MoreauIntegration(Integration):
         self.problem = problem
         self._remember(contacts, problem.x)
         self.largest_residual = max(self.largest_residual, problem.residual)
-        mean = problem.velocity(0.5 * (v + end))
-        works = problem.x * mean
+        mean = 0.5 * (v + end)
+        works = problem.x * problem.velocity(mean)
         self._meet(contacts, problem.x / h)
         self.friction_work += float(works[:, 1:].sum())
         moved = 0.5 * h * (end - v)
@@ -293,7 +296,7 @@ class MoreauIntegration(Integration):
         _move(r, p, moved)
         v1[:], w1[:] = end[1:, :3], end[1:, 3:]
         self._part(t + h, after)
-        return after, float(works.sum())
+        return after, float(works.sum()) + problem.work_of_joints(mean)
 
     def _meet(self, contacts: ContactSet, force: Floats) -> None:
         """Keep what shapes push with, (m, 3) N in the frames of contacts, for a report."""

@@ -36,6 +36,8 @@ from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps
 
 #: Gaps, m of a scene of ordinary size, below which bodies touch: in a run, and where it begins.
 TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
+#: What an impulse changes where joints hold, as a part of what it does to free bodies: nothing.
+HELD = 1e-10
 #: Slip, m/s, that is stopped where it goes through zero.
 STOPPED = 1e-6
 #: Ends of modes within this part of the run: what changes more often comes to no end.
@@ -110,6 +112,20 @@ class ContactJumps(Jumps):
         if beyond.size:
             raise SceneError([self._overlap(int(k), -gaps[k]) for k in beyond])
         self._resolve(integration, [], TOUCHING_AT_START * length)
+
+    def _refuse_prescribed(self, rows: ContactRows, closed: list[int]) -> None:
+        """SimulationError: the joints leave no impulse of a contact that closes an effect."""
+        limit = -AT_REST * self._evaluator.model.length
+        for c in closed:
+            row = rows.G[3 * c]
+            if rows.W[3 * c, 3 * c] > HELD * (row @ rows.inverse @ row):
+                continue
+            if rows.slip[c, 0] < limit or rows.free[3 * c] < limit:
+                raise SimulationError(
+                    f"the run stopped at t = {rows.t:.9g} s: contact {self.table.names[c]} closes, "
+                    "and joints or drivers prescribe the motion of its bodies: nothing that it "
+                    "pushes with can stop them"
+                )
 
     def _overlap(self, k: int, depth: float) -> Mistake:
         """What is said of a contact whose gap is negative at the start."""
@@ -248,6 +264,7 @@ class ContactJumps(Jumps):
         closed = [c for c in range(table.count) if c not in beyond
                   and (before[c] > 0.5 or near[c] or (c, 0) in ended)]  # fmt: skip
         sliding, leaving, stopped = self._what_ended(rows, outputs, before, ended)
+        self._refuse_prescribed(rows, closed)
         impact = collide(table, rows, closed, evaluator.model.length)
         try:
             modes = find_modes(table, rows, closed, sliding, leaving)
