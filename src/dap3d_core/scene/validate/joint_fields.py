@@ -50,6 +50,14 @@ def with_joint_fields(
                 refuse(field, *missing_words(report, "joint", name, report.scene.joints))
             else:
                 found.append(joint)
+        for joint in found if spec.acts_in else ():
+            type_info = known("joint", joint.type)
+            coordinate = getattr(type_info and type_info.type, "coordinate", "")
+            if coordinate not in ("", spec.acts_in):
+                what = (
+                    f"is of type {joint.type}, which has no {spec.acts_in} that this could act in"
+                )
+                refuse(field, what)
         for own, other in gives.items() if found else ():
             values = [_of_moving(report, geometry, joint, other) for joint in found]
             if own in element.fields:
