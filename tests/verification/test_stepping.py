@@ -281,6 +281,22 @@ def test_events_refuse_shapes_that_collide():
         dap.equilibrium(ball(mu=0.3))
 
 
+def test_the_ledger_has_the_work_of_a_driver_on_what_it_lifts():
+    """A lift takes a load of 2 kg and its own 1 kg up by 0.1 m, from rest to rest."""
+    scene = dap.Scene(name="lift")
+    scene.add_body("lift", mass=1.0, Jp=[0.1] * 3)
+    scene.add_body("load", mass=2.0, Jp=[0.1] * 3, r=[0, 0, 0.1])
+    scene.add_joint("tran", "shaft", P_i="lift.O", P_j="ground.O", a_j="ground.z")
+    scene.add_function("b", "up", x_start=0.0, x_end=0.4, f_start=0.0, f_end=0.1)
+    scene.add_joint("drive-tran", joint="shaft", function="up")
+    scene.add_shape("plane", body="lift", collides=True)
+    scene.add_shape("sphere", body="load", radius=0.1, collides=True)
+    scene.add_force("weight", "gravity")
+    lifted = dap.simulate(scene, t_end=0.4, dt=0.4, contact_step=5e-3, contact="stepping")
+    assert lifted.energy.total[-1] - lifted.energy.total[0] == pytest.approx(0.1 * 3 * 9.81, 1e-4)
+    assert lifted.ledger["energy"].value < 1e-4
+
+
 def test_small_problems_have_the_results_of_sparse_matrices(monkeypatch):
     """Dense arrays take the place of sparse ones up to a size, to rounding of the solves."""
     given = {"t_end": 0.4, "dt": 0.1, "contact_step": 4e-3}

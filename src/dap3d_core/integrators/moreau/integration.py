@@ -276,8 +276,8 @@ class MoreauIntegration(Integration):
         self.problem = problem
         self._remember(contacts, problem.x)
         self.largest_residual = max(self.largest_residual, problem.residual)
-        mean = problem.velocity(0.5 * (v + end))
-        works = problem.x * mean
+        mean = 0.5 * (v + end)
+        works = problem.x * problem.velocity(mean)
         self._meet(contacts, problem.x / h)
         self.friction_work += float(works[:, 1:].sum())
         moved = 0.5 * h * (end - v)
@@ -296,7 +296,7 @@ class MoreauIntegration(Integration):
         _move(r, p, moved)
         v1[:], w1[:] = end[1:, :3], end[1:, 3:]
         self._part(t + h, after)
-        return after, float(works.sum())
+        return after, float(works.sum()) + problem.work_of_joints(mean)
 
     def _meet(self, contacts: ContactSet, force: Floats) -> None:
         """Keep what shapes push with, (m, 3) N in the frames of contacts, for a report."""
