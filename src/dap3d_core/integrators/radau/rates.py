@@ -270,12 +270,8 @@ def measure_rate_noise(
     functions: Any,
 ) -> float:  # fmt: skip
     """As ``measure_stage_noise``."""
-    rhs, y, argument, noise = (
-        functions[0],
-        work.state[Y],
-        work.state[SCRATCH],
-        work.tolerance[NOISE],
-    )
+    rhs, y, argument = functions[0], work.state[Y], work.state[SCRATCH]
+    noise = work.tolerance[NOISE]
     m, size = method_index(work.stages), 0.0
     for i in range(work.stages):
         size += ROUNDINGS * abs(work.method.e[m, i]) / h
