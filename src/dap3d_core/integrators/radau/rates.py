@@ -103,9 +103,9 @@ def find_rate_tangent(
                 slope = -1.0 if slope > JUMPS * far else slope
             finite = finite and abs(changed[n]) < math.inf  # no power where forces jam
             first = slope if steepest < 0.0 else first
-            if slope > STEEPER * steepest or not slope < math.inf:
+            if (slope >= 0.0 and slope > STEEPER * steepest) or not slope < math.inf:
                 steepest = slope
-                for i in range(n if slope >= 0.0 else 0):
+                for i in range(n):
                     J[i, j] = changed[i]
             step *= COARSER if trial % 2 == 1 else 1.0
             trial += 1
