@@ -26,8 +26,8 @@ SETTLED = 1e-10
 PASSES = 25
 #: Differences of passes that are kept of forces on reactions; then they begin anew.
 DEPTH = 8
-#: Of a difference made orthogonal to the earlier ones, less than this part (squared) is rounding.
-ROUNDING = 1e-12
+#: A difference depends on earlier ones where less than this part (squared) is orthogonal to them.
+DEPENDENT_PART = 1e-12
 
 
 def forces_by(t: float, system: System, loops: Any, Lam: Floats) -> Floats:
@@ -144,7 +144,7 @@ def keep_difference(x: Floats, memory: Floats, last: int) -> None:
         for k in range(rows):
             mine[k] -= share * memory[o + k]
             moved[k] -= share * memory[o + rows + k]
-    if not squares(mine) > ROUNDING * whole:
+    if not squares(mine) > DEPENDENT_PART * whole:
         zero(mine)
         zero(moved)
 
