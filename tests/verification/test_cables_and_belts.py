@@ -50,6 +50,26 @@ def test_an_elastic_cable_swings_about_its_stretch():
     np.testing.assert_allclose(result.quantity("rope.tension").values, 800.0 * sink, atol=1e-4)
 
 
+def test_a_damped_cable_that_jerks_taut_is_the_same_by_each_integrator():
+    """A hoist with a movable pulley: at each jerk the damping jumps, which is no slope of a law."""
+    scene = dap.Scene(name="hoist")
+    for name, mass, x in (("pulley", 3.0, 0.0), ("load", 1.0, 2.0)):
+        scene.add_body(name, mass=mass, Jp=(0.1, 0.1, 0.1), r=(x, 0.0, 0.0))
+        scene.add_point(f"at_{name}", "ground", (x, 0.0, 0.0))
+        scene.add_point(f"over_{name}", "ground", (x, 0.0, 2.0))
+        scene.add_joint("tran", name, P_i=f"{name}.O", P_j=f"at_{name}", a_j="ground.z")
+    scene.add_point("beside", "ground", (0.0, 0.0, 2.0001))
+    path = ["over_pulley", "pulley.O", "beside", "over_load", "load.O"]
+    scene.add_force("cable", "rope", points=path, length=8.3, k=1e5, c=50.0, slack=True)
+    scene.add_force("weight")
+    settings = {"t_end": 0.7, "dt": 0.1}
+    exact = dap.simulate(scene, rtol=1e-11, atol=1e-13, **settings)
+    result = dap.simulate(scene, method="joint", integrator="radau", **settings)
+    assert len(exact.events) == 10
+    np.testing.assert_allclose(result.r, exact.r, rtol=0.0, atol=1e-5)
+    assert result.ledger["energy"].ok
+
+
 def test_a_slack_cable_does_not_push():
     """Thrown up on a slack cable a block moves freely until it is taut."""
     scene = dap.Scene(name="thrown")

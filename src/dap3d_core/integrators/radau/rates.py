@@ -41,6 +41,9 @@ from dap3d_core.linear.lu.factor import factor_lu, solve_lu
 PART = 1e-12
 #: Lengths of differences over bends, and their ratio; slopes that count as steeper.
 LEVELS, COARSER, STEEPER = 6, 16.0, 2.0
+#: A difference of more than this part of the largest rate may be a jump: it is one where the
+#: quotient over a step that is COARSER is smaller by more than the factor JUMPS.
+JUMP, JUMPS = 1e-7, 4.0
 #: Least size of a rate, as part of the scene's length (or of a radian) a second.
 LEAST_RATE = 1e-2
 
@@ -68,7 +71,9 @@ def find_rate_tangent(
     """The tangent at the predicted end of the step, as ``find_tangent``.
 
     Once an iteration failed, of differences over steps of many lengths the steepest are taken:
-    those over the bend of a law that is flat where the motion is, as in jacobian.py.
+    those over the bend of a law that is flat where the motion is, as in jacobian.py. What jumps, as
+    the damping of a cable does where it becomes taut and a motion starts anew, has no slope: that
+    on its other side is taken.
     """
     rhs, y, J, bends = functions[0], work.state[SCRATCH], tangent.J, tangent.bends
     f, changed, length = work.state[TRIAL], work.state[OTHER], system.settings[LENGTH]
@@ -77,34 +82,57 @@ def find_rate_tangent(
         y[k] = work.state[Y, k] + work.Z[work.stages - 1, k]
     rhs(at, y, f, system, loops)
     trials = 2 * LEVELS if bends[0] >= MAY_BEND else 1
-    finite = abs(f[J.shape[0]]) < math.inf
-    for j in range(J.shape[0]):
+    n, jump = J.shape[0], 0.0
+    for i in range(n):
+        jump = max(jump, JUMP * abs(f[i]))
+    finite = abs(f[n]) < math.inf
+    work.rhs_count += 1
+    for j in range(n):
         now, is_rate = y[j], j >= work.counts[0]
         least = 0.0 if j >= work.counts[0] + work.counts[1] else length
         step = PART * max(abs(now), LEAST_RATE * least if is_rate else least)
-        step, steepest, first = step if step > 0.0 else PART, -1.0, 0.0
-        for trial in range(trials):
-            y[j] = now + (step if trial % 2 == 0 else -step)
-            rhs(at, y, changed, system, loops)
-            finite = finite and abs(changed[J.shape[0]]) < math.inf  # no power where forces jam
-            slope = 0.0
-            for i in range(J.shape[0]):
-                changed[i] = (changed[i] - f[i]) / (y[j] - now)
-                slope = max(slope, abs(changed[i]))
-            first = slope if trial == 0 else first
-            if slope > STEEPER * steepest or not slope < math.inf:
+        step, steepest, first, trial = step if step > 0.0 else PART, -1.0, 0.0, 0
+        for i in range(n):
+            J[i, j] = 0.0
+        while trial < trials or (steepest < 0.0 and trial < 2 * LEVELS):
+            h = step if trial % 2 == 0 else -step
+            slope = slopes(at, j, h, y, f, changed, work, system, loops, functions)
+            if jump < slope * step < math.inf:
+                far = slopes(at, j, COARSER * h, y, f, changed, work, system, loops, functions)
+                slope = slopes(at, j, h, y, f, changed, work, system, loops, functions)
+                slope = -1.0 if slope > JUMPS * far else slope
+            finite = finite and abs(changed[n]) < math.inf  # no power where forces jam
+            first = slope if steepest < 0.0 else first
+            if (slope >= 0.0 and slope > STEEPER * steepest) or not slope < math.inf:
                 steepest = slope
-                for i in range(J.shape[0]):
+                for i in range(n):
                     J[i, j] = changed[i]
             step *= COARSER if trial % 2 == 1 else 1.0
-        y[j] = now
+            trial += 1
         if steepest > STEEPER * first:
             bends[0] = BENT
         finite = finite and steepest < math.inf
-    work.rhs_count += trials * J.shape[0] + 1
     work.jacobian_count += 1
     work.tangent_needed, work.tangent_is_current = 0, 1 if finite else 0
     work.factored_step = 0.0
+
+
+@compiled
+def slopes(
+    t: float, j: int, step: float, y: Floats, f: Floats, out: Floats, work: RadauState,
+    system: System, loops: Any, functions: Any,
+) -> float:  # fmt: skip
+    """Difference quotients of the rates f at y by component j into out; returns the largest."""
+    rhs, now, largest = functions[0], y[j], 0.0
+    y[j] = now + step
+    step = y[j] - now
+    rhs(t, y, out, system, loops)
+    work.rhs_count += 1
+    for i in range(y.shape[0] - 1):
+        out[i] = (out[i] - f[i]) / step
+        largest = max(largest, abs(out[i]))
+    y[j] = now
+    return largest
 
 
 @compiled
