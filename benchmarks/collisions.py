@@ -6,6 +6,7 @@ The scenes are those of tests/verification/test_stepping.py, over longer times; 
 spheres, or so many, that fall into a box.
 """
 
+import re
 import sys
 import time
 from pathlib import Path
@@ -45,28 +46,46 @@ def spheres(count):
     return collide(scene, mu=0.5)
 
 
-def main(count=1000):
-    """Print a line for each scene."""
+def measure(count=1000):
+    """Rows of the table: what, figure, unit."""
+    rows = [*resting(), *rolling(), *piling(count)]
+    return [dict(zip(("measure", "found", "unit"), row, strict=True)) for row in rows]
+
+
+def resting():
+    """What should stand, by steps of 5 ms."""
     result, seconds = timed(slope(), t_end=60.0, dt=1.0, contact_step=5e-3)
-    moved = np.abs(result.r - result.r[0]).max()
-    print(f"slope, 60 s: creep {moved:.1e} m, {seconds / 12e3 * 1e3:.2f} ms a step", flush=True)
+    yield "slope, 60 s: creep", float(np.abs(result.r - result.r[0]).max()), "m"
+    yield "slope: a step", seconds / 12e3 * 1e3, "ms"
     result, seconds = timed(tower(), t_end=10.0, dt=0.5, contact_step=5e-3)
-    moved, z = np.abs(result.r - result.r[0]).max(), result.r[-1, :, 2]
-    overlap = -min(z[0] - 0.05, (np.diff(z) - 0.1).min())
-    print(f"tower, 10 s: moved {moved:.1e} m, overlap {overlap:.1e} m, "
-          f"{seconds / 2e3 * 1e3:.2f} ms a step", flush=True)  # fmt: skip
+    z = result.r[-1, :, 2]
+    yield "tower, 10 s: moved", float(np.abs(result.r - result.r[0]).max()), "m"
+    yield "tower: overlap", float(-min(z[0] - 0.05, (np.diff(z) - 0.1).min())), "m"
+    yield "tower: a step", seconds / 2e3 * 1e3, "ms"
+
+
+def rolling():
+    """A ball that slides, then rolls, against its closed form."""
     v0, mu = 3.0, 0.3
     end = 2.0 / 7.0 * v0 / (mu * G)
     exact = v0 * end - 0.5 * mu * G * end**2 + 5.0 / 7.0 * v0 * (1.0 - end)
     for h in (4e-3, 1e-3):
         result, _ = timed(ball(mu=mu), t_end=1.0, dt=0.5, contact_step=h)
-        print(f"slides, then rolls, {1e3 * h:g} ms: {abs(result.r[-1, 0, 0] - exact):.1e} m")
+        yield f"slides, then rolls, {1e3 * h:g} ms", float(abs(result.r[-1, 0, 0] - exact)), "m"
+
+
+def piling(count):
+    """Spheres that fall into a box."""
     settings = {"dt": 0.1, "contact_step": 4e-3, "rtol": 1e-4}
     for t_end in (0.1, 0.5):
         result, seconds = timed(spheres(count), t_end=t_end, **settings)
-        print(f"{count} spheres, {t_end:g} s: {seconds / t_end * 4.0:.0f} ms a step on average; "
-              f"{result.notes[-1]}", flush=True)  # fmt: skip
+        what, told = f"{count} spheres, {t_end:g} s", result.notes[-1]
+        yield f"{what}: a step on average", seconds / t_end * 4.0, "ms"
+        solved = float(re.search(r"were solved to (\S+)", told)[1])
+        yield f"{what}: residual", solved, "of the largest impulse"
+        yield f"{what}: overlap", float(re.search(r"overlap by (\S+)", told)[1]), "m"
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    for row in measure(*map(int, sys.argv[1:])):
+        print(f"{row['measure']}: {row['found']:.2g} {row['unit']}", flush=True)

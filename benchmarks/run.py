@@ -1,7 +1,7 @@
 """All benchmarks, as tables and as JSON.
 
-``make bench``, or ``python benchmarks/run.py [--only NAME ...] [-o FILE]``. scale_long and
-streaming, some minutes, study and start are run only when they are named. With
+``make bench``, or ``python benchmarks/run.py [--only NAME ...] [-o FILE]``. scale_long,
+streaming and collisions, some minutes, study and start are run only when they are named. With
 ``--docs`` the figures of hard_cases, long_time, chaos, flips and hinges go to
 docs/reference/hard-cases.md as well; ``--only hard`` is all of these.
 """
@@ -16,6 +16,7 @@ from pathlib import Path
 sys.path.append(str(Path(__file__).resolve().parents[1] / "tests"))
 
 import calls
+import collisions
 import contact
 import derivatives
 import derived
@@ -48,7 +49,7 @@ from rich.console import Console
 from rich.table import Table
 
 #: What is run only when it is named.
-NAMED = ("scale_long", "streaming", "study", "start")
+NAMED = ("collisions", "scale_long", "streaming", "study", "start")
 #: Columns that a table has at most beside its first.
 COLUMNS = 8
 #: Columns that every table of one title has, and those of sentences, which stand below.
@@ -114,6 +115,7 @@ def main():
         "study": study.measure,
         "points": points.measure,
         "contact": contact.measure,
+        "collisions": collisions.measure,
         "lanes": lanes.measure,
         "programs": programs.measure,
         "step_parts": step_parts.measure,

@@ -82,7 +82,8 @@ class ChangeOver:
         self._constants = b""
         sizes = model.body_count, model.row_count, len(evaluator.loop_groups)
         self._key = evaluator.method, *sizes, count
-        takes_one = not model.contact_count  # their friction is solved for, in passes
+        # friction of contacts is solved for, in passes; joints may break
+        takes_one = not (model.contact_count or model.breaks)
         self._is_open = jit_is_on() and takes_one and 0 < model.body_count <= MOST_BODIES
 
     def during(self, integration: Any, run: "Callable[[], object]") -> None:
