@@ -34,7 +34,9 @@ class AxialSpring(Force):
 
     keyword = "tran_sda"
     actuates = "f_a"
-    joint: str = joint_fields("P_i", "P_j", "a_j", doc="the joint in whose coordinate it acts")
+    joint: str = joint_fields(
+        "P_i", "P_j", "a_j", acts_in="length", doc="the joint in whose coordinate it acts"
+    )
     P_i: Point = point(doc="where the force acts, on body i")
     P_j: Point = point(doc="point from which x is measured, on body j")
     a_j: Vector = vector(doc="axis, on body j")

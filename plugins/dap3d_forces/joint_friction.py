@@ -39,7 +39,9 @@ class RotationFriction(Force):
     keyword = "rot_friction"
     symbol = "ring"
     regularised = "w_tol"
-    joint: str = joint_fields("body_i", "body_j", axis="a_j", doc="the hinge that rubs")
+    joint: str = joint_fields(
+        "body_i", "body_j", axis="a_j", acts_in="angle", doc="the hinge that rubs"
+    )
     body_i: Body = body(doc="body that turns")
     body_j: Body = body(doc="body against which it turns")
     axis: Vector = vector(doc="axis, on either body")
@@ -83,7 +85,7 @@ class TranslationFriction(Force):
 
     keyword = "tran_friction"
     regularised = "v_tol"
-    joint: str = joint_fields("P_i", "a_j", doc="the slider that rubs")
+    joint: str = joint_fields("P_i", "a_j", acts_in="length", doc="the slider that rubs")
     P_i: Point = point(doc="where body i slides")
     a_j: Vector = vector(doc="axis it slides along, on body j")
     f_c: float = number(unit="N", minimum=0.0, doc="friction force")

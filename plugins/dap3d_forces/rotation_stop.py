@@ -45,7 +45,9 @@ class RotationStop(Force):
     unilateral = (0,)
     restitution = "e"
     energy_where = "where the bodies turn about the common axis"
-    joint: str = joint_fields("body_i", "body_j", axis="a_j", doc="the hinge that it stops")
+    joint: str = joint_fields(
+        "body_i", "body_j", axis="a_j", acts_in="angle", doc="the hinge that it stops"
+    )
     body_i: Body = body(default=None, doc="body i; that of v_i")
     body_j: Body = body(default=None, doc="body j; that of v_j")
     v_i: Vector = vector(None, across="axis", doc="direction it is measured from, on body i")

@@ -48,7 +48,9 @@ class Torsion(Force):
     actuates = "n_a"
     symbol = "ring"
     energy_where = "where the bodies turn about the common axis, and without n_a"
-    joint: str = joint_fields("body_i", "body_j", axis="a_j", doc="the hinge that it acts in")
+    joint: str = joint_fields(
+        "body_i", "body_j", axis="a_j", acts_in="angle", doc="the hinge that it acts in"
+    )
     body_i: Body = body(default=None, doc="body i; that of v_i")
     body_j: Body = body(default=None, doc="body j; that of v_j")
     v_i: Vector = vector(None, across="axis", doc="direction it is measured from, on body i")

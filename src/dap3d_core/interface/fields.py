@@ -55,6 +55,7 @@ class FieldSpec:
         instead_of: fields that an input or a number takes the place of.
         gives: fields that a joint gives -> its own, as of ``joint_fields``.
         facts: fields that it gives where the scene does not, by attributes of its type.
+        acts_in: the coordinate of the joint that the element acts in, "angle" or "length"; or "".
         size: name of the number of entries of a list, which the scene gives by its length; "" of
             all else.
         least: smallest number of entries of a list.
@@ -88,6 +89,7 @@ class FieldSpec:
     instead_of: tuple[str, ...] = ()
     gives: Mapping[str, str] = attrs.field(factory=dict)
     facts: tuple[str, ...] = ()
+    acts_in: str = ""
     size: str = ""
     least: int = 1
     apart: bool = False
@@ -334,18 +336,22 @@ def joint(*, rows: int | None = None, doc: str = "") -> Any:
     return field_of(FieldSpec("joint", REQUIRED, doc=doc, rows=rows))
 
 
-def joint_fields(*same: str, facts: Sequence[str] = (), doc: str = "", **others: str) -> Any:
+def joint_fields(
+    *same: str, facts: Sequence[str] = (), acts_in: str = "", doc: str = "", **others: str
+) -> Any:
     """A joint by name, from which an element takes fields that it then leaves out.
 
     ``joint_fields("body_i", "body_j", "a_j")`` takes fields of the same names: what acts in the
     coordinate of a joint names the joint. ``joint_fields(P_j="P", a_j="a")`` takes the point and
     the axis that the joint has on the body that moves: body i, or body j where body i is ground.
     The scene gives the joint or the fields. ``facts`` are attributes of the joint's type, such as
-    ``coordinate``, for fields of the same names that the scene does not give. A list field takes
-    something of each of several joints.
+    ``coordinate``, for fields of the same names that the scene does not give. With ``acts_in``,
+    "angle" or "length", joints of the other coordinate are refused. A list field takes something
+    of each of several joints.
     """
     gives = {name: name for name in same} | others
-    return field_of(FieldSpec("joint_fields", None, doc=doc, gives=gives, facts=tuple(facts)))
+    return field_of(FieldSpec("joint_fields", None, doc=doc, gives=gives, facts=tuple(facts),
+                              acts_in=acts_in))  # fmt: skip
 
 
 def angle(first: str, second: str, about: str, *, doc: str = "") -> Any:

@@ -27,7 +27,7 @@ PASSES = 25
 #: Differences of passes that are kept of forces on reactions; then they begin anew.
 DEPTH = 8
 #: Of a difference made orthogonal to the earlier ones, less than this part (squared) is rounding.
-ROUNDING = 1e-12
+DIFFERENCE_ROUNDING = 1e-12
 
 
 def forces_by(t: float, system: System, loops: Any, Lam: Floats) -> Floats:
@@ -144,7 +144,7 @@ def keep_difference(x: Floats, memory: Floats, last: int) -> None:
         for k in range(rows):
             mine[k] -= share * memory[o + k]
             moved[k] -= share * memory[o + rows + k]
-    if not squares(mine) > ROUNDING * whole:
+    if not squares(mine) > DIFFERENCE_ROUNDING * whole:
         zero(mine)
         zero(moved)
 

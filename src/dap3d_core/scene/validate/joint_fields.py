@@ -51,6 +51,10 @@ def with_joint_fields(
                 refuse(field, *missing_words(report, "joint", name, report.scene.joints))
             else:
                 found.append(joint)
+        for joint in found if spec.acts_in else ():
+            if _coordinate(known("joint", joint.type)) not in ("", spec.acts_in):
+                has_no = f"is of type {joint.type}, which has no {spec.acts_in}"
+                refuse(field, f"{has_no} that this could act in")
         for own, other in gives.items() if found else ():
             values = [_of_moving(report, geometry, joint, other) for joint in found]
             if own in element.fields:
@@ -67,6 +71,11 @@ def with_joint_fields(
             if fact := getattr(type_info and type_info.type, name, ""):
                 fields.setdefault(name, fact)
     return attrs.evolve(element, fields=fields) if good else None
+
+
+def _coordinate(type_info: TypeInfo | None) -> str:
+    """What a joint of a type moves by, "angle" or "length"; "" where it does not say."""
+    return str(getattr(type_info and type_info.type, "coordinate", ""))
 
 
 def _of_moving(report: Collector, geometry: Geometry, joint: Element, name: str) -> Any:

@@ -1,4 +1,4 @@
-"""Fields of whole numbers, such as the teeth of a gear."""
+"""Fields of whole numbers, such as the teeth of a gear, and joints that forces act in."""
 
 import pytest
 from support.own_types import registry_of
@@ -43,3 +43,19 @@ def test_any_other_is_refused(count, words):
     with pytest.raises(dap.SceneError, match=words) as caught:
         check(scene(count), registry_of(Blades))
     assert "count" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("keyword", "fields", "joint"),
+    [("rot_friction", {"n_c": 1.0}, "slide"), ("tran_friction", {"f_c": 1.0}, "hinge")],
+)
+def test_what_acts_in_an_angle_refuses_a_joint_without_one(keyword, fields, joint):
+    """It would have no effect at all."""
+    scene = dap.Scene(name="two")
+    scene.add_body("a")
+    scene.add_body("b")
+    scene.add_joint("tran", "slide", P_i="a.O", P_j="ground.O", a_j="ground.x")
+    scene.add_joint("rev", "hinge", P_i="b.O", P_j="a.O", a_i="b.z", a_j="a.z")
+    scene.add_force(keyword, "rub", joint=joint, **fields)
+    with pytest.raises(dap.SceneError, match=rf"rub\.joint = .{joint}.*that this could act in"):
+        check(scene, dap.load_registry())
