@@ -32,7 +32,15 @@ void repeat(long n, const double** given, double** out) {
 
 
 def casadi_function(mechanism):
-    """(q, v) -> dv/dt by articulated bodies; frames at the joints, whose axes are parallel to y."""
+    """(q, v) -> dv/dt."""
+    import casadi as ca
+
+    q, v = ca.SX.sym("q", COUNT), ca.SX.sym("v", COUNT)
+    return ca.Function("rates", [q, v], [accelerations(mechanism, q, v)], {"cse": True})
+
+
+def accelerations(mechanism, q, v):
+    """dv/dt by articulated bodies; frames at the joints, whose axes are parallel to y."""
     import casadi as ca
 
     def cross(a):
@@ -40,7 +48,6 @@ def casadi_function(mechanism):
             ca.horzcat(0, -a[2], a[1]), ca.horzcat(a[2], 0, -a[0]), ca.horzcat(-a[1], a[0], 0)
         )
 
-    q, v = ca.SX.sym("q", COUNT), ca.SX.sym("v", COUNT)
     axis = ca.sparsify(ca.SX([0, 1, 0, 0, 0, 0]))
     shifts, inertias, forces, biases = [], [], [], []
     speed, at = ca.SX(6, 1), np.zeros(3)
@@ -79,23 +86,28 @@ def casadi_function(mechanism):
         acceleration = shifts[k] @ acceleration + biases[k]
         found.append((rests[k] - ca.dot(gains[k], acceleration)) / divisors[k])
         acceleration = acceleration + axis * found[k]
-    return ca.Function("rates", [q, v], [ca.vertcat(*found)], {"cse": True})
+    return ca.vertcat(*found)
+
+
+def library_of(function, loop):
+    """The C that CasADi writes for a function, and a loop that calls it, loaded."""
+    with tempfile.TemporaryDirectory() as folder:
+        source = Path(folder) / f"{function.name()}.c"
+        function.generate(source.name, {"with_header": False})
+        Path(source.name).replace(source)
+        source.write_text(source.read_text() + loop)
+        library = source.with_suffix(".so")
+        command = ["gcc", *FLAGS, "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
+        subprocess.run(command, check=True)
+        return ctypes.CDLL(str(library))
 
 
 def compiled(function):
     """(q, v) -> dv/dt, seconds of so many calls; by the C that CasADi writes."""
-    folder = tempfile.TemporaryDirectory()
-    source = Path(folder.name) / "rates.c"
-    function.generate(source.name, {"with_header": False})
-    Path(source.name).replace(source)
-    source.write_text(source.read_text() + LOOP)
-    library = source.with_suffix(".so")
-    command = ["gcc", *FLAGS, "-shared", "-fPIC", "-o", str(library), str(source), "-lm"]
-    subprocess.run(command, check=True)
-    repeat = ctypes.CDLL(str(library)).repeat
+    repeat = library_of(function, LOOP).repeat
     repeat.argtypes = [ctypes.c_long, ctypes.c_void_p, ctypes.c_void_p]
 
-    def run(q, v, _folder=folder):
+    def run(q, v):
         arrays, out = [np.array(q), np.array(v)], np.zeros(COUNT)
         given = (ctypes.c_void_p * 2)(*(a.ctypes.data for a in arrays))
         results = (ctypes.c_void_p * 1)(out.ctypes.data)

@@ -94,6 +94,23 @@ def test_a_pendulum_by_its_length(method):
     close(s.of("bob.r.z")[:, 0], derivative(height, 0.7))
 
 
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_what_python_computes_at_the_start(method):
+    """Mass metrics, points, a pose: first accelerations, to 1e-12 of theirs by a part of each."""
+    by = ["parameters.length", "bodies.bob.mass", "bodies.bob.Jp.y"]
+    s = dap.sensitivities(pendulum(), by, t_end=0.1, dt=0.1, method=method)
+    values = np.array([0.7, 1.0, 0.02])
+
+    def acceleration(length, m, J):
+        across = -m * 9.81 * length**2 * np.sin(2.0) / (m * length**2 + J)
+        return across * np.array([np.cos(2.0), 0.0, np.sin(2.0)])
+
+    imaginary = 1e-30j * np.eye(3)
+    expected = np.stack([acceleration(*(values + e)).imag / 1e-30 for e in imaginary], axis=-1)
+    error = np.abs(s.of("bob.rdd")[0] - expected) * values
+    assert error.max() < 1e-12 * np.abs(acceleration(*values)).max()
+
+
 def test_a_free_symmetric_top():
     """Angular velocity in body axes precesses at (C - A) / A times the spin."""
     scene = dap.Scene(name="top")

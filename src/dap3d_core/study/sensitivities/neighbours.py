@@ -24,9 +24,10 @@ from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import settings_of
 from dap3d_core.study.parameters import SceneParameter, all_parameters, with_values
 
-#: Steps of differences, over the size of the parameter: rounding over the step and the sixth power
-#: of the step are both near 1e-14. The last one is for starts that wide changes tear apart.
-STEPS = (1e-2, 1e-3, 1e-4)
+#: Steps of differences, over the size of the parameter: rounding over the step is near 1e-13, and
+#: what the sixth power of the step leaves of 1/sqrt(mass) below that. Others are for starts that
+#: wide changes tear apart.
+STEPS = (3e-3, 1e-3, 1e-4)
 #: Offsets of differences in steps: central, and to either side where a value has a limit.
 OFFSETS = (-3, -2, -1, 1, 2, 3), (0, 1, 2, 3, 4, 5, 6), (0, -1, -2, -3, -4, -5, -6)
 #: A change of a state, over its size, in differences of functions of it.
