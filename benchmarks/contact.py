@@ -8,7 +8,7 @@ import time
 import numpy as np
 from right_hand_side import repeat
 from timing import wait_for_good_code
-from verification.test_contacts import TIGHT, G, ball, spring_block, times
+from verification.test_contacts import TIGHT, G, ball, slope, spring_block, times
 
 import dap3d_core as dap
 from dap3d_core.formulations.contacts.contact_rows import ContactTable
@@ -44,20 +44,6 @@ def closed_forms():
         swings = int(np.ceil((0.1 / limit - 1.0) / 2.0))
         rest = (-1.0) ** swings * (0.1 - 2.0 * limit * swings)
         yield f"Coulomb oscillator, {integrator}", abs(result.r[-1, 0, 0] - rest), "m"
-
-
-def slope(part):
-    """A box on four corners, in this part of its cone."""
-    angle, h = 0.4, 0.05
-    c, s = np.cos(angle), np.sin(angle)
-    scene = dap.Scene(name="slope")
-    scene.add_vector("n", "ground", [-s, 0.0, c])
-    p = [np.cos(angle / 2.0), 0.0, -np.sin(angle / 2.0), 0.0]
-    scene.add_body("box", mass=1.0, Jp=[0.002, 0.003, 0.004], r=[-s * h, 0.0, c * h], p=p)
-    scene.add_force("weight", "g")
-    fields = {"size": [0.3, 0.2, 2.0 * h], "a_j": "n", "mu": np.tan(angle) / part}
-    scene.add_contact("box_plane", "floor", P_i="box.O", **fields)
-    return scene
 
 
 def pinched_capsule():

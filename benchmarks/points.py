@@ -8,24 +8,13 @@ import time
 
 import numpy as np
 import scenes
+from support.studies import pendulum
 
 import dap3d_core as dap
 from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.study import Ensemble, Study, outputs_of
 
 ROUNDS, POINTS = 9, 320
-
-
-def pendulum():
-    """A bob on a revolute joint, with its spring."""
-    scene = dap.Scene(name="pendulum")
-    scene.add_body("bob", mass=1.0, Jp=(0.01, 0.01, 0.01), r=(0.5, 0.0, 0.0))
-    scene.add_point("end", "bob", (-0.5, 0.0, 0.0))
-    scene.add_point("post", "ground", (1.0, 0.0, 1.0))
-    scene.add_joint("rev", "hinge", P_i="end", P_j="ground.O", a_i="bob.y", a_j="ground.y")
-    scene.add_force("weight", "gravity")
-    scene.add_force("ptp", "spring", P_i="bob.O", P_j="post", k=10.0, l0=0.5)
-    return scene
 
 
 def flight():

@@ -1,9 +1,8 @@
-"""Draw the pictures of the engineering gallery.
+"""Draw the pictures of the galleries of engineering and contact.
 
-    python tools/gallery_pictures.py [FOLDER]
+    python tools/gallery_pictures.py [MODEL...]
 
-Writes MODEL.png for each model of models/engineering into FOLDER, by default
-docs/how-to/engineering-gallery.
+Writes docs/how-to/GROUP-gallery/MODEL.png, by default of every model of both.
 """
 
 import sys
@@ -11,9 +10,14 @@ from pathlib import Path
 
 import dap3d_core as dap
 
-ROOT = Path(__file__).resolve().parents[1]
+DOCS = Path(__file__).resolve().parents[1] / "docs/how-to"
 #: The instant that is drawn, s.
 AT = {
+    "cradle": 0.5,
+    "domino_row": 0.24,
+    "gripper": 0.8,
+    "marble_run": 0.9,
+    "quadruped": 0.4,
     "crane": 1.5,
     "engine": 0.004,
     "excavator": 2.5,
@@ -25,18 +29,26 @@ AT = {
     "wiper": 0.5,
 }
 #: Of plane mechanisms with shapes, the direction from which they are drawn.
-VIEW = {"crane": "x", "quarter_car": "x"}
+VIEW = {
+    "crane": "x",
+    "quarter_car": "x",
+    "cradle": "y",
+    "domino_row": "y",
+    "gripper": "y",
+    "marble_run": "y",
+}
 
 
-def main(folder: Path) -> None:
-    """Draw every model into a folder."""
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, t in AT.items():
-        picture = folder / f"{name}.png"
+def main(names: list[str]) -> None:
+    """Draw models, each into the folder of its gallery."""
+    for name in names or AT:
+        group = dap.shipped_models()[name].parent.name
+        picture = DOCS / f"{group}-gallery" / f"{name}.png"
+        picture.parent.mkdir(exist_ok=True)
         view = VIEW.get(name)
-        dap.animate(dap.simulate(name), picture, at=t, size=(400, 0), view=view, force=True)
+        dap.animate(dap.simulate(name), picture, at=AT[name], size=(400, 0), view=view, force=True)
         print(f"{picture} written")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "docs/how-to/engineering-gallery")
+    main(sys.argv[1:])

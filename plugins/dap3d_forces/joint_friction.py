@@ -62,14 +62,7 @@ class StickingRotation(Contact, of=RotationFriction, w_tol=False):
     """It sticks at rest."""
 
     keyword, symbol = "rot_friction", "ring"
-    joint: str = joint_fields("body_i", "body_j", axis="a_j", doc="the hinge that rubs")
-    body_i: Body = body(doc="body that turns")
-    body_j: Body = body(doc="body against which it turns")
-    axis: Vector = vector(doc="axis, on either body")
-    n_c: float = number(unit="N m", minimum=0.0, doc="friction moment")
-    n_s: float = number(
-        None, unit="N m", minimum=0.0, doc="at most where it sticks; n_c by default"
-    )
+    shared = ("joint", "body_i", "body_j", "axis", "n_c", "n_s")
 
     def prepare(self, bodies):
         return sizes(self.n_c, self.n_s, "n_c", "n_s")
@@ -111,11 +104,7 @@ class StickingTranslation(Contact, of=TranslationFriction, v_tol=False):
     """It sticks at rest."""
 
     keyword = "tran_friction"
-    joint: str = joint_fields("P_i", "a_j", doc="the slider that rubs")
-    P_i: Point = point(doc="where body i slides")
-    a_j: Vector = vector(doc="axis it slides along, on body j")
-    f_c: float = number(unit="N", minimum=0.0, doc="friction force")
-    f_s: float = number(None, unit="N", minimum=0.0, doc="at most where it sticks; f_c by default")
+    shared = ("joint", "P_i", "a_j", "f_c", "f_s")
 
     def prepare(self, bodies):
         return sizes(self.f_c, self.f_s, "f_c", "f_s")

@@ -80,10 +80,7 @@ class RigidPlaneStop(Contact, of=PlaneStop, k=False):
     """The plane carries, without a stiffness."""
 
     keyword, symbol, is_smooth = "plane_stop", "plate", True
-    P_i: Point = point(doc="centre of the ball")
-    P_j: Point = point(default="ground.O", doc="a point of the plane")
-    a_j: Vector = vector(default="ground.z", doc="normal of the plane, to the side of the ball")
-    radius: float = number(default=0.0, unit="m", minimum=0.0, doc="of the ball")
+    shared = ("P_i", "P_j", "a_j", "radius")
 
     def gap(r_P_i, r_P_j, a_j, radius):
         return dot(a_j, sub(r_P_i, r_P_j)) - radius

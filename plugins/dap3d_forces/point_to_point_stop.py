@@ -67,9 +67,7 @@ class RigidPointToPointStop(Contact, of=PointToPointStop, k=False):
     """The stop carries, without a stiffness."""
 
     keyword, symbol, is_smooth = "ptp_stop", "spring", True
-    d: Vector2 = vector2(direction=True, doc="from the end on body i to the end on body j")
-    l_stop: float = number(unit="m", positive=True, doc="least or greatest distance")
-    side: str = choice(("min", "max"), default="min", doc="whether it is the least or the greatest")
+    shared = ("d", "l_stop", "side")
 
     def prepare(self, bodies):
         return {"sense": 1.0 if self.side == "min" else -1.0}

@@ -94,15 +94,7 @@ class RigidRotationStop(Contact, of=RotationStop, k=False):
     """The stop carries, without a stiffness."""
 
     keyword, symbol, is_smooth = "rot_stop", "ring", True
-    joint: str = joint_fields("body_i", "body_j", axis="a_j", doc="the hinge that it stops")
-    body_i: Body = body(default=None, doc="body i; that of v_i")
-    body_j: Body = body(default=None, doc="body j; that of v_j")
-    v_i: Vector = vector(None, across="axis", doc="direction it is measured from, on body i")
-    v_j: Vector = vector(None, across="axis", doc="direction it is measured to, on body j")
-    axis: Vector = vector(doc="common axis, on either body")
-    theta: float = angle("v_i", "v_j", "axis")
-    theta_stop: float = number(unit="rad", doc="least or greatest angle")
-    side: str = choice(("min", "max"), default="min", doc="whether it is the least or the greatest")
+    shared = ("joint", "body_i", "body_j", "v_i", "v_j", "axis", "theta", "theta_stop", "side")
 
     def prepare(self, bodies):
         return {"sense": 1.0 if self.side == "min" else -1.0} | marks(self, bodies)

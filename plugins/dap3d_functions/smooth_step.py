@@ -1,12 +1,13 @@
 """Function of type b: a smooth transition between two values."""
 
-from dap3d_core.interface import Function, hookimpl, number
+from dap3d_core.interface import hookimpl
 from dap3d_core.kernels import where
+from dap3d_functions.step import Step
 
 interface_version = 1
 
 
-class SmoothStep(Function):
+class SmoothStep(Step):
     """From f_start to f_end, at rest and without curvature at both ends (manual: type ``b``).
 
     Spec 7. With D = x_end - x_start, u = (x - x_start) / D and h = f_end - f_start:
@@ -16,18 +17,6 @@ class SmoothStep(Function):
 
     keyword = "b"
     synonyms = ("smoothstep", "ramp")
-    x_start: float = number(default=0.0, doc="where the transition begins")
-    x_end: float = number(default=1.0, doc="where it ends")
-    f_start: float = number(default=0.0, doc="value before")
-    f_end: float = number(default=1.0, doc="value after")
-
-    def prepare(self, bodies):
-        if not self.x_end > self.x_start:
-            raise ValueError(f"x_end = {self.x_end:g} must lie beyond x_start = {self.x_start:g}")
-        return {}
-
-    def breaks(self):
-        return self.x_start, self.x_end
 
     def value(x, x_start, x_end, f_start, f_end):
         D, h = x_end - x_start, f_end - f_start

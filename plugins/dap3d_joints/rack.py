@@ -33,7 +33,11 @@ class Rack(Joint):
     keyword, rows = "rack", 1
     synonyms = ("pinion", "rackandpinion", "rackpin")
     symbol = "link"
-    example: ClassVar[Mapping[str, str]] = {"a_i": '"crank.y"', "a_j": '"rod.x"'}
+    example: ClassVar[Mapping[str, str]] = {
+        "P_j": '"ground.O"',
+        "a_i": '"crank.y"',
+        "a_j": '"ground.x"',
+    }
     joint_i: str = joint_fields(P_i="P", a_i="a", doc="hinge of the pinion")
     joint_j: str = joint_fields(P_j="P", a_j="a", doc="slider of the rack")
     P_i: Point = point(default=None, doc="on the axis of the pinion; its mass centre by default")
@@ -50,18 +54,20 @@ class Rack(Joint):
                 "the axis a_i of the pinion is not normal to the direction a_j of the rack",
                 stacklevel=2,
             )
-        d = sub(pinion.place(self.P_i), rack.place(self.P_j))
-        sense = 1.0 if dot(d, cross(a, b)) <= 0.0 else -1.0
-        n = cross(a, b)
+        d, n = sub(pinion.place(self.P_i), rack.place(self.P_j)), cross(a, b)
         if not dot(n, n) > MISFIT**2:
             raise ValueError("the axis a_i of the pinion lies along a_j; it is normal to the rack")
         n = scale(1.0 / sqrt(dot(n, n)), n)
+        side = -dot(d, n)
+        if not abs(side) > MISFIT * self.radius:
+            raise ValueError("P_j is level with the axis of the pinion, and does not say on which "
+                             "side the rack lies: give a point on its pitch line")  # fmt: skip
         return {
             "u_i": pinion.to_local(b),
             "n_j": rack.to_local(n),
             "b_j": rack.to_local(cross(b, n)),
             "x_0": dot(b, d),
-            "sense": sense,
+            "sense": 1.0 if side > 0.0 else -1.0,
         }
 
     def C(r_P_i, r_P_j, u_i, a_j, n_j, x_0, radius, sense):

@@ -194,22 +194,23 @@ JOINTS = {
 }
 
 
+def joint_of(word):
+    """The text of a file of one joint."""
+    return f"J = Joint_struct; J.type = '{word}'; J.{JOINTS[word][0]};\nJoints = [J];\n"
+
+
 @pytest.mark.parametrize("word", JOINTS)
 def test_joints(read, word):
     """Numbers become names, fields those of the scene (design of the scene file)."""
-    given, expected = JOINTS[word]
-    scene, report = read(
-        inJoints=f"J = Joint_struct; J.type = '{word}'; J.{given};\nJoints = [J];\n"
-    )
+    scene, report = read(inJoints=joint_of(word))
     assert scene.joints["J1"].type == word
-    assert scene.joints["J1"].fields == expected
+    assert scene.joints["J1"].fields == JOINTS[word][1]
     assert report.unused == []
 
 
 @pytest.mark.parametrize("word", JOINTS)
 def test_joints_are_accepted_by_their_types(tmp_path, word):
-    given, _ = JOINTS[word]
-    text = f"J = Joint_struct; J.type = '{word}'; J.{given};\nJoints = [J];\n"
+    text = joint_of(word)
     if word == "tran":
         text = text.replace("[0 -1 0 1 0 0 0 0 1]", "eye(3)")
     if word not in dap.load_registry().keywords("joint"):
@@ -239,24 +240,24 @@ FORCES = {
 }
 
 
+def force_of(word):
+    """The text of a file of one force."""
+    return f"S = Force_struct; S.type = '{word}'; S.{FORCES[word][0]};\nForces = [S];\n"
+
+
 @pytest.mark.parametrize("word", FORCES)
 def test_forces(read, word):
-    given, expected = FORCES[word]
-    scene, report = read(
-        inForces=f"S = Force_struct; S.type = '{word}'; S.{given};\nForces = [S];\n"
-    )
+    scene, report = read(inForces=force_of(word))
     assert scene.forces["F1"].type == word
-    assert scene.forces["F1"].fields == expected
+    assert scene.forces["F1"].fields == FORCES[word][1]
     assert report.unused == []
 
 
 @pytest.mark.parametrize("word", FORCES)
 def test_forces_are_accepted_by_their_types(tmp_path, word):
-    given, _ = FORCES[word]
     if word not in dap.load_registry().keywords("force"):
         pytest.fail(f"the type {word} is not installed")
-    text = f"S = Force_struct; S.type = '{word}'; S.{given};\nForces = [S];\n"
-    scene, _ = dap.import_matlab(write(tmp_path, inForces=text))
+    scene, _ = dap.import_matlab(write(tmp_path, inForces=force_of(word)))
     assert scene.forces["F1"].type == word
 
 

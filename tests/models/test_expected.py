@@ -16,8 +16,8 @@ EXPECTED = {
     for name, folder in dap.shipped_models().items()
     if (folder / "expected.toml").exists()
 }
-#: Of forty loops.
-LONG = {"A02-40"}
+#: Of forty loops, and of hundreds of steps with contacts.
+LONG = {"A02-40", "domino_row", "marble_run"}
 COUNTS = ("rows", "rank", "dof")
 
 
@@ -80,6 +80,8 @@ def at_end(result, quantity):
     if head == "reaction":
         joint, side, what = rest
         return getattr(result.reaction(joint)[side], what)[-1]
+    if head == "load":
+        return result.contacts.of(rest[0]).at(result.t[-1:]).force.sum(axis=0)
     names = result.model.point_names if head in ("rP", "rPd") else result.model.body_names
     return getattr(result, head)[-1, names.index(rest[0])]
 

@@ -1,7 +1,7 @@
 """Forces on the reactions of joints: a brake, a tyre, the friction of a pin, a slider."""
 
 from dap3d_core.interface import Body, Force, Point, Vector, body, joint, number, point, vector
-from dap3d_core.kernels import add, cross, dot, neg, scale, sqrt, sub, tanh
+from dap3d_core.kernels import add, cross, dot, neg, scale, sqrt, sub, tanh, where
 
 ZERO = (0.0, 0.0, 0.0)
 
@@ -72,6 +72,17 @@ class Servo(Force):
         load = abs(lam_plane[0])
         sliding = tanh(dot(a_j, v_i) / 1e-3)
         return ((add(scale(-mu * load * sliding, a_j), scale(-k * load, n_j)), ZERO),)
+
+
+class SeizingServo(Servo):
+    """The servo, whose gain below a speed of 4.9 m/s is so large that it jams."""
+
+    keyword = "seizing-servo"
+
+    def wrench(a_j, n_j, v_i, lam_plane, mu, k):
+        load, sliding = abs(lam_plane[0]), dot(a_j, v_i)
+        gain = where(sliding < 4.9, 1.5, k)
+        return ((add(scale(-mu * load, a_j), scale(-gain * load, n_j)), ZERO),)
 
 
 ON_REACTIONS = (Brake, Tyre, PinFriction, Servo)

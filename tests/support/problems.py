@@ -108,3 +108,21 @@ def everything():
     scene.add_function("a", "turn", coeff=(0.0, 0.3, 0.1))
     scene.add_joint("rel-rot", "motor", body_i=first, a_j="ground.z", function="turn")
     return scene
+
+
+def short_runs(dt):
+    """Models and settings of runs of two instants dt, with every method and integrator."""
+    short = {"t_end": 2.0 * dt, "dt": dt}
+    return [
+        ("fourbar3", short),
+        ("fourbar3", short | {"method": "penalty"}),
+        ("fourbar3", short | {"method": "lsq"}),
+        ("pen2", short | {"integrator": "adams"}),
+        ("pen2", short | {"method": "joint"}),
+        ("pen2", short | {"integrator": "radau"}),
+        ("fourbar2", short | {"integrator": "dopri5"}),
+        ("pen1", short | {"integrator": "rk4", "step": 0.5 * dt}),
+        ("bodies2", short),
+        ("ball1", {"t_end": 0.5, "dt": 0.1, "allow_code": True}),
+        ("tri", short),
+    ]

@@ -10,6 +10,18 @@ _random = np.random.default_rng(1)
 POINTS = np.column_stack([_random.uniform(0.5, 2.0, 200), _random.uniform(-2.0, 2.0, 200)])
 
 
+def pendulum():
+    """A bob on a hinge with a spring, whose stiffness sets the number of steps."""
+    scene = dap.Scene(name="pendulum")
+    scene.add_body("bob", mass=1.0, Jp=(0.01, 0.01, 0.01), r=(0.5, 0.0, 0.0))
+    scene.add_point("end", "bob", (-0.5, 0.0, 0.0))
+    scene.add_point("post", "ground", (1.0, 0.0, 1.0))
+    scene.add_joint("rev", "hinge", P_i="end", P_j="ground.O", a_i="bob.y", a_j="ground.y")
+    scene.add_force("weight", "gravity")
+    scene.add_force("ptp", "spring", P_i="bob.O", P_j="post", k=10.0, l0=0.5)
+    return scene
+
+
 def bob(outputs=("bob.r.z:min", "bob.r.x:series", "energy.total:max"), **settings):
     """A pendulum of 0.5 m of which mass and angular velocity vary."""
     scene = dap.Scene(name="bob")

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.on_reactions import ON_REACTIONS, WornBrake
+from support.on_reactions import ON_REACTIONS, SeizingServo, WornBrake
 from support.own_types import registry_of
 from support.unknown_types import OnCurve
 
@@ -10,7 +10,7 @@ import dap3d_core as dap
 from dap3d_core.simulation import CompiledModel
 
 G = 9.81
-REGISTRY = registry_of(*ON_REACTIONS, WornBrake, OnCurve)
+REGISTRY = registry_of(*ON_REACTIONS, SeizingServo, WornBrake, OnCurve)
 SETTINGS = {"t_end": 0.4, "dt": 0.1, "rtol": 1e-10, "atol": 1e-12}
 
 
@@ -129,6 +129,17 @@ def test_a_brake_that_loads_itself_too_much_jams(integrator):
     """With k > 1 no load fits: the run ends, and names the force."""
     with pytest.raises(dap.SimulationError, match=r"force s0: the reactions .* jams"):
         dap.simulate(compiled(sliders(1.5), "standard"), integrator=integrator, **SETTINGS)
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_no_step_goes_into_a_jam(integrator):
+    """It slows down by mu g / (1 - k) to 4.9 m/s: no slope across the jam takes a step beyond."""
+    scene = sliders(0.5)
+    scene.forces["s0"].type = "seizing-servo"
+    with pytest.raises(dap.SimulationError, match="force s0: the reactions") as caught:
+        dap.simulate(compiled(scene, "joint"), integrator=integrator, **SETTINGS)
+    stopped = float(str(caught.value).split(" s:")[0].split("t = ")[1])
+    assert stopped == pytest.approx(0.1 / (0.02 * G / 0.5), rel=1e-8)
 
 
 def test_a_jam_in_the_course_of_a_run_keeps_what_was_computed():

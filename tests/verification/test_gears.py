@@ -177,6 +177,25 @@ def test_a_pressure_angle_presses_a_wheel_in_a_ring_inwards():
     assert (x, abs(y)) == pytest.approx((20.0 * math.tan(math.radians(25.0)), 20.0), abs=1e-9)
 
 
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_rubbing_bearings_carry_the_whole_tooth_force(method):
+    """With F along the tangent both bearings carry F / cos(20 deg), and brake by mu r of it.
+
+    Far beyond v_tol: T - r_a F - mu r F / cos = J alpha, r_b F - mu r F / cos = J alpha / 2.
+    """
+    scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
+    pair(scene, "a", "b", teeth_i=20, teeth_j=40)
+    torque(scene, "a", 5.0)
+    for name in "ab":
+        scene.add_force("friction", f"rub_{name}", joint=f"hinge_{name}", mu=0.3, radius=0.02)
+    result = dap.simulate(scene, method=method, t_end=0.2, dt=0.1, **TIGHT)
+    brake = 0.3 * 0.02 / math.cos(math.radians(20.0))
+    alpha, F = np.linalg.solve([[J, 0.1 + brake], [J / 2, brake - 0.2]], [5.0, 0.0])
+    assert result.wd[-1, :, 2] == pytest.approx([alpha, -alpha / 2], rel=1e-9)
+    assert load(result, "mesh")[1] == pytest.approx(-F, rel=1e-9)
+    assert not any("did not settle" in note for note in result.notes)
+
+
 def held():
     """Two wheels, one of them held by a spring, the other under 3 N m."""
     scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
@@ -279,6 +298,15 @@ def test_a_pinion_drives_a_rack(side, method):
     assert result.r[-1, index, 0] == pytest.approx(0.2 + side * a * 2.0, rel=1e-9)
     assert load(result, "hinge_pinion") == pytest.approx([side * m * a, 0.0, 0.0], abs=1e-8)
     assert turned(result, "pinion") == pytest.approx(a * 2.0 / r, rel=1e-9)
+
+
+def test_a_rack_level_with_the_axis_is_on_no_side():
+    """Its direction of motion would be a guess."""
+    scene = wheels(pinion=(0.0, 0.0))
+    scene.add_joint("rack", "teeth", joint_i="hinge_pinion", P_j="ground.O", a_j="ground.x",
+                    radius=0.05)  # fmt: skip
+    with pytest.raises(dap.SceneError, match="on which side the rack lies"):
+        dap.simulate(scene, t_end=0.1)
 
 
 def test_couples_turn_by_the_same_ratio_without_a_tooth_force():

@@ -223,6 +223,19 @@ def test_joints_hold_while_shapes_touch():
     assert np.abs(smooth.reaction("J")["i"].force[-1]).max() < 1e-3
 
 
+def test_stiff_dampers_do_not_explode():
+    """A damper of 1e4 N s/m stops 1 kg within 0.1 ms, a tenth of a step, after v m / c."""
+    scene, c = dap.Scene(name="damped"), 1e4
+    scene.add_body("block", mass=1.0, Jp=[0.1] * 3, r=[0.0, 0.0, 1.0], r_dot=[1.0, 0.0, 0.0])
+    scene.add_shape("sphere", body="block", radius=0.1, collides=True)
+    scene.add_point("wall", "ground", [10.0, 0.0, 1.0])
+    scene.add_joint("tran", "rail", P_i="block.O", P_j="wall", a_j="ground.x")
+    scene.add_force("ptp", "damper", P_i="block.O", P_j="wall", c=c)
+    result = dap.simulate(collide(scene, mu=0.1), t_end=0.02, dt=0.01, contact_step=1e-3)
+    assert result.r[-1, 0, 0] == pytest.approx(1.0 / c, rel=1e-3)  # parts are second order
+    assert abs(result.rd[-1, 0, 0]) < 1e-12
+
+
 def test_guided_fingers_lift_a_box():
     """Four corners on each side, more impulses than there are equations: none may be left over."""
     scene, press = dap.Scene(name="lift"), 20.0  # N
@@ -266,6 +279,22 @@ def test_events_refuse_shapes_that_collide():
         dap.simulate(ball(mu=0.3), t_end=0.1, contact="events")
     with pytest.raises(dap.SimulationError, match="shapes that collide"):
         dap.equilibrium(ball(mu=0.3))
+
+
+def test_the_ledger_has_the_work_of_a_driver_on_what_it_lifts():
+    """A lift takes a load of 2 kg and its own 1 kg up by 0.1 m, from rest to rest."""
+    scene = dap.Scene(name="lift")
+    scene.add_body("lift", mass=1.0, Jp=[0.1] * 3)
+    scene.add_body("load", mass=2.0, Jp=[0.1] * 3, r=[0, 0, 0.1])
+    scene.add_joint("tran", "shaft", P_i="lift.O", P_j="ground.O", a_j="ground.z")
+    scene.add_function("b", "up", x_start=0.0, x_end=0.4, f_start=0.0, f_end=0.1)
+    scene.add_joint("drive-tran", joint="shaft", function="up")
+    scene.add_shape("plane", body="lift", collides=True)
+    scene.add_shape("sphere", body="load", radius=0.1, collides=True)
+    scene.add_force("weight", "gravity")
+    lifted = dap.simulate(scene, t_end=0.4, dt=0.4, contact_step=5e-3, contact="stepping")
+    assert lifted.energy.total[-1] - lifted.energy.total[0] == pytest.approx(0.1 * 3 * 9.81, 1e-4)
+    assert lifted.ledger["energy"].value < 1e-4
 
 
 def test_small_problems_have_the_results_of_sparse_matrices(monkeypatch):

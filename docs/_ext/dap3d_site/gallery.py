@@ -31,6 +31,8 @@ HEADERS = {
          "in :doc:`/reference/shipped-models`."),
     "benchmarks": ("Reference problems", "Problems known from the literature on multibody "
                    "programs; :doc:`/reference/reference-problems` says what each is hard for."),
+    "contact": ("Contact", "Bodies that touch; :doc:`/how-to/contact-gallery` says what each "
+                "shows."),
     "engineering": ("Engineering", "Mechanisms that engineers know; "
                     ":doc:`/how-to/engineering-gallery` says what each shows."),
 }  # fmt: skip

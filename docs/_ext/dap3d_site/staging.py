@@ -18,6 +18,7 @@ ELSEWHERE = {
     "CONTRIBUTING.md": "contributing.md",
     "models/README.md": "reference/shipped-models.md",
     "models/benchmarks/README.md": "reference/reference-problems.md",
+    "models/contact/README.md": "reference/contact-models.md",
     "models/engineering/README.md": "reference/engineering-models.md",
 }
 #: The README is for who opens the repository; the site has pages of its own for what it says.

@@ -8,7 +8,6 @@ _DRAWING = "drawing"
 _SOFT = "softness of limits and equalities"
 _LAW = "the law of an actuator; one that is linear is an input, a spring and a damper"
 _FRAME = taken("pos quat axisangle xyaxes zaxis euler")
-_CLASS = taken("class")
 _ACTUATOR = (
     taken("name class joint jointinparent gear kp kv gaintype gainprm biastype biasprm dyntype")
     | taken("group")

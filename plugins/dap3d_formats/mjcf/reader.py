@@ -55,7 +55,7 @@ class MjcfReader:
     def __attrs_post_init__(self) -> None:
         root = self.document.root
         name = root.get("model") or self.document.source.path.stem
-        self.model = Articulation(name, fixed_base=True, place=root.place)
+        self.model = Articulation(name, fixed_base=True, base_meets=True, place=root.place)
         self.geoms = Geoms.of(self.document)
         self.given = set(_names(root))
 

@@ -96,4 +96,5 @@ SDF: Table = {
 CONTACTS: Table = {
     **SDF,
     "surface": moves("", "but mu of ode: contacts are rigid"), "plane": taken(), "normal": taken(),
+    "self_collide": taken(),
 }  # fmt: skip

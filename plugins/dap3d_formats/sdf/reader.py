@@ -1,6 +1,7 @@
 """Reads links, frames, nested and included models of SDF."""
 
 from collections.abc import Sequence
+from itertools import combinations
 from typing import Any
 
 from dap3d_core.interface.formats import (
@@ -32,8 +33,9 @@ class SdfReader:
         self.version = _version(root)
         self.frames = FrameGraph()
         self.model = Articulation(source.path.stem, gravity=(0.0, 0.0, -9.8), fixed_base=False,
-                                  place=root.place)  # fmt: skip
+                                  friction_of_pair=min, place=root.place)  # fmt: skip
         self.elements: list[tuple[XmlElement, str]] = []
+        self.self_collide: set[str] = set()
         self.static: list[str] = []  # what names of links in static models begin with
 
     def read_links(self) -> None:
@@ -112,6 +114,7 @@ class SdfReader:
             self.frames.attached[scope] = inner
         if canonical := element.get("canonical_link"):
             self.frames.attached[inner] = scoped(scope, canonical)
+        before = len(self.model.links)
         for child in element.all("link"):
             self._link(child, scope)
         for child in element.all("model"):
@@ -122,6 +125,9 @@ class SdfReader:
             self._frame(child, scope)
         for child in element.all("joint"):
             self._joint_frame(child, scope)
+        if not outer and text_of(element, "self_collide") not in ("true", "1"):
+            alone = [n for n in list(self.model.links)[before:] if n not in self.self_collide]
+            self.model.excluded += combinations(alone, 2)
         if text_of(element, "static") in ("true", "1"):
             self.remarks.translate(element.place, "a static model is a part of ground")
             self.static.append(scoped(scope, ""))
@@ -151,11 +157,14 @@ class SdfReader:
         self.frames.add(name, scoped(scope, relative or "__model__"), pose, element.place)
         link = Link(name, place=element.place)
         link.inertial = self._inertial(element)
-        tag = "visual" if element.all("visual") else "collision"
-        for shape in element.all(tag):
-            geometry = self._geometry(shape, collision=tag == "collision")
-            if geometry is not None:
-                link.geometries.append(geometry)
+        if text_of(element, "self_collide") in ("true", "1"):
+            self.self_collide.add(name)
+        both = self.source.contacts or not element.all("visual")
+        for tag in ("visual", "collision") if both else ("visual",):
+            for shape in element.all(tag):
+                geometry = self._geometry(shape, collision=tag == "collision")
+                if geometry is not None:
+                    link.geometries.append(geometry)
         self.model.links[name] = link
 
     def _inertial(self, link: XmlElement) -> Inertial:

@@ -75,11 +75,12 @@ class UrdfReader:
         inertial = element.first("inertial")
         if inertial is not None:
             link.inertial = self._inertial(inertial)
-        tag = "visual" if element.all("visual") else "collision"
-        for shape in element.all(tag):
-            geometry = self._geometry(shape, collision=tag == "collision")
-            if geometry is not None:
-                link.geometries.append(geometry)
+        both = self.source.contacts or not element.all("visual")
+        for tag in ("visual", "collision") if both else ("visual",):
+            for shape in element.all(tag):
+                geometry = self._geometry(shape, collision=tag == "collision")
+                if geometry is not None:
+                    link.geometries.append(geometry)
         self.model.links[name] = link
 
     def _inertial(self, element: XmlElement) -> Inertial | None:

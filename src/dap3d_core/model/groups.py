@@ -119,6 +119,8 @@ class Grouping:
     def groups(self, instances: Sequence[Instance], members: Sequence[int]) -> tuple[Group, ...]:
         """Sort instances by type, in the order in which types first appear.
 
+        Each joint that may be released is in a group of its own.
+
         Args:
             instances: checked elements, in file order.
             members: their places among all elements of the kind.
@@ -129,7 +131,8 @@ class Grouping:
         by_type: dict[Any, list[int]] = {}
         for place, instance in enumerate(instances):
             given = tuple((n, f.structure) for n, f in self._given(instance).items())
-            by_type.setdefault((instance.structure, given), []).append(place)
+            alone = None if instance.breaks_at is None else instance.name  # its loop may end
+            by_type.setdefault((instance.structure, given, alone), []).append(place)
         return _each(
             lambda places: self._group(
                 [instances[k] for k in places], [members[k] for k in places]

@@ -4,7 +4,7 @@ Coordinates stand in the state u in the order of the manual: r, p of every body,
 of every body.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -64,6 +64,7 @@ class Model:
         notes: what types warned about.
         contact_laws: (contacts,) law of impact of each point of contact; they are the last joints.
         collisions: the shapes that collide; None where there are none.
+        breaks: of joints that may be released, name -> N at which they break; inf: not by itself.
         motions: of the joints (assembly/motion); joint_angles: those that are counted. None until
             they are looked for.
     """
@@ -98,6 +99,7 @@ class Model:
     joint_angles: JointAngles | None = None
     contact_laws: tuple[str, ...] = ()
     collisions: CollisionShapes | None = None
+    breaks: Mapping[str, float] = attrs.Factory(dict)
 
     @property
     def contact_count(self) -> int:
@@ -366,6 +368,7 @@ def build_model(checked: ValidatedScene) -> Model:
         input_values=np.array(list(checked.inputs.values()), dtype=float),
         collisions=checked.collisions,
         contact_laws=tuple(contact.values["law"] for contact in checked.contacts),
+        breaks={j.name: j.breaks_at for j in checked.joints if j.breaks_at is not None},
     )
     for value in attrs.astuple(model, recurse=False):
         if isinstance(value, np.ndarray):

@@ -22,6 +22,7 @@ from dap3d_core.plot.style import (
     PANEL_HEIGHT,
     REAL_PART_ROUNDING,
     WIDTH,
+    OnePanel,
     Picture,
     PlainOffset,
     folded,
@@ -227,7 +228,7 @@ def show_plot(
     pyplot.close(figure)
 
 
-class EigenvaluePicture(Picture):
+class EigenvaluePicture(OnePanel):
     """The eigenvalues of a linearisation.
 
     Modes have their numbers; those that grow are drawn as crosses, to the right of the axis.
@@ -235,15 +236,6 @@ class EigenvaluePicture(Picture):
 
     def __init__(self, linearization: "Linearization") -> None:
         self.linearization = linearization
-
-    @property
-    def height(self) -> float:
-        """A suitable height of the figure, inches."""
-        return HEIGHT
-
-    def draw(self, figure: Figure) -> list[Axes]:
-        """Draw on an empty figure."""
-        return [self.draw_on(figure.add_subplot())]
 
     def draw_on(self, ax: Axes) -> Axes:
         """Draw on axes of the user."""

@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.plot.style import (
     DASHES,
-    HEIGHT,
     LETTERS,
     PALETTE,
     REAL_PART_ROUNDING,
+    OnePanel,
     Picture,
     folded,
     legend_above,
@@ -48,20 +48,11 @@ def modes_over_picture(
     return RootLocusPicture(modes) if EIGENVALUES in names else ModesOverPicture(modes)
 
 
-class ModesOverPicture(Picture):
+class ModesOverPicture(OnePanel):
     """Frequency of each mode over the parameter; crosses where its motion grows."""
 
     def __init__(self, modes: "ModesOver") -> None:
         self.modes = modes
-
-    @property
-    def height(self) -> float:
-        """A suitable height of the figure, inches."""
-        return HEIGHT
-
-    def draw(self, figure: Figure) -> list[Axes]:
-        """Draw on an empty figure."""
-        return [self.draw_on(figure.add_subplot())]
 
     def draw_on(self, ax: Axes) -> Axes:
         """Draw on axes of the user."""
@@ -82,7 +73,7 @@ class ModesOverPicture(Picture):
         return ax
 
 
-class RootLocusPicture(Picture):
+class RootLocusPicture(OnePanel):
     """Eigenvalues in the complex plane, coloured by the parameter.
 
     Circles are those at the first value, squares those at the last one; motions grow on the tinted
@@ -91,11 +82,6 @@ class RootLocusPicture(Picture):
 
     def __init__(self, modes: "ModesOver") -> None:
         self.modes = modes
-
-    @property
-    def height(self) -> float:
-        """A suitable height of the figure, inches."""
-        return HEIGHT
 
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw on an empty figure."""

@@ -45,6 +45,19 @@ class Picture(ABC):
         """Draw on axes of the user; a ValueError where the picture has several panels."""
 
 
+class OnePanel(Picture):
+    """A picture of one panel, which is drawn on axes."""
+
+    @property
+    def height(self) -> float:
+        """A suitable height of the figure, inches."""
+        return HEIGHT
+
+    def draw(self, figure: Figure) -> list[Axes]:
+        """Draw on an empty figure; returns its axes."""
+        return [self.draw_on(figure.add_subplot())]
+
+
 class PlainOffset(ScalarFormatter):
     """Shows factor and offset of the numbers of an axis as ``×10⁻⁹ + 43``."""
 

@@ -6,8 +6,9 @@ from typing import Any
 import attrs
 
 #: A switch that restarted the integration, or ended the run; an event that stopped it, was
-#: recorded, or changed parameters of a force or velocities; a jump of velocities by elements.
-KINDS = ("switch", "end", "stop", "record", "change", "jump")
+#: recorded, or changed parameters of a force or velocities; a jump of velocities by elements; a
+#: joint that has broken or was let go.
+KINDS = ("switch", "end", "stop", "record", "change", "jump", "break")
 #: The same of contacts (docs/concepts/contact.md).
 CONTACT_KINDS = ("touch", "impact", "lift", "slip", "stick", "rest", "jam")
 
@@ -21,8 +22,8 @@ class EventRecord:
     """A switch or an event at a located instant.
 
     Attributes:
-        name: of the event; of a switch ``force NAME`` or ``joint NAME``; of a jump those of all
-            elements whose impulses acted.
+        name: of the event; of a joint that breaks its own; of a switch ``force NAME`` or ``joint
+            NAME``; of a jump those of all elements whose impulses acted.
         t: s.
         direction: +1 if its function rose through its level, -1 if it fell; of a jump that of the
             first switch, 0 without one.
@@ -59,6 +60,8 @@ class EventRecord:
             of = [f", {element}.{n} = {_short(x)}" for element, new in self.states.items()
                   for n, x in new.items()]  # fmt: skip
             return f"t = {self.t:.9g} s: jump by {self.name}: work {self.work:.6g} J{''.join(of)}"
+        if self.kind == "break":
+            return f"t = {self.t:.9g} s: joint {self.name} ends"
         if self.kind in ("switch", "end"):
             way = f": its switch became {'positive' if self.direction > 0 else 'negative'}"
         else:

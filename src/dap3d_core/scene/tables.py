@@ -138,6 +138,8 @@ class Simulation:
 
 #: Keys of joints whose coordinate a contact limits (contacts/read_contacts.py).
 LIMITS = ("lower", "upper", "e")
+#: Key of joints that end where their force becomes larger (validate/joint_fields.py).
+BREAKS_AT = "breaks_at"
 HEADER_KEYS = frozenset({"name", "description", "schema"})
 #: Tables of the scene file with named entries, and the class of an entry.
 NAMED: dict[str, type] = {

@@ -352,7 +352,8 @@ class CompiledModel:
             SimulationError: the requested method does not fit the scene.
         """
         method, reason = choose_method(self.model, requested)
-        if requested != "auto" or not self.model.row_count or self.model.contact_count:
+        model = self.model
+        if requested != "auto" or not model.row_count or model.contact_count or model.breaks:
             return method, reason
         start = self._start_of_scene()
         if start is None:
@@ -383,7 +384,7 @@ class CompiledModel:
         """
         count, joints = self.model.body_count, len(self.model.joint_names)
         is_open = self.requested_method == "auto" and self._may_choose_joint
-        is_open = is_open and not self.model.iterated_forces
+        is_open = is_open and not (self.model.iterated_forces or self.model.breaks)
         if not is_open or not MANY_BODIES <= count >= joints > 0:
             return None
         with suppress(SimulationError):  # too many rows to keep, or no start

@@ -42,6 +42,16 @@ def refuse_collisions(model: Any, what: str) -> None:
             f"({model.collisions.names[0]}): leave collides = true out, or run the scene "
             "(simulate), which does"
         )
+    refuse_breaks(model, what)
+
+
+def refuse_breaks(model: Any, what: str) -> None:
+    """Refuse what does not know that joints break; as above."""
+    for joint in model.breaks:
+        raise SimulationError(
+            f"{what} does not take joints that may break yet, and the scene has some ({joint}): "
+            "leave breaks_at out, or run the scene (simulate), which does"
+        )
 
 
 class RedundantError(SimulationError):

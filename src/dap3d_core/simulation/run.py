@@ -16,7 +16,7 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import Computed, Result, ResultError, information
 from dap3d_core.scene import Mistake, SceneError, Simulation
-from dap3d_core.simulation.errors import RedundantError, SimulationError
+from dap3d_core.simulation.errors import RedundantError, SimulationError, refuse_breaks
 from dap3d_core.simulation.failure.refused_steps import refusal_notes
 from dap3d_core.simulation.failure.stepping import stepping_notes
 from dap3d_core.simulation.handover import (
@@ -69,6 +69,7 @@ class Run(RunState):
         """Write checkpoints next to the output; arguments and errors as of ``CheckpointWriter``."""
         from dap3d_core.simulation.checkpoint.save import CheckpointWriter
 
+        refuse_breaks(self.evaluator.model, "a checkpoint")
         self.checkpoint_writer = CheckpointWriter(self, seconds, force=force)
 
     def execute(self, restore: Callable[[RunState], None] | None = None) -> Result:
@@ -105,7 +106,7 @@ class Run(RunState):
             raise
         finally:
             if self.event_locator:
-                self.event_locator.numbers.put_back()
+                self.event_locator.put_back()
             if self.control is not None:
                 self.control.put_back()
         ended = self.present.status
@@ -144,7 +145,7 @@ class Run(RunState):
         self, settings: Simulation, limits: StepLimits | None, seconds: float
     ) -> Result:
         """The result of a second run with other settings and limits of its steps, in memory."""
-        events = self.event_locator.events if self.event_locator else ()
+        events = self.event_locator.of_script if self.event_locator else ()
         watch = ending_after(seconds, self.callbacks.watch)
         callbacks = attrs.evolve(self.callbacks, watch=watch)
         run = Run(self.compiled, settings, callbacks, events, limits=limits, start=self.start)
@@ -201,6 +202,10 @@ class Run(RunState):
             least = " (reported are those of least |lambda|)" if formulation.is_exact else ""
             unique = f"Accelerations are unique; reactions in these joints are not{least}"
         self.notes.append(f"{words}. {unique}")
+        if self.evaluator.model.breaks:
+            from dap3d_core.simulation.events.breaking import share_notes
+
+            self.notes += share_notes(self.evaluator.model, redundancy)
         if singular is not None:
             self.notes.append(singular.describe())
 
@@ -236,7 +241,7 @@ class Run(RunState):
             options = options | {
                 "stop_when_stiff": fits(IMPLICIT, evaluator.formulation)
                 and not self.shared_laws
-                and not evaluator.model.contact_count
+                and not (evaluator.model.contact_count or evaluator.model.breaks)
             }
         try:
             integration = integrator.make(evaluator, y0, self.times, **options)

@@ -17,6 +17,7 @@ from dap3d_core.result import EventRecord, RunMetadata, RunStatistics, informati
 from dap3d_core.result.contact_table import ContactTable, no_contacts
 from dap3d_core.scene import MISSING, Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.errors import refuse_breaks
 from dap3d_core.simulation.events.event import Event, check_every
 from dap3d_core.simulation.events.locate import EventLocator
 from dap3d_core.simulation.initial.tolerances import atol_notes, resolved_atol
@@ -118,11 +119,11 @@ class RunState:
         self.crossed: list[float] = []
         self.until = np.inf
         self.options: dict[str, Any] = {}
-        self.event_locator = EventLocator(compiled, events) if events else None
-        if self.event_locator is not None:
-            check_every(self.event_locator.events, self.t_end)
+        watches = bool(events or compiled.model.breaks)
+        self.event_locator = EventLocator(compiled, events) if watches else None
         self.jumps = jumps_of(self.evaluator, self.settings)
         if self.event_locator is not None:
+            check_every(self.event_locator.events, self.t_end)
             self.event_locator.jumps = self.jumps
         self.programs = ChangeOver(self.evaluator)
         self.control: SampledControl | None = None
@@ -168,7 +169,7 @@ class RunState:
         if self.limits is not None:
             integration.work.longest_step = self.limits.longest
         if self.event_locator is not None:
-            integration.follow_steps()
+            integration.work.follows_steps = 1  # dense output, for ``state_within``
         before = time.perf_counter()
         integration.compile()
         spent = time.perf_counter() - before
@@ -265,7 +266,10 @@ def jumps_of(evaluator: Evaluator, settings: Simulation) -> "Jumps | None":
 
     Raises:
         SceneError: elements change velocities by laws that steps of contacts do not know.
+        SimulationError: joints may break, which these steps do not know either.
     """
+    if integrator_named(settings.integrator).steps_contacts:
+        refuse_breaks(evaluator.model, "time stepping")
     jumping = [switch for switch in evaluator.switches if switch.jumps]
     if not jumping:
         return None

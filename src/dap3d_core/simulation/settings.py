@@ -83,7 +83,8 @@ def contact_engine_reason(model: Model, contact: str) -> str:
     if contact == "stepping" and (model.contact_count or model.collisions is not None):
         return "asked for"
     if contact == "auto" and model.collisions is not None:
-        return f"{len(set(model.collisions.names))} shapes may meet anywhere"
+        count = len(set(model.collisions.names))
+        return f"{count} shape{'s' * (count != 1)} may meet anywhere"
     points = Counter(name.partition("#")[0] for name in model.contact_names)
     closed = sum(min(count, MOST_CLOSED) for count in points.values())
     if contact == "auto" and closed > MOST_BY_EVENTS and not _sticking(model):

@@ -12,7 +12,7 @@ from dap3d_core.interface.fields import specs_of
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Instance, Mistake, Scene, SceneError, Simulation, ValidatedScene
 from dap3d_core.scene.coerce import canonical
-from dap3d_core.scene.tables import NAMED, Element
+from dap3d_core.scene.tables import LIMITS, NAMED, Element
 from dap3d_core.settings import SETTINGS
 
 AXES = ("x", "y", "z")
@@ -259,9 +259,16 @@ def _fields(checked: ValidatedScene, path: tuple[str, ...]) -> Iterator[_Field]:
     holder = _holder(checked.scene, (*path, ""))
     if isinstance(holder, Element):
         instances: list[Instance] = getattr(checked, table)
+        if table == "forces":  # those that are rigid, or stick, are contacts
+            instances = [*instances, *checked.contacts]
         # of a contact of several points, NAME#1 and so on, the first
         instance = next(one for one in instances if one.name.partition("#")[0] == path[1])
         yield from _element_fields(holder, path, instance)
+        type_: Any = instance.type_info.type
+        for name in LIMITS if table == "joints" and type_.limit else ():
+            unit = "1" if name == "e" else "rad" if type_.coordinate == "angle" else "m"
+            if _is_numeric(value := holder.fields.get(name)):
+                yield _Field((*path, name), value, unit)
         return
     if isinstance(holder, dict):
         for name, value in holder.items():

@@ -43,14 +43,21 @@ ENGINEERING = (
     "two_link_arm",
     "wiper",
 )
-ALL = (*NAMES, *BENCHMARKS, *ENGINEERING)
+#: Scenes of contacts.
+CONTACT = ("cradle", "domino_row", "gripper", "marble_run", "quadruped")
+#: The folder of each model that is in one.
+GROUPS = {
+    **dict.fromkeys(BENCHMARKS, "benchmarks"),
+    **dict.fromkeys(ENGINEERING, "engineering"),
+    **dict.fromkeys(CONTACT, "contact"),
+}
+ALL = (*NAMES, *GROUPS)
 PRINTED = ("specification", "benchmarks")  # sources that are no script of this folder
 
 
 def folder_of(model: str) -> Path:
     """Return the folder of a model."""
-    group = "benchmarks" if model in BENCHMARKS else "engineering" if model in ENGINEERING else ""
-    return MODELS / group / model
+    return MODELS / GROUPS.get(model, "") / model
 
 
 def reference(model: str) -> Any:

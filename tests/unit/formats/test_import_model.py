@@ -1,5 +1,7 @@
 """Models of other programs as scenes: what is common to all formats."""
 
+from itertools import combinations
+
 import numpy as np
 import pytest
 from support.process import REPOSITORY
@@ -311,3 +313,64 @@ def test_a_spring_by_a_time_constant_needs_a_mass(tmp_path):
     assert any("springdamper: links without mass" in one.text for one in report.left_out)
     with pytest.raises(dap.SceneError, match="both numbers of springdamper are above 0"):
         imported(tmp_path, LINE.format(first='springdamper="0.1 0"', second=""))
+
+
+SOLID = "<inertial><mass>1</mass></inertial>"
+SDF = f"""<sdf version="1.9"><world name="w">
+<model name="floor"><static>true</static><link name="l">
+<collision name="c"><geometry><plane><normal>0 0 1</normal></plane></geometry>
+<surface><friction><ode><mu>0.4</mu></ode></friction></surface></collision></link></model>
+<model name="ball"><link name="l">{SOLID}
+<visual name="v"><geometry><sphere><radius>2</radius></sphere></geometry></visual>
+<collision name="c"><geometry><sphere><radius>1</radius></sphere></geometry></collision>
+</link></model></world></sdf>"""
+
+
+def test_collisions_of_sdf_meet_beside_what_is_seen(tmp_path):
+    """The smaller friction of a pair holds, as in Gazebo's ODE and in DART."""
+    (tmp_path / "a.sdf").write_text(SDF)
+    scene, _ = dap.import_model(tmp_path / "a.sdf", contacts=True)
+    floor, seen, ball = (shape.fields for shape in scene.shapes.values())
+    assert (seen["radius"], seen.get("collides")) == (2.0, None)
+    assert (ball["radius"], ball["collides"], floor["collides"]) == (1.0, True, True)
+    (pair,) = (m.with_ for m in scene.materials.values() if m.with_)
+    assert [one["mu"] for one in pair.values()] == [0.4]
+    scene, _ = dap.import_model(tmp_path / "a.sdf")
+    assert [shape.fields["radius"] for shape in scene.shapes.values()] == [2.0]
+
+
+BALL = "<collision name='c'><geometry><sphere><radius>1</radius></sphere></geometry></collision>"
+CHAIN = f"""<sdf version="1.9"><world name="w">
+<model name="floor"><static>true</static><link name="l">{BALL}</link></model>
+<model name="m"><joint name="f" type="fixed"><parent>world</parent><child>base</child></joint>
+<link name="base">{BALL}</link><link name="arm">{SOLID}{BALL}</link>
+<link name="tip">{SOLID}{BALL}</link>
+<joint name="j" type="ball"><parent>base</parent><child>arm</child></joint>
+<joint name="k" type="ball"><parent>arm</parent><child>tip</child></joint>
+%s</model></world></sdf>"""
+#: Links of a model by itself, and with links that collide: which pairs of shapes meet.
+MEET = {
+    "": {("floor", "arm"), ("floor", "tip")},
+    "<self_collide>true</self_collide>": {("floor", "arm"), ("floor", "tip"), ("base", "tip")},
+}
+
+
+@pytest.mark.parametrize("self_collide", MEET)
+def test_links_stay_apart_from_a_base_that_does_not_move(tmp_path, self_collide):
+    """They meet what else is of ground; joined links never meet, nor any of a model by itself."""
+    (tmp_path / "a.sdf").write_text(CHAIN % self_collide)
+    scene, _ = dap.import_model(tmp_path / "a.sdf", contacts=True)
+    shapes = {name.split("::")[0 if "floor" in name else 1].removesuffix("_sphere"): shape.fields
+              for name, shape in scene.shapes.items()}  # fmt: skip
+    apart = {frozenset(pair) for pair in scene.collisions.exclude} | {
+        frozenset(("m::arm", "m::tip"))
+    }
+    meeting = set()
+    for (a, one), (b, other) in combinations(shapes.items(), 2):
+        (group, meets), (group_2, meets_2) = (
+            (s.get("group", 1), s.get("meets", 1)) for s in (one, other)
+        )
+        bodies = frozenset((one["body"], other["body"]))
+        if len(bodies) == 2 and bodies not in apart and group & meets_2 | group_2 & meets:
+            meeting.add((a, b))
+    assert meeting == MEET[self_collide]

@@ -227,6 +227,10 @@ def test_sub_assemblies_within_one_another(folder):
         ('[include.a]\nfile = "parts/leg.toml"\nplace = 1\n', r":3: include.a.place.*unknown key"),
         ('[include.a]\nfile = "parts/leg.toml"\nat = 1\n', r":3: include.a.at.*a table"),
         ("[include]\na = 1\n", r"\[include.a\]"),
+        (
+            '[include.a]\nfile = "parts/leg.toml"\n[outputs]\nx = "a/rod.r.x"\n',
+            r":4: outputs.x.*sub-assembly 'a' .*in quotes: 'a/rod.r.x'",
+        ),
     ],
 )
 def test_mistakes_are_located(folder, text, words):

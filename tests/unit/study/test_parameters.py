@@ -1,6 +1,7 @@
 """Parameters of a scene by their names."""
 
 import attrs
+import numpy as np
 import pytest
 
 import dap3d_core as dap
@@ -161,3 +162,18 @@ def test_names_go_on_part_by_part(checked):
     assert sorted(reached) == sorted(n.name for n in all_parameters(checked))
     assert names_under(checked, "bodies.rod.r") == ["bodies.rod.r.", "bodies.rod.r_dot."]
     assert names_under(checked, "bodies.none.") == names_under(checked, "none.") == []
+
+
+def test_numbers_of_what_sticks_and_of_limits():
+    """Friction that sticks and limits are contacts, and have their numbers as other elements."""
+    scene = dap.Scene(name="slider")
+    scene.add_body("b", mass=2.0, r_dot=(1.0, 0.0, 0.0))
+    scene.add_joint("tran", "rail", P_i="b.O", P_j="ground.O", a_j="ground.x", upper=0.1, e=0.5)
+    scene.add_force("tran_friction", "rub", joint="rail", f_c=2.0)
+    found = parameters_named(
+        check(scene, dap.load_registry()), ["forces.rub.f_c", "joints.rail.upper", "joints.rail.e"]
+    )
+    assert [(one.value, one.unit) for one in found] == [(2.0, "N"), (0.1, "m"), (0.5, "1")]
+    # v^2 = 1 - 2 a 0.1 at the stop, e^2 of it behind, and e^2 (1 / (2 a) - 0.1) to where it rests
+    by = dap.sensitivities(scene, [one.name for one in found], t_end=2.0, dt=1.0).final("b.r.x")
+    np.testing.assert_allclose(by, (0.25 / 4.0, 1.25, -2 * 0.5 * 0.4), atol=1e-7)

@@ -17,7 +17,12 @@ from dap3d_core.formats.import_scene.rigid_groups import (
     rigid_groups,
 )
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
-from dap3d_core.formats.import_scene.shapes import MeshFiles, add_collisions, add_shapes
+from dap3d_core.formats.import_scene.shapes import (
+    MeshFiles,
+    add_collisions,
+    add_shapes,
+    bits_beside_ground,
+)
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.formats.import_scene.start import couples, start_of
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Link
@@ -119,9 +124,10 @@ def scene_of(
             _add_body(builder, group, placed[group.name])
     _add_gravity(scene, model.gravity)
     _add_joints(builder, model)
+    bits = bits_beside_ground(builder, model) if options.contacts else {}
     for group in groups.values():
         for link, _ in group.links:
-            add_shapes(builder, link, MeshFiles() if meshes is None else meshes)
+            add_shapes(builder, link, MeshFiles() if meshes is None else meshes, bits)
     if options.contacts:
         add_collisions(builder, model)
     return scene

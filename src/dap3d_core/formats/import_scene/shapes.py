@@ -1,6 +1,7 @@
 """Shapes of links as shapes of a scene."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from dap3d_core.interface.formats.articulation import (
     Link,
 )
 from dap3d_core.interface.formats.frames import Frame, quaternion
+from dap3d_core.scene.tables import GROUND
 from dap3d_core.scene.validate.shapes import MESHES
 
 #: Folder of the meshes next to a scene.
@@ -49,10 +51,12 @@ def _plain(stem: str) -> str:
     return "".join(c if c.isalnum() or c in "-_" else "_" for c in stem)
 
 
-def add_shapes(builder: SceneBuilder, link: Link, meshes: MeshFiles) -> None:
+def add_shapes(
+    builder: SceneBuilder, link: Link, meshes: MeshFiles, bits: Mapping[str, tuple[int, int]]
+) -> None:
     """Add the shapes of a link: those that are seen, or of contacts where it has no others.
 
-    And those that meet others.
+    And those that meet others; bits: ``bits_beside_ground``.
     """
     seen = [shape for shape in link.geometries if not shape.collision] or link.geometries
     for shape in link.geometries:
@@ -61,18 +65,58 @@ def add_shapes(builder: SceneBuilder, link: Link, meshes: MeshFiles) -> None:
         body, at = builder.attached(link.name, shape.pose)
         for keyword, fields in _shapes(builder, shape, at, meshes):
             name = builder.names.free("shapes", f"{usable(link.name)}_{keyword}")
-            given = fields | _meeting(builder, shape.contact)
+            given = fields | _meeting(builder, shape.contact, bits.get(link.name))
             builder.scene.add_shape(keyword, name, body=body, color=shape.color or None, **given)
 
 
-def _meeting(builder: SceneBuilder, contact: Contact | None) -> dict[str, Any]:
-    """Fields of a shape that meets others."""
+def _meeting(
+    builder: SceneBuilder, contact: Contact | None, bits: tuple[int, int] | None
+) -> dict[str, Any]:
+    """Fields of a shape that meets others; bits: in place of its own."""
     if contact is None:
         return {}
     key = (contact.mu, contact.smooth)
     name = builder.surfaces.setdefault(key, f"surface{len(builder.surfaces) + 1}")
-    bits = {"group": contact.group, "meets": contact.meets}
-    return {"collides": True, "material": name} | {n: x for n, x in bits.items() if x != 1}
+    group, meets = bits or (contact.group, contact.meets)
+    given = {"group": group, "meets": meets}
+    return {"collides": True, "material": name} | {n: x for n, x in given.items() if x != 1}
+
+
+def bits_beside_ground(builder: SceneBuilder, model: Articulation) -> dict[str, tuple[int, int]]:
+    """(group, meets) of links that do not move and of those that stay apart from them.
+
+    ``exclude`` of bodies would keep the latter from all of ground, a floor too. Each set of links
+    that do not move has a bit of its own, 4 and on, and those that move and do not meet all of
+    them have 2; so both meet what has the usual bits, 1 and 1.
+    """
+    if model.base_meets:
+        return {}
+    apart: dict[str, set[str]] = {}
+    for pair in (*model.excluded, *_joined(model)):
+        groups = [builder.member[link][0] for link in pair]
+        for link, (own, other) in zip(pair, (groups, groups[::-1]), strict=True):
+            if own == WORLD != other and link != WORLD:
+                apart.setdefault(link, set()).add(other)
+    kinds = list(dict.fromkeys(frozenset(others) for others in apart.values()))
+    bits = {link: (4 << kinds.index(frozenset(others)), 1) for link, others in apart.items()}
+    for link, (group, _) in builder.member.items():
+        met = [k for k, others in enumerate(kinds) if group not in others]
+        if group != WORLD and len(met) < len(kinds):
+            bits[link] = (2, 3 + sum(4 << k for k in met))
+    return bits
+
+
+def _joined(model: Articulation) -> Iterator[tuple[str, str]]:
+    """Pairs of links that a joint holds together, through links that are fixed to one of them."""
+    held: dict[str, set[str]] = {name: {name} for name in model.links}
+    for joint in model.joints.values():
+        if joint.kind == "fixed" and WORLD not in (joint.parent, joint.child):
+            together = held[joint.parent] | held[joint.child]
+            for name in together:
+                held[name] = together
+    for joint in model.joints.values():
+        if joint.kind not in ("fixed", "free") and WORLD not in (joint.parent, joint.child):
+            yield from product(held[joint.parent], held[joint.child])
 
 
 def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
@@ -80,13 +124,15 @@ def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
     surfaces = list(builder.surfaces.items())
     for k, ((mu, smooth), name) in enumerate(surfaces):
         pairs = {
-            other: {"mu": 0.0 if smooth and and_smooth else max(mu, mu_other)}
+            other: {"mu": 0.0 if smooth and and_smooth else model.friction_of_pair(mu, mu_other)}
             for (mu_other, and_smooth), other in surfaces[k + 1 :]
         }
         given: dict[str, Any] = {"with_": pairs} if pairs else {}
         builder.scene.add_material(name, mu=0.0 if smooth else mu, **given)
     bodies = [tuple(builder.bodies[builder.member[link][0]] for link in pair)
               for pair in (*model.excluded, *_beyond_rows(model))]  # fmt: skip
+    if not model.base_meets:  # of those that do not move by bits
+        bodies = [pair for pair in bodies if GROUND not in pair]
     apart = dict.fromkeys(tuple(sorted(pair)) for pair in bodies if pair[0] != pair[1])
     builder.scene.add_collisions(exclude=tuple(apart))
 

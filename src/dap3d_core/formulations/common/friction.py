@@ -26,6 +26,8 @@ SETTLED = 1e-10
 PASSES = 25
 #: Differences of passes that are kept of forces on reactions; then they begin anew.
 DEPTH = 8
+#: Of a difference made orthogonal to the earlier ones, less than this part (squared) is rounding.
+DIFFERENCE_ROUNDING = 1e-12
 
 
 def forces_by(t: float, system: System, loops: Any, Lam: Floats) -> Floats:
@@ -126,7 +128,8 @@ def accelerate_fixed_point(system: System, passes: int) -> bool:
 def keep_difference(x: Floats, memory: Floats, last: int) -> None:
     """Keep the differences from the pass before, of changes and results, as pair ``last``.
 
-    Those of changes are made orthogonal to the earlier ones.
+    Those of changes are made orthogonal to the earlier ones; where they depend on them nothing but
+    rounding is left, which projections would magnify: the pair is zero.
     """
     rows = x.shape[0]
     guess, result, change = memory[:rows], memory[rows : 2 * rows], memory[2 * rows : 3 * rows]
@@ -134,12 +137,25 @@ def keep_difference(x: Floats, memory: Floats, last: int) -> None:
     mine, moved = memory[o : o + rows], memory[o + rows : o + 2 * rows]
     for k in range(rows):
         mine[k], moved[k] = x[k] - guess[k] - change[k], x[k] - result[k]
+    whole = squares(mine)
     for q in range(last):
         o = (3 + 2 * q) * rows
         share = projection(mine, memory[o : o + rows])
         for k in range(rows):
             mine[k] -= share * memory[o + k]
             moved[k] -= share * memory[o + rows + k]
+    if not squares(mine) > DIFFERENCE_ROUNDING * whole:
+        zero(mine)
+        zero(moved)
+
+
+@compiled
+def squares(a: Floats) -> float:
+    """A . a."""
+    total = 0.0
+    for k in range(a.shape[0]):
+        total += a[k] * a[k]
+    return total
 
 
 @compiled

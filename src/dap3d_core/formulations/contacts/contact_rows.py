@@ -27,6 +27,7 @@ class ContactTable:
         mu, mu_s, e: (m,) coefficients of friction and restitution.
         newton: (m,) True where the law of impact is Newton's.
         turns: (m,) 1 of those whose gap or slip is an angle, 0 of others.
+        movable: (m,) True of those that a scene may have moved until they touch.
         load: (m,) 1 of friction that is the same under any load, of which mu is the size; else 0.
         mode, way, near: (m,), (m, 3), (m, 3) where each has them among the states of elements.
     """
@@ -40,6 +41,7 @@ class ContactTable:
         self.turns, self.load = np.zeros((2, self.count))
         self.newton = np.array([law == "newton" for law in model.contact_laws], dtype=bool)
         self.numbers = {name: np.zeros(self.count) for name in ("mu", "mu_s", "e")}
+        self.movable = np.array(["#" not in name for name in self.names], dtype=bool)
         self.mode = np.zeros(self.count, dtype=np.int64)
         self.switches: Integers = np.zeros((self.count, 2), dtype=np.int64)
         self._loops = []
@@ -48,6 +50,7 @@ class ContactTable:
             which, layout = group.members - first, group.type_info.layout
             type_: Any = group.type_info.type
             self.turns[which], self.load[which] = type_.at is None, type_.along is not None
+            self.movable[which] &= not type_.is_smooth
             for name, values in self.numbers.items():
                 values[which] = group.numbers[:, layout.numbers[name][0]]
             self.mode[which] = [places[self.names[k], "mode"] for k in which]

@@ -3,8 +3,6 @@
 # What a compiled function returns is Any to mypy.
 # mypy: disable-error-code="no-any-return"
 
-from typing import Any
-
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -20,40 +18,25 @@ ZERO = 1e-12
 SWEEPS = 60
 
 
-def row_impulses(A: Floats, b: Floats, pushes: Any) -> Floats:
-    """Impulses Lambda (m,) of rows with A Lambda = b; of those that push 0 <= Lambda.
-
-    Where a row that pushes would have to pull, it is left alone and its rate changes by more than
-    b asks for: 0 <= Lambda, 0 <= A Lambda - b, and one of both is zero (Moreau's law). Rows that
-    depend on each other share their impulse, by the least sum of squares.
-
-    Args:
-        A: (m, m) symmetric, positive semidefinite: changes of the rows' rates by unit impulses;
-            for rows that have unit length in the metric of the masses.
-        b: (m,) wanted changes.
-        pushes: (m,) truth values.
-    """
-    m = len(b)
-    x = np.zeros((4, m))
-    x[0] = b
-    of = np.array(pushes, dtype=np.int64)
-    find_impulses(m, np.ascontiguousarray(A), x, of, np.zeros(m, np.int64), np.zeros((2, m, m)))
-    return x[1]
-
-
 @compiled
 def find_impulses(
     m: int, A: Floats, x: Floats, pushes: Integers, acts: Integers, space: Floats
 ) -> None:
-    """The impulses of the first m rows.
+    """The impulses Lambda of the first m rows, with A Lambda = b; of those that push 0 <= Lambda.
 
-    Where the least solution pulls, by the active sets of Lawson and Hanson (Solving Least Squares
-    Problems, 23); rows that may pull are always in them.
+    Where a row that pushes would have to pull, it is left alone and its rate changes by more than
+    b asks for: 0 <= Lambda, 0 <= A Lambda - b, and one of both is zero (Moreau's law). Rows that
+    depend on each other share their impulse, by the least sum of squares. Where the least solution
+    pulls, by the active sets of Lawson and Hanson (Solving Least Squares Problems, 23); rows that
+    may pull are always in them.
 
     Args:
         m: number of rows.
-        A, pushes: of these rows, as in ``row_impulses``.
-        x: row 0 is b, row 1 becomes the impulses, the others are scratch.
+        A: (m, m) symmetric, positive semidefinite: changes of the rows' rates by unit impulses;
+            for rows that have unit length in the metric of the masses.
+        x: (4, m); row 0 is b, the wanted changes, row 1 becomes the impulses, the others are
+            scratch.
+        pushes: (m,) 1 of rows that push, 0 of others.
         acts, space: scratch, (m,) and (2, m, m).
     """
     largest = 0.0

@@ -68,16 +68,22 @@ _making = threading.Lock()
 class ChangeOver:
     """The programs of an evaluator, for its integrations."""
 
-    def __init__(self, evaluator: Any, varied: "Varied" = None) -> None:
-        """Args: the evaluator; numbers that differ from run to run (symbolic_arrays.py)."""
+    def __init__(self, evaluator: Any, varied: "Varied" = None, count: int = 1) -> None:
+        """Args:
+        evaluator: whose functions programs stand for.
+        varied: numbers that differ from run to run, or have derivatives (symbolic_arrays.py).
+        count: numbers for each float of the functions: more than one where they are differentiated.
+        """
         model = evaluator.model
-        self._evaluator, self._varied = evaluator, varied
+        self._evaluator, self._varied, self._count = evaluator, varied, count
         self._name: str | None = None
         #: Constants of the programs: where they stand, and their numbers.
         self._parts: list[tuple[Floats, Integers]] = []
         self._constants = b""
-        self._key = evaluator.method, model.body_count, model.row_count, len(evaluator.loop_groups)
-        takes_one = not model.contact_count  # their friction is solved for, in passes
+        sizes = model.body_count, model.row_count, len(evaluator.loop_groups)
+        self._key = evaluator.method, *sizes, count
+        # friction of contacts is solved for, in passes; joints may break
+        takes_one = not (model.contact_count or model.breaks)
         self._is_open = jit_is_on() and takes_one and 0 < model.body_count <= MOST_BODIES
 
     def during(self, integration: Any, run: "Callable[[], object]") -> None:
@@ -91,7 +97,7 @@ class ChangeOver:
             return work.rhs_count, work.projection_count
 
         if self._is_open and integration.takes_programs:
-            addresses = integration.functions.addresses
+            addresses = self._evaluator.functions.addresses
             self.call(run, addresses, lambda: (integration.t, integration.trial), counts)
         else:
             run()
@@ -187,7 +193,7 @@ class ChangeOver:
             else:
                 others = (record.anew[1],)
             text, written = scene_program.write_programs(
-                evaluator, name, *place, self._varied, others
+                evaluator, name, *place, self._varied, others, self._count
             )
             if BESIDE and path is not None and optimiser.request(text, written, path):
                 record.is_requested = True

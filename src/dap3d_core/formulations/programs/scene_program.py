@@ -22,6 +22,7 @@ from dap3d_core.formulations.programs.ways import Results, merged
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler import types as t
+from dap3d_core.kernels.compiler.derivatives import differentiate
 from dap3d_core.kernels.compiler.straight_line import Item, StraightLine
 from dap3d_core.kernels.compiler.trace import Symbol, TraceError
 from dap3d_core.kernels.compiler.units import Entry
@@ -236,11 +237,13 @@ def write_programs(
     state: Floats,
     varied: Varied = None,
     others: Sequence[Floats] | None = None,
+    count: int = 1,
 ) -> tuple[str, list[int]]:
     """LLVM IR of the programs of a scene, and the indices of their functions.
 
     All but the right-hand side are left out where they would be too long. With projections comes
-    ``BEHIND``.
+    ``BEHIND``; in differentiated form alone, as a projection that changes no value may change
+    slopes, by other ways to other ones.
 
     Args:
         evaluator: of the scene, as a run begins.
@@ -248,6 +251,7 @@ def write_programs(
         time, state: where branches are decided.
         varied: as of ``constants``.
         others: of projections, as of ``merged`` (ways.py), unless that were too long.
+        count: numbers for each float of the functions: a value, and its derivatives.
 
     Raises:
         TypeError, ValueError, ArithmeticError: the scene has none; says why.
@@ -268,6 +272,8 @@ def write_programs(
             texts.append(_BEHIND.format(name=behind, head=head, rhs=general[RHS], size=state.size,
                                         **given))  # fmt: skip
             written.append(BEHIND)
+            if count > 1:
+                continue
         of = evaluator, k, time, state, names, head, varied, None
         for ways in (None,) if others is None or k != PROJECT else (others, None):
             try:
@@ -281,7 +287,8 @@ def write_programs(
             needs |= needed
             break
     declared = [f"declare void @{symbol}({ARGUMENTS})" for symbol in general.values()]
-    return "\n".join([*needs.values(), *declared, *texts, _WEIGHTS]), written
+    text = "\n".join([*needs.values(), *declared, *texts, _WEIGHTS])
+    return text if count == 1 else differentiate(text, count), written
 
 
 def load_programs(

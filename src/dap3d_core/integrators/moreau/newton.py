@@ -31,7 +31,7 @@ INNER = 1e-2
 TINY = 1e-300
 #: Unknowns up to which all matrices are dense, so small that numpy starts no threads; and up to
 #: which that of a pass is: scalar elimination is quicker then.
-SMALL, DENSE = 36, 150
+SMALL, DENSE = 60, 150
 
 
 def project(z: Floats, mu: Floats) -> Floats:

@@ -60,6 +60,10 @@ class Problem:
         found: Floats = np.einsum("mrk,mk->mr", self._J.reshape(-1, 3, 12), both)
         return found
 
+    def work_of_joints(self, v: Floats) -> float:
+        """Work of the joints' impulses on bodies of velocities (n + 1, 6), J: that of drivers."""
+        return float(self.y @ (self._D @ v[1:].ravel()))
+
     def change(self) -> Floats:
         """(n + 1, 6) changes of velocity by the impulses."""
         found = np.zeros(self._inverse.shape[:2])

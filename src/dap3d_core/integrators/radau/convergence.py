@@ -11,8 +11,8 @@ from dap3d_core.kernels.runtime.cache import compiled
 
 #: An iteration that converges slower than this does not.
 SLOWEST = 0.99
-#: A change of this many roundings is none; and the loosest limit, as part of the tolerance.
-ROUNDINGS, LOOSEST = 10.0, 0.1
+#: A change of this many roundings is none.
+ROUNDINGS = 10.0
 #: Where multipliers fall by this much in an iteration the stages are yet to follow them.
 SETTLING = 0.1
 #: Changes up to this many roundings of a state show no rate of convergence.

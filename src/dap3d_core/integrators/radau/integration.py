@@ -2,7 +2,7 @@
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -35,10 +35,10 @@ from dap3d_core.integrators.stepping.integration import Integration, Refusals
 from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, restored
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
 from dap3d_core.kernels.array_types import Integers
+from dap3d_core.kernels.compiler.types import FLOAT, Signature
 from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import (
     LOOP_LIST,
-    number_signature,
     procedure_signature,
 )
 from dap3d_core.linear.lu.plan import LuPlan, StateNode, make_lu_plan
@@ -59,14 +59,6 @@ LOOSER = 3.0
 OF_STATES = ("tangent.states.", "matrix.state_")
 #: Arrays that each tangent writes before it reads them.
 SCRATCH = ("tangent.wide.", *(f"tangent.{name}" for name in OF_LOOPS))
-
-
-class Effort(NamedTuple):
-    """Counts of an implicit integration besides those of ``Statistics``."""
-
-    iterations: int
-    jacobians: int
-    factorisations: int
 
 
 def make_matrix(evaluator: Evaluator, tangent: Any) -> tuple[StageMatrix, LuPlan]:
@@ -282,7 +274,8 @@ class RadauIntegration(Integration):
         """
         kinds = (RadauState.type_of(), System.type_of(), LOOP_LIST, *self.tangent_kinds)
         tangents = table_of(procedure_signature(*kinds), (self.parts[0],), values_alone=True)
-        return table_of(number_signature(*kinds), self.parts[1:]), tangents
+        signature = Signature((FLOAT, FLOAT, *kinds), FLOAT)
+        return table_of(signature, self.parts[1:]), tangents
 
     @property
     def loop_arguments(self) -> tuple[Any, ...]:
@@ -332,14 +325,6 @@ class RadauIntegration(Integration):
     def dy_dt(self) -> Any:
         """As ``Integration.dy_dt``."""
         return self.work.state[at.SLOPE].copy() if self.work.first_stage_valid else None
-
-    @property
-    def effort(self) -> Effort:
-        """Counts of iterations, Jacobians and factorisations so far."""
-        work = self.work
-        return Effort(
-            int(work.iteration_count), int(work.jacobian_count), int(work.factorisation_count)
-        )
 
     @property
     def refusals(self) -> Refusals:

@@ -76,7 +76,8 @@ def find_rate_tangent(
     for k in range(y.shape[0]):
         y[k] = work.state[Y, k] + work.Z[work.stages - 1, k]
     rhs(at, y, f, system, loops)
-    finite, trials = True, 2 * LEVELS if bends[0] >= MAY_BEND else 1
+    trials = 2 * LEVELS if bends[0] >= MAY_BEND else 1
+    finite = abs(f[J.shape[0]]) < math.inf
     for j in range(J.shape[0]):
         now, is_rate = y[j], j >= work.counts[0]
         least = 0.0 if j >= work.counts[0] + work.counts[1] else length
@@ -85,6 +86,7 @@ def find_rate_tangent(
         for trial in range(trials):
             y[j] = now + (step if trial % 2 == 0 else -step)
             rhs(at, y, changed, system, loops)
+            finite = finite and abs(changed[J.shape[0]]) < math.inf  # no power where forces jam
             slope = 0.0
             for i in range(J.shape[0]):
                 changed[i] = (changed[i] - f[i]) / (y[j] - now)
@@ -240,12 +242,8 @@ def measure_rate_noise(
     functions: Any,
 ) -> float:  # fmt: skip
     """As ``measure_stage_noise``."""
-    rhs, y, argument, noise = (
-        functions[0],
-        work.state[Y],
-        work.state[SCRATCH],
-        work.tolerance[NOISE],
-    )
+    rhs, y, argument = functions[0], work.state[Y], work.state[SCRATCH]
+    noise = work.tolerance[NOISE]
     m, size = method_index(work.stages), 0.0
     for i in range(work.stages):
         size += ROUNDINGS * abs(work.method.e[m, i]) / h

@@ -279,10 +279,6 @@ class Integration(Restorable):
         """Let the next step start anew: what the functions compute has changed."""
         restart(self.work)
 
-    def follow_steps(self) -> None:
-        """Prepare dense output of each step, for ``state_within``."""
-        self.work.follows_steps = 1
-
     def state_within(self, t: float) -> Floats | None:
         """(n,) state at a time within the last step, by its dense output; None where it has none.
 

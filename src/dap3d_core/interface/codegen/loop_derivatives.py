@@ -77,9 +77,8 @@ class _Instances:
         self.idx, self._places = idx.copy(), 0
         self.at: dict[tuple[str, int], Integers] = {}
         self.seeds: list[_Seed] = []
-        self._arrays: dict[str, Any] = {
-            n: getattr(arrays, n) for n in ("body", "F", "par", "states")
-        }
+        names = ("body", "F", "par", "states")
+        self._arrays: dict[str, Any] = {name: getattr(arrays, name) for name in names}
         self._arrays["multipliers"] = np.zeros(0) if multipliers is None else multipliers
 
     def part(self, name: str, column: int, length: int = 1) -> None:
@@ -169,11 +168,8 @@ def differentiate_loop(
     """
     layout, (i0, p0, count), width = type_info.layout, group, stride(type_info)
     idx = arrays.idx[i0 : i0 + count * width].reshape(count, width)
-    slots, first, state = (
-        len(layout.slots),
-        len(layout.slots) + len(layout.functions),
-        layout.integers - 1,
-    )
+    slots, state = len(layout.slots), layout.integers - 1
+    first = slots + len(layout.functions)
     read = rows_read(type_info) if what == "friction" else {}
     places = [*range(slots), *range(first, first + len(layout.others))]
     places += body_columns(type_info) if read else []

@@ -32,7 +32,7 @@ def entries(value: Any, shape: tuple[int, ...], what: str, name: str = "out") ->
     return _paths(actual, name)
 
 
-def state_entries(value: Any, shapes: Sequence[tuple[int, ...]], name: str = "out") -> list[str]:
+def state_entries(value: Any, shapes: Sequence[tuple[int, ...]]) -> list[str]:
     """As ``entries``, of what ``rate`` returns: the derivative of each state, in their order.
 
     Raises:
@@ -40,14 +40,14 @@ def state_entries(value: Any, shapes: Sequence[tuple[int, ...]], name: str = "ou
     """
     what = f"{sum(map(size, shapes))} numbers, the derivatives of its states"
     if len(shapes) == 1:
-        return entries(value, shapes[0], what, name)
+        return entries(value, shapes[0], what)
     count = len(value) if isinstance(value, (tuple, list)) else 1
     if count != len(shapes):
         raise ShapeError(
             f"it should return {len(shapes)} derivatives, one for each state; it returned {count}"
         )
     parts = zip(value, shapes, strict=True)
-    found = [entries(part, shape, what, f"{name}[{k}]") for k, (part, shape) in enumerate(parts)]
+    found = [entries(part, shape, what, f"out[{k}]") for k, (part, shape) in enumerate(parts)]
     return [path for paths in found for path in paths]
 
 

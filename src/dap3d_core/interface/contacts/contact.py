@@ -58,6 +58,7 @@ class Contact(Joint):
         points: at how many points the bodies may touch. Each is a contact of its own, whose
             ``part``, 0 and so on, ``prepare`` reads: it returns what differs between them.
         is_smooth: without friction, and without fields of a material but ``e``.
+        shared: of a variant of a force, the fields of that force that it has, too.
     """
 
     kernel_names: ClassVar[tuple[str, ...]] = (  # type: ignore[assignment]
@@ -68,12 +69,16 @@ class Contact(Joint):
     declared: ClassVar[tuple[str, ...]] = (*DECLARED, *OPTIONAL)
     points: ClassVar[int] = 1
     is_smooth: ClassVar[bool] = False
+    shared: ClassVar[tuple[str, ...]] = ()
     at: ClassVar[Any] = None
     along: ClassVar[Any] = None
 
     def __init_subclass__(cls, of: type[TypeBase] | None = None, **conditions: Any) -> None:
         if "kernel_names" not in vars(cls):
             cls.states = {"mode": 1, "way": 3, "near": 3}
+            if of is not None:
+                specs = _specs(of)
+                _add_fields(cls, {name: field_of(specs[name]) for name in cls.shared})
             _add_material(cls)
             if cls.along is not None or all(hasattr(cls, name) for name in DECLARED):
                 for name, kernel in _kernels(cls).items():
@@ -107,6 +112,11 @@ def _add_material(class_: type) -> None:
         fields = {name: hidden(0.0) for name in ("e", "mu", "mu_s")}
         fields |= {} if class_.along is not None else {"e": e}  # type: ignore[attr-defined]
     fields |= {name: hidden(value) for name, value in HIDDEN.items()}
+    _add_fields(class_, fields)
+
+
+def _add_fields(class_: type, fields: Mapping[str, Any]) -> None:
+    """Give a class fields, but for those that it declares."""
     own = dict(vars(class_).get("__annotations__", {}))
     for name, field in fields.items():
         if not any(name in vars(base).get("__annotations__", {}) for base in class_.__mro__):

@@ -4,6 +4,7 @@ Every importer makes one and every exporter is given one, so that a format is tr
 each direction. Lengths in m, angles in rad, masses in kg.
 """
 
+from collections.abc import Callable
 from math import inf, isfinite
 from typing import Any
 
@@ -79,7 +80,7 @@ class Contact:
     """How a shape meets others.
 
     Attributes:
-        mu: coefficient of friction; that of a pair is the larger one.
+        mu: coefficient of friction; of a pair see ``Articulation.friction_of_pair``.
         smooth: without friction, but with shapes that are not smooth.
         group, meets: bits; a pair meets where ``group`` of one and ``meets`` of the other have one
             in common.
@@ -238,6 +239,8 @@ class Articulation:
         links, joints: by name, in the order of the file.
         couplings, actuators: in the order of the file.
         excluded: pairs of links whose shapes do not meet.
+        base_meets: whether links meet those that do not move and that a joint holds them at.
+        friction_of_pair: the coefficient of two shapes that meet, of those of both: max or min.
         gravity: (3,) m/s^2.
         fixed_base: whether links without a joint to a parent are fixed to the world, rather than
             free; None where the format leaves it open.
@@ -251,6 +254,8 @@ class Articulation:
     couplings: list[Coupling] = attrs.Factory(list)
     actuators: list[Actuator] = attrs.Factory(list)
     excluded: list[tuple[str, str]] = attrs.Factory(list)
+    base_meets: bool = False
+    friction_of_pair: Callable[[float, float], float] = max
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     fixed_base: bool | None = None
     place: Place = NOWHERE

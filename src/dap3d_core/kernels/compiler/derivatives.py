@@ -25,8 +25,7 @@ _BINARY = re.compile(r"(fmul|fdiv) double (\S+), (\S+)")
 _COMPARED = re.compile(r"fcmp (\w+) double (\S+), (\S+)")
 _JOINED = re.compile(rf"select i1 true, double (\S+), double (\S+) {SLOPES}")
 _ZERO, _ONE = bits(0.0), bits(1.0)
-#: Functions of the C library that derivatives call, and those of LLVM.
-_CALLED = ("sin", "cos", "sinh", "cosh", "pow", "log", "llvm.sqrt.f64")
+#: Of functions that derivatives call.
 _PURE = " nobuiltin nounwind willreturn memory(none)"
 #: Constant but for steps.
 _FLAT = ("llvm.floor.f64", "llvm.ceil.f64", "llvm.rint.f64")

@@ -43,11 +43,6 @@ def step_signature(system: Any) -> Signature:
     return procedure_signature(FLOAT, VECTOR, VECTOR, system, LOOP_LIST)
 
 
-def number_signature(*arguments: Any) -> Signature:
-    """Signature of a function of two numbers and these arguments that returns a number."""
-    return Signature((FLOAT, FLOAT, *arguments), FLOAT)
-
-
 def loop_list(loops: Sequence[Callable[..., Any]]) -> Any:
     """Group loops as a table, an argument of the driver."""
     return table_of(LOOP, loops)

@@ -100,11 +100,6 @@ def differentiated(entry: Entry, count: int) -> Entry:
     return Entry(wide, entry.k, entry.signature)
 
 
-def differentiated_table(table: Functions, count: int) -> Functions:
-    """A table of functions, each as ``differentiated`` gives it."""
-    return Functions(table.signature, [differentiated(entry, count) for entry in table.entries])
-
-
 class ValueFunctions:
     """A table of functions that compute values alone, for differentiated code.
 
@@ -273,7 +268,8 @@ class Differentiation:
             elif argument.values_alone:
                 wide = ValueFunctions(argument, self._run_plain)
             else:
-                wide = differentiated_table(argument, self.count)
+                entries = [differentiated(entry, self.count) for entry in argument.entries]
+                wide = Functions(argument.signature, entries)
             self._wide[id(argument)] = argument, wide
         return self._wide[id(argument)][1]
 

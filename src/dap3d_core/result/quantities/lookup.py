@@ -259,6 +259,11 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
         components = ", ".join(_with_norm(output.components)) or "no components"
         return UnknownNameError(f"the output {parts[0]} has {components}, not {name!r}")
     heads = [n for n in SYSTEM if n.startswith(f"{parts[0]}.")]
+    names = {kind: tuple(indices) for kind, indices in _indices(result).items()}
+    inside = [n for of_kind in names.values() for n in of_kind if n.startswith(f"{name}/")]
+    if inside:
+        part = f"parts of the sub-assembly {name!r} have names such as {inside[0]}"
+        return UnknownNameError(f"{part}; in expressions they stand in quotes: '{inside[0]}.r.x'")
     if heads or len(parts) == 1:
         known = (*SYSTEM, *result.summary.input_names, *result.outputs)
         choices = heads or ["BODY.r", "BODY.w.z", "POINT.v", "JOINT.force.norm", *known]
@@ -266,7 +271,6 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
         return UnknownNameError(fault, nearest(name, known))
     size = 2 if parts[0] == "animation" and len(parts) > 2 else 1
     given = ".".join(parts[:size])
-    names = {kind: tuple(indices) for kind, indices in _indices(result).items()}
     fault = f"there is no body, point, joint or force {given!r}"
     near = nearest(given, [n for of_kind in names.values() for n in of_kind])
     if not near and sum(map(len, names.values())) <= LISTED:

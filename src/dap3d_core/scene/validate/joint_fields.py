@@ -5,9 +5,10 @@ from typing import Any
 
 import attrs
 
+from dap3d_core.interface.codegen.reactions import joint_fields
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
-from dap3d_core.scene.tables import GROUND, Element
+from dap3d_core.scene.tables import BREAKS_AT, GROUND, LIMITS, Element
 from dap3d_core.scene.validate.geometry import Geometry, missing_words
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance
@@ -130,3 +131,35 @@ def brought_forces(
         name = f"{joint.name}.{field}"
         forces[name] = Element(name, keyword, fields | {place: joint.name})
     return forces
+
+
+def read_breaks(
+    report: Collector, joints: Iterable[Instance], forces: Collection[Instance]
+) -> None:
+    """Give joints the force at which they break; forces: all of the scene."""
+    for joint in joints:
+        value = report.scene.joints[joint.name].fields[BREAKS_AT]
+        what, remedy = _unbreakable(report, joint, forces), "leave breaks_at out"
+        if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0.0:
+            what = "should be a positive force in N, inf of a joint that scripts alone release"
+            remedy = ""
+        if what:
+            report.add(("joints", joint.name, BREAKS_AT), value, what, remedy=remedy)
+        else:
+            joint.breaks_at = float(value)
+
+
+def _unbreakable(report: Collector, joint: Instance, forces: Iterable[Instance]) -> str:
+    """Why a joint cannot break, "" where it can: what it does besides its rows would go on."""
+    type_info = joint.type_info
+    own = {"switch", "impulse", "reset"} & set(type_info.kernels)
+    if own or type_info.layout.states or type_info.layout.unknowns:
+        has = ", ".join(sorted(own)) or "states or unknowns"
+        return f"cannot be: a {type_info.type.keyword} has {has} of its own, which go on"
+    if limits := report.scene.joints[joint.name].fields.keys() & set(LIMITS):
+        return f"cannot be beside {', '.join(sorted(limits))}, which go on"
+    for force in forces:
+        fields = (force.type_info.friction_joint, *joint_fields(force.type_info.type))
+        if any(force.values.get(field) == joint.name for field in fields):
+            return f"cannot be: the force {force.name} acts on its reaction"
+    return ""

@@ -9,7 +9,7 @@ from dap3d_core.interface.types import acts_on_all
 from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.scene import Scene
-from dap3d_core.scene.tables import LIMITS, NAMED, fault_of_name
+from dap3d_core.scene.tables import BREAKS_AT, LIMITS, NAMED, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
 
@@ -50,7 +50,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     inputs, functions = _read_signals(report, geometry, types)
     joints = read_elements(report, geometry, "joints", types, functions)
     forces = read_elements(report, geometry, "forces", types, functions)
-    _report_twins(report, joints=joints, forces=forces)
+    _check_together(report, joints, forces)
     contacts = _read_contacts(report, geometry, types, functions, (joints, forces))
     collisions = _check_shapes_and_outputs(report, bodies, joints)
     left = bool(contacts or collisions)
@@ -150,6 +150,16 @@ def _read_contacts(
     elements = report.scene.contacts | limits_of(report, limited)
     contacts = read_contacts(report, geometry, types, functions, elements) if elements else []
     return [*contacts, *read_rigid(report, types, rigid)]
+
+
+def _check_together(report: Collector, joints: list[Instance], forces: list[Instance]) -> None:
+    """Report twins; read the forces at which joints break, where a scene has any."""
+    _report_twins(report, joints=joints, forces=forces)
+    breaking = [j for j in joints if BREAKS_AT in report.scene.joints[j.name].fields]
+    if breaking:
+        from dap3d_core.scene.validate.joint_fields import read_breaks
+
+        read_breaks(report, breaking, forces)
 
 
 def _check_requires(report: Collector) -> str:

@@ -32,6 +32,8 @@ class Instance:
             where ``prepare`` returns them; vec3, table: tuples; matrix: three rows; references to
             bodies, functions, inputs and joints: words; choices: words, False or True.
         terms: of a function that combines functions, those.
+        breaks_at: N, of a joint that may be released: it ends where its force becomes larger, by
+            itself never where this is inf; None of what holds throughout.
     """
 
     name: str
@@ -41,6 +43,7 @@ class Instance:
     values: dict[str, Any]
     others: tuple[int, ...] = ()
     terms: tuple["Instance", ...] = ()
+    breaks_at: float | None = None
 
     @property
     def structure(self) -> Any:

@@ -160,7 +160,7 @@ class ParameterStatics:
         """Refuse a pose at which states of elements do not come to rest."""
         from dap3d_core.simulation.equilibrium.states_at_rest import moving_states
 
-        if moving := moving_states(self.evaluator, 0.0, pose.u):
+        if moving := moving_states(self.evaluator, pose.u):
             names = ", ".join(f"{state.element}.{state.name}" for state in moving)
             raise SimulationError(f"a path cannot be followed: the rate of {names} vanishes for no "
                                   "value of the state at a pose")  # fmt: skip

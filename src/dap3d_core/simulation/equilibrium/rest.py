@@ -197,7 +197,7 @@ def _with_states(evaluator: Evaluator, search: Search) -> Search:
     """
     from dap3d_core.simulation.equilibrium.states_at_rest import moving_states
 
-    moving = moving_states(evaluator, 0.0, search.pose.u)
+    moving = moving_states(evaluator, search.pose.u)
     if not moving:
         return search
     statics = Statics(evaluator)

@@ -49,9 +49,9 @@ def settle(evaluator: Evaluator, t: float, u: Floats) -> None:
         evaluator.states = best - _inverse(evaluator, own.rate_by_states) @ own.rates
 
 
-def moving_states(evaluator: Evaluator, t: float, u: Floats) -> list[ElementState]:
+def moving_states(evaluator: Evaluator, u: Floats) -> list[ElementState]:
     """The states that do not come to rest at a pose."""
-    own = _derivatives(evaluator, t, u)
+    own = _derivatives(evaluator, 0.0, u)
     moves = np.abs(own.rates) > 1e3 * SETTLED * _terms(own, evaluator.states)
     return [s for s in evaluator.model.element_states
             if np.any(moves[s.first : s.first + s.length])]  # fmt: skip

@@ -36,6 +36,8 @@ from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps
 
 #: Gaps, m of a scene of ordinary size, below which bodies touch: in a run, and where it begins.
 TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
+#: What an impulse changes where joints hold, as a part of what it does to free bodies: nothing.
+HELD = 1e-10
 #: Slip, m/s, that is stopped where it goes through zero.
 STOPPED = 1e-6
 #: Ends of modes within this part of the run: what changes more often comes to no end.
@@ -106,19 +108,38 @@ class ContactJumps(Jumps):
             self._repeat(integration)
             return
         gaps = self._gaps(integration)
-        mistakes = [
-            Mistake(
-                name, MISSING, f"its bodies overlap by {-gap:.6g} m at the start",
-                remedy="move them apart by that along the normal, or have them moved until they "
-                f"touch (touch = true); a gap of up to {TOUCHING_AT_START * length:g} m counts as "
-                "touching",
-            )
-            for name, gap in zip(self.table.names, gaps, strict=True)
-            if gap < -TOUCHING_AT_START * length
-        ]  # fmt: skip
-        if mistakes:
-            raise SceneError(mistakes)
+        beyond = np.flatnonzero(gaps < -TOUCHING_AT_START * length)
+        if beyond.size:
+            raise SceneError([self._overlap(int(k), -gaps[k]) for k in beyond])
         self._resolve(integration, [], TOUCHING_AT_START * length)
+
+    def _refuse_prescribed(self, rows: ContactRows, closed: list[int]) -> None:
+        """SimulationError: the joints leave no impulse of a contact that closes an effect."""
+        limit = -AT_REST * self._evaluator.model.length
+        for c in closed:
+            row = rows.G[3 * c]
+            if rows.W[3 * c, 3 * c] > HELD * (row @ rows.inverse @ row):
+                continue
+            if rows.slip[c, 0] < limit or rows.free[3 * c] < limit:
+                raise SimulationError(
+                    f"the run stopped at t = {rows.t:.9g} s: contact {self.table.names[c]} closes, "
+                    "and joints or drivers prescribe the motion of its bodies: nothing that it "
+                    "pushes with can stop them"
+                )
+
+    def _overlap(self, k: int, depth: float) -> Mistake:
+        """What is said of a contact whose gap is negative at the start."""
+        unit = "rad" if self.table.turns[k] else "m"
+        remedy = "move them apart by that along the normal"
+        if unit == "rad":
+            remedy = "turn them back by that about the axis, or change the bound"
+        elif self.table.movable[k]:
+            remedy += ", or have them moved until they touch (touch = true)"
+        least = TOUCHING_AT_START * self._evaluator.model.length
+        return Mistake(
+            self.table.names[k], MISSING, f"its bodies overlap by {depth:.6g} {unit} at the start",
+            remedy=f"{remedy}; a gap of up to {least:g} {unit} counts as touching",
+        )  # fmt: skip
 
     def apply(self, integration: Integration) -> None:
         """Go on behind the end of a mode."""
@@ -243,6 +264,7 @@ class ContactJumps(Jumps):
         closed = [c for c in range(table.count) if c not in beyond
                   and (before[c] > 0.5 or near[c] or (c, 0) in ended)]  # fmt: skip
         sliding, leaving, stopped = self._what_ended(rows, outputs, before, ended)
+        self._refuse_prescribed(rows, closed)
         impact = collide(table, rows, closed, evaluator.model.length)
         try:
             modes = find_modes(table, rows, closed, sliding, leaving)

@@ -38,7 +38,8 @@ class Event:
         direction: +1 upwards, -1 downwards, 0 both.
         action: "record" notes the instant in ``result.events``; "stop" ends the run there as well;
             a function is called with the ``Instant`` there, and may change numbers of forces,
-            velocities of bodies, states of elements and inputs (``Instant.set``).
+            velocities of bodies, states of elements and inputs (``Instant.set``), end joints
+            and let them hold again (``Instant.release``, ``Instant.engage``).
         name: what it is called in the result; made from the rest where it is left out.
         every: s, the largest distance of two looks at it; by default as its values ask for it.
 
@@ -204,6 +205,9 @@ class Instant:
         self.states: dict[int, Floats] = {}
         #: number of an input -> its new value
         self.inputs: dict[int, float] = {}
+        #: joints that end here, and that hold again
+        self.released: list[str] = []
+        self.engaged: list[str] = []
 
     def __getitem__(self, name: str) -> Any:
         """A quantity by its name in results: a number, or (components,).
@@ -241,6 +245,37 @@ class Instant:
         elif numbers:
             self._numbers.set(name, numbers)
         self.changes.setdefault(name, {}).update(fields)
+
+    def release(self, joint: str) -> None:
+        """End a joint that has ``breaks_at``, for the rest of this run or until it is engaged.
+
+        Raises:
+            ValueError: there is no such joint, or it has no ``breaks_at``.
+        """
+        self._check_released(joint)
+        self.released.append(joint)
+
+    def engage(self, joint: str) -> None:
+        """Let a joint that has ended hold again.
+
+        Its bodies are to stand as it wants them, within 1e-6 of the scene's length; velocities jump
+        onto its rows by impulses in it and in other joints, which take energy.
+
+        Raises:
+            ValueError: there is no such joint, or it has no ``breaks_at``.
+        """
+        self._check_released(joint)
+        self.engaged.append(joint)
+        self.changes.setdefault(joint, {})["engaged"] = True
+
+    def _check_released(self, joint: str) -> None:
+        breaks = self._compiled.model.breaks
+        if joint not in breaks:
+            known = f"there are {some(list(breaks), 20)}" if breaks else "there are none"
+            raise ValueError(
+                f"{joint!r} is no joint that may be released: {known}; give it breaks_at, inf "
+                "where it never breaks by itself"
+            )
 
     def _set_state(self, element: str, name: str, value: Any) -> bool:
         """Set a state of an element; False where it has none of this name."""

@@ -24,6 +24,7 @@ from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_
 from dap3d_core.simulation.events.sampling import Sampler
 
 if TYPE_CHECKING:
+    from dap3d_core.simulation.events.breaking import ReleasedJoints
     from dap3d_core.simulation.events.jumps import Jumps
 
 
@@ -52,6 +53,8 @@ class EventLocator:
     """Locates events during an integration.
 
     Attributes:
+        events: what is looked for: those of the script, ``of_script``, then ``breaks`` of joints.
+        released: joints that have ended; None where none may.
         occurrences: what was found.
         numbers: of the forces, which events may change.
         jumps: of velocities, which events may set; made where one does.
@@ -63,7 +66,15 @@ class EventLocator:
 
     def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
         self.compiled = compiled
-        self.events = checked_events(events, compiled.model.body_names)
+        self.of_script = checked_events(events, compiled.model.body_names)
+        self.breaks: tuple[Event, ...] = ()
+        self.released: ReleasedJoints | None = None
+        if compiled.model.breaks:
+            from dap3d_core.simulation.events import breaking
+
+            self.breaks = breaking.breaks_of(compiled.model)
+            self.released = breaking.ReleasedJoints(compiled.evaluator)
+        self.events = (*self.of_script, *self.breaks)
         self.numbers = Numbers(compiled)
         self.jumps: Jumps | None = None
         self.take_rows: Callable[[], None] = lambda: None
@@ -135,8 +146,7 @@ class EventLocator:
     def advance(self, integration: Integration, budget: int) -> Status:
         """As ``Integration.advance``, step by step."""
         if not self._values:
-            self._values = self._all(self._instant(integration))
-            self._sides = [float(np.sign(value)) for value in self._values]
+            self.begin_anew(integration)
         limit = integration.statistics.rhs + budget
         while integration.status is Status.RUNNING and not integration.rows_are_full:
             self._step(integration)
@@ -149,9 +159,26 @@ class EventLocator:
         self._take_notice(integration, self._instant(integration))
 
     def begin_anew(self, integration: Integration) -> None:
-        """Look at the events again where what they watch may have jumped: that is no event."""
+        """Look at the events again where what they watch may have jumped: that is no event.
+
+        But joints that carry too much there break, and others that have to carry more then.
+        """
         self._values = self._all(self._instant(integration))
         self._sides = [float(np.sign(value)) for value in self._values]
+        if self.released is None:
+            return
+        values = self._values[len(self.of_script) :]
+        over = [event for event, value in zip(self.breaks, values, strict=True) if value > 0.0]
+        for event in over:
+            self._act(integration, event, 1)
+        if over:
+            self.begin_anew(integration)
+
+    def put_back(self) -> None:
+        """Make numbers and joints those of the scene again."""
+        self.numbers.put_back()
+        if self.released is not None:
+            self.released.put_back()
 
     def _step(self, integration: Integration) -> None:
         arrays = self._arrays(integration)
@@ -315,6 +342,7 @@ class EventLocator:
     def _act(self, integration: Integration, event: Event, direction: int) -> bool:
         """Do what an event asks for; whether it changed numbers of forces, velocities, states."""
         here, kind = self._instant(integration), "change"
+        ended: list[EventRecord] = []
         if callable(event.action):
             event.action(here)
         else:
@@ -323,16 +351,36 @@ class EventLocator:
             integration.end()
         if here.changes:
             integration.restart()
+        if here.released:
+            ended = self._end_joints(integration, here, direction)
+            if event in self.breaks:
+                self.occurrences += ended
+                return True
         after, work = None, 0.0
         if here.inputs:
             self._set_inputs(here.inputs)
-        if here.velocities or here.states or here.inputs:
+        if here.engaged and self.released is not None:
+            self.released.engage(here.engaged, here.t, integration.y)
+        if here.velocities or here.states or here.inputs or here.engaged:
             after, work = self._set_state(integration, event, here)
         self.occurrences.append(
             EventRecord(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,
                        changes=here.changes, u_after=after, work=work)
         )  # fmt: skip
-        return bool(here.changes)
+        self.occurrences += ended
+        return bool(here.changes or here.released)
+
+    def _end_joints(
+        self, integration: Integration, here: Instant, direction: int
+    ) -> list[EventRecord]:
+        """End joints from here on; a record of each that held until now."""
+        assert self.released is not None
+        names = self.released.release(here.released, here.t, integration.y)
+        integration.restart()
+        return [
+            EventRecord(name=name, t=here.t, direction=direction, kind="break", u=here.u)
+            for name in names
+        ]
 
     def _set_inputs(self, inputs: Mapping[int, float]) -> None:
         """Set inputs from here on; what was reported so far has those before."""

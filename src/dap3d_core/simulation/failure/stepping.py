@@ -6,7 +6,8 @@ from typing import Any
 from dap3d_core.integrators import STEPPING, Integration
 from dap3d_core.result.note import information
 
-#: A residual above this part of the largest impulse is a warning.
+#: A residual above this part of the largest impulse is a warning, and an overlap above this part of
+#: the length of the scene.
 UNSOLVED = 1e-3
 #: Overlaps at the start above this part of the length of the scene are told.
 LEAST_OVERLAP = 1e-8
@@ -28,6 +29,8 @@ def stepping_notes(integrations: Sequence[Integration], length: float) -> list[s
     notes: list[str] = [information(words)]
     if residual > UNSOLVED:
         notes = [f"{words}: where bodies rest is not to be trusted; give a shorter contact_step"]
+    elif deepest > UNSOLVED * length:
+        notes = [f"{words}: joints or drivers hold them where they cannot move apart"]
     if (overlap := ran[0].overlap_at_start) > LEAST_OVERLAP * length:
         notes.append(
             f"bodies overlapped by {overlap:.2g} m at the start, and were moved apart: move them"

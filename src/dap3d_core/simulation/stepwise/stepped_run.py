@@ -25,7 +25,7 @@ from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
 from dap3d_core.simulation.control.sampled import ALIKE, jump
 from dap3d_core.simulation.control.state_view import StateView
-from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.errors import SimulationError, refuse_breaks
 from dap3d_core.simulation.handover import hand_over
 from dap3d_core.simulation.initial.given_state import state_of
 from dap3d_core.simulation.output.termination import why_stopped
@@ -265,6 +265,7 @@ def start(
         SimulationError (RedundantError, AssemblyError): the run cannot begin.
     """
     compiled = compiled_for(scene, allow_code, announce, **settings)
+    refuse_breaks(compiled.model, "a run step by step")
     end = HORIZON if t_end is None else t_end
     simulation = settings_of(compiled, t_end=end, dt=end, **settings)
     with compiled.borrow_evaluator():

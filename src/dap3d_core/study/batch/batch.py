@@ -45,7 +45,7 @@ def batch_runner(reduction: Reduction, times: Floats) -> "BatchRunner | None":
     evaluator, collisions = compiled.evaluator, compiled.model.collisions
     if collisions is not None or integrator_named(settings.integrator).steps_contacts:
         return None  # so are those of contacts by stepping
-    if not evaluator.coordinates.suits_batches:
+    if compiled.model.breaks or not evaluator.coordinates.suits_batches:
         return None
     try:
         start = compiled.start(bool(settings.correct), settings.hold, str(settings.correct_metric))

@@ -1,10 +1,12 @@
 """A run that carries derivatives by parameters: its compiled code in differentiated form."""
 
+import copy
 from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
 
+from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import Integration
 from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.kernels.array_types import Floats
@@ -51,11 +53,12 @@ class DifferentiatedRun(Run):
             )
         super().begin(integration)
         self._differentiation = Differentiation(1 + self._lanes)
-        integration.takes_programs = False
         integration.call = self._differentiation.call  # type: ignore[method-assign]
         integration.rows = self._rows  # type: ignore[method-assign]
         self._seed()
         integration.compile()
+        if integration.takes_programs:
+            self.programs = self._programs()
         if self.jumps is not None:
             law = type(self.jumps)
             self.jumps.begin = self._jumping(law.begin)  # type: ignore
@@ -77,6 +80,18 @@ class DifferentiatedRun(Run):
             )
             for array, slope in zip(arrays.values(), np.split(found, ends), strict=True):
                 self._slopes_of(array)[:, j] = slope
+
+    def _programs(self) -> ChangeOver:
+        """Programs of the scene in differentiated form; numbers that have slopes are loaded."""
+        evaluator = copy.copy(self.evaluator)
+        evaluator.functions = self._differentiation.wide(evaluator.functions)
+        evaluator.loops = self._differentiation.wide(evaluator.loops)
+        varied = {
+            name: np.flatnonzero(self._slopes_of(array).any(axis=1))
+            for name, array in evaluator.system.walk()
+            if array.dtype.kind == "f" and array.size
+        }
+        return ChangeOver(evaluator, varied, self._differentiation.count)
 
     def _rows(self) -> Floats:
         """As ``Integration.rows``; their derivatives are kept."""

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
     from dap3d_core.simulation.initial.start_state import Start
 
-#: Directions of one run that make, with the value, vectors of 2, 4 or 8 numbers.
-FAST = (1, 3, 7)
+#: Directions of one run that make, with the value, vectors of 2, 4, 8 or 16 numbers.
+FAST = (1, 3, 7, 15)
 #: Motion of each body in data sets.
 OF_BODIES = ("r", "rd", "w")
 
@@ -210,7 +210,7 @@ def sensitivities(
     method = given.pop("method", None)
     state = given_state(start, compiled)
     base = run_beside(compiled, given, (), state)
-    directions, lanes = _directions(len(parameters))
+    directions, lanes = directions_of(len(parameters))
     runs, results = [], []
     for first in range(0, len(parameters), directions):
         part = parameters[first : first + directions]
@@ -248,7 +248,7 @@ def no_derivative(parameter: SceneParameter) -> str:
     return ""
 
 
-def _directions(count: int) -> tuple[int, int]:
+def directions_of(count: int) -> tuple[int, int]:
     """Directions of a run, for so many parameters in blocks of one size; and of its code."""
     blocks = -(-count // FAST[-1])
     directions = -(-count // blocks)

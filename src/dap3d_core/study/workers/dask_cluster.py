@@ -209,7 +209,7 @@ def _run(
     # A task that returns the study, and no scattered data: dask makes it again where the worker
     # that had it is lost. Each worker gets it once.
     with _requests(client):
-        study = client.submit(_identity, payload, key=f"{name}-study", pure=False)
+        study = client.submit(bytes, payload, key=f"{name}-study", pure=False)
     done = _distributed().as_completed(loop=client.loop, with_results=True, raise_errors=False)
     chunks, monitor = ChunkSize(TASK_SECONDS, 1), _ClusterMonitor(client)
     waiting: dict[Any, Integers] = {}
@@ -317,10 +317,6 @@ def _ensemble(payload: bytes, digest: str) -> Ensemble:
                 _ensembles.popitem(last=False)
         _ensembles.move_to_end(digest)
         return _ensembles[digest]
-
-
-def _identity(payload: bytes) -> bytes:
-    return payload
 
 
 def _raise(client: Any, outcome: Any, part: Integers) -> NoReturn:

@@ -122,13 +122,13 @@ def motion_words(parts: Sequence[Part], axes: Sequence[str] = ()) -> str:
     return ", and ".join(texts)
 
 
-def axis_words(motion: JointMotions, joint: int = 0) -> list[str]:
+def axis_words(motion: JointMotions) -> list[str]:
     """Of each part without a name, its axis in the axes of the body that it is constant in."""
     words = []
     for k, part in enumerate(motion.parts):
-        axis = motion.axis(k)[joint]
+        axis = motion.axis(k)[0]
         if part.constant_in != motion.slots[0]:
-            axis = to_global(motion.start.p[joint], axis)
+            axis = to_global(motion.start.p[0], axis)
         words.append("" if part.name or part.kind == BALL else _vector(axis))
     return words
 

@@ -203,7 +203,10 @@ def _capsule(shape: Shape) -> list[Shape]:
     ends = [floats_of(np.add(v["at"], side * half)) for side in (-1.0, 1.0)]
     return [
         attrs.evolve(shape, type="cylinder"),
-        *(attrs.evolve(shape, type="sphere", values=v | {"at": at}) for at in ends),
+        *(
+            attrs.evolve(shape, type="sphere", values={"radius": v["radius"], "at": at})
+            for at in ends
+        ),
     ]
 
 

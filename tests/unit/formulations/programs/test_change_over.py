@@ -65,6 +65,25 @@ def test_switches_have_programs(at_once):
     assert set(programs(at_once)) == {RHS, PROJECT, BEHIND, WATCH}
 
 
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_derivatives_run_by_programs(method, at_once, monkeypatch):
+    """Numbers by which there are some are no constants; projections remain general ones."""
+    by = ["bodies.cone.mass", "forces.gravity.gravity"]
+
+    def slopes():
+        return dap.sensitivities("pen1", by, method=method, **SETTINGS).of("cone.rdd")
+
+    first, second = slopes(), slopes()
+    found = programs(at_once)
+    assert set(found) == ({RHS, PROJECT} if method == "standard" else {RHS})
+    assert found[RHS].failures() == 0
+    monkeypatch.setattr(change_over, "LOAD_AFTER", np.inf)
+    expected = slopes()
+    assert np.array_equal(first, expected)
+    assert np.array_equal(second, expected)
+    assert np.all(np.abs(expected).max(axis=(0, 1)) > 1e-3)
+
+
 def test_controllers_run_by_programs(at_once):
     """They change inputs alone, which programs load."""
     scene = dap.load("pen1")

@@ -7,6 +7,7 @@ import json
 
 import pytest
 from support.plain import jit_is_on
+from support.problems import short_runs
 from support.process import run
 
 pytestmark = [
@@ -31,19 +32,8 @@ for model, settings in {cases!r}:
     digest = hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays))
     print(json.dumps([model, settings, digest.hexdigest(), result.stats.rhs]))
 """
-SHORT = {"t_end": 0.01, "dt": 0.005}
 CASES = [
-    ("fourbar3", SHORT),
-    ("fourbar3", SHORT | {"method": "penalty"}),
-    ("fourbar3", SHORT | {"method": "lsq"}),
-    ("pen2", SHORT | {"integrator": "adams"}),
-    ("pen2", SHORT | {"method": "joint"}),
-    ("pen2", SHORT | {"integrator": "radau"}),
-    ("fourbar2", SHORT | {"integrator": "dopri5"}),
-    ("pen1", SHORT | {"integrator": "rk4", "step": 0.0025}),
-    ("bodies2", SHORT),
-    ("ball1", {"t_end": 0.5, "dt": 0.1, "allow_code": True}),
-    ("tri", SHORT),
+    *short_runs(0.005),
     ("A03", {"t_end": 0.001, "dt": 0.001}),
     ("A05", {"t_end": 0.001, "dt": 0.001, "integrator": "radau"}),
 ]

@@ -7,6 +7,7 @@ import json
 
 import pytest
 from support.plain import jit_is_on
+from support.problems import short_runs
 from support.process import REPOSITORY, run
 
 from dap3d_core.kernels.compiler.types import FLOAT, INT, Known, Struct
@@ -29,22 +30,8 @@ calls = recorder.calls
 print(json.dumps([[len(few), differences(few, {few})],
                   [len(calls), {all} and differences(calls, {all})], recorder.missing()]))
 """
-SHORT = {"t_end": 0.002, "dt": 0.001}
-QUICK = [("pen1", SHORT)]
-RUNS = [
-    *QUICK,
-    ("fourbar3", SHORT),
-    ("fourbar3", SHORT | {"method": "penalty"}),
-    ("fourbar3", SHORT | {"method": "lsq"}),
-    ("pen2", SHORT | {"integrator": "adams"}),
-    ("pen2", SHORT | {"method": "joint"}),
-    ("pen2", SHORT | {"integrator": "radau"}),
-    ("fourbar2", SHORT | {"integrator": "dopri5"}),
-    ("pen1", SHORT | {"integrator": "rk4", "step": 0.0005}),
-    ("bodies2", SHORT),
-    ("ball1", {"t_end": 0.5, "dt": 0.1, "allow_code": True}),
-    ("tri", SHORT),
-]
+QUICK = [("pen1", {"t_end": 0.002, "dt": 0.001})]
+RUNS = [*QUICK, *short_runs(0.001)]
 #: Friction, singular poses, points, dense supernodes, radau with elements of many kinds.
 MORE = """
 from support.problems import everything

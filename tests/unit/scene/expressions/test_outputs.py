@@ -1,24 +1,13 @@
 """Outputs of scenes: what is refused says where, and scenes keep them."""
 
 import pytest
+from support.falling import SCENE
 
 import dap3d_core as dap
 from dap3d_core.scene import parse
 from dap3d_core.scene.expressions.outputs import LONGEST_CHAIN, outputs_of
 
-FALLING = """\
-[scene]
-name = "fall"
-
-[bodies.stone]
-mass = 2.0
-Jp = [0.1, 0.1, 0.1]
-
-[forces.gravity]
-type = "weight"
-
-[outputs]
-"""
+FALLING = SCENE.partition("[simulation]")[0] + "[outputs]\n"
 
 
 def mistake_of(tmp_path, outputs):

@@ -50,7 +50,7 @@ def test_models_of_a_group_are_read_with_and_without_it(monkeypatch, tmp_path):
     models = dap.shipped_models()
     groups = [group_of(folder) for folder in models.values()]
     assert groups == sorted(groups), "models without a group come first"
-    assert set(groups) == {"", "benchmarks", "engineering"}
+    assert set(groups) == {"", "benchmarks", "contact", "engineering"}
     assert dap.load("benchmarks/A04").path == dap.load("A04").path == models["A04"] / "scene.toml"
     for name in ("benchmarks/pen1", "models/pen1", "other/A04", "/A04", "/pen1", "benchmarks"):
         refused(name)

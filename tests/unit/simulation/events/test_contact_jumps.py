@@ -32,6 +32,27 @@ def test_bodies_that_overlap_are_refused_with_depth_and_remedy():
         dap.simulate(bouncing(height=-0.01))
 
 
+def test_a_joint_that_starts_beyond_its_limit_is_refused_with_the_angle():
+    scene = dap.Scene(name="door")
+    scene.add_body("door", mass=1.0)
+    hinge = {"P_i": "door.O", "P_j": "ground.O", "a_i": "door.z", "a_j": "ground.z"}
+    scene.add_joint("rev", "hinge", **hinge, lower=0.5)
+    with pytest.raises(dap.SceneError, match=r"hinge_lower.*by 0\.5 rad.*\n.*turn them") as refused:
+        dap.simulate(scene, t_end=1.0)
+    assert "touch =" not in str(refused.value)
+
+
+def test_a_driver_that_goes_on_into_a_limit_is_named_with_the_contact():
+    scene = dap.Scene(name="driven")
+    scene.add_body("door", mass=1.0, w=(0.0, 0.0, 1.0))
+    hinge = {"P_i": "door.O", "P_j": "ground.O", "a_i": "door.z", "a_j": "ground.z"}
+    scene.add_joint("rev", "hinge", **hinge, upper=0.5)
+    scene.add_function("a", "turn", coeff=(0.0, 1.0, 0.0))
+    scene.add_joint("drive-rot", "drive", joint="hinge", function="turn")
+    with pytest.raises(dap.SimulationError, match=r"t = 0\.5 s: contact hinge_upper.*drivers"):
+        dap.simulate(scene, t_end=1.0)
+
+
 @pytest.mark.parametrize("height", [0.2, -0.05])
 def test_bodies_are_moved_until_they_touch(height):
     result = dap.simulate(bouncing(height=height, touch=True), t_end=0.1, dt=0.05)

@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import dap3d_core as dap
 from dap3d_core.simulation.failure.stepping import stepping_notes
 
 
@@ -17,6 +18,21 @@ def test_what_is_not_solved_is_a_warning(residual, severity):
     (note,) = stepping_notes([ran(residual)], 1.0)
     assert (getattr(note, "severity", "warning"), "2 J" in note) == (severity, True)
     assert ("shorter contact_step" in note) == (severity == "warning")
+
+
+def test_what_is_driven_into_another_is_a_warning():
+    scene = dap.Scene(name="press")
+    scene.add_body("b", mass=1.0, r=(0.0, 0.0, 0.5), r_dot=(0.0, 0.0, -1.0))
+    scene.add_joint("tran", "guide", P_i="b.O", P_j="ground.O", a_j="ground.z")
+    scene.add_function("a", "down", coeff=(0.5, -1.0, 0.0))
+    scene.add_joint("drive-tran", joint="guide", function="down")
+    scene.add_shape("sphere", body="b", radius=0.5, collides=True)
+    scene.add_shape("plane", body="ground", collides=True)
+    result = dap.simulate(scene, t_end=0.02, dt=0.02, contact_step=5e-3)
+    assert result.r[-1, 0, 2] == pytest.approx(0.48, abs=1e-6)
+    (note,) = (note for note in result.notes if "overlap by" in note)
+    assert "drivers hold them" in note
+    assert getattr(note, "severity", "warning") == "warning"
 
 
 def test_overlaps_are_parts_of_the_length_of_the_scene():

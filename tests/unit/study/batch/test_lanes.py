@@ -6,6 +6,7 @@ from support import mechanisms, trees
 from support.on_axles import driven, stone, wheel
 from support.plain import jit_is_on
 from support.state_types import stated
+from support.studies import pendulum
 from unit.study.batch.test_batch import DONE, ensemble, path_of, singly
 from unit.study.batch.test_batch import pendulum as ball_pendulum
 
@@ -53,18 +54,6 @@ def branched():
     scene.add_function("harmonic", "waves", amplitude=0.2, frequency=3.0, phase=0.5, offset=1.0)
     scene.add_force("ptp", "spring", P_i="b4.O", P_j="ground.O", k=20.0, c=0.5, l0=1.0)
     scene.add_force("ptp", "pushed", P_i="b2.O", P_j="ground.O", k=5.0, c=0.1, function="waves")
-    return scene
-
-
-def pendulum():
-    """A bob on a hinge with a spring, whose stiffness sets the number of steps."""
-    scene = dap.Scene(name="pendulum")
-    scene.add_body("bob", mass=1.0, Jp=(0.01, 0.01, 0.01), r=(0.5, 0.0, 0.0))
-    scene.add_point("end", "bob", (-0.5, 0.0, 0.0))
-    scene.add_point("post", "ground", (1.0, 0.0, 1.0))
-    scene.add_joint("rev", "hinge", P_i="end", P_j="ground.O", a_i="bob.y", a_j="ground.y")
-    scene.add_force("weight", "gravity")
-    scene.add_force("ptp", "spring", P_i="bob.O", P_j="post", k=10.0, l0=0.5)
     return scene
 
 

@@ -122,6 +122,15 @@ def test_what_no_graphics_can_show_is_told_and_left_out(tmp_path, kind, fields):
     assert len(found.meshes) + len(found.lines) == 0
 
 
+def test_a_capsule_ends_in_halves_of_balls():
+    scene = dap.Scene(name="capsule")
+    scene.add_shape("capsule", "leg", body="ground", radius=0.1, length=2.0)
+    marks = shapes.scene_shapes(scene, [], []).marks
+    ball = ("sphere", (0.1, 0.1, 0.1))
+    assert [(mark.kind, mark.size) for mark in marks] == [("cylinder", (0.1, 0.1, 2.0)), ball, ball]
+    assert [mark.at[2] for mark in marks] == [0.0, -1.0, 1.0]
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="links and FIFOs of POSIX")
 def test_links_in_a_circle_and_fifos_are_mistakes_of_the_scene(tmp_path):
     (tmp_path / "loop.obj").symlink_to("loop.obj")
