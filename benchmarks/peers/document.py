@@ -11,6 +11,7 @@ from pathlib import Path
 import goals
 import levels
 import tables
+import touching
 
 HERE = Path(__file__).parent
 DOCS = HERE.parents[1] / "docs" / "reference"
@@ -83,6 +84,32 @@ def stored(cells, scenes, data):
     ]
 
 
+def contacts(data):
+    """Each method of time stepping: its coarsest step, that of the least error, time to 1e-6."""
+    lines = ["| scene | program | steps, s | error, m | overlap, m | ms a step | s to 1e-6 |",
+             "| --- " * 7 + "|"]  # fmt: skip
+    for (scene, program, method), rows in touching.ladders(data["rows"]).items():
+        best = min(rows, key=lambda r: math.inf if r["error"] is None else r["error"])
+        shown = [rows[0]] if best is rows[0] else [rows[0], best]
+        good = [r["seconds"] for r in rows if r["error"] is not None and r["error"] <= 1e-6]
+        cells = [
+            ["own" if r["step"] is None else f"{r['step']:.0e}" for r in shown],
+            ["-" if r["error"] is None else f"{r['error']:.0e}" for r in shown],
+            ["-" if r["overlap"] is None else f"{abs(r['overlap']):.0e}" for r in shown],
+            ["-" if r["step"] is None else f"{1e3 * touching.seconds_a_step(r):.2g}"
+             for r in shown],
+            [f"{min(good):.2g}" if good else "-"],
+        ]  # fmt: skip
+        words = (scene, f"{program}, {method}", *(" / ".join(cell) for cell in cells))
+        lines.append(f"| {' | '.join(words)} |")
+    return lines
+
+
+def contact_versions(data):
+    """What the figures of contacts are from."""
+    return [", ".join(f"{name} {number}" for name, number in data["versions"].items()) + "."]
+
+
 PARTS = {"ratios": ratios, "missed": missed, "price": price, "chosen": chosen}
 
 
@@ -91,7 +118,10 @@ def filled(text, data):
     cells = data["cells"]
     scenes = list(dict.fromkeys(cell["scene"] for cell in cells))
     made = {name: make(cells, scenes) for name, make in PARTS.items()}
-    for name, rows in (made | {"stored": stored(cells, scenes, data)}).items():
+    made["stored"] = stored(cells, scenes, data)
+    beside = json.loads(touching.RESULTS.read_text())
+    made |= {"contacts": contacts(beside), "contact versions": contact_versions(beside)}
+    for name, rows in made.items():
         lines = "\n".join(rows)
         part = rf"(<!-- {name} -->\n).*?(<!-- end -->)"
         text = re.sub(part, lambda m, t=lines: f"{m[1]}{t}\n{m[2]}", text, flags=re.DOTALL)
@@ -106,6 +136,8 @@ def main():
     PAGE.write_text(filled(PAGE.read_text(), data))
     figures.work_precision(data["cells"], DOCS / "peers-precision.svg")
     figures.growth(data["cells"], DOCS / "peers-growth.svg")
+    beside = json.loads(touching.RESULTS.read_text())
+    figures.contacts(touching.ladders(beside["rows"]), DOCS / "peers-contacts.svg")
     print(f"{PAGE} and its pictures are made")
 
 

@@ -15,6 +15,7 @@ LOOK = {
     "mujoco": ("#0072B2", "^"),
     "drake": ("#009E73", "D"),
     "pinocchio": ("#CC79A7", "v"),
+    "dart": ("#D55E00", "v"),
 }
 PANELS = ("free-body-1", "heavy-top-1", "spherical-chain-8", "spherical-chain-64",
           "revolute-chain-8", "four-bar-1")  # fmt: skip
@@ -93,6 +94,26 @@ def growth(cells, path):
         handles, labels = row[0].get_legend_handles_labels()
         named = dict(zip(labels, handles, strict=True))
         figure.legend(named.values(), named.keys(), loc="outside upper center", ncols=5,
+                      frameon=False)  # fmt: skip
+        figure.savefig(path, metadata={"Date": None})
+        pyplot.close(figure)
+
+
+def contacts(ladders, path):
+    """One panel a scene with a closed form: error against CPU time, a line for each method."""
+    scenes = ("ball", "bounce", "slope", "tower")
+    with pyplot.rc_context(SETTINGS):
+        figure, rows = pyplot.subplots(2, 2, figsize=(10, 7), layout="constrained")
+        for axes, scene in zip(rows.flat, scenes, strict=True):
+            for (where, program, _), found in ladders.items():
+                points = [(r["seconds"], max(r["error"], 1e-17)) for r in found if r["error"]]
+                if where == scene and points:
+                    _line(axes, program, *zip(*points, strict=True))
+            axes.set(xscale="log", yscale="log", title=scene)
+        figure.supxlabel("CPU time, s")
+        figure.supylabel("largest error of a position, m")
+        labels = dict(zip(*reversed(rows[0, 0].get_legend_handles_labels()), strict=True))
+        figure.legend(labels.values(), labels.keys(), loc="outside upper center", ncols=4,
                       frameon=False)  # fmt: skip
         figure.savefig(path, metadata={"Date": None})
         pyplot.close(figure)
