@@ -73,9 +73,6 @@ class LengthLimit(JointLimit, coordinate="length"):
     def at(r_P_i):
         return r_P_i
 
-    def normal(a_j, sense):
-        return scale(sense, a_j)
-
 
 @hookimpl
 def dap3d_contacts():
