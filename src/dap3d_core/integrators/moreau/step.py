@@ -226,9 +226,7 @@ def work_done(work: Any, s: StepArrays) -> float:
 
 
 @compiled
-def move(
-    y: Floats, c: int, dx: float, dy: float, dz: float, a: float, b: float, d: float
-) -> None:
+def move(y: Floats, c: int, dx: float, dy: float, dz: float, a: float, b: float, d: float) -> None:
     """Move and turn the body at c by (dx, dy, dz), m, and (a, b, d), rad, in global axes."""
     y[c], y[c + 1], y[c + 2] = y[c] + dx, y[c + 1] + dy, y[c + 2] + dz
     half = 0.5 * math.sqrt(a * a + b * b + d * d)

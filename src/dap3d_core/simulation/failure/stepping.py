@@ -1,7 +1,6 @@
 """What time stepping of contacts left unsolved."""
 
 from collections.abc import Sequence
-from typing import Any
 
 from dap3d_core.integrators import STEPPING, Integration
 from dap3d_core.result.note import information
@@ -22,9 +21,10 @@ def stepping_notes(integrations: Sequence[Integration], length: float) -> list[s
     if not states:
         return []
     residual, deepest = max(w.largest_residual for w in states), max(w.deepest for w in states)
+    rubbed = abs(sum(w.friction_work for w in states))
     words = (
         f"contacts were solved to {residual:.2g} of the largest impulse of a step, bodies overlap "
-        f"by {deepest:.2g} m at most; friction took {abs(sum(w.friction_work for w in states)):.6g} J"
+        f"by {deepest:.2g} m at most; friction took {rubbed:.6g} J"
     )
     notes: list[str] = [information(words)]
     if residual > UNSOLVED:

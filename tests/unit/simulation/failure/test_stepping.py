@@ -9,8 +9,9 @@ from dap3d_core.simulation.failure.stepping import stepping_notes
 
 
 def ran(residual, overlap=0.0):
-    return SimpleNamespace(name="moreau", largest_residual=residual, deepest=1e-12,
-                           friction_work=-2.0, overlap_at_start=overlap)  # fmt: skip
+    work = SimpleNamespace(largest_residual=residual, deepest=1e-12, friction_work=-2.0,
+                           overlap_at_start=overlap)  # fmt: skip
+    return SimpleNamespace(name="moreau", work=work)
 
 
 @pytest.mark.parametrize(("residual", "severity"), [(1e-4, "information"), (1e-2, "warning")])
