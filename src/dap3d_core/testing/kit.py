@@ -17,7 +17,6 @@ from dap3d_core.testing.checks import (
     forces,
     functions,
     joints,
-    plain_kernels,
     purity,
     states,
 )
@@ -164,7 +163,7 @@ def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
         checks.append(Check("branches", subject, "", branches.switches))
         checks.append(Check("rest", subject, "", branches.rest))
         checks.append(Check("purity", subject, "", purity.purity))
-        checks.append(Check("plain", subject, "", plain_kernels.plain))
+        checks.append(Check("plain", subject, "", purity.plain))
         checks.append(Check("compiled", subject, "", purity.compiled))
     return checks
 
