@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formats.import_scene.couplings import add_couplings, add_rotor
-from dap3d_core.formats.import_scene.joints import NamedEnds, add_joint, from_ground
+from dap3d_core.formats.import_scene.joints import add_joint, from_ground, named_ends
 from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.rigid_groups import (
     STAND_IN,
@@ -282,7 +282,7 @@ def _acts(value: float | Limits) -> bool:
 
 def _add_ball_spring(builder: SceneBuilder, joint: Joint) -> None:
     """Add a spring and damper against any turn of a ball."""
-    ends = NamedEnds(builder, from_ground(builder, joint))
+    ends = named_ends(builder, from_ground(builder, joint))
     k, c = joint.stiffness[0], joint.damping[0]
     rest = quaternion(ends.on_child.A @ ends.on_parent.A.T) if k else None
     name = builder.names.free("forces", f"{ends.name}_{'spring' if k else 'damper'}")
@@ -302,7 +302,7 @@ class _JointCoordinate:
         self.turns = joint.kind != "prismatic"
         # exchanged ends of a universal joint have its axes in the other order
         there = from_ground(builder, joint)
-        self.ends = NamedEnds(builder, there)
+        self.ends = named_ends(builder, there)
         self.at = k if there is joint else len(joint.axes) - 1 - k
         self.axis = np.asarray(there.axes[self.at], dtype=float)
         self.name = self.ends.name if len(joint.axes) == 1 else f"{self.ends.name}_{k + 1}"
@@ -445,7 +445,7 @@ def _add_inputs(builder: SceneBuilder, model: Articulation) -> None:
         wanted = f"input_{wanted}" if wanted[:1].isdigit() else wanted
         name = names.of("inputs", wanted, actuator.place, builder.remarks)
         scene.add_input(name, 0.0)
-        ends = NamedEnds(builder, joint)
+        ends = named_ends(builder, joint)
         axis = np.asarray(joint.axes[0], dtype=float)
         sides = (("i", ends.child, ends.on_child, 1.0), ("j", ends.parent, ends.on_parent, -1.0))
         for end, body, frame, sign in sides:

@@ -284,7 +284,8 @@ def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]
     names = ACTIONS if owner.slot else QUANTITIES[owner.kind]
     is_actuator = owner.name in result.record.actuation
     known = (name for name in names if name != ACTUATION or is_actuator)
-    return (*known, *own_names(result, owner), *_coordinate_names(result, owner))
+    own = (*states_of(result.summary, owner), *unknowns_of(result, owner))
+    return (*known, *own, *_coordinate_names(result, owner))
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:
@@ -366,11 +367,6 @@ def _has_own_angles(summary: ModelSummary) -> bool:
     """True if elements have angles or unknowns of their own, so far as that is known."""
     names = summary.angle_names or [""] * summary.angle_count
     return any(not name.startswith(JOINT_ANGLES) for name in names)
-
-
-def own_names(source: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
-    """Names of the states and unknowns of an owner."""
-    return (*states_of(source.summary, owner), *unknowns_of(source, owner))
 
 
 def own_quantity(

@@ -29,15 +29,11 @@ OWN = ("scene", "by", "allow_code", "announce")
 NAME = "objective"
 
 
-def _integral(values: Floats, t: Floats) -> Any:
-    return np.trapezoid(values, t, axis=-1)
-
-
 #: Numbers of a quantity over a run, by their names.
 NUMBERS: dict[str, Callable[[Floats, Floats], Any]] = {
     **{name: REDUCTIONS[name] for name in ("mean", "max", "min", "end")},
     "final": REDUCTIONS["end"],
-    "integral": _integral,
+    "integral": lambda values, t: np.trapezoid(values, t, axis=-1),
 }
 
 
