@@ -10,6 +10,21 @@ from dap3d_core.scene.tables import Element
 from dap3d_matlab.files.report import remark
 from dap3d_matlab.language.structures import DISKS
 from dap3d_matlab.language.values import GivenValue, Struct
+from dap3d_matlab.translate.field_rules import (
+    AT,
+    BODY_I,
+    DISK_ALIASES,
+    FORCES,
+    FUNCTIONS,
+    JOINTS,
+    N_J,
+    OTHER_FRICTION,
+    P_I,
+    P_J,
+    PIN_FRICTION,
+    D,
+    Rule,
+)
 from dap3d_matlab.translate.fields import GROUND, Fields, name_of
 
 #: Fields of bodies, implied by points and vectors of a type.
@@ -18,130 +33,17 @@ _BODY_FIELDS = {"iBindex": "i", "jBindex": "j"}
 _OF_DISK = {"iBindex": "iBindex", "type": "disk", "R": "R", "mu": "mu"}
 
 
-@attrs.frozen
-class _Rule:
-    """A field of a type.
-
-    Attributes:
-        field: in the MATLAB structure.
-        scene: in the scene.
-        how: number, vec3, table, matrix, word; or the array that an index refers to.
-        needed: 0 (no member of the array), or no value, is a mistake.
-        default: the default, for the report; "" where it is not reported.
-    """
-
-    field: str
-    scene: str
-    how: str
-    needed: bool = False
-    default: str = ""
-
-
-def _numbers(**fields: str) -> tuple[_Rule, ...]:
-    """Numbers with a reported default: MATLAB field = "scene field: default"."""
-    return tuple(
-        _Rule(field, scene, "number", default=default)
-        for field, (scene, _, default) in ((f, w.partition(":")) for f, w in fields.items())
-    )
-
-
-_P_I, _P_J = _Rule("iPindex", "P_i", "Points", True), _Rule("jPindex", "P_j", "Points", True)
-_A_I, _A_J = (
-    _Rule("iVindex_a", "a_i", "Vectors1", True),
-    _Rule("jVindex_a", "a_j", "Vectors1", True),
-)
-_N_J = _Rule("jVindex_n", "n_j", "Vectors1", True)
-#: Or two points, ``iPindex`` and ``jPindex``.
-_D = _Rule("V2index", "d", "Vectors2", True)
-_BODY_I = _Rule("iBindex", "body_i", "Bodies", True)
-_BODY_J = _Rule("jBindex", "body_j", "Bodies", default="jBindex = 0, the ground")
-#: A point in place of the body.
-_AT = _Rule("iPindex", "P_i", "Points")
-_FUNCTION = _Rule("iFunct", "function", "Functs")
-_LOCK = _Rule("iFunct", "function", "Functs", default="iFunct = 0, no motion: a lock")
-_LENGTH = _Rule("el", "length", "number", True)
-_LEVEL = _Rule("el", "length", "number", default="el = 0")
-_A_C = _Rule("Ac", "A_c", "matrix", default="Ac = eye(3)")
-_SLIP = _Rule("disk", "slip", "word", default="disk = 'xyz'")
-_RADIUS = _Rule("R", "radius", "number", default="R = 1")
-
-_JOINTS: dict[str, tuple[_Rule, ...]] = {
-    "sph": (_P_I, _P_J),
-    "rev": (_P_I, _P_J, _A_I, _A_J),
-    "sph-sph": (_D, _LENGTH),
-    "cyl": (_A_I, _A_J, _D),
-    "tran": (_A_J, _D, _A_C),
-    "univ": (_P_I, _P_J, _A_I, _N_J),
-    "rel-rot": (_BODY_I, _BODY_J, _A_J, _LOCK),
-    "rel-tran": (_BODY_I, _BODY_J, _A_J, _LOCK),
-    "rP": (_BODY_I, _AT, _A_J, _LEVEL, _FUNCTION),
-    "fix": (_BODY_I,),
-    "disk": (_BODY_I, _SLIP, _RADIUS),
-}
-_FORCES: dict[str, tuple[_Rule, ...]] = {
-    "weight": (
-        _Rule("gravity", "gravity", "number", default="gravity = 9.81"),
-        _Rule("wgt", "wgt", "vec3", default="wgt = [0;0;-1]"),
-    ),
-    "ptp": (
-        _D,
-        *_numbers(k="k:k = 0", c="c:c = 0", el_0="l0:el_0 = 0", f_a="f_a:f_a = 0"),
-        _FUNCTION,
-    ),
-    "rot_sda": (
-        _Rule("iVindex", "v_i", "Vectors1", True),
-        _Rule("jVindex", "v_j", "Vectors1", True),
-        _Rule("kVindex", "axis", "Vectors1", True),
-        *_numbers(k="k:k = 0", c="c:c = 0", theta_0="theta_0:theta_0 = 0", n_a="n_a:n_a = 0"),
-        _FUNCTION,
-    ),
-    "fp": (_BODY_I, _AT, _Rule("fp", "fp", "vec3", default="fp = [0;0;0]")),
-    "np": (_BODY_I, _Rule("np", "np", "vec3", default="np = [0;0;0]")),
-    "f": (_BODY_I, _AT, _Rule("f", "f", "vec3", default="f = [0;0;0]")),
-    "n": (_BODY_I, _Rule("n", "n", "vec3", default="n = [0;0;0]")),
-    "friction": (
-        _Rule("joint", "joint", "Joints", True, default="joint = 1"),
-        _Rule("mu", "mu", "number", default="mu = 0.5"),
-        _Rule("v_tol", "v_tol", "number"),
-        _Rule("radius", "radius", "number"),
-    ),
-    "user": (),
-}
-_SPAN = _numbers(
-    x_start="x_start:x_start = 0",
-    x_end="x_end:x_end = 1",
-    f_start="f_start:f_start = 0",
-)
-_END = _numbers(f_end="f_end:f_end = 1")
-_FUNCTIONS: dict[str, tuple[_Rule, ...]] = {
-    "a": (_Rule("coeff", "coeff", "vec3", True),),
-    "b": (*_SPAN, *_END),
-    "c": (
-        *_SPAN,
-        *_END,
-        _Rule("x_max", "x_max", "number", default="x_max = 0"),
-        _Rule("f_max", "f_max", "number", default="f_max = 0"),
-    ),
-    "d": (*_SPAN, _Rule("fp_end", "fp_end", "number", default="fp_end = 0")),
-}
-
-#: Joints with a law of friction: with the radius of a pin, and without.
-_PIN_FRICTION, _OTHER_FRICTION = ("rev", "sph", "cyl"), ("tran", "disk")
-#: Two spellings of the manual.
-_DISK_ALIASES = {"zn": "nz", "zt": "tz"}
-
-
 def add_functions(scene: Scene, fields: Fields) -> None:
     """Add the functions, in the order of their array."""
     for k, struct in enumerate(fields.model.arrays["Functs"] or [], 1):
-        _add(scene.functions, "Functs", k, struct, _FUNCTIONS, fields)
+        _add(scene.functions, "Functs", k, struct, FUNCTIONS, fields)
 
 
 def add_joints(scene: Scene, fields: Fields) -> None:
     """Add the joints, in the order of their array; their friction becomes forces."""
     for k, struct in enumerate(fields.model.arrays["Joints"] or [], 1):
         joint = _with_disk(struct, fields)
-        element = _add(scene.joints, "Joints", k, joint, _JOINTS, fields)
+        element = _add(scene.joints, "Joints", k, joint, JOINTS, fields)
         if element is not None:
             _add_friction(scene, joint, element, fields)
 
@@ -151,7 +53,7 @@ def add_forces(scene: Scene, fields: Fields) -> None:
     frictions = scene.forces
     scene.forces = {}
     for k, struct in enumerate(fields.model.arrays["Forces"] or [], 1):
-        element = _add(scene.forces, "Forces", k, struct, _FORCES, fields)
+        element = _add(scene.forces, "Forces", k, struct, FORCES, fields)
         if element is None or element.type != "friction":
             continue
         joint = str(element.fields.get("joint", ""))
@@ -168,7 +70,7 @@ def _add(
     array: str,
     number: int,
     struct: Struct,
-    types: dict[str, tuple[_Rule, ...]],
+    types: dict[str, tuple[Rule, ...]],
     fields: Fields,
 ) -> Element | None:
     """Add the element of a structure; None where its type is unknown, which is reported."""
@@ -202,14 +104,14 @@ class _Values:
     bodies: dict[str, tuple[str, str]] = attrs.field(factory=dict)  # slot -> body, field
     defaults: list[str] = attrs.field(factory=list)
 
-    def read(self, rule: _Rule) -> None:
+    def read(self, rule: Rule) -> None:
         """Read one field."""
-        if rule is _D:
+        if rule is D:
             self._ends()
             return
-        if rule is _BODY_I and self._has_point():
+        if rule is BODY_I and self._has_point():
             return
-        if rule is _N_J and not self.fields.differs(self.struct, _N_J.field):
+        if rule is N_J and not self.fields.differs(self.struct, N_J.field):
             rule = attrs.evolve(rule, field="jVindex_a")  # the manual gives the arm there
         value = self._value(rule)
         if value is None:
@@ -218,7 +120,7 @@ class _Values:
         self.fields.placed(f"{self.key}.{rule.scene}", self.struct, rule.field)
         self._note_body(rule, value)
 
-    def _value(self, rule: _Rule) -> Any:
+    def _value(self, rule: Rule) -> Any:
         struct, fields = self.struct, self.fields
         self.used.add(rule.field)
         is_given = rule.field in struct.given
@@ -235,9 +137,9 @@ class _Values:
             return None  # left to the type
         if rule.how == "word":
             word = fields.word(struct, rule.field)
-            if word in _DISK_ALIASES:
-                fields.changed(struct, rule.field, f"= {word} is {_DISK_ALIASES[word]}")
-            return _DISK_ALIASES.get(word or "", word)
+            if word in DISK_ALIASES:
+                fields.changed(struct, rule.field, f"= {word} is {DISK_ALIASES[word]}")
+            return DISK_ALIASES.get(word or "", word)
         if rule.how == "matrix":
             return fields.matrix(struct, rule.field)
         if rule.how == "vec3":
@@ -247,31 +149,31 @@ class _Values:
     def _has_point(self) -> bool:
         """True if a point is given in place of the body."""
         struct = self.struct
-        types = {**_JOINTS, **_FORCES}[str(struct.value("type"))]
-        return _AT in types and self.fields.differs(struct, _AT.field)
+        types = {**JOINTS, **FORCES}[str(struct.value("type"))]
+        return AT in types and self.fields.differs(struct, AT.field)
 
     def _ends(self) -> None:
         """A vector of type 2, or the two points between which it runs."""
         struct, fields = self.struct, self.fields
-        self.used |= {_D.field, _P_I.field, _P_J.field}
-        both = [r for r in (_P_I, _P_J) if fields.differs(struct, r.field)]
-        if fields.differs(struct, _D.field) or len(both) < 2:
-            name = fields.reference(struct, _D.field, _D.how, needed=True)
+        self.used |= {D.field, P_I.field, P_J.field}
+        both = [r for r in (P_I, P_J) if fields.differs(struct, r.field)]
+        if fields.differs(struct, D.field) or len(both) < 2:
+            name = fields.reference(struct, D.field, D.how, needed=True)
             if name is None:
                 return
-            self.values[_D.scene] = name
-            fields.placed(f"{self.key}.{_D.scene}", struct, _D.field)
+            self.values[D.scene] = name
+            fields.placed(f"{self.key}.{D.scene}", struct, D.field)
             vectors = fields.model.arrays["Vectors2"]
             if vectors is None:
                 return
             vector = vectors[int(name[1:]) - 1]
-            for rule in (_P_I, _P_J):
+            for rule in (P_I, P_J):
                 point = fields.reference(vector, rule.field, rule.how, needed=False)
                 self._note_body(rule, point)
                 if rule in both and fields.reference(struct, rule.field, rule.how, needed=True) != (
                     point
                 ):
-                    what = f"is another point than that of vector {name[1:]}, {_D.field}"
+                    what = f"is another point than that of vector {name[1:]}, {D.field}"
                     fields.refuse(struct, rule.field, what, "leave it out")
             return
         for rule in both:
@@ -279,7 +181,7 @@ class _Values:
 
     # ---------------------------------------------------------------- bodies, unused fields
 
-    def _note_body(self, rule: _Rule, value: Any) -> None:
+    def _note_body(self, rule: Rule, value: Any) -> None:
         """Record the body of a slot, as a point or a vector gives it."""
         slot = rule.scene[-1]
         array = self.fields.model.arrays.get(rule.how)
@@ -304,7 +206,7 @@ class _Values:
                 fields.left_out(struct, field, "is worked out by the program: not read")
             elif field in _BODY_FIELDS:
                 self._same_body(field)
-            elif fields.differs(struct, field) and not (field == "R" and word in _PIN_FRICTION):
+            elif fields.differs(struct, field) and not (field == "R" and word in PIN_FRICTION):
                 fields.left_out(struct, field, f"has no meaning for the type {word}: not read")
 
     def _same_body(self, field: str) -> None:
@@ -353,13 +255,13 @@ def _add_friction(scene: Scene, struct: Struct, element: Element, fields: Fields
     mu = fields.number(struct, "mu") if "mu" in struct.given else 0.0
     if not mu:
         return
-    if element.type not in (*_PIN_FRICTION, *_OTHER_FRICTION):
+    if element.type not in (*PIN_FRICTION, *OTHER_FRICTION):
         what = f"there is no law of friction for a joint of type {element.type}"
         fields.refuse(struct, "mu", what, "leave it out; the MATLAB program does not use it")
         return
     name = f"friction_{element.name}"
     force = Element(name, "friction", {"joint": element.name, "mu": mu})
-    if element.type in _PIN_FRICTION:
+    if element.type in PIN_FRICTION:
         force.fields["radius"] = fields.number(struct, "R")
         if "R" not in struct.given:
             fields.defaulted(struct, "R = 1, the radius of its friction")
@@ -374,7 +276,7 @@ def _take_radius(
 ) -> None:
     """Give a friction force without a radius that of its joint."""
     joints = fields.model.arrays["Joints"]
-    if joint not in scene.joints or not joints or scene.joints[joint].type not in _PIN_FRICTION:
+    if joint not in scene.joints or not joints or scene.joints[joint].type not in PIN_FRICTION:
         return
     source = joints[int(joint[1:]) - 1]
     element.fields["radius"] = fields.number(source, "R")

@@ -37,9 +37,9 @@ FEW = 50
 #: Quantities that are drawn on the scale of the energies of their run.
 ENERGIES = ("energy.kinetic", "energy.potential", "energy.total")
 #: Mode -> word and colour; open contacts have the colour of the page.
-_LOOKS = {1: ("slides", "#F6D9B8"), 2: ("sticks", "#CFE5CF")}
+LOOKS = {1: ("slides", "#F6D9B8"), 2: ("sticks", "#CFE5CF")}
 #: Parts of the width of a panel from which on a band has its word, upright and as written.
-_ROOM, _ENOUGH = 0.04, 0.16
+ROOM, ENOUGH = 0.04, 0.16
 
 
 def _shaped(t: Floats, x: Floats, cuts: Sequence[float]) -> Floats:
@@ -366,15 +366,15 @@ def _bands_of(result: Result, quantities: Iterable[Quantity]) -> list[Band]:
 def _shade(ax: Axes, bands: Sequence[Band]) -> None:
     """Draw bands behind the curves, each mode with its word in its widest band."""
     width = bands[-1].end - bands[0].start if bands else 0.0
-    for mode, (word, color) in _LOOKS.items():
+    for mode, (word, color) in LOOKS.items():
         alike = [band for band in bands if band.mode == mode]
         for band in alike:
             ax.axvspan(band.start, band.end, color=color, linewidth=0.0, zorder=0.0)
         widest = max(alike, key=lambda band: band.end - band.start, default=None)
         room = widest.end - widest.start if widest is not None else 0.0
-        if widest is not None and room > _ROOM * width:
+        if widest is not None and room > ROOM * width:
             ax.text(
                 0.5 * (widest.start + widest.end), 0.5, word, transform=ax.get_xaxis_transform(),
-                rotation=0 if room > _ENOUGH * width else 90, ha="center", va="center",
+                rotation=0 if room > ENOUGH * width else 90, ha="center", va="center",
                 fontsize=LETTERS, color="#444444",
             )  # fmt: skip

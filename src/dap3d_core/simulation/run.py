@@ -57,9 +57,9 @@ MUCH_WORK = 3_000_000
 SECOND_RUN_FACTOR = 0.8
 #: A residual above this part of the largest impulse is a warning, and an overlap above this part of
 #: the length of the scene.
-_UNSOLVED = 1e-3
+UNSOLVED = 1e-3
 #: Overlaps at the start above this part of the length of the scene are told.
-_LEAST_OVERLAP = 1e-8
+LEAST_OVERLAP = 1e-8
 
 
 class Run(RunState):
@@ -367,11 +367,11 @@ def stepping_notes(integrations: Sequence[Integration], length: float) -> list[s
         f"by {deepest:.2g} m at most; friction took {abs(sum(i.friction_work for i in ran)):.6g} J"
     )
     notes: list[str] = [information(words)]
-    if residual > _UNSOLVED:
+    if residual > UNSOLVED:
         notes = [f"{words}: where bodies rest is not to be trusted; give a shorter contact_step"]
-    elif deepest > _UNSOLVED * length:
+    elif deepest > UNSOLVED * length:
         notes = [f"{words}: joints or drivers hold them where they cannot move apart"]
-    if (overlap := ran[0].overlap_at_start) > _LEAST_OVERLAP * length:
+    if (overlap := ran[0].overlap_at_start) > LEAST_OVERLAP * length:
         notes.append(
             f"bodies overlapped by {overlap:.2g} m at the start, and were moved apart: move them"
         )

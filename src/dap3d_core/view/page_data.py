@@ -20,11 +20,11 @@ from dap3d_core.view.scene3d.scene_data import geometry_of
 #: Curves that every page can draw besides those derived from motion and reactions.
 USUAL = ("energy.kinetic", "energy.potential", "energy.total")
 #: An arrow below this fraction of the largest of its kind is left out.
-_SMALLEST = 1e-9
+SMALLEST = 1e-9
 #: Greatest lengths of the longest arrow and of the usual one, as fractions of the scene's size.
-_LONGEST, _USUAL_LENGTH = 0.36, 0.16
+LONGEST, USUAL_LENGTH = 0.36, 0.16
 #: Pairs of shapes whose forces are drawn at most.
-_MOST_PAIRS = 200
+MOST_PAIRS = 200
 
 
 def page_data(
@@ -149,7 +149,7 @@ def _arrows_of(result: Result, elements: Elements, size: float) -> dict[str, Any
             (one, np.linalg.norm(one["values"], axis=1)) for one in every if one["what"] == what
         ]
         largest = max((float(length.max()) for _, length in alike), default=0.0)
-        least = max(least * size, _SMALLEST * largest)  # forces that cancel leave rounding moments
+        least = max(least * size, SMALLEST * largest)  # forces that cancel leave rounding moments
         visible = [(arrow, length) for arrow, length in alike if length.max() > least]
         scales[what] = _scale([length for _, length in visible], size)
         arrows += [
@@ -166,7 +166,7 @@ def _scale(lengths: list[Floats], size: float) -> float:
     peak = max(float(np.max(length)) for length in lengths)
     usual = max(float(np.median(length)) for length in lengths)
     middle = np.sqrt(max(usual, 1e-3 * peak) * peak)
-    return float(min(_LONGEST / peak, _USUAL_LENGTH / middle) * size)
+    return float(min(LONGEST / peak, USUAL_LENGTH / middle) * size)
 
 
 def _reactions(result: Result, elements: Elements) -> Iterator[dict[str, Any]]:
@@ -205,11 +205,9 @@ def _shape_contacts(result: Result, notes: list[str]) -> Iterator[dict[str, Any]
     table = result.contacts
     pairs, which = np.unique(table.pair, axis=0, return_inverse=True)
     size = np.linalg.norm(table.force, axis=1)
-    largest = np.argsort(-np.bincount(which.ravel(), size, len(pairs)), kind="stable")[:_MOST_PAIRS]
-    if len(pairs) > _MOST_PAIRS:
-        notes.append(
-            f"arrows of {_MOST_PAIRS} of {len(pairs)} pairs of shapes that touch are drawn"
-        )
+    largest = np.argsort(-np.bincount(which.ravel(), size, len(pairs)), kind="stable")[:MOST_PAIRS]
+    if len(pairs) > MOST_PAIRS:
+        notes.append(f"arrows of {MOST_PAIRS} of {len(pairs)} pairs of shapes that touch are drawn")
     place = np.searchsorted(result.t, table.t)
     for k in largest:
         chosen = which.ravel() == k

@@ -12,7 +12,7 @@ from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusing
 
 #: Options of the formats c and fmu alone, by parameter.
-_NATIVE_OPTIONS = {
+NATIVE_OPTIONS = {
     "quantities": click.option(
         "--quantity", "quantities", multiple=True, metavar="NAME",
         help="c, fmu: an output, such as load.r.z, once for each; those of the MODEL by default."),
@@ -38,7 +38,7 @@ _NATIVE_OPTIONS = {
     options.FPS, options.MODEL_OF_RESULT, options.ALLOW_CODE,
     click.option("--strict", is_flag=True,
                  help="Refuse a MODEL if something would be left out."),
-    *_NATIVE_OPTIONS.values(),
+    *NATIVE_OPTIONS.values(),
     options.FORCE, options.JSON, options.QUIET,
 )  # fmt: skip
 def export(

@@ -93,11 +93,15 @@ def plot(
     _check(data, names, target, axes, size, files, force)
     _draw(data, names, target, show, force, **axes, **size)
     if target is not None:
-        drawn = axes if hasattr(data, "data_vars") else {"x": x or "t"}
-        about = {"results": files, "quantities": names} | drawn
+        about = {"results": files, "quantities": names} | _drawn(data, axes)
         notes = [note for note in _notes_of(data) if note not in earlier]
         show_written(target, ", ".join(names), about, notes, as_json=as_json, quiet=quiet)
     return DONE
+
+
+def _drawn(data: Any, axes: dict[str, Any]) -> dict[str, Any]:
+    """The axes of a sweep, the abscissa of a result."""
+    return axes if hasattr(data, "data_vars") else {"x": axes["x"] or "t"}
 
 
 def _notes_of(data: Any) -> list[str]:

@@ -1,4 +1,4 @@
-"""An articulated model as a scene."""
+"""An articulated model as a scene: bodies, joints, and what acts on coordinates of joints."""
 
 import re
 from collections.abc import Mapping, Sequence
@@ -42,15 +42,15 @@ LIMITS = ("off", "soft", "hard")
 #: at hard ones, s. Critically damped, what they stop stands still within some of it.
 STOP_TIME = {"soft": 2e-3, "hard": 1e-4}
 #: Rate below which dry friction fades, rad/s and m/s.
-_FADING = 1e-2
+FADING = 1e-2
 #: What may act on each coordinate of a joint -> its name in a remark.
-_WORDS = {
+WORDS = {
     "damping": "damping", "stiffness": "spring", "friction": "friction", "armature": "armature",
     "limits": "limits",
 }  # fmt: skip
 #: Kind of a joint -> what is taken of it.
-_TAKEN = {
-    "revolute": tuple(_WORDS), "prismatic": tuple(_WORDS),
+TAKEN = {
+    "revolute": tuple(WORDS), "prismatic": tuple(WORDS),
     "universal": ("damping", "stiffness", "friction", "limits"), "ball": ("damping", "stiffness"),
 }  # fmt: skip
 
@@ -253,11 +253,11 @@ def split_planar(model: Articulation, remarks: Remarks) -> Articulation:
 
 def _add_joint_forces(builder: SceneBuilder, joint: Joint) -> None:
     """Add what acts on the coordinates of a joint; what no type can say is left out, remarked."""
-    given = [key for key in _WORDS if any(map(_acts, getattr(joint, key)))]
-    taken = _TAKEN.get(joint.kind, ())
+    given = [key for key in WORDS if any(map(_acts, getattr(joint, key)))]
+    taken = TAKEN.get(joint.kind, ())
     for key in given:
         if key not in taken:
-            text = f"{_WORDS[key]} of a {joint.kind} joint"
+            text = f"{WORDS[key]} of a {joint.kind} joint"
             builder.remarks.leave_out(joint.place, text, motion=True)
     if not set(given) & set(taken):
         return
@@ -407,17 +407,17 @@ class _JointCoordinate:
             return
         unit = "rad/s" if self.turns else "m/s"
         text = (
-            f"dry friction of a joint fades below {_FADING:g} {unit}: it creeps, and does not stick"
+            f"dry friction of a joint fades below {FADING:g} {unit}: it creeps, and does not stick"
         )
         builder.remarks.translate(self.joint.place, text, motion=True)
         name = builder.names.free("forces", f"{self.name}_friction")
         if self.turns:
             axis = ends.vector(self._holder(), self.axis)
             builder.scene.add_force("rot_friction", name, body_i=ends.child, body_j=ends.parent,
-                                    axis=axis, n_c=friction, w_tol=_FADING)  # fmt: skip
+                                    axis=axis, n_c=friction, w_tol=FADING)  # fmt: skip
         else:
             builder.scene.add_force("tran_friction", name, P_i=ends.point("i"), f_c=friction,
-                                    a_j=ends.vector("j", self.axis), v_tol=_FADING)  # fmt: skip
+                                    a_j=ends.vector("j", self.axis), v_tol=FADING)  # fmt: skip
 
 
 def _perpendicular(axis: Floats) -> Floats:

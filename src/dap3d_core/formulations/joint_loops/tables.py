@@ -41,9 +41,9 @@ FREEDOMS = {FIXED: 0, REVOLUTE: 1, PRISMATIC: 1, SPHERICAL: 3, FREE: 6}
 #: Numbers that the tables and arrays may hold: 800 MB.
 MOST_NUMBERS = 100_000_000
 #: Compliances by which rows are judged, as parts of their diagonals.
-_SMALL = 1e-9
+SMALL = 1e-9
 #: They are divided by this; a pivot that falls by its root or more has nothing else.
-_LESS = 16.0
+LESS = 16.0
 
 
 @attrs.frozen(eq=False)
@@ -231,8 +231,8 @@ def judge_kept_rows(evaluator: Evaluator, y: Floats) -> None:
     The pivot of a row that depends on others is what compliances make of it, and follows them.
     """
     kept: KeptRowArrays = evaluator.system.tree.kept
-    more, less = (_pivots(evaluator, y, part) for part in (_SMALL, _SMALL / _LESS))
-    redundant = ~(more < np.sqrt(_LESS) * less)
+    more, less = (_pivots(evaluator, y, part) for part in (SMALL, SMALL / LESS))
+    redundant = ~(more < np.sqrt(LESS) * less)
     kept.smallest[:] = np.where(redundant, 0.0, SINGULAR_PIVOT_RATIO * less)
     kept.settings[PART_OF_ROW] = PART if redundant.any() else 0.0
 

@@ -399,7 +399,7 @@ class _Part(NamedTuple):
     is_vector: bool = False
 
 
-_CONTACT_QUANTITIES = {
+CONTACT_QUANTITIES = {
     "gap": _Part("gap", "gap", "m"),
     "normal": _Part("normal_force", "normal force", "N"),
     "friction": _Part("friction", "friction", "N", True),
@@ -409,7 +409,7 @@ _CONTACT_QUANTITIES = {
 
 
 def _contact_quantity(source: QuantitySource, name: str) -> Quantity | None:
-    """A quantity of a contact; None where the name is of no contact.
+    """A quantity of a contact, such as ``floor.friction.x``; None of a name of no contact.
 
     Vectors by components or ``norm``; those of a contact with several points are of ``NAME#1``;
     scalars of such a contact have a column for each point.
@@ -422,12 +422,12 @@ def _contact_quantity(source: QuantitySource, name: str) -> Quantity | None:
     points = names.get(head.partition(POINT)[0])
     if points is None or (POINT in head and head not in points):
         return None
-    part = _CONTACT_QUANTITIES.get(rest[0]) if rest else None
+    part = CONTACT_QUANTITIES.get(rest[0]) if rest else None
     component = rest[1] if len(rest) == 2 else ""
     several = len(points) > 1 and POINT not in head
     allowed = (*AXES, "norm", "") if part is not None and part.is_vector else ("",)
     if part is None or len(rest) > 2 or component not in allowed or (several and part.is_vector):
-        known = ", ".join(f"{head}.{n}" for n in _CONTACT_QUANTITIES)
+        known = ", ".join(f"{head}.{n}" for n in CONTACT_QUANTITIES)
         more = f"; vectors are those of a point, {points[0]}.slip.x" if several else ""
         raise UnknownNameError(f"there is no quantity {name!r}; contact {head} has {known}{more}")
     values = np.asarray(getattr(source.contact(head), part.attribute), dtype=float)

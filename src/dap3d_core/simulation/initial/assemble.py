@@ -48,18 +48,18 @@ MOST_LEFT = 2
 #: Joints that the message of a failure lists.
 MOST_JOINTS = 10
 #: Freedoms beyond which no way out is searched: the work grows with the square of them.
-_MOST_FREE = 60
+MOST_FREE = 60
 #: Part of a gap that no first-order change closes at a singular pose, at least.
-_OPEN = 0.9
+OPEN = 0.9
 #: A rate of closing below this part of the largest, or of the length of the scene, is none.
-_CLOSING = 1e-6
+CLOSING = 1e-6
 #: Directions that close a gap equally well, but for this part, are equal.
-_TIED = 1e-6
+TIED = 1e-6
 #: Ways out that are tried; singular values above this part of the largest are no rounding: a way
 #: that ends at another singular pose, such as a folded one, is taken only where there is no other.
-_MOST_WAYS, _REGULAR = 4, 1e-4
+MOST_WAYS, REGULAR = 4, 1e-4
 #: Rotations that a sentence gives, in rad from this on.
-_MOST_BODIES, _TURNED = 6, 1e-3
+MOST_BODIES, TURNED = 6, 1e-3
 
 
 @attrs.frozen(eq=False)
@@ -350,8 +350,10 @@ def _ways_out(
 ) -> Iterator[Floats]:
     """Displacements (n, 6) from a singular pose that close its gap, the smallest first.
 
-    Of those that close it equally well, and of the two signs, the one in which the first component
-    that can be largest is positive.
+    No small change closes a gap there to first order: of a mechanism drawn straight, for example.
+    Along velocities v that the rows allow C changes by -gamma(v) s^2 / 2: the direction in which
+    that closes the gap with the least motion leads away. Of those that close it equally well, and
+    of the two signs, the one in which the first component that can be largest is positive.
     """
     if len(rows.C) > DENSE_ROWS:
         return
@@ -361,17 +363,17 @@ def _ways_out(
     rank = _rank(values, RCOND)
     beyond = gap - left[:, :rank] @ (left[:, :rank].T @ gap)
     distance = float(np.linalg.norm(beyond))
-    if distance < _OPEN * np.linalg.norm(gap) or not 0 < len(right) - rank <= _MOST_FREE:
+    if distance < OPEN * np.linalg.norm(gap) or not 0 < len(right) - rank <= MOST_FREE:
         return
     motions = np.zeros((len(right) - rank, len(is_free)))
     motions[:, is_free] = right[rank:]
     closing = _closing(evaluator, u, rows, t, held, metric, motions, beyond / distance)
     rates, directions = np.linalg.eigh(closing)
-    least = _CLOSING * max(-float(rates[0]), evaluator.model.length)
-    for _ in range(_MOST_WAYS):
+    least = CLOSING * max(-float(rates[0]), evaluator.model.length)
+    for _ in range(MOST_WAYS):
         if not rates.size or not rates[-1] > least:
             return
-        equal = rates >= (1.0 - _TIED) * rates[-1]
+        equal = rates >= (1.0 - TIED) * rates[-1]
         yield displacements(
             evaluator,
             _first_of(directions[:, equal].T @ motions) * (2.0 * distance / rates[-1]) ** 0.5,
@@ -383,7 +385,7 @@ def _ways_out(
 def _first_of(directions: Floats) -> Floats:
     """A unit vector (6 n,) of the space of orthonormal ones (k, 6 n), the same on any computer."""
     size = np.sum(directions**2, axis=0)
-    k = int(np.argmax(size >= (1.0 - _TIED) * np.max(size)))
+    k = int(np.argmax(size >= (1.0 - TIED) * np.max(size)))
     first: Floats = directions[:, k] @ directions / size[k] ** 0.5
     return first
 
@@ -394,7 +396,7 @@ def _rank(values: Floats, part: float) -> int:
 
 def _is_farther(evaluator: Evaluator, u: Floats, other: ConstraintRows, t: float) -> bool:
     """True if the rows of a state are clearly more independent than those of a singular pose."""
-    parts = ((finite_rows(evaluator, t, u), _REGULAR), (other, RCOND))
+    parts = ((finite_rows(evaluator, t, u), REGULAR), (other, RCOND))
     no_one = np.zeros(0, dtype=np.int64)
     ranks = [
         _rank(np.linalg.svd(scaled_system(evaluator, r, r.C, no_one, "unit")[0])[1], part)
@@ -439,14 +441,14 @@ def _rotations(model: Model, start: Floats, end: Floats) -> str:
     sine *= np.where(cosine < 0.0, -1.0, 1.0)[:, None]
     size = np.linalg.norm(sine, axis=1)
     angle = 2.0 * np.arctan2(size, np.abs(cosine))
-    order = [int(k) for k in np.argsort(-angle, kind="stable") if angle[k] > _TURNED]
+    order = [int(k) for k in np.argsort(-angle, kind="stable") if angle[k] > TURNED]
     listed = [
         f"{model.body_names[k]} turned by {angle[k]:.3g} rad about {_axis(sine[k] / size[k])}"
-        for k in sorted(order[:_MOST_BODIES])
+        for k in sorted(order[:MOST_BODIES])
     ]
-    more = [f"and {len(order) - _MOST_BODIES} bodies more"] if len(order) > _MOST_BODIES else []
+    more = [f"and {len(order) - MOST_BODIES} bodies more"] if len(order) > MOST_BODIES else []
     return ", ".join([*listed, *more]) or "bodies moved without turning"
 
 
 def _axis(n: Floats) -> str:
-    return "[" + ", ".join(f"{c:.3g}" for c in np.where(np.abs(n) > _TURNED, n, 0.0)) + "]"
+    return "[" + ", ".join(f"{c:.3g}" for c in np.where(np.abs(n) > TURNED, n, 0.0)) + "]"

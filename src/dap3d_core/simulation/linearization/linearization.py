@@ -36,9 +36,9 @@ REAL_PART_ROUNDING = 1e-9, 1e-12
 #: Eigenvalues within this part of i Omega are drifts of free bodies, seen from axes that turn.
 DRIFT = 1e-5
 #: sigma as a part of the frequency that the largest terms would give.
-_SHIFT = 1e-4
+SHIFT = 1e-4
 #: Eigenvalues below this part of sigma are zeros of rigid motions, which rounding has moved.
-_ZERO = 1e-3
+ZERO = 1e-3
 
 
 class Linearization:
@@ -408,6 +408,13 @@ def lowest_eigenvalues(
 ) -> Eigenvalues:
     """The ``count`` eigenvalues nearest to zero, and displacements x^ (6 n, count) of each.
 
+    Of the sparse equations without independent coordinates: with y = (x^, v^, lambda, z), z of
+    elements with states, they are a pencil E y_dot = B y, E singular. Position rows stand as
+    D x^ = 0, rows of the velocity level alone as D v^ + G x^ = 0, redundant rows are left out.
+    Arnoldi iterations with (B - sigma E)^-1 E (scipy.sparse.linalg.eigs, ARPACK) find the
+    eigenvalues nearest to a small real sigma; those at infinity, which the constraints add, become
+    zero and stay out of the way.
+
     Raises:
         SimulationError: the iteration does not converge.
     """
@@ -434,7 +441,7 @@ def lowest_eigenvalues(
         masses.append(eye_array(own.by_states.shape[0]))
     B, E = block_array(terms).tocsc(), block_diag(masses).tocsc()
     largest = max(np.sqrt(_norm(equations.K)), _norm(equations.C), _norm(equations.S))
-    sigma = _SHIFT * largest if largest > 0.0 else 1.0
+    sigma = SHIFT * largest if largest > 0.0 else 1.0
     factors = splu(csc_array(B - sigma * E))
     size = B.shape[0]
     operator = LinearOperator((size, size), lambda z: factors.solve(E @ np.asarray(z).ravel()))
@@ -449,7 +456,7 @@ def lowest_eigenvalues(
                 f"of the lowest {wanted} eigenvalues {len(theta)} were found; take fewer modes"
             ) from error
     values = sigma + 1.0 / theta
-    values[np.abs(values) < _ZERO * sigma] = 0.0
+    values[np.abs(values) < ZERO * sigma] = 0.0
     order = order_of(values)
     return Eigenvalues(values[order], vectors[:six, order])
 

@@ -44,8 +44,8 @@ TRIED_MOTION, EARLIER = 0.05, (1e-6, 1e-4, 1e-2, 1.0)
 NEARLY = 1e-2
 #: What is asked of a combination is nothing below this part of what is asked of its rows.
 NOTHING = 1e-6
-_HALVINGS = 40
-_NO_ROWS = np.zeros(0, dtype=np.int64)
+HALVINGS = 40
+NO_ROWS = np.zeros(0, dtype=np.int64)
 
 
 @attrs.frozen
@@ -100,7 +100,7 @@ def _leads_away(evaluator: Evaluator, u: Floats, t: float, direction: Floats) ->
     )
     moved = displaced(u, step / extent)
     try:
-        closed, _ = correct_positions(evaluator, moved, t, _NO_ROWS)
+        closed, _ = correct_positions(evaluator, moved, t, NO_ROWS)
     except AssemblyError:
         return False
     gone, asked = coordinates_of(closed - u), coordinates_of(moved - u)
@@ -137,7 +137,7 @@ def _out_of_reach(evaluator: Evaluator, t: float, u: Floats) -> str:
         good = late
     else:
         return ""
-    for _ in range(_HALVINGS):
+    for _ in range(HALVINGS):
         middle = 0.5 * (good + late)
         if not good < middle < late:
             break
@@ -153,7 +153,7 @@ def _closed(evaluator: Evaluator, u: Floats, t: float, later: float) -> Floats |
     """The bodies at a later time, put together; None where they cannot be."""
     moved = displaced(u, (later - t) * velocities_of(u))
     try:
-        return correct_positions(evaluator, moved, later, _NO_ROWS)[0]
+        return correct_positions(evaluator, moved, later, NO_ROWS)[0]
     except AssemblyError:
         return None
 

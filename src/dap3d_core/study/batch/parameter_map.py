@@ -392,6 +392,10 @@ def dependence_of(
 ) -> _Dependence:
     """Fields and poses that ``prepare`` reads for an element; none where its type has none.
 
+    It is run once on an element whose fields, and the bodies' poses, record that they are read.
+    Nothing else can change what it returns: with other values of what was not read it takes the
+    same way through its code.
+
     Args:
         instance: a checked element.
         poses: of each body index, ground included.
