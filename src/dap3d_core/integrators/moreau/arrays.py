@@ -24,7 +24,8 @@ MET = 14
 LOG_ROOM = 64
 #: Arrays of which a row belongs to a contact.
 OF_CONTACTS = ("bodies", "key", "group", "chosen", "J", "moved", "own", "gap", "mu", "e", "bias",
-               "r", "left", "collides", "x", "u", "z", "B", "push", "kept", "met", "own_held")  # fmt: skip
+               "r", "left", "collides", "closing", "x", "u", "z", "B", "push", "kept", "met",
+               "own_held")  # fmt: skip
 
 
 def _integer() -> Scalar[int]:
@@ -105,7 +106,8 @@ class StepArrays(Arrays):
     rest: Floats
     trial_rest: Floats
     end: Floats  # at the end of the step
-    hit: Floats  # 1 of bodies that collide
+    hit: Floats  # the part of the step at which a body is hit; and 1 where it flies else
+    flies: Floats
     used: Integers  # bodies of a group of contacts, in the order of K; the place of each, or -1
     place: Integers
     parent: Integers  # scratch of groups and of the order of bodies
@@ -118,7 +120,8 @@ class StepArrays(Arrays):
     key: Integers  # a number that a contact keeps
     group: Integers  # the least body of those that contacts connect
     chosen: Integers  # contacts of a group
-    collides: Integers
+    collides: Integers  # what it does; the part of the step at which it closes
+    closing: Floats
     J: Floats  # (c, 36) rows of the velocity of body i less that of j: normal, tangents
     moved: Floats  # the same times M^-1
     own: Floats  # (c, 9) J M^-1 J^T of each
@@ -186,7 +189,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         **{name: np.zeros((n + 1, 6)) for name in (
             "before", "free", "v", "trial", "rest", "trial_rest", "end")},
         **{name: np.zeros(n + 1) for name in (
-            "margin", "shape_reach", "mass", "mass_inverse", "hit")},
+            "margin", "shape_reach", "mass", "mass_inverse", "hit", "flies")},
         **{name: np.zeros(n + 1, dtype=np.int64) for name in (
             "used", "place", "parent", "queue", "first_edge")},
     }  # fmt: skip
@@ -271,7 +274,7 @@ def _declared(evaluator: Evaluator) -> dict[str, Any]:
     return {
         "declared_bodies": bodies.astype(np.int64),
         "declared_place": places,
-        "declared_gap": np.ascontiguousarray(evaluator.system.row[own :: 3][:d]),
+        "declared_gap": np.ascontiguousarray(evaluator.system.row[own::3][:d]),
         "declared_mode": np.zeros(0, dtype=np.int64) if table is None else table.mode,
         "declared_mu": np.zeros(0) if table is None else table.mu,
         "declared_e": np.zeros(0) if table is None else table.e,
