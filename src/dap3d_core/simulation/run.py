@@ -358,20 +358,20 @@ def stepping_notes(integrations: Sequence[Integration], length: float) -> list[s
 
     length: of the scene, m.
     """
-    ran: list[Any] = [one for one in integrations if one.name == STEPPING.name]
-    if not ran:
+    states = [one.work for one in integrations if one.name == STEPPING.name]
+    if not states:
         return []
-    residual, deepest = max(i.largest_residual for i in ran), max(i.deepest for i in ran)
+    residual, deepest = max(w.largest_residual for w in states), max(w.deepest for w in states)
     words = (
         f"contacts were solved to {residual:.2g} of the largest impulse of a step, bodies overlap "
-        f"by {deepest:.2g} m at most; friction took {abs(sum(i.friction_work for i in ran)):.6g} J"
+        f"by {deepest:.2g} m at most; friction took {abs(sum(w.friction_work for w in states)):.6g} J"
     )
     notes: list[str] = [information(words)]
     if residual > UNSOLVED:
         notes = [f"{words}: where bodies rest is not to be trusted; give a shorter contact_step"]
     elif deepest > UNSOLVED * length:
         notes = [f"{words}: joints or drivers hold them where they cannot move apart"]
-    if (overlap := ran[0].overlap_at_start) > LEAST_OVERLAP * length:
+    if (overlap := states[0].overlap_at_start) > LEAST_OVERLAP * length:
         notes.append(
             f"bodies overlapped by {overlap:.2g} m at the start, and were moved apart: move them"
         )
