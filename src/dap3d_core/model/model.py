@@ -337,7 +337,7 @@ def build_model(checked: ValidatedScene) -> Model:
     poses = _Poses(checked)
     holding = checked.holding
     rows = np.array([_rows(j) for j in holding], dtype=np.int64)
-    mask = [_position_mask(j) for j in holding]
+    mask = [j.type_info.type.constraint_mask() for j in holding]  # type: ignore[attr-defined]
     groups = _Groups(checked, poses)
     model = Model(
         body_names=tuple(checked.body_names),
@@ -441,11 +441,6 @@ def _faults(
 
 def _rows(joint: Instance) -> int:
     return joint.type_info.row_count
-
-
-def _position_mask(joint: Instance) -> tuple[bool, ...]:
-    mask: tuple[bool, ...] = joint.type_info.type.constraint_mask()  # type: ignore[attr-defined]
-    return mask
 
 
 class _Poses(dict[int, BodyPose]):

@@ -101,12 +101,12 @@ def _read_signals(
 
     inputs = {}
     if report.scene.inputs:
-        from dap3d_core.scene.signals.inputs import read_inputs
+        from dap3d_core.scene.signals import read_inputs
 
         inputs = read_inputs(report)
     functions = read_elements(report, geometry, "functions", types)
     if any(combines(function.type_info) for function in functions):
-        from dap3d_core.scene.signals.combinations import combine_functions
+        from dap3d_core.scene.signals import combine_functions
 
         functions = combine_functions(report, functions)
     return inputs, functions
@@ -212,7 +212,7 @@ def _note_unused_signals(
             key = dotted(("functions", name))
             report.note(f"{key}: no joint and no force uses it", "functions left unused")
     if report.scene.inputs:
-        from dap3d_core.scene.signals.inputs import note_unread_inputs
+        from dap3d_core.scene.signals import note_unread_inputs
 
         note_unread_inputs(report, elements)
 
