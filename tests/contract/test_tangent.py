@@ -81,10 +81,8 @@ def directions(rng, bodies):
 
 def compare(scene, tolerance=1e-9):
     """Compare all derivatives of a scene of three bodies at a random state off the constraints.
-
     Truncation: h^6 / 140 of seventh derivatives up to some 1e5 of the terms, with h = 2e-3 5e-14;
-    rounding: eps / h = 1e-13.
-    """
+    rounding: eps / h = 1e-13."""
     evaluator = Evaluator(build_model(checked(scene, REGISTRY)), "lsq")
     u, t, n = Motion(3, np.random.default_rng(100)).u(0.1), 0.1, 18
     rng = np.random.default_rng(1)

@@ -76,9 +76,7 @@ def test_a_width_of_no_columns_is_none(scene_file, monkeypatch, capfd, columns):
 @pytest.mark.slow
 def test_a_full_disk_is_named_and_what_was_computed_is_kept(scene_file):
     """On a disk of 2 MiB: a run that fills it, all that writes a file, and a cache there.
-
-    What the run has written is a result, and the run goes on once there is room.
-    """
+    What the run has written is a result, and the run goes on once there is room."""
     steps = 't_end = 600.0\nintegrator = "rk4"\nstep = 0.01'  # so many that rows come in chunks
     folder = scene_file(("t_end = 0.1", steps)).parent
     (folder / "disk").mkdir()

@@ -75,9 +75,7 @@ def damaged_results(draw):
 
 def examine_file(path):
     """A file is read, or refused as a result; what was read can be asked for.
-
-    That of a sweep is not known by its damaged bytes, so each file is read as both.
-    """
+    That of a sweep is not known by its damaged bytes, so each file is read as both."""
     with strict(HANG):
         found = _read(open_result, path)
         if found is None:

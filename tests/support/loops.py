@@ -11,9 +11,7 @@ CLOSING = ("sph", "sph-sph", "univ", "rev")
 
 def add_loops(scene, seed, count, keywords=CLOSING):
     """Add joints between bodies drawn at random, or a body and ground, closed as these stand.
-
-    Whether rows of theirs depend on others is left to chance.
-    """
+    Whether rows of theirs depend on others is left to chance."""
     rng = np.random.default_rng(seed)
     bodies = ["ground", *scene.bodies]
     for n in range(count):

@@ -10,9 +10,7 @@ from dap3d_core.testing.samples.sampled_type import own_values
 
 def cases(registry, kind):
     """(keyword, values of fields) for each type of a kind as it is, and for each of its variants.
-
-    A type whose variants leave no place for itself is there by its variants alone.
-    """
+    A type whose variants leave no place for itself is there by its variants alone."""
     found = []
     for row in registry.listing():
         if row.kind == kind and row.state == "ok":

@@ -55,9 +55,7 @@ def bicycle(speed):
 @pytest.mark.parametrize("speed", [float(v) for v in range(11)])
 def test_eigenvalues(speed):
     """Weave, capsize and castering at every speed; all other eigenvalues are exactly zero.
-
-    They are the place (x, y), heading, both wheels' angles, and the speed.
-    """
+    They are the place (x, y), heading, both wheels' angles, and the speed."""
     K, C = 9.81 * K0 + speed**2 * K2, speed * C1
     inverse = np.linalg.inv(M)
     matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ C]])

@@ -78,12 +78,10 @@ def pairs():
 @pytest.mark.parametrize(("name", "setting"), pairs())
 def test_the_true_error_is_within_ten_times_the_estimate(name, setting):
     """At 95 % of the instants or more, for every body's position, orientation and velocities.
-
     The two references may each be off by as much as they differ. And the estimate is no mere
     exaggeration: wherever the largest true error can be told from the uncertainty of the reference,
     the largest estimate is no less than a third and no more than 30 times of it (past a kink of a
-    driving function the finer run may be the worse one, tenfold).
-    """
+    driving function the finer run may be the worse one, tenfold)."""
     given = dict(SETTINGS[setting])
     if given.get("step", 0.0) is None:
         given["step"] = float(tight(name, "dop853", 1e-13).t[1]) / 4.0
@@ -129,10 +127,8 @@ def test_published_digits_are_within_ten_times_the_estimate(name, quantity, digi
 
 def test_the_tip_of_a_chain_is_within_ten_times_the_estimate():
     """benchmarks.md 3, n = 5, t = 1: the tip is half a rod beyond the last mass centre.
-
     Its error is at most that of the mass centre and, for rotation, twice half a rod's length times
-    that of the Euler parameters.
-    """
+    that of the Euler parameters."""
     result = dap.simulate(compiled("chain"), t_end=1.0, dt=1.0, rtol=1e-6, atol=1e-8,
                           estimate_error=True)  # fmt: skip
     tip = result.rP[-1, result.model.point_names.index("out4"), :2]
@@ -144,9 +140,7 @@ def test_the_tip_of_a_chain_is_within_ten_times_the_estimate():
 @pytest.mark.slow
 def test_a_start_below_the_tolerance_does_not_hide_its_error():
     """A rod upright at 1e-9 rad/s falls at 5.7 s: for half of the run it is below atol.
-
-    No error limits the steps there, and two runs that let them grow alike have the same error.
-    """
+    No error limits the steps there, and two runs that let them grow alike have the same error."""
     rate = 9.81 * 0.5 / (1.0 / 3.0)
     scene = dap.Scene(name="almost upright")
     scene.add_body("rod", mass=1.0, Jp=(1.0 / 12.0, 1.0 / 12.0, 1e-3), r=(0.0, 0.0, 0.5),

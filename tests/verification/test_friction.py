@@ -78,10 +78,9 @@ def test_a_sliding_disk_is_braked_by_the_ground():
 @pytest.mark.parametrize(("direction", "settles"), [(-1.0, True), (1.0, False)])
 def test_multipliers_that_do_not_settle_are_reported(direction, settles):
     """Painleve's paradox: a light leaning disk slides towards its contact, at s = R (c, -sigma).
-
     Friction presses it down by mu sigma c R^2 / J for each newton of load, which carries
-    1 / m + c^2 R^2 / J: above mu = 1.04 here no load is in balance. Sliding the other way is plain.
-    """
+    1 / m + c^2 R^2 / J: above mu = 1.04 here no load is in balance. Sliding the other way is
+    plain."""
     lean, radius, mass, J = np.pi / 4, 0.5, 1.0, 1e-2 / 2
     scene = dap.Scene(name="paradox")
     p = (np.cos(lean / 2), np.sin(lean / 2), 0.0, 0.0)  # the disk's axis to (0, 1, 1) / sqrt 2

@@ -136,9 +136,7 @@ def test_a_ground_that_pulls_does_not_rub():
 
 def test_the_disk_rubs_against_the_material_point():
     """A disk that rolls without slip feels no friction; one that spins on the spot is pushed on.
-
-    For eta = y the contact is (0, 0, -R); v + w x s = 0 where v_x = w_y R.
-    """
+    For eta = y the contact is (0, 0, -R); v + w x s = 0 where v_x = w_y R."""
     state = State(np.random.default_rng(1))
     state.A, state.w["i"] = np.eye(3), np.array([0.0, 2.0, 0.0])
     state.v["i"] = np.array([2.0 * RADIUS, 0.0, 0.0])

@@ -30,9 +30,7 @@ class Body:
 
 def test_driven_legs_of_a_stewart_platform_bear_what_newton_and_euler_say():
     """Thirteen bodies: each leg as a beam about its foot, then six equations of the platform.
-
-    1e-10 of the largest force: rounding times the condition of the equations, some hundred.
-    """
+    1e-10 of the largest force: rounding times the condition of the equations, some hundred."""
     scene = stewart(50.0, 2.0, 100.0, spins=False)
     result = dap.kinematics(scene, t_end=0.5, dt=0.1)
     heads = {k: np.array(scene.points[f"head{k}"].sPp) for k in range(6)}
@@ -104,9 +102,7 @@ def lines_of(scene, body):
 @pytest.mark.parametrize("number", [6, 8])
 def test_tensions_of_a_platform_are_those_of_newton_and_euler(number):
     """As many legs as freedoms: their one solution; more: the least of all, and a note.
-
-    The motion is that of a run of the platform on springs: its accelerations are exact.
-    """
+    The motion is that of a run of the platform on springs: its accelerations are exact."""
     motion = dap.simulate(platform_on_lines(number, spring=True), t_end=0.3, dt=0.1)
     scene = platform_on_lines(number, spring=False)
     result = dap.inverse(scene, motion, [f"leg{k}" for k in range(number)])

@@ -37,10 +37,8 @@ def test_errors_of_fixed_steps_fall_with_the_order():
 @pytest.mark.slow
 def test_chaos_is_told_and_errors_are_measured_up_to_there():
     """A chain of three rods from the horizontal: two runs at 1e-13 part before 30 s.
-
     It loses four digits in 5 s (benchmarks.md 3), so that 1e-13 grows to 1e-3 after some 13 s or
-    more: neighbours part at that rate only while they are close to each other.
-    """
+    more: neighbours part at that rate only while they are close to each other."""
     found = dap.report(
         problems.chain(3), quick=True, t_end=30.0, dt=0.1, methods=["standard", "lsq"]
     )

@@ -57,9 +57,7 @@ CHAINS = [
 @pytest.mark.parametrize(("lengths", "end"), CHAINS)
 def test_a_chain_drawn_straight_is_assembled(lengths, end, joint):
     """Its bars lie end to end, from the origin to its pivot; a note says how they were turned.
-
-    A residual of 1e-10 m closes a joint (simulation/initial/assemble.py).
-    """
+    A residual of 1e-10 m closes a joint (simulation/initial/assemble.py)."""
     result = dap.simulate(straight(lengths, end, joint=joint), t_end=0.0, dt=0.1)
     ends = ends_of(result, lengths)
     np.testing.assert_allclose(ends[0, 0], 0.0, atol=2e-10)

@@ -53,10 +53,8 @@ def rows_of_door():
 
 def friction_moment(w, compliance=None):
     """Moment of friction at the speed w, with the share of least lambda . c lambda.
-
     c: by default 1 for forces, 1 / length^2 for moments. Friction turns the load by its
-    deceleration: iterated until it agrees.
-    """
+    deceleration: iterated until it agrees."""
     D = rows_of_door()
     c = np.where(np.arange(10) % 5 < 3, 1.0, PARTS**-2) if compliance is None else compliance
     moment = 0.0
@@ -163,9 +161,7 @@ def spread(result):
 
 def test_the_note_has_the_spread_of_the_outcome():
     """It holds what the same motion would lose by two shares that numpy finds.
-
-    Hinges that keep the axes parallel stiffly carry little by forces, soft ones all of it.
-    """
+    Hinges that keep the axes parallel stiffly carry little by forces, soft ones all of it."""
     result = dap.simulate(door(shared="least"), t_end=3.0, dt=0.05)
     least, low, high = spread(result)
     J = J_Z + MASS * ARM**2

@@ -36,10 +36,8 @@ def angle(result, body):
 @pytest.mark.parametrize("start", [0.0, 1.0])
 def test_a_flat_parallelogram_stays_one(start, rtol):
     """At rest, or with the cranks' velocities: w = w0 + t / (2 J + m l^2), from the first instant.
-
     Errors of a step are rtol of a part of the motion; rounding over the square of the distance,
-    some 1e-16 / 1e-6, is what the first step leaves at tighter ones.
-    """
+    some 1e-16 / 1e-6, is what the first step leaves at tighter ones."""
     scene = singular.flat_parallelogram((start, 0.0, start))
     result = dap.simulate(scene, t_end=1.0, dt=0.05, rtol=rtol, atol=rtol / 100)
     rise = 1.0 / (2 * CRANK + 1.0)
@@ -116,10 +114,8 @@ def test_redundant_rows_alone_are_not_singular(scene):
 @pytest.mark.parametrize("rtol", [1e-5, 1e-6, 1e-7, 1e-8, 1e-9])
 def test_a_slider_goes_through_its_dead_centre(rtol):
     """Also where that instant is reported: cos phi = (x^2 - 3) / (2 x), phi changes its sign.
-
     All places are prescribed, so that projection leaves rounding over the distance; at the instant
-    itself, where rows say nothing of phi, it is known to the root of it or of rtol.
-    """
+    itself, where rows say nothing of phi, it is known to the root of it or of rtol."""
     result = dap.simulate(singular.dead_centre(), t_end=2.0, dt=0.02, rtol=rtol, atol=rtol / 100)
     t = result.t
     x = 3.0 - (1.0 - t) ** 2 / 2.0

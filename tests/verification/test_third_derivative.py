@@ -37,9 +37,7 @@ def dap3d_joints():
 @pytest.mark.parametrize("integrator", ["dop853", "radau"])
 def test_a_row_on_the_rate_of_a_function(integrator, tmp_path):
     """Positions and accelerations of the harmonic function in closed form, to 1e-11 by rounding.
-
-    The row holds the motion exactly, whatever the steps are.
-    """
+    The row holds the motion exactly, whatever the steps are."""
     (tmp_path / "plugin.py").write_text(PLUGIN)
     made = dap.Scene(name="lead")
     made.add_body("slide", mass=2.0, Jp=[0.1, 0.1, 0.1], r=[0.3 * 0.5 * 4.0, 0.0, 0.0])

@@ -72,9 +72,7 @@ SLIDES = [
 @pytest.mark.parametrize(("type_", "fields", "sense"), TURNS)
 def test_a_driver_of_rotation_moves_the_angle(type_, fields, sense, joint, i, j):
     """The angle is f(t) - f(0): drive-rot; the types of the manual: its negative.
-
-    Position level to 1e-11 by projection; velocity level to the tolerance, some 1e-10.
-    """
+    Position level to 1e-11 by projection; velocity level to the tolerance, some 1e-10."""
     scene, axis = pair(joint, i, j)
     scene.add_joint(type_, "drive", body_i=i, body_j=j, a_j=axis, **fields)
     angle, rate = moved(scene, "angle")
@@ -174,9 +172,7 @@ def test_a_plane_moves_a_point_along_its_normal():
 @pytest.mark.parametrize("kind", ["turn", "slide", "leg"])
 def test_inverse_dynamics_finds_actions_that_increase_the_coordinate(kind, i, j):
     """The actuation of drivers and of actuators is q'' times the reduced inertia, of one sign.
-
-    q'' = 0.4; splines through positions are not needed: the motion is a result.
-    """
+    q'' = 0.4; splines through positions are not needed: the motion is a result."""
     scene, axis = pair("rev" if kind == "turn" else "tran", i, j)
     if kind == "turn":
         scene.add_joint("drive-rot", "drive", body_i=i, body_j=j, a_j=axis, function="law")
@@ -288,9 +284,7 @@ def test_bodies_of_a_joint_to_ground_may_be_exchanged(type_, method, integrator)
 @pytest.mark.parametrize(("place", "sense"), [(-5.0, -1.0), (0.8, 1.0)])
 def test_lambda_of_a_leg_times_its_length_is_its_force(function, place, sense):
     """200 kg that hang or stand: lambda |d| = -+ m (g + l''), negative in tension.
-
-    The leg of 5 m pulls, that of 0.8 m pushes, at whose end guides keep the load.
-    """
+    The leg of 5 m pulls, that of 0.8 m pushes, at whose end guides keep the load."""
     m, g, pace = 200.0, 9.81, 0.3
     scene = dap.Scene(name="leg")
     scene.add_body("load", mass=m, Jp=(5.0, 5.0, 5.0), r=(0.0, 0.0, place))

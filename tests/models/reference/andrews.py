@@ -118,10 +118,8 @@ def flat(x: complex) -> tuple[float, float, float]:
 
 def quantities(t: float) -> dict[str, Array]:
     """Return every quantity that `expected.toml` may name, at `t`.
-
     The reactions are those that Newton's law needs for this motion: 41 unknowns, 42 equations, of
-    which "imbalance" is the residual.
-    """
+    which "imbalance" is the residual."""
     y = trajectory().at(t)
     angles, speeds = y[:7], y[7:]
     turning = second(angles, speeds)

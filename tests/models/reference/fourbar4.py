@@ -56,9 +56,7 @@ def driver_moment(t: float) -> float:
 
 def held(t: float) -> Array:
     """Return what the fixing joint exerts on the link: force, moment about its mass centre.
-
-    Nothing else acts from outside, so it is the rate of the momentum of the moving bodies.
-    """
+    Nothing else acts from outside, so it is the rate of the momentum of the moving bodies."""
     force, moment = np.zeros(3), np.zeros(3)
     for body, part in zip(SYSTEM.bodies, PARTS, strict=True):
         r, p, v, v_dot = part(t)

@@ -42,9 +42,7 @@ def about(axis: Array, angle: float) -> Array:
 
 def closing_angle(axis: Array, arm: Array, to: Array, distance: float) -> float:
     """Return the smaller turn of `arm` that brings its tip to a distance from `to`.
-
-    |R arm - to|^2 is a + b cos + c sin of the angle.
-    """
+    |R arm - to|^2 is a + b cos + c sin of the angle."""
     along = axis * (axis @ arm)
     b, c = -2.0 * to @ (arm - along), -2.0 * to @ np.cross(axis, arm)
     a = arm @ arm + to @ to - 2.0 * to @ along

@@ -71,10 +71,8 @@ def spring(
 
 class Trajectory:
     """The solution of y' = rhs(t, y), y(0) = y0, at any instants that are asked for.
-
     Every instant is the end of a step: the dense output of DOP853 is of lower order than its
-    steps and would cost digits. States already known are the starting points of later ones.
-    """
+    steps and would cost digits. States already known are the starting points of later ones."""
 
     def __init__(
         self,

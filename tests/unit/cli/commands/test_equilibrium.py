@@ -52,9 +52,7 @@ def test_json(model, capsys):
 
 def test_table_fits_sixty_columns(model, capsys, monkeypatch):
     """Given values and turning points, with the coordinate that changes most; a picture.
-
-    To return is no failure; a note says how to go on.
-    """
+    To return is no failure; a note says how to go on."""
     monkeypatch.setenv("COLUMNS", "60")
     assert main([*model, "-o", "curve.png"]) == 0
     lines = capsys.readouterr().out.splitlines()

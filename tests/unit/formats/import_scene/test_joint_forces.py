@@ -100,10 +100,8 @@ UNIVERSAL = """<sdf version="1.9"><model name="u"><link name="a"><inertial><mass
 @pytest.mark.parametrize("way", [1.0, -1.0])
 def test_both_angles_of_a_universal_joint_have_springs_and_friction(tmp_path, way):
     """J w_dot . u_k = -k (q_k - rest) - c q_k' - n sign(q_k') on the axes, of three equal moments.
-
     The reaction of the joint is across both axes. With the link as the parent the angles are those
-    of ground against it.
-    """
+    of ground against it."""
     q, rate = np.array([0.9, -0.6]), np.array([1.3, -0.8])
     first, second = np.array([0.0, 0.6, 0.8]), np.array([1.0, 0.0, 0.0])
     parent, child = ("world", "a") if way > 0.0 else ("a", "world")

@@ -220,9 +220,7 @@ def test_turns_knots_and_events_are_those_of_standard():
 @pytest.mark.parametrize("holder", ["ground", "post"])
 def test_a_thin_rod_on_a_ball_turns_as_euler_says(thin, holder):
     """Euler's equations about the ball, in its axes; the spin about itself alone loses digits.
-
-    That of a moment is lost to rounding of the moments across, 5e-15 N m here, over its inertia.
-    """
+    That of a moment is lost to rounding of the moments across, 5e-15 N m here, over its inertia."""
     e, length, mass = np.array([0.8, 0.3, -0.4, 0.33]), 0.7, 2.0
     e /= np.linalg.norm(e)
     A, w = pose((0.0, 0.0, 0.0), e).A, np.array([0.3, -0.5, 0.7])
@@ -248,10 +246,8 @@ def test_a_thin_rod_on_a_ball_turns_as_euler_says(thin, holder):
 @pytest.mark.parametrize("on_ground", [False, True])
 def test_a_thin_rotor_alone_keeps_its_spin(on_ground):
     """Euler's equations of a symmetric body: nothing turns about its axis, at 1000 rad/s.
-
     A C of 1e-9 of the other moments would divide the rounding of moments summed in global axes:
-    1e-4 rad/s^2. In the rotor's axes that of w is left, 1e-13 rad/s times w across.
-    """
+    1e-4 rad/s^2. In the rotor's axes that of w is left, 1e-13 rad/s times w across."""
     e, w, J = (
         np.array([0.8, 0.3, -0.4, 0.33]),
         np.array([0.3, -0.5, 1e3]),

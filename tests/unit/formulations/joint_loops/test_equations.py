@@ -23,10 +23,8 @@ LOOPS = 10.0
 
 def dense_solution(evaluator, u):
     """Accelerations and least multipliers of a state by singular values of the whole Jacobian.
-
     Of all accelerations that the rows permit those nearest to free motion in the metric of the
-    masses (Gauss); then the least lambda with D^T lambda = M v_dot - g.
-    """
+    masses (Gauss); then the least lambda with D^T lambda = M v_dot - g."""
     rows, forces, model = evaluator.rows(0.0, u), evaluator.applied_forces(0.0, u), evaluator.model
     _, p, _, w = split(u)
     A, n = matrices(p), model.body_count

@@ -47,9 +47,7 @@ def test_as_many_balls_leave_a_cradle_as_hit_it(moving):
 
 def test_two_impacts_at_one_instant_are_solved_together():
     """A ball of mass M between two of mass m that hit it at u from the left, w from the right.
-
-    Newton's law for both: v2 - v1 = e u, v3 - v2 = e w, with the momentum of all conserved.
-    """
+    Newton's law for both: v2 - v1 = e u, v3 - v2 = e w, with the momentum of all conserved."""
     m, M, u, w, e = 1.0, 3.0, 2.0, 1.0, 0.6
     after, jump = velocities_after([m, M, m], [u, 0.0, -w], e)
     total, relative = m * u - m * w, np.array([e * u, e * w])

@@ -69,9 +69,7 @@ def integration(scene, times=(0.0, 1.0), method=None, **settings):
 @pytest.mark.parametrize("h", [1.0, 1e-2])
 def test_tangent_is_that_of_all_equations(scene, h):
     """s z - J z = r for the solution z, J by central differences of all equations in all unknowns.
-
-    Both kinds of differences err by some 1e-9 of the largest term.
-    """
+    Both kinds of differences err by some 1e-9 of the largest term."""
     run = integration(scene())
     evaluator, work, matrix = run.evaluator, run.work, run.matrix
     system, rows = evaluator.system, evaluator.plan.row_size

@@ -221,7 +221,6 @@ def test_the_metric_shares_a_gap_by_mass(rows, metric, share, request):
 def test_the_metric_of_masses_weighs_rotations_by_inertia(rows, request):
     """A bar of mass m, inertia J about z, held at an arm L: of a small gap g across it the centre
     takes g (1/m) / (1/m + L^2/J), the rotation g (L/J) / (1/m + L^2/J); to the second order of g.
-
     The bar is turned about y, so that its inertia about its own x is the one that counts."""
     if rows == "many":
         request.getfixturevalue("many_rows")

@@ -480,9 +480,7 @@ def test_whole_numbers_stay_whole(monkeypatch):
 @pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 def test_derivatives_by_what_varies(swept, tmp_path):
     """Outputs have the bits that they have without; derivatives those of the closed form, to 1e-7.
-
-    Of x = l + a cos(sqrt(k/m) t): dx/dk = -a t sin(w t) / (2 sqrt(k m)), dx/dm = -k/m dx/dk.
-    """
+    Of x = l + a cos(sqrt(k/m) t): dx/dk = -a t sin(w t) / (2 sqrt(k m)), dx/dm = -k/m dx/dk."""
     with_slopes = dap.sweep(
         spring(), VARY, outputs=OUTPUTS, gradients=True, output=tmp_path / "x.nc", **TIMES
     )
