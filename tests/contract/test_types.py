@@ -7,11 +7,11 @@ That the checks find errors is the subject of tests/unit/testing/checks.
 
 import numpy as np
 import pytest
+from support.internals import Evaluator
 from support.motions import Motion, derivative
 from support.scenes import case_names, cases, scene_for
 
 import dap3d_core as dap
-from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
 from dap3d_core.scene import check as checked
 from dap3d_core.testing import checks_for

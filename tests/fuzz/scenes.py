@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 from hypothesis import strategies as st
+from support.rotations import rotation
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
 
 EVENT = "# event: "
 METHODS = ("auto", "auto", "standard", "penalty", "lsq", "unconstrained")

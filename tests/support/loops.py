@@ -3,7 +3,7 @@
 import numpy as np
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
+from support.rotations import rotation
 
 #: Joints that close a loop, in the order in which they are drawn.
 CLOSING = ("sph", "sph-sph", "univ", "rev")

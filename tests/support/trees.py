@@ -90,6 +90,6 @@ def _unit(x):
 
 
 def _rotation(p):
-    from dap3d_core.model.rotations import rotation
+    from support.rotations import rotation
 
     return rotation(np.asarray(p))

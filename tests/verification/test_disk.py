@@ -92,7 +92,7 @@ def test_a_push_across_is_carried_without_lateral_slip():
 
 def _contact(scene):
     """The lowest point of the upright disk in its own axes."""
-    from dap3d_core.model.rotations import rotation
+    from support.rotations import rotation
 
     A = rotation(np.array(scene.bodies["coin"].p))
     return A.T @ (0.0, 0.0, -RADIUS)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from support import problems
+from support.internals import split
 
 import dap3d_core as dap
-from dap3d_core.model.state_layout import split
 from dap3d_core.result.post.global_error import difference
 
 #: Scene, and settings where the scene leaves them open or a shorter run will do: A05 is stiff, A02

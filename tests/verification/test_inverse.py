@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.rotations import rotation
 from support.stewart import stewart
 
 import dap3d_core as dap
@@ -9,19 +10,12 @@ import dap3d_core as dap
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
 
-def matrix(p):
-    """The rotation matrix of Euler parameters."""
-    e0, e = p[0], p[1:]
-    skew = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
-    return (2 * e0 * e0 - 1) * np.eye(3) + 2 * (np.outer(e, e) + e0 * skew)
-
-
 class Body:
     """Motion, and inertial force and moment, of a body of a result at an instant."""
 
     def __init__(self, result, name, k, mass, J):
         b = result.summary.body_index[name]
-        self.A = matrix(result.p[k, b])
+        self.A = rotation(result.p[k, b])
         self.r, w = result.r[k, b], result.w[k, b]
         inertia = self.A @ np.diag(J) @ self.A.T
         self.force = mass * (result.rdd[k, b] - GRAVITY)  # what all but the weight gives

@@ -7,9 +7,9 @@ which this code has.
 import numpy as np
 import pytest
 from scipy.linalg import eigvals
+from support.rotations import rotation
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
 from dap3d_core.simulation.linearization.operating_point import operating_point
 from dap3d_core.simulation.linearization.sparse_modes import lowest_eigenvalues
 

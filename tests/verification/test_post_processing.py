@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from support import problems
+from support.rotations import rotation
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}
 STEP = 1e-3

@@ -4,15 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from support.rotations import rotation
 
 import dap3d_core as dap
 
 G = 9.81
-
-
-def rotation(p):
-    e0, e = p[0], np.array(p[1:])
-    return (e0**2 - e @ e) * np.eye(3) + 2 * np.outer(e, e) + 2 * e0 * np.cross(np.eye(3), e)
 
 
 def steiner(m, d):

@@ -5,12 +5,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import integrands as toys
 from support.integrands import finish, kepler, kepler_f, kepler_orbit, slope
+from support.internals import compiled, loop_list
 
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.adams import formulas as adams
 from dap3d_core.integrators.adams.integration import AdamsIntegration
-from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.runtime.function_lists import loop_list
 
 
 def start(rhs, y0, times, project=toys.no_constraint, report=toys.plain_report, **options):

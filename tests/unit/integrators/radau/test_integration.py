@@ -6,7 +6,8 @@ import sys
 import numpy as np
 import pytest
 from support import mechanisms, problems
-from support.plain import in_another_process, long_in_plain_python
+from support.internals import compiled
+from support.plain import in_another_process, jit_is_on, long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.formulations.pivots import store_reference_pivots
@@ -14,7 +15,6 @@ from dap3d_core.formulations.stabilized_index2.stage_equations import evaluate_s
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.radau.integration import RadauIntegration, estimate_tolerances
 from dap3d_core.integrators.radau.newton import factorise_both, find_tangent, solve_first
-from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 
 
 @compiled

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.internals import split
 from support.mechanisms import (
     bent_chain,
     door,
@@ -15,7 +16,6 @@ from support.own_types import registry_of
 import dap3d_core as dap
 from dap3d_core.interface import Function, Joint, Vector2, number, vector2
 from dap3d_core.kernels import cross, dot, neg, row, scale, sqrt, where
-from dap3d_core.model.state_layout import split
 from dap3d_core.result import Note
 from dap3d_core.simulation.initial import assemble, least_change
 from dap3d_core.simulation.initial.assemble import correct_initial, violation
