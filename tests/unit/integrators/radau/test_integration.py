@@ -171,12 +171,6 @@ def test_body_without_joints():
     assert result.wp[-1, 0] == pytest.approx(w, abs=1e-8)
 
 
-def test_a_fixed_step_without_stages_stops_the_run():
-    """Ten times the length of a swing: no stages are found, and nothing is reported as good."""
-    with pytest.raises(dap.SimulationError, match="the run stopped at t = 0 s"):
-        dap.simulate(problems.chain(2), t_end=50.0, dt=25.0, step=25.0, integrator="radau")
-
-
 @pytest.mark.slow
 @in_another_process
 def test_other_integrators_load_nothing_of_it():
