@@ -1,7 +1,6 @@
 """Proof from outside: wheels in a fresh environment, with good and with broken packages.
-
-dap3d and every plugin are truly installed from wheels. Nothing of the working tree can be reached.
-"""
+dap3d and every plugin are truly installed from wheels. Nothing of the working tree can be
+reached."""
 
 import shlex
 import shutil

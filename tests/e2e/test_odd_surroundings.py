@@ -243,11 +243,11 @@ def test_an_unknown_backend_of_matplotlib_is_one_sentence(scene_file, dap3d, com
     assert "unexpected" not in found.stderr
 
 
-@pytest.mark.parametrize("option", ["--t inf", "--t=-inf", "--t nan", "--t 1e999", "--t x"])
-def test_a_time_that_is_not_finite_is_a_usage_error(scene_file, refuse, option):
-    assert "--t" in refuse("modes", scene_file(), *option.split())
-
-
-@pytest.mark.parametrize("limit", ["nan", "inf", "0", "-1"])
-def test_a_limit_of_loading_is_a_positive_time(refuse, limit):
-    assert "--limit" in refuse("plugins", "--no-compile", "--limit", limit)
+@pytest.mark.parametrize(
+    "words",
+    [f"modes pen1 {t}" for t in ("--t inf", "--t=-inf", "--t nan", "--t 1e999", "--t x")]
+    + [f"plugins --no-compile --limit {limit}" for limit in ("nan", "inf", "0", "-1")],
+)
+def test_times_that_are_none_are_usage_errors(refuse, words):
+    """Of a state, finite ones; of a limit of loading, positive ones."""
+    assert ("--t" if "modes" in words else "--limit") in refuse(*words.split())

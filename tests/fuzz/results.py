@@ -1,9 +1,7 @@
 """Files of results and sweeps with damaged bytes, and what must be true of reading them.
-
 The HDF5 library itself crashes on some damaged files and never ends on others, so a file is read
 in a child process. A file with a seal is refused before the library sees it; for others, as older
-programs wrote them, such an end is counted, and is no find (``CRASHED``, ``STUCK``).
-"""
+programs wrote them, such an end is counted, and is no find (``CRASHED``, ``STUCK``)."""
 
 import functools
 import os

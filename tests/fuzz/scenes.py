@@ -1,8 +1,6 @@
 """Whole scenes at random, assembled by construction: poses first, then points and axes that meet.
-
 A scene is drawn as the text of its file; events, which a file has no place for, stand in comments
-at its top (``events_of``).
-"""
+at its top (``events_of``)."""
 
 import json
 import math

@@ -1,10 +1,8 @@
 """Graphs of bodies and joints, with random blocks as those of joints, and the dense matrix.
-
 The rows of a random joint are of one size and do not feel a common rigid motion of its bodies, as
 those of joints: each body gets a random orthogonal 6 x 6 frame X, and a joint the blocks R X of its
 bodies, with rows R that are orthonormal and that add up to zero over the bodies (ground takes its
-share). The static order relies on that.
-"""
+share). The static order relies on that."""
 
 import numpy as np
 

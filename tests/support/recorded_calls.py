@@ -1,9 +1,7 @@
 """Calls of the core's compiled functions, recorded in plain Python and repeated as machine code.
-
 Records copies of the arguments of each function at some of its calls, with what plain Python
 returned and left in the arrays. ``differences`` then compiles all recorded functions at every level
-and compares each call in all bits. For a process of its own: it switches the compiler off.
-"""
+and compares each call in all bits. For a process of its own: it switches the compiler off."""
 
 import importlib
 import inspect

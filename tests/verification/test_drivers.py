@@ -1,8 +1,6 @@
 """Drivers at position level, and a point on a plane, against closed forms.
-
 Tolerances: what stands at position level is held to 1e-11 by projection; rtol 1e-11 elsewhere
-leaves some 1e-9.
-"""
+leaves some 1e-9."""
 
 import numpy as np
 import pytest

@@ -1,9 +1,7 @@
 """The estimated error of a run against its true one, for many motions, integrators and tolerances.
-
 The true error is the distance to a run of the other integrator at rtol 1e-12, or to published
 digits. Where that run itself is uncertain (its distance to a third one at 1e-13), so is the true
-error, by as much.
-"""
+error, by as much."""
 
 from functools import cache
 

@@ -1,8 +1,7 @@
 """Events and switches that are passed twice within a step, and fixed steps across switches.
-
 Closed forms of free flight; the pendulum by elliptic integrals (SciPy). Instants are compared with
-what a height known to rounding, or to the tolerance of the run, over the speed of passing leaves.
-"""
+what a height known to rounding, or to the tolerance of the run, over the speed of passing
+leaves."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Switches against closed forms: contact, grazing, a disk that lies down, chatter.
-
-Tolerances: rtol 1e-12 leaves some 1e-11 of the largest coordinate after a few pieces of motion.
-"""
+Tolerances: rtol 1e-12 leaves some 1e-11 of the largest coordinate after a few pieces of motion."""
 
 import numpy as np
 import pytest

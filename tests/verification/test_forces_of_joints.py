@@ -1,7 +1,5 @@
 """Springs along axes and of balls, and dry friction of hinges and sliders, against closed forms.
-
-Tolerances: rtol 1e-11 over some seconds leaves some 1e-9 of the largest coordinate.
-"""
+Tolerances: rtol 1e-11 over some seconds leaves some 1e-9 of the largest coordinate."""
 
 import numpy as np
 import pytest

@@ -1,8 +1,6 @@
 """Friction in joints, found together with the multipliers: closed forms, energy, and its limits.
-
 Tolerances: the multipliers settle to 1e-10 of their size; rtol 1e-9 over a second leaves less than
-1e-8.
-"""
+1e-8."""
 
 from inspect import signature
 

@@ -1,8 +1,6 @@
 """Errors that grow: exponentially in a chaotic motion, with a power of time in one that repeats.
-
 The double pendulum is known to 30 digits from its own equations (support/double_pendulum.py), the
-flips of a free body by Jacobi's elliptic functions (benchmarks/hard/flips.py).
-"""
+flips of a free body by Jacobi's elliptic functions (benchmarks/hard/flips.py)."""
 
 import sys
 from decimal import Decimal, localcontext

@@ -1,10 +1,8 @@
 """Branches that guard a formula guard what is derived from it, and the derivatives of that.
-
 Each type leaves a formula to be derived and guards it where it has no value by itself: a root, a
 quotient, an angle, a power or a logarithm at zero, in one branch or nested ones, in helpers, by
 ==, ~ and &. Expected numbers are limits in closed form. Where a series stands for a function its
-first term left out is below 1e-12 within the guard.
-"""
+first term left out is below 1e-12 within the guard."""
 
 import numpy as np
 import pytest

@@ -1,9 +1,7 @@
 """Cases of docs/reference/hard-cases.md: what the page says passes does, and references are right.
-
 The cases stand in benchmarks/hard, with their references and what limits their errors: 1000 times
 rtol, and the reason where it is more. Details of many of them are tested elsewhere; the page says
-where. What is not: contact, masses of 1 and 1e9 kg, other units, long runs.
-"""
+where. What is not: contact, masses of 1 and 1e9 kg, other units, long runs."""
 
 import json
 import sys

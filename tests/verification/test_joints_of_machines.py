@@ -1,8 +1,6 @@
 """Joints screw, planar, parallel, inline, inplane and cv, and the bushing, against closed forms.
-
 Runs at rtol 1e-11: errors of some 1e-10 of what moves are to be expected, tolerances are ten times
-that.
-"""
+that."""
 
 import numpy as np
 import pytest

@@ -1,8 +1,6 @@
 """The ledger says no to nonsense, and yes to motions that are as exact as was requested.
-
 Its limits stay within a hundredth of the scene's scales, whatever the tolerances and however far a
-run has blown up.
-"""
+run has blown up."""
 
 import numpy as np
 import pytest

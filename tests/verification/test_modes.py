@@ -1,8 +1,6 @@
 """Eigenvalues of linearised scenes against closed forms, to 1e-10 of each.
-
 Expected values come from formulas of textbooks or from matrices of minimal coordinates, none of
-which this code has.
-"""
+which this code has."""
 
 import numpy as np
 import pytest

@@ -1,8 +1,6 @@
 """Runs against closed forms and published digits (IFToMM library; benchmark collections).
-
 Each reference is good to about 1e-11. A tolerance is stated with its reason: at rtol 1e-11 the
-global error of these runs is some 10 to 100 times the tolerance over their length.
-"""
+global error of these runs is some 10 to 100 times the tolerance over their length."""
 
 from itertools import pairwise
 

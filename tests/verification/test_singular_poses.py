@@ -1,9 +1,7 @@
 """Redundant rows, and motion through singular poses, against closed equations and published digits.
-
 The reference of A02 is its one closed equation, solved to 1e-12; the error e is that of
 benchmarks.md, section 0. Between rtol 1e-8 and the end lie ten crossings or so of the pose with all
-links in line, and ten seconds that multiply an error by about 100.
-"""
+links in line, and ten seconds that multiply an error by about 100."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Springs about an axis (rot_sda) and springs given by a function, against closed forms.
-
-Tolerances: rtol 1e-11 over some seconds leaves some 1e-9 of the largest angle.
-"""
+Tolerances: rtol 1e-11 over some seconds leaves some 1e-9 of the largest angle."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,6 @@
 """Angles that count whole turns: between reports, in files, sweeps and checkpoints; long steps.
-
-The wheel is wound up by 100 rad/s: x = 100 sin t, 16 turns and back, 1.6 turns between two reports.
-"""
+The wheel is wound up by 100 rad/s: x = 100 sin t, 16 turns and back, 1.6 turns between two
+reports."""
 
 import attrs
 import numpy as np

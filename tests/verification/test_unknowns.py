@@ -1,7 +1,5 @@
 """Joints with unknowns of their own against minimal coordinates, which SciPy integrates.
-
-Tolerances: 1e-9 of motions of some m in runs with rtol 1e-11.
-"""
+Tolerances: 1e-9 of motions of some m in runs with rtol 1e-11."""
 
 import numpy as np
 import pytest

@@ -1,10 +1,8 @@
 """The driven spatial four-bar in closed form: what `fourbar3.py` and `fourbar2.py` share.
-
 The crank angle is alpha = -2 pi t about +x: the driver prescribes the angular velocity of j (the
 ground) relative to i (the crank), so the crank turns backwards. T is the crank tip and
 B = O + 7 e(phi), e = cos(phi) z + sin(phi) u, the follower tip. The loop closes at |B - T| = 6.4,
-linear in (cos phi, sin phi). Velocities and accelerations follow by differentiating it.
-"""
+linear in (cos phi, sin phi). Velocities and accelerations follow by differentiating it."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple

@@ -1,10 +1,8 @@
 """Reference for the model `fourbar4`: that of `fourbar3` with its ground link as a fourth body.
-
 The link stays at rest, so the motion is that of `fourbar`, in closed form; the reactions are those
 that Newton's law needs for it (23 unknowns, 24 equations, residual checked). What the fixing joint
 carries is found once more in `held` from the balance of the whole mechanism, without any Jacobian.
-`simulated` integrates the same system with the generic simulator `kkt`.
-"""
+`simulated` integrates the same system with the generic simulator `kkt`."""
 
 from functools import cache
 

@@ -1,12 +1,9 @@
 """A small, dense, generic simulator of constrained rigid bodies, for reference only.
-
 Only the position-level equation C of a constraint is written down (for the driver, its
 velocity-level equation). Its Jacobian and the right-hand side gamma of its accelerations come from
 exact time derivatives along a motion of constant velocities, so none of the printed formulas for
 them is used. The accelerations solve the whole system [M, -D^T; D, 0] (v_dot, lambda) = (g, gamma).
-
-Body -1 is the ground. Velocities are ordered (v, w) a body, in global axes.
-"""
+Body -1 is the ground. Velocities are ordered (v, w) a body, in global axes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field

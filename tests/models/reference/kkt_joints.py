@@ -1,8 +1,6 @@
 """Further joints of the generic simulator `kkt`, each by its position-level equations alone.
-
 A rolling disk has none for its slip: there the velocity of the material point at the contact is
-given, and differentiated by a complex step.
-"""
+given, and differentiated by a complex step."""
 
 import numpy as np
 from kkt import GROUND, Fixed, Jet, Joint, Motion, dot

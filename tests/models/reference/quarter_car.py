@@ -1,10 +1,8 @@
 """Reference for the model `quarter_car`: two coordinates, by SciPy.
-
 The height of the chassis and the angle of the lower arm are the coordinates. The loop of the
 wishbones and the tie rod closes for an angle in closed form; polynomials through poses at
 Chebyshev's points are differentiated for the first and second derivatives. Virtual power of all
-forces and of the masses' accelerations gives the motion.
-"""
+forces and of the masses' accelerations gives the motion."""
 
 from functools import cache
 

@@ -1,8 +1,6 @@
 """Rotations, springs and a careful integration: what the reference simulators share.
-
 Nothing here comes from the program under test. Quaternions are p = (e0, e1, e2, e3), body to
-ground; vectors are numpy arrays of length 3; SI units.
-"""
+ground; vectors are numpy arrays of length 3; SI units."""
 
 from collections.abc import Callable
 

@@ -1,9 +1,7 @@
 """A model evaluated at any state: accelerations, multipliers, residuals, power.
-
 The dense saddle-point systems of tests/models/reference/kkt.py judge them: these know positions
 alone, and get Jacobian and accelerations by exact differentiation along a motion. States are taken
-at random, far off the constraints, where a simplified row would show.
-"""
+at random, far off the constraints, where a simplified row would show."""
 
 import numpy as np
 import pytest

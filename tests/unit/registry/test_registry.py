@@ -1,7 +1,5 @@
 """The registry: installed types are found by keyword, and a broken plugin only breaks itself.
-
-Plugins here are real distributions on sys.path: a module, and a dist-info with entry points.
-"""
+Plugins here are real distributions on sys.path: a module, and a dist-info with entry points."""
 
 import json
 import os

@@ -1,7 +1,5 @@
 """Each compiled function of the core: plain Python and machine code give the same bits.
-
-Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py).
-"""
+Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py)."""
 
 import json
 

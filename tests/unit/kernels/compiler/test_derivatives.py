@@ -1,7 +1,5 @@
 """Differentiated functions of the subset: values have the bits of the function, slopes are exact.
-
-Slopes are compared with complex steps where the function is analytic, else with differences.
-"""
+Slopes are compared with complex steps where the function is analytic, else with differences."""
 
 import cmath
 import math

@@ -404,28 +404,22 @@ REDUNDANT = [
 ]
 
 
+@pytest.mark.parametrize("count", ["few", "many"])
 @pytest.mark.parametrize(
     ("scene", "rows", "redundant", "dof", "joints"), REDUNDANT, ids=lambda s: getattr(s, "name", "")
 )
-def test_redundancy_is_counted_and_the_joints_named(scene, rows, redundant, dof, joints):
-    """Exact counts at the state as given: rows, rank, degrees of freedom, joints that share one."""
+def test_redundancy_is_counted_and_the_joints_named(
+    scene, rows, redundant, dof, joints, count, request
+):
+    """Exact counts at the state as given: rows, rank, degrees of freedom, joints that share one.
+    By parts, where there are many rows, the same."""
+    if count == "many":
+        request.getfixturevalue("many_rows")
     found = dap.compile(scene).redundancy()
     assert (found.rank.rows, found.rank.redundant, found.rank.dof) == (rows, redundant, dof)
     assert found.joints == joints
-    if redundant:
-        assert f"{redundant} of {rows} constraint rows are redundant" in found.describe()
-    else:
-        assert "all independent" in found.describe()
-
-
-@pytest.mark.parametrize(
-    ("scene", "rows", "redundant", "dof", "joints"), REDUNDANT, ids=lambda s: getattr(s, "name", "")
-)
-def test_many_rows_count_the_same(scene, rows, redundant, dof, joints, many_rows):
-    """By parts: the same counts and joints."""
-    found = dap.compile(scene).redundancy()
-    assert (found.rank.rows, found.rank.redundant, found.rank.dof) == (rows, redundant, dof)
-    assert found.joints == joints
+    words = f"{redundant} of {rows} constraint rows are redundant" if redundant else "independent"
+    assert words in found.describe()
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.02])
