@@ -491,13 +491,6 @@ def test_what_can_do_work_is_known(model, wanted):
 # ------------------------------------------------------------------ a compiled model
 
 
-@pytest.mark.parametrize("u", [np.zeros(12), np.zeros((1, 13)), np.full(13, np.nan), []])
-def test_rates_of_what_is_no_state_are_refused(u):
-    """13 n finite numbers, or a ValueError that says so."""
-    with pytest.raises(ValueError, match="13 finite numbers"):
-        dap.compile(mass_point()).rhs(0.0, u)
-
-
 def test_a_compiled_model_says_what_it_is():
     """explain() counts bodies, joints and rows, names method and kernels, and what was left out."""
     text = dap.compile(dap.load("fourbar3")).explain()
