@@ -168,7 +168,8 @@ class ContactRows:
         """The rows at a state u (13 n,), as if all contacts stuck."""
         evaluator, table = self._table.evaluator, self._table
         stuck = self.states.copy()
-        stuck[table.mode], stuck[table.near.ravel()] = 2.0, 0.0
+        stuck[table.mode] = 2.0
+        stuck[table.way.ravel()] = stuck[table.near.ravel()] = 0.0
         evaluator.states = stuck
         rows = evaluator.rows(self.t, u)
         evaluator.states = self.states

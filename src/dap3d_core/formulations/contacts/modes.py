@@ -35,7 +35,8 @@ class Modes:
 
     Attributes:
         mode: (m,) 0 open, 1 slides, 2 sticks.
-        way: (m, 3) unit vectors of sliding, zero where none is known.
+        way: (m, 3) unit vectors of sliding, zero where none is known; of friction alone that
+            sticks 1.0 for rows that do not hold, as others hold what they would.
         near: (m, 3) forces on body i of those that share what they carry.
         force: (m, 3) forces with which they were found, in the frames of the contacts.
     """
@@ -83,7 +84,7 @@ def _put_loaded(
 
     What may stick is held at first, however large its load: friction that raises its own load by
     more than itself holds. Then each pass takes the loads of the one before, extrapolated from
-    those of all passes (Anderson, J. ACM 12 (1965) 547).
+    those of as many passes as there are loads (Anderson, J. ACM 12 (1965) 547).
     """
     mine = [c for c in group if c in table.loads]
     ways, none = _ways(table, rows, group, sliding, limit), np.zeros(len(rows.G))
@@ -105,7 +106,7 @@ def _put_loaded(
         if k == 0 and not slides.all():
             loads = np.where(slides, loads, given)
             continue
-        taken, rests = [*taken, loads], [*rests, rest]
+        taken, rests = [*taken, loads][-len(mine) - 1 :], [*rests, rest][-len(mine) - 1 :]
         loads = given
         if len(rests) > 1:
             changes, moves = np.diff(rests, axis=0).T, np.diff(taken, axis=0).T
@@ -259,6 +260,34 @@ def _put(
         if shares or table.alone[c]:  # what its row adds has next to no rounding then
             normal = 0.0 if table.gapless[c] else force[0]
             found.near[c] = force @ frame if mode == 2.0 else normal * frame[0]
+    if shares:
+        _leave_to_others(table, rows, closed, found)
+
+
+def _leave_to_others(
+    table: ContactTable, rows: ContactRows, closed: list[int], found: Modes
+) -> None:
+    """Let rows of friction alone not hold where others, and the joints, hold what they would.
+
+    They carry what was found for them; joints and rows would divide that between them otherwise.
+    """
+    alone = [c for c in closed if table.alone[c] and found.mode[c] == 2.0]
+    mine = [(c, k) for c in alone for k in np.flatnonzero(table.holds[c]).tolist()]
+    others = [3 * c + k for c in closed if not table.alone[c] for k in range(3)
+              if found.mode[c] > (0.5 if k == 0 else 1.5)]  # fmt: skip
+    W, left = rows.W, dict.fromkeys(mine)
+    least, kept = DEPENDENT * np.abs(W).max(), others
+    while left:
+        back = np.linalg.pinv(W[np.ix_(kept, kept)], rcond=DEPENDENT, hermitian=True)
+        own = {at: 3 * at[0] + at[1] for at in left}
+        free = {at: W[q, q] - W[q, kept] @ back @ W[kept, q] for at, q in own.items()}
+        best = max(free, key=lambda at: float(free[at]))
+        if free[best] <= least:
+            break
+        kept = [*kept, own[best]]
+        del left[best]
+    for c, k in left:
+        found.way[c, k] = 1.0
 
 
 def _share(table: ContactTable, closed: list[int], A: Floats) -> bool:

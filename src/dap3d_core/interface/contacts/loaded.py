@@ -18,6 +18,7 @@ from dap3d_core.interface.contacts.rows import (
     closed,
     direction,
     held,
+    holds,
     rate,
     slip_of,
     tangent_rates,
@@ -118,38 +119,42 @@ def position():
     return 0.0
 
 
-def blocks(E, c, r_i, r_j, mode):
+def holding(E, mode, way):
+    """The directions whose rows hold."""
+    return tuple(where(holds(mode, way, k), e, _ZERO) for k, e in enumerate(E))
+
+
+def blocks(E, c, r_i, r_j, mode, way):
     """J of both bodies."""
-    on, s_i, s_j = tuple(where(held(mode), e, _ZERO) for e in E), sub(c, r_i), sub(c, r_j)
+    on, s_i, s_j = holding(E, mode, way), sub(c, r_i), sub(c, r_j)
     return (
         tuple(row(e, cross(s_i, e)) for e in on),
         tuple(row(neg(e), neg(cross(s_j, e))) for e in on),
     )
 
 
-def block(E, c, r_i, mode):
+def block(E, c, r_i, mode, way):
     """J of a contact of one body with ground."""
-    return blocks(E, c, r_i, _ZERO, mode)[0]
+    return blocks(E, c, r_i, _ZERO, mode, way)[0]
 
 
-def turning_blocks(E, mode):
+def turning_blocks(E, mode, way):
     """J of both bodies."""
-    on = tuple(where(held(mode), e, _ZERO) for e in E)
+    on = holding(E, mode, way)
     return tuple(row(_ZERO, e) for e in on), tuple(row(_ZERO, neg(e)) for e in on)
 
 
-def gamma(E, E_dot, u, c_dot, v_i, w_i, v_j, w_j, mode):
+def gamma(E, E_dot, u, c_dot, v_i, w_i, v_j, w_j, mode, way):
     """-J_dot v."""
     bent = sub(cross(w_i, sub(c_dot, v_i)), cross(w_j, sub(c_dot, v_j)))
     return tuple(
-        where(held(mode), -dot(e_dot, u) - dot(e, bent), 0.0)
-        for e, e_dot in zip(E, E_dot, strict=True)
+        where(holds(mode, way, k), -dot(E_dot[k], u) - dot(E[k], bent), 0.0) for k in range(3)
     )
 
 
-def turning_gamma(E_dot, u, mode):
+def turning_gamma(E_dot, u, mode, way):
     """-J_dot v."""
-    return tuple(where(held(mode), -dot(e_dot, u), 0.0) for e_dot in E_dot)
+    return tuple(where(holds(mode, way, k), -dot(E_dot[k], u), 0.0) for k in range(3))
 
 
 def projected(E, vector):
