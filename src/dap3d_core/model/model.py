@@ -400,6 +400,9 @@ class _Groups:
         def made(kind: str, elements: Sequence[tuple[int, Instance]]) -> tuple[Group, ...]:
             places, instances = [k for k, _ in elements], [i for _, i in elements]
             try:
+                if kind == "joint":
+                    index = {name: k for name, (k, _) in joints.items()}
+                    return by_kind[kind].loaded_groups(instances, index)
                 return by_kind[kind].groups(instances, places)
             except PrepareError as error:
                 faults.extend(_faults(kind, names[kind], error))
