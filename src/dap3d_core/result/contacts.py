@@ -10,6 +10,7 @@ from dap3d_core.result.post.contact_output import (
     ContactOutput,
     contact_names,
     contact_outputs,
+    contact_table,
     together,
 )
 from dap3d_core.scene.coerce import canonical
@@ -31,10 +32,19 @@ class ResultContacts:
 
     @cached_property
     def contacts(self) -> ContactTable:
-        """Points of shapes that push on each other at the reported instants after the start."""
+        """Points at which bodies push on each other, at the reported instants.
+
+        Of shapes that collide at those after the start; of declared contacts, with bodies in place
+        of shapes.
+
+        Raises:
+            ResultError: as ``model``, where there are declared contacts.
+        """
         result: Any = self
-        table: ContactTable = result.record.contacts
-        return table.at(result.t)
+        table: ContactTable = result.record.contacts.at(result.t)
+        if not self._points:
+            return table
+        return table.joined(contact_table(result.model, result.t, self._contact_outputs))
 
     @checked
     def contact(self, name: str) -> ContactOutput:
