@@ -22,7 +22,7 @@ from dap3d_core.interface.formats.frames import Frame, axis_angle, from_quaterni
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import Scene
-from dap3d_core.scene.tables import BREAKS_AT, GROUND, LIMITS, Element
+from dap3d_core.scene.tables import GROUND, LIMITS, RELEASES, Element
 
 #: Kinds of joints whose points may be apart along the axis.
 SLIDERS = ("prismatic", "cylindrical")
@@ -101,8 +101,8 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
                 limited,
                 "lower and upper of a joint, where a rot_stop or plane_stop is written",
             )
-        if BREAKS_AT in limited.fields:
-            leave_out(remarks, limited, "breaks_at of a joint, which holds here")
+        for key in limited.fields.keys() & set(RELEASES):
+            leave_out(remarks, limited, f"{key} of a joint, which holds here throughout")
     for contact in scene.contacts.values():
         leave_out(remarks, contact, "contacts of other programs yield")
     for body in elements.bodies:

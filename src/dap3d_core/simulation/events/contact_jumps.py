@@ -230,7 +230,7 @@ class ContactJumps(Jumps):
     ) -> tuple[Floats, float]:
         """Refused: what contacts make of it is not known yet."""
         raise SimulationError(
-            f"the run stopped at t = {integration.t:.9g} s: event {title} sets velocities or "
+            f"the run stopped at t = {integration.t:.9g} s: {title} sets velocities or "
             "states, which a scene with contacts does not take yet; apply a force instead"
         )
 
