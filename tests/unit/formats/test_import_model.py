@@ -240,8 +240,22 @@ def test_geoms_meet_as_in_the_file(tmp_path):
     first = report.translated[0]
     assert first.motion
     assert "1e-06 of the mass that it carries" in first.text
-    with pytest.raises(dap.SceneError, match="hard"):
-        imported(tmp_path, CONTACTS, contacts=True, limits="hard")
+
+
+def test_limits_beside_contacts_are_rigid(tmp_path):
+    """An arm falls on its limit and stays there; its friction fades, for stepping.
+
+    What overlaps is moved apart step by step, to 1e-9 of a turn at least.
+    """
+    text = """<compiler angle="radian"/><worldbody><geom type="plane" size="1 1 1" pos="0 0 -5"/>
+      <body name="b">
+      <joint name="j" axis="0 1 0" range="-9 0.3" frictionloss="0.1"/>
+      <geom size="0.1" pos="1 0 0" mass="1"/></body></worldbody>"""
+    scene, report = imported(tmp_path, text, contacts=True, limits="hard")
+    assert scene.forces["j_friction"].fields["w_tol"] == 0.01
+    assert "limits of a joint are rigid" in " ".join(one.text for one in report.translated)
+    result = dap.simulate(scene, t_end=1.0, dt=0.5)
+    assert result.quantity("j.angle").values[-1] == pytest.approx(0.3, abs=1e-9)
 
 
 def test_a_box_of_a_file_slides_by_the_friction_of_its_pair(tmp_path):

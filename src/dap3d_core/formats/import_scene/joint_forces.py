@@ -9,6 +9,7 @@ import numpy as np
 from dap3d_core.formats.import_scene.couplings import add_rotor
 from dap3d_core.formats.import_scene.joints import NamedEnds, from_ground
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
+from dap3d_core.formats.import_scene.start import AGREE, SCALAR
 from dap3d_core.interface.formats.articulation import Articulation, Joint, Limits
 from dap3d_core.interface.formats.frames import quaternion
 from dap3d_core.kernels.array_types import Floats
@@ -140,11 +141,15 @@ class JointCoordinate:
             text = "limits of joints are left out: limits = off"
             builder.remarks.translate(joint.place, text, motion=True)
             return
+        if self._limit(limits):
+            text = "limits of a joint are rigid: its rate ends at once, without rebound"
+            builder.remarks.translate(joint.place, text, motion=True)
+            return
         seen = builder.inertia
         inertia = seen.of(joint.name, self.k) or seen.of_alone(joint.name, self.k)
         inertia = inertia or self._own_inertia()
-        hard, given = builder.limits == "hard", limits.stiffness
-        k = inertia / STOP_TIME[builder.limits] ** 2 if hard or given is None else given
+        hard, given = builder.limits == "hard" and not builder.takes_contacts, limits.stiffness
+        k = inertia / STOP_TIME["hard" if hard else "soft"] ** 2 if hard or given is None else given
         text = "limits of a joint are stops at which its rate ends at once, without rebound"
         if not hard:
             text = "limits of a joint are soft stops, critically damped for the inertia that they "
@@ -155,6 +160,27 @@ class JointCoordinate:
         for side, bound in (("min", limits.lower), ("max", limits.upper)):
             if isfinite(bound):
                 self._add_stop(side, bound, fields)
+
+    def _limit(self, limits: Limits) -> bool:
+        """Give the joint of the scene rigid limits, if they are hard and it can have some.
+
+        The joint counts from where it starts, which is within them but in loops: what closes one
+        does not know where it starts, and others may start beyond.
+        """
+        builder, joint = self.builder, self.joint
+        if builder.limits != "hard" or not builder.takes_contacts or joint.kind not in SCALAR:
+            return False
+        q = joint.position[0] if joint.position else 0.0
+        slack = AGREE * max(1.0, abs(q))
+        inside = limits.lower - slack <= q <= limits.upper + slack
+        if joint in builder.inertia.loops or not inside:
+            return False
+        fields = builder.scene.joints[self.name].fields
+        if isfinite(limits.lower):
+            fields["lower"] = min(limits.lower - q, 0.0)
+        if isfinite(limits.upper):
+            fields["upper"] = max(limits.upper - q, 0.0)
+        return True
 
     def _add_stop(self, side: str, bound: float, fields: dict[str, Any]) -> None:
         """Add the stop of one limit."""
@@ -178,26 +204,26 @@ class JointCoordinate:
         return turning if self.turns else body.mass
 
     def add_friction(self) -> None:
-        """Add dry friction, which fades at low rates."""
+        """Add dry friction, which sticks, or fades at low rates where contacts are not events."""
         friction, builder, ends = self._value("friction"), self.builder, self.ends
         if friction < 0.0:
             text = "friction below 0, which would drive"
             builder.remarks.leave_out(self.joint.place, text, motion=True)
         if friction <= 0.0:
             return
-        unit = "rad/s" if self.turns else "m/s"
-        text = (
-            f"dry friction of a joint fades below {FADING:g} {unit}: it creeps, and does not stick"
-        )
-        builder.remarks.translate(self.joint.place, text, motion=True)
+        fading = None if builder.takes_contacts and not builder.stepped else FADING
+        if fading:
+            unit = "rad/s" if self.turns else "m/s"
+            text = f"dry friction of a joint fades below {fading:g} {unit}: it creeps, and does not"
+            builder.remarks.translate(self.joint.place, f"{text} stick", motion=True)
         name = builder.names.free("forces", f"{self.name}_friction")
         if self.turns:
             axis = ends.vector(self._holder(), self.axis)
             builder.scene.add_force("rot_friction", name, body_i=ends.child, body_j=ends.parent,
-                                    axis=axis, n_c=friction, w_tol=FADING)  # fmt: skip
+                                    axis=axis, n_c=friction, w_tol=fading)  # fmt: skip
         else:
             builder.scene.add_force("tran_friction", name, P_i=ends.point("i"), f_c=friction,
-                                    a_j=ends.vector("j", self.axis), v_tol=FADING)  # fmt: skip
+                                    a_j=ends.vector("j", self.axis), v_tol=fading)  # fmt: skip
 
 
 def perpendicular(axis: Floats) -> Floats:

@@ -27,6 +27,7 @@ class SceneBuilder:
         names: names in the scene.
         inertia: the inertias that joints see.
         limits: what becomes of limits of joints: "off", "soft" or "hard".
+        stepped: shapes meet each other, by time stepping.
     """
 
     scene: Scene
@@ -35,9 +36,15 @@ class SceneBuilder:
     member: dict[str, tuple[str, Frame]]
     inertia: JointInertia
     limits: str
+    stepped: bool = False
     names: Names = attrs.Factory(Names)
     bodies: dict[str, str] = attrs.Factory(dict)
     surfaces: dict[tuple[float, bool], str] = attrs.Factory(dict)
+
+    @property
+    def takes_contacts(self) -> bool:
+        """True where the method takes contacts, among them rigid limits and sticking friction."""
+        return bool(self.scene.simulation.method != "joint")
 
     def attached(self, link: str, frame: Frame) -> tuple[str, Frame]:
         """A frame of a link as body and frame in its axes at its mass centre."""

@@ -35,19 +35,13 @@ from dap3d_core.scene.tables import GROUND
 
 #: Steps of a settled result: a model does not say how long to simulate.
 DURATION, STEP = 1.0, 0.01
-#: Limits of joints: left out, springs with dampers, or stops that velocities end at.
+#: Limits of joints: left out, springs with dampers, or rigid.
 LIMITS = ("off", "soft", "hard")
 
 
 def _checked_limits(_: Any, __: Any, value: Any) -> None:
     if value not in LIMITS:
         raise FormatError(f"limits = {value!r}: should be one of {', '.join(LIMITS)}")
-
-
-def _checked_contacts(options: "ImportOptions", _: Any, contacts: bool) -> None:
-    if contacts and options.limits == "hard":
-        what = "contacts do not go with limits = hard, at which velocities jump by another law"
-        raise FormatError(what, remedy="take soft limits, or none")
 
 
 @attrs.frozen
@@ -69,7 +63,7 @@ class ImportOptions:
     limits: str = attrs.field(default="soft", validator=_checked_limits)
     positions: dict[str, Sequence[float]] = attrs.Factory(dict)
     rates: dict[str, Sequence[float]] = attrs.Factory(dict)
-    contacts: bool = attrs.field(default=False, validator=_checked_contacts)
+    contacts: bool = False
 
 
 def scene_of(
@@ -117,7 +111,7 @@ def scene_of(
         text = "method joint, for links without mass or inertia: others lose digits to them"
         remarks.translate(model.place, text)
     builder = SceneBuilder(scene, remarks, groups, member, _inertia(tree, groups), options.limits,
-                           names or Names())  # fmt: skip
+                           options.contacts, names or Names())  # fmt: skip
     builder.bodies[WORLD] = GROUND
     for group in groups.values():
         if group.name != WORLD:
