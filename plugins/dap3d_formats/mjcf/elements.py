@@ -152,9 +152,9 @@ MJCF: Table = {
 #: Where shapes are to meet each other.
 CONTACTS: Table = {
     **MJCF,
-    "geom": dict(MJCF["geom"]) | taken("contype conaffinity friction")
+    "geom": dict(MJCF["geom"]) | taken("contype conaffinity friction priority")
     | translated("condim", "of 1 smooth, else friction along the surface alone")
-    | moves("priority solmix solref solimp margin gap", "contacts are rigid"),
+    | moves("solmix solref solimp margin gap", "contacts are rigid"),
     "contact": taken(),
     "exclude": taken() | taken("name body1 body2"),
     "pair": moves("", "pairs of geoms of their own"),

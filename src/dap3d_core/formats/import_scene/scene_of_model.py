@@ -21,7 +21,7 @@ from dap3d_core.formats.import_scene.shapes import (
     MeshFiles,
     add_collisions,
     add_shapes,
-    bits_beside_ground,
+    bits_of_shapes,
 )
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.formats.import_scene.start import couples, start_of
@@ -118,7 +118,7 @@ def scene_of(
             _add_body(builder, group, placed[group.name])
     _add_gravity(scene, model.gravity)
     _add_joints(builder, model)
-    bits = bits_beside_ground(builder, model) if options.contacts else {}
+    bits = bits_of_shapes(builder, model) if options.contacts else {}
     for group in groups.values():
         for link, _ in group.links:
             add_shapes(builder, link, MeshFiles() if meshes is None else meshes, bits)
