@@ -89,7 +89,8 @@ NOT_CALLED = {
         "formulations.standard": "settle_rows",
         "integrators.adams.step": "reject",
         "integrators.stepping.vector_ops": "scaled_beyond",
-        "integrators.stepping.step_control": "error_beyond_rounding",
+        "integrators.runge_kutta.error": "error_beyond_rounding",
+        "integrators.runge_kutta.sums": "combine_by_table",
         "integrators.stepping.singular_poses": "predict_measures is_approaching "
         "least_time_to_singularity",
         "integrators.radau.step": "reject_iteration stage_is_across blame",
