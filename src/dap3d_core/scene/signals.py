@@ -80,7 +80,8 @@ def note_unread_inputs(report: Collector, elements: Sequence[Instance]) -> None:
     """Note inputs that no joint and no force reads."""
     behind = 1 + len(report.scene.functions)
     read = {index - behind for e in elements for index in e.functions}
+    named = {name for e in elements if e.active for name in e.active.names}
     for index, name in enumerate(report.scene.inputs):
-        if index not in read:
+        if index not in read and name not in named:
             key = dotted(("inputs", name))
             report.note(f"{key}: no joint and no force reads it", "inputs left unread")

@@ -92,7 +92,14 @@ class Run(RunState):
         self.started = time.perf_counter()
         if self.event_locator:
             self.event_locator.take_rows = self._take_rows
-        self.begin(self._integration(self._start()))
+        try:
+            if self.event_locator:
+                self.event_locator.release_inactive(self.start)
+            self.begin(self._integration(self._start()))
+        except BaseException:
+            if self.event_locator:
+                self.event_locator.put_back()
+            raise
 
     def finish(self) -> Result:
         """Integrate from the present state to the end.

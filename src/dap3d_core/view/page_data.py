@@ -202,7 +202,7 @@ def _contacts(result: Result) -> Iterator[dict[str, Any]]:
 
 def _shape_contacts(result: Result, notes: list[str]) -> Iterator[dict[str, Any]]:
     """What each pair of shapes pushes with, all its points together, on shape i."""
-    table = result.contacts
+    table = result.record.contacts.at(result.t)
     pairs, which = np.unique(table.pair, axis=0, return_inverse=True)
     size = np.linalg.norm(table.force, axis=1)
     largest = np.argsort(-np.bincount(which.ravel(), size, len(pairs)), kind="stable")[:MOST_PAIRS]

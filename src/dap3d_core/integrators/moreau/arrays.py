@@ -25,7 +25,7 @@ LOG_ROOM = 64
 #: Arrays of which a row belongs to a contact.
 OF_CONTACTS = ("bodies", "key", "group", "chosen", "J", "moved", "own", "gap", "mu", "e", "bias",
                "r", "left", "collides", "closing", "x", "u", "z", "B", "push", "kept", "met",
-               "own_held")  # fmt: skip
+               "own_held", "x_bounce")  # fmt: skip
 
 
 def _integer() -> Scalar[int]:
@@ -55,7 +55,7 @@ class StepArrays(Arrays):
             ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "trial",
              "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z", "B", "push",
              "kept", "met", "D", "declared_x", "log", "values", "vectors", "crossed", "answer",
-             "felt"),
+             "felt", "bounce", "v_bounce", "x_bounce"),
             MATRIX,
         ),
         "shapes": PlacedShapes.type_of(),
@@ -108,6 +108,9 @@ class StepArrays(Arrays):
     end: Floats  # at the end of the step
     hit: Floats  # the part of the step at which a body is hit; and 1 where it flies else
     flies: Floats
+    bounce: Floats  # (n + 1, 5) of each group (restitution.py)
+    v_bounce: Floats  # (n + 1, 6), (c, 3), (k,) what bounces lead to
+    x_bounce: Floats
     used: Integers  # bodies of a group of contacts, in the order of K; the place of each, or -1
     place: Integers
     parent: Integers  # scratch of groups and of the order of bodies
@@ -156,6 +159,7 @@ class StepArrays(Arrays):
     y: Floats  # impulses; tried, kept, and of the last step
     pull: Floats
     y_kept: Floats
+    y_bounce: Floats
     joint_y: Floats
     # scratch
     slopes: Floats  # (2, y) flat: dy/dt
@@ -187,7 +191,8 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     bodies: dict[str, Any] = {
         **{name: np.zeros((n + 1, 9)) for name in ("Jp", "Jp_inverse", "spin", "spin_inverse")},
         **{name: np.zeros((n + 1, 6)) for name in (
-            "before", "free", "v", "trial", "rest", "trial_rest", "end")},
+            "before", "free", "v", "trial", "rest", "trial_rest", "end", "v_bounce")},
+        "bounce": np.zeros((n + 1, 5)),
         **{name: np.zeros(n + 1) for name in (
             "margin", "shape_reach", "mass", "mass_inverse", "hit", "flies")},
         **{name: np.zeros(n + 1, dtype=np.int64) for name in (
@@ -210,7 +215,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         **own,
         **_declared(evaluator),
         **_of_contacts(ROOM + model.contact_count, own["row_start"]),
-        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "joint_y")},
+        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "y_bounce", "joint_y")},
         slopes=np.zeros(2 * size),
         changed=np.zeros(size),
         slots=np.zeros(slots, dtype=np.int64),
@@ -229,7 +234,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
 def _of_contacts(room: int, row_start: Integers) -> dict[str, Any]:
     """Arrays of so many contacts, and of edges between bodies, by these and by rows of joints."""
     widths = {"bodies": 2, "J": 36, "moved": 36, "own": 9, "own_held": 9, "B": 9, "met": MET,
-              **dict.fromkeys(("x", "u", "z", "push", "kept"), 3)}  # fmt: skip
+              **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
     whole = ("bodies", "key", "group", "chosen", "collides")
     found = {
         name: np.zeros((room, widths[name]) if name in widths else room,

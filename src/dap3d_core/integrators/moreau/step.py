@@ -20,6 +20,7 @@ from dap3d_core.integrators.moreau.impulses import (
 )
 from dap3d_core.integrators.moreau.newton import speed_of, velocity_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
+from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
 from dap3d_core.integrators.stepping.integration_state import (
     NOT_FINITE,
     OTHER,
@@ -37,8 +38,8 @@ from dap3d_core.kernels.runtime.cache import compiled
 OVERLAP, PASSES = 1e-12, 8
 #: A contact collides where it approaches by more than this times h times the acceleration.
 COLLIDES = 4.0
-#: What a contact that collides does; a part of the step where bodies are not hit.
-STOPS, BOUNCES, NOT_HIT = 1, 2, 2.0
+#: A part of the step where bodies are not hit.
+NOT_HIT = 2.0
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
@@ -115,6 +116,9 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     recall(work, s)
     if not solve(s, work.rtol):
         return False
+    put_hits(s, any_collides)
+    if any_collides and not limit_bounces(s, work.rtol):
+        return False
     s.is_solved = 1
     work.largest_residual = max(work.largest_residual, s.residual)
     for b in range(n + 1):
@@ -122,7 +126,6 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     remember(work, s)
     keep_for_reports(s)
     trial[trial.size - 1] += work_done(work, s)
-    put_hits(s, any_collides)
     for b in range(1, n + 1):
         c, d = coordinate_offset(b), s.trial[b]
         if s.hit[b] <= 1.0:  # from where it was

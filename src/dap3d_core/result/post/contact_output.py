@@ -1,6 +1,6 @@
 """Contacts evaluated at reported states: gap, forces, slip and mode."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -9,12 +9,13 @@ import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.registry.arguments import checked
-from dap3d_core.result.contact_table import ContactTable
+from dap3d_core.result.contact_table import WIDTH, ContactTable
 from dap3d_core.result.errors import unknown
 from dap3d_core.scene.coerce import canonical
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
+    from dap3d_core.model import Model
     from dap3d_core.result.arrays import Arrays
 
 #: Separates the name of a contact from the number of one of its points.
@@ -90,6 +91,32 @@ def contact_outputs(evaluator: "Evaluator", arrays: "Arrays") -> dict[str, Conta
     }  # fmt: skip
 
 
+def contact_table(model: "Model", t: Floats, outputs: Mapping[str, ContactOutput]) -> ContactTable:
+    """The table of declared contacts that push at a point, with bodies in place of shapes.
+
+    Args:
+        model: of the result.
+        t: (nt,) the reported instants.
+        outputs: of all points of contacts, as of ``contact_outputs``.
+    """
+    rows = [np.zeros((0, WIDTH))]
+    for group in model.contacts:
+        type_: Any = group.type_info.type
+        for k in group.members if type_.at is not None and type_.along is None else ():
+            one = outputs[model.joint_names[k]]
+            pushes = (np.nan_to_num(one.mode) > 0) & (one.normal_force > 0.0)
+            N = one.normal_force[pushes, None]
+            pair = (*model.joint_slots[k], 0)[:2]  # what names one body touches ground
+            normal = (one.force - one.friction)[pushes] / N
+            rows.append(np.column_stack([
+                t[pushes], np.tile(pair, (len(N), 1)), one.mode[pushes], one.gap[pushes],
+                one.at[pushes], normal, one.force[pushes],
+            ]))  # fmt: skip
+    found = np.concatenate(rows)
+    order = np.argsort(found[:, 0], kind="stable")
+    return ContactTable.of_rows(("ground", *model.body_names), found[order])
+
+
 def together(outputs: Sequence[ContactOutput]) -> ContactOutput:
     """The output of a contact with several points; of one that of the point."""
     if len(outputs) == 1:
@@ -114,10 +141,19 @@ class ResultContacts:
 
     @cached_property
     def contacts(self) -> ContactTable:
-        """Points of shapes that push on each other at the reported instants after the start."""
+        """Points at which bodies push on each other, at the reported instants.
+
+        Of shapes that collide at those after the start; of declared contacts, with bodies in place
+        of shapes.
+
+        Raises:
+            ResultError: as ``model``, where there are declared contacts.
+        """
         result: Any = self
-        table: ContactTable = result.record.contacts
-        return table.at(result.t)
+        table: ContactTable = result.record.contacts.at(result.t)
+        if not self._points:
+            return table
+        return table.joined(contact_table(result.model, result.t, self._contact_outputs))
 
     @checked
     def contact(self, name: str) -> ContactOutput:

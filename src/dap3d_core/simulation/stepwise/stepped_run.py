@@ -31,7 +31,7 @@ from dap3d_core.simulation.initial.given_state import state_of
 from dap3d_core.simulation.output.termination import why_stopped
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks, jumps_of
-from dap3d_core.simulation.settings import compiled_for, settings_of
+from dap3d_core.simulation.settings import compiled_for, replaced_notes, settings_of
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.events.jumps import Jumps
@@ -262,6 +262,7 @@ def start(
     simulation = settings_of(compiled, t_end=end, dt=end, **settings)
     with compiled.borrow_evaluator():
         run = OpenRun(compiled, simulation, Callbacks(announce=announce))
+        run.notes += replaced_notes(compiled, simulation, settings)
         return SteppedRun(run, record=record)
 
 

@@ -65,13 +65,10 @@ def test_what_is_refused(by, of, said):
         dap.objective(oscillator(), by, of)
 
 
-def test_a_point_of_another_size():
+def test_points_of_another_size_and_settings_that_are_none():
     f = dap.objective(oscillator(), "forces.spring.k", "mass.r.x")
     with pytest.raises(ValueError, match="2 numbers for 1 parameters"):
         f([1.0, 2.0])
-
-
-def test_a_setting_that_is_none():
     with pytest.raises(TypeError, match="takes no tend; did you mean 't_end'"):
         dap.objective(oscillator(), "forces.spring.k", "mass.r.x", tend=1.0)
 
