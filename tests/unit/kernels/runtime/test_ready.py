@@ -102,13 +102,13 @@ def test_a_file_that_is_cut_off_is_not_used(pack, size):
         assert value()[1]
 
 
-def test_what_a_file_does_not_hold_is_made_here(pack, packs):
+def test_what_a_file_does_not_hold_and_code_of_another_processor_is_made_here(
+    pack, packs, monkeypatch
+):
+    with monkeypatch.context() as named:
+        named.setenv("DAP3D_CPU", "x86-64")
+        assert value()[1]
     pack.write_bytes(ready.packed({"curve-2": (["None"], b"")}))
-    assert value()[1]
-
-
-def test_another_processor_that_was_named_has_code_of_its_own(pack, monkeypatch):
-    monkeypatch.setenv("DAP3D_CPU", "x86-64")
     assert value()[1]
 
 
