@@ -8,8 +8,8 @@ from scipy.linalg import eigvals
 from support.rotations import rotation
 
 import dap3d_core as dap
+from dap3d_core.simulation.linearization.linearization import lowest_eigenvalues
 from dap3d_core.simulation.linearization.operating_point import operating_point
-from dap3d_core.simulation.linearization.sparse_modes import lowest_eigenvalues
 
 G = 9.81
 ROD = [1 / 12, 1 / 12, 1e-3]

@@ -9,9 +9,8 @@ from support.plain import long_in_plain_python
 import dap3d_core as dap
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
 from dap3d_core.study.batch import driver
-from dap3d_core.study.batch.parameter_map import ParameterMap, poses_of
-from dap3d_core.study.batch.prepare_dependence import dependence_of
-from dap3d_core.study.batch.rebuild import ModelRebuilder
+from dap3d_core.study.batch.batch import ModelRebuilder
+from dap3d_core.study.batch.parameter_map import ParameterMap, dependence_of, poses_of
 
 DONE, STOPPED, FAILED = PointStatus.DONE, PointStatus.STOPPED, PointStatus.FAILED
 
