@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 from support.ended import EndedError
+from support.internals import Checkpoint, read_checkpoint, write_checkpoint
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
 from dap3d_core.result.file.checksum import write_checksums
-from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
 from fuzz.acceptable import examine_result, strict
 from fuzz.damage import seeds
 from fuzz.results import HANG, SEAL, in_child

@@ -8,8 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from dap3d_core.kernels.compiler.objects import OPTIMISED, UNOPTIMISED, compile_ir, load, processor
-from dap3d_core.kernels.compiler.units import Entry
-from support.internals import Program
+from support.internals import Entry, Program
 
 _count = count()
 

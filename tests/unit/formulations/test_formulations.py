@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import mechanisms, problems, redundant
-from support.internals import Evaluator
+from support.internals import Evaluator, correct_initial
 from support.own_types import registry_of
 from support.plain import in_another_process, long_in_plain_python
 from support.process import run
@@ -15,7 +15,6 @@ from dap3d_core.interface import Joint, Point, Vector, number, point, vector
 from dap3d_core.kernels import cross, dot, eye, hstack, neg, normals, row, scale, skew, sub
 from dap3d_core.model import build_model
 from dap3d_core.scene import check
-from dap3d_core.simulation.initial.assemble import correct_initial
 
 REDUNDANT = {
     "door": mechanisms.door,

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import xarray
 from support import problems
+from support.internals import Evaluator
 from support.plain import long_in_plain_python
 from support.process import run
 from support.results import (
@@ -29,7 +30,6 @@ from support.results import (
 )
 
 import dap3d_core as dap
-from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.result import ResultError, RunMetadata, RunStatistics, open_result
 from dap3d_core.result import arrays as arrays_module
 from dap3d_core.result.arrays import Arrays

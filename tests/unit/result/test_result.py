@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from support.internals import Evaluator, join, y_from_u
 from support.results import (
     ARM,
     MASS,
@@ -15,11 +16,9 @@ from support.results import (
     model_of,
     result_of,
 )
+from support.rotations import to_global
 
 import dap3d_core as dap
-from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.model.rotations import to_global
-from dap3d_core.model.state_layout import join, y_from_u
 from dap3d_core.result import ResultError, RunStatistics, UnknownNameError
 
 # ---------------------------------------------------------------------------- motion

@@ -10,6 +10,7 @@ import threading
 
 import numpy as np
 import pytest
+from support.command_line import dap3d
 from support.falling import SCENE
 from tests.e2e.conftest import COMMAND, environment
 
@@ -231,8 +232,6 @@ def test_a_mistake_is_told_and_changes_nothing(call, folder, words, said):
 
 def main_commands():
     """The commands that take --json."""
-    from dap3d_core.cli.app import dap3d
-
     return {
         name for name, command in dap3d.commands.items()
         if any("--json" in p.opts for p in command.params)
@@ -241,8 +240,6 @@ def main_commands():
 
 def test_every_command_tries_wrong_words():
     tried = {words[0] for words, _ in REFUSED}
-    from dap3d_core.cli.app import dap3d
-
     assert set(dap3d.commands) <= tried
     assert set(dap3d.commands) == main_commands()
 

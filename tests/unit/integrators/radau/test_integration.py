@@ -6,11 +6,10 @@ import sys
 import numpy as np
 import pytest
 from support import mechanisms, problems
-from support.internals import compiled
+from support.internals import compiled, store_reference_pivots
 from support.plain import in_another_process, jit_is_on, long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.formulations.stabilized_index2.stage_equations import evaluate_stage, keep_frames
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.radau.integration import RadauIntegration, estimate_tolerances

@@ -4,13 +4,12 @@ import sys
 
 import numpy as np
 import pytest
+from support.internals import FLOAT, Array, Entry, Program, Signature
 from support.plain import jit_is_on
 from support.process import REPOSITORY
 
 from dap3d_core.kernels.compiler import objects, units
-from dap3d_core.kernels.compiler.functions import Program
-from dap3d_core.kernels.compiler.types import FLOAT, Array, Signature
-from dap3d_core.kernels.compiler.units import Entry, Unit
+from dap3d_core.kernels.compiler.units import Unit
 from dap3d_core.kernels.runtime import ready
 from dap3d_core.kernels.scalar_math import atan2, sin, sqrt
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.internals import join, split
 from support.results import (
     CONTROLLED,
     about_z,
@@ -14,7 +15,6 @@ from support.results import (
 )
 
 import dap3d_core as dap
-from dap3d_core.model.state_layout import join, split
 
 
 def test_kinetic_energy_of_bodies_that_slide_and_spin():
