@@ -75,9 +75,6 @@ def _leave(model, place, **settings):
         raise AssertionError("the run has ended by itself")
 
 
-# ------------------------------------------------------------------ places of numbers
-
-
 @functools.cache
 def places(kind, name):
     """Where numbers stand in a file: (what, size or path, whether they are integers)."""
@@ -151,9 +148,6 @@ def _put(value, path, new):
     return changed
 
 
-# ------------------------------------------------------------------ the changed file
-
-
 def make(change, place):
     """Write the changed file, with what belongs to it, into an empty folder; its path."""
     kind, name, what, where, value = change
@@ -200,9 +194,6 @@ def _as(dtype, value):
         limits = np.iinfo(dtype)
         value = min(max(int(value), limits.min), limits.max)
     return dtype.type(value)
-
-
-# ------------------------------------------------------------------ what must be true
 
 
 def check_change(data):

@@ -73,8 +73,6 @@ def same_bits(one, other):
     )
 
 
-# ------------------------------------------------------------------ random programs
-
 FLOATS, WHOLES = ("a", "b", "c", "d"), ("i", "j", "k")
 
 

@@ -11,8 +11,6 @@ from dap3d_core.linear.ldlt.saddle_point import solve_saddle
 from support.internals import make_plan
 from support.plain import jit_is_on
 
-# ------------------------------------------------------------------ graphs
-
 
 def chain(n, rows=3):
     """Ground - 1 - 2 - ... - n."""

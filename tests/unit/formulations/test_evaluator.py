@@ -186,9 +186,6 @@ def test_layout_of_the_rates(name, length, machines):
     assert close(np.hstack([a, w_dot]), report, 1e-11)  # rounding of p, times the condition
 
 
-# ------------------------------------------------------------------ inertia in any axes
-
-
 def in_other_axes(turns):
     """pen2 with a spring and a damper, its bodies described in axes turned by these matrices."""
     rod, cylinder = turns
@@ -236,9 +233,6 @@ def test_accelerations_do_not_depend_on_the_axes_of_a_body():
         found.append(evaluator.report(0.0, u))
     assert close(found[1][:12], found[0][:12], 1e-12)
     assert found[1][20:23] == pytest.approx(found[0][20:23], rel=1e-11)  # potential, |C|, |D v|
-
-
-# ------------------------------------------------------------------ power
 
 
 def power_and_rate(evaluator, t, u):

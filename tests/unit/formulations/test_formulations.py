@@ -126,9 +126,6 @@ def test_lsq_and_standard_agree_where_rows_are_independent(name):
         assert other == pytest.approx(one, abs=1e-11 * np.max(np.abs(one)))
 
 
-# ------------------------------------------------------------------ scaled rows
-
-
 class Sized(Joint):
     """A revolute joint whose rows are all multiplied by ``size``."""
 
@@ -177,9 +174,6 @@ def test_the_motion_does_not_depend_on_the_size_of_rows(size):
     assert abs(plain.r[-1, 0, 1] + 0.5) > 0.1  # it has swung
     assert sized.r == pytest.approx(plain.r, abs=1e-10)
     assert sized.rdd[0] == pytest.approx(plain.rdd[0], abs=1e-12)
-
-
-# ------------------------------------------------------------------ which one is taken
 
 
 def test_auto_takes_lsq_where_rows_are_redundant():

@@ -29,9 +29,6 @@ def solve_at(t, h, y, multipliers, work, system, loops, tangent, matrix):
     solve_first(h, work, system, tangent, matrix)
 
 
-# ---------------------------------------------------------------------------- tangent
-
-
 def sprung():
     """A moving chain with damped springs between its bodies and to ground, one of them rubbing."""
     scene = mechanisms.bent_chain(4)
@@ -112,9 +109,6 @@ def test_tangent_is_that_of_all_equations(scene, h):
     expected = np.concatenate([residual, of_rows.ravel()])
     size = max(np.max(np.abs(term)) for term in (s * change, *terms, expected))
     assert np.max(np.abs(left - expected)) < 2e-8 * size
-
-
-# ---------------------------------------------------------------------------- method
 
 
 def test_tolerances_of_the_estimate_keep_their_ratio():

@@ -125,8 +125,6 @@ def test_source_that_is_not_there_is_refused():
         Program().function(namespace["f"], (FLOAT,))
 
 
-# ------------------------------------------------------------------ kernels
-
 ZERO = (0.0, 0.0, 0.0)
 
 

@@ -25,9 +25,6 @@ def arguments(graph):
     return n, [slots for slots, _ in joints], [rows for _, rows in joints]
 
 
-# ------------------------------------------------------------------ fill and work
-
-
 @pytest.mark.parametrize("net", [rod_net, plate_net])
 def test_fill_of_a_net_grows_as_nested_dissection_promises(net):
     """Of k x k knots the fill is O(k^2 log k), the work O(k^3) (George 1973): from k to 2 k fill
@@ -97,9 +94,6 @@ def test_trees_are_not_dissected(graph, monkeypatch):
     """Their fronts are narrow: no other order is tried, no panel made."""
     monkeypatch.delattr(elimination_order, "dissect")
     assert order_nodes(*arguments(graph)).panels == ()
-
-
-# ------------------------------------------------------------------ panels
 
 
 @pytest.fixture(params=[0.3, 0.9] if jit_is_on() else [0.3])
@@ -217,9 +211,6 @@ def test_small_pivots_of_panels_are_counted_or_dropped(panels_everywhere):
     wanted = np.linalg.solve(D @ D.T, np.delete(gamma, weak))
     scale = 1e3 * EPS * np.linalg.cond(D) ** 2 * np.max(np.abs(wanted))
     assert np.delete(multipliers, weak) == pytest.approx(wanted, abs=scale)
-
-
-# ------------------------------------------------------------------ once for all steps
 
 
 def test_the_program_is_found_once_for_all_runs_and_steps(monkeypatch):

@@ -93,8 +93,6 @@ def test_action_and_reaction(keyword, ground):
     np.testing.assert_allclose(moment[1], 0, atol=1e-8)  # |C| <= 1e-10 leaves an arm of that size
 
 
-# ---------------------------------------------------------------------------- force elements
-
 K, C, L0, FA = 30.0, 0.7, 0.4, 1.5
 
 
