@@ -2,16 +2,14 @@
 
 import numpy as np
 import pytest
+from support.internals import Evaluator, correct_initial, split
 from support.motions import Motion
 from support.results import ARM, MASS, PIVOT, RATE, about_z, circling, model_of, result_of, rows_of
+from support.rotations import rotation
 from support.scenes import scene_for
 
 import dap3d_core as dap
-from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.model.rotations import rotation
-from dap3d_core.model.state_layout import split
 from dap3d_core.result import ResultError, UnknownNameError
-from dap3d_core.simulation.initial.assemble import correct_initial
 
 REGISTRY = dap.load_registry()
 SEVERAL = [
@@ -94,8 +92,6 @@ def test_action_and_reaction(keyword, ground):
     np.testing.assert_allclose(force, 0, atol=1e-12)
     np.testing.assert_allclose(moment[1], 0, atol=1e-8)  # |C| <= 1e-10 leaves an arm of that size
 
-
-# ---------------------------------------------------------------------------- force elements
 
 K, C, L0, FA = 30.0, 0.7, 0.4, 1.5
 
