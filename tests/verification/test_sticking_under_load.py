@@ -85,13 +85,13 @@ def test_a_loaded_hinge_holds_up_to_its_friction(part):
 
 
 def test_a_door_with_a_loaded_hinge_strikes_its_limit():
-    """From 2 rad/s to 1 rad by friction, back with e of its speed, and to rest by friction."""
-    scene, moment, inertia = wheel(spin=2.0, upper=1.0, e=0.5)
+    """From 4 rad/s to 1 rad by friction, back with e of its speed, and to rest by friction."""
+    scene, moment, inertia = wheel(spin=4.0, upper=1.0, e=0.5)
     result = dap.simulate(scene, t_end=6.0, dt=0.5, **TIGHT)
     a = moment / inertia
-    at_limit = np.sqrt(4.0 - 2.0 * a)
+    at_limit = np.sqrt(16.0 - 2.0 * a)
     assert [event.kind for event in result.events] == ["impact", "stick"]
-    ends = (2.0 - at_limit) / a + 0.5 * at_limit / a
+    ends = (4.0 - at_limit) / a + 0.5 * at_limit / a
     assert result.events[1].t == pytest.approx(ends, rel=0, abs=1e-9)
     back = (0.5 * at_limit) ** 2 / (2.0 * a)
     assert result.quantity("pin.angle").values[-1] == pytest.approx(1.0 - back, abs=1e-11)
@@ -143,7 +143,7 @@ def test_an_overhung_shaft_in_two_bearings():
     result = dap.simulate(scene, t_end=1.2 * stops, dt=0.2 * stops, **TIGHT)
     assert [event.kind for event in result.events] == ["stick", "stick"]
     assert result.events[0].t == pytest.approx(stops, rel=0, abs=1e-9)
-    assert np.abs(result.w[-1]).max() < 1e-15
+    assert np.abs(result.w[-1]).max() < 1e-14  # 30 rad/s has a rounding of 7e-15
     load = result.contact("rub_second").normal_force
     assert load[:-2] == pytest.approx(m * G * c / L, rel=1e-9)
 
@@ -202,9 +202,9 @@ def test_a_disk_slides_in_the_plane_and_then_rolls():
     mu, R, m, J, v = 0.2, 0.5, 3.0, 5.0, 2.0
     scene = dap.Scene(name="disk")
     scene.add_body("disk", mass=m, Jp=(J, J, J), r=(0.0, 0.0, R), r_dot=(v, 0.0, 0.0))
-    scene.add_joint("disk", "ground", body_i="disk", slip="z", radius=R)
+    scene.add_joint("disk", "plane", body_i="disk", slip="z", radius=R)
     scene.add_force("weight")
-    scene.add_force("friction", "rub", joint="ground", mu=mu)
+    scene.add_force("friction", "rub", joint="plane", mu=mu)
     stops = v / (mu * m * G * (1.0 / m + R * R / J))
     result = dap.simulate(scene, t_end=1.5 * stops, dt=0.5 * stops, **TIGHT)
     assert result.events[0].kind == "stick"
@@ -275,9 +275,9 @@ def test_a_leaning_disk_and_its_paradox(mu, direction):
     p = (np.cos(lean / 2), np.sin(lean / 2), 0.0, 0.0)  # the disk's axis to (0, 1, 1) / sqrt 2
     scene.add_body("disk", mass=m, Jp=(J, J, J), p=p, r=(0.0, 0.0, R * np.cos(lean)),
                    r_dot=(0.0, direction, 0.0))  # fmt: skip
-    scene.add_joint("disk", "ground", body_i="disk", slip="z", radius=R)
+    scene.add_joint("disk", "plane", body_i="disk", slip="z", radius=R)
     scene.add_force("weight")
-    scene.add_force("friction", "rub", joint="ground", mu=mu)
+    scene.add_force("friction", "rub", joint="plane", mu=mu)
     part = 0.5 * R * R / J
     carries = 1.0 / m + part - direction * mu * part
     if carries < 0.0:
@@ -368,7 +368,8 @@ def test_what_sticks_holds_no_less_than_what_slides():
 
 
 def test_a_pin_without_a_radius_is_named():
-    scene, *_ = wheel(radius=None)
+    scene, *_ = wheel()
+    del scene.forces["rub"].fields["radius"]
     with pytest.raises(dap.SceneError, match=r"forces\.rub\.radius.*which friction in rev needs"):
         dap.compile(scene)
 
