@@ -146,10 +146,12 @@ class ContactRows:
         self._reaction = np.zeros((own, 3 * table.count))
         if own:
             held = self.inverse @ self.D.T
-            back = np.linalg.pinv(self.D @ held, rcond=1e-12) @ held.T
-            self.P = self.inverse - held @ back
-            if table.loads:
-                self._reaction = -back @ self.G.T
+            mobility = self.D @ held
+            self.P = self.inverse - held @ np.linalg.pinv(mobility, rcond=1e-12) @ held.T
+            if table.loads:  # of rows that depend on each other the least, as equations.py has them
+                s = 1.0 / np.sqrt(np.maximum(np.diag(mobility), 1e-300))
+                least = np.linalg.pinv(s[:, None] * mobility * s, rcond=1e-12)
+                self._reaction = -s[:, None] * (least @ (s[:, None] * held.T @ self.G.T))
         self.W = self.G @ self.P @ self.G.T
 
     @cached_property

@@ -41,6 +41,8 @@ TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
 HELD = 1e-10
 #: Slip, m/s, that is stopped where it goes through zero.
 STOPPED = 1e-6
+#: Mobility of a slip, as a part of that of free bodies, below which it is the pose that stops it.
+DEAD = 1e-12
 #: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 500, 1e-6
 #: So many steps within this part of the run are too many: it would not come to an end.
@@ -364,8 +366,14 @@ class ContactJumps(Jumps):
         self._go_on(integration, u, rows, moved, states, float(np.sum(impact.work)))
 
     def _stop(self, rows: ContactRows, c: int) -> None:
-        """Stop the slip of a contact, rounding of zero, without a change of its normal velocity."""
+        """Stop the slip of a contact, rounding of zero, without a change of its normal velocity.
+
+        At a dead centre it passes through zero while the mechanism moves on.
+        """
         which = rows.rows_of([c])
+        free = np.einsum("ri,ij,rj->r", rows.G[which], rows.inverse, rows.G[which])
+        if np.diag(rows.W)[which].max() < DEAD * free.max():
+            return
         A, u = rows.W[np.ix_(which, which)], rows.slip[c].copy()
         u[: self.table.across(c).start] = 0.0
         x = np.zeros(len(rows.G))
