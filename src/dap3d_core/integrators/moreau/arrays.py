@@ -24,8 +24,8 @@ MET = 14
 LOG_ROOM = 64
 #: Arrays of which a row belongs to a contact.
 OF_CONTACTS = ("bodies", "key", "group", "chosen", "J", "moved", "own", "own_held", "gap", "mu",
-               "e", "bias", "r", "left", "collides", "x", "u", "z", "B", "push", "kept",
-               "met")  # fmt: skip
+               "e", "bias", "r", "left", "collides", "closing", "x", "u", "z", "B", "push", "kept",
+               "met", "x_bounce")  # fmt: skip
 
 
 def _integer() -> Scalar[int]:
@@ -56,7 +56,7 @@ class StepArrays(Arrays):
              "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z", "B",
              "push",
              "kept", "met", "D", "declared_x", "log", "values", "vectors", "crossed", "answer",
-             "felt"),
+             "felt", "bounce", "v_bounce", "x_bounce"),
             MATRIX,
         ),
         "shapes": PlacedShapes.type_of(),
@@ -107,7 +107,11 @@ class StepArrays(Arrays):
     rest: Floats
     trial_rest: Floats
     end: Floats  # at the end of the step
-    hit: Floats  # 1 of bodies that collide
+    hit: Floats  # the part of the step at which a body is hit; and 1 where it flies else
+    flies: Floats
+    bounce: Floats  # (n + 1, 5) of each group (restitution.py)
+    v_bounce: Floats  # (n + 1, 6), (c, 3), (k,) what bounces lead to
+    x_bounce: Floats
     used: Integers  # bodies of a group of contacts, in the order of K; the place of each, or -1
     place: Integers
     parent: Integers  # scratch of groups and of the order of bodies
@@ -121,7 +125,8 @@ class StepArrays(Arrays):
     key: Integers  # a number that a contact keeps
     group: Integers  # the least body of those that contacts connect
     chosen: Integers  # contacts of a group
-    collides: Integers
+    collides: Integers  # what it does; the part of the step at which it closes
+    closing: Floats
     J: Floats  # (c, 36) rows of the velocity of body i less that of j: normal, tangents
     moved: Floats  # the same times M^-1
     own: Floats  # (c, 9) J M^-1 J^T of each
@@ -156,6 +161,7 @@ class StepArrays(Arrays):
     y: Floats  # impulses; tried, kept, and of the last step
     pull: Floats
     y_kept: Floats
+    y_bounce: Floats
     joint_y: Floats
     # scratch
     slopes: Floats  # (2, y) flat: dy/dt
@@ -187,9 +193,10 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     bodies: dict[str, Any] = {
         **{name: np.zeros((n + 1, 9)) for name in ("Jp", "Jp_inverse", "spin", "spin_inverse")},
         **{name: np.zeros((n + 1, 6)) for name in (
-            "before", "free", "v", "trial", "rest", "trial_rest", "end")},
+            "before", "free", "v", "trial", "rest", "trial_rest", "end", "v_bounce")},
+        "bounce": np.zeros((n + 1, 5)),
         **{name: np.zeros(n + 1) for name in (
-            "margin", "shape_reach", "mass", "mass_inverse", "hit")},
+            "margin", "shape_reach", "mass", "mass_inverse", "hit", "flies")},
         **{name: np.zeros(n + 1, dtype=np.int64) for name in (
             "used", "place", "parent", "queue", "order")},
         "entry_start": np.zeros(n + 2, dtype=np.int64),
@@ -203,7 +210,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         np.maximum.at(bodies["shape_reach"], model.collisions.body, far)
         bodies["shape_reach"][0] = 0.0
     scratch: dict[str, Any] = {
-        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "joint_y")},
+        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "y_bounce", "joint_y")},
         **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
     }
     arrays = StepArrays(
@@ -233,7 +240,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
 def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
     widths = {"bodies": 2, "J": 36, "moved": 36, "own": 9, "own_held": 9, "B": 9, "met": MET,
-              **dict.fromkeys(("x", "u", "z", "push", "kept"), 3)}  # fmt: skip
+              **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
     whole = ("bodies", "key", "group", "chosen", "collides")
     return {
         name: np.zeros((room, widths[name]) if name in widths else room,

@@ -11,7 +11,7 @@ from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.integrators.moreau.arrays import StepArrays
 from dap3d_core.integrators.moreau.contact_set import axes_of, evaluate_rows, find_contacts
 from dap3d_core.integrators.moreau.free_motion import move_freely
-from dap3d_core.integrators.moreau.groups import find_groups
+from dap3d_core.integrators.moreau.groups import find_groups, root_of
 from dap3d_core.integrators.moreau.impulses import (
     complete_rows,
     keep_for_reports,
@@ -20,6 +20,7 @@ from dap3d_core.integrators.moreau.impulses import (
 )
 from dap3d_core.integrators.moreau.newton import speed_of, velocity_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
+from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
 from dap3d_core.integrators.stepping.integration_state import (
     NOT_FINITE,
     OTHER,
@@ -37,6 +38,8 @@ from dap3d_core.kernels.runtime.cache import compiled
 OVERLAP, PASSES = 1e-12, 8
 #: A contact collides where it approaches by more than this times h times the acceleration.
 COLLIDES = 4.0
+#: A part of the step where bodies are not hit.
+NOT_HIT = 2.0
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
@@ -113,6 +116,9 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     recall(work, s)
     if not solve(s, work.rtol):
         return False
+    put_hits(s, any_collides)
+    if any_collides and not limit_bounces(s, work.rtol):
+        return False
     s.is_solved = 1
     work.largest_residual = max(work.largest_residual, s.residual)
     for b in range(n + 1):
@@ -120,20 +126,25 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     remember(work, s)
     keep_for_reports(s)
     trial[trial.size - 1] += work_done(work, s)
-    put_hits(s, any_collides)
     for b in range(1, n + 1):
-        end, free, c, part = s.end[b], s.free[b], coordinate_offset(b), s.h
-        if s.hit[b] != 0.0:  # from where it was, by v+
+        c, d = coordinate_offset(b), s.trial[b]
+        if s.hit[b] <= 1.0:  # from where it was
             for k in range(7):
                 trial[c + k] = y[c + k]
-            move(trial, c, part * end[0], part * end[1], part * end[2],
-                 part * end[3], part * end[4], part * end[5])  # fmt: skip
-        else:
-            part = 0.5 * s.h
-            move(trial, c, part * (end[0] - free[0]), part * (end[1] - free[1]),
-                 part * (end[2] - free[2]), part * (end[3] - free[3]), part * (end[4] - free[4]),
-                 part * (end[5] - free[5]))  # fmt: skip
+        for k in range(6):
+            d[k] = way_of(s, b, k)
+        move(trial, c, d[0], d[1], d[2], d[3], d[4], d[5])
     return True
+
+
+@compiled
+def way_of(s: StepArrays, b: int, k: int) -> float:
+    """How far a body goes by impulses; one that is hit, at all."""
+    before, free, end, first = s.before[b, k], s.free[b, k], s.end[b, k], s.hit[b]
+    if first > 1.0:
+        return 0.5 * s.h * (end - free)
+    fall, last = s.flies[b] * (free - before), 1.0 - first
+    return s.h * (first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall))
 
 
 @compiled
@@ -185,44 +196,69 @@ def put_bias(s: StepArrays) -> bool:
         normal, _, _ = velocity_of(s, c, s.free)
         s.collides[c], s.bias[c] = 0, max(s.gap[c], 0.0) / s.h
         if approach < -COLLIDES * fall and s.gap[c] + s.h * min(approach, normal) < 0.0:
-            s.collides[c], found = 1, True
-            if s.e[c] > 0.0:
-                s.bias[c] = s.e[c] * approach
+            s.collides[c], found = STOPS, True
+            s.closing[c] = closing_of(max(s.gap[c], 0.0), s.h * approach, s.h * (normal - approach))
+            last = 1.0 - s.closing[c]
+            back = last * (normal - approach) - s.e[c] * (normal - last * (normal - approach))
+            if s.e[c] > 0.0 and back > 0.0:
+                s.collides[c], s.bias[c] = BOUNCES, -back
     return found
 
 
 @compiled
+def closing_of(gap: float, way: float, more: float) -> float:
+    """The part x of a step in which a gap closes: gap + x (way + x more / 2) = 0."""
+    inner = way * way - 2.0 * gap * more
+    return min(1.0, 2.0 * gap / (math.sqrt(max(inner, 0.0)) - way))
+
+
+@compiled
 def put_hits(s: StepArrays, any_collides: bool) -> None:
-    """Find the bodies of groups that collide."""
-    all_hit = any_collides and s.y.size > 0
+    """When bodies are hit, as parts of the step, and whether their group flies else.
+
+    All of a group at once: where all that collides bounces at the first instant, else at the start.
+    """
     for b in range(s.hit.size):
-        s.hit[b], s.place[b] = 1.0 if all_hit else 0.0, 0
-    if all_hit or not any_collides:
+        s.hit[b], s.flies[b] = NOT_HIT, 1.0
+    if not any_collides:
         return
     find_groups(s)
     for c in range(s.contact_count):
-        if s.collides[c] != 0:
-            s.place[s.group[c]] = 1
-    for c in range(s.contact_count):
-        if s.place[s.group[c]] != 0:
-            s.hit[s.bodies[c, 0]] = s.hit[s.bodies[c, 1]] = 1.0
+        g = s.group[c]
+        if s.collides[c] == BOUNCES:
+            s.hit[g] = min(s.hit[g], s.closing[c])
+        elif s.collides[c] == STOPS or s.x[c, 0] > 0.0:
+            s.flies[g] = 0.0
+            s.hit[g] = 0.0 if s.collides[c] == STOPS else s.hit[g]
+    for b in range(s.hit.size):
+        g = root_of(s.parent, b) if s.y.size == 0 else 0
+        s.hit[b], s.flies[b] = s.hit[g], s.flies[g]
 
 
 @compiled
 def work_done(work: Any, s: StepArrays) -> float:
-    """Work of the impulses, J; that of friction is added to the sum of all steps."""
-    for b in range(s.free.shape[0]):
-        for k in range(6):
-            s.trial[b, k] = 0.5 * (s.free[b, k] + s.end[b, k])
+    """Work of the impulses behind free motion, J; that of friction is added to the sum."""
     total, rubbed = 0.0, 0.0
+    put_means(s, s.before)
     for c in range(s.contact_count):
-        u0, u1, u2 = velocity_of(s, c, s.trial)
-        total += s.x[c, 0] * u0
+        _, u1, u2 = velocity_of(s, c, s.trial)
         rubbed += s.x[c, 1] * u1 + s.x[c, 2] * u2
     work.friction_work += rubbed
+    put_means(s, s.free)
+    for c in range(s.contact_count):
+        u0, u1, u2 = velocity_of(s, c, s.trial)
+        total += s.x[c, 0] * u0 + s.x[c, 1] * u1 + s.x[c, 2] * u2
     for k in range(s.y.size):
         total += s.y[k] * speed_of(s, k, s.trial)
-    return total + rubbed
+    return total
+
+
+@compiled
+def put_means(s: StepArrays, v: Floats) -> None:
+    """Put the means of velocities v and those of the end into ``trial``."""
+    for b in range(v.shape[0]):
+        for k in range(6):
+            s.trial[b, k] = 0.5 * (v[b, k] + s.end[b, k])
 
 
 @compiled
