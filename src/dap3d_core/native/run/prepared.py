@@ -34,7 +34,7 @@ from dap3d_core.registry import Registry
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
-from dap3d_core.simulation.errors import refuse_contacts
+from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
 from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.breakpoints import SEEN
@@ -273,7 +273,11 @@ class PreparedRun:
         if integrator_named(self.run.settings.integrator).steps_contacts:
             jumps_of(self.evaluator, self.run.settings)
             return
-        refuse_contacts(self.evaluator.model, "export")
+        if names := self.evaluator.model.contact_names:
+            raise SimulationError(
+                "export does not take contacts yet that events follow, and the scene has some "
+                f'({names[0].partition("#")[0]}): let steps follow them, contact = "stepping"'
+            )
         if any(s.jumps for s in self.evaluator.switches):
             self.jumps = JumpCode.of(self.evaluator)
 
