@@ -370,7 +370,6 @@ def stepping_notes(integrations: Sequence[Integration], length: float) -> list[s
         return []
     residual, deepest = max(w.largest_residual for w in states), max(w.deepest for w in states)
     taken = abs(sum(w.friction_work for w in states))
-    rubbed = abs(sum(w.friction_work for w in states))
     words = (
         f"contacts were solved to {residual:.2g} of the largest impulse of a step, bodies overlap "
         f"by {deepest:.2g} m at most; friction took {taken:.6g} J"
