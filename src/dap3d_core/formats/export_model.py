@@ -22,7 +22,7 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.extensions import extensions
 from dap3d_core.scene import Scene, SceneError, check, load
 from dap3d_core.scene.errors import MISSING, Mistake
-from dap3d_core.scene.tables import Element
+from dap3d_core.scene.tables import LIMITS, Element
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene
 
 
@@ -129,6 +129,10 @@ def _plain_scene(checked: ValidatedScene) -> Scene:
     for name, p in zip(checked.body_names, checked.p.tolist(), strict=True):
         body = scene.bodies[name]
         body.p, body.rpy, body.axis_angle = tuple(p), None, None
+    for contact in checked.contacts:
+        joint, _, end = contact.name.rpartition("_")
+        if end in LIMITS and joint in scene.joints:
+            scene.joints[joint].fields[end] = contact.values["bound"]
     rigid = [contact for contact in checked.contacts if contact.name in scene.forces]
     for elements, instances in (
         (scene.joints, checked.joints),

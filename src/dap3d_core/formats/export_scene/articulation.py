@@ -22,7 +22,7 @@ from dap3d_core.interface.formats.frames import Frame, axis_angle, from_quaterni
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import Scene
-from dap3d_core.scene.tables import GROUND, LIMITS, RELEASES, Element
+from dap3d_core.scene.tables import GROUND, RELEASES, Element
 
 #: Kinds of joints whose points may be apart along the axis.
 SLIDERS = ("prismatic", "cylindrical")
@@ -95,12 +95,8 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
     add_gravity(builder, scene)
     add_forces(builder, scene)
     for limited in scene.joints.values():
-        if not limited.fields.keys().isdisjoint(LIMITS):
-            leave_out(
-                remarks,
-                limited,
-                "lower and upper of a joint, where a rot_stop or plane_stop is written",
-            )
+        if limited.fields.get("e"):
+            leave_out(remarks, limited, "e of the limits of a joint")
         for key in limited.fields.keys() & set(RELEASES):
             leave_out(remarks, limited, f"{key} of a joint, which holds here throughout")
     for contact in scene.contacts.values():
@@ -163,6 +159,8 @@ def _add_joint(builder: ModelBuilder, joint: SceneJoint, *, closes: bool) -> Non
         builder.in_link(joint.body_j, there), builder.in_link(joint.body_i, here),
         axes=tuple(tuple(axis.tolist()) for axis in joint.axes), closes=closes,
     )  # fmt: skip
+    fields = builder.elements.scene.joints[joint.name].fields
+    made.limits = (Limits(fields.get("lower", -inf), fields.get("upper", inf)),)
     d, slides = (j @ there).r - (i @ here).r, joint.kind in SLIDERS
     if slides:  # along the axis it is free
         axis = i.A @ joint.axes[0]

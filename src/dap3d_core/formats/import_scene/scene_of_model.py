@@ -22,10 +22,10 @@ from dap3d_core.formats.import_scene.shapes import (
     MeshFiles,
     add_collisions,
     add_shapes,
-    bits_beside_ground,
+    bits_of_shapes,
 )
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
-from dap3d_core.formats.import_scene.start import couples, start_of
+from dap3d_core.formats.import_scene.start import AGREE, SCALAR, couples, start_of
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Limits, Link
 from dap3d_core.interface.formats.frames import IDENTITY, quaternion
 from dap3d_core.interface.formats.joint_inertia import JointInertia
@@ -36,7 +36,7 @@ from dap3d_core.scene.tables import GROUND
 
 #: Steps of a settled result: a model does not say how long to simulate.
 DURATION, STEP = 1.0, 0.01
-#: Limits of joints: left out, springs with dampers, or stops that velocities end at.
+#: Limits of joints: left out, springs with dampers, or rigid.
 LIMITS = ("off", "soft", "hard")
 #: Time constant of stops where the format says no stiffness: of soft ones, and of contact at rest
 #: at hard ones, s. Critically damped, what they stop stands still within some of it.
@@ -60,12 +60,6 @@ def _checked_limits(_: Any, __: Any, value: Any) -> None:
         raise FormatError(f"limits = {value!r}: should be one of {', '.join(LIMITS)}")
 
 
-def _checked_contacts(options: "ImportOptions", _: Any, contacts: bool) -> None:
-    if contacts and options.limits == "hard":
-        what = "contacts do not go with limits = hard, at which velocities jump by another law"
-        raise FormatError(what, remedy="take soft limits, or none")
-
-
 @attrs.frozen
 class ImportOptions:
     """Choices of the user that a model leaves open.
@@ -85,7 +79,7 @@ class ImportOptions:
     limits: str = attrs.field(default="soft", validator=_checked_limits)
     positions: dict[str, Sequence[float]] = attrs.Factory(dict)
     rates: dict[str, Sequence[float]] = attrs.Factory(dict)
-    contacts: bool = attrs.field(default=False, validator=_checked_contacts)
+    contacts: bool = False
 
 
 def scene_of(
@@ -133,14 +127,14 @@ def scene_of(
         text = "method joint, for links without mass or inertia: others lose digits to them"
         remarks.translate(model.place, text)
     builder = SceneBuilder(scene, remarks, groups, member, _inertia(tree, groups), options.limits,
-                           names or Names())  # fmt: skip
+                           options.contacts, names or Names())  # fmt: skip
     builder.bodies[WORLD] = GROUND
     for group in groups.values():
         if group.name != WORLD:
             _add_body(builder, group, placed[group.name])
     _add_gravity(scene, model.gravity)
     _add_joints(builder, model)
-    bits = bits_beside_ground(builder, model) if options.contacts else {}
+    bits = bits_of_shapes(builder, model) if options.contacts else {}
     for group in groups.values():
         for link, _ in group.links:
             add_shapes(builder, link, MeshFiles() if meshes is None else meshes, bits)
@@ -360,11 +354,15 @@ class _JointCoordinate:
             text = "limits of joints are left out: limits = off"
             builder.remarks.translate(joint.place, text, motion=True)
             return
+        if self._limit(limits):
+            text = "limits of a joint are rigid: its rate ends at once, without rebound"
+            builder.remarks.translate(joint.place, text, motion=True)
+            return
         seen = builder.inertia
         inertia = seen.of(joint.name, self.k) or seen.of_alone(joint.name, self.k)
         inertia = inertia or self._own_inertia()
-        hard, given = builder.limits == "hard", limits.stiffness
-        k = inertia / STOP_TIME[builder.limits] ** 2 if hard or given is None else given
+        hard, given = builder.limits == "hard" and not builder.takes_contacts, limits.stiffness
+        k = inertia / STOP_TIME["hard" if hard else "soft"] ** 2 if hard or given is None else given
         text = "limits of a joint are stops at which its rate ends at once, without rebound"
         if not hard:
             text = "limits of a joint are soft stops, critically damped for the inertia that they "
@@ -375,6 +373,27 @@ class _JointCoordinate:
         for side, bound in (("min", limits.lower), ("max", limits.upper)):
             if isfinite(bound):
                 self._add_stop(side, bound, fields)
+
+    def _limit(self, limits: Limits) -> bool:
+        """Give the joint of the scene rigid limits, if they are hard and it can have some.
+
+        The joint counts from where it starts, which is within them but in loops: what closes one
+        does not know where it starts, and others may start beyond.
+        """
+        builder, joint = self.builder, self.joint
+        if builder.limits != "hard" or not builder.takes_contacts or joint.kind not in SCALAR:
+            return False
+        q = joint.position[0] if joint.position else 0.0
+        slack = AGREE * max(1.0, abs(q))
+        inside = limits.lower - slack <= q <= limits.upper + slack
+        if joint in builder.inertia.loops or not inside:
+            return False
+        fields = builder.scene.joints[self.name].fields
+        if isfinite(limits.lower):
+            fields["lower"] = min(limits.lower - q, 0.0)
+        if isfinite(limits.upper):
+            fields["upper"] = max(limits.upper - q, 0.0)
+        return True
 
     def _add_stop(self, side: str, bound: float, fields: dict[str, Any]) -> None:
         """Add the stop of one limit."""
@@ -398,26 +417,26 @@ class _JointCoordinate:
         return turning if self.turns else body.mass
 
     def add_friction(self) -> None:
-        """Add dry friction, which fades at low rates."""
+        """Add dry friction, which sticks, or fades at low rates where contacts are not events."""
         friction, builder, ends = self._value("friction"), self.builder, self.ends
         if friction < 0.0:
             text = "friction below 0, which would drive"
             builder.remarks.leave_out(self.joint.place, text, motion=True)
         if friction <= 0.0:
             return
-        unit = "rad/s" if self.turns else "m/s"
-        text = (
-            f"dry friction of a joint fades below {FADING:g} {unit}: it creeps, and does not stick"
-        )
-        builder.remarks.translate(self.joint.place, text, motion=True)
+        fading = None if builder.takes_contacts and not builder.stepped else FADING
+        if fading:
+            unit = "rad/s" if self.turns else "m/s"
+            text = f"dry friction of a joint fades below {fading:g} {unit}: it creeps, and does not"
+            builder.remarks.translate(self.joint.place, f"{text} stick", motion=True)
         name = builder.names.free("forces", f"{self.name}_friction")
         if self.turns:
             axis = ends.vector(self._holder(), self.axis)
             builder.scene.add_force("rot_friction", name, body_i=ends.child, body_j=ends.parent,
-                                    axis=axis, n_c=friction, w_tol=FADING)  # fmt: skip
+                                    axis=axis, n_c=friction, w_tol=fading)  # fmt: skip
         else:
             builder.scene.add_force("tran_friction", name, P_i=ends.point("i"), f_c=friction,
-                                    a_j=ends.vector("j", self.axis), v_tol=FADING)  # fmt: skip
+                                    a_j=ends.vector("j", self.axis), v_tol=fading)  # fmt: skip
 
 
 def _perpendicular(axis: Floats) -> Floats:

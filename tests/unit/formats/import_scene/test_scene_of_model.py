@@ -33,18 +33,16 @@ def imported(tmp_path, text, suffix="xml", **options):
 
 @pytest.mark.parametrize(("suffix", "text", "type"), TURNED + SLID)
 def test_dry_friction_stops_a_joint(tmp_path, suffix, text, type):
-    """At t = I w / n, after I w^2 / (2 n); pi^2 / 12 I w_tol^2 / n = 6e-5 of creep more."""
+    """At t = I w / n, after I w^2 / (2 n), where it sticks: to the tolerance of the run."""
     scene, report = imported(tmp_path, text.format(type=type), suffix, rates={"q": RATE})
     assert not [one for one in report.left_out if "friction" in one.text]
-    assert any("fades below 0.01 " in one.text for one in report.translated)
+    assert not any("friction" in one.text for one in report.translated)
     scene.forces.pop("gravity", None)
-    result = dap.simulate(scene, t_end=2.0, dt=0.5, integrator="radau", rtol=1e-10, atol=1e-12)
+    result = dap.simulate(scene, t_end=2.0, dt=0.5, rtol=1e-10, atol=1e-12)
     turned = 2.0 * np.arctan2(result.p[:, 0, 3], result.p[:, 0, 0])
     q = result.r[:, 0, 2] if type in ("prismatic", "slide") else turned
     assert q[1] == pytest.approx(0.5 * (RATE - 0.25 * FRICTION / INERTIA), abs=1e-9)
-    stop = 0.5 * INERTIA * RATE**2 / FRICTION
-    creep = np.pi**2 / 12.0 * INERTIA * 0.01**2 / FRICTION
-    assert q[-1] == pytest.approx(stop + creep, abs=1e-9)
+    assert q[-1] == pytest.approx(0.5 * INERTIA * RATE**2 / FRICTION, abs=1e-9)
 
 
 BALL = """<mujoco><option gravity="0 0 0"/><worldbody><body name="a" quat="0.8 0 0.6 0">
@@ -110,7 +108,9 @@ def test_both_angles_of_a_universal_joint_have_springs_and_friction(tmp_path, wa
     A = turn if way > 0.0 else turn.inv()
     axes = axes if way > 0.0 else A.apply(axes)  # in global axes
     p, w = A.as_quat()[[3, 0, 1, 2]], way * rate @ axes
-    w_dot = dap.compile(scene).rhs(0.0, np.array([0.0, 0.0, 0.0, *p, 0.0, 0.0, 0.0, *w]))[10:]
+    body = scene.bodies["a"]
+    body.p, body.w = tuple(p), tuple(w)
+    w_dot = dap.simulate(scene, t_end=0.0).wd[0, 0]
     force = -np.array([3.0, 2.0]) * (q - [0.1, -0.3]) - [0.2, 0.5] * rate
     force -= [0.7, 0.4] * np.sign(rate)
     np.testing.assert_allclose(way * 0.3 * axes @ w_dot, force, rtol=0, atol=1e-12)

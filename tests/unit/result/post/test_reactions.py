@@ -163,7 +163,7 @@ def test_friction_in_a_joint_has_no_quantities():
     scene = dap.Scene(name="rubbing")
     scene.add_body("wheel", mass=1.0, Jp=[1, 1, 1])
     scene.add_joint("rev", "axle", P_i="wheel.O", P_j="ground.O", a_i="wheel.z", a_j="ground.z")
-    scene.add_force("friction", "rub", joint="axle", mu=0.2, radius=0.1)
+    scene.add_force("friction", "rub", joint="axle", mu=0.2, radius=0.1, v_tol=1e-3)
     model = model_of(scene)
     rows = rows_of(model, np.zeros(1), model.u0[None], np.zeros((1, 6)), np.zeros((1, 5)))
     with pytest.raises(UnknownNameError, match=r"'rub' has no quantities: .* or in a joint"):

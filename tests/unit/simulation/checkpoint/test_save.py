@@ -79,7 +79,7 @@ def paradox():
                    r_dot=(0.0, 1.0, 0.0))  # fmt: skip
     scene.add_joint("disk", "contact", body_i="disk", slip="z", radius=radius)
     scene.add_force("weight")
-    scene.add_force("friction", joint="contact", mu=3.0)
+    scene.add_force("friction", joint="contact", mu=3.0, v_tol=1e-3)
     return scene
 
 
