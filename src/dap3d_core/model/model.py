@@ -28,10 +28,10 @@ from dap3d_core.model.state_layout import (
 )
 from dap3d_core.scene import Instance, ValidatedScene
 from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
-from dap3d_core.scene.expressions.expression import Expression
 
 if TYPE_CHECKING:
     from dap3d_core.model.element_states import ElementState
+    from dap3d_core.scene.expressions.expression import Expression
 
 #: Sizes, m, of ordinary scenes: their tolerances are in metres as they are.
 ORDINARY = 0.03, 30.0
@@ -102,7 +102,7 @@ class Model:
     contact_laws: tuple[str, ...] = ()
     collisions: CollisionShapes | None = None
     breaks: Mapping[str, float] = attrs.Factory(dict)
-    active: Mapping[str, Expression] = attrs.Factory(dict)
+    active: Mapping[str, "Expression"] = attrs.Factory(dict)
 
     @property
     def contact_count(self) -> int:
