@@ -29,8 +29,8 @@ class Disk(Joint):
         gamma = -u . (w x s_dot) - u_dot . v_c
 
     lambda of row z is the load that the ground carries; where it is negative the ground pulls: a
-    real disk would lift off, and the run gets a note. Friction acts along the free directions of
-    v_c, mu max(lambda_z, 0).
+    real disk would lift off, as the contact ``disk_plane`` does, and the run gets a note. Friction
+    acts along the free directions of v_c, mu max(lambda_z, 0).
     """
 
     keyword, rows, holonomic = "disk", 3, (False, False, True)

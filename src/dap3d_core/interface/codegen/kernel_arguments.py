@@ -287,8 +287,6 @@ def _offer_constant(offer: Callable[..., None], name: str, layout: InstanceLayou
 def stored(layout: InstanceLayout, name: str) -> str:
     """Expression for a number of an instance."""
     offset, shape = layout.numbers[name]
-    if shape == ():
-        return f"par[p1 + {offset}]"
     if shape == (3,):
         return f"vector_in(par, p1 + {offset})"
     if shape == (3, 3):
