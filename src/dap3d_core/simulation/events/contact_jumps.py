@@ -352,7 +352,10 @@ class ContactJumps(Jumps):
                 size = length_of(force)
                 if size > 0.0:
                     sliding[c] = -force / size
-            elif length_of(rows.slip[c, self.table.across(c)]) < STOPPED * self._evaluator.model.length:
+            elif (
+                length_of(rows.slip[c, self.table.across(c)])
+                < STOPPED * self._evaluator.model.length
+            ):
                 self._stop(rows, c)
                 stopped.append(c)
         return sliding, leaving, stopped
