@@ -72,7 +72,6 @@ def test_a_contact_of_several_points_cannot_be_moved_until_it_touches():
     [
         ("linearisation", lambda s: dap.linearize(touching(s))),
         ("kinematics", lambda s: dap.kinematics(s, t_end=1.0)),
-        ("method joint", lambda s: dap.simulate(s, method="joint")),
         ("method standard", lambda s: dap.simulate(s, method="standard")),
     ],
 )
