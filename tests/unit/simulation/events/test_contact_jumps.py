@@ -80,13 +80,6 @@ def test_what_does_not_know_contacts_says_so(what, call):
         call(bouncing())
 
 
-def test_inverse_dynamics_refuses_contacts():
-    scene = bouncing()
-    result = dap.simulate(scene)
-    with pytest.raises(dap.SimulationError, match=r"inverse dynamics.*contacts"):
-        dap.inverse(scene, result, actuators=["g"])
-
-
 def test_elements_with_jumps_of_their_own_are_refused_beside_contacts():
     scene = bouncing()
     scene.add_body("other", mass=1.0, Jp=[1.0] * 3, r=[5.0, 0.0, 0.0])
