@@ -50,7 +50,7 @@ def _close(reader: MjcfReader, element: XmlElement) -> None:
     name = reader.free_joint(element.get("name") or f"{element.name}{len(model.joints) + 1}")
     kind = "ball" if element.name == "connect" else "fixed"
     if "site1" in element.attributes:
-        ends = [_site(reader, element, key) for key in ("site1", "site2")]
+        ends = [reader.site(element, key) for key in ("site1", "site2")]
         (parent, in_parent), (child, in_child) = ends
     else:
         parent, child = _link(reader, element, "body1"), _link(reader, element, "body2")
@@ -73,13 +73,6 @@ def _weld(reader: MjcfReader, element: XmlElement, parent: str, child: str) -> t
         return _relative(reader, parent, child), Frame()
     anchor = Frame(element.numbers("anchor", 3, (0.0, 0.0, 0.0)))
     return Frame(relpose[:3], from_quaternion(relpose[3:])) @ anchor, anchor
-
-
-def _site(reader: MjcfReader, element: XmlElement, key: str) -> tuple[str, Frame]:
-    name = element.require(key)
-    if name not in reader.sites:
-        raise FormatError(f"{key} of <{element.name}>: there is no site {name!r}", element.place)
-    return reader.sites[name]
 
 
 def _relative(reader: MjcfReader, of: str, other: str) -> Frame:
@@ -127,13 +120,23 @@ def _couple(reader: MjcfReader, element: XmlElement) -> None:
     )
 
 
+def tendon_of(reader: MjcfReader, element: XmlElement, key: str) -> XmlElement:
+    """The tendon that an element names.
+
+    Raises:
+        FormatError: it is not there.
+    """
+    name, holders = element.require(key), reader.document.root.all("tendon")
+    found = next((t for holder in holders for t in holder if t.get("name") == name), None)
+    if found is None:
+        raise FormatError(f"there is no tendon {name!r}", element.place)
+    return reader.document.settled(found, "main")
+
+
 def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:
     """The length of a fixed tendon of two joints stays constant: c1 q1 + c2 q2 = 0."""
     remarks, name = reader.document.source.remarks, element.require("tendon1")
-    tendons = [t for holder in reader.document.root.all("tendon") for t in holder]
-    tendon = next((t for t in tendons if t.get("name") == name), None)
-    if tendon is None:
-        raise FormatError(f"there is no tendon {name!r}", element.place)
+    tendon = tendon_of(reader, element, "tendon1")
     terms = tendon.all("joint")
     simple = tendon.name == "fixed" and len(terms) == 2 and "tendon2" not in element.attributes
     polycoef = element.numbers("polycoef", None, (0.0, 1.0))

@@ -1,6 +1,5 @@
 """What acts on the coordinates of joints: springs, dampers, stops, dry friction, inputs."""
 
-import re
 from math import atan2, cos, isfinite, pi, sin
 from typing import Any
 
@@ -10,10 +9,9 @@ from dap3d_core.formats.import_scene.couplings import add_rotor
 from dap3d_core.formats.import_scene.joints import NamedEnds, from_ground
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.formats.import_scene.start import AGREE, SCALAR
-from dap3d_core.interface.formats.articulation import Articulation, Joint, Limits
+from dap3d_core.interface.formats.articulation import Joint, Limits
 from dap3d_core.interface.formats.frames import quaternion
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.scene.tables import GROUND
 
 #: Time constant of stops where the format says no stiffness: of soft ones, and of contact at rest
 #: at hard ones, s. Critically damped, what they stop stands still within some of it.
@@ -231,35 +229,3 @@ def perpendicular(axis: Floats) -> Floats:
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     across = other - (other @ axis) * axis
     return np.asarray(across / np.linalg.norm(across))
-
-
-def add_inputs(builder: SceneBuilder, model: Articulation) -> None:
-    """Add actuators as inputs, each a factor of a force or moment on both sides of a joint.
-
-    The force of a slider acts on the line of its axis, on both bodies.
-    """
-    scene, names = builder.scene, builder.names
-    for actuator in model.actuators:
-        joint = from_ground(builder, model.joints[actuator.joint])
-        if joint.kind == "fixed" or builder.moves_alone(joint):
-            text = "an actuator of a joint that does not move"
-            builder.remarks.leave_out(actuator.place, text, motion=True)
-            continue
-        others = (scene.bodies, scene.points, scene.joints, scene.forces)
-        clash = any(actuator.name in table for table in others)
-        wanted = re.sub(r"\W", "_", f"{actuator.name}_input" if clash else actuator.name)
-        wanted = f"input_{wanted}" if wanted[:1].isdigit() else wanted
-        name = names.of("inputs", wanted, actuator.place, builder.remarks)
-        scene.add_input(name, 0.0)
-        ends = NamedEnds(builder, joint)
-        axis = np.asarray(joint.axes[0], dtype=float)
-        sides = (("i", ends.child, ends.on_child, 1.0), ("j", ends.parent, ends.on_parent, -1.0))
-        for end, body, frame, sign in sides:
-            if body == GROUND:
-                continue
-            vector = tuple((sign * actuator.gear * (frame.A @ axis) + 0.0).tolist())
-            force = names.free("forces", f"{name}_{end}")
-            if joint.kind == "revolute":
-                scene.add_force("np", force, body_i=body, np=vector, input=name)
-            else:
-                scene.add_force("fp", force, P_i=ends.point(end), fp=vector, input=name)

@@ -6,8 +6,9 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.formats.import_scene.actuators import add_actuators
 from dap3d_core.formats.import_scene.couplings import add_couplings
-from dap3d_core.formats.import_scene.joint_forces import add_inputs, add_joint_forces
+from dap3d_core.formats.import_scene.joint_forces import add_joint_forces
 from dap3d_core.formats.import_scene.joints import add_joint
 from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.rigid_groups import (
@@ -26,7 +27,7 @@ from dap3d_core.formats.import_scene.shapes import (
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.formats.import_scene.start import couples, start_of
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Link
-from dap3d_core.interface.formats.frames import IDENTITY, quaternion
+from dap3d_core.interface.formats.frames import IDENTITY, Frame, quaternion
 from dap3d_core.interface.formats.joint_inertia import JointInertia
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
@@ -116,7 +117,7 @@ def scene_of(
     for group in groups.values():
         if group.name != WORLD:
             _add_body(builder, group, placed[group.name])
-    _add_gravity(scene, model.gravity)
+    _add_gravity(builder, model.gravity)
     _add_joints(builder, model)
     bits = bits_of_shapes(builder, model) if options.contacts else {}
     for group in groups.values():
@@ -136,7 +137,7 @@ def _add_joints(builder: SceneBuilder, model: Articulation) -> None:
             add_joint(builder, joint)
         add_joint_forces(builder, joint)
     add_couplings(builder, model)
-    add_inputs(builder, model)
+    add_actuators(builder, model)
 
 
 def _inertia(tree: SpanningTree, groups: Mapping[str, RigidGroup]) -> JointInertia:
@@ -193,11 +194,23 @@ def inertia_numbers(inertia: Floats) -> Any:
     return tuple(float_tuple(row) for row in symmetric)
 
 
-def _add_gravity(scene: Scene, gravity: Sequence[float]) -> None:
-    size = float(np.linalg.norm(gravity))
-    if size > 0.0:
-        wgt = tuple(g / size + 0.0 for g in gravity)
-        scene.add_force("weight", "gravity", gravity=size, wgt=wgt)
+def _add_gravity(builder: SceneBuilder, gravity: Sequence[float]) -> None:
+    """Add gravity, and what carries a part of the weight of links at their mass centres."""
+    size, scene = float(np.linalg.norm(gravity)), builder.scene
+    if not size > 0.0:
+        return
+    wgt = tuple(g / size + 0.0 for g in gravity)
+    scene.add_force("weight", "gravity", gravity=size, wgt=wgt)
+    for group in builder.groups.values():
+        for link, _ in group.links:
+            if group.name != WORLD and link.gravcomp and link.inertial is not None:
+                body, frame = builder.attached(link.name, Frame(link.inertial.com))
+                force = float_tuple(-link.gravcomp * link.inertial.mass * np.array(gravity))
+                point, name = f"{body}.O", builder.names.free("forces", f"{body}_carried")
+                if np.abs(frame.r).max() > 0.0:
+                    point = builder.names.free("points", f"{body}_carried")
+                    scene.add_point(point, body, float_tuple(frame.r))
+                scene.add_force("f", name, P_i=point, f=force)
 
 
 def split_planar(model: Articulation, remarks: Remarks) -> Articulation:

@@ -1,6 +1,7 @@
 """The interface of file formats: what an importer returns and what an exporter is given."""
 
 from dap3d_core.interface.formats.articulation import (
+    UNBOUNDED,
     WORLD,
     Actuator,
     Articulation,
@@ -47,6 +48,7 @@ __all__ = [
     "INTERFACE_VERSION",
     "LEAST",
     "NOWHERE",
+    "UNBOUNDED",
     "WORLD",
     "Actuator",
     "Articulation",

@@ -26,6 +26,8 @@ KINDS = {
 }  # fmt: skip
 #: Limits of this size and beyond are none, rad or m: files have 1e16, and the largest numbers.
 UNLIMITED = 1e6
+#: Bounds that are none.
+UNBOUNDED = (-inf, inf)
 
 
 def _floats(value: Any) -> Floats:
@@ -105,12 +107,14 @@ class Link:
         inertial: its mass and inertia, or None for none.
         geometries: its shapes.
         place: its place in the file.
+        gravcomp: the part of its weight that is carried.
     """
 
     name: str
     inertial: Inertial | None = None
     geometries: list[Geometry] = attrs.Factory(list)
     place: Place = NOWHERE
+    gravcomp: float = 0.0
 
 
 def _lower(value: float) -> float:
@@ -219,19 +223,38 @@ class Coupling:
 
 @attrs.frozen(eq=False)
 class Actuator:
-    """A force on the coordinate of a joint: gear times the input.
+    """A force on the coordinate q of a joint, or a force and moment on a link, by an input u.
+
+        F = gear u + bias - stiffness q - damping q_dot
 
     Attributes:
-        name: its name in the file, which becomes that of an input.
-        joint: the joint.
+        name: its name in the file, which becomes that of an input; several may share one.
+        joint: the joint; "" for one of a link.
         gear: N m or N for an input of 1.
         place: its place in the file.
+        bias, stiffness, damping: see above; q as the joint counts it.
+        control, force, active: least and greatest u, F and activation, infinite for none.
+        activation: "lag" or "integral" where u acts by a state, with the time constant ``time``.
+        start: that state, and the input, where the model starts.
+        link, at, wrench: of a link, the frame and the (6,) force and moment for u = 1 in its axes.
     """
 
     name: str
     joint: str
     gear: float = 1.0
     place: Place = NOWHERE
+    bias: float = 0.0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    control: tuple[float, float] = UNBOUNDED
+    force: tuple[float, float] = UNBOUNDED
+    active: tuple[float, float] = UNBOUNDED
+    activation: str = ""
+    time: float = 1.0
+    start: tuple[float, float] = (0.0, 0.0)
+    link: str = ""
+    at: Frame = IDENTITY
+    wrench: tuple[float, ...] = ()
 
 
 @attrs.define(eq=False)
