@@ -14,11 +14,12 @@ pytest.importorskip("mujoco")
 
 MODEL = """<mujoco><compiler angle="radian"/><default><motor ctrlrange="-0.5 0.8"/></default>
 <worldbody><body name="a" gravcomp="1"><joint name="p" axis="0 1 0.3" range="-1.5 2" {limit}/>
-  <geom size="0.1" pos="0.4 0 0"/><body name="b" pos="0.8 0 0"><joint name="q" axis="0 1 0" ref="0.3"
-  damping="0.2" stiffness="1.5"/><geom size="0.08" pos="0.2 0.1 0"/><geom size="0.05" pos="0 0.2 0"/>
-  <site name="jet" pos="0.3 0.1 0" euler="0.4 0.2 0.7"/>
+  <geom size="0.1" pos="0.4 0 0"/><body name="b" pos="0.8 0 0"><joint name="q" axis="0 1 0"
+  ref="0.3" damping="0.2" stiffness="1.5"/><geom size="0.08" pos="0.2 0.1 0"/><geom size="0.05"
+  pos="0 0.2 0"/><site name="jet" pos="0.3 0.1 0" euler="0.4 0.2 0.7"/>
   <body name="c" pos="0.4 0 0" gravcomp="0.4"><joint name="s" type="slide" axis="1 0 0.2"
-  ref="-0.1"/><geom size="0.06" pos="0.1 0 0.1"/></body></body></body><body name="f" pos="3 0 0"><freejoint name="fly"/><geom size="0.1 0.2 0.1"
+  ref="-0.1"/><geom size="0.06" pos="0.1 0 0.1"/></body></body></body>
+<body name="f" pos="3 0 0"><freejoint name="fly"/><geom size="0.1 0.2 0.1"
   type="box"/><site name="rotor" pos="0.1 0 0.1" euler="0 0.3 0"/></body></worldbody>
 <tendon><fixed name="both"><joint joint="p" coef="0.7"/><joint joint="q" coef="-1.2"/></fixed>
   <fixed name="one"><joint joint="q" coef="0.6"/></fixed></tendon>
