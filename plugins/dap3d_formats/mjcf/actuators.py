@@ -17,18 +17,19 @@ from dap3d_core.interface.formats import (
     XmlElement,
 )
 from dap3d_formats.mjcf.constraints import SCALAR, tendon_of
-from dap3d_formats.mjcf.document import ACTUATORS
+from dap3d_formats.mjcf.keyframes import Keyframe, actuators_of
 from dap3d_formats.mjcf.reader import MjcfReader
 
 Bounds = tuple[float, float]
 
 
-def read_actuators(reader: MjcfReader, inertia: JointInertia) -> None:
+def read_actuators(reader: MjcfReader, inertia: JointInertia, keyframe: Keyframe) -> None:
     """Read actuators whose force is linear within bounds; others are left out, remarked.
 
     Args:
         reader: of the bodies, which have been read.
         inertia: of the joints where the model starts.
+        keyframe: the controls and activations at the start.
 
     Raises:
         FormatError: one names a joint, tendon or site that is not there.
@@ -36,20 +37,27 @@ def read_actuators(reader: MjcfReader, inertia: JointInertia) -> None:
     document = reader.document
     options = document.root.all("option")
     disabled = {g for one in options for g in one.numbers("actuatorgroupdisable", None, ())}
-    elements = []
-    for holder in document.root.all("actuator"):
-        for given in holder:
-            if given.name not in ACTUATORS or given.name == "plugin":
-                continue
-            element = document.settled(given, "main")
-            if element.number("group", 0.0) in disabled:
-                text = "an actuator of a group that is disabled"
-                document.source.remarks.leave_out(given.place, text)
-            else:
-                elements.append(element)
-    reading = ActuatorReader(reader, inertia, [(e, _targets(reader, e)) for e in elements])
-    for element, targets in reading.elements:
-        reading.read(element, targets)
+    elements = actuators_of(document)
+    starts = keyframe.controls(elements, [_dynamics(one) != "none" for one in elements])
+    acting = []
+    for element, start in zip(elements, starts, strict=True):
+        if element.number("group", 0.0) in disabled:
+            text = "an actuator of a group that is disabled"
+            document.source.remarks.leave_out(element.place, text)
+        elif element.name != "plugin":
+            acting.append((element, _targets(reader, element), start))
+    reading = ActuatorReader(reader, inertia, [(e, targets) for e, targets, _ in acting])
+    for one in acting:
+        reading.read(*one)
+
+
+def _dynamics(element: XmlElement) -> str:
+    """How the control of an actuator acts: "none", or the kind of its state."""
+    lag = "timeconst" in element.attributes and element.number("timeconst") > 0.0
+    kinds = {"cylinder": "filter", "intvelocity": "integrator", "muscle": "muscle",
+             "position": "filterexact" if lag else "none"}  # fmt: skip
+    usual = kinds.get(element.name, "none")
+    return element.get("dyntype") or usual if element.name in ("general", "plugin") else usual
 
 
 def _targets(reader: MjcfReader, element: XmlElement) -> list[tuple[str, float]]:
@@ -81,11 +89,15 @@ class ActuatorReader:
     inertia: JointInertia
     elements: list[tuple[XmlElement, list[tuple[str, float]]]]
 
-    def read(self, element: XmlElement, targets: list[tuple[str, float]]) -> None:
-        """Read one actuator."""
+    def read(
+        self, element: XmlElement, targets: list[tuple[str, float]], start: tuple[float, float]
+    ) -> None:
+        """Read one actuator, with its activation and control at the start."""
         place, law, activation = element.place, _law(element), self._activation(element)
-        actuator = Actuator(self._name(element), "", place=place, control=self._control(element),
-                            force=self._range(element, "force"), **activation or {})  # fmt: skip
+        actuator = Actuator(
+            self._name(element), "", place=place, control=self._control(element),
+            force=self._range(element, "force"), start=start, **activation or {},
+        )  # fmt: skip
         why = ""
         if law is None or activation is None:
             why = "its law"
@@ -180,10 +192,7 @@ class ActuatorReader:
 
     def _activation(self, element: XmlElement) -> dict[str, Any] | None:
         """How the control acts by a state: none, a lag, an integral; None for others."""
-        lag = "timeconst" in element.attributes and element.number("timeconst") > 0.0
-        usual = {"cylinder": "filter", "intvelocity": "integrator"}.get(element.name, "none")
-        usual = "filterexact" if element.name == "position" and lag else usual
-        kind = element.get("dyntype", usual) if element.name == "general" else usual
+        kind = _dynamics(element)
         if kind == "none":
             return {"activation": ""}
         if kind not in ("integrator", "filter", "filterexact"):

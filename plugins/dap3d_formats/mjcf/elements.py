@@ -81,7 +81,7 @@ MJCF: Table = {
     "model": noted("", "models that <attach> would take"),
     "worldbody": taken(),
     "body": taken() | _FRAME | taken("name childclass")
-    | translated("mocap", "a part of ground")
+    | translated("mocap", "a part of ground, at its pose or that of the keyframe")
     | taken("gravcomp")
     | noted("user sleep fuse simple", "data of a simulator"),
     "frame": taken() | _FRAME | taken("name childclass"),
@@ -151,7 +151,9 @@ MJCF: Table = {
     ),
     "actuator/plugin": noted("", "plugins of a simulator are not run"),
     "sensor": noted("", "sensors"),
-    "keyframe": noted("", "poses; --position gives the start"),
+    "keyframe": taken(),
+    "key": translated("", "where the scene starts, with --key")
+    | taken("name qpos qvel act ctrl mpos mquat") | noted("time", "runs start at 0"),
 }  # fmt: skip
 
 #: Where shapes are to meet each other.

@@ -16,6 +16,7 @@ class MjcfImporter(Importer):
         from dap3d_formats.mjcf.constraints import read_equalities
         from dap3d_formats.mjcf.document import Document
         from dap3d_formats.mjcf.elements import CONTACTS, MJCF
+        from dap3d_formats.mjcf.keyframes import Keyframe
         from dap3d_formats.mjcf.reader import MjcfReader
         from dap3d_formats.mjcf.replicate import expand_replicas
 
@@ -25,9 +26,11 @@ class MjcfImporter(Importer):
         expand_replicas(document)
         reader = MjcfReader(document)
         reader.read_bodies()
+        keyframe = Keyframe.of(document, reader.model)
         reader.scale_masses()
         inertia = reader.inertia()
         reader.scale_springs(inertia)
         read_equalities(reader)
-        read_actuators(reader, inertia)
+        read_actuators(reader, inertia, keyframe)
+        keyframe.start(reader.model, reader.mocap)
         return reader.model

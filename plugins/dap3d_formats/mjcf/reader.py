@@ -44,6 +44,7 @@ class MjcfReader:
         joints: names of the joints that have been read.
         springdampers: joint -> time constant and damping ratio that give its spring and damper.
         force_ranges: joint -> bounds of the force of its actuators.
+        mocap: names of bodies that a user would move.
     """
 
     document: Document
@@ -54,6 +55,7 @@ class MjcfReader:
     joints: set[str] = attrs.Factory(set)
     springdampers: dict[str, tuple[float, ...]] = attrs.Factory(dict)
     force_ranges: dict[str, tuple[float, float]] = attrs.Factory(dict)
+    mocap: list[str] = attrs.Factory(list)
 
     def __attrs_post_init__(self) -> None:
         root = self.document.root
@@ -141,6 +143,8 @@ class MjcfReader:
         if name in model.links or name == WORLD:
             raise FormatError(f"there are two bodies {name}", element.place)
         childclass = element.get("childclass") or outer
+        if element.get("mocap") == "true":
+            self.mocap.append(name)
         link = Link(name, place=element.place, gravcomp=element.number("gravcomp", 0.0))
         here = frame @ document.frame(element)
         joints = self._gathered(element, ("joint", "freejoint"), Frame(), childclass)
