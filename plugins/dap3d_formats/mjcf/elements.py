@@ -153,7 +153,7 @@ MJCF: Table = {
     "sensor": noted("", "sensors"),
     "keyframe": taken(),
     "key": translated("", "where the scene starts, with --key")
-    | taken("name qpos qvel act ctrl mpos mquat") | noted("time", "runs start at 0"),
+    | taken("name qpos qvel act ctrl mpos mquat") | noted("time plastic", "runs start at 0"),
 }  # fmt: skip
 
 #: Where shapes are to meet each other.
