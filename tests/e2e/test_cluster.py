@@ -76,9 +76,7 @@ def another_worker(client, **variables):
 @contextmanager
 def worker_of(address, **variables):
     """A worker of a scheduler; in the end it is killed.
-
-    As clusters lose workers; SIGTERM waits for a loop that may be busy.
-    """
+    As clusters lose workers; SIGTERM waits for a loop that may be busy."""
     command = [sys.executable, "-m", "distributed.cli.dask_worker", address]
     process = subprocess.Popen(
         [*command, "--no-dashboard", "--no-nanny", "--nthreads", "1"],

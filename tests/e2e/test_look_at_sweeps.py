@@ -11,9 +11,9 @@ from support import hostile
 from support.browser import Opened, browser
 from support.pages import follow
 from support.process import REPOSITORY
+from support.rotations import to_global
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import to_global
 
 pytestmark = pytest.mark.slow  # a browser that draws without a graphics card
 

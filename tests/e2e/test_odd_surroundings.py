@@ -76,9 +76,7 @@ def test_a_width_of_no_columns_is_none(scene_file, monkeypatch, capfd, columns):
 @pytest.mark.slow
 def test_a_full_disk_is_named_and_what_was_computed_is_kept(scene_file):
     """On a disk of 2 MiB: a run that fills it, all that writes a file, and a cache there.
-
-    What the run has written is a result, and the run goes on once there is room.
-    """
+    What the run has written is a result, and the run goes on once there is room."""
     steps = 't_end = 600.0\nintegrator = "rk4"\nstep = 0.01'  # so many that rows come in chunks
     folder = scene_file(("t_end = 0.1", steps)).parent
     (folder / "disk").mkdir()
@@ -245,11 +243,11 @@ def test_an_unknown_backend_of_matplotlib_is_one_sentence(scene_file, dap3d, com
     assert "unexpected" not in found.stderr
 
 
-@pytest.mark.parametrize("option", ["--t inf", "--t=-inf", "--t nan", "--t 1e999", "--t x"])
-def test_a_time_that_is_not_finite_is_a_usage_error(scene_file, refuse, option):
-    assert "--t" in refuse("modes", scene_file(), *option.split())
-
-
-@pytest.mark.parametrize("limit", ["nan", "inf", "0", "-1"])
-def test_a_limit_of_loading_is_a_positive_time(refuse, limit):
-    assert "--limit" in refuse("plugins", "--no-compile", "--limit", limit)
+@pytest.mark.parametrize(
+    "words",
+    [f"modes pen1 {t}" for t in ("--t inf", "--t=-inf", "--t nan", "--t 1e999", "--t x")]
+    + [f"plugins --no-compile --limit {limit}" for limit in ("nan", "inf", "0", "-1")],
+)
+def test_times_that_are_none_are_usage_errors(refuse, words):
+    """Of a state, finite ones; of a limit of loading, positive ones."""
+    assert ("--t" if "modes" in words else "--limit") in refuse(*words.split())

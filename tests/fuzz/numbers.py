@@ -1,9 +1,7 @@
 """Valid files of which one number was changed, their checksums made right again.
-
 So made, or so damaged before they were written, files pass every seal. What is read of them must be
 refused in words, or be something that a run could have left: no crash of compiled code, no hang, no
-other exception, no warning. An input is the change, as JSON.
-"""
+other exception, no warning. An input is the change, as JSON."""
 
 import functools
 import json

@@ -7,11 +7,11 @@ import sys
 import numpy as np
 import pytest
 from support.matlab import write
+from support.rotations import rotation
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.model.rotations import rotation
-from dap3d_matlab.import_matlab import translate
+from dap3d_matlab.importer import translate
 from dap3d_matlab.translate.bodies import parameters_of, rotation_of
 
 

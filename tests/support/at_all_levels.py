@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 from hypothesis import strategies as st
 
-from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.objects import OPTIMISED, UNOPTIMISED, compile_ir, load, processor
 from dap3d_core.kernels.compiler.units import Entry
+from support.internals import Program
 
 _count = count()
 

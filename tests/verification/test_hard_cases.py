@@ -1,9 +1,7 @@
 """Cases of docs/reference/hard-cases.md: what the page says passes does, and references are right.
-
 The cases stand in benchmarks/hard, with their references and what limits their errors: 1000 times
 rtol, and the reason where it is more. Details of many of them are tested elsewhere; the page says
-where. What is not: contact, masses of 1 and 1e9 kg, other units, long runs.
-"""
+where. What is not: contact, masses of 1 and 1e9 kg, other units, long runs."""
 
 import json
 import sys
@@ -172,10 +170,8 @@ def test_velocities_are_projected_though_old_factors_do_not_serve():
 
 def test_other_units_give_the_same_motion():
     """A03 in mm, g and ms and in SI, the same 500 steps of dop853: to 1e-11 of its size.
-
     Factors of 1000 are no powers of two, so every number is rounded, and the motion multiplies that
-    by some 1e3.
-    """
+    by some 1e3."""
     si = dap.simulate(dap.load("A03"), t_end=0.05, dt=0.005, step=1e-4)
     mm = dap.simulate(scenes.squeezer_in_mm(), t_end=50.0, dt=5.0, step=0.1)
     assert mm.r / 1e3 == pytest.approx(si.r, abs=1e-11 * np.max(np.abs(si.r)))
@@ -188,9 +184,7 @@ def test_other_units_give_the_same_motion():
 
 def held(result):
     """|p| to the last digit of 1; residuals below what the projection calls zero.
-
-    That is 1e-15 times 1 + the largest coordinate or speed, here below 6: and a few roundings.
-    """
+    That is 1e-15 times 1 + the largest coordinate or speed, here below 6: and a few roundings."""
     found = long_time.drifts(result)
     assert np.max(found["p"]) <= EPS
     if "C" in found:

@@ -5,7 +5,7 @@ import pytest
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.formats.import_scene.joint_forces import STOP_TIME
+from dap3d_core.formats.import_scene.scene_of_model import STOP_TIME
 from dap3d_core.model.rotations import rotation
 
 

@@ -135,9 +135,7 @@ def test_a_motor_saturates(kind, field, name):
 @pytest.mark.parametrize(("kind", "name"), [("rev", "angle"), ("tran", "length")])
 def test_a_speed_within_a_limit(kind, name):
     """I e' = -L tanh(e / c) of the error e: sinh(e / c) falls by exp(-L t / (I c)).
-
-    Under a load it is missed by c artanh(load / L).
-    """
+    Under a load it is missed by c artanh(load / L)."""
     limit, tolerance, speed = 4.0, 0.5, 3.0
     inertia = J if kind == "rev" else M
     scene = machine(kind)
@@ -161,9 +159,7 @@ def test_a_speed_within_a_limit(kind, name):
 )
 def test_a_prescribed_speed(way, swapped, kind, name):
     """The rate is the speed, whichever body is i; the multiplier is inertia times acceleration.
-
-    Rows are kept to 1e-10.
-    """
+    Rows are kept to 1e-10."""
     value, _ = WAYS[way]
     scene = machine(kind, swapped)
     which = {"coordinate": name} if (kind, name) == ("cyl", "length") else {}

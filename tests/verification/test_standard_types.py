@@ -1,7 +1,5 @@
 """Standard types on mechanisms with closed forms.
-
-Tolerances: rtol 1e-11 over a second leaves some 1e-10.
-"""
+Tolerances: rtol 1e-11 over a second leaves some 1e-10."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,6 @@
 """Angles that count whole turns: between reports, in files, sweeps and checkpoints; long steps.
-
-The wheel is wound up by 100 rad/s: x = 100 sin t, 16 turns and back, 1.6 turns between two reports.
-"""
+The wheel is wound up by 100 rad/s: x = 100 sin t, 16 turns and back, 1.6 turns between two
+reports."""
 
 import attrs
 import numpy as np
@@ -85,9 +84,8 @@ def test_the_points_of_a_sweep_keep_their_turns():
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4])
 def test_long_steps_do_not_lose_turns(rtol):
     """At loose tolerances a step turns the wheel by more than half a turn.
-
-    A turn that is lost changes the speed by 2 pi k / J for the time of a step, some 1 rad/s each.
-    """
+    A turn that is lost changes the speed by 2 pi k / J for the time of a step, some 1 rad/s
+    each."""
     result = dap.simulate(winding(), integrator="dop853", rtol=rtol, atol=rtol / 100.0)
     assert 3.0 * 2.0 / np.pi * SPEED / result.stats.steps > np.pi / 2.0
     np.testing.assert_allclose(result.w[:, 0, 2], SPEED * np.cos(result.t), atol=SPEED * 100 * rtol)

@@ -76,14 +76,14 @@ def _method_of_breaks(model: Model, requested: str) -> tuple[str, str]:
     some_joint = next(iter(model.breaks))
     if model.contact_count or model.collisions is not None:
         raise SimulationError(
-            f"joint {some_joint} has breaks_at, which is not known beside contacts yet: leave it "
-            "out, or the contacts"
+            f"joint {some_joint} may break or holds at times, which is not known beside contacts "
+            "yet: leave breaks_at and active out, or the contacts"
         )
     if requested in ("auto", "lsq"):
-        return "lsq", "joints may break"
+        return "lsq", "joints may break or hold at times"
     raise SimulationError(
-        f"method {requested} does not fit: joint {some_joint} may break (breaks_at), and its rows "
-        "are zero then; use lsq or auto"
+        f"method {requested} does not fit: joint {some_joint} may end (breaks_at, active), and its "
+        "rows are zero then; use lsq or auto"
     )
 
 

@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import attrs
@@ -18,7 +18,7 @@ from dap3d_core.model import Model
 from dap3d_core.result.note import information
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
 from dap3d_core.scene.validate.settings import notes_of
-from dap3d_core.settings import METHODS
+from dap3d_core.settings import METHODS, SETTINGS
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.explain import takes_joint_coordinates
@@ -99,6 +99,35 @@ def settings_notes(compiled: CompiledModel, settings: Simulation) -> list[str]:
         why = contact_engine_reason(compiled.model, settings.contact) or "asked for"
         words = f"contacts by stepping, h = {settings.step:g} s: {why}; errors are of order h"
         notes.append(information(words))
+    return notes
+
+
+def replaced_notes(
+    compiled: CompiledModel, settings: Simulation, asked: Mapping[str, Any]
+) -> list[str]:
+    """Notes on settings of steps that mean nothing, or another thing, where contacts are stepped.
+
+    Args:
+        compiled: of the run.
+        settings: of the run, as of ``settings_of``.
+        asked: what it was called with.
+    """
+    if not integrator_named(settings.integrator).steps_contacts:
+        return []
+    of_scene, given = compiled.scene.simulation, {}
+    for name in ("integrator", "step", "atol", "rtol"):
+        value, written = asked.get(name), getattr(of_scene, name)
+        if value is None and written != SETTINGS[name].default:
+            value = written
+        if value is not None and (name.endswith("tol") or value != getattr(settings, name)):
+            given[name] = value
+    notes: list[str] = []
+    if "rtol" in given:
+        what = "the part of the largest impulse to which the impulses of a step are solved"
+        notes.append(information(f"rtol {given.pop('rtol'):g} is {what}"))
+    if given:
+        left = ", ".join(f"{name} {value}" for name, value in given.items())
+        notes.append(f"{left} left out: contacts are stepped, by contact_step and rtol alone")
     return notes
 
 

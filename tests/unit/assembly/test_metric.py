@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from support.internals import compiled
 
 from dap3d_core.assembly.metric import gyroscopic_moment
-from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP
 
 

@@ -1,21 +1,18 @@
 """A model evaluated at any state: accelerations, multipliers, residuals, power.
-
 The dense saddle-point systems of tests/models/reference/kkt.py judge them: these know positions
 alone, and get Jacobian and accelerations by exact differentiation along a motion. States are taken
-at random, far off the constraints, where a simplified row would show.
-"""
+at random, far off the constraints, where a simplified row would show."""
 
 import numpy as np
 import pytest
+from support.internals import Evaluator, join, split
 from support.motions import G, Motion
 from support.process import REPOSITORY
+from support.rotations import rotation, to_body
 
 import dap3d_core as dap
 from dap3d_core.formulations import RHS
-from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import rotation, to_body
-from dap3d_core.model.state_layout import join, split
 from dap3d_core.scene import check
 from dap3d_core.simulation.initial.assemble import correct_initial
 

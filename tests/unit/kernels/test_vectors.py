@@ -105,9 +105,7 @@ def test_rotate_is_a_matrix_times_a_vector(A, s):
 @given(vec, vec, vec)
 def test_triple_products(a, b, c):
     """a . (b x c) is invariant under rotation of its three; a x (b x c) = b (a.c) - c (a.b).
-
-    Products of three numbers up to 1e3, six of them.
-    """
+    Products of three numbers up to 1e3, six of them."""
     assert near(dot(a, cross(b, c)), dot(c, cross(a, b)), 6e9)
     assert near(cross(a, cross(b, c)), sub(scale(dot(a, c), b), scale(dot(a, b), c)), 6e9)
 
@@ -195,9 +193,7 @@ def test_functions_of_a_float_are_those_of_the_library(function, real, slope, x)
 @one
 def test_complex_step_is_the_derivative(function, real, slope, x):
     """Im f(x + ih) / h = f'(x) with h = 1e-30: no difference is taken, so rounding alone is left.
-
-    tanh near one loses digits of 1 - tanh^2 in the expected value: 1e-11.
-    """
+    tanh near one loses digits of 1 - tanh^2 in the expected value: 1e-11."""
     found = function(complex(x, 1e-30))
     assert found.real == pytest.approx(real(x), rel=1e-15)
     assert found.imag / 1e-30 == pytest.approx(slope(x), rel=1e-11)

@@ -1,19 +1,15 @@
 """The registry: installed types are found by keyword, and a broken plugin only breaks itself.
-
-Plugins here are real distributions on sys.path: a module, and a dist-info with entry points.
-"""
+Plugins here are real distributions on sys.path: a module, and a dist-info with entry points."""
 
 import json
 import os
 import shutil
-import subprocess
 import sys
 import textwrap
 import time
 from pathlib import Path
 
 import pytest
-from support.plain import in_another_process
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
@@ -399,21 +395,6 @@ def test_what_a_plugin_changes_in_the_process_is_put_back(install, tmp_path, cap
     assert any("working folder" in note for note in registry.notes)
     assert any("numpy" in note for note in registry.notes)
     assert capsys.readouterr().out == "", "what it prints does not mix with results"
-
-
-@in_another_process
-def test_finding_types_imports_nothing_heavy_and_no_plugin():
-    code = """
-    import sys
-    from dap3d_core.registry import load_registry
-    assert "sph" in load_registry().keywords("joint")
-    heavy = ["numpy", "scipy", "llvmlite", "matplotlib", "rich", "click", "dap3d_joints"]
-    print([m for m in heavy if m in sys.modules])
-    """
-    answer = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True
-    )
-    assert answer.stdout.strip() == "[]"
 
 
 # ---------------------------------------------------------------------------- a model's own file

@@ -181,9 +181,7 @@ def test_a_target_that_cannot_be_reached_or_told_is_said_so():
 @long_in_plain_python
 def test_every_integrator_is_measured_and_errors_fall_with_the_tolerance(small):
     """Of the pendulum from rest, over 0.2 s; in each ladder the last error is far below the first.
-
-    Three rungs span six decades of tolerance, or a factor of 16 in the step of an order of 4.
-    """
+    Three rungs span six decades of tolerance, or a factor of 16 in the step of an order of 4."""
     assert small.status == "done"
     assert not small.failed
     assert {r.integrator for r in small.runs} == set(MEASURED)
@@ -277,9 +275,7 @@ def test_the_recommended_setting_gives_the_motion_that_was_measured(small):
 @long_in_plain_python
 def test_a_run_that_fails_is_a_row_with_its_reason(monkeypatch):
     """A spring of 1e12 N/m with a fixed step far beyond its period of 6 us: it blows up.
-
-    A rough reference will do.
-    """
+    A rough reference will do."""
     monkeypatch.setattr("dap3d_core.report.reference.TIGHTEST", (1e-5, 1e-4))
     scene = dap.Scene(name="stiff")
     scene.add_body("bob", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(1.0, 0.0, 0.0))

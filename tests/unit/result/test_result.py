@@ -1,13 +1,9 @@
 """A result gives back the motion that was put into it: closed-form motions, laws of mechanics."""
 
-import json
 import pickle
-import subprocess
-import sys
 
 import numpy as np
 import pytest
-from support.plain import in_another_process
 from support.results import (
     ARM,
     MASS,
@@ -237,13 +233,3 @@ def test_versions_name_what_the_numbers_depend_on():
     versions = circling()[0].versions
     assert set(versions) == {"dap3d", "numpy", "llvmlite", "python"}
     assert versions["numpy"] == np.__version__
-
-
-@in_another_process
-def test_importing_results_brings_in_no_compiler_and_no_plots():
-    code = (
-        "import dap3d_core.result, sys, json; print(json.dumps([m for m in"
-        " ('llvmlite', 'scipy', 'matplotlib', 'netCDF4', 'xarray', 'pandas') if m in sys.modules]))"
-    )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert json.loads(out.stdout) == []

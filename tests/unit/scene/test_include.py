@@ -136,9 +136,7 @@ def folder(tmp_path):
 
 def test_a_turned_sub_assembly_moves_as_it_does_alone(folder):
     """Its motion is that of its own file in axes turned with it, weight included.
-
-    Two runs at a relative tolerance of 1e-10.
-    """
+    Two runs at a relative tolerance of 1e-10."""
     result = dap.simulate(folder)
     turn = Rotation.from_euler("xyz", [0.0, np.radians(20.0), np.radians(90.0)])
     for name, length, R, origin in (
@@ -336,8 +334,7 @@ torque = 0.3
 )
 def test_what_is_taken_from_ground_unwritten_is_turned_too(sides, axis):
     """A slider keeps its orientation to the axes of ground, from either side: it starts where its
-    own file has it. Euler parameters are correct to rounding, as is the correction of the start.
-    """
+    own file has it. Euler parameters are correct to rounding, as is the correction of the start."""
     text = SLIDER.replace("SIDES", sides).replace("AXIS", axis)
     if "line" in sides:
         text += '\n[vectors2.line]\nP_i = "block.O"\nP_j = "ground.O"\n'

@@ -491,13 +491,6 @@ def test_what_can_do_work_is_known(model, wanted):
 # ------------------------------------------------------------------ a compiled model
 
 
-@pytest.mark.parametrize("u", [np.zeros(12), np.zeros((1, 13)), np.full(13, np.nan), []])
-def test_rates_of_what_is_no_state_are_refused(u):
-    """13 n finite numbers, or a ValueError that says so."""
-    with pytest.raises(ValueError, match="13 finite numbers"):
-        dap.compile(mass_point()).rhs(0.0, u)
-
-
 def test_a_compiled_model_says_what_it_is():
     """explain() counts bodies, joints and rows, names method and kernels, and what was left out."""
     text = dap.compile(dap.load("fourbar3")).explain()
@@ -526,3 +519,32 @@ def test_a_run_that_blows_up_within_a_step_names_the_joint_that_did_it():
         dap.simulate(
             scene, t_end=2.0, integrator="rk4", step=0.01, correct=False, project=False
         )  # assembled and projected, the link would be as long as it is
+
+
+@pytest.mark.parametrize(
+    ("asked", "words"),
+    [
+        ({"integrator": "radau"}, ["integrator radau left out"]),
+        ({"integrator": "dop853"}, ["integrator dop853 left out"]),
+        ({"step": 2e-3}, ["step 0.002 left out"]),
+        ({"atol": 1e-6, "rtol": 1e-7}, ["rtol 1e-07 is the part", "atol 1e-06 left out"]),
+        ({"integrator": "adams", "atol": {"r": 1e-6}}, ["adams, atol {'r': 1e-06} left out"]),
+        ({"integrator": "moreau", "step": 2e-3}, []),
+        ({}, []),
+    ],
+)
+@pytest.mark.parametrize("in_scene", [True, False])
+def test_settings_that_stepping_of_contacts_leaves_out_are_named(asked, words, in_scene):
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 0.1))
+    scene.add_shape("sphere", body="ball", radius=0.1, collides=True)
+    scene.add_shape("plane", body="ground", collides=True)
+    if in_scene:
+        for name, value in asked.items():
+            setattr(scene.simulation, name, value)
+    result = dap.simulate(scene, t_end=0.01, dt=0.01, **({} if in_scene else asked))
+    found = [note for note in result.notes if "left out" in note or "largest impulse to" in note]
+    if in_scene and asked.get("integrator") == "dop853":
+        words = []  # that of every scene which names none
+    assert len(found) == len(words)
+    assert all(word in note for word, note in zip(words, found, strict=True))

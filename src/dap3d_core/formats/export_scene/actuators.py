@@ -4,8 +4,7 @@ from math import inf
 
 import numpy as np
 
-from dap3d_core.formats.export_scene.elements import ALIGNED, SceneJoint
-from dap3d_core.formats.export_scene.model_builder import ModelBuilder
+from dap3d_core.formats.export_scene.elements import ALIGNED, ModelBuilder, SceneJoint
 from dap3d_core.interface.formats.articulation import Actuator
 from dap3d_core.interface.formats.remarks import NOWHERE
 from dap3d_core.scene.scene import Scene
@@ -71,7 +70,8 @@ def _gear(builder: ModelBuilder, joint: SceneJoint, users: list[Element]) -> flo
     if joint.kind not in TYPES or builder.placed[joint.name].closes:
         return 0.0
     type_ = TYPES[joint.kind]
-    acting = {_body_of(builder, e): e for e in users if e.type == type_}
+    point = builder.elements.point
+    acting = {point(_point_of(e))[0]: e for e in users if e.type == type_}
     moving = [one for one in (joint, joint.reversed()) if one.body_i != GROUND]
     if len({_bounds(e, "input") for e in users}) > 1:
         return 0.0
@@ -88,11 +88,6 @@ def _gear(builder: ModelBuilder, joint: SceneJoint, users: list[Element]) -> flo
         if np.abs(np.cross(places[-1] - places[0], axis)).max() > ALIGNED:
             return 0.0
     return gear
-
-
-def _body_of(builder: ModelBuilder, element: Element) -> str:
-    """The body on which a force acts."""
-    return builder.elements.point(_point_of(element))[0]
 
 
 def _point_of(element: Element) -> str:

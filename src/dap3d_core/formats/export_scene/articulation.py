@@ -6,8 +6,13 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.formats.export_scene.actuators import add_actuators
-from dap3d_core.formats.export_scene.elements import ALIGNED, SceneElements, SceneJoint, leave_out
-from dap3d_core.formats.export_scene.model_builder import ModelBuilder
+from dap3d_core.formats.export_scene.elements import (
+    ALIGNED,
+    ModelBuilder,
+    SceneElements,
+    SceneJoint,
+    leave_out,
+)
 from dap3d_core.interface.formats.articulation import (
     WORLD,
     Articulation,
@@ -22,7 +27,7 @@ from dap3d_core.interface.formats.frames import Frame, axis_angle, from_quaterni
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import Scene
-from dap3d_core.scene.tables import BREAKS_AT, GROUND, Element
+from dap3d_core.scene.tables import GROUND, RELEASES, Element
 
 #: Kinds of joints whose points may be apart along the axis.
 SLIDERS = ("prismatic", "cylindrical")
@@ -33,6 +38,11 @@ SAME = 1e-12
 #: Type of dry friction -> kind of its joint, its axis, and its size.
 FRICTION = {
     "rot_friction": ("revolute", "axis", "n_c"), "tran_friction": ("prismatic", "a_j", "f_c"),
+}  # fmt: skip
+#: Kind of a shape -> the fields of its size, and a factor: a model has semi-axes of an ellipsoid.
+SIZES = {
+    "box": (("size",), 1.0), "sphere": (("radius",), 1.0),
+    "cylinder": (("radius", "length"), 1.0), "ellipsoid": (("size",), 0.5),
 }  # fmt: skip
 NO_JOINT = "no force on the coordinate of a joint"
 
@@ -63,8 +73,8 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
     for limited in scene.joints.values():
         if limited.fields.get("e"):
             leave_out(remarks, limited, "e of the limits of a joint")
-        if BREAKS_AT in limited.fields:
-            leave_out(remarks, limited, "breaks_at of a joint, which holds here")
+        for key in limited.fields.keys() & set(RELEASES):
+            leave_out(remarks, limited, f"{key} of a joint, which holds here throughout")
     for contact in scene.contacts.values():
         leave_out(remarks, contact, "contacts of other programs yield")
     for body in elements.bodies:
@@ -154,20 +164,14 @@ def geometries_of(builder: ModelBuilder, scene: Scene, body: str) -> list[Geomet
         if "axis" in fields:
             A = turned_to(np.asarray(fields["axis"], dtype=float))
         pose = builder.in_link(body, Frame(fields.get("at", (0.0, 0.0, 0.0)), A))
-        if element.type == "box":
-            size = tuple(map(float, fields["size"]))
-            geometries.append(Geometry("box", size, pose, color=color))
-        elif element.type == "sphere":
-            geometries.append(Geometry("sphere", (float(fields["radius"]),), pose, color=color))
-        elif element.type == "cylinder":
-            size = (float(fields["radius"]), float(fields["length"]))
-            geometries.append(Geometry("cylinder", size, pose, color=color))
-        elif element.type == "ellipsoid":
-            size = tuple(0.5 * float(edge) for edge in fields["size"])
-            geometries.append(Geometry("ellipsoid", size, pose, color=color))
-        elif element.type == "mesh":
+        kind = str(element.type)
+        if kind == "mesh":
             scale = (float(fields.get("scale", 1.0)),) * 3
-            geometries.append(Geometry("mesh", (), pose, fields["file"], scale, color))
+            geometries.append(Geometry(kind, (), pose, fields["file"], scale, color))
+        elif kind in SIZES:
+            names, factor = SIZES[kind]
+            size = factor * np.ravel([fields[name] for name in names])
+            geometries.append(Geometry(kind, tuple(size.tolist()), pose, color=color))
         else:
             leave_out(builder.remarks, element, "no shape of a model", motion=False)
     return geometries
@@ -393,18 +397,14 @@ def _add_rotors(builder: ModelBuilder) -> None:
                 builder.remarks.leave_out(NOWHERE, text, motion=True)
                 continue
             pairs.append((joint.name, float(fields.get("ratio", 1.0))))
-        leader = next((one for one, ratio in pairs if ratio == 1.0), None)
-        if leader is None:
+        place = next((k for k, (_, ratio) in enumerate(pairs) if ratio == 1.0), None)
+        if place is None:
             text = f"wheel {name}: no joint turns as it does"
             builder.remarks.leave_out(NOWHERE, text, motion=True)
             continue
+        leader, _ = pairs.pop(place)
         builder.placed[leader].armature = (rotor.inertia,)
-        first = True
-        for one, ratio in pairs:
-            if one == leader and first:
-                first = False
-                continue
-            builder.model.couplings.append(Coupling("", one, leader, ratio))
+        builder.model.couplings += [Coupling("", one, leader, ratio) for one, ratio in pairs]
 
 
 def _followed(builder: ModelBuilder, fields: dict[str, Any]) -> SceneJoint | None:

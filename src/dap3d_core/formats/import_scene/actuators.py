@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.formats.import_scene.joints import NamedEnds, from_ground
+from dap3d_core.formats.import_scene.joints import from_ground, named_ends
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
 from dap3d_core.interface.formats.articulation import Actuator, Articulation
 from dap3d_core.scene.tables import GROUND
@@ -70,7 +70,7 @@ def _act_in_joint(
             **{key: value for key, value in given.items() if value},
         )  # fmt: skip
         return
-    ends = NamedEnds(builder, joint)
+    ends = named_ends(builder, joint)
     axis = np.asarray(joint.axes[0], dtype=float)
     sides = (("i", ends.child, ends.on_child, 1.0), ("j", ends.parent, ends.on_parent, -1.0))
     for end, body, frame, sign in sides:

@@ -162,6 +162,11 @@ def items_of(value: Value) -> tuple[Value, ...]:
     return tuple(Value(item, tuple(next(words) for _ in item.words)) for item in value.type.items)
 
 
+def is_constant(value: Value) -> bool:
+    """True for a number that is known, or a tuple of such."""
+    return value.constant is not None or (bool(value.items) and all(map(is_constant, value.items)))
+
+
 def wider(*types: Any) -> Any:
     """The common type of numbers; None where a type is no number's."""
     return max(types, key=NUMBERS.index) if all(type_ in NUMBERS for type_ in types) else None

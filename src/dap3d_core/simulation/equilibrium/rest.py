@@ -138,7 +138,7 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
             "(start=result)"
         )
     states = evaluator.states.copy()
-    states[table.mode], states[table.way.ravel()], states[table.near.ravel()] = found.mode, 0.0, 0.0
+    states[table.mode], states[table.way], states[table.near] = found.mode, found.way, 0.0
     evaluator.states = states
 
 

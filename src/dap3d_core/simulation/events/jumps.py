@@ -131,7 +131,7 @@ class Jumps:
             bodies: number of a body, from 0 -> (6,) its r_dot and omega, global axes; NaN leaves a
                 component to the joints.
             states: first place of a state among all -> its numbers.
-            title: of the event.
+            title: of what asks for it, with its kind.
 
         Raises:
             SimulationError: the joints do not allow such velocities.
@@ -147,7 +147,7 @@ class Jumps:
         except ImpossibleJumpError as error:
             names = ", ".join(self._evaluator.model.body_names[k] for k in bodies) or "no body"
             raise SimulationError(
-                f"the run stopped at t = {t:.9g} s: event {title} sets a velocity of {names} that "
+                f"the run stopped at t = {t:.9g} s: {title} sets a velocity of {names} that "
                 "the joints do not allow; set fewer components (None leaves one to the joints)"
             ) from error
         return self._take(integration, u, jump), jump.work

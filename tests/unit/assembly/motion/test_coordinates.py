@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from support.internals import split
 from support.joint_pairs import BETWEEN, STANDARD, compiled_pair, pair
+from support.rotations import to_body
 
 from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.coordinates import (
@@ -13,8 +15,6 @@ from dap3d_core.assembly.motion.coordinates import (
     joint_coordinates,
 )
 from dap3d_core.model.rigid_motion import Pose, compose, inverse, relative, rotation_vector
-from dap3d_core.model.rotations import to_body
-from dap3d_core.model.state_layout import split
 from dap3d_core.simulation import CompiledModel
 
 #: Joints with one factor and with two, axes parallel and not.

@@ -1,7 +1,5 @@
 """The command line used wrongly: one message that says what is allowed, and the right exit code.
-
-What a process of its own is not needed for runs in this one, with the streams of the process.
-"""
+What a process of its own is not needed for runs in this one, with the streams of the process."""
 
 import json
 import os

@@ -9,8 +9,13 @@ from support.integrands import (
 )
 
 from dap3d_core.integrators import TABLEAUS
-from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA, combinations
-from dap3d_core.integrators.stepping.vector_ops import GROUP, GROUPS, TERMS
+from dap3d_core.integrators.runge_kutta.sums import (
+    ABSCISSA,
+    GROUP,
+    GROUPS,
+    TERMS,
+    combinations,
+)
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -43,9 +43,7 @@ class Named(Force):
 
 def test_a_vector_may_be_called_v_i():
     """It takes the place of the velocity of that name; the velocity of a point stays one.
-
-    All of it by numpy: v_P = v + w x A s, the vector A a and its rate w x A a.
-    """
+    All of it by numpy: v_P = v + w x A s, the vector A a and its rate w x A a."""
     type_info = examine(Named)
     assert not type_info.names["v_i"].velocity
     assert type_info.names["v_i_dot"].velocity

@@ -1,9 +1,7 @@
 """Every name that a kernel may ask for holds what it says, computed by the written loops.
-
 Types made for these tests return the named quantities as forces and moments, eighteen numbers from
 three bodies; numpy computes them anew from the state. Tolerance: two rotations and some sums, 1e-13
-of numbers of order one.
-"""
+of numbers of order one."""
 
 import numpy as np
 import pytest

@@ -1,9 +1,7 @@
 """Formulas derived from C, C_dot, energy or value are those that are written by hand.
-
 Both are evaluated at random states off the constraints. They differ by rounding alone, 1e-11 of the
 largest term: a few hundred operations, and differences of angles near 1. Where there is none by
-hand, rates along random motions stand for it (see tests/contract for the tolerance).
-"""
+hand, rates along random motions stand for it (see tests/contract for the tolerance)."""
 
 import inspect
 import math

@@ -1,7 +1,5 @@
 """Complex numbers of compiled code, which plain Python takes from numpy: in all bits.
-
-Programs drawn at random: tests/fuzz/programs.py.
-"""
+Programs drawn at random: tests/fuzz/programs.py."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Each compiled function of the core: plain Python and machine code give the same bits.
-
-Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py).
-"""
+Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py)."""
 
 import json
 
@@ -91,7 +89,8 @@ NOT_CALLED = {
         "formulations.standard": "settle_rows",
         "integrators.adams.step": "reject",
         "integrators.stepping.vector_ops": "scaled_beyond",
-        "integrators.stepping.step_control": "error_beyond_rounding",
+        "integrators.runge_kutta.error": "error_beyond_rounding",
+        "integrators.runge_kutta.sums": "combine_by_table",
         "integrators.stepping.singular_poses": "predict_measures is_approaching "
         "least_time_to_singularity",
         "integrators.radau.step": "reject_iteration stage_is_across blame",
@@ -147,9 +146,7 @@ NOT_CALLED = {
 
 def repeated(runs, few, more="", every=()):
     """Of the calls of runs at levels, of these and more at others: number, those that differ.
-
-    And the functions that were not called.
-    """
+    And the functions that were not called."""
     lines = [
         f"recorder.record(dap.simulate, {model!r}, **{settings!r})" for model, settings in runs
     ]
@@ -173,9 +170,7 @@ def test_calls_of_a_short_run_have_the_bits_of_plain_python():
 @pytest.mark.slow
 def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python(found):
     """Optimised for this processor; functions not called are listed.
-
-    Without FMA: `make no-fma`. Unoptimised: a short run, above.
-    """
+    Without FMA: `make no-fma`. Unoptimised: a short run, above."""
     _, (count, different), missing = found
     assert count > 4000
     assert different == []
@@ -185,9 +180,7 @@ def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python(found):
 @pytest.mark.slow
 def test_calls_have_the_same_bits_where_their_numbers_carry_derivatives(found):
     """Functions of all formulations and integrators; complex numbers of radau as well.
-
-    Where a switch crosses, Newton steps for derivatives leave other numbers in rows of scratch.
-    """
+    Where a switch crosses, Newton steps for derivatives leave other numbers in rows of scratch."""
     (count, different), *_ = found
     assert count > 2000
     crossing = "dap3d_core.integrators.stepping.event_location."

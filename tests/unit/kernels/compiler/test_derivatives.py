@@ -1,7 +1,5 @@
 """Differentiated functions of the subset: values have the bits of the function, slopes are exact.
-
-Slopes are compared with complex steps where the function is analytic, else with differences.
-"""
+Slopes are compared with complex steps where the function is analytic, else with differences."""
 
 import cmath
 import math
@@ -100,9 +98,7 @@ def arrays(rng):
 
 def differentiated_run(function, one, directions):
     """The results (48,) and their slopes (48, d) along directions of x, (3, d), and of the table.
-
-    Those of the table are of x as well, row by row.
-    """
+    Those of the table are of x as well, row by row."""
     wide = DifferentiatedArrays(one, 1 + directions.shape[1])
     wide.slopes(one.x)[:] = directions
     wide.slopes(one.inner.table)[:] = np.repeat(directions, 2, axis=0)

@@ -18,10 +18,8 @@ def test_solution_is_that_of_the_dense_saddle_point_matrix(name):
 @all_graphs
 def test_rows_eliminated_so_far_are_independent_on_the_bodies_eliminated_so_far(name):
     """What the static order promises at each of its places, and what makes every pivot exist.
-
     Singular values of the prefix and of the same rows on all bodies: where these are independent
-    (above 1e-3), those do not vanish (1e-9 is far above rounding).
-    """
+    (above 1e-3), those do not vanish (1e-9 is far above rounding)."""
     case = full_case(name)
     ordering = case.plan.ordering
     bodies, rows = set(ordering.early), []

@@ -173,9 +173,7 @@ def test_each_row_of_the_matrix_is_in_one_node():
 
 def test_the_fill_that_is_reported_is_that_of_the_matrix():
     """Blocks of the Cholesky factor of a random matrix of this pattern, less those of the matrix.
-
-    Fill of a pattern is that of numbers without cancellation; hubs are not among these.
-    """
+    Fill of a pattern is that of numbers without cancellation; hubs are not among these."""
     case = Case(plate_net(7), np.random.default_rng(2))
     made = case.plan
     nodes = made.ordering.nodes

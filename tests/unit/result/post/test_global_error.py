@@ -24,9 +24,7 @@ def estimated():
 
 def test_it_is_the_difference_to_a_run_ten_times_tighter():
     """Up to the second run's own error, a tenth of the first's, which its first step changes.
-
-    Over some dozens of steps; in a handful, as of the other tests here, the first one decides.
-    """
+    Over some dozens of steps; in a handful, as of the other tests here, the first one decides."""
     options = SHORT | dict(t_end=5.0, dt=0.5)
     estimated = dap.simulate(problems.pendulum(), estimate_error=True, **options)
     finer = dap.simulate(problems.pendulum(), **(options | dict(rtol=1e-6, atol=1e-8)))

@@ -65,10 +65,8 @@ def test_reactions_of_all_joints_are_those_of_each():
 @pytest.mark.parametrize("ground", [None, "j"], ids=["body-body", "body-ground"])
 def test_action_and_reaction(keyword, ground):
     """Any multipliers: forces of a joint cancel, moments about a common point too (Newton 3).
-
     On the constraints, where both bodies meet. Rows of the velocity level alone have to balance in
-    force only: ``rel-tran`` is the manual's literal equation (spec 4.8).
-    """
+    force only: ``rel-tran`` is the manual's literal equation (spec 4.8)."""
     type_info = REGISTRY.get("joint", keyword)
     scene = scene_for(type_info, np.random.default_rng(7), ground=ground)
     model = model_of(scene)

@@ -71,9 +71,7 @@ def test_a_tangent_that_is_kept_for_the_next_step(make, t, has_factors, tmp_path
 
 def paradox():
     """A light leaning disk that slides towards its contact: no load of it is in balance.
-
-    Painleve's paradox, as in verification/test_friction.py.
-    """
+    Painleve's paradox, as in verification/test_friction.py."""
     lean, radius, J = np.pi / 4, 0.5, 0.005
     scene = dap.Scene(name="paradox")
     p = (np.cos(lean / 2), np.sin(lean / 2), 0.0, 0.0)

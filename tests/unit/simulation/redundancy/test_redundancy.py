@@ -180,7 +180,6 @@ def test_what_cannot_be_moved_cannot_be_told():
 
 def test_the_count_does_not_depend_on_how_well_the_start_was_closed():
     """Newton stops with up to 1e-10 open, and tilts the axes by as much: they still are parallel.
-
     Without allowing for it one in ten of these starts would have all of its rows independent."""
     compiled = dap.compile(planar_four_bar())
     rng = np.random.default_rng(0)

@@ -9,9 +9,8 @@ from support.plain import long_in_plain_python
 import dap3d_core as dap
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
 from dap3d_core.study.batch import driver
-from dap3d_core.study.batch.parameter_map import ParameterMap, poses_of
-from dap3d_core.study.batch.prepare_dependence import dependence_of
-from dap3d_core.study.batch.rebuild import ModelRebuilder
+from dap3d_core.study.batch.batch import ModelRebuilder
+from dap3d_core.study.batch.parameter_map import ParameterMap, dependence_of, poses_of
 
 DONE, STOPPED, FAILED = PointStatus.DONE, PointStatus.STOPPED, PointStatus.FAILED
 
@@ -151,9 +150,7 @@ def test_a_point_does_not_depend_on_those_before_it():
 @pytest.mark.parametrize("name", ["points.A.sPp.y", "bodies.bob.r_dot.x", "bodies.bob.r.z"])
 def test_starts_are_corrected_as_those_of_single_runs(name):
     """Compiled Newton passes on the block factors, against numpy's least squares: rounding.
-
-    One radian of swing multiplies it by some ten; 1e-13 leaves another ten.
-    """
+    One radian of swing multiplies it by some ten; 1e-13 leaves another ten."""
     of = ensemble(pendulum(), [name], ["bob.r:series", "bob.w"], dt=0.1, t_end=0.5)
     points = np.array([[0.3], [0.9], [1.1]])
     batch = of.run(points)
