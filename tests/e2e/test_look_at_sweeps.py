@@ -47,9 +47,6 @@ def opened(chromium, page):
     assert found.complaints == []
 
 
-# ---------------------------------------------------------------- the commands
-
-
 @pytest.fixture
 def file(dap3d):
     """A sweep in the folder of the command line."""
@@ -129,9 +126,6 @@ def test_view_makes_a_page_of_a_sweep(dap3d, refuse, file):
     assert "--model MODEL --allow-code" in refuse("view", "own.nc")
     assert "not run unless it is allowed" in refuse("view", "own.nc", "--model", "ball1")
     assert dap3d("view", "own.nc", "--model", "ball1", "--allow-code").returncode == 0
-
-
-# ---------------------------------------------------------------- the browser
 
 
 def test_sliders_choose_the_motion(opened, swept):

@@ -28,9 +28,6 @@ def in_shell(words, folder, **variables):
     return found
 
 
-# ---------------------------------------------------------------- streams
-
-
 @has_full
 @pytest.mark.parametrize("option", ["", "--json"])
 def test_a_result_is_saved_though_its_words_are_lost(scene_file, option):
@@ -109,9 +106,6 @@ def test_a_full_disk_is_named_and_what_was_computed_is_kept(scene_file):
     assert dap.open(folder / "large.nc").t[-1] == 600.0
 
 
-# ---------------------------------------------------------------- files that are none
-
-
 @posix
 @pytest.mark.parametrize(
     "words",
@@ -164,9 +158,6 @@ def test_a_link_of_the_system_stays_and_its_pipe_is_refused(scene_file):
     assert sorted(p.name for p in folder.iterdir()) == ["fall.toml", "r.nc", "stdout"]
 
 
-# ---------------------------------------------------------------- the shell itself
-
-
 @posix
 def test_a_current_folder_that_is_gone_is_named(tmp_path):
     found = in_shell("mkdir gone && cd gone && rmdir ../gone && $DAP3D check pen1", tmp_path)
@@ -183,9 +174,6 @@ def test_ctrl_c_while_options_are_parsed_is_an_interruption(monkeypatch, capfd):
     monkeypatch.setattr(Command, "parse_args", interrupted)
     assert main(["models"]) == 130
     assert capfd.readouterr().err.strip() == "interrupted"
-
-
-# ---------------------------------------------------------------- limits
 
 
 linux = pytest.mark.skipif(not Path("/proc").exists(), reason="limits as Linux has them")
@@ -214,9 +202,6 @@ def test_a_limit_on_files_is_named_before_the_run(scene_file):
     assert "dt of at least" in found.stderr
     found = in_shell("ulimit -f 2000; $DAP3D run fall.toml --t-end 1 --dt 0.5", folder)
     assert found.returncode == 0, found
-
-
-# ---------------------------------------------------------------- variables of the environment
 
 
 @pytest.mark.parametrize("name", quickly(["nonsense", "../x", "x86-64-v2 ", "pentium4", "'"]))

@@ -15,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 from support.ended import EndedError
+from support.internals import Checkpoint, read_checkpoint, write_checkpoint
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
 from dap3d_core.result.file.checksum import write_checksums
-from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
 from fuzz.acceptable import examine_result, strict
 from fuzz.damage import seeds
 from fuzz.results import HANG, SEAL, in_child
@@ -73,9 +73,6 @@ def _leave(model, place, **settings):
         assert (place / "run.nc.checkpoint").exists()
     else:
         raise AssertionError("the run has ended by itself")
-
-
-# ------------------------------------------------------------------ places of numbers
 
 
 @functools.cache
@@ -151,9 +148,6 @@ def _put(value, path, new):
     return changed
 
 
-# ------------------------------------------------------------------ the changed file
-
-
 def make(change, place):
     """Write the changed file, with what belongs to it, into an empty folder; its path."""
     kind, name, what, where, value = change
@@ -200,9 +194,6 @@ def _as(dtype, value):
         limits = np.iinfo(dtype)
         value = min(max(int(value), limits.min), limits.max)
     return dtype.type(value)
-
-
-# ------------------------------------------------------------------ what must be true
 
 
 def check_change(data):

@@ -9,6 +9,7 @@ import pytest
 from fuzz.numbers import PATIENCE, RUNS, check_change, folder, make
 from fuzz.results import in_child
 from support.ended import EndedError, ended_at, leave, shorten_chunks
+from support.internals import Checkpoint, read_checkpoint, write_checkpoint
 from support.results import same_bits
 
 import dap3d_core as dap
@@ -17,7 +18,6 @@ from dap3d_core.integrators.adams.formulas import AdamsState
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.simulation import CheckpointError, CompiledModel
-from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
 
 
 def crafted(run, what, where, value):

@@ -27,9 +27,6 @@ def command(tmp_path, monkeypatch, capfd):
     return call
 
 
-# ---------------------------------------------------------------- the cache of compiled code
-
-
 @pytest.mark.parametrize(
     ("mode", "words"),
     [(0o700, ""), (0o755, ""), (0o775, "others may write to it"), (0o1777, "others may write")],
@@ -83,9 +80,6 @@ print(json.dumps([str(cache_folder()), dap.compile(scene).notes]))
     (note,) = [n for n in notes if str(cache) in n]
     assert note.startswith("for information: compiled code is not kept in")
     assert list(cache.iterdir()) == []
-
-
-# ---------------------------------------------------------------- files that commands write
 
 
 @pytest.mark.parametrize(

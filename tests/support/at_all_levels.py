@@ -8,8 +8,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from dap3d_core.kernels.compiler.objects import OPTIMISED, UNOPTIMISED, compile_ir, load, processor
-from dap3d_core.kernels.compiler.units import Entry
-from support.internals import Program
+from support.internals import Entry, Program
 
 _count = count()
 
@@ -73,8 +72,6 @@ def same_bits(one, other):
         one[~nan].tobytes() == np.asarray(other)[~nan].tobytes()
     )
 
-
-# ------------------------------------------------------------------ random programs
 
 FLOATS, WHOLES = ("a", "b", "c", "d"), ("i", "j", "k")
 

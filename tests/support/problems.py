@@ -100,7 +100,7 @@ def everything():
     for n, (i, j) in enumerate([(first, bodies[0]), (first, last), (last, "ground"),
                                 ("loose", last), ("loose", "ground")]):  # fmt: skip
         scene.add_force("ptp", f"spring{n}", P_i=f"{i}.O", P_j=f"{j}.O", k=20.0 + n, l0=0.3, c=0.5)
-    scene.add_force("friction", "rub", joint=joint, mu=0.2, radius=0.05)
+    scene.add_force("friction", "rub", joint=joint, mu=0.2, radius=0.05, v_tol=1e-3)
     scene.add_function("a", "turn", coeff=(0.0, 0.3, 0.1))
     scene.add_joint("rel-rot", "motor", body_i=first, a_j="ground.z", function="turn")
     return scene

@@ -61,9 +61,6 @@ def time_near_turn(d):
     return found.t_events[0][0]
 
 
-# ------------------------------------------------------------------ events of a script
-
-
 @pytest.mark.parametrize("d", [1e-2, 1e-4, 1e-6, 1e-8])
 @pytest.mark.parametrize("every", [None, 0.005, 0.3])
 def test_a_level_below_an_apex_is_passed_twice(flight, d, every):
@@ -224,9 +221,6 @@ def test_turning_points_close_to_each_other(rise):
             found = turning_points(np.real(slope.integ()(FRACTIONS)))
             # the slope there is d^2, of values to rounding: 1e-15 / (d 1) of a place, and a margin
             assert [x for x, _ in found] == pytest.approx([a, a + d], abs=1e-2 * d + 1e-13 / d)
-
-
-# ------------------------------------------------------------------ switches of types
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Friction in joints, found together with the multipliers: closed forms, energy, and its limits.
+"""Friction in joints that fades below v_tol: closed forms, energy, and its limits.
 Tolerances: the multipliers settle to 1e-10 of their size; rtol 1e-9 over a second leaves less than
 1e-8."""
 
@@ -15,14 +15,14 @@ SLOPE = np.radians(30.0)
 METHODS = ["standard", "lsq"]
 
 
-def incline(mu, **fields):
+def incline(mu, v_tol=1e-3):
     """A block on a straight guide that falls at 30 degrees, from rest."""
     scene = dap.Scene(name="incline")
     scene.add_body("block", mass=2.0, Jp=(0.1, 0.2, 0.3))
     scene.add_vector("down", "ground", (np.cos(SLOPE), 0.0, -np.sin(SLOPE)))
     scene.add_joint("tran", "guide", P_i="block.O", P_j="ground.O", a_j="down")
     scene.add_force("weight", "gravity")
-    scene.add_force("friction", "rub", joint="guide", mu=mu, **fields)
+    scene.add_force("friction", "rub", joint="guide", mu=mu, v_tol=v_tol)
     return scene
 
 
@@ -51,7 +51,7 @@ def test_a_loaded_pin_stops_its_wheel():
     scene.add_body("wheel", mass=mass, Jp=(J, J, J), w=(0.0, spin, 0.0))
     scene.add_joint("rev", "pin", P_i="wheel.O", P_j="ground.O", a_i="wheel.y", a_j="ground.y")
     scene.add_force("weight")
-    scene.add_force("friction", joint="pin", mu=mu, radius=radius)
+    scene.add_force("friction", joint="pin", mu=mu, radius=radius, v_tol=1e-3)
     result = dap.simulate(scene, t_end=2.0, dt=1.0)
     slowing = mu * radius * mass * G / J
     wanted = spin - slowing * result.t
@@ -67,7 +67,7 @@ def test_a_sliding_disk_is_braked_by_the_ground():
                    r_dot=(2.0, 0.0, 0.0))  # fmt: skip
     scene.add_joint("disk", "contact", body_i="disk", slip="z", radius=radius)
     scene.add_force("weight")
-    scene.add_force("friction", joint="contact", mu=mu)
+    scene.add_force("friction", joint="contact", mu=mu, v_tol=1e-3)
     result = dap.simulate(scene, t_end=0.5, dt=0.5)
     # the rim also turns back: F R / J = 2e-3 of the acceleration's size is left out of neither side
     turn = mu * mass * G * radius / 1e3
@@ -89,7 +89,7 @@ def test_multipliers_that_do_not_settle_are_reported(direction, settles):
                    r_dot=(0.0, direction, 0.0))  # fmt: skip
     scene.add_joint("disk", "contact", body_i="disk", slip="z", radius=radius)
     scene.add_force("weight")
-    scene.add_force("friction", joint="contact", mu=3.0)
+    scene.add_force("friction", joint="contact", mu=3.0, v_tol=1e-3)
     notes = " ".join(dap.simulate(scene, t_end=0.0).notes)
     assert ("did not settle" in notes) is not settles
 

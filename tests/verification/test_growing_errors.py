@@ -85,9 +85,6 @@ def test_no_note_where_digits_remain():
     assert not any("beyond 0.001" in note for note in simulated(2.0, 1e-8).notes)
 
 
-# ---------------------------------------------------------------------------- flips
-
-
 def test_the_instants_of_the_flips():
     """Where omega_2 of Euler's equations, integrated at 3e-14, passes zero within 11 s."""
     expected = flips.instants(11.0)

@@ -10,10 +10,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support import mechanisms, redundant
+from support.internals import store_reference_pivots
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import near_singular_rows, store_reference_pivots
+from dap3d_core.formulations.pivots import near_singular_rows
 
 sys.path.append(str(REPOSITORY / "benchmarks"))
 
@@ -77,9 +78,6 @@ def test_a_ball_bounces_until_it_lies(integrator, rtol):
     assert result.ledger["energy"].ok
 
 
-# ---------------------------------------------------------------------------- the references
-
-
 def test_the_pendulum_by_elliptic_functions():
     """Published digits of A01 at 1, 10 and 100 s, which have 16 of them: 1e-13 at 50 periods."""
     found = references.pendulum(np.array([1.0, 10.0, 100.0]))
@@ -125,9 +123,6 @@ def test_the_cart_keeps_momentum_and_energy():
     bob = (rate - y * turning) ** 2 + (s * turning) ** 2
     energy = 0.5 * ratio * rate**2 + 0.5 * bob + 9.81 * y
     assert energy[~np.isnan(energy)] == pytest.approx(0.0, abs=1e-11)
-
-
-# ---------------------------------------------------------------------------- masses and units
 
 
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6, 1e7, 3e7, 1e8, 1e9])
@@ -179,9 +174,6 @@ def test_other_units_give_the_same_motion():
     assert mm.p == pytest.approx(si.p, abs=1e-11)
 
 
-# ---------------------------------------------------------------------------- long time
-
-
 def held(result):
     """|p| to the last digit of 1; residuals below what the projection calls zero.
     That is 1e-15 times 1 + the largest coordinate or speed, here below 6: and a few roundings."""
@@ -227,9 +219,6 @@ def test_at_rounding_drifts_grow_with_the_root_of_the_steps(run, step):
     limit = 8.0 * EPS * np.sqrt(result.stats.steps)
     assert np.max(found["energy"]) < limit
     assert "L" not in found or np.max(found["L"]) < limit
-
-
-# ---------------------------------------------------------------------------- the page
 
 
 def test_the_page_shows_its_figures():

@@ -23,8 +23,6 @@ def radau(scene, t, **settings):
     return dap.simulate(scene, t_end=t, integrator="radau", **({"dt": t} | settings))
 
 
-# ---------------------------------------------------------------------------- stiff scenes
-
 #: A05: height of the slider (benchmarks, section 1).
 GOVERNOR = {0.05: 0.506100897244, 0.1: 0.5238364755696, 0.5: 0.7432494247863}
 
@@ -73,9 +71,6 @@ def test_stiff_spring_is_a_rod():
     # the radial velocity is the rate of the stretch, 1e-7 m/s, with no oscillation on top
     radial = np.sum(result.r[-1, 0] * result.rd[-1, 0])
     assert abs(radial) < 1e-6
-
-
-# ---------------------------------------------------------------------------- orders
 
 
 def order_of(errors, ratio=2.0):

@@ -269,18 +269,15 @@ def test_kinematics_over_the_coordinate_of_a_motor():
         ("joint", {"speed": 1.0, "limit": 2.0}, r"the force motor has it: \[forces.NAME\]"),
         ("joint", {"speed": 1.0, "a_j": "ground.x"}, "give joint or a_j, not both"),
         ("force", {}, "give torque, force, speed or position"),
-        (
-            "force",
-            {"position": 1.0},
-            "a position needs k here; one that is held exactly is a joint",
-        ),
+        ("force", {"position": 1.0},
+         "a position needs k here; one that is held exactly is a joint"),
         ("force", {"speed": 1.0}, "a speed needs a limit here; without one it is a joint motor"),
         ("force", {"torque": 1.0, "force": 1.0}, "give torque or force, not both"),
         ("force", {"position": 1.0, "speed": 1.0}, "give speed or position, not both"),
         ("force", {"force": 1.0}, "the coordinate is an angle, which a torque changes"),
         ("force", {"torque": 1.0, "limit": -1.0}, "limit = -1.0: should be greater than 0"),
     ],
-)
+)  # fmt: skip
 def test_a_wrong_motor_is_refused(table, fields, words):
     scene = machine()
     add = scene.add_joint if table == "joint" else scene.add_force

@@ -115,9 +115,6 @@ def test_multipliers_fulfil_the_equations_of_motion(result):
     np.testing.assert_allclose(found, joints, atol=1e-9 * (1 + np.abs(joints).max()))
 
 
-# ---------------------------------------------------------------------------- reactions
-
-
 def test_tension_of_the_pendulum():
     """A01 over 10 s: the rod pulls the bob towards the pivot with -3 m g y, to 1e-8 (closed form).
     28.294567206067251 N at t = 10 s: elliptic functions (benchmarks.md, A01)."""

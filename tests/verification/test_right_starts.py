@@ -136,9 +136,6 @@ def test_a_chain_that_lies_straight_in_its_place_stays():
     assert not any("turned by" in note for note in result.notes)
 
 
-# ------------------------------------------------------------------ springs without a length
-
-
 def sprung(*, k=4.0, c=0.0, r=(0.0, 0.0, 0.0), v=(0.0, 0.5, 0.0), weight=False, **fields):
     """A body of 1 kg on a spring to the origin."""
     scene = dap.Scene(name="sprung")

@@ -57,20 +57,6 @@ def test_a_file_of_an_older_program_has_no_turns_and_says_so(tmp_path):
     assert sum("holds no turns" in note for note in read.notes) == 1
 
 
-def test_a_resumed_run_keeps_its_turns(tmp_path):
-    class Enough(Exception):
-        pass
-
-    def stop(t, t_end):
-        if t > 1.4:
-            raise Enough
-
-    path = tmp_path / "run.nc"
-    with pytest.raises(Enough):
-        dap.simulate(winding(), dt=0.001, output=path, checkpoint=np.inf, progress=stop)
-    check(dap.resume(tmp_path / "run.nc.checkpoint"))
-
-
 def test_the_points_of_a_sweep_keep_their_turns():
     def moment(result):
         return float(result.force("spring").on["i"].moment[-1, 2])

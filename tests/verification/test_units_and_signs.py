@@ -3,10 +3,9 @@ Units of outputs: test_units_of_outputs.py."""
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.command_line import output_of
 
 import dap3d_core as dap
-from dap3d_core.cli.app import dap3d
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 #: (body i, body j): ground on either side, and two free bodies in both orders.
@@ -16,12 +15,6 @@ INERTIA, MASS = {"a": 0.2, "b": 0.5}, {"a": 2.0, "b": 3.0}
 #: Of a driver f(t) = 0.3 t + 0.2 t^2, and of its end after 1 s.
 LAW, TRAVEL = (0.0, 0.3, 0.2), 0.5
 EFFORT = 0.7
-
-
-def described(type_):
-    done = CliRunner().invoke(dap3d, ["describe", type_])
-    assert done.exit_code == 0
-    return done.output
 
 
 def pair(joint, i, j):
@@ -198,7 +191,7 @@ def test_kinematics_over_a_driver_moves_the_coordinate_along(type_, i, j):
                                    "tran_sda", "ptp", "rP", "sph-sph"])  # fmt: skip
 def test_describe_says_the_sign_in_its_first_lines(type_):
     """Which way a positive function, force or moment moves the coordinate."""
-    text = described(type_)[:900]
+    text = output_of("describe", type_)[:900]
     words = ("increases", "decreases")
     assert any(word in " ".join(text.split()) for word in words)
 
@@ -327,6 +320,6 @@ def test_couples_transmit_moments_alone():
 @pytest.mark.parametrize("type_", ["couple", "follow"])
 def test_describe_says_what_bearings_of_wheels_carry(type_):
     """In its first lines: moments alone, and nothing of the tooth force."""
-    text = " ".join(described(type_).split())[:500]
+    text = " ".join(output_of("describe", type_).split())[:500]
     assert "transmits moments" in text
     assert "bearings" in text

@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import attrs
 import numpy as np
@@ -369,9 +369,10 @@ def stepping_notes(integrations: Sequence[Integration], length: float) -> list[s
     if not states:
         return []
     residual, deepest = max(w.largest_residual for w in states), max(w.deepest for w in states)
+    taken = abs(sum(w.friction_work for w in states))
     words = (
         f"contacts were solved to {residual:.2g} of the largest impulse of a step, bodies overlap "
-        f"by {deepest:.2g} m at most; friction took {abs(sum(w.friction_work for w in states)):.6g} J"
+        f"by {deepest:.2g} m at most; friction took {taken:.6g} J"
     )
     notes: list[str] = [information(words)]
     if residual > UNSOLVED:

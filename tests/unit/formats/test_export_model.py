@@ -19,7 +19,7 @@ def places(scene):
     """Points and vectors of all joints and forces in global axes, by element and field."""
     bodies = {"ground": (np.zeros(3), np.eye(3))}
     for name, body in scene.bodies.items():
-        from dap3d_core.model.rotations import rotation
+        from support.rotations import rotation
 
         bodies[name] = np.array(body.r), rotation(np.array(body.p))
     found = {}

@@ -5,9 +5,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 from support.process import REPOSITORY
+from support.rotations import rotation
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
 
 ARM = REPOSITORY / "tests" / "data" / "formats" / "arm.urdf"
 

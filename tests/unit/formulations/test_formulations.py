@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from support import mechanisms, problems, redundant
-from support.internals import Evaluator
+from support.internals import Evaluator, correct_initial
 from support.own_types import registry_of
 from support.plain import in_another_process, long_in_plain_python
 from support.process import run
@@ -15,7 +15,6 @@ from dap3d_core.interface import Joint, Point, Vector, number, point, vector
 from dap3d_core.kernels import cross, dot, eye, hstack, neg, normals, row, scale, skew, sub
 from dap3d_core.model import build_model
 from dap3d_core.scene import check
-from dap3d_core.simulation.initial.assemble import correct_initial
 
 REDUNDANT = {
     "door": mechanisms.door,
@@ -127,9 +126,6 @@ def test_lsq_and_standard_agree_where_rows_are_independent(name):
         assert other == pytest.approx(one, abs=1e-11 * np.max(np.abs(one)))
 
 
-# ------------------------------------------------------------------ scaled rows
-
-
 class Sized(Joint):
     """A revolute joint whose rows are all multiplied by ``size``."""
 
@@ -178,9 +174,6 @@ def test_the_motion_does_not_depend_on_the_size_of_rows(size):
     assert abs(plain.r[-1, 0, 1] + 0.5) > 0.1  # it has swung
     assert sized.r == pytest.approx(plain.r, abs=1e-10)
     assert sized.rdd[0] == pytest.approx(plain.rdd[0], abs=1e-12)
-
-
-# ------------------------------------------------------------------ which one is taken
 
 
 def test_auto_takes_lsq_where_rows_are_redundant():

@@ -143,14 +143,17 @@ def test_what_timings_cannot_tell_goes_by_evaluations(timing):
     assert "takes the least work of 3 settings" in advice.reason
 
 
-def test_evaluations_of_another_integrator_count_at_their_own_cost():
-    """One of radau costs a factorisation or more: few of them are no sign of little work."""
-    runs = [run("a", 20.0, 1e-7, repeats=1, rhs=2000), run("b", 30.0, 1e-7, repeats=1, rhs=300)]
-    assert recommend(runs, None, 1e-5).run is runs[0]
-
-
-def test_timings_that_can_tell_decide():
-    runs = [run("a", 20.0, 1e-7, spread=1.0, rhs=900), run("a", 23.0, 1e-7, spread=1.0, rhs=100)]
+@pytest.mark.parametrize(
+    ("timing", "integrator", "time_s", "evaluations"),
+    [
+        # of radau one costs a factorisation or more: few of them are no sign of little work
+        (dict(repeats=1), "b", 30.0, (2000, 300)),
+        (dict(spread=1.0), "a", 23.0, (900, 100)),  # timings that can tell
+    ],
+)
+def test_evaluations_do_not_decide(timing, integrator, time_s, evaluations):
+    runs = [run(name, t, 1e-7, rhs=rhs, **timing) for name, t, rhs in
+            zip(("a", integrator), (20.0, time_s), evaluations, strict=True)]  # fmt: skip
     assert recommend(runs, None, 1e-5).run is runs[0]
 
 

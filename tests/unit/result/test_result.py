@@ -4,6 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
+from support.internals import Evaluator, join, y_from_u
 from support.results import (
     ARM,
     MASS,
@@ -15,14 +16,10 @@ from support.results import (
     model_of,
     result_of,
 )
+from support.rotations import to_global
 
 import dap3d_core as dap
-from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.model.rotations import to_global
-from dap3d_core.model.state_layout import join, y_from_u
 from dap3d_core.result import ResultError, RunStatistics, UnknownNameError
-
-# ---------------------------------------------------------------------------- motion
 
 
 def test_stored_arrays_are_those_of_the_rows():
@@ -79,9 +76,6 @@ def test_stored_arrays_cannot_be_changed_by_accident():
 def test_rows_of_another_width_are_refused():
     with pytest.raises(ValueError, match=r"\(nt, 28\), not \(5, 4\)"):
         result_of(circling_scene(), np.zeros((5, 4)))
-
-
-# ---------------------------------------------------------------------------- joints
 
 
 def test_reaction_is_the_centripetal_force_and_its_opposite_on_the_ground():
@@ -189,9 +183,6 @@ def test_the_machine_is_made_once_and_only_when_needed():
     assert made == []
     _ = result.Jac, result.reaction("J1"), result.model
     assert made == [1]
-
-
-# ---------------------------------------------------------------------------- what the run says
 
 
 def test_what_the_run_says_of_itself():

@@ -250,10 +250,13 @@ def test_mistakes_of_a_part_stand_in_its_file(folder):
         assert (str(leg), leg.read_text().splitlines().index(new) + 1, key) in found
 
 
-def test_a_text_includes_nothing():
+def test_a_text_includes_nothing_and_an_expression_turns_nothing():
     scene = parse('[include.a]\nfile = "x.toml"\n')
     with pytest.raises(dap.SceneError, match="a text has no folder"):
         dap.compile(scene)
+    scene = dap.Scene(parameters={"a": 1.0})
+    with pytest.raises(dap.SceneError, match="expressions may move a sub-assembly, not turn it"):
+        dap.include(scene, "b", dap.load("pen1"), {"rpy": [0.0, 0.0, "= a"]})
 
 
 SLIDER = """
@@ -368,10 +371,3 @@ def test_points_that_are_left_out_are_those_of_the_part():
     fields = scene.joints["a/planet_and_ring"].fields
     assert fields["P_j"] == "a/ground O"
     assert "P_i" not in fields, "that is the hinge's"
-
-
-def test_a_turn_by_an_expression_is_refused():
-    scene = dap.Scene(parameters={"a": 1.0})
-    part = dap.load("pen1")
-    with pytest.raises(dap.SceneError, match="expressions may move a sub-assembly, not turn it"):
-        dap.include(scene, "b", part, {"rpy": [0.0, 0.0, "= a"]})

@@ -27,8 +27,9 @@ def test_a_long_run_whose_method_was_left_open_says_that_joint_is_quicker(
 
 
 def ran(residual, overlap=0.0):
-    return SimpleNamespace(name="moreau", largest_residual=residual, deepest=1e-12,
-                           friction_work=-2.0, overlap_at_start=overlap)  # fmt: skip
+    work = SimpleNamespace(largest_residual=residual, deepest=1e-12, friction_work=-2.0,
+                           overlap_at_start=overlap)  # fmt: skip
+    return SimpleNamespace(name="moreau", work=work)
 
 
 @pytest.mark.parametrize(("residual", "severity"), [(1e-4, "information"), (1e-2, "warning")])

@@ -79,13 +79,16 @@ def placed_shapes(shapes: CollisionShapes | None) -> PlacedShapes:
         none, zero, of_two = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 2))
         shapes = CollisionShapes(
             (), none, none, zero, np.zeros((0, 4)), zero, of_two.astype(np.int64), zero, none,
-            of_two.astype(np.int64), *np.zeros((2, 0, 0)), none,
+            of_two.astype(np.int64), np.zeros((0, 0)), np.zeros((0, 0)), none,
         )  # fmt: skip
     m = len(shapes.kind)
     solids = np.flatnonzero(shapes.kind != PLANE)
-    same = ("kind", "body", "at", "size", "corners", "vertices", "bits", "material", "mu", "e")
-    given = {name: np.ascontiguousarray(getattr(shapes, name)) for name in (*same, "apart")}
-    whole = {name: np.zeros(len(solids), dtype=np.int64) for name in ("small", "large")}
+    names = ("kind", "body", "at", "size", "corners", "vertices", "bits", "material", "mu", "e",
+             "apart")  # fmt: skip
+    given: dict[str, Any] = {name: np.ascontiguousarray(getattr(shapes, name)) for name in names}
+    whole: dict[str, Any] = {
+        name: np.zeros(len(solids), dtype=np.int64) for name in ("small", "large", "following")
+    }
     return PlacedShapes(
         **given,
         **whole,
@@ -100,7 +103,6 @@ def placed_shapes(shapes: CollisionShapes | None) -> PlacedShapes:
         sorted=np.zeros(len(solids)),
         cells=np.zeros((len(solids), 3), dtype=np.int64),
         head=np.zeros(2 * len(solids) + 1, dtype=np.int64),
-        following=np.zeros(len(solids), dtype=np.int64),
         pairs=np.zeros((ROOM, 2), dtype=np.int64),
         which=np.zeros((ROOM, 3), dtype=np.int64),
         found=np.zeros((ROOM, WIDTH)),

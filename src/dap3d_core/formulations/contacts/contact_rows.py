@@ -1,5 +1,6 @@
 """The contacts of a model at one state: gaps, rows, forces, as arrays of Python."""
 
+from collections.abc import Sequence
 from functools import cached_property, reduce
 from typing import Any
 
@@ -17,6 +18,8 @@ from dap3d_core.model.state_layout import split
 GAP, NORMAL = 0, 1
 FRICTION, SLIP, PLACE = slice(2, 5), slice(5, 8), slice(8, 11)
 REACH, FORCE, WIDTH = 11, slice(12, 15), 15
+#: Velocities that are set are met to this part of their size.
+HELD = 1e-9
 
 
 def length_of(vector: Floats) -> float:
@@ -127,7 +130,7 @@ class ContactRows:
         self.states = evaluator.states
         rows = self._stuck(u)
         D, own = rows.dense(), model.joint_row_count
-        self.D, self.G = D[:own], D[own:]
+        self.D, self.G, self._nu = D[:own], D[own:], rows.nu[:own]
         self.C = rows.C[own:].reshape(-1, 3)[:, 0]
         self._free: Floats | None = None
         self._free_multipliers: Any = None
@@ -146,10 +149,12 @@ class ContactRows:
         self._reaction = np.zeros((own, 3 * table.count))
         if own:
             held = self.inverse @ self.D.T
-            back = np.linalg.pinv(self.D @ held, rcond=1e-12) @ held.T
-            self.P = self.inverse - held @ back
-            if table.loads:
-                self._reaction = -back @ self.G.T
+            mobility = self.D @ held
+            self.P = self.inverse - held @ np.linalg.pinv(mobility, rcond=1e-12) @ held.T
+            if table.loads:  # of rows that depend on each other the least, as equations.py has them
+                s = 1.0 / np.sqrt(np.maximum(np.diag(mobility), 1e-300))
+                least = np.linalg.pinv(s[:, None] * mobility * s, rcond=1e-12)
+                self._reaction = -s[:, None] * (least @ (s[:, None] * held.T @ self.G.T))
         self.W = self.G @ self.P @ self.G.T
 
     @cached_property
@@ -221,6 +226,24 @@ class ContactRows:
     def change(self, dv: Floats) -> None:
         """Change the velocities by dv (6 n,)."""
         self.v, self._free, self._free_multipliers = self.v + dv, None, None
+
+    def follow(self, given: Sequence[tuple[Floats, float]] = ()) -> bool:
+        """Bring velocities onto the joints by impulses in them, and rows to what they are given.
+
+        Args:
+            given: rows (6 n + 6,), ground first, and changes of their rates.
+
+        Returns:
+            False where joints hold what a row is to change.
+        """
+        R = np.array([row[6:] for row, _ in given]).reshape(-1, len(self.v))
+        target = R @ self.v + [change for _, change in given]
+        for N, P, rates in ((self.D, self.inverse, self._nu), (R, self.P, target)):
+            if len(N):
+                held = P @ N.T
+                self.change(held @ np.linalg.pinv(N @ held, rcond=1e-12) @ (rates - N @ self.v))
+        missed, size = np.abs(R @ self.v - target), np.abs(target)
+        return bool(np.all(missed <= HELD * np.maximum(size.max(initial=0.0), 1.0)))
 
     @property
     def slip(self) -> Floats:

@@ -250,7 +250,7 @@ def _put(
             mode, way = 1.0, ways[c]
         elif table.mu_s[c] == 0.0:
             mode, way = 1.0, np.zeros_like(rate[across])
-        elif length_of(rate[across]) > ZERO * big:
+        elif length_of(rate[across]) > ZERO * max(big, _stops(table, rows, c)):
             has_force = table.mu[c] > 0.0 and np.any(force[across])
             along = -force[across] if has_force else rate[across]
             mode, way = 1.0, along / length_of(along)
@@ -262,6 +262,12 @@ def _put(
             found.near[c] = force @ frame if mode == 2.0 else normal * frame[0]
     if shares:
         _leave_to_others(table, rows, closed, found)
+
+
+def _stops(table: ContactTable, rows: ContactRows, c: int) -> float:
+    """The rate of slip that friction alone could change: less than a part of it is rounding."""
+    own = np.diag(rows.W)[3 * c : 3 * c + 3]
+    return float(table.mu_s[c] * rows.load[c] * own.max()) if table.alone[c] else 0.0
 
 
 def _leave_to_others(

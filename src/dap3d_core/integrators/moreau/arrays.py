@@ -23,9 +23,9 @@ MET = 14
 #: Reported rows of such contacts that there is room for at first.
 LOG_ROOM = 64
 #: Arrays of which a row belongs to a contact.
-OF_CONTACTS = ("bodies", "key", "group", "chosen", "J", "moved", "own", "gap", "mu", "e", "bias",
-               "r", "left", "collides", "closing", "x", "u", "z", "B", "push", "kept", "met",
-               "own_held", "x_bounce")  # fmt: skip
+OF_CONTACTS = ("bodies", "key", "group", "chosen", "J", "moved", "own", "own_held", "gap", "mu",
+               "e", "bias", "r", "left", "collides", "closing", "x", "u", "z", "B", "push", "kept",
+               "met", "x_bounce")  # fmt: skip
 
 
 def _integer() -> Scalar[int]:
@@ -40,20 +40,21 @@ def _real() -> Scalar[float]:
 class StepArrays(Arrays):
     """n bodies and ground, c contacts at most, d of them declared, k rows of joints.
 
-    None of it is read by a step that did not write it, but for what the last one leaves for reports.
+    A step reads nothing of it that it did not write, but for what the last one leaves for reports.
     """
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(
             ("integer", "key", "group", "chosen", "collides", "declared_gap", "declared_mode",
-             "row_start", "row_body", "row_place", "used", "place", "parent", "queue", "first_edge",
-             "next_edge", "edge_end", "slots"),
+             "row_start", "row_body", "row_place", "used", "place", "parent", "queue", "order",
+             "entry_start", "entries", "bits", "slots"),
             INTEGERS,
         ),
         **dict.fromkeys(("bodies", "declared_bodies", "declared_place"), INTEGER_MATRIX),
         **dict.fromkeys(
             ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "trial",
-             "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z", "B", "push",
+             "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z", "B",
+             "push",
              "kept", "met", "D", "declared_x", "log", "values", "vectors", "crossed", "answer",
              "felt", "bounce", "v_bounce", "x_bounce"),
             MATRIX,
@@ -72,9 +73,9 @@ class StepArrays(Arrays):
     chosen_count = _integer()
     used_count = _integer()
     matrix_size = _integer()  # numbers of K that are needed
-    stride = _integer()  # entry (r, c) of K is at stride r + shift + c
-    shift = _integer()
-    reach = _integer()  # entries beside the diagonal
+    width = _integer()  # numbers from row to row of K: all unknowns, or 6 where it has blocks
+    entry_count = _integer()  # blocks of K below the diagonal
+    bit_size = _integer()  # words of bits
     held_count = _integer()  # contacts that scratch of held ones is needed for
     # constants
     dense_size = _integer()  # unknowns up to which K is a square
@@ -115,9 +116,10 @@ class StepArrays(Arrays):
     place: Integers
     parent: Integers  # scratch of groups and of the order of bodies
     queue: Integers
-    first_edge: Integers
-    next_edge: Integers
-    edge_end: Integers
+    order: Integers
+    bits: Integers
+    entry_start: Integers  # (n + 2,) first of the blocks of K below the diagonal of each column
+    entries: Integers  # their rows
     # of contacts
     bodies: Integers  # (c, 2) i and j, ground 0
     key: Integers  # a number that a contact keeps
@@ -167,7 +169,7 @@ class StepArrays(Arrays):
     slots: Integers  # table of the contacts remembered
     K: Floats
     change: Floats
-    turned: Floats  # (18,)
+    turned: Floats  # (36,)
     log: Floats  # (room, MET) contacts at instants reported
     values: Floats  # (k, k), (k, k), (k, 3 c), (3 c, 3 c) of contacts that joints hold, once needed
     vectors: Floats
@@ -196,7 +198,9 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         **{name: np.zeros(n + 1) for name in (
             "margin", "shape_reach", "mass", "mass_inverse", "hit", "flies")},
         **{name: np.zeros(n + 1, dtype=np.int64) for name in (
-            "used", "place", "parent", "queue", "first_edge")},
+            "used", "place", "parent", "queue", "order")},
+        "entry_start": np.zeros(n + 2, dtype=np.int64),
+        **{name: np.zeros(0, dtype=np.int64) for name in ("bits", "entries")},
     }  # fmt: skip
     bodies["mass"][1:], bodies["mass_inverse"][1:] = model.mass, 1.0 / model.mass
     bodies["Jp"][1:] = model.Jp.reshape(-1, 9)
@@ -205,7 +209,10 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         far = np.linalg.norm(model.collisions.at, axis=1) + model.collisions.reach
         np.maximum.at(bodies["shape_reach"], model.collisions.body, far)
         bodies["shape_reach"][0] = 0.0
-    slots = 2 * remembered + 1
+    scratch: dict[str, Any] = {
+        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "y_bounce", "joint_y")},
+        **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
+    }
     arrays = StepArrays(
         shapes=placed_shapes(model.collisions),
         integer=np.zeros(len(StepArrays.indices("integer")), dtype=np.int64),
@@ -214,16 +221,15 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         **bodies,
         **own,
         **_declared(evaluator),
-        **_of_contacts(ROOM + model.contact_count, own["row_start"]),
-        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "y_bounce", "joint_y")},
+        **_of_contacts(ROOM + model.contact_count),
+        **scratch,
         slopes=np.zeros(2 * size),
         changed=np.zeros(size),
-        slots=np.zeros(slots, dtype=np.int64),
-        K=np.zeros((6 * n) ** 2 if 6 * n <= dense_size else dense_size**2),
+        slots=np.zeros(2 * remembered + 1, dtype=np.int64),
+        K=np.zeros(min(6 * n, dense_size) ** 2),
         change=np.zeros(6 * n),
-        turned=np.zeros(18),
+        turned=np.zeros(36),
         log=np.zeros((LOG_ROOM, MET)),
-        **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
     )
     arrays.dense_size, arrays.length = dense_size, model.length
     arrays.first_v_dot, arrays.first_lam = layout["v_dot"].start, layout["Lam"].start
@@ -231,20 +237,16 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     return arrays
 
 
-def _of_contacts(room: int, row_start: Integers) -> dict[str, Any]:
-    """Arrays of so many contacts, and of edges between bodies, by these and by rows of joints."""
+def _of_contacts(room: int) -> dict[str, Any]:
+    """Arrays of so many contacts."""
     widths = {"bodies": 2, "J": 36, "moved": 36, "own": 9, "own_held": 9, "B": 9, "met": MET,
               **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
     whole = ("bodies", "key", "group", "chosen", "collides")
-    found = {
+    return {
         name: np.zeros((room, widths[name]) if name in widths else room,
                        dtype=np.int64 if name in whole else float)
         for name in OF_CONTACTS
     }  # fmt: skip
-    edges = int((np.diff(row_start) ** 2).sum())
-    for name in ("next_edge", "edge_end"):
-        found[name] = np.zeros(2 * room + edges, dtype=np.int64)
-    return found
 
 
 def _joint_rows(evaluator: Evaluator) -> dict[str, Any]:
@@ -292,12 +294,15 @@ def grown(s: StepArrays) -> StepArrays:
     new: dict[str, Any] = {"shapes": with_room(s.shapes)}
     room = max(s.contact_count, s.shapes.point_count + len(s.declared_gap))
     if room > len(s.key):
-        new |= _of_contacts(room + room // 4, s.row_start)
+        new |= _of_contacts(room + room // 4)
         new["met"][: s.met_count] = s.met[: s.met_count]
     if 2 * s.met_count > len(s.log):
         new["log"] = np.zeros((4 * s.met_count, MET))
     if s.matrix_size > len(s.K):
         new["K"] = np.zeros(s.matrix_size)
+    for name, size in (("entries", s.entry_count), ("bits", s.bit_size)):
+        if size > len(getattr(s, name)):
+            new[name] = np.zeros(size + size // 4, dtype=np.int64)
     if s.held_count > len(s.felt) // 3:
         k, m = len(s.y), 3 * s.held_count
         new |= {"values": np.zeros((k, k)), "vectors": np.zeros((k, k))}

@@ -7,6 +7,9 @@ from dap3d_core.integrators.moreau.arrays import StepArrays
 from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
+#: Bits of a word.
+BITS = 32
+
 
 @compiled
 def root_of(parent: Integers, b: int) -> int:
@@ -54,88 +57,115 @@ def choose(s: StepArrays, group: int) -> None:
 
 @compiled
 def lay_out(s: StepArrays) -> bool:
-    """Lay out the matrix of a group, K; False without room."""
-    size = 6 * s.used_count
-    s.stride, s.shift, s.reach, s.matrix_size = size, 0, size, size * size
-    if size > s.dense_size:
-        s.reach = 6 * order_bodies(s) + 5
-        s.stride, s.shift = 3 * s.reach, s.reach
-        s.matrix_size = size * (s.stride + 1)
-    return s.matrix_size <= s.K.size
-
-
-@compiled
-def order_bodies(s: StepArrays) -> int:
-    """Order the bodies of a group so that those that feel each other are near; how near.
-
-    Source: Cuthill, McKee, Reducing the bandwidth of sparse symmetric matrices (1969).
-    """
-    connect(s)
-    for b in range(s.place.size):
-        s.place[b] = -1
-    done = 0
-    for q in range(s.used_count):
-        start = s.used[q]
-        if s.place[start] < 0:
-            end = walk(s, start, done)
-            far = s.queue[end - 1]
-            for k in range(done, end):
-                s.place[s.queue[k]] = -1
-            done = walk(s, far, done)
-    widest = 0
-    for q in range(done):
-        s.used[q] = b = s.queue[q]
-        edge = s.first_edge[b]
-        while edge >= 0:
-            widest = max(widest, abs(q - s.place[s.edge_end[edge]]))
-            edge = s.next_edge[edge]
-    return widest
+    """Lay out the matrix of a group, K, as a square or by blocks; False without room."""
+    n = s.used_count
+    s.width, s.matrix_size, s.entry_count = 6 * n, 36 * n * n, 0
+    if 6 * n > s.dense_size:
+        s.width, s.bit_size = 6, n * ((n + BITS - 1) // BITS)
+        if s.bit_size > s.bits.size:
+            return False
+        connect(s)
+        s.entry_count = order_bodies(s)
+        s.matrix_size = 36 * (n + 2 * s.entry_count)
+    return s.matrix_size <= s.K.size and s.entry_count <= s.entries.size
 
 
 @compiled
 def connect(s: StepArrays) -> None:
-    """List the neighbours of each body of a group; ``parent`` has their number."""
-    for b in range(s.parent.size):
-        s.first_edge[b], s.parent[b] = -1, 0
-    count = 0
+    """Put which bodies of a group feel each other, as bits."""
+    for k in range(s.bit_size):
+        s.bits[k] = 0
     for q in range(s.chosen_count):
         i, j = s.bodies[s.chosen[q], 0], s.bodies[s.chosen[q], 1]
         if i > 0 and j > 0:
-            count = add_edge(s, i, j, add_edge(s, j, i, count))
+            join(s, s.place[i], s.place[j])
     for k in range(s.y.size):
         for p in range(s.row_start[k], s.row_start[k + 1]):
-            for q in range(s.row_start[k], s.row_start[k + 1]):
-                if p != q:
-                    count = add_edge(s, s.row_body[p], s.row_body[q], count)
+            for q in range(s.row_start[k], p):
+                join(s, s.place[s.row_body[p]], s.place[s.row_body[q]])
 
 
 @compiled
-def add_edge(s: StepArrays, i: int, j: int, count: int) -> int:
-    """Add j to the neighbours of i; the number of edges."""
-    s.edge_end[count], s.next_edge[count] = j, s.first_edge[i]
-    s.first_edge[i] = count
-    s.parent[i] += 1
-    return count + 1
+def join(s: StepArrays, i: int, j: int) -> None:
+    """Set the bits of two bodies by place."""
+    words = (s.used_count + BITS - 1) // BITS
+    s.bits[i * words + j // BITS] |= 1 << (j % BITS)
+    s.bits[j * words + i // BITS] |= 1 << (i % BITS)
 
 
 @compiled
-def walk(s: StepArrays, start: int, done: int) -> int:
-    """Queue what is connected with a body, level by level, few neighbours first; the new length."""
-    s.queue[done], s.place[start] = start, done
-    at, end = done, done + 1
-    while at < end:
-        first, edge = end, s.first_edge[s.queue[at]]
-        while edge >= 0:
-            b = s.edge_end[edge]
-            if s.place[b] < 0:
-                s.place[b], k = 0, end
-                while k > first and s.parent[s.queue[k - 1]] > s.parent[b]:
-                    s.queue[k] = s.queue[k - 1]
-                    k -= 1
-                s.queue[k] = b
-                end += 1
-            edge = s.next_edge[edge]
-        for k in range(first, end):
-            s.place[s.queue[k]] = k
-        at += 1
-    return end
+def bit_count(x: int) -> int:
+    """The number of bits of a word."""
+    x = x - ((x >> 1) & 0x55555555)
+    x = (x & 0x33333333) + ((x >> 2) & 0x33333333)
+    x = (x + (x >> 4)) & 0x0F0F0F0F
+    return ((x * 0x01010101) >> 24) & 0xFF
+
+
+@compiled
+def order_bodies(s: StepArrays) -> int:
+    """Order the bodies of a group by least degree, as they are eliminated; entries below diagonals.
+
+    Those of column q are ``entries[entry_start[q] : entry_start[q + 1]]``, as far as there is
+    room. Source: Rose, A graph-theoretic study of the numerical solution of
+    sparse positive definite systems of linear equations (1972).
+    """
+    n, count = s.used_count, 0
+    for v in range(n):
+        s.parent[v] = degree_of(s, v)
+        s.order[v] = -1
+    for q in range(n):
+        best = -1
+        for v in range(n):
+            if s.order[v] < 0 and (best < 0 or s.parent[v] < s.parent[best]):
+                best = v
+        s.order[best], s.queue[q], s.entry_start[q] = q, s.used[best], count
+        count = eliminate(s, best, count)
+    s.entry_start[n] = count
+    for e in range(min(count, s.entries.size)):
+        s.entries[e] = s.order[s.entries[e]]
+    for q in range(n):
+        s.used[q] = s.queue[q]
+        s.place[s.used[q]] = q
+    return count
+
+
+@compiled
+def degree_of(s: StepArrays, v: int) -> int:
+    """Bodies that one feels."""
+    words, found = (s.used_count + BITS - 1) // BITS, 0
+    for w in range(v * words, (v + 1) * words):
+        found += bit_count(s.bits[w])
+    return found
+
+
+@compiled
+def eliminate(s: StepArrays, v: int, count: int) -> int:
+    """Let the bodies that one feels feel each other in its place, and list them; the new count."""
+    words, bits = (s.used_count + BITS - 1) // BITS, s.bits
+    for u in range(s.used_count):
+        if (bits[v * words + u // BITS] >> (u % BITS)) & 1 == 0:
+            continue
+        for w in range(words):
+            bits[u * words + w] |= bits[v * words + w]
+        for b in (u, v):
+            bits[u * words + b // BITS] ^= 1 << (b % BITS)
+        s.parent[u] = degree_of(s, u)
+        if count < s.entries.size:
+            s.entries[count] = u
+        count += 1
+    return count
+
+
+@compiled
+def block_at(s: StepArrays, p: int, q: int) -> int:
+    """Where the block of bodies p and q, by place, begins in K; its rows are ``width`` apart."""
+    if s.width != 6 or s.used_count == 1:
+        return 6 * (p * s.width + q)
+    if p == q:
+        return 36 * p
+    first, last = min(p, q), max(p, q)
+    e = s.entry_start[first]
+    while s.entries[e] != last:
+        e += 1
+    return 36 * (s.used_count + 2 * e + (1 if p < q else 0))

@@ -19,7 +19,8 @@ import math
 import numpy as np
 
 from dap3d_core.integrators.moreau.arrays import StepArrays
-from dap3d_core.integrators.moreau.dense import solve_banded
+from dap3d_core.integrators.moreau.dense import solve_blocks, solve_square
+from dap3d_core.integrators.moreau.groups import block_at
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -31,7 +32,7 @@ HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
 TINY = 1e-300
-#: Unknowns up to which the matrix of a pass is a square; that of more has a band.
+#: Unknowns up to which the matrix of a pass is a square; that of more has blocks.
 SMALL = 60
 
 
@@ -274,7 +275,7 @@ def put_rest(s: StepArrays, v: Floats, weight: float, R: Floats) -> float:
 
 @compiled
 def size_of(x: Floats, m: float, spin: Floats) -> float:
-    """x . M x of six numbers, by the mass and the moments of inertia of a body."""
+    """X . M x of six numbers, by the mass and the moments of inertia of a body."""
     total = 0.0
     for k in range(3):
         turned = spin[3 * k] * x[3] + spin[3 * k + 1] * x[4] + spin[3 * k + 2] * x[5]
@@ -313,7 +314,10 @@ def try_pass(s: StepArrays, weight: float, merit: float) -> float:
     for q in range(s.used_count):
         for k in range(6):
             s.change[6 * q + k] = -s.rest[s.used[q], k]
-    solve_banded(s.K, s.change, 6 * s.used_count, s.stride, s.shift, s.reach)
+    if s.width == 6 * s.used_count:
+        solve_square(s.K, s.change, s.width)
+    else:
+        solve_blocks(s.K, s.change, s.used_count, s.entry_start, s.entries, s.parent, s.turned)
     part = 1.0
     for _ in range(CUTS):
         for q in range(s.used_count):
@@ -339,9 +343,10 @@ def assemble(s: StepArrays, weight: float) -> None:
         K[k] = 0.0
     for q in range(s.used_count):
         spin, m = s.spin[s.used[q]], s.mass[s.used[q]]
+        start = block_at(s, q, q)
         for i in range(3):
-            K[s.stride * (6 * q + i) + s.shift + 6 * q + i] = m
-            at = s.stride * (6 * q + 3 + i) + s.shift + 6 * q + 3
+            K[start + i * s.width + i] = m
+            at = start + (3 + i) * s.width + 3
             K[at], K[at + 1], K[at + 2] = spin[3 * i], spin[3 * i + 1], spin[3 * i + 2]
     for q in range(s.chosen_count):
         c = s.chosen[q]
@@ -353,13 +358,13 @@ def assemble(s: StepArrays, weight: float) -> None:
                 for other in range(2):
                     row = s.place[s.bodies[c, other]]
                     if row >= 0:
-                        add_contact(s, 6 * row, 6 * first, s.J[c], 6 * other, turned)
+                        add_contact(s, block_at(s, row, first), s.J[c], 6 * other, turned)
     for k in range(s.y.size):
         for p in range(s.row_start[k], s.row_start[k + 1]):
             for q in range(s.row_start[k], s.row_start[k + 1]):
-                row, first = 6 * s.place[s.row_body[p]], 6 * s.place[s.row_body[q]]
+                start = block_at(s, s.place[s.row_body[p]], s.place[s.row_body[q]])
                 for i in range(6):
-                    at = s.stride * (row + i) + s.shift + first
+                    at = start + i * s.width
                     part = weight * s.s[k] * s.D[p, i]
                     for j in range(6):
                         K[at + j] += part * s.D[q, j]
@@ -376,11 +381,11 @@ def put_turned(B: Floats, weight: float, J: Floats, side: int, out: Floats) -> N
 
 
 @compiled
-def add_contact(s: StepArrays, row: int, first: int, J: Floats, side: int, turned: Floats) -> None:
-    """Add J^T of one body times ``turned`` of another one."""
+def add_contact(s: StepArrays, start: int, J: Floats, side: int, turned: Floats) -> None:
+    """Add J^T of one body times ``turned`` of another one to their block of K."""
     K = s.K
     for i in range(6):
         a, b, c = J[side + i], J[12 + side + i], J[24 + side + i]
-        at = s.stride * (row + i) + s.shift + first
+        at = start + i * s.width
         for k in range(6):
             K[at + k] += a * turned[k] + b * turned[6 + k] + c * turned[12 + k]

@@ -231,7 +231,7 @@ class FunctionCompiler(Expressions):
         if any(isinstance(n, (ast.Break, ast.Continue)) for n in ast.walk(node)):
             self.refuse(node, "break or continue in a loop over a tuple", "loop over a range")
         items, names = t.items_of(over), stored_names(node.target)
-        if not all(map(t.is_constant, items)) or names & stored_names(*node.body):
+        if not all(map(t.is_constant, items)) or names & self._stored_but_for(node.target):
             names = set()
         for item in items:
             if names:
@@ -240,7 +240,12 @@ class FunctionCompiler(Expressions):
                 self._assign(node.target, item)
             self.statements(node.body)
         for name in names:
-            self.constants.pop(name)
+            self.constants.pop(name, None)
+
+    def _stored_but_for(self, target: ast.expr) -> set[str]:
+        """Names that the function assigns to elsewhere than in the target of a loop."""
+        here = {id(n) for n in ast.walk(target)}
+        return {n.id for n in _stores(self.node) if id(n) not in here}
 
     def _count(self, node: ast.For, call: ast.Call) -> None:
         """``for k in range(...)``; assignments to k do not change the count."""
@@ -284,11 +289,15 @@ def _named(target: ast.expr, value: t.Value) -> dict[str, t.Value]:
     return {name: x for part, item in parts for name, x in _named(part, item).items()}
 
 
+def _stores(node: ast.AST) -> list[ast.Name]:
+    names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
+    return [n for n in names if isinstance(n.ctx, ast.Store)]
+
+
 @cache
-def stored_names(*nodes: ast.AST) -> set[str]:
-    """Names that a function, or statements, assign to."""
-    names = (n for node in nodes for n in ast.walk(node) if isinstance(n, ast.Name))
-    return {n.id for n in names if isinstance(n.ctx, ast.Store)}
+def stored_names(node: ast.AST) -> set[str]:
+    """Names that a function, or a part of it, assigns to."""
+    return {n.id for n in _stores(node)}
 
 
 def definition(function: Callable[..., Any]) -> ast.FunctionDef:

@@ -164,7 +164,8 @@ def items_of(value: Value) -> tuple[Value, ...]:
 
 def is_constant(value: Value) -> bool:
     """True for a number that is known, or a tuple of such."""
-    return value.constant is not None or (bool(value.items) and all(map(is_constant, value.items)))
+    is_tuple = isinstance(value.type, Tuple) and len(value.items) == len(value.type.items)
+    return value.constant is not None or (is_tuple and all(map(is_constant, value.items)))
 
 
 def wider(*types: Any) -> Any:

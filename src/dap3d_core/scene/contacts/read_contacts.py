@@ -120,9 +120,10 @@ def read_friction(
             name = force.name if len(grips) == 1 else f"{force.name}#{k + 1}"
             values = SMOOTH | joint.values | HIDDEN | {"e": 0.0, "part": float(k)}
             values |= {n: given.get(n) for n in ("mu", "mu_s")} | {"joint": joint.name}
+            values["shared"] = given.get("shared")
             if "radius" in grip.layout.numbers and "radius" not in joint.values:
-                values["radius"] = given.get("radius")
-                if values["radius"] is None and k + 1 == len(grips):
+                values["radius"] = given.get("radius") or 1.0
+                if given.get("radius") is None and k + 1 == len(grips):
                     what = f"is missing, which friction in {joint.type_info.type.keyword} needs"
                     report.add((*key, "radius"), MISSING, what)
             found.append(Instance(name, grip, joint.bodies, (), values))

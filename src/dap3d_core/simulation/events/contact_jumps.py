@@ -33,7 +33,7 @@ from dap3d_core.result.note import information
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.scene.errors import MISSING
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps
+from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps, rows_to
 
 #: Gaps, m of a scene of ordinary size, below which bodies touch: in a run, and where it begins.
 TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
@@ -41,6 +41,8 @@ TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
 HELD = 1e-10
 #: Slip, m/s, that is stopped where it goes through zero.
 STOPPED = 1e-6
+#: Mobility of a slip, as a part of that of free bodies, below which it is the pose that stops it.
+DEAD = 1e-12
 #: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 500, 1e-6
 #: So many steps within this part of the run are too many: it would not come to an end.
@@ -114,21 +116,24 @@ class ContactJumps(Jumps):
             raise SceneError([self._overlap(int(k), -gaps[k]) for k in beyond])
         self._resolve(integration, [], TOUCHING_AT_START * length)
 
-    def _refuse_prescribed(self, rows: ContactRows, closed: list[int]) -> None:
-        """SimulationError: the joints leave no impulse of a contact that closes an effect."""
-        limit = -AT_REST * self._evaluator.model.length
+    def _movable(self, rows: ContactRows, closed: list[int]) -> list[int]:
+        """Contacts that joints leave an effect; those that touch a body that they hold do nothing.
+
+        Raises:
+            SimulationError: one closes, and joints prescribe that.
+        """
+        movable, limit = list[int](), -AT_REST * self._evaluator.model.length
         for c in closed:
             row = rows.G[3 * c]
-            if self.table.alone[c]:
-                continue
-            if rows.W[3 * c, 3 * c] > HELD * (row @ rows.inverse @ row):
-                continue
-            if rows.slip[c, 0] < limit or rows.free[3 * c] < limit:
+            if self.table.alone[c] or rows.W[3 * c, 3 * c] > HELD * (row @ rows.inverse @ row):
+                movable.append(c)
+            elif rows.slip[c, 0] < limit or rows.free[3 * c] < limit:
                 raise SimulationError(
                     f"the run stopped at t = {rows.t:.9g} s: contact {self.table.names[c]} closes, "
                     "and joints or drivers prescribe the motion of its bodies: nothing that it "
                     "pushes with can stop them"
                 )
+        return movable
 
     def _overlap(self, k: int, depth: float) -> Mistake:
         """What is said of a contact whose gap is negative at the start."""
@@ -228,11 +233,27 @@ class ContactJumps(Jumps):
         states: Mapping[int, Floats],
         title: str,
     ) -> tuple[Floats, float]:
-        """Refused: what contacts make of it is not known yet."""
-        raise SimulationError(
-            f"the run stopped at t = {integration.t:.9g} s: {title} sets velocities or "
-            "states, which a scene with contacts does not take yet; apply a force instead"
-        )
+        """As of ``Jumps``: joints carry it, and what then approaches collides.
+
+        Raises:
+            SimulationError: the joints do not allow such velocities.
+        """
+        evaluator, t, u = self._evaluator, integration.t, self._state_of(integration)
+        rows, own = ContactRows(self.table, t, u), evaluator.states.copy()
+        if not rows.follow(rows_to(u, bodies)):
+            raise self._impossible(t, title, bodies)
+        for first, numbers in states.items():
+            own[first : first + len(numbers)] = numbers
+        after = rows.with_velocities(rows.v)
+        v = u[-len(rows.v) :]
+        work = 0.5 * float(rows.v @ rows.M @ rows.v - v @ rows.M @ v)
+        self._go_on(integration, u, rows, np.zeros_like(v), own, work)
+        self.settle(integration)
+        return after, work
+
+    def settle(self, integration: Integration) -> None:
+        """Find velocities and modes anew, where joints have ended or velocities were set."""
+        self._resolve(integration, [], TOUCHING * self._evaluator.model.length)
 
     def _gaps(self, integration: Integration) -> Floats:
         u = self._state_of(integration)
@@ -267,7 +288,7 @@ class ContactJumps(Jumps):
         closed = [c for c in range(table.count) if c not in beyond
                   and (before[c] > 0.5 or near[c] or (c, 0) in ended)]  # fmt: skip
         sliding, leaving, stopped = self._what_ended(rows, outputs, before, ended)
-        self._refuse_prescribed(rows, closed)
+        closed = self._movable(rows, closed)
         impact = collide(table, rows, closed, evaluator.model.length)
         try:
             modes = find_modes(table, rows, closed, sliding, leaving)
@@ -364,8 +385,14 @@ class ContactJumps(Jumps):
         self._go_on(integration, u, rows, moved, states, float(np.sum(impact.work)))
 
     def _stop(self, rows: ContactRows, c: int) -> None:
-        """Stop the slip of a contact, rounding of zero, without a change of its normal velocity."""
+        """Stop the slip of a contact, rounding of zero, without a change of its normal velocity.
+
+        At a dead centre it passes through zero while the mechanism moves on.
+        """
         which = rows.rows_of([c])
+        free = np.einsum("ri,ij,rj->r", rows.G[which], rows.inverse, rows.G[which])
+        if np.diag(rows.W)[which].max() < DEAD * free.max():
+            return
         A, u = rows.W[np.ix_(which, which)], rows.slip[c].copy()
         u[: self.table.across(c).start] = 0.0
         x = np.zeros(len(rows.G))

@@ -408,6 +408,8 @@ class EventLocator:
                 EventRecord(name=name, t=t, direction=0, kind="engage", u=u, u_after=after,
                            work=work)
             )  # fmt: skip
+        elif ended and self.jumps is not None:
+            self.jumps.settle(integration)
         if switched := [*ended, *engaged]:
             self._of_joints.refuse_endless(t, switched, float(integration.work.times[-1]))
         return bool(switched)

@@ -4,24 +4,21 @@ import json
 import tomllib
 
 import pytest
-from click.testing import CliRunner
+from support.command_line import output_of
 from support.derived_types import Cam
+from support.internals import specs_of
 from support.own_types import registry_of
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.cli.app import dap3d
 from dap3d_core.cli.commands.describe_example import example_of
-from dap3d_core.interface.fields import specs_of
 
 TYPES = sorted(dap.load_registry().sources)
 each = pytest.mark.parametrize(("kind", "keyword"), TYPES, ids=["-".join(t) for t in TYPES])
 
 
 def described(keyword, *options, width=80):
-    done = CliRunner().invoke(dap3d, ["describe", keyword, *options], env={"COLUMNS": str(width)})
-    assert done.exit_code == 0, done.output
-    return done.output
+    return output_of("describe", keyword, *options, columns=width)
 
 
 @pytest.mark.every(6)

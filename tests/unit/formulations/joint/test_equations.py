@@ -4,15 +4,13 @@ import attrs
 import numpy as np
 import pytest
 from support import trees
-from support.internals import u_from_y
+from support.internals import correct_initial, pose, u_from_y
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.assembly.arrays import TOLERANCE_C, TOLERANCE_V
 from dap3d_core.formulations import PROJECT
-from dap3d_core.interface.body_pose import pose
 from dap3d_core.simulation import CompiledModel
-from dap3d_core.simulation.initial.assemble import correct_initial
 
 #: Accelerations and multipliers of two factorisations of equations with condition numbers up to
 #: some 1e3 differ by rounding times that.

@@ -20,9 +20,6 @@ def start(rhs, y0, times, project=toys.no_constraint, report=toys.plain_report, 
     return run
 
 
-# ------------------------------------------------------------------ formulas
-
-
 @compiled
 def predicted(work, h, k):
     adams.update_coefficients(work, h, k)
@@ -59,9 +56,6 @@ def test_constants_are_those_of_the_literature():
     """|gamma*_j| of HNW, table III.1.2."""
     known = [1, 1 / 2, 1 / 12, 1 / 24, 19 / 720, 3 / 160, 863 / 60480]
     assert adams.make_table()[adams.CONSTANT, :7] == pytest.approx(known, rel=1e-14)
-
-
-# ------------------------------------------------------------------ accuracy
 
 
 def test_error_is_proportional_to_the_tolerance():
@@ -125,9 +119,6 @@ def test_trailing_components_do_not_steer_the_step():
     finish(alone), finish(longer)
     assert alone.statistics == longer.statistics
     assert np.array_equal(alone.y, longer.y[:2])
-
-
-# ------------------------------------------------------------------ bookkeeping and trouble
 
 
 def test_chunks_change_no_bit():

@@ -6,11 +6,10 @@ import sys
 import numpy as np
 import pytest
 from support import mechanisms, problems
-from support.internals import compiled
+from support.internals import compiled, store_reference_pivots
 from support.plain import in_another_process, jit_is_on, long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.formulations.stabilized_index2.stage_equations import evaluate_stage, keep_frames
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.radau.integration import RadauIntegration, estimate_tolerances
@@ -28,9 +27,6 @@ def solve_at(t, h, y, multipliers, work, system, loops, tangent, matrix):
     evaluate_stage(t, y, multipliers, matrix.held, work.R[1], work.G[1], system, loops)
     keep_frames(system.body, work.frames[0])
     solve_first(h, work, system, tangent, matrix)
-
-
-# ---------------------------------------------------------------------------- tangent
 
 
 def sprung():
@@ -113,9 +109,6 @@ def test_tangent_is_that_of_all_equations(scene, h):
     expected = np.concatenate([residual, of_rows.ravel()])
     size = max(np.max(np.abs(term)) for term in (s * change, *terms, expected))
     assert np.max(np.abs(left - expected)) < 2e-8 * size
-
-
-# ---------------------------------------------------------------------------- method
 
 
 def test_tolerances_of_the_estimate_keep_their_ratio():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.internals import LoopArrays, call_loop, loop_list, specs_of
 
 from dap3d_core.interface import (
     Body,
@@ -18,10 +19,8 @@ from dap3d_core.interface import (
     vector,
 )
 from dap3d_core.interface.codegen.compile_loops import write
-from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels import add
 from dap3d_core.kernels.runtime import loop_support
-from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_modules import build
 
 ZERO = (0.0, 0.0, 0.0)

@@ -6,12 +6,12 @@ import warnings
 
 import numpy as np
 import pytest
+from support.internals import call_kinds
 from support.own_types import registry_of
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.assembly.arrays import ANGLE
-from dap3d_core.assembly.evaluate import call_kinds
 from dap3d_core.interface import (
     REQUIRED,
     Body,

@@ -4,11 +4,12 @@ Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py
 import json
 
 import pytest
+from support.internals import FLOAT, INT
 from support.plain import jit_is_on
 from support.problems import short_runs
 from support.process import REPOSITORY, run
 
-from dap3d_core.kernels.compiler.types import FLOAT, INT, Known, Struct
+from dap3d_core.kernels.compiler.types import Known, Struct
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -122,11 +123,38 @@ NOT_CALLED = {
         "bend flat_directions part_best touch_convex",
         "assembly.collisions.manifold": "turn outline clip tangents spread inside crossing "
         "at_plane_along put_points points_within",
-        "assembly.collisions.broad_phase": "meet place_of grid_pairs",
-        "assembly.collisions.find": "touch",
-        "integrators.moreau.dense": "solve_dense",
+        "assembly.collisions.broad_phase": (
+            "find_pairs add_pair meet ranked place_of fill_cells grid_pairs"
+        ),
+        "assembly.collisions.placed_shapes": "place_shapes",
+        "assembly.collisions.find": "has_formula touch find_touches",
+        "integrators.moreau.dense": (
+            "solve_dense solve_square solve_blocks invert multiply take take_from"
+        ),
         "integrators.moreau.gauss_seidel": "sweep_bodies sweep_contacts change_of",
-        "integrators.moreau.integration": "state_at goes_on take_state",
+        "integrators.moreau.contact_set": (
+            "find_contacts place_poses axes_of turn_tensor put_touch put_frame evaluate_rows "
+            "put_declared"
+        ),
+        "integrators.moreau.free_motion": "move_freely normalise size_of largest_rate",
+        "integrators.moreau.groups": (
+            "root_of find_groups choose lay_out connect join bit_count order_bodies degree_of "
+            "eliminate block_at"
+        ),
+        "integrators.moreau.held": "refine_held keep take_kept put_crossed put_answer put_felt",
+        "integrators.moreau.impulses": (
+            "slot_of recall remember mode_of keep_for_reports complete_rows complete_forces"
+        ),
+        "integrators.moreau.newton": (
+            "put_projected put_slopes put_missed put_velocities clear add_pull times_inverse "
+            "add_inverse velocity_of speed_of left_at residual_of newton exchange put_rest "
+            "size_of solve_round try_pass assemble put_turned add_contact"
+        ),
+        "integrators.moreau.problem": "prepare_problem solve judge sweep finish refine_groups",
+        "integrators.moreau.step": (
+            "advance goes_on state_at meet take_velocities put_margins length_of deepest_of "
+            "put_bias put_hits work_done move part finish"
+        ),
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",
         "formulations.jumps.rounds": "kick has_crossed stop",

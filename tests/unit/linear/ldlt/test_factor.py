@@ -75,9 +75,6 @@ def test_scaled_blocks_are_those_of_the_scaled_jacobian():
     assert out[case.places] == pytest.approx(case.dense @ (scaling @ a), abs=1e-12)
 
 
-# ------------------------------------------------------------------ small pivots
-
-
 def weak_case():
     """A wheel whose joint 2 has a row 1e-6 of its length; the place of that row among all rows."""
     case = full_case("wheel")

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.graphs import GRAPHS, RANDOM, Case, chain, check_solution, star
+from support.internals import make_plan
 from support.nets import fourbars, ladder, plate_net, rod_net
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.linear.ldlt import plan
-from dap3d_core.linear.ldlt.plan import make_plan
 from dap3d_core.linear.ordering import elimination_order, supernodes
 from dap3d_core.linear.ordering.elimination_order import dissect, order_nodes
 from dap3d_core.linear.rank import rank
@@ -23,9 +23,6 @@ EPS = np.finfo(float).eps
 def arguments(graph):
     n, joints = graph
     return n, [slots for slots, _ in joints], [rows for _, rows in joints]
-
-
-# ------------------------------------------------------------------ fill and work
 
 
 @pytest.mark.parametrize("net", [rod_net, plate_net])
@@ -97,9 +94,6 @@ def test_trees_are_not_dissected(graph, monkeypatch):
     """Their fronts are narrow: no other order is tried, no panel made."""
     monkeypatch.delattr(elimination_order, "dissect")
     assert order_nodes(*arguments(graph)).panels == ()
-
-
-# ------------------------------------------------------------------ panels
 
 
 @pytest.fixture(params=[0.3, 0.9] if jit_is_on() else [0.3])
@@ -217,9 +211,6 @@ def test_small_pivots_of_panels_are_counted_or_dropped(panels_everywhere):
     wanted = np.linalg.solve(D @ D.T, np.delete(gamma, weak))
     scale = 1e3 * EPS * np.linalg.cond(D) ** 2 * np.max(np.abs(wanted))
     assert np.delete(multipliers, weak) == pytest.approx(wanted, abs=scale)
-
-
-# ------------------------------------------------------------------ once for all steps
 
 
 def test_the_program_is_found_once_for_all_runs_and_steps(monkeypatch):

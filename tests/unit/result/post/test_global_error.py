@@ -137,14 +137,15 @@ def test_a_time_of_tenfold_growth():
     assert found.meaningless_from == pytest.approx(6.1)
 
 
-@pytest.mark.parametrize("power", [1.0, 2.0, 8.0])
-def test_powers_of_time_are_no_exponentials(power):
-    assert growing(lambda t: 1e-9 * t**power).tenfold is None
-
-
-def test_little_growth_is_none():
-    """Two decades in all, of which nobody can say how they went on."""
-    assert growing(lambda t: 1e-9 * 10.0 ** (0.2 * t)).tenfold is None
+@pytest.mark.parametrize(
+    "law",
+    [
+        *(lambda t, power=power: 1e-9 * t**power for power in (1.0, 2.0, 8.0)),
+        lambda t: 1e-9 * 10.0 ** (0.2 * t),  # two decades in all: nobody can say how they go on
+    ],
+)
+def test_powers_of_time_and_little_growth_are_no_exponentials(law):
+    assert growing(law).tenfold is None
 
 
 def test_the_tightest_tolerance_has_no_estimate_and_says_so():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.internals import correct_initial
 from support.mechanisms import (
     bent_chain,
     bricard,
@@ -15,7 +16,6 @@ from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.linear.rank import rank
-from dap3d_core.simulation.initial.assemble import correct_initial
 from dap3d_core.simulation.redundancy import redundancy
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 
@@ -41,9 +41,6 @@ def elsewhere_of(scene):
     u = correct_initial(compiled.evaluator, compiled.model.u0).u
     found = compiled.redundancy(u)
     return found, redundancy_elsewhere(compiled.evaluator, u, found)
-
-
-# ------------------------------------------------------------------ who shares what
 
 
 def test_separate_loops_are_separate_groups():
@@ -116,9 +113,6 @@ def test_many_four_bars_are_counted_beyond_a_thousand_rows():
     found = dap.compile(four_bar_row(80, 0.3)).redundancy()
     assert found.rank.method == "elimination"
     assert (found.rank.rows, found.rank.redundant, found.rank.dof) == (1205, 240, 1)
-
-
-# ------------------------------------------------------------------ everywhere or here alone
 
 
 @pytest.mark.parametrize(
@@ -195,9 +189,6 @@ def test_the_count_does_not_depend_on_how_well_the_start_was_closed():
     assert max(left_open) > 1e-12  # some of them are far above rounding
 
 
-# ------------------------------------------------------------------ whether they agree
-
-
 def test_drivers_that_contradict_each_other_are_named():
     """Rates 1 and 2 for one angle: the unit combination of the two rows misses by 1 / sqrt(2)."""
     found = dap.compile(two_motors()).redundancy()
@@ -241,9 +232,6 @@ def test_joints_that_are_merely_open_contradict_nothing(scene):
     start = correct_initial(compiled.evaluator, compiled.model.u0)
     assert compiled.redundancy().contradictions == ()
     assert compiled.redundancy(start.u).contradictions == ()
-
-
-# ------------------------------------------------------------------ what stays unique
 
 
 def test_reactions_in_the_plane_of_a_four_bar_are_unique():
