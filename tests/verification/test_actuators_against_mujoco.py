@@ -94,3 +94,63 @@ def test_activation_follows_its_control(tmp_path):
     names = [n for n, f in scene.forces.items() if f.fields.get("activation")]
     states = [result.quantity(f"{name}.z").values[-1] for name in names]
     np.testing.assert_allclose(states, oracle.data.act, rtol=0, atol=1e-4)
+
+
+TENDON = """<mujoco><default><tendon stiffness="40"/></default><worldbody>
+  <site name="hook" pos="0.2 0 2"/><body name="a" pos="0 0 1"><freejoint name="fly"/>
+  <geom type="box" size="0.1 0.2 0.15" pos="0.05 0 0"/><site name="eye" pos="0.1 0.1 0.1"/></body>
+  <body name="b" pos="1 0 1"><joint name="b" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/>
+  <site name="end" pos="0.4 0 0.1"/></body></worldbody><tendon>
+  <spatial damping="2"><site site="hook"/><site site="eye"/></spatial>
+  <spatial stiffness="15" springlength="0.3"><site site="end"/><site site="eye"/></spatial>
+  <spatial name="bent" stiffness="1"><site site="hook"/><site site="end"/><site site="eye"/>
+  </spatial></tendon></mujoco>"""
+
+
+def test_tendons_between_two_sites_are_springs_and_dampers(tmp_path):
+    """Of their class, at rest as the file draws them or at a length; those that bend are said."""
+    path, rng = tmp_path / "a.xml", np.random.default_rng(6)
+    path.write_text(TENDON)
+    oracle = Oracle(path)
+    oracle.model.tendon_stiffness[2] = 0.0
+    for _ in range(3):
+        positions, rates = oracle.randomise(rng)
+        scene, report = dap.import_model(path, positions=positions, rates=rates)
+        assert [one.text for one in report.left_out] == [
+            "forces and limits of spatial tendons but between two sites"
+        ]
+        result = dap.simulate(scene, t_end=0.0)
+        for b, name in enumerate("ab", 1):
+            k = list(scene.bodies).index(name)
+            found = np.concatenate([result.rdd[0, k], result.wd[0, k]])
+            expected = oracle.acceleration(b, oracle.group(b)[1])
+            atol = 1e-10 * np.abs(oracle.data.qacc).max()
+            np.testing.assert_allclose(found, expected, rtol=0, atol=atol)
+
+
+@pytest.mark.parametrize("engine", ["events", "stepping"])
+def test_a_tendon_at_its_limit_holds(tmp_path, engine):
+    """A body hangs by a point beside its centre: accelerations as of MuJoCo's hard limit.
+
+    Extrapolated from impedances of 2e-4 and 1e-4 to 1e-7; a step of 1e-6 s is off by its length.
+    """
+    from support.hard_mujoco import HardOracle
+
+    path = tmp_path / "a.xml"
+    path.write_text("""<mujoco><worldbody><site name="hook" pos="0 0 2"/>
+      <body name="a" pos="0 0 1.5"><freejoint/>
+      <geom type="box" size="0.1 0.2 0.15" pos="0.3 0 0"/><site name="eye"/></body></worldbody>
+      <tendon><spatial name="rope" range="0 0.5"><site site="hook"/><site site="eye"/></spatial>
+      </tendon></mujoco>""")
+    oracle = HardOracle(path)
+    oracle.data.qpos[2] -= 1e-9  # touches from where it is beyond its limit
+    oracle.settle(0.0, None)
+    ((_, (_, expected)),) = oracle.accelerations()
+    scene, report = dap.import_model(path, contacts=engine == "stepping")
+    assert scene.forces["rope_max_stop"].type == "ptp_stop"
+    assert not [one for one in report.left_out if one.motion]
+    k = list(scene.bodies).index("a")
+    result = dap.simulate(scene, t_end=1e-6, dt=1e-6, contact_step=1e-6, contact=engine)
+    found = np.hstack([result.rd[-1] - result.rd[0], result.w[-1] - result.w[0]])[k] / 1e-6
+    assert abs(expected[2]) > 1.0
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-5)

@@ -1,12 +1,18 @@
 """Equalities of MJCF, with the tendons that they hold."""
 
+import attrs
+import numpy as np
+
 from dap3d_core.interface.formats import (
+    UNBOUNDED,
     WORLD,
     Coupling,
     FormatError,
     Frame,
     Joint,
+    Limits,
     Place,
+    Tendon,
     XmlElement,
     from_quaternion,
     held,
@@ -130,7 +136,41 @@ def tendon_of(reader: MjcfReader, element: XmlElement, key: str) -> XmlElement:
     found = next((t for holder in holders for t in holder if t.get("name") == name), None)
     if found is None:
         raise FormatError(f"there is no tendon {name!r}", element.place)
-    return reader.document.settled(found, "main")
+    return _settled_tendon(reader, found)
+
+
+def _settled_tendon(reader: MjcfReader, tendon: XmlElement) -> XmlElement:
+    """A tendon with the attributes of its class, which all tendons share."""
+    settled = reader.document.settled(attrs.evolve(tendon, name="tendon"), "main")
+    return attrs.evolve(settled, name=tendon.name)
+
+
+def read_tendons(reader: MjcfReader) -> None:
+    """Read spatial tendons between two sites; others that act are left out, remarked.
+
+    Raises:
+        FormatError: one names a site that is not there.
+    """
+    tendons = [t for holder in reader.document.root.all("tendon") for t in holder.all("spatial")]
+    for k, given in enumerate(tendons, 1):
+        tendon = _settled_tendon(reader, given)
+        low, high = reader.document.bounds(tendon, "range", "limited")
+        stiffness, damping = (tendon.numbers(key, None, (0.0,))[0]
+                              for key in ("stiffness", "damping"))  # fmt: skip
+        if not (stiffness or damping or (low, high) != UNBOUNDED):
+            continue
+        rest = tendon.numbers("springlength", None, (-1.0,))
+        if [part.name for part in tendon] != ["site", "site"] or len(set(rest)) > 1:
+            text = "forces and limits of spatial tendons but between two sites"
+            reader.document.source.remarks.leave_out(tendon.place, text, motion=True)
+            continue
+        (one, at), (other, there) = (reader.site(site, "site") for site in tendon)
+        apart = (_pose(reader, one) @ at).r - (_pose(reader, other) @ there).r
+        length = float(np.linalg.norm(apart)) if rest[0] < 0.0 else rest[0]
+        reader.model.tendons.append(Tendon(
+            tendon.get("name") or f"tendon{k}", ((one, at.r), (other, there.r)), stiffness,
+            damping, length, Limits(low, high), tendon.place,
+        ))  # fmt: skip
 
 
 def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:

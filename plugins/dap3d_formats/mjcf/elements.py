@@ -129,7 +129,10 @@ MJCF: Table = {
     "flexvert": noted("", "deformable bodies"),
     "distance": moves("", "distances"),
     "tendon": taken(),
-    "default/tendon": noted("", "tendons but those of equalities"),
+    "default/tendon": taken() | moves(
+        "frictionloss armature actuatorfrclimited actuatorfrcrange springyield margin "
+        "solreflimit solimplimit solreffriction solimpfriction", "of tendons",
+    ) | taken("class limited range stiffness damping springlength group width material rgba user"),
     "fixed": translated("", "where an equality or an actuator takes it") | taken("name class")
     | moves(
         "group limited actuatorfrclimited range actuatorfrcrange solreflimit solimplimit "
@@ -138,7 +141,14 @@ MJCF: Table = {
         "forces and limits of tendons",
     ),
     "fixed/joint": taken() | taken("joint coef"),
-    "spatial": moves("", "tendons over sites and pulleys"),
+    "spatial": translated("", "between two sites a spring, a damper and rigid stops")
+    | taken("name class limited range stiffness damping springlength")
+    | noted("group width material rgba user", _DRAWING)
+    | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
+    | moves("frictionloss armature actuatorfrclimited actuatorfrcrange springyield",
+            "friction, armature and bounds of tendons"),
+    "spatial/site": taken() | taken("site"),
+    "spatial/geom": noted("", "wrapping"), "pulley": noted("", "pulleys"),
     "actuator": taken(),
     **dict.fromkeys(
         ("motor", "general", "position", "velocity", "intvelocity", "cylinder"),

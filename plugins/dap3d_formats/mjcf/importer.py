@@ -13,7 +13,7 @@ class MjcfImporter(Importer):
         """The model in a file."""
         from dap3d_formats.element_table import note_elements
         from dap3d_formats.mjcf.actuators import read_actuators
-        from dap3d_formats.mjcf.constraints import read_equalities
+        from dap3d_formats.mjcf.constraints import read_equalities, read_tendons
         from dap3d_formats.mjcf.document import Document
         from dap3d_formats.mjcf.elements import CONTACTS, MJCF
         from dap3d_formats.mjcf.keyframes import Keyframe
@@ -30,6 +30,7 @@ class MjcfImporter(Importer):
         reader.scale_masses()
         inertia = reader.inertia()
         reader.scale_springs(inertia)
+        read_tendons(reader)
         read_equalities(reader)
         read_actuators(reader, inertia, keyframe)
         keyframe.start(reader.model, reader.mocap)

@@ -1,4 +1,4 @@
-"""Actuators of a model as inputs, and the forces that they set."""
+"""Actuators of a model as inputs, with the forces that they set; tendons."""
 
 import re
 from math import isfinite
@@ -8,7 +8,8 @@ import numpy as np
 
 from dap3d_core.formats.import_scene.joints import from_ground, named_ends
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
-from dap3d_core.interface.formats.articulation import Actuator, Articulation
+from dap3d_core.interface.formats.articulation import Actuator, Articulation, Tendon
+from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.scene.tables import GROUND
 
 
@@ -99,3 +100,35 @@ def _act_on_link(builder: SceneBuilder, actuator: Actuator, name: str) -> None:
     if moment.any():
         about = builder.names.free("forces", f"{name}_moment")
         builder.scene.add_force("np", about, body_i=body, np=float_tuple(moment), **given)
+
+
+def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
+    """Add tendons: a spring and damper between two points, and rigid stops of their distance."""
+    for tendon in model.tendons:
+        if len({builder.member[link][0] for link, _ in tendon.ends}) == 1:
+            continue
+        points = []
+        for (link, at), end in zip(tendon.ends, "ij", strict=True):
+            body, frame = builder.attached(link, Frame(at))
+            name = builder.names.free("points", f"{tendon.name}_{end}")
+            points.append(builder.scene.add_point(name, body, float_tuple(frame.r)))
+        ends = dict(zip(("P_i", "P_j"), points, strict=True))
+        if tendon.stiffness or tendon.damping:
+            name = builder.names.free("forces", f"{tendon.name}_spring")
+            builder.scene.add_force(
+                "ptp", name, **ends, k=tendon.stiffness or None, c=tendon.damping or None,
+                l0=tendon.rest or None,
+            )  # fmt: skip
+        _add_limits(builder, tendon, ends)
+
+
+def _add_limits(builder: SceneBuilder, tendon: Tendon, ends: dict[str, str]) -> None:
+    """Add rigid stops at the limits of a tendon."""
+    if tendon.limits.finite and (builder.limits == "off" or not builder.takes_contacts):
+        text = "limits of tendons, with limits = off or method joint"
+        builder.remarks.leave_out(tendon.place, text, motion=True)
+        return
+    for side, bound in (("min", tendon.limits.lower), ("max", tendon.limits.upper)):
+        if isfinite(bound) and bound > 0.0:
+            name = builder.names.free("forces", f"{tendon.name}_{side}_stop")
+            builder.scene.add_force("ptp_stop", name, **ends, side=side, l_stop=bound)

@@ -12,6 +12,7 @@ from dap3d_core.interface.formats.articulation import (
     Joint,
     Limits,
     Link,
+    Tendon,
 )
 from dap3d_core.interface.formats.format_types import (
     Exporter,
@@ -70,6 +71,7 @@ __all__ = [
     "Remarks",
     "ResultExporter",
     "Source",
+    "Tendon",
     "XmlElement",
     "axis_angle",
     "euler_angles",

@@ -257,6 +257,28 @@ class Actuator:
     wrench: tuple[float, ...] = ()
 
 
+@attrs.frozen(eq=False)
+class Tendon:
+    """A straight line between points of two links, with a spring, a damper and limits.
+
+    Attributes:
+        name: its name in the file.
+        ends: two links, and the points in their axes, (3,) each.
+        stiffness, damping: N/m, N s/m.
+        rest: the length without force, m.
+        limits: of its length, m.
+        place: its place in the file.
+    """
+
+    name: str
+    ends: tuple[tuple[str, Floats], tuple[str, Floats]]
+    stiffness: float = 0.0
+    damping: float = 0.0
+    rest: float = 0.0
+    limits: Limits = Limits()
+    place: Place = NOWHERE
+
+
 @attrs.define(eq=False)
 class Articulation:
     """A model of links and joints.
@@ -264,7 +286,7 @@ class Articulation:
     Attributes:
         name: of the model.
         links, joints: by name, in the order of the file.
-        couplings, actuators: in the order of the file.
+        couplings, actuators, tendons: in the order of the file.
         excluded: pairs of links whose shapes do not meet.
         base_meets: whether links meet those that do not move and that a joint holds them at.
         coefficient_of_pair: friction and restitution of two shapes that meet, of those of both: max
@@ -281,6 +303,7 @@ class Articulation:
     joints: dict[str, Joint] = attrs.Factory(dict)
     couplings: list[Coupling] = attrs.Factory(list)
     actuators: list[Actuator] = attrs.Factory(list)
+    tendons: list[Tendon] = attrs.Factory(list)
     excluded: list[tuple[str, str]] = attrs.Factory(list)
     base_meets: bool = False
     coefficient_of_pair: Callable[[float, float], float] = max
