@@ -46,6 +46,8 @@ STATES = 5
 #: Time of motion before contacts are compared, and the step whose change of velocities counts, s:
 #: a gap of 1e-11 m closes in it.
 SETTLED, STEP = 0.5, 1e-6
+#: Mass centres of the same body are not further apart, m.
+NEAR = 1e-4
 #: Asked of accelerations with contacts.
 RIGID = 1e-3
 
@@ -164,8 +166,11 @@ def compare_contacts(path, root):
     found = np.hstack([result.rd[-1] - result.rd[0], result.w[-1] - result.w[0]]) / STEP
     places, pairs = {name: k for k, name in enumerate(scene.bodies)}, []
     for name, (com, a) in oracle.accelerations():
-        near = int(np.argmin(np.abs(result.r[0] - com).max(axis=1)))  # of one without a name
-        pairs.append((found[places.get(name, near)], a))
+        apart = np.abs(result.r[0] - com).max(axis=1)  # of one without a name the nearest
+        if name in places or apart.min() < NEAR:
+            pairs.append((found[places.get(name, int(np.argmin(apart)))], a))
+    if not pairs:
+        raise PeerError("no body that both have")
     largest = max(1.0, *(np.abs(a).max() for _, a in pairs))
     worst = max(np.abs(here - a).max() for here, a in pairs) / largest
     left = [one.text for one in report.left_out if one.motion and not SOFT & {*one.text.split()}]
