@@ -183,10 +183,7 @@ class ActuatorReader:
             low, high = target.limits[0].lower, target.limits[0].upper
             mean, half = (low + high) / 2.0 + target.reference, (high - low) / 2.0
             return mean - inherited * half, mean + inherited * half
-        flags = (
-            flag for one in self.reader.document.root.all("option") for flag in one.all("flag")
-        )
-        if any(flag.get("clampctrl") == "disable" for flag in flags):
+        if self.reader.document.disables("clampctrl"):
             return UNBOUNDED
         return self._range(element, "ctrl")
 

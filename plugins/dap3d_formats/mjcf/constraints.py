@@ -30,7 +30,8 @@ def read_equalities(reader: MjcfReader) -> None:
         FormatError: one names something that is not there.
     """
     remarks, document = reader.document.source.remarks, reader.document
-    for holder in document.root.all("equality"):
+    holders = document.root.all("equality")
+    for holder in () if document.disables("equality", "constraint") else holders:
         for given in holder:
             element = document.settled_equality(given)
             if element.get("active", "true") == "false":

@@ -120,6 +120,11 @@ class Document:
         """An angle in rad, as the compiler reads it."""
         return value if self.compiler.get("angle", "degree") == "radian" else value * pi / 180.0
 
+    def disables(self, *names: str) -> bool:
+        """True if a flag of one of these names is off."""
+        flags = [flag for option in self.root.all("option") for flag in option.all("flag")]
+        return any(flag.get(name) == "disable" for flag in flags for name in names)
+
     def bounds(self, element: XmlElement, key: str, limited: str) -> tuple[float, float]:
         """Two bounds, infinite where they do not hold: attributes such as range and limited."""
         holds = element.get(limited, "auto")

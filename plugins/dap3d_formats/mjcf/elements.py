@@ -51,13 +51,14 @@ MJCF: Table = {
         "apirate mpr_iterations mpr_tolerance collision",
         _SOLVER,
     ),
-    "flag": taken() | taken("gravity")
-    | moves(
-        "constraint equality frictionloss limit contact passive spring damper clampctrl warmstart "
-        "filterparent actuation refsafe sensor midphase eulerdamp autoreset nativeccd island "
-        "override energy fwdinv invdiscrete multiccd sleep diagexact ipc speculative",
-        "what a solver leaves out",
-    ),
+    "flag": taken()
+    | taken("gravity constraint equality frictionloss limit contact clampctrl")
+    | noted(
+        "warmstart refsafe sensor midphase eulerdamp autoreset nativeccd island energy fwdinv "
+        "invdiscrete multiccd sleep diagexact ipc speculative",
+        _SOLVER,
+    )
+    | moves("passive spring damper filterparent actuation override", "what a solver leaves out"),
     "size": noted("", "memory of a simulator"),
     "visual": noted("", _DRAWING),
     "statistic": noted("", _DRAWING),

@@ -74,9 +74,8 @@ class MjcfReader:
         for option in document.root.all("option"):
             x, y, z = option.numbers("gravity", 3, (0.0, 0.0, -9.81))
             model.gravity = (x, y, z)
-            for flag in option.all("flag"):
-                if flag.get("gravity") == "disable":
-                    model.gravity = (0.0, 0.0, 0.0)
+        if document.disables("gravity"):
+            model.gravity = (0.0, 0.0, 0.0)
         for world in document.root.all("worldbody"):
             self._contents(world, WORLD, Frame(), "main")
         if not model.links:
@@ -289,6 +288,8 @@ class MjcfReader:
             if any(others):
                 text = f"{attribute} of a joint: higher coefficients of its polynomial"
                 self.document.source.remarks.leave_out(element.place, text, motion=True)
+        if self.document.disables("frictionloss", "constraint"):
+            joint.friction = (0.0,)
         joint.rest = (turned(element.number("springref", 0.0)) - reference,)
         both = element.numbers("springdamper", 2, (0.0, 0.0))
         if min(both) > 0.0:
@@ -298,7 +299,7 @@ class MjcfReader:
         keys = ("actuatorfrcrange", "actuatorfrclimited")
         self.force_ranges[joint.name] = self.document.bounds(element, *keys)
         low, high = self.document.bounds(element, "range", "limited")
-        if (low, high) != UNBOUNDED:
+        if (low, high) != UNBOUNDED and not self.document.disables("limit", "constraint"):
             limited = element.get("limited", "auto")
             if joint.kind == "ball":
                 joint.limits = (Limits(upper=self.document.angle(high)),)
