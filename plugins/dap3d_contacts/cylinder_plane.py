@@ -1,4 +1,4 @@
-"""A cylinder at a plane: on its rims, its side or a cap."""
+"""A cylinder at a plane: on its rims, its side or a cap; and a disk."""
 
 import math
 from collections.abc import Mapping
@@ -8,9 +8,9 @@ from dap3d_core.interface import Contact, Point, Vector, hookimpl, number, point
 from dap3d_core.kernels import add, cross, dot, scale, sqrt, sub, where
 
 interface_version = 1
-#: Points of a cap; sine of the tilt below which they count, and half of it, below which a rim has
-#: no lowest point.
-ON_CAP, UPRIGHT = 8, 1e-9
+#: Points of what lies flat; sine of the tilt below which they touch, and half of it, below which a
+#: rim has no lowest point and does not.
+FLAT, UPRIGHT = 8, 1e-9
 
 
 def tilt(a_i, a_j):
@@ -27,7 +27,7 @@ def upright(a_i, a_j):
 def lowest(r_P_i, a_i, spoke_i, a_j, radius, length, end):
     """A point of part ``end``: -1, 1 the lowest of a rim, else one of the cap that is lower.
 
-    Of a cylinder that stands upright the lowest of a rim is the centre of its cap.
+    Of a cylinder that stands upright the lowest of a rim is the centre of its cap: out of reach.
     """
     across, square = tilt(a_i, a_j)
     tilts = square > 0.25 * UPRIGHT * UPRIGHT
@@ -43,27 +43,26 @@ def is_rim(end):
     return (end > 0.5) | (end < -0.5)
 
 
-class CylinderPlane(Contact):
-    """The cylinder of ``radius`` and ``length`` about P_i, with axis a_i, at a plane.
+class DiskPlane(Contact):
+    """The rim of a thin disk of ``radius`` about P_i, with axis a_i, at a plane: wheel, knife edge.
 
-    The plane goes through P_j, with normal a_j towards the cylinder. It rolls on the lowest point
-    of a rim, lies on those of both, and stands on its cap, which eight points of its rim carry, the
-    first of them along the axis of the body that is farthest from a_i: a load that tips it does so
-    at its rim itself where it acts towards one of them, and at 0.92 of it between two.
+    The plane goes through P_j, with normal a_j towards the disk, which touches it with the lowest
+    point of its rim, and where it lies flat with eight, the first of them along the axis of the
+    body that is farthest from a_i. It rolls, slides and lifts off; the joint ``disk`` rolls or
+    slides as its rows say, and stays.
 
-        gap = a_j . (r_Pi +- length / 2 a_i - r_Pj) - radius sin(tilt),   and of 8 points of the cap
+        gap = a_j . (r_Pi - r_Pj) - radius sin(tilt),   and of 8 points of the disk that lies
     """
 
-    keyword, points = "cylinder_plane", 2 + ON_CAP
+    keyword, points, rims = "disk_plane", 1 + FLAT, (1.0,)
     example: ClassVar[Mapping[str, str]] = {
-        "P_j": '"ground.O"', "a_j": '"ground.z"', "radius": "0.1", "length": "0.2",
+        "P_j": '"ground.O"', "a_j": '"ground.z"', "radius": "0.1",
     }  # fmt: skip
-    P_i: Point = point(doc="centre of the cylinder")
-    a_i: Vector = vector(doc="axis of the cylinder")
-    radius: float = number(unit="m", positive=True, doc="of the cylinder")
-    length: float = number(unit="m", positive=True, doc="of the cylinder, from cap to cap")
+    P_i: Point = point(doc="centre")
+    a_i: Vector = vector(doc="axis")
+    radius: float = number(unit="m", positive=True, doc="of the rim")
     P_j: Point = point("ground.O", doc="point of the plane")
-    a_j: Vector = vector("ground.z", doc="normal of the plane, towards the cylinder")
+    a_j: Vector = vector("ground.z", doc="normal of the plane, towards the body")
 
     def gap(r_P_i, a_i, spoke_i, r_P_j, a_j, radius, length, end):
         low = lowest(r_P_i, a_i, spoke_i, a_j, radius, length, end)
@@ -76,24 +75,41 @@ class CylinderPlane(Contact):
         return a_j
 
     def reach(a_i, a_j, end):
-        return where(is_rim(end), 1.0, upright(a_i, a_j))
+        flat = upright(a_i, a_j)
+        return where(is_rim(end), 0.75 * UPRIGHT - flat, flat)
 
     def prepare(self, bodies):
-        """The rim of parts 0 and 1, the spoke of the others, in axes of the body."""
-        k = int(self.part)
+        """The rim of the first parts, the spoke of the others, in axes of the body."""
+        k = int(self.part) - len(self.rims)
         a = self.a_i
         far = min(range(3), key=lambda m: abs(a[m]))
         first = [(m == far) - a[far] * a[m] for m in range(3)]
         size = math.sqrt(sum(x * x for x in first))
         u = [x / size for x in first]
         v = [a[m - 2] * u[m - 1] - a[m - 1] * u[m - 2] for m in range(3)]
-        turn = 2.0 * math.pi * (k - 2) / ON_CAP
+        turn = 2.0 * math.pi * k / FLAT
         spoke = tuple(math.cos(turn) * x + math.sin(turn) * y for x, y in zip(u, v, strict=True))
-        end = 0.0 if k > 1 else 2.0 * k - 1.0
-        return {**super().prepare(bodies), "spoke_i": spoke, "end": end}
+        part = {"spoke_i": spoke, "end": self.rims[k] if k < 0 else 0.0}
+        return {**super().prepare(bodies), **part, "length": getattr(self, "length", 0.0)}
+
+
+class CylinderPlane(DiskPlane):
+    """The cylinder of ``radius`` and ``length`` about P_i, with axis a_i, at a plane.
+
+    The plane goes through P_j, with normal a_j towards the cylinder. It rolls on the lowest point
+    of a rim, lies on those of both, and stands on its cap, which eight points of its rim carry, the
+    first of them along the axis of the body that is farthest from a_i: a load that tips it does so
+    at its rim itself where it acts towards one of them, and at 0.92 of it between two.
+
+        gap = a_j . (r_Pi +- length / 2 a_i - r_Pj) - radius sin(tilt),   and of 8 points of the cap
+    """
+
+    keyword, points, rims = "cylinder_plane", 2 + FLAT, (-1.0, 1.0)
+    example: ClassVar[Mapping[str, str]] = {**DiskPlane.example, "length": "0.2"}
+    length: float = number(unit="m", positive=True, doc="of the cylinder, from cap to cap")
 
 
 @hookimpl
 def dap3d_contacts():
     """The contact types of this module."""
-    return [CylinderPlane]
+    return [CylinderPlane, DiskPlane]

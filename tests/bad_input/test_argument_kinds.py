@@ -1,8 +1,6 @@
 """Every public function given arguments of wrong kinds: refused in a sentence that names them.
-
 The kinds are those of the annotations. A wrong kind is one that no value of the parameter has, so
-the refusals need no numbers.
-"""
+the refusals need no numbers."""
 
 import inspect
 import re

@@ -1,7 +1,5 @@
 """The command line as a user has it, in a folder of its own.
-
-The user's cache of compiled code is used, but where a test is about it.
-"""
+The user's cache of compiled code is used, but where a test is about it."""
 
 import os
 import subprocess

@@ -71,14 +71,6 @@ def test_models_and_plugins_are_listed(dap3d):
     assert "weight" in dap3d("plugins").stdout
 
 
-@pytest.mark.slow
-def test_a_model_of_a_group_runs_with_and_without_it(dap3d):
-    for name in ("N1", "benchmarks/N1"):
-        done = dap3d("run", name, "--t-end", "0.1", "--force")
-        assert done.returncode == 0, done.stderr
-        (dap3d.folder / "N1.nc").unlink()
-
-
 @pytest.fixture(scope="module")
 def run_file(tmp_path_factory):
     """The file of a short run of pen1."""

@@ -11,9 +11,9 @@ from support import hostile
 from support.browser import Opened, browser
 from support.pages import follow
 from support.process import REPOSITORY
+from support.rotations import to_global
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import to_global
 
 pytestmark = pytest.mark.slow  # a browser that draws without a graphics card
 
@@ -45,9 +45,6 @@ def opened(chromium, page):
     yield found
     found.close()
     assert found.complaints == []
-
-
-# ---------------------------------------------------------------- the commands
 
 
 @pytest.fixture
@@ -129,9 +126,6 @@ def test_view_makes_a_page_of_a_sweep(dap3d, refuse, file):
     assert "--model MODEL --allow-code" in refuse("view", "own.nc")
     assert "not run unless it is allowed" in refuse("view", "own.nc", "--model", "ball1")
     assert dap3d("view", "own.nc", "--model", "ball1", "--allow-code").returncode == 0
-
-
-# ---------------------------------------------------------------- the browser
 
 
 def test_sliders_choose_the_motion(opened, swept):

@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support.browser import Opened, browser
+from support.rotations import to_global
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import to_global
 
 pytestmark = pytest.mark.slow  # a browser that draws without a graphics card
 

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
+from scipy.optimize import brentq
 
 import dap3d_core as dap
 
@@ -190,3 +192,97 @@ def test_edges_of_crossed_boxes_bounce():
     after = np.array(impact.u_after).reshape(2, -1)
     assert e * np.sqrt(2.0 * G * drop) == pytest.approx(np.max(after), abs=TOLERANCE)
     assert int(impact.name.split("#")[1]) > 16  # a pair of edges, not a corner
+
+
+ROLL = {"mass": 2.0, "radius": 0.5, "axial": 0.3, "across": 0.2}
+
+
+def wheel(r_dot=(0.0, 0.0, 0.0), w=(0.0, 0.0, 0.0), centre=(0.0, 0.0, 0.0), **contact):
+    """An upright disk whose axis is y, with its mass centre off its centre."""
+    scene = dap.Scene(name="wheel")
+    Jp = [ROLL["across"], ROLL["axial"], ROLL["across"]]
+    r = [0.0, 0.0, ROLL["radius"] - centre[2]]
+    scene.add_body("wheel", mass=ROLL["mass"], Jp=Jp, r=r, r_dot=r_dot, w=w)
+    scene.add_force("weight", "g")
+    scene.add_point("C", "wheel", centre)
+    shape = {"P_i": "C", "a_i": "wheel.y", "radius": ROLL["radius"]}
+    scene.add_contact("disk_plane", "floor", **shape, **contact)
+    return scene
+
+
+def test_a_disk_rolls_as_the_joint_disk_does():
+    """Leaning and turning, without slip: the same motion by other rows and another method."""
+    lean = 1.1
+    p = [np.cos(lean / 2.0), np.sin(lean / 2.0), 0.0, 0.0]
+    eta = np.array([0.0, np.cos(lean), np.sin(lean)])
+    level = eta - [0.0, 0.0, eta[2]]
+    size = np.linalg.norm(level)
+    spoke = ROLL["radius"] * (eta[2] / size * level - [0.0, 0.0, size])
+    w = np.array([0.3, -1.0, 2.0])
+    found = []
+    for kind in ("joint", "contact"):
+        scene = wheel(r_dot=list(-np.cross(w, spoke)), w=list(w), mu=10.0)
+        scene.bodies["wheel"].p, scene.bodies["wheel"].r = p, [0.0, 0.0, ROLL["radius"] * size]
+        if kind == "joint":
+            del scene.contacts["floor"]
+            scene.add_joint("disk", "floor", body_i="wheel", radius=ROLL["radius"])
+        found.append(dap.simulate(scene, t_end=2.0, dt=0.1, **TIGHT))
+    joint, contact = found
+    assert contact.r == pytest.approx(joint.r, abs=TOLERANCE)
+    assert contact.w == pytest.approx(joint.w, abs=TOLERANCE)
+    assert contact.contact("floor").force[:, 0] == pytest.approx(joint.Lam, abs=1e-8)
+    assert set(contact.contact("floor").mode[:, 0]) == {2}
+
+
+def test_a_spinning_wheel_slides_until_it_rolls():
+    """v = mu g t, w = w_0 - mu m g R / J t: it rolls where v = R w."""
+    mu, w, R = 0.2, 20.0, ROLL["radius"]
+    result = dap.simulate(wheel(w=(0.0, w, 0.0), mu=mu), t_end=4.0, dt=0.5, **TIGHT)
+    t = R * w / (mu * G * (1.0 + ROLL["mass"] * R**2 / ROLL["axial"]))
+    assert first(result, "stick").t == pytest.approx(t, abs=TOLERANCE)
+    assert result.rd[-1, 0] == pytest.approx([mu * G * t, 0.0, 0.0], abs=TOLERANCE)
+    assert result.ledger["energy"].value < TOLERANCE
+
+
+def test_an_unbalanced_wheel_lifts_off():
+    """Without friction its mass centre goes straight up and down: z = R - e cos(phi).
+
+    Energy gives phi_dot^2 = F(phi), phi_ddot = F' / 2, and z_ddot; it lifts where that is -g. The
+    instant is the integral of 1 / phi_dot.
+    """
+    m, J, R, e, w = ROLL["mass"], ROLL["axial"], ROLL["radius"], 0.2, 12.0
+
+    def square(phi):
+        energy = J * w**2 - 2.0 * m * G * e * (1.0 - np.cos(phi))
+        return energy / (J + m * e**2 * np.sin(phi) ** 2)
+
+    def load(phi):  # from below: phi = 0 is the lowest place of the mass centre
+        h = 1e-5
+        bent = (square(phi + h) - square(phi - h)) / (4.0 * h)
+        return G + e * (np.cos(phi) * square(phi) + np.sin(phi) * bent)
+
+    result = dap.simulate(wheel(w=(0.0, w, 0.0), centre=(0.0, 0.0, e)), t_end=1.0, dt=0.1, **TIGHT)
+    lift = first(result, "lift")
+    phi = brentq(load, 0.5, np.pi)
+    assert lift.u[2] == pytest.approx(R - e * np.cos(phi), abs=TOLERANCE)
+    t = quad(lambda x: 1.0 / np.sqrt(square(x)), 0.0, phi, epsabs=1e-13, epsrel=1e-13)[0]
+    assert lift.t == pytest.approx(t, abs=TOLERANCE)
+
+
+def test_a_coin_falls_flat_and_its_spin_ends():
+    """It lands on all of its rim at once, and mu R times the load of its rim stops the spin.
+
+    The impulse of the landing is the weight times the time of the fall, as if it had lain before:
+    t = J w_0 / (mu m g R).
+    """
+    mu, w, R = 0.3, 4.0, ROLL["radius"]
+    scene = wheel(w=(0.0, 0.0, w), mu=mu)
+    coin = scene.bodies["wheel"]
+    coin.p, coin.r = [np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0], [0.0, 0.0, 0.1]
+    result = dap.simulate(scene, t_end=2.0, dt=0.1, **TIGHT)
+    lands = np.sqrt(0.2 / G)
+    assert first(result, "impact").t == pytest.approx(lands, abs=TOLERANCE)
+    stops = ROLL["axial"] * w / (mu * ROLL["mass"] * G * R)
+    assert first(result, "stick").t == pytest.approx(stops, abs=TOLERANCE)
+    assert np.max(np.abs(result.w[-1])) < 1e-12
+    assert result.ledger["energy"].value < TOLERANCE

@@ -87,7 +87,7 @@ MJCF: Table = {
     "inertial": taken() | _FRAME | taken("mass diaginertia fullinertia"),
     "joint": taken()
     | taken("name class type pos axis range limited ref springref stiffness damping armature")
-    | translated("frictionloss", "it fades at low rates, and does not stick")
+    | translated("frictionloss", "it sticks; with contacts it fades at low rates")
     | translated("springdamper", "stiffness and damping, by the mass matrix where the model starts")
     | moves("springyield", "springs do not yield")
     | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
@@ -152,9 +152,9 @@ MJCF: Table = {
 #: Where shapes are to meet each other.
 CONTACTS: Table = {
     **MJCF,
-    "geom": dict(MJCF["geom"]) | taken("contype conaffinity friction")
+    "geom": dict(MJCF["geom"]) | taken("contype conaffinity friction priority")
     | translated("condim", "of 1 smooth, else friction along the surface alone")
-    | moves("priority solmix solref solimp margin gap", "contacts are rigid"),
+    | moves("solmix solref solimp margin gap", "contacts are rigid"),
     "contact": taken(),
     "exclude": taken() | taken("name body1 body2"),
     "pair": moves("", "pairs of geoms of their own"),

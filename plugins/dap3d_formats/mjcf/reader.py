@@ -76,18 +76,21 @@ class MjcfReader:
             self._contents(world, WORLD, Frame(), "main")
         if not model.links:
             raise FormatError("holds no <body>", document.root.place)
+        ground = ""
         for world in document.root.all("worldbody"):
-            self._world_shapes(world)
+            ground = self._world_shapes(world)
         for contact in document.root.all("contact"):
             for pair in contact.all("exclude"):
                 ends = pair.require("body1"), pair.require("body2")
                 for name in ends:
-                    if name not in model.links and document.source.contacts:
+                    if name not in (*model.links, WORLD) and document.source.contacts:
                         raise FormatError(f"there is no body {name}", pair.place)
-                model.excluded.append(ends)
+                if ground in model.links or WORLD not in ends:
+                    one, other = (ground if name == WORLD else name for name in ends)
+                    model.excluded.append((one, other))
 
-    def _world_shapes(self, world: XmlElement) -> None:
-        """The geoms of the world, as a link that is fixed to it."""
+    def _world_shapes(self, world: XmlElement) -> str:
+        """The geoms of the world, as a link that is fixed to it; its name."""
         geoms = self._gathered(world, ("geom",), Frame(), "main")
         shapes = [self.geoms.geometry(geom, frame) for geom, frame in geoms]
         link = Link(self._free_link("world_shapes"), place=world.place)
@@ -96,6 +99,7 @@ class MjcfReader:
             name = self._free(f"{link.name}_fixed")
             self.model.links[link.name] = link
             self.model.joints[name] = Joint(name, "fixed", WORLD, link.name, place=world.place)
+        return link.name
 
     def _contents(self, holder: XmlElement, link: str, frame: Frame, childclass: str) -> None:
         """Bodies and sites in a body or frame."""

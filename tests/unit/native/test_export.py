@@ -73,18 +73,21 @@ def differences(scene, folder, t_end, count=20, **settings):
     return np.array_equal(np.array(rows), expected)
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "rk4", "adams", "radau", "auto"])
-def test_a_run_has_the_bits_of_simulate(tmp_path, integrator):
-    step = 1e-3 if integrator == "rk4" else None
-    assert differences(dap.load("pen1"), tmp_path, 0.5, integrator=integrator, step=step)
-
-
 @pytest.mark.every(3)
-@pytest.mark.parametrize("model", ["tri", "fourbar2", "bodies2"])
-def test_so_have_runs_with_break_points_angles_and_no_joints(tmp_path, model):
-    t_end = 3.5 if model == "tri" else 0.5
-    assert differences(dap.load(model), tmp_path, t_end, integrator="dop853")
+@pytest.mark.parametrize(
+    ("model", "t_end", "settings"),
+    [
+        # break points, angles, no joints
+        ("tri", 3.5, {"integrator": "dop853"}),
+        ("pen1", 0.5, {"integrator": "dop853"}),
+        ("fourbar2", 0.5, {"integrator": "dop853"}),
+        ("pen1", 0.5, {"integrator": "rk4", "step": 1e-3}),
+        ("bodies2", 0.5, {"integrator": "dop853"}),
+        *(("pen1", 0.5, {"integrator": name}) for name in ("dopri5", "adams", "radau", "auto")),
+    ],
+)
+def test_a_run_has_the_bits_of_simulate(tmp_path, model, t_end, settings):
+    assert differences(dap.load(model), tmp_path, t_end, **settings)
 
 
 def test_so_have_runs_in_joint_coordinates(tmp_path):

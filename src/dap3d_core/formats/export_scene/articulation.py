@@ -3,10 +3,10 @@
 from math import inf
 from typing import Any
 
+import attrs
 import numpy as np
 
 from dap3d_core.formats.export_scene.elements import ALIGNED, SceneElements, SceneJoint, leave_out
-from dap3d_core.formats.export_scene.model_builder import ModelBuilder
 from dap3d_core.interface.formats.articulation import (
     WORLD,
     Actuator,
@@ -22,7 +22,7 @@ from dap3d_core.interface.formats.frames import Frame, axis_angle, from_quaterni
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import Scene
-from dap3d_core.scene.tables import GROUND, LIMITS, RELEASES, Element
+from dap3d_core.scene.tables import GROUND, RELEASES, Element
 
 #: Kinds of joints whose points may be apart along the axis.
 SLIDERS = ("prismatic", "cylindrical")
@@ -34,9 +34,41 @@ SAME = 1e-12
 FRICTION = {
     "rot_friction": ("revolute", "axis", "n_c"), "tran_friction": ("prismatic", "a_j", "f_c"),
 }  # fmt: skip
+#: Kind of a shape -> the fields of its size, and a factor: a model has semi-axes of an ellipsoid.
+SIZES = {
+    "box": (("size",), 1.0), "sphere": (("radius",), 1.0),
+    "cylinder": (("radius", "length"), 1.0), "ellipsoid": (("size",), 0.5),
+}  # fmt: skip
 NO_JOINT = "no force on the coordinate of a joint"
 #: Kind of a joint -> the type of force, in axes of its body, that acts on its coordinate.
 TYPES = {"revolute": "np", "prismatic": "fp"}
+
+
+@attrs.define(eq=False)
+class ModelBuilder:
+    """A model that is made of a scene.
+
+    Attributes:
+        elements: the elements of the scene, with their frames.
+        remarks: of the export.
+        model: the model so far.
+        origin: body -> the origin of its link in its axes at its mass centre.
+        placed: joint of the scene -> that of the model.
+    """
+
+    elements: SceneElements
+    remarks: Remarks
+    model: Articulation
+    origin: dict[str, np.ndarray] = attrs.Factory(dict)
+    placed: dict[str, Joint] = attrs.Factory(dict)
+
+    def link(self, body: str) -> str:
+        """The link of a body."""
+        return WORLD if body == GROUND else body
+
+    def in_link(self, body: str, frame: Frame) -> Frame:
+        """A frame of a body at its mass centre, in its link."""
+        return Frame(frame.r - self.origin.get(body, np.zeros(3)), frame.A)
 
 
 def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
@@ -63,12 +95,8 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
     add_gravity(builder, scene)
     add_forces(builder, scene)
     for limited in scene.joints.values():
-        if not limited.fields.keys().isdisjoint(LIMITS):
-            leave_out(
-                remarks,
-                limited,
-                "lower and upper of a joint, where a rot_stop or plane_stop is written",
-            )
+        if limited.fields.get("e"):
+            leave_out(remarks, limited, "e of the limits of a joint")
         for key in limited.fields.keys() & set(RELEASES):
             leave_out(remarks, limited, f"{key} of a joint, which holds here throughout")
     for contact in scene.contacts.values():
@@ -131,6 +159,8 @@ def _add_joint(builder: ModelBuilder, joint: SceneJoint, *, closes: bool) -> Non
         builder.in_link(joint.body_j, there), builder.in_link(joint.body_i, here),
         axes=tuple(tuple(axis.tolist()) for axis in joint.axes), closes=closes,
     )  # fmt: skip
+    fields = builder.elements.scene.joints[joint.name].fields
+    made.limits = (Limits(fields.get("lower", -inf), fields.get("upper", inf)),)
     d, slides = (j @ there).r - (i @ here).r, joint.kind in SLIDERS
     if slides:  # along the axis it is free
         axis = i.A @ joint.axes[0]
@@ -158,20 +188,14 @@ def geometries_of(builder: ModelBuilder, scene: Scene, body: str) -> list[Geomet
         if "axis" in fields:
             A = turned_to(np.asarray(fields["axis"], dtype=float))
         pose = builder.in_link(body, Frame(fields.get("at", (0.0, 0.0, 0.0)), A))
-        if element.type == "box":
-            size = tuple(map(float, fields["size"]))
-            geometries.append(Geometry("box", size, pose, color=color))
-        elif element.type == "sphere":
-            geometries.append(Geometry("sphere", (float(fields["radius"]),), pose, color=color))
-        elif element.type == "cylinder":
-            size = (float(fields["radius"]), float(fields["length"]))
-            geometries.append(Geometry("cylinder", size, pose, color=color))
-        elif element.type == "ellipsoid":
-            size = tuple(0.5 * float(edge) for edge in fields["size"])
-            geometries.append(Geometry("ellipsoid", size, pose, color=color))
-        elif element.type == "mesh":
+        kind = str(element.type)
+        if kind == "mesh":
             scale = (float(fields.get("scale", 1.0)),) * 3
-            geometries.append(Geometry("mesh", (), pose, fields["file"], scale, color))
+            geometries.append(Geometry(kind, (), pose, fields["file"], scale, color))
+        elif kind in SIZES:
+            names, factor = SIZES[kind]
+            size = factor * np.ravel([fields[name] for name in names])
+            geometries.append(Geometry(kind, tuple(size.tolist()), pose, color=color))
         else:
             leave_out(builder.remarks, element, "no shape of a model", motion=False)
     return geometries
@@ -397,18 +421,14 @@ def _add_rotors(builder: ModelBuilder) -> None:
                 builder.remarks.leave_out(NOWHERE, text, motion=True)
                 continue
             pairs.append((joint.name, float(fields.get("ratio", 1.0))))
-        leader = next((one for one, ratio in pairs if ratio == 1.0), None)
-        if leader is None:
+        place = next((k for k, (_, ratio) in enumerate(pairs) if ratio == 1.0), None)
+        if place is None:
             text = f"wheel {name}: no joint turns as it does"
             builder.remarks.leave_out(NOWHERE, text, motion=True)
             continue
+        leader, _ = pairs.pop(place)
         builder.placed[leader].armature = (rotor.inertia,)
-        first = True
-        for one, ratio in pairs:
-            if one == leader and first:
-                first = False
-                continue
-            builder.model.couplings.append(Coupling("", one, leader, ratio))
+        builder.model.couplings += [Coupling("", one, leader, ratio) for one, ratio in pairs]
 
 
 def _followed(builder: ModelBuilder, fields: dict[str, Any]) -> SceneJoint | None:
@@ -452,7 +472,8 @@ def _gear(builder: ModelBuilder, joint: SceneJoint, users: list[Element]) -> flo
     if joint.kind not in TYPES or builder.placed[joint.name].closes:
         return 0.0
     type_ = TYPES[joint.kind]
-    acting = {_body_of(builder, e): e for e in users if e.type == type_}
+    point = builder.elements.point
+    acting = {point(_point_of(e))[0]: e for e in users if e.type == type_}
     moving = [one for one in (joint, joint.reversed()) if one.body_i != GROUND]
     if len(acting) != len(users) or acting.keys() != {one.body_i for one in moving}:
         return 0.0
@@ -467,11 +488,6 @@ def _gear(builder: ModelBuilder, joint: SceneJoint, users: list[Element]) -> flo
         if np.abs(np.cross(places[-1] - places[0], axis)).max() > ALIGNED:
             return 0.0
     return gear
-
-
-def _body_of(builder: ModelBuilder, element: Element) -> str:
-    """The body on which a force acts."""
-    return builder.elements.point(_point_of(element))[0]
 
 
 def _point_of(element: Element) -> str:

@@ -194,7 +194,7 @@ class TreeCoordinates(Coordinates):
         """The state y of the constants as they are, with states of elements; kept rows judged."""
         y[self.nodes.layout["states"]] = self.evaluator.states
         if self.kept:
-            from dap3d_core.formulations.joint_loops.reference_pivots import judge_kept_rows
+            from dap3d_core.formulations.joint_loops.tables import judge_kept_rows
 
             judge_kept_rows(self.evaluator, y)
         return y

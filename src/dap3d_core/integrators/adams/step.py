@@ -249,7 +249,7 @@ def plan(work: AdamsState, h: float, k: int, here: float, below: float, lower: b
             highest[i] = h * f[k + 1, i]
         size = work.error_size
         above = work.table[CONSTANT, k + 1] * scaled_largest(
-            highest, y, y, size, work.rtol, work.tolerance, h
+            work.state[SCRATCH], highest, y, y, size, work.rtol, work.tolerance, h
         )
         if k > 1 and below <= min(here, above):
             order, error = k - 1, below

@@ -19,7 +19,7 @@ from dap3d_core.integrators.runge_kutta.step import (
     step,
     step_error,
 )
-from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA
+from dap3d_core.integrators.runge_kutta.sums import ABSCISSA, combine
 from dap3d_core.integrators.stepping.event_location import is_cut_at_sample, next_length
 from dap3d_core.integrators.stepping.integration_state import (
     GIVEN,
@@ -43,7 +43,6 @@ from dap3d_core.integrators.stepping.step_control import (
     first_step,
 )
 from dap3d_core.integrators.stepping.switch_values import count_from_far_edges
-from dap3d_core.integrators.stepping.vector_ops import combine
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays

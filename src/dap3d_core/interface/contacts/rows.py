@@ -30,6 +30,14 @@ def held(mode):
     return mode > 1.5
 
 
+def holds(mode, way, k):
+    """True where row k of friction alone holds: where it sticks, but for those that others hold.
+
+    The components of ``way`` name these, 1.0; it is a direction of sliding in mode 1 alone.
+    """
+    return held(mode) & (way[k] < 0.5)
+
+
 def axis(n):
     """The axis of ground that a normal is farthest from."""
     x, y, z = (c * c for c in n)

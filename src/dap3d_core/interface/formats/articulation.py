@@ -80,16 +80,20 @@ class Contact:
     """How a shape meets others.
 
     Attributes:
-        mu: coefficient of friction; of a pair see ``Articulation.friction_of_pair``.
+        mu: coefficient of friction; of a pair see ``Articulation.coefficient_of_pair``.
         smooth: without friction, but with shapes that are not smooth.
         group, meets: bits; a pair meets where ``group`` of one and ``meets`` of the other have one
             in common.
+        priority: of a pair the one with the larger decides alone.
+        e: coefficient of restitution.
     """
 
     mu: float = 1.0
     smooth: bool = False
     group: int = 1
     meets: int = 1
+    priority: int = 0
+    e: float = 0.0
 
 
 @attrs.define(eq=False)
@@ -240,7 +244,8 @@ class Articulation:
         couplings, actuators: in the order of the file.
         excluded: pairs of links whose shapes do not meet.
         base_meets: whether links meet those that do not move and that a joint holds them at.
-        friction_of_pair: the coefficient of two shapes that meet, of those of both: max or min.
+        coefficient_of_pair: friction and restitution of two shapes that meet, of those of both: max
+            or min.
         gravity: (3,) m/s^2.
         fixed_base: whether links without a joint to a parent are fixed to the world, rather than
             free; None where the format leaves it open.
@@ -255,7 +260,7 @@ class Articulation:
     actuators: list[Actuator] = attrs.Factory(list)
     excluded: list[tuple[str, str]] = attrs.Factory(list)
     base_meets: bool = False
-    friction_of_pair: Callable[[float, float], float] = max
+    coefficient_of_pair: Callable[[float, float], float] = max
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     fixed_base: bool | None = None
     place: Place = NOWHERE

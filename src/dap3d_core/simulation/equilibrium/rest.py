@@ -138,7 +138,7 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
             "(start=result)"
         )
     states = evaluator.states.copy()
-    states[table.mode], states[table.way.ravel()], states[table.near.ravel()] = found.mode, 0.0, 0.0
+    states[table.mode], states[table.way], states[table.near] = found.mode, found.way, 0.0
     evaluator.states = states
 
 
@@ -282,18 +282,14 @@ def findings(search: Search, stability: Stability, model: Model) -> Iterator[str
     if count:
         moves = describe_motion(model, stability.indifferent[0])
         others = f" and {count - 1} more" if count > 1 else ""
-        yield (
-            information(
-                f"indifferent: nothing drives or holds a freedom of {moves}{others}; "
-                "it is where the start has it"
-            )
+        yield information(
+            f"indifferent: nothing drives or holds a freedom of {moves}{others}; "
+            "it is where the start has it"
         )
     if not stability.is_symmetric:
-        yield (
-            information(
-                "forces without a potential act: stability is that of small motions, "
-                "with masses and dampers"
-            )
+        yield information(
+            "forces without a potential act: stability is that of small motions, "
+            "with masses and dampers"
         )
 
 
@@ -322,11 +318,9 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
         )
     rolling = model.row_owners(np.flatnonzero(~model.position_row & (rows.nu == 0.0)))
     if rolling:
-        yield (
-            information(
-                f"rolling joints constrain displacements as they do velocities: "
-                f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
-            )
+        yield information(
+            f"rolling joints constrain displacements as they do velocities: "
+            f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
         )
 
 

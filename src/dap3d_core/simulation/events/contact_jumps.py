@@ -16,6 +16,7 @@ from dap3d_core.formulations.contacts.contact_rows import (
     SLIP,
     ContactRows,
     ContactTable,
+    length_of,
 )
 from dap3d_core.formulations.contacts.impacts import AT_REST, Impact, collide, repeat
 from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes
@@ -38,6 +39,8 @@ TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
 HELD = 1e-10
 #: Slip, m/s, that is stopped where it goes through zero.
 STOPPED = 1e-6
+#: Mobility of a slip, as a part of that of free bodies, below which it is the pose that stops it.
+DEAD = 1e-12
 #: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 500, 1e-6
 #: So many steps within this part of the run are too many: it would not come to an end.
@@ -120,7 +123,7 @@ class ContactJumps(Jumps):
         movable, limit = list[int](), -AT_REST * self._evaluator.model.length
         for c in closed:
             row = rows.G[3 * c]
-            if self.table.load[c] or rows.W[3 * c, 3 * c] > HELD * (row @ rows.inverse @ row):
+            if self.table.alone[c] or rows.W[3 * c, 3 * c] > HELD * (row @ rows.inverse @ row):
                 movable.append(c)
             elif rows.slip[c, 0] < limit or rows.free[3 * c] < limit:
                 raise SimulationError(
@@ -295,7 +298,7 @@ class ContactJumps(Jumps):
             ) from error
         held = [c for c in closed if modes.mode[c] > 0.5]
         others = [c for c in closed if modes.mode[c] < 0.5]
-        rows.change(rows.lifted(rows.slip[:, 0], held, others))
+        rows.change(rows.lifted(rows.closing, held, others))
         gaps = np.where(np.abs(outputs[:, GAP]) < touching, outputs[:, GAP], 0.0)
         moved = self._apart(rows, gaps, held, others)
         states = evaluator.states.copy()
@@ -314,7 +317,7 @@ class ContactJumps(Jumps):
         for c, (old, new) in enumerate(
             zip(before.astype(int), modes.mode.astype(int), strict=True)
         ):
-            if (kind := CHANGES.get((int(old), int(new)), "")) and (old or not table.load[c]):
+            if (kind := CHANGES.get((int(old), int(new)), "")) and (old or not table.alone[c]):
                 self._note(c, t, kind, u)
 
     def _apart(self, rows: ContactRows, gaps: Floats, held: list[int], others: list[int]) -> Floats:
@@ -324,7 +327,7 @@ class ContactJumps(Jumps):
         """
         rounding = POSITION_ROUNDING * self._evaluator.model.length
         still = AT_REST * self._evaluator.model.length
-        deep = [c for c in others if rows.slip[c, 0] < still and gaps[c] < -0.5 * rounding]
+        deep = [c for c in others if rows.closing[c] < still and gaps[c] < -0.5 * rounding]
         return rows.lifted(gaps, [*held, *deep], others, 2.0 * rounding)
 
     def _outputs(self, t: float, u: Floats) -> Floats:
@@ -343,11 +346,14 @@ class ContactJumps(Jumps):
             if part == 0:
                 continue
             if before[c] > 1.5:
-                force = rows.frames[c, 1:] @ outputs[c, FRICTION]
-                size = float(np.hypot(*force))
+                force = rows.frames[c, self.table.across(c)] @ outputs[c, FRICTION]
+                size = length_of(force)
                 if size > 0.0:
                     sliding[c] = -force / size
-            elif float(np.hypot(*rows.slip[c, 1:])) < STOPPED * self._evaluator.model.length:
+            elif (
+                length_of(rows.slip[c, self.table.across(c)])
+                < STOPPED * self._evaluator.model.length
+            ):
                 self._stop(rows, c)
                 stopped.append(c)
         return sliding, leaving, stopped
@@ -365,7 +371,7 @@ class ContactJumps(Jumps):
         for c in decided.stopped:
             self._stop(rows, c)
         impact = repeat(table, rows, decided.impact)
-        rows.change(rows.lifted(rows.slip[:, 0], decided.held, []))
+        rows.change(rows.lifted(rows.closing, decided.held, []))
         modes = decided.modes
         states[table.mode], states[table.way], states[table.near] = (
             modes.mode,
@@ -373,18 +379,23 @@ class ContactJumps(Jumps):
             modes.near,
         )
         for c in np.flatnonzero(modes.mode == 1.0).tolist():
-            slip = rows.slip[c, 1:]
-            if float(np.hypot(*slip)) > STOPPED * evaluator.model.length:
-                states[table.way[c]] = slip / np.hypot(*slip) @ rows.frames[c, 1:]
+            slip, frame = rows.slip[c, table.across(c)], rows.frames[c, table.across(c)]
+            if length_of(slip) > STOPPED * evaluator.model.length:
+                states[table.way[c]] = slip / length_of(slip) @ frame
         moved = np.zeros(len(rows.v))
         self._go_on(integration, u, rows, moved, states, float(np.sum(impact.work)))
 
-    @staticmethod
-    def _stop(rows: ContactRows, c: int) -> None:
-        """Stop the slip of a contact, rounding of zero, without a change of its normal velocity."""
+    def _stop(self, rows: ContactRows, c: int) -> None:
+        """Stop the slip of a contact, rounding of zero, without a change of its normal velocity.
+
+        At a dead centre it passes through zero while the mechanism moves on.
+        """
         which = rows.rows_of([c])
+        free = np.einsum("ri,ij,rj->r", rows.G[which], rows.inverse, rows.G[which])
+        if np.diag(rows.W)[which].max() < DEAD * free.max():
+            return
         A, u = rows.W[np.ix_(which, which)], rows.slip[c].copy()
-        u[0] = 0.0
+        u[: self.table.across(c).start] = 0.0
         x = np.zeros(len(rows.G))
         x[which] = np.linalg.lstsq(A, -u, rcond=1e-12)[0]
         rows.kick(x)

@@ -59,16 +59,16 @@ class ContactForces:
         columns, places, known = [], list[int](), np.zeros(len(rows.v))
         cones: dict[int, tuple[list[int], float]] = {}
         states = table.evaluator.states.copy()
-        closed = (near & (np.abs(slip[:, 0]) < still)) | (table.load == 1.0)
+        closed = (near & (np.abs(slip[:, 0]) < still)) | table.alone
         for c in np.flatnonzero(closed).tolist():
             normal, *across = rows.G[3 * c : 3 * c + 3]
             sliding = float(np.hypot(*slip[c, 1:])) > still
             way = slip[c, 1:] / np.hypot(*slip[c, 1:]) if sliding else np.zeros(2)
             friction = -table.mu[c] * (way @ across)
             own, first = [], len(places)
-            if table.load[c] and sliding:
+            if table.alone[c] and sliding:
                 known += friction
-            elif not table.load[c]:
+            elif not table.alone[c]:
                 own.append(normal + friction)
                 places.append(3 * c)
             for k, tangent in enumerate(across, 1):
@@ -132,7 +132,7 @@ class ContactForces:
         found = force.copy()
         for c, (places, mu) in closed.cones.items():
             x = force[places]
-            if self.table.load[c]:
+            if self.table.alone[c]:
                 found[places] = np.clip(x, -mu, mu)
                 continue
             if not places:

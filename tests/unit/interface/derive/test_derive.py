@@ -1,9 +1,7 @@
 """Formulas derived from C, C_dot, energy or value are those that are written by hand.
-
 Both are evaluated at random states off the constraints. They differ by rounding alone, 1e-11 of the
 largest term: a few hundred operations, and differences of angles near 1. Where there is none by
-hand, rates along random motions stand for it (see tests/contract for the tolerance).
-"""
+hand, rates along random motions stand for it (see tests/contract for the tolerance)."""
 
 import inspect
 import math
@@ -24,14 +22,15 @@ from support.derived_types import (
     Winding,
     from_C_alone,
 )
+from support.internals import Evaluator, split
 from support.motions import Motion, derivative
 from support.own_types import registry_of
 from support.plain import in_another_process
 from support.process import REPOSITORY, run
+from support.rotations import rotation
 from support.scenes import scene_for
 
 import dap3d_core as dap
-from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface import (
     Function,
     Joint,
@@ -45,8 +44,6 @@ from dap3d_core.interface import (
 )
 from dap3d_core.kernels import acos, asin, dot, exp, floor, log
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import rotation
-from dap3d_core.model.state_layout import split
 from dap3d_core.scene import check
 from dap3d_core.testing import check_type
 

@@ -170,9 +170,6 @@ def test_a_writer_that_cannot_begin_leaves_nothing(tmp_path, monkeypatch):
     assert os.listdir(tmp_path) == []
 
 
-# ---------------------------------------------------------------------------- writing safely
-
-
 def test_an_existing_file_is_kept_unless_forced(tmp_path):
     path = tmp_path / "run.nc"
     path.write_text("precious")

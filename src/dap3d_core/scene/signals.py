@@ -1,15 +1,21 @@
-"""Functions that combine others: their terms, by name, as instances."""
+"""Signals of a scene: functions that combine others, and inputs."""
 
+from collections.abc import Sequence
 from graphlib import CycleError, TopologicalSorter
 
 import attrs
 
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.scene.errors import dotted
+from dap3d_core.scene.expressions.outputs import fault_of_quantity
+from dap3d_core.scene.validate.coerce_values import number_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance, arguments_of
 
 #: Most functions in one combination, each counted as often as it occurs: all become one kernel.
 MOST_TERMS = 200
+#: First words of the quantities that every result has (result/quantities/catalogue.py).
+SYSTEM_NAMES = ("t", "energy", "work", "constraint")
 
 
 def combine_functions(report: Collector, functions: list[Instance]) -> list[Instance]:
@@ -55,3 +61,27 @@ def _terms(function: Instance) -> tuple[str, ...]:
         name for field, spec in specs.items() if spec.kind == "functions"
         for name in function.values[field]
     )  # fmt: skip
+
+
+def read_inputs(report: Collector) -> dict[str, float]:
+    """The values of the inputs at the start of a run, by name; mistakes are reported."""
+    inputs = {}
+    for name, entry in report.scene.inputs.items():
+        fault = fault_of_quantity(report.scene, name, but="inputs")
+        if not fault and name in SYSTEM_NAMES:
+            fault = "every result has a quantity of this name"
+        if fault:
+            report.add(("inputs", str(name)), name, f"not a name for an input: {fault}")
+        inputs[name] = report.read(("inputs", str(name), "value"), entry.value, number_of)
+    return inputs
+
+
+def note_unread_inputs(report: Collector, elements: Sequence[Instance]) -> None:
+    """Note inputs that no joint and no force reads."""
+    behind = 1 + len(report.scene.functions)
+    read = {index - behind for e in elements for index in e.functions}
+    named = {name for e in elements if e.active for name in e.active.names}
+    for index, name in enumerate(report.scene.inputs):
+        if index not in read and name not in named:
+            key = dotted(("inputs", name))
+            report.note(f"{key}: no joint and no force reads it", "inputs left unread")
