@@ -367,10 +367,7 @@ class _Family:
         report = evaluator.report(0.0, u)
         report[layout["v_dot"]] = 0.0
         report[layout["Lam"]] = least_multipliers(self.statics.statics, u)[0]
-        row: Floats = np.concatenate(
-            [[0.0], evaluator.integrated(u), report[: evaluator.report_size]]
-        )
-        return row
+        return np.concatenate([[0.0], evaluator.integrated(u), report[: evaluator.report_size]])
 
     def quantity(self, name: str, points: list[PathPoint], rows: Floats) -> Quantity:
         """A quantity of points with their rows (k, ...)."""

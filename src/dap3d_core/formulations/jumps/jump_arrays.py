@@ -212,5 +212,4 @@ def _state_places(evaluator: Evaluator, q: int, group: Group) -> Integers:
     layout, system = group.type_info.layout, evaluator.system
     width = stride(group.type_info)
     first = system.idx[system.groups[q, 0] + layout.integers - 1 :: width][: group.count]
-    places: Integers = first[:, None] + np.arange(layout.state_width)
-    return places
+    return first[:, None] + np.arange(layout.state_width)

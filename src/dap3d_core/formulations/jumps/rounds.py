@@ -1,8 +1,5 @@
 """The rounds of a jump, compiled (law.py says what they do)."""
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 import numpy as np

@@ -6,9 +6,6 @@ Source: Hairer, Wanner, Solving Ordinary Differential Equations II, IV.8, VII.4,
 RADAU.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from collections.abc import Sequence
 from typing import Any

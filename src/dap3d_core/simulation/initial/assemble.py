@@ -99,8 +99,7 @@ def violation(evaluator: Evaluator, u: Floats, t: float = 0.0) -> tuple[float, f
 
 def weights_of(evaluator: Evaluator) -> Floats:
     """(rows,) weights of the residuals of the model's rows (System.weight)."""
-    weight: Floats = evaluator.system.weight[evaluator.system.row]
-    return weight
+    return evaluator.system.weight[evaluator.system.row]
 
 
 def correct_initial(
@@ -386,8 +385,7 @@ def _first_of(directions: Floats) -> Floats:
     """A unit vector (6 n,) of the space of orthonormal ones (k, 6 n), the same on any computer."""
     size = np.sum(directions**2, axis=0)
     k = int(np.argmax(size >= (1.0 - TIED) * np.max(size)))
-    first: Floats = directions[:, k] @ directions / size[k] ** 0.5
-    return first
+    return directions[:, k] @ directions / size[k] ** 0.5
 
 
 def _rank(values: Floats, part: float) -> int:
