@@ -175,8 +175,7 @@ class EquilibriumPath:
         for name in quantities:
             found = self.quantity(name)
             dimensions = ("point", f"component of {name}")[: found.values.ndim]
-            data[name] = (dimensions, found.values,
-                          {"units": found.unit, "long_name": found.label})  # fmt: skip
+            data[name] = (dimensions, found.values, {"units": found.unit, "long_name": found.label})
         about = {"units": self.unit, "long_name": self.parameter}
         marks = {name: ("point", getattr(self, name)) for name in MARKS}
         labels = {"body": list(names), "axis": list(AXES), "euler": list(EULER)}

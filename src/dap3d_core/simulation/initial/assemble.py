@@ -307,8 +307,7 @@ def _failure(
     if len(still_open) > MOST_JOINTS:
         lines.append(f"  and {len(still_open) - MOST_JOINTS} joints more")
     names = ", ".join(model.body_names[b - 1] for b in held)
-    why = ["bodies that do not reach their joints, and",
-           "contradictory joints cannot be assembled"]  # fmt: skip
+    why = ["bodies that do not reach their joints, and", "contradictory joints cannot be assembled"]
     if is_far:
         why = ["the bodies were still on their way: give positions nearer to an assembled pose,",
                "unless the joints contradict each other"]  # fmt: skip
