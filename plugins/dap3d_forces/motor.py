@@ -58,7 +58,7 @@ class Motor(Force):
     """
 
     keyword = "motor"
-    synonyms = ("actuator", "rotational-motor")
+    synonyms = ("rotational-motor",)
     symbol = "ring"
     example: ClassVar[Mapping[str, str]] = {"torque": "2.0"}
     joint: str = joint_fields(

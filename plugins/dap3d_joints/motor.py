@@ -49,7 +49,7 @@ class Motor(Joint):
     """
 
     keyword, rows = "motor", 1
-    synonyms = ("actuator", "rotational-motor")
+    synonyms = ("rotational-motor",)
     symbol = "ring"
     drives = True
     example: ClassVar[Mapping[str, str]] = {"position": "0.5"}

@@ -41,7 +41,8 @@ class Translational(Joint):
 
     On the constraints these are the manual's; it prints J = [0, -I], [0, I] and gamma = 0 for rows
     1 to 3. Friction, with N = lambda_4 n_j + lambda_5 m_j (spec 6.1): a force mu |N| S(v / v_tol)
-    along a_j at P_i, against the speed v of P_i along a_j as seen from body j; without v_tol it sticks.
+    along a_j at P_i, against the speed v of P_i along a_j as seen from body j; without v_tol it
+    sticks.
     """
 
     keyword, rows = "tran", 5

@@ -62,6 +62,12 @@ class CommandLine:
         assert "Traceback" not in err, err
         return subprocess.CompletedProcess(arguments, code, out, err)
 
+    def succeed(self, *arguments, **variables):
+        """Run a command that ends well."""
+        done = self(*arguments, **variables)
+        assert done.returncode == 0, done.stderr
+        return done
+
 
 @pytest.fixture
 def dap3d(tmp_path, capfd):

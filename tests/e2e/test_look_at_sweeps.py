@@ -57,8 +57,7 @@ def file(dap3d):
 
 
 def test_plot_draws_a_sweep(dap3d, refuse, file):
-    done = dap3d("plot", file)
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("plot", file)
     assert "s.png written" in done.stdout
     cut = dap3d("plot", file, "J1.force.norm:max", "--at", f"{MASS}=2", "-o", "a.svg", "--json")
     assert json.loads(cut.stdout) == {
@@ -111,8 +110,7 @@ def afar(file):
 
 
 def test_view_makes_a_page_of_a_sweep(dap3d, refuse, file):
-    done = dap3d("view", file)
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("view", file)
     assert "s.html written" in done.stdout
     assert "6 points" in done.stdout
     told = json.loads(dap3d("view", file, "--force", "--json", "--quantity", "cone.r.z").stdout)

@@ -62,8 +62,7 @@ def pen1(dap3d):
 
 
 def test_the_command_writes_a_page(dap3d, refuse, pen1):
-    done = dap3d("view", "pen1.nc")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("view", "pen1.nc")
     assert "pen1.html written" in done.stdout
     assert (dap3d.folder / "pen1.html").read_text().startswith("<!DOCTYPE html>")
     assert "pen1.html exists" in refuse("view", "pen1.nc")

@@ -180,26 +180,27 @@ def test_a_soft_spring_lets_a_ball_sink_far():
     assert dap.equilibrium(scene).r[0] == pytest.approx([0, 0, -9810.0], abs=9810 * ULP)
 
 
-def test_a_spring_without_first_order_stiffness_holds():
+def across_a_spring():
     """A bead on a line across an unstretched spring: V is of fourth order."""
     scene = at_rest.ball(weight=False)
     scene.add_joint("tran", P_i="ball.O", P_j="ground.O", a_j="ground.z")
     scene.add_point("wall", "ground", (1.0, 0.0, 0.0))
     scene.add_force("ptp", P_i="ball.O", P_j="wall", k=100.0, l0=1.0)
-    found = dap.equilibrium(scene)
-    assert found.stable
-    assert found.indifferent == 0
+    return scene
 
 
-def test_a_balanced_lamp_is_indifferent():
+def balanced_lamp():
     """A spring of free length zero carries the rod at every angle: k h = m g (Carwardine 1932)."""
     scene = at_rest.pendulum(1.0)
     scene.add_point("hook", "ground", (0.0, 0.0, 0.5))
     scene.add_force("ptp", P_i="rod.O", P_j="hook", k=2 * G / 0.5, l0=0.0)
-    found = dap.equilibrium(scene)
-    assert found.indifferent == 1
-    assert found.stable
-    assert found.steps == 0
+    return scene
+
+
+@pytest.mark.parametrize(("make", "indifferent"), [(across_a_spring, 0), (balanced_lamp, 1)])
+def test_without_first_order_stiffness_it_holds_or_is_indifferent(make, indifferent):
+    found = dap.equilibrium(make())
+    assert (found.stable, found.indifferent, found.steps) == (True, indifferent, 0)
 
 
 @pytest.mark.slow

@@ -213,33 +213,41 @@ def test_a_disk_slides_in_the_plane_and_then_rolls():
     assert result.w[-1, 0, 1] == pytest.approx(mu * m * G * R / J * stops, abs=1e-9)
 
 
-def test_a_pendulum_whose_load_depends_on_its_friction():
-    """An independent integration: the load N of the pin has the acceleration in it, and so itself.
+M, L, J, MU, R = 1.0, 0.5, 0.01, 0.5, 0.15  # of the pendulum
 
-    I t'' = -m g L sin t - mu R |N| sign t';  N = m (g cos t + L t'^2, g sin t + L t'').
-    """
-    m, L, J, mu, R = 1.0, 0.5, 0.01, 0.5, 0.15
+
+def pendulum():
     scene = dap.Scene(name="pendulum")
-    scene.add_body("bob", mass=m, Jp=(J, J, J), r=(L, 0.0, 0.0))
+    scene.add_body("bob", mass=M, Jp=(J, J, J), r=(L, 0.0, 0.0))
     scene.add_point("top", "bob", (-L, 0.0, 0.0))
     axis = {"P_i": "top", "P_j": "ground.O", "a_i": "bob.y", "a_j": "ground.y"}
     scene.add_joint("rev", "pin", **axis)
     scene.add_force("weight")
-    scene.add_force("friction", "rub", joint="pin", mu=mu, radius=R)
-    result = dap.simulate(scene, t_end=20.0, dt=0.05, **TIGHT)
+    scene.add_force("friction", "rub", joint="pin", mu=MU, radius=R)
+    return scene
 
-    def rates(t, y):
-        def over(N):
-            a = (-m * G * L * np.sin(y[0]) - mu * R * N * np.sign(y[1])) / (J + m * L * L)
-            radial = G * np.cos(y[0]) + L * y[1] ** 2
-            return m * np.hypot(radial, G * np.sin(y[0]) + L * a) - N, a
 
-        N = brentq(lambda N: over(N)[0], 0.0, 1e3, xtol=1e-14, rtol=1e-14)
-        return [y[1], over(N)[1]]
+def deceleration(angle, rate):
+    """t'' of an independent solution: the load N of the pin has t'' in it, and so itself.
 
+    I t'' = -m g L sin t - mu R |N| sign t';  N = m (g cos t + L t'^2, g sin t + L t'').
+    """
+
+    def over(N):
+        a = (-M * G * L * np.sin(angle) - MU * R * N * np.sign(rate)) / (J + M * L * L)
+        radial = G * np.cos(angle) + L * rate**2
+        return M * np.hypot(radial, G * np.sin(angle) + L * a) - N, a
+
+    return over(brentq(lambda N: over(N)[0], 0.0, 1e3, xtol=1e-14, rtol=1e-14))[1]
+
+
+def test_a_pendulum_whose_load_depends_on_its_friction():
+    """Against an integration by scipy; it comes to rest, and has lost what friction took."""
+    result = dap.simulate(pendulum(), t_end=20.0, dt=0.05, **TIGHT)
     times = result.t[(result.t > 0.0) & (result.t < 0.55)]  # before it turns back
     start = [-0.5 * np.pi, 1e-300]
-    own = solve_ivp(rates, (0.0, times[-1]), start, "DOP853", times, rtol=1e-12, atol=1e-13)
+    own = solve_ivp(lambda t, y: [y[1], deceleration(*y)], (0.0, times[-1]), start, "DOP853",
+                    times, rtol=1e-12, atol=1e-13)  # fmt: skip
     x, z = L * np.sin(own.y[0]), -L * np.cos(own.y[0])
     k = len(times) + 1
     found = np.hypot(result.r[1:k, 0, 0] + x, result.r[1:k, 0, 2] - z)
@@ -247,6 +255,17 @@ def test_a_pendulum_whose_load_depends_on_its_friction():
     assert result.events[-1].kind == "stick"
     assert np.abs(result.w[-1]).max() < 1e-15
     assert abs(result.ledger["energy"].value) < 1e-9
+
+
+def test_a_linearisation_while_it_slides_has_the_friction():
+    """The derivative of t'' by t', by differences of the independent solution."""
+    scene = pendulum()
+    result = dap.simulate(scene, t_end=0.4, dt=0.2, **TIGHT)
+    lin = dap.linearize(scene, at=result, t=0.2)
+    angle = result.quantity("pin.angle").values[1] - 0.5 * np.pi
+    rate, h = result.w[1, 0, 1], 1e-5
+    slope = (deceleration(angle, rate + h) - deceleration(angle, rate - h)) / (2.0 * h)
+    assert lin.A[1, 1] == pytest.approx(slope, rel=1e-7)  # of differences: h^2, and rounding / h
 
 
 @pytest.mark.parametrize("push", [1.0, 1e3, 1e6])

@@ -146,13 +146,3 @@ def test_a_spring_on_a_line_by_a_function():
         one_dimensional(law, 1.4, 0.0, 2.0, result.t), abs=1e-8
     )
     assert result.ledger["energy"].ok
-
-
-def test_a_spring_without_length_is_named():
-    """ptp: where its points coincide it has no direction; a scene that starts so is refused where
-    one is needed."""
-    scene = dap.Scene(name="no length")
-    scene.add_body("mass", mass=2.0, Jp=(1.0, 1.0, 1.0))
-    scene.add_force("ptp", "spring", P_i="mass.O", P_j="ground.O", k=10.0, l0=0.1)
-    with pytest.raises(dap.SceneError, match=r"forces\.spring: .*coincide at the start"):
-        dap.simulate(scene, t_end=0.1)

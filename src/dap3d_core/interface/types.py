@@ -112,8 +112,8 @@ class Joint(TypeBase):
     It may also define:
 
     * ``friction``  the wrench of its Coulomb friction on each body, as a force returns it; takes
-      ``lam`` (its multipliers), ``mu``, ``v_tol``, ``radius``; a force ``friction`` with a ``v_tol``
-      switches it on, one without the ``grips``;
+      ``lam`` (its multipliers), ``mu``, ``v_tol``, ``radius``; a force ``friction`` with ``v_tol``
+      switches it on, one without switches on the ``grips``;
     * ``switch``    a number, or a tuple of numbers, smooth in time. With ``switch_words`` the run
       ends with this message where one becomes negative; without, the integration restarts where
       one changes its sign: there the element's law takes another branch (docs/how-to/events.md);

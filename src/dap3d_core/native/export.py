@@ -266,6 +266,8 @@ def export_model(
     rtol: float | None = None,
     atol: float | None = None,
     step: float | None = None,
+    contact: str | None = None,
+    contact_step: float | None = None,
     strict: bool = False,
     force: bool = False,
     allow_code: bool = False,
@@ -283,7 +285,7 @@ def export_model(
             where it has none the motion of its bodies.
         parameters: numbers that may be set, such as "forces.spring.k".
         platforms: "linux", "windows", "macos", "linux-arm64" ...; by default this one.
-        fmi: version of an FMU, 3 or 2. t_end, ..., step: settings as of ``simulate``.
+        fmi: version of an FMU, 3 or 2. t_end, ..., contact_step: settings as of ``simulate``.
         strict, force: refuse a scene of which something would be left out; overwrite what exists.
         allow_code, registry: as of ``compile``.
 
@@ -297,6 +299,7 @@ def export_model(
     chosen: dict[str, Any] = {
         "outputs": outputs, "parameters": parameters, "platforms": platforms, "t_end": t_end,
         "method": method, "integrator": integrator, "rtol": rtol, "atol": atol, "step": step,
+        "contact": contact, "contact_step": contact_step,
     }  # fmt: skip
     given = {name: value for name, value in chosen.items() if value is not None}
     if kind not in NATIVE_FORMATS:

@@ -176,8 +176,8 @@ def _of_joint(subject: SampledType) -> list[Check]:
     no_form = "" if "C_dot" in subject.kernels.names() else "it defines no C_dot"
     ground = joints.against_ground(subject)
     turns = fewer = ""
-    if subject.type.is_contact and subject.type.along is not None:
-        fewer = "it has one row, and two that stay zero"
+    if subject.type.is_contact and subject.type.is_friction_alone():
+        fewer = "" if all(subject.type.holds) else "some of its three rows stay zero"
     elif subject.type.is_contact and subject.type.at is None:
         turns = "its gap is an angle, whose rows are those of bodies that turn about its normal"
     checks = [

@@ -325,6 +325,29 @@ def test_actuators_read_back(tmp_path):
     assert sum("actuator" in str(one) for one in left) == 3
 
 
+BOUNDED = """<motor name="turn" joint="q" gear="-3" ctrlrange="-1 2" forcerange="-2 3"/>
+  <position name="servo" joint="p" kp="5" kv="0.5" forcerange="-1 4" ctrlrange="-9 0.3"/>
+  <general name="push" joint="s" dyntype="filter" dynprm="0.2" gainprm="4" actrange="0 1"/>
+  <intvelocity name="on" joint="p" kp="3" actrange="-1 1"/></actuator>"""
+
+
+def test_bounds_and_activations_of_actuators_read_back(tmp_path):
+    text = DRIVEN.partition("<position")[0] + BOUNDED + "</mujoco>"
+    (tmp_path / "a.xml").write_text(text)
+    scene, _ = dap.import_model(tmp_path / "a.xml", positions={"p": 0.3})
+    assert not dap.export_model(scene, tmp_path / "b.xml", format="mjcf").left_out
+    back, _ = dap.import_model(tmp_path / "b.xml")
+    assert_same(scene, back)
+    made = [one for one in scene.forces.values() if one.type == "actuator"]
+    assert len(made) == 4
+    for force in made:
+        other = back.forces[force.name].fields
+        for key, value in force.fields.items():
+            assert other[key] == (
+                pytest.approx(value, rel=1e-14) if type(value) is float else value
+            )
+
+
 def test_a_joint_that_closes_a_loop_has_no_actuator(tmp_path):
     """It is an equality in MJCF, on which nothing acts."""
     scene, _ = dap.import_model(DATA / "parallelogram.sdf")

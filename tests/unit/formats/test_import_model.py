@@ -290,6 +290,23 @@ def test_links_stay_apart_from_those_that_the_file_names_alone(tmp_path, more, f
     assert meeting == ALL - fewer
 
 
+@pytest.mark.parametrize("flag", ["contact", "constraint", "limit", "frictionloss", "equality"])
+def test_flags_that_disable_something_are_heeded(tmp_path, flag):
+    text = f"""<option><flag {flag}="disable"/></option><worldbody><geom type="plane" size="1 1 1"/>
+      <body name="b"><joint name="j" range="-1 1" frictionloss="1"/><geom size="0.1"/></body>
+      <body name="c"><joint name="k"/><geom size="0.1" pos="1 0 0"/></body></worldbody>
+      <equality><joint joint1="j" joint2="k"/></equality>"""
+    scene, _ = imported(tmp_path, text, contacts=True, limits="hard")
+    there = {
+        "contact": any(shape.fields.get("collides") for shape in scene.shapes.values()),
+        "limit": "lower" in scene.joints["j"].fields,
+        "frictionloss": any(one.type == "rot_friction" for one in scene.forces.values()),
+        "equality": any(one.type == "follow" for one in scene.joints.values()),
+    }
+    off = set(there) if flag == "constraint" else {flag}
+    assert {name for name, found in there.items() if not found} == off
+
+
 def test_friction_of_a_pair_is_that_of_the_one_with_priority(tmp_path):
     text = CONTACTS.replace('friction="0.2"', 'friction="0.2" priority="1"')
     scene, _ = imported(tmp_path, text, contacts=True)

@@ -3,13 +3,18 @@
 from math import inf
 from typing import Any
 
-import attrs
 import numpy as np
 
-from dap3d_core.formats.export_scene.elements import ALIGNED, SceneElements, SceneJoint, leave_out
+from dap3d_core.formats.export_scene.actuators import add_actuators
+from dap3d_core.formats.export_scene.elements import (
+    ALIGNED,
+    ModelBuilder,
+    SceneElements,
+    SceneJoint,
+    leave_out,
+)
 from dap3d_core.interface.formats.articulation import (
     WORLD,
-    Actuator,
     Articulation,
     Coupling,
     Geometry,
@@ -40,35 +45,6 @@ SIZES = {
     "cylinder": (("radius", "length"), 1.0), "ellipsoid": (("size",), 0.5),
 }  # fmt: skip
 NO_JOINT = "no force on the coordinate of a joint"
-#: Kind of a joint -> the type of force, in axes of its body, that acts on its coordinate.
-TYPES = {"revolute": "np", "prismatic": "fp"}
-
-
-@attrs.define(eq=False)
-class ModelBuilder:
-    """A model that is made of a scene.
-
-    Attributes:
-        elements: the elements of the scene, with their frames.
-        remarks: of the export.
-        model: the model so far.
-        origin: body -> the origin of its link in its axes at its mass centre.
-        placed: joint of the scene -> that of the model.
-    """
-
-    elements: SceneElements
-    remarks: Remarks
-    model: Articulation
-    origin: dict[str, np.ndarray] = attrs.Factory(dict)
-    placed: dict[str, Joint] = attrs.Factory(dict)
-
-    def link(self, body: str) -> str:
-        """The link of a body."""
-        return WORLD if body == GROUND else body
-
-    def in_link(self, body: str, frame: Frame) -> Frame:
-        """A frame of a body at its mass centre, in its link."""
-        return Frame(frame.r - self.origin.get(body, np.zeros(3)), frame.A)
 
 
 def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
@@ -443,53 +419,3 @@ def _followed(builder: ModelBuilder, fields: dict[str, Any]) -> SceneJoint | Non
             if abs(along - 1.0) <= ALIGNED:
                 return joint
     return None
-
-
-def add_actuators(builder: ModelBuilder, scene: Scene) -> set[str]:
-    """Add inputs that are factors of forces on the coordinate of one joint.
-
-    Returns:
-        the names of these forces.
-    """
-    taken: set[str] = set()
-    for name, given in scene.inputs.items():
-        users = [e for e in (*scene.forces.values(), *scene.joints.values())
-                 if e.fields.get("input") == name]  # fmt: skip
-        for joint in builder.elements.joints:
-            gear = _gear(builder, joint, users)
-            if gear:
-                builder.model.actuators.append(Actuator(name, joint.name, gear))
-                taken |= {element.name for element in users}
-                if given.value:
-                    text = f"the value of input {name} at the start"
-                    builder.remarks.leave_out(NOWHERE, text, motion=True)
-                break
-    return taken
-
-
-def _gear(builder: ModelBuilder, joint: SceneJoint, users: list[Element]) -> float:
-    """Force on the coordinate of a joint for an input of 1; 0.0 if that is not what acts."""
-    if joint.kind not in TYPES or builder.placed[joint.name].closes:
-        return 0.0
-    type_ = TYPES[joint.kind]
-    point = builder.elements.point
-    acting = {point(_point_of(e))[0]: e for e in users if e.type == type_}
-    moving = [one for one in (joint, joint.reversed()) if one.body_i != GROUND]
-    if len(acting) != len(users) or acting.keys() != {one.body_i for one in moving}:
-        return 0.0
-    forces = [np.asarray(acting[one.body_i].fields[type_], dtype=float) for one in moving]
-    gear = float(forces[0] @ moving[0].axes[0])
-    apart = max(np.abs(f - gear * one.axes[0]).max() for f, one in zip(forces, moving, strict=True))
-    if apart > ALIGNED * abs(gear):
-        return 0.0
-    if type_ == "fp":  # on one line
-        places = [builder.elements.at(_point_of(acting[one.body_i])) for one in moving]
-        axis = builder.elements.bodies[moving[0].body_i].pose.A @ moving[0].axes[0]
-        if np.abs(np.cross(places[-1] - places[0], axis)).max() > ALIGNED:
-            return 0.0
-    return gear
-
-
-def _point_of(element: Element) -> str:
-    """The point at which a force acts."""
-    return str(element.fields.get("P_i") or f"{element.fields['body_i']}.O")

@@ -1,6 +1,5 @@
 """An articulated model as a scene: bodies, joints, and what acts on coordinates of joints."""
 
-import re
 from collections.abc import Mapping, Sequence
 from math import atan2, cos, isfinite, pi, sin
 from typing import Any
@@ -8,6 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
+from dap3d_core.formats.import_scene.actuators import add_actuators, add_tendons
 from dap3d_core.formats.import_scene.couplings import add_couplings, add_rotor
 from dap3d_core.formats.import_scene.joints import add_joint, from_ground, named_ends
 from dap3d_core.formats.import_scene.names import Names
@@ -27,7 +27,7 @@ from dap3d_core.formats.import_scene.shapes import (
 from dap3d_core.formats.import_scene.spanning_tree import Placed, SpanningTree
 from dap3d_core.formats.import_scene.start import AGREE, SCALAR, couples, start_of
 from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint, Limits, Link
-from dap3d_core.interface.formats.frames import IDENTITY, quaternion
+from dap3d_core.interface.formats.frames import IDENTITY, Frame, quaternion
 from dap3d_core.interface.formats.joint_inertia import JointInertia
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
@@ -132,7 +132,7 @@ def scene_of(
     for group in groups.values():
         if group.name != WORLD:
             _add_body(builder, group, placed[group.name])
-    _add_gravity(scene, model.gravity)
+    _add_gravity(builder, model.gravity)
     _add_joints(builder, model)
     bits = bits_of_shapes(builder, model) if options.contacts else {}
     for group in groups.values():
@@ -152,7 +152,8 @@ def _add_joints(builder: SceneBuilder, model: Articulation) -> None:
             add_joint(builder, joint)
         _add_joint_forces(builder, joint)
     add_couplings(builder, model)
-    _add_inputs(builder, model)
+    add_actuators(builder, model)
+    add_tendons(builder, model)
 
 
 def _inertia(tree: SpanningTree, groups: Mapping[str, RigidGroup]) -> JointInertia:
@@ -209,11 +210,23 @@ def inertia_numbers(inertia: Floats) -> Any:
     return tuple(float_tuple(row) for row in symmetric)
 
 
-def _add_gravity(scene: Scene, gravity: Sequence[float]) -> None:
-    size = float(np.linalg.norm(gravity))
-    if size > 0.0:
-        wgt = tuple(g / size + 0.0 for g in gravity)
-        scene.add_force("weight", "gravity", gravity=size, wgt=wgt)
+def _add_gravity(builder: SceneBuilder, gravity: Sequence[float]) -> None:
+    """Add gravity, and what carries a part of the weight of links at their mass centres."""
+    size, scene = float(np.linalg.norm(gravity)), builder.scene
+    if not size > 0.0:
+        return
+    wgt = tuple(g / size + 0.0 for g in gravity)
+    scene.add_force("weight", "gravity", gravity=size, wgt=wgt)
+    for group in builder.groups.values():
+        for link, _ in group.links:
+            if group.name != WORLD and link.gravcomp and link.inertial is not None:
+                body, frame = builder.attached(link.name, Frame(link.inertial.com))
+                force = float_tuple(-link.gravcomp * link.inertial.mass * np.array(gravity))
+                point, name = f"{body}.O", builder.names.free("forces", f"{body}_carried")
+                if np.abs(frame.r).max() > 0.0:
+                    point = builder.names.free("points", f"{body}_carried")
+                    scene.add_point(point, body, float_tuple(frame.r))
+                scene.add_force("f", name, P_i=point, f=force)
 
 
 def split_planar(model: Articulation, remarks: Remarks) -> Articulation:
@@ -444,35 +457,3 @@ def _perpendicular(axis: Floats) -> Floats:
     other = np.eye(3)[int(np.argmin(np.abs(axis)))]
     across = other - (other @ axis) * axis
     return np.asarray(across / np.linalg.norm(across))
-
-
-def _add_inputs(builder: SceneBuilder, model: Articulation) -> None:
-    """Add actuators as inputs, each a factor of a force or moment on both sides of a joint.
-
-    The force of a slider acts on the line of its axis, on both bodies.
-    """
-    scene, names = builder.scene, builder.names
-    for actuator in model.actuators:
-        joint = from_ground(builder, model.joints[actuator.joint])
-        if joint.kind == "fixed" or builder.moves_alone(joint):
-            text = "an actuator of a joint that does not move"
-            builder.remarks.leave_out(actuator.place, text, motion=True)
-            continue
-        others = (scene.bodies, scene.points, scene.joints, scene.forces)
-        clash = any(actuator.name in table for table in others)
-        wanted = re.sub(r"\W", "_", f"{actuator.name}_input" if clash else actuator.name)
-        wanted = f"input_{wanted}" if wanted[:1].isdigit() else wanted
-        name = names.of("inputs", wanted, actuator.place, builder.remarks)
-        scene.add_input(name, 0.0)
-        ends = named_ends(builder, joint)
-        axis = np.asarray(joint.axes[0], dtype=float)
-        sides = (("i", ends.child, ends.on_child, 1.0), ("j", ends.parent, ends.on_parent, -1.0))
-        for end, body, frame, sign in sides:
-            if body == GROUND:
-                continue
-            vector = tuple((sign * actuator.gear * (frame.A @ axis) + 0.0).tolist())
-            force = names.free("forces", f"{name}_{end}")
-            if joint.kind == "revolute":
-                scene.add_force("np", force, body_i=body, np=vector, input=name)
-            else:
-                scene.add_force("fp", force, P_i=ends.point(end), fp=vector, input=name)

@@ -34,6 +34,7 @@ class SourceFiles:
         contacts: whether shapes are to meet each other.
         arguments: of macros, by name.
         unused: names of arguments that the file has not asked for.
+        key: the keyframe that the model starts at, until an importer takes it.
         remarks: of the import.
         text: replaces the contents of the file, as the output of a macro processor.
     """
@@ -46,6 +47,7 @@ class SourceFiles:
     contacts: bool = False
     arguments: Mapping[str, str] = attrs.Factory(dict)
     unused: set[str] = attrs.Factory(lambda self: set(self.arguments), takes_self=True)
+    key: str | None = None
     remarks: Remarks = attrs.Factory(Remarks)
     text: bytes | str | None = None
     _open: list[Path] = attrs.Factory(list)

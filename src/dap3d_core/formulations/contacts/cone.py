@@ -29,7 +29,12 @@ TINY = 1e-300
 
 
 def solve_cone(
-    A: Floats, b: Floats, mu: Any, more: Any = None, start: Any = None, tries: int = TRIES,
+    A: Floats,
+    b: Floats,
+    mu: Any,
+    more: Any = None,
+    start: Any = None,
+    tries: int = TRIES,
     gapless: Any = None,
 ) -> tuple[Floats, float]:
     """The solution x (3 m,), and the residual of the equations over its size.

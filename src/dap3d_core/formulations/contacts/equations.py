@@ -1,8 +1,8 @@
 """Right-hand side, projection, report and switches of scenes with contacts (lsq.py has the rows).
 
-Sliding friction is linear in the normal force of its contact, or in the load of its joint. So the rows are factored once and
-solved once more for each contact that slides, by its friction of a normal force of one; what these
-forces are follows from as many equations:
+Sliding friction is linear in the normal force of its contact, or in the load of its joint. So the
+rows are factored once and solved once more for each contact that slides, by its friction of a
+normal force of one; what these forces are follows from as many equations:
 
     N = N_0 + L N,    L_rs the normal force at r by friction of a normal force of one at s.
 
@@ -315,7 +315,7 @@ def solve_loads(system: System, count: int) -> None:
 
 @compiled
 def fill_load(system: System, count: int, r: int, A: Floats) -> float:
-    """An equation of ``solve_loads``: its derivatives by N into A (2 count,); what is left of it."""
+    """What is left of an equation of ``solve_loads``; its derivatives by N into A (2 count,)."""
     x, total, size = system.multipliers, system.total, system.acceleration.shape[0]
     N, own = inverse(system, count)[2 * count * count :], column(system, r)
     c = contact_of(system, r)

@@ -281,12 +281,15 @@ def _leave_to_others(
     mine = [(c, k) for c in alone for k in np.flatnonzero(table.holds[c]).tolist()]
     others = [3 * c + k for c in closed if not table.alone[c] for k in range(3)
               if found.mode[c] > (0.5 if k == 0 else 1.5)]  # fmt: skip
-    W, left = rows.W, dict.fromkeys(mine)
-    least, kept = DEPENDENT * np.abs(W).max(), others
+    mobility, left = rows.W, dict.fromkeys(mine)
+    least, kept = DEPENDENT * np.abs(mobility).max(), others
     while left:
-        back = np.linalg.pinv(W[np.ix_(kept, kept)], rcond=DEPENDENT, hermitian=True)
+        back = np.linalg.pinv(mobility[np.ix_(kept, kept)], rcond=DEPENDENT, hermitian=True)
         own = {at: 3 * at[0] + at[1] for at in left}
-        free = {at: W[q, q] - W[q, kept] @ back @ W[kept, q] for at, q in own.items()}
+        free = {
+            at: mobility[q, q] - mobility[q, kept] @ back @ mobility[kept, q]
+            for at, q in own.items()
+        }
         best = max(free, key=lambda at: float(free[at]))
         if free[best] <= least:
             break

@@ -112,6 +112,7 @@ class TreeCoordinates(Coordinates):
     def function(self, k: int) -> Any:
         """As of ``Coordinates``."""
         name = "joint_loops" if self.kept else "joint"
+        name += ".contacts" if self.evaluator.model.contact_count else ""
         return getattr(import_module(f"dap3d_core.formulations.{name}"), FUNCTIONS[k])
 
     @property
@@ -161,6 +162,8 @@ class TreeCoordinates(Coordinates):
                 f"method joint takes some {self._cost_ratio:.2g} times as long as standard or lsq "
                 "here: its kept rows meet far from ground, or many of them do; auto takes those"
             )
+        elif self.evaluator.model.contact_count:
+            pass  # friction of contacts is linear in their multipliers
         elif forces := self.evaluator.model.iterated_forces:
             notes.append(
                 "method joint takes two to three times as long as standard here: at each pass of "
@@ -255,6 +258,13 @@ class TreeCoordinates(Coordinates):
         after[-1] += work
         return after
 
+    def displace(self, y: Floats, moved: Floats) -> None:
+        """As of ``Coordinates``: a change of rates, for a unit of time."""
+        from dap3d_core.formulations.joint_loops.kept_rows import add_displacement
+
+        change = self.with_jump(y, moved, self.evaluator.states, 0.0) - y
+        add_displacement(y, change, self.evaluator.system)
+
     def u_dot(self, t: float, u: Floats) -> Floats:
         """As of ``Coordinates``."""
         _, p, v, w = split(u)
@@ -306,8 +316,10 @@ def cost_over_standard(model: Model, plan: Plan) -> float:
 def _tree_and_reasons(model: Model) -> tuple[ModelMotions, SpanningForest, dict[int, str]]:
     """Motions of joints, the joints of a tree, and why others keep their rows."""
     motions = model.motions or classify(model)
+    count = len(model.joint_names)
+    of_contacts = range(count - model.contact_count, count)
     ends: dict[int, tuple[int, int]] = {}
-    reasons = dict(motions.refused)
+    reasons = dict(motions.refused) | dict.fromkeys(of_contacts, "it is a contact")
     for group in motions.motions:
         joints = group.joints.tolist()
         if reason := unsuitable_motion(group):

@@ -231,6 +231,9 @@ def judge_kept_rows(evaluator: Evaluator, y: Floats) -> None:
     The pivot of a row that depends on others is what compliances make of it, and follows them.
     """
     kept: KeptRowArrays = evaluator.system.tree.kept
+    if evaluator.model.contact_count:  # those that close make other pivots
+        kept.smallest[:], kept.settings[PART_OF_ROW] = 0.0, PART
+        return
     more, less = (_pivots(evaluator, y, part) for part in (SMALL, SMALL / LESS))
     redundant = ~(more < np.sqrt(LESS) * less)
     kept.smallest[:] = np.where(redundant, 0.0, SINGULAR_PIVOT_RATIO * less)

@@ -22,6 +22,9 @@ ROOM = 16
 MET = 14
 #: Reported rows of such contacts that there is room for at first.
 LOG_ROOM = 64
+#: Pairs of shapes a shape, and points a pair, that exported models have room for; entries of their
+#: matrices a body; contacts that joints hold.
+MOST_PAIRS, MOST_POINTS, MOST_ENTRIES, MOST_HELD = 32, 8, 16, 100
 #: Arrays of which a row belongs to a contact.
 OF_CONTACTS = ("bodies", "key", "group", "chosen", "J", "moved", "own", "own_held", "gap", "mu",
                "e", "bias", "r", "left", "collides", "closing", "x", "u", "z", "B", "push", "kept",
@@ -77,6 +80,7 @@ class StepArrays(Arrays):
     entry_count = _integer()  # blocks of K below the diagonal
     bit_size = _integer()  # words of bits
     held_count = _integer()  # contacts that scratch of held ones is needed for
+    is_exported = _integer()  # 1: Python makes no room, and takes no log
     # constants
     dense_size = _integer()  # unknowns up to which K is a square
     first_v_dot = _integer()  # places in reported rows
@@ -287,6 +291,22 @@ def _declared(evaluator: Evaluator) -> dict[str, Any]:
         "declared_e": np.zeros(0) if table is None else table.e,
         "declared_x": np.zeros((d, 3)),
     }
+
+
+def all_room(s: StepArrays) -> StepArrays:
+    """The same arrays with room for all that exported models may need, and no log."""
+    m, n = len(s.shapes.kind), len(s.mass) - 1
+    s.shapes.pair_count = min(m * (m - 1) // 2, MOST_PAIRS * m)
+    s.shapes.point_count = MOST_POINTS * s.shapes.pair_count
+    s.bit_size = n * (n // 32 + 1)
+    s.entry_count = min(n * (n - 1) // 2, MOST_ENTRIES * n)
+    s.matrix_size = 36 * (n + 2 * s.entry_count)
+    s.held_count = min(s.shapes.point_count + len(s.declared_gap), MOST_HELD) if len(s.y) else 0
+    found = grown(s)
+    found.shapes.pair_count = found.shapes.point_count = 0
+    found.entry_count = found.held_count = 0
+    found.is_exported = 1
+    return found
 
 
 def grown(s: StepArrays) -> StepArrays:

@@ -59,7 +59,7 @@ def choose(s: StepArrays, group: int) -> None:
 def lay_out(s: StepArrays) -> bool:
     """Lay out the matrix of a group, K, as a square or by blocks; False without room."""
     n = s.used_count
-    s.width, s.matrix_size, s.entry_count = 6 * n, 36 * n * n, 0
+    s.width, s.matrix_size, s.entry_count = 6 * n, 0, 0
     if 6 * n > s.dense_size:
         s.width, s.bit_size = 6, n * ((n + BITS - 1) // BITS)
         if s.bit_size > s.bits.size:
@@ -67,6 +67,8 @@ def lay_out(s: StepArrays) -> bool:
         connect(s)
         s.entry_count = order_bodies(s)
         s.matrix_size = 36 * (n + 2 * s.entry_count)
+    else:
+        s.matrix_size = 36 * n * n
     return s.matrix_size <= s.K.size and s.entry_count <= s.entries.size
 
 

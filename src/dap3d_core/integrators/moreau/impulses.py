@@ -91,32 +91,30 @@ def keep_for_reports(s: StepArrays) -> None:
 
 
 @compiled
-def complete_rows(work: Any, s: StepArrays, first: int) -> None:
-    """Put means of the last step into rows of reports from ``first`` on, and the contacts."""
-    for q in range(first, work.row_count):
-        row = work.rows[q]
-        for b in range(1, s.end.shape[0]):
-            for k in range(6):
-                mean = (s.end[b, k] - s.before[b, k]) / s.h
-                row[s.first_v_dot + 6 * (b - 1) + k] = mean
-        if s.is_solved != 0:
-            complete_forces(s, row)
-            for m in range(s.met_count):
-                log, met = s.log[s.log_count], s.met[m]
-                log[0] = row[0]
-                for k in range(1, MET):
-                    log[k] = met[k]
-                s.log_count += 1
-
-
-@compiled
-def complete_forces(s: StepArrays, row: Floats) -> None:
-    """Put mean forces, and modes of declared contacts."""
-    own = s.joint_y.size
-    for k in range(own):
+def complete_row(work: Any, s: StepArrays, row: Floats) -> None:
+    """Put means of the last step, and modes of declared contacts, into a row of reports."""
+    if work.step_count == 0:
+        return
+    for b in range(1, s.end.shape[0]):
+        for k in range(6):
+            mean = (s.end[b, k] - s.before[b, k]) / s.h
+            row[s.first_v_dot + 6 * (b - 1) + k] = mean
+    own, solved = s.joint_y.size, s.is_solved != 0
+    for k in range(own if solved else 0):
         row[s.first_lam + k] += s.joint_y[k] / s.h
-    for c in range(s.declared_gap.size):
+    for c in range(s.declared_gap.size if solved else 0):
         x = s.declared_x[c]
         for k in range(3):
             row[s.first_lam + own + 3 * c + k] = x[k] / s.h
         row[s.first_state + s.declared_mode[c]] = mode_of(x, s.declared_mu[c])
+
+
+@compiled
+def log_contacts(work: Any, s: StepArrays, t: float) -> None:
+    """Log the contacts that shapes push with at a reported instant."""
+    for m in range(s.met_count if work.step_count > 0 else 0):
+        log, met = s.log[s.log_count], s.met[m]
+        log[0] = t
+        for k in range(1, MET):
+            log[k] = met[k]
+        s.log_count += 1

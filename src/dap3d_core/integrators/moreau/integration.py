@@ -18,7 +18,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.integrators.moreau.arrays import grown
+from dap3d_core.integrators.moreau.arrays import all_room, grown
 from dap3d_core.integrators.moreau.problem import arrays_of
 from dap3d_core.integrators.moreau.step import advance
 from dap3d_core.integrators.stepping.integration import Integration
@@ -85,11 +85,15 @@ class MoreauIntegration(Integration):
         """As ``Integration.loop_arguments``."""
         return self.work, self._arrays, *self._arguments
 
+    def make_room(self) -> None:
+        """Make all room that a run without Python has."""
+        self._arrays = all_room(self._arrays)
+
     @IGNORE_FLOAT_ERRORS
     def _advance(self, budget: int) -> None:
         limit = int(self.work.rhs_count) + budget
         while True:
-            self.call(self.loop, *self.loop_arguments, limit)
+            self.call(self.loop, *self.loop_arguments, limit - int(self.work.rhs_count))
             arrays = self._arrays
             waits = arrays.log_count + 2 * arrays.met_count > len(arrays.log)
             if arrays.log_count:

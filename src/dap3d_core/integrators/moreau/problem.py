@@ -5,9 +5,8 @@
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.moreau.arrays import StepArrays, step_arrays
-from dap3d_core.integrators.moreau.gauss_seidel import sweep_bodies
+from dap3d_core.integrators.moreau.gauss_seidel import refine_held, sweep_bodies
 from dap3d_core.integrators.moreau.groups import choose, find_groups, lay_out
-from dap3d_core.integrators.moreau.held import refine_held
 from dap3d_core.integrators.moreau.newton import (
     SMALL,
     TINY,

@@ -13,8 +13,9 @@ from dap3d_core.integrators.moreau.contact_set import axes_of, evaluate_rows, fi
 from dap3d_core.integrators.moreau.free_motion import move_freely
 from dap3d_core.integrators.moreau.groups import find_groups, root_of
 from dap3d_core.integrators.moreau.impulses import (
-    complete_rows,
+    complete_row,
     keep_for_reports,
+    log_contacts,
     recall,
     remember,
 )
@@ -22,6 +23,7 @@ from dap3d_core.integrators.moreau.newton import speed_of, velocity_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
 from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
 from dap3d_core.integrators.stepping.integration_state import (
+    NO_ROOM,
     NOT_FINITE,
     OTHER,
     RUNNING,
@@ -49,9 +51,13 @@ FREE, MOVED = 1, 2
 
 @compiled
 def advance(
-    work: Any, s: StepArrays, functions: Any, system: System, loops: Any, limit: int
+    work: Any, s: StepArrays, functions: Any, system: System, loops: Any, budget: int
 ) -> None:
-    """Integrate until so many right-hand sides are spent, the rows are full, or room is missing."""
+    """Integrate until more than ``budget`` calls of rhs are spent, or the rows are full.
+
+    Or room is missing: ``stage`` says so.
+    """
+    limit = work.rhs_count + budget
     while s.stage != 0 or goes_on(work, s, functions, system, loops, limit):
         if s.stage == 0:
             s.t1 = min(end_of_step(work), work.step_limit)
@@ -63,12 +69,14 @@ def advance(
                 return
         if s.stage == FREE:
             if not meet(work, s, system, loops):
-                return
+                break
             s.stage = MOVED
         if s.is_solved != 0 and not part(work, s, system, loops):
-            return
+            break
         s.stage = 0
         finish(work, s, functions, system, loops)
+    if s.stage != 0 and s.is_exported != 0:
+        work.t_stop, work.status, s.stage = s.t1, NO_ROOM, 0
 
 
 @compiled
@@ -76,12 +84,14 @@ def goes_on(
     work: Any, s: StepArrays, functions: Any, system: System, loops: Any, limit: int
 ) -> bool:
     """Report what is reached; True if a step is to be taken now."""
-    if s.log_count + 2 * s.met_count > s.log.shape[0]:
+    if s.log_count + 2 * s.met_count > s.log.shape[0] and s.is_exported == 0:
         return False
     first = work.row_count
     again = may_step(work, state_at, limit, functions[1], functions[2], system, loops)
-    if work.step_count > 0:
-        complete_rows(work, s, first)
+    for q in range(first, work.row_count):
+        complete_row(work, s, work.rows[q])
+        if s.is_exported == 0:
+            log_contacts(work, s, work.rows[q, 0])
     return again
 
 

@@ -122,10 +122,12 @@ class _Instances:
         for first in range(0, max(len(self.seeds), 1), AT_ONCE):
             wide = DifferentiatedArrays(arrays, 1 + AT_ONCE)
             outs = np.zeros((3, size, 1 + AT_ONCE))
-            outs[1, : len(multipliers), 0] = multipliers
+            outs[1:, : len(multipliers), 0] = multipliers  # contacts read them behind outputs
             for lane, (name, at, slopes) in enumerate(self.seeds[first : first + AT_ONCE], 1):
-                numbers = outs[1] if name == "multipliers" else wide.matrix(self._arrays[name])
-                numbers[at, lane] = slopes
+                if name == "multipliers":
+                    outs[1:, at, lane] = slopes
+                else:
+                    wide.matrix(self._arrays[name])[at, lane] = slopes
             entry(t, wide, 0, p0, len(self.idx), *outs)
             parts.append([*outs, wide.matrix(arrays.rates)])
         return [

@@ -74,7 +74,8 @@ class Contact(Joint):
     kernel_names: ClassVar[tuple[str, ...]] = (  # type: ignore[assignment]
         *DECLARED, *OPTIONAL, *Joint.kernel_names, "tension"
     )  # fmt: skip
-    rows, holonomic = 3, (True, False, False)
+    rows = 3
+    holonomic: ClassVar[bool | tuple[bool, ...]] = (True, False, False)
     is_contact: ClassVar[bool] = True
     declared: ClassVar[tuple[str, ...]] = (*DECLARED, *OPTIONAL)
     points: ClassVar[int] = 1
@@ -95,6 +96,7 @@ class Contact(Joint):
             _add_material(cls)
             if cls.load:
                 pushing = getattr(of, "unilateral", ())
+                cls.holonomic = False
                 cls.pushes = len(cls.load) == 1 and pushing is not True and cls.load[0] in pushing
             is_one = cls.load or cls.along is not None
             if is_one or all(getattr(cls, name, None) is not None for name in DECLARED):
@@ -195,7 +197,7 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     # imported here: finding types by keyword does not need kernels
     from dap3d_core.interface.codegen.kernel_arguments import parameters
     from dap3d_core.interface.codegen.specialise import bound_kernel
-    from dap3d_core.interface.contacts import grips, rates, rows, turning
+    from dap3d_core.interface.contacts import grips, loaded, rates, rows, turning
 
     names_of = [n for n in (*DECLARED, *OPTIONAL) if getattr(class_, n, None) is not None]
     declared = {name: getattr(class_, name) for name in names_of}
@@ -221,7 +223,7 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     if not has_j:
         calls |= dict.fromkeys(("r_j", "v_j", "w_j"), "(0.0, 0.0, 0.0)")
     kernels = {f"{name}__": kernel for name, kernel in declared.items()}
-    every = kernels | {"rate_of__": rates.rate_of, "turned__": rates.turned}
+    every: dict[str, Any] = kernels | {"rate_of__": rates.rate_of, "turned__": rates.turned}
 
     def bound(kernel: Callable[..., Any]) -> Any:
         own = parameters(kernel)
@@ -229,17 +231,10 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         needed = dict.fromkeys(n for short in given for n in wanted.get(short, ()))
         return bound_kernel(kernel, given, needed, every)
 
-    if class_.load:
-        from dap3d_core.interface.contacts import loaded
-
-        calls |= loaded.expressions(calls, pushes=class_.pushes)
-        wanted |= loaded.needs(wanted, calls)
-        every |= loaded.FUNCTIONS
-        at_point = loaded.KERNELS if has_j else loaded.OF_ONE
-        of_joint = at_point if "at" in declared else loaded.TURNING
-        return {name: bound(kernel) for name, kernel in of_joint.items()}
     special: dict[str, Any] = turning.KERNELS if "at" not in declared else {}
-    if "along" in declared:
+    if class_.load:
+        special = loaded.kernels_of(calls, wanted, every, pushes=class_.pushes, has_j=has_j)
+    elif "along" in declared:
         special = grips.KERNELS if "at" in declared else grips.TURNING
     if special:
         return {name: bound(kernel) for name, kernel in special.items()}

@@ -1,7 +1,7 @@
 """Kernels of the friction of a joint: it sticks, or slides, by the load that multipliers are.
 
 Of the three rows of a contact (rows.py) those along a direction, in a plane, or all hold where it
-sticks; E has their unit vectors, zero where there is none, u is the slip. There is no gap: it is
+sticks; axes has their unit vectors, zero where there is none, u is the slip. There is no gap: it is
 never open. mu and mu_s are multiplied by the load; of moments they hold the radius. The functions
 whose names begin with turning are of moments.
 """
@@ -74,10 +74,8 @@ FUNCTIONS: dict[str, Any] = {
 }  # fmt: skip
 
 
-def expressions(
-    calls: Mapping[str, str], *, pushes: bool
-) -> dict[str, str]:
-    """Expressions for E, u and what else kernels name here, from those of the declared functions.
+def expressions(calls: Mapping[str, str], *, pushes: bool) -> dict[str, str]:
+    """Expressions for what kernels name here, from those of the declared functions.
 
     Args:
         calls: expressions of c, n, e and their rates, where they are declared.
@@ -90,17 +88,22 @@ def expressions(
     found = {"u": u, "load": "pressed__(lam_load)" if pushes else "size__(lam_load)"}
     if "e" in calls:
         way = f"toward__({calls['e']}, way)"
-        E, rates = f"line__({calls['e']})", f"line__({calls['e_dot']})"
-        return found | {"E": E, "E_dot": rates, "ahead": way, "toward": way}
+        axes, rates = f"line__({calls['e']})", f"line__({calls['e_dot']})"
+        return found | {"axes": axes, "axes_dot": rates, "ahead": way, "toward": way}
     if "n" in calls:
         n, both = calls["n"], f"{calls['n']}, {calls['n_dot']}"
         return found | {
-            "E": f"plane__({n})", "E_dot": f"plane_rates__({both})",
+            "axes": f"plane__({n})", "axes_dot": f"plane_rates__({both})",
             "ahead": f"direction__({u}, {n}, way)", "toward": f"across__(way, {n})",
         }  # fmt: skip
     none = "(0.0, 0.0, 0.0)"
     ahead = f"direction__({u}, {none}, way)"
-    return found | {"E": "every__()", "E_dot": f"line__({none})", "ahead": ahead, "toward": "way"}
+    return found | {
+        "axes": "every__()",
+        "axes_dot": f"line__({none})",
+        "ahead": ahead,
+        "toward": "way",
+    }
 
 
 def needs(wanted: Mapping[str, Sequence[str]], calls: Mapping[str, str]) -> dict[str, list[str]]:
@@ -110,111 +113,125 @@ def needs(wanted: Mapping[str, Sequence[str]], calls: Mapping[str, str]) -> dict
     axis = [*wanted.get("e", ()), *wanted.get("n", ())]
     rates = [*axis, *wanted.get("e_dot", ()), *wanted.get("n_dot", ())]
     ahead = [*axis, "way"] if "e" in calls else [*u, *axis, "way"]
-    return {"u": u, "load": ["lam_load"], "E": axis, "E_dot": rates, "ahead": ahead,
+    return {"u": u, "load": ["lam_load"], "axes": axis, "axes_dot": rates, "ahead": ahead,
             "toward": [*axis, "way"]}  # fmt: skip
 
 
-def position():
-    """C: there is no gap."""
-    return 0.0
-
-
-def holding(E, mode, way):
+def holding(axes, mode, way):
     """The directions whose rows hold."""
-    return tuple(where(holds(mode, way, k), e, _ZERO) for k, e in enumerate(E))
+    return tuple(where(holds(mode, way, k), e, _ZERO) for k, e in enumerate(axes))
 
 
-def blocks(E, c, r_i, r_j, mode, way):
+def blocks(axes, c, r_i, r_j, mode, way):
     """J of both bodies."""
-    on, s_i, s_j = holding(E, mode, way), sub(c, r_i), sub(c, r_j)
+    on, s_i, s_j = holding(axes, mode, way), sub(c, r_i), sub(c, r_j)
     return (
         tuple(row(e, cross(s_i, e)) for e in on),
         tuple(row(neg(e), neg(cross(s_j, e))) for e in on),
     )
 
 
-def block(E, c, r_i, mode, way):
+def block(axes, c, r_i, mode, way):
     """J of a contact of one body with ground."""
-    return blocks(E, c, r_i, _ZERO, mode, way)[0]
+    return blocks(axes, c, r_i, _ZERO, mode, way)[0]
 
 
-def turning_blocks(E, mode, way):
+def turning_blocks(axes, mode, way):
     """J of both bodies."""
-    on = holding(E, mode, way)
+    on = holding(axes, mode, way)
     return tuple(row(_ZERO, e) for e in on), tuple(row(_ZERO, neg(e)) for e in on)
 
 
-def gamma(E, E_dot, u, c_dot, v_i, w_i, v_j, w_j, mode, way):
+def gamma(axes, axes_dot, u, c_dot, v_i, w_i, v_j, w_j, mode, way):
     """-J_dot v."""
     bent = sub(cross(w_i, sub(c_dot, v_i)), cross(w_j, sub(c_dot, v_j)))
     return tuple(
-        where(holds(mode, way, k), -dot(E_dot[k], u) - dot(E[k], bent), 0.0) for k in range(3)
+        where(holds(mode, way, k), -dot(axes_dot[k], u) - dot(axes[k], bent), 0.0) for k in range(3)
     )
 
 
-def turning_gamma(E_dot, u, mode, way):
+def turning_gamma(axes_dot, u, mode, way):
     """-J_dot v."""
-    return tuple(where(holds(mode, way, k), -dot(E_dot[k], u), 0.0) for k in range(3))
+    return tuple(where(holds(mode, way, k), -dot(axes_dot[k], u), 0.0) for k in range(3))
 
 
-def projected(E, vector):
+def projected(axes, vector):
     """The part of a vector along the rows."""
-    x, y, z = (scale(dot(e, vector), e) for e in E)
+    x, y, z = (scale(dot(e, vector), e) for e in axes)
     return add(add(x, y), z)
 
 
-def besides(E, ahead, load, mu, mode, near):
+def besides(axes, ahead, load, mu, mode, near):
     """Friction on body i that the rows do not give."""
     slides = where(closed(mode), scale(-mu * load, ahead), _ZERO)
-    return where(held(mode), projected(E, near), slides)
+    return where(held(mode), projected(axes, near), slides)
 
 
-def whole(E, ahead, lam, load, mu, mode, near):
+def whole(axes, ahead, lam, load, mu, mode, near):
     """Friction on body i."""
-    x, y, z = (scale(where(held(mode), part, 0.0), e) for part, e in zip(lam, E, strict=True))
-    return add(besides(E, ahead, load, mu, mode, near), add(add(x, y), z))
+    x, y, z = (scale(where(held(mode), part, 0.0), e) for part, e in zip(lam, axes, strict=True))
+    return add(besides(axes, ahead, load, mu, mode, near), add(add(x, y), z))
 
 
-def friction(E, ahead, c, r_i, r_j, load, mu, mode, near):
+def friction(axes, ahead, c, r_i, r_j, load, mu, mode, near):
     """What acts besides the rows."""
-    F = besides(E, ahead, load, mu, mode, near)
+    F = besides(axes, ahead, load, mu, mode, near)
     return (F, cross(sub(c, r_i), F)), (neg(F), neg(cross(sub(c, r_j), F)))
 
 
-def friction_of_one(E, ahead, c, r_i, load, mu, mode, near):
+def friction_of_one(axes, ahead, c, r_i, load, mu, mode, near):
     """The same of a contact of one body with ground."""
-    return friction(E, ahead, c, r_i, _ZERO, load, mu, mode, near)[0]
+    return friction(axes, ahead, c, r_i, _ZERO, load, mu, mode, near)[0]
 
 
-def turning_friction(E, ahead, load, mu, mode, near):
+def turning_friction(axes, ahead, load, mu, mode, near):
     """What acts besides the rows."""
-    M = besides(E, ahead, load, mu, mode, near)
+    M = besides(axes, ahead, load, mu, mode, near)
     return (_ZERO, M), (_ZERO, neg(M))
 
 
-def switch(E, u, ahead, toward, lam, load, mu, mu_s, mode, near):
+def switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, near):
     """What ends a mode where it is negative: nothing; slip, or the rest of the cone."""
-    T = whole(E, ahead, lam, load, mu, mode, near)
+    T = whole(axes, ahead, lam, load, mu, mode, near)
     sticks = where(mu_s > 0.0, mu_s * load - sqrt(dot(T, T)), 1.0)
     slides = where(mu > 0.0, dot(u, toward), 1.0)
     return 1.0, where(held(mode), sticks, where(closed(mode), slides, 1.0))
 
 
-def output(E, u, ahead, c, lam, load, mu, mode, near):
+def output(axes, u, ahead, c, lam, load, mu, mode, near):
     """As that of rows.py; the normal force is the load."""
-    T = whole(E, ahead, lam, load, mu, mode, near)
-    return (0.0, load, *T, *projected(E, u), *c, 1.0, *T)
+    T = whole(axes, ahead, lam, load, mu, mode, near)
+    return (0.0, load, *T, *projected(axes, u), *c, 1.0, *T)
 
 
-def turning_output(E, u, ahead, lam, load, mu, mode, near):
+def turning_output(axes, u, ahead, lam, load, mu, mode, near):
     """The same of a moment, N m, and an angular velocity."""
-    T = whole(E, ahead, lam, load, mu, mode, near)
-    return (0.0, load, *T, *projected(E, u), *_ZERO, 1.0, *_ZERO)
+    T = whole(axes, ahead, lam, load, mu, mode, near)
+    return (0.0, load, *T, *projected(axes, u), *_ZERO, 1.0, *_ZERO)
 
 
-KERNELS = {"C": position, "J": blocks, "gamma": gamma, "friction": friction, "switch": switch,
+KERNELS = {"J": blocks, "gamma": gamma, "friction": friction, "switch": switch,
            "rate": rate, "tension": output}  # fmt: skip
 OF_ONE = KERNELS | {"J": block, "friction": friction_of_one}
-TURNING = {"C": position, "J": turning_blocks, "gamma": turning_gamma, "rate": rate,
-           "friction": turning_friction, "switch": switch,
-           "tension": turning_output}  # fmt: skip
+TURNING = {"J": turning_blocks, "gamma": turning_gamma, "rate": rate, "friction": turning_friction,
+           "switch": switch, "tension": turning_output}  # fmt: skip
+
+
+def kernels_of(
+    calls: dict[str, str], wanted: dict[str, list[str]], every: dict[str, Any],
+    *, pushes: bool, has_j: bool,
+) -> dict[str, Any]:  # fmt: skip
+    """The kernels of the friction of a joint.
+
+    Args:
+        calls, wanted: expressions, and the names that they take, to which those of here are added.
+        every: functions that expressions call; as well.
+        pushes: the load is of one row, and none where that pulls.
+        has_j: there are two bodies.
+    """
+    wanted |= needs(wanted, calls)
+    calls |= expressions(calls, pushes=pushes)
+    every |= FUNCTIONS
+    if "c" not in calls:
+        return TURNING
+    return KERNELS if has_j else OF_ONE

@@ -115,7 +115,7 @@ def read_friction(
         if given.get("mu_s") is not None and given["mu_s"] < given["mu"]:
             what = f"is less than mu = {given['mu']:g}; what slides would stick more than rest"
             report.add((*key, "mu_s"), given["mu_s"], what)
-        grips = grips_of(joint.type_info.type)
+        grips = grips_of(joint.type_info)
         for k, grip in enumerate(grips):
             name = force.name if len(grips) == 1 else f"{force.name}#{k + 1}"
             values = SMOOTH | joint.values | HIDDEN | {"e": 0.0, "part": float(k)}
@@ -130,10 +130,15 @@ def read_friction(
     return found
 
 
-@cache
-def grips_of(type_: Any) -> tuple[TypeInfo, ...]:
+def grips_of(joint: TypeInfo) -> tuple[TypeInfo, ...]:
     """The friction that sticks of a type of joint."""
-    return tuple(map(examine, type_.grips))
+    type_: Any = joint.type
+    return tuple(map(_examined, type_.grips))
+
+
+@cache
+def _examined(grip: Any) -> TypeInfo:
+    return examine(grip)
 
 
 def _with_material(report: Collector, element: Element) -> Element:

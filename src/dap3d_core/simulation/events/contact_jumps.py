@@ -26,8 +26,6 @@ from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.contacts.rows import APART
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.model.rotations import euler_rates
-from dap3d_core.model.state_layout import split
 from dap3d_core.result import EventRecord
 from dap3d_core.result.note import information
 from dap3d_core.scene import Mistake, SceneError
@@ -352,7 +350,10 @@ class ContactJumps(Jumps):
                 size = length_of(force)
                 if size > 0.0:
                     sliding[c] = -force / size
-            elif length_of(rows.slip[c, self.table.across(c)]) < STOPPED * self._evaluator.model.length:
+            elif (
+                length_of(rows.slip[c, self.table.across(c)])
+                < STOPPED * self._evaluator.model.length
+            ):
                 self._stop(rows, c)
                 stopped.append(c)
         return sliding, leaving, stopped
@@ -407,10 +408,7 @@ class ContactJumps(Jumps):
         evaluator, work_state = self._evaluator, integration.work
         dv = rows.v - u[-len(rows.v) :]
         y = evaluator.coordinates.with_jump(integration.y, dv, states, work)
-        r, p, *_ = split(evaluator.bodies_of(y))
-        parts = moved.reshape(-1, 2, 3)
-        r += parts[:, 0]
-        p += euler_rates(p, parts[:, 1])
+        evaluator.coordinates.displace(y, moved)
         work_state.state[at.Y] = y
         integration.restart()
         evaluator.states = states

@@ -154,17 +154,6 @@ def test_a_wrench_is_derived_from_the_energy(type_):
     assert power == pytest.approx(-rate[0], rel=1e-8)
 
 
-def test_a_function_by_its_value_alone_has_its_derivatives():
-    """Of a sin(w x) / sqrt(1 + x^2), against the derivatives of its Taylor series' factors."""
-    value = examine(Wave).kernels["value"]
-    x, a, w, h = 0.4, 1.3, 2.1, 1e-3
-    for order in (1, 2, 3):
-        lower = [value(x + k * h, a, w)[order - 1] for k in (-3, -2, -1, 1, 2, 3)]
-        slope = np.array([-1, 9, -45, 45, -9, 1]) @ lower / (60.0 * h)
-        assert value(x, a, w)[order] == pytest.approx(slope, rel=1e-10)
-    assert value(x, a, w)[0] == pytest.approx(a * np.sin(w * x) / np.sqrt(1.0 + x * x), rel=1e-15)
-
-
 class Words(Function):
     """A function of time in all words that sympy has under names of its own."""
 
@@ -174,17 +163,24 @@ class Words(Function):
         return exp(-t) * log(t + 2.0) + asin(t / 3.0) * acos(t / 4.0) + t * floor(5.0 * t)
 
 
-def test_derived_kernels_take_all_words_and_t_is_the_argument():
+@pytest.mark.parametrize(
+    ("type_", "x", "constants", "exact"),
+    [
+        (Wave, 0.4, (1.3, 2.1), lambda x, a, w: a * np.sin(w * x) / np.sqrt(1.0 + x * x)),
+        (Words, 0.41, (), lambda t: (math.exp(-t) * math.log(t + 2.0)
+                                     + math.asin(t / 3.0) * math.acos(t / 4.0)
+                                     + t * math.floor(5.0 * t))),
+    ],
+    ids=["wave", "all words"],
+)  # fmt: skip
+def test_a_function_by_its_value_alone_has_its_derivatives(type_, x, constants, exact):
     """By central differences of order 6: steps of 1e-3, in which 5 t is not a whole number."""
-    value = examine(Words).kernels["value"]
-    t, h = 0.41, 1e-3
-    exact = (math.exp(-t) * math.log(t + 2.0) + math.asin(t / 3.0) * math.acos(t / 4.0)
-             + t * math.floor(5.0 * t))  # fmt: skip
-    assert value(t)[0] == pytest.approx(exact, rel=1e-15)
+    value, h = examine(type_).kernels["value"], 1e-3
+    assert value(x, *constants)[0] == pytest.approx(exact(x, *constants), rel=1e-15)
     for order in (1, 2, 3):
-        lower = [value(t + k * h)[order - 1] for k in (-3, -2, -1, 1, 2, 3)]
+        lower = [value(x + k * h, *constants)[order - 1] for k in (-3, -2, -1, 1, 2, 3)]
         slope = np.array([-1, 9, -45, 45, -9, 1]) @ lower / (60.0 * h)
-        assert value(t)[order] == pytest.approx(slope, rel=1e-10)
+        assert value(x, *constants)[order] == pytest.approx(slope, rel=1e-10)
 
 
 # ------------------------------------------------------------------ what cannot be derived

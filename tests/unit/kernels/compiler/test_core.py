@@ -131,7 +131,10 @@ NOT_CALLED = {
         "integrators.moreau.dense": (
             "solve_dense solve_square solve_blocks invert multiply take take_from"
         ),
-        "integrators.moreau.gauss_seidel": "sweep_bodies sweep_contacts change_of",
+        "integrators.moreau.gauss_seidel": (
+            "sweep_bodies sweep_contacts change_of refine_held keep take_kept put_crossed "
+            "put_answer put_felt"
+        ),
         "integrators.moreau.contact_set": (
             "find_contacts place_poses axes_of turn_tensor put_touch put_frame evaluate_rows "
             "put_declared"
@@ -141,9 +144,8 @@ NOT_CALLED = {
             "root_of find_groups choose lay_out connect join bit_count order_bodies degree_of "
             "eliminate block_at"
         ),
-        "integrators.moreau.held": "refine_held keep take_kept put_crossed put_answer put_felt",
         "integrators.moreau.impulses": (
-            "slot_of recall remember mode_of keep_for_reports complete_rows complete_forces"
+            "slot_of recall remember mode_of keep_for_reports complete_row log_contacts"
         ),
         "integrators.moreau.newton": (
             "put_projected put_slopes put_missed put_velocities clear add_pull times_inverse "
