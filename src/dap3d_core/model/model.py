@@ -162,8 +162,7 @@ class Model:
             if other is group:
                 break
             first += other.count * len(other.type_info.layout.angles)
-        found: Integers = first + width * np.asarray(places)[:, None] + np.arange(width)
-        return found
+        return first + width * np.asarray(places)[:, None] + np.arange(width)
 
     @cached_property
     def angle_names(self) -> tuple[str, ...]:
