@@ -98,8 +98,8 @@ class Contact(Joint):
                 pushing = getattr(of, "unilateral", ())
                 cls.holonomic = False
                 cls.pushes = len(cls.load) == 1 and pushing is not True and cls.load[0] in pushing
-            is_one = cls.load or cls.along is not None
-            if is_one or all(getattr(cls, name, None) is not None for name in DECLARED):
+            is_whole = all(getattr(cls, name, None) is not None for name in DECLARED)
+            if not cls.load and (cls.along is not None or is_whole):
                 for name, kernel in _kernels(cls).items():
                     setattr(cls, name, kernel)
             cls.holds = _holds(cls)
@@ -108,6 +108,14 @@ class Contact(Joint):
         elif of is not None:  # class RigidStop(Contact, of=SpringStop, k=False): no stiffness
             of.variants, conditions = (*of.variants, (conditions, cls)), {}
         super().__init_subclass__(**conditions)
+
+    @classmethod
+    def kernels(cls) -> dict[str, Callable[..., Any]]:
+        """As of other types; those of friction of a joint are made where a scene has some."""
+        if cls.load and "gamma" not in vars(cls):
+            for name, kernel in _kernels(cls).items():
+                setattr(cls, name, staticmethod(kernel))
+        return super().kernels()
 
     @classmethod
     def is_friction_alone(cls) -> bool:
