@@ -338,7 +338,7 @@ def build_model(checked: ValidatedScene) -> Model:
     """
     poses = _Poses(checked)
     holding = checked.holding
-    rows = np.array([_rows(j) for j in holding], dtype=np.int64)
+    rows = np.array([j.type_info.row_count for j in holding], dtype=np.int64)
     mask = [j.type_info.type.constraint_mask() for j in holding]  # type: ignore[attr-defined]
     groups = _Groups(checked, poses)
     model = Model(
@@ -443,10 +443,6 @@ def _faults(
 ) -> list[tuple[str, str, str]]:
     """Mistakes in instances, with their names."""
     return [(kind, instances[member].name, words) for member, words in error.faults]
-
-
-def _rows(joint: Instance) -> int:
-    return joint.type_info.row_count
 
 
 class _Poses(dict[int, BodyPose]):
