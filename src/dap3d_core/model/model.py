@@ -398,11 +398,7 @@ class _Groups:
         through = [(k, f) for k, f in enumerate(checked.forces) if f.type_info.friction_joint]
         direct = [(k, f) for k, f in enumerate(checked.forces) if not f.type_info.friction_joint]
         joints = {j.name: (k, j) for k, j in enumerate(checked.holding)}
-        names = {
-            "joint": checked.holding,
-            "force": checked.forces,
-            "function": checked.functions,
-        }
+        names = {"joint": checked.holding, "force": checked.forces, "function": checked.functions}
 
         faults: list[tuple[str, str, str]] = []
 
