@@ -14,15 +14,7 @@ from dap3d_core.interface import (
     points,
     vector,
 )
-from dap3d_core.kernels import (
-    add,
-    by_body,
-    cross,
-    maximum,
-    scale,
-    sub,
-    where,
-)
+from dap3d_core.kernels import add, by_body, cross, maximum, scale, sub, where
 from dap3d_joints.belt import runs, signed_radii, speeds
 
 interface_version = 1

@@ -16,19 +16,7 @@ from dap3d_core.interface import (
     point,
     vector,
 )
-from dap3d_core.kernels import (
-    add,
-    atan2,
-    cross,
-    dot,
-    neg,
-    norm2,
-    row,
-    scale,
-    sqrt,
-    sub,
-    tan,
-)
+from dap3d_core.kernels import add, atan2, cross, dot, neg, norm2, row, scale, sqrt, sub, tan
 from dap3d_joints.turning import line_accelerations, line_rates, wrapped
 
 interface_version = 1

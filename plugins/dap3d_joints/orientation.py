@@ -1,15 +1,6 @@
 """The relative orientation of two bodies as an error quaternion, and its rate (spec 3.4)."""
 
-from dap3d_core.kernels import (
-    add,
-    conjugate,
-    cross,
-    dot,
-    quaternion_product,
-    scale,
-    sub,
-    where,
-)
+from dap3d_core.kernels import add, conjugate, cross, dot, quaternion_product, scale, sub, where
 
 
 def error(p_j, p_c, p_i):

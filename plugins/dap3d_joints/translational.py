@@ -71,11 +71,7 @@ class Translational(Joint):
                 row(neg(n_j), neg(cross(s_P_i, n_j))),
                 row(neg(m_j), neg(cross(s_P_i, m_j))),
             ),
-            (
-                *hstack(eye(0.0), turn(q0, e)),
-                row(n_j, cross(arm, n_j)),
-                row(m_j, cross(arm, m_j)),
-            ),
+            (*hstack(eye(0.0), turn(q0, e)), row(n_j, cross(arm, n_j)), row(m_j, cross(arm, m_j))),
         )
 
     def gamma(p_i, p_j, p_c, d, d_dot, n_j, m_j, n_j_dot, m_j_dot, s_P_i_dot, s_P_j_dot, w_i, w_j):

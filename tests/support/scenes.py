@@ -59,7 +59,7 @@ def scene_for(type_info, rng, *, ground=None, values=None):
         if value is not None:
             fields[name] = value
     for low in [name for name in fields if name.endswith("_min")]:
-        ends = low, f"{low[:-3]}max"
+        ends = [end for end in (low, f"{low[:-3]}max") if end in fields]
         fields |= zip(ends, sorted(fields[end] for end in ends), strict=True)
     for name, spec in specs_of(type_info.type).items():
         if spec.kind == "vector2":

@@ -6,12 +6,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.scene import Mistake
-from dap3d_matlab.language.expressions import (
-    Expressions,
-    arguments_of,
-    check_field,
-    named_children,
-)
+from dap3d_matlab.language.expressions import Expressions, arguments_of, check_field, named_children
 from dap3d_matlab.language.operators import RefusalError, ReportedError, numbers
 from dap3d_matlab.language.parse import Place, SourceFile, excerpt, text_of
 from dap3d_matlab.language.values import (

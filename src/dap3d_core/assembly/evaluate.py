@@ -7,7 +7,7 @@ end: the states of elements that have some (docs/decisions/0054), and the work d
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import RATE, VALUE, Floats, System
+from dap3d_core.assembly.arrays import RATE, VALUE, WRENCH, Floats, System
 from dap3d_core.assembly.metric import gyroscopic_moment, scaled, scaled_moment, unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.assembly.orientation import orient_by_state
@@ -185,3 +185,16 @@ def largest(values: Floats) -> float:
         size = abs(values[k])
         found = where((size > found) | (size != size), size, found)
     return found
+
+
+@compiled_into
+def evaluate_forces(t: float, y: Floats, system: System, loops: Any) -> float:
+    """Place the bodies of a state; scaled forces into ``acceleration``; returns their power.
+
+    Functions of time stand ready after that.
+    """
+    body, metric, force = system.body, system.metric, system.force
+    place_state(y, system)
+    zero(force)
+    call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
+    return scale_forces(body, metric, force, system.acceleration)

@@ -72,9 +72,7 @@ class App(click.Group):
 
 
 @click.group(
-    cls=App,
-    commands=_Commands(),
-    context_settings={"help_option_names": ["-h", "--help"]},
+    cls=App, commands=_Commands(), context_settings={"help_option_names": ["-h", "--help"]}
 )
 @click.version_option(package_name="dap3d", prog_name="dap3d")
 @DEBUG

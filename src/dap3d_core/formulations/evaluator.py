@@ -173,11 +173,7 @@ class Evaluator:
 
     @IGNORE_FLOAT_ERRORS
     def start(
-        self,
-        t: float,
-        u: ArrayLike,
-        angles: Floats | None = None,
-        states: Floats | None = None,
+        self, t: float, u: ArrayLike, angles: Floats | None = None, states: Floats | None = None
     ) -> None:
         """Make ready for a run from a state u (13 n,): whole turns are counted from here.
 

@@ -2,34 +2,22 @@
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import ENERGY, SCRATCH, TURNED, VALUE, WRENCH, Floats, System
+from dap3d_core.assembly.arrays import ENERGY, SCRATCH, TURNED, Floats, System
 from dap3d_core.assembly.evaluate import (
     call_kinds,
+    evaluate_forces,
     global_accelerations,
-    place_state,
     rates,
-    scale_forces,
     state_rates,
-    zero,
 )
 from dap3d_core.assembly.state_update import normalise
 from dap3d_core.kernels.runtime.cache import compiled
 
 
 @compiled
-def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
-    """Scaled ``acceleration``; returns the power of the forces."""
-    body, metric, force = system.body, system.metric, system.force
-    place_state(y, system)
-    zero(force)
-    call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
-    return scale_forces(body, metric, force, system.acceleration)
-
-
-@compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of the forces last."""
-    power = accelerate(t, y, system, loops)
+    power = evaluate_forces(t, y, system, loops)
     rates(y, system.metric, system.acceleration, out)
     state_rates(t, out, system, loops)
     out[out.shape[0] - 1] = power
@@ -47,7 +35,7 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     """v_dot (6 n, global axes), angles, potential energy, zeros for the levels of constraints."""
     value = system.settings[SCRATCH : SCRATCH + 1]
     last = out.shape[0] - 4
-    accelerate(t, y, system, loops)
+    evaluate_forces(t, y, system, loops)
     global_accelerations(system.metric, system.acceleration, out)
     value[0] = 0.0
     call_kinds(ENERGY, ENERGY, t, system, loops, value, value, value)

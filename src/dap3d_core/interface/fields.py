@@ -258,12 +258,7 @@ def square(size: int, default: Any = REQUIRED, *, unit: str = "", doc: str = "")
 
 
 def table(
-    *,
-    columns: int = 1,
-    given: bool = True,
-    by_rows: bool = False,
-    unit: str = "",
-    doc: str = "",
+    *, columns: int = 1, given: bool = True, by_rows: bool = False, unit: str = "", doc: str = ""
 ) -> Any:
     """Numbers of any count, which kernels read by ``lookup``.
 

@@ -344,7 +344,7 @@ def build_model(checked: ValidatedScene) -> Model:
     """
     poses = _Poses(checked)
     holding = checked.holding
-    rows = np.array([_rows(j) for j in holding], dtype=np.int64)
+    rows = np.array([j.type_info.row_count for j in holding], dtype=np.int64)
     mask = [j.type_info.type.constraint_mask() for j in holding]  # type: ignore[attr-defined]
     groups = _Groups(checked, poses)
     model = Model(
@@ -398,11 +398,7 @@ class _Groups:
         through = [(k, f) for k, f in enumerate(checked.forces) if f.type_info.friction_joint]
         direct = [(k, f) for k, f in enumerate(checked.forces) if not f.type_info.friction_joint]
         joints = {j.name: (k, j) for k, j in enumerate(checked.holding)}
-        names = {
-            "joint": checked.holding,
-            "force": checked.forces,
-            "function": checked.functions,
-        }
+        names = {"joint": checked.holding, "force": checked.forces, "function": checked.functions}
 
         faults: list[tuple[str, str, str]] = []
 
@@ -449,10 +445,6 @@ def _faults(
 ) -> list[tuple[str, str, str]]:
     """Mistakes in instances, with their names."""
     return [(kind, instances[member].name, words) for member, words in error.faults]
-
-
-def _rows(joint: Instance) -> int:
-    return joint.type_info.row_count
 
 
 class _Poses(dict[int, BodyPose]):

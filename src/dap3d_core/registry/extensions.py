@@ -11,7 +11,7 @@ from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.hooks import EXTENSIONS
 from dap3d_core.registry.discovery import Source, discover
 from dap3d_core.registry.guard import guard, within
-from dap3d_core.registry.plugin_module import hooks_of
+from dap3d_core.registry.loading import hooks_of
 from dap3d_core.registry.registry import LOAD_LIMIT, PluginInfo, collision, info_of
 from dap3d_core.registry.suggestions import nearest
 

@@ -17,11 +17,10 @@ from dap3d_core.interface import PluginError, hooks
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.interface.hooks import GROUPS, KINDS
-from dap3d_core.interface.types import TypeBase
+from dap3d_core.interface.hooks import GROUPS, KINDS, PROJECT
+from dap3d_core.interface.types import INTERFACE_VERSION, TypeBase
 from dap3d_core.registry.discovery import Source
 from dap3d_core.registry.guard import guard, within
-from dap3d_core.registry.plugin_module import hooks_of
 from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.suggestions import nearest
 
@@ -145,6 +144,40 @@ def _call_hook(brought: pluggy.HookRelay, kind: str, *, must_exist: bool) -> lis
                 )
             types.append(type_)
     return types
+
+
+def hooks_of(module: ModuleType, specs: ModuleType) -> pluggy.HookRelay:
+    """The hooks that a module implements, ready to be called.
+
+    Args:
+        module: the plugin.
+        specs: the module that specifies the hooks.
+
+    Raises:
+        PluginError: no interface version, or another one.
+        pluggy.PluginValidationError: a hook is unknown, or of another signature.
+    """
+    _check_version(module)
+    manager = pluggy.PluginManager(PROJECT)
+    manager.add_hookspecs(specs)
+    manager.register(module)
+    manager.check_pending()
+    return manager.hook
+
+
+def _check_version(module: ModuleType) -> None:
+    version = getattr(module, "interface_version", None)
+    if type(version) is not int:
+        said = "says no interface_version" if version is None else f"says {version!r}"
+        raise PluginError(
+            f"it {said}; write the line interface_version = {INTERFACE_VERSION} (an integer) in it"
+        )
+    if version != INTERFACE_VERSION:
+        newer = "dap3d" if version > INTERFACE_VERSION else "version of the plugin"
+        raise PluginError(
+            f"it is written for interface version {version}, this dap3d has {INTERFACE_VERSION}; "
+            f"install a newer {newer}"
+        )
 
 
 def _with_keyword(source: Source, types: list[type[TypeBase]]) -> type[TypeBase]:

@@ -28,12 +28,7 @@ BEHIND = 3.0
 #: A length that goes to zero with a higher power of the time left than this is not near zero.
 HIGHEST = 6.0
 #: How an integration ends that does not get through a singular pose.
-FAILURES = (
-    Status.STEP_FLOOR,
-    Status.NOT_FINITE,
-    Status.PROJECTION_FAILED,
-    Status.STALLED,
-)
+FAILURES = (Status.STEP_FLOOR, Status.NOT_FINITE, Status.PROJECTION_FAILED, Status.STALLED)
 
 
 def hand_over(run: RunState) -> bool:

@@ -101,7 +101,8 @@ class Ensemble:
         batch = Batch.empty(self.outputs, len(values), len(self.times), p)
         runner = self._runner()
         if runner is not None:
-            most = max(1, MAX_ROW_VALUES // (self._row_width() * len(self.times)))
+            width = 2 + 20 * self.compiled.model.body_count + self.compiled.model.row_count + 4
+            most = max(1, MAX_ROW_VALUES // (width * len(self.times)))
             for first in range(0, len(values), most):
                 runner.run(values[first : first + most], batch, first)
         for k in np.flatnonzero(batch.status == PointStatus.OPEN):
@@ -144,9 +145,6 @@ class Ensemble:
 
                 self._of_thread.runner = batch_runner(self.reduction, self.times)
         return self._of_thread.runner
-
-    def _row_width(self) -> int:
-        return 2 + 20 * self.compiled.model.body_count + self.compiled.model.row_count + 4
 
     def _run_one(self, k: int, point: Floats, batch: Batch) -> None:
         """Run one point by ``simulate`` and store its status, note and outputs."""

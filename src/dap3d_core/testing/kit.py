@@ -12,14 +12,7 @@ from dap3d_core.interface.codegen.reactions import joints_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.testing.checks import (
-    branches,
-    forces,
-    functions,
-    joints,
-    purity,
-    states,
-)
+from dap3d_core.testing.checks import branches, forces, functions, joints, purity, states
 from dap3d_core.testing.checks.findings import (
     FAILED,
     LEFT_OUT,

@@ -28,12 +28,7 @@ MOST_PAIRS = 200
 
 
 def page_data(
-    result: Result,
-    scene: Scene,
-    quantities: Sequence[str],
-    fps: float | None,
-    *,
-    share: int = 1,
+    result: Result, scene: Scene, quantities: Sequence[str], fps: float | None, *, share: int = 1
 ) -> dict[str, Any]:
     """The data of a page, ready for JSON.
 

@@ -303,11 +303,7 @@ def _aligned(
 
 
 def _motions(
-    group: Group,
-    joints: ClosedJoints,
-    members: Integers,
-    parts: tuple[Part, ...],
-    screws: Floats,
+    group: Group, joints: ClosedJoints, members: Integers, parts: tuple[Part, ...], screws: Floats
 ) -> JointMotions:
     start = Pose(joints.start.r[members], joints.start.p[members])
     i, j = two_bodies(group)[members].T

@@ -134,12 +134,7 @@ def coordinates(motion: JointMotions, pose: Pose) -> Floats:
 
 def _angle_of(p: Floats, axis: Floats) -> Floats:
     """Angles in (-pi, pi] of rotations (..., m, 4) about axes (m, 3)."""
-    angle: Floats = 2.0 * np.arctan2(np.sum(p[..., 1:] * axis, axis=-1), p[..., 0])
-    return _principal(angle)
-
-
-def _principal(angle: Floats) -> Floats:
-    """The same angles in (-pi, pi]."""
+    angle = 2.0 * np.arctan2(np.sum(p[..., 1:] * axis, axis=-1), p[..., 0])
     return angle - TURN * np.ceil(angle / TURN - 0.5)
 
 

@@ -35,7 +35,11 @@ def example_of(type_info: "TypeInfo", registry: "Registry") -> str:
     """
     scene = _Example(registry)
     type_: Any = type_info.type
-    name = "J1" if type_.kind == "joint" else f"{_element_name(type_.keyword)}1"
+    name = (
+        "J1"
+        if type_.kind == "joint"
+        else "".join(c if c.isalnum() or c in "_-" else "_" for c in f"{type_.keyword}1")
+    )
     scene.add(type_info, name)
     if type_.kind == "function" and type_.arguments == 1:
         scene.add(scene.first("joint", lambda joint: bool(joint.layout.functions)), "J1", name)
@@ -193,10 +197,6 @@ class _Example:
 def _body(body: str) -> str:
     place = _toml((PLACES[body], 0.0, HEIGHT))
     return f"[bodies.{body}]\nmass = 1.0\nJp = [0.1, 0.1, 0.1]\nr = {place}\n"
-
-
-def _element_name(keyword: str) -> str:
-    return "".join(c if c.isalnum() or c in "_-" else "_" for c in keyword)
 
 
 def _toml(value: Any) -> str:

@@ -64,7 +64,7 @@ def _show_run(file: str, as_json: bool) -> None:
             *run_pairs(data),
             ("settings", ", ".join(settings)),
             ("made with", ", ".join(f"{name} {v}" for name, v in result.versions.items())),
-        ],
+        ]
     )
     show_details(console, data)
 

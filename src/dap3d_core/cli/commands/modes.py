@@ -139,11 +139,7 @@ def _draw(found: Any, names: list[str], plot: str | None, *, force: bool) -> Non
 
 
 def _targets(plot: str | None, output: str | None, force: bool) -> list[Path]:
-    """The files to write.
-
-    Raises:
-        Refused: one cannot be written, or is no picture.
-    """
+    """The files to write; Refused where one cannot be written, or is no picture."""
     from dap3d_core.cli.framework.paths import refuse_all, writable
 
     checks: list[Callable[[], object]] = []

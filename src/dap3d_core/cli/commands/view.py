@@ -66,10 +66,7 @@ def view(
         raise Refused(f"cannot write {target}: a page is a .html file")
     check_target = partial(writable, target, force=force, sources=(Path(result),))
     data = _data(result, quantities, check_target, model=model, allow_code=allow_code)
-    with (
-        PointsProgress(quiet=quiet or as_json) as progress,
-        refusing(UnknownNameError, ValueError),
-    ):
+    with PointsProgress(quiet=quiet or as_json) as progress, refusing(UnknownNameError, ValueError):
         count = signals_of(ctx).interruptible(progress.count)
         page = make_view(data, *quantities, fps=fps, play=play, model=model, allow_code=allow_code,
                          progress=count, announce=progress.announce)  # fmt: skip

@@ -55,7 +55,7 @@ def show_report(console: Terminal, report: "Report", command: str, *, with_targe
             ("reference", _reference(report)),
             ("uncertainty", _uncertainty(report)),
             ("expected", _expected(report)),
-        ],
+        ]
     )
     for method, integrator in dict.fromkeys((r.method, r.integrator) for r in report.runs):
         console.title(f"{method}, {integrator}")

@@ -72,11 +72,7 @@ def run_data(result: "Result") -> dict[str, Any]:
         "t_end": float(result.t[-1]) if instants else None,
         **attrs.asdict(result.stats),
         "error_estimate": error
-        and {
-            **error.largest,
-            "meaningless_from": error.meaningless_from,
-            "tenfold": error.tenfold,
-        },
+        and {**error.largest, "meaningless_from": error.meaningless_from, "tenfold": error.tenfold},
         "events": [
             {**attrs.asdict(event, filter=lambda field, _: field.name != "u"), "text": event.words}
             for event in result.events

@@ -99,7 +99,7 @@ def show_sweep(console: Terminal, data: dict[str, Any], file: str = "") -> None:
             *((f"{v['name']}", _values(v["spec"])) for v in data["varied"]),
             ("time", time),
             ("file", file),
-        ],
+        ]
     )
     rows = [
         (label if word == "min" else "", word, f"{one[word]:.6g}", _in_words(one[f"at_{word}"]))

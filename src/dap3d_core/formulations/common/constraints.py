@@ -16,18 +16,15 @@ from dap3d_core.assembly.arrays import (
     POSITION,
     SCRATCH,
     TURNED,
-    VALUE,
-    WRENCH,
     Floats,
     System,
 )
 from dap3d_core.assembly.evaluate import (  # noqa: F401  read by projection.py
     call_kinds,
+    evaluate_forces,
     largest_weighted,
     place,
     place_bodies,
-    place_state,
-    scale_forces,
     scale_velocities,
     zero,
 )
@@ -98,19 +95,6 @@ def factorise_anyway(system: System, part: float | None) -> None:
     """The same where the pose may be singular to the last digit: regularised there."""
     if factorise(system, part) > 0 and part is None and not have_pivots(system.nodes, system.K):
         factorise(system, PART)
-
-
-@compiled_into
-def evaluate_forces(t: float, y: Floats, system: System, loops: Any) -> float:
-    """Place the bodies of a state; scaled forces into ``acceleration``; returns their power.
-
-    Functions of time stand ready after that.
-    """
-    body, metric, force = system.body, system.metric, system.force
-    place_state(y, system)
-    zero(force)
-    call_kinds(VALUE, WRENCH, t, system, loops, force, force, force)
-    return scale_forces(body, metric, force, system.acceleration)
 
 
 @compiled_into

@@ -92,13 +92,7 @@ def project_onto(
 
 @compiled_into
 def project_velocities(
-    y: Floats,
-    out: Floats,
-    system: System,
-    rows: Any,
-    part: float | None,
-    lost: float,
-    stale: bool,
+    y: Floats, out: Floats, system: System, rows: Any, part: float | None, lost: float, stale: bool
 ) -> None:
     """The velocities' part of ``project_onto``, with the rows of this pose.
 

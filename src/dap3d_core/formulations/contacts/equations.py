@@ -24,6 +24,7 @@ import numpy as np
 from dap3d_core.assembly.arrays import KNOT, SCRATCH, SWITCH, Floats, System
 from dap3d_core.assembly.evaluate import (
     call_kinds,
+    evaluate_forces,
     global_accelerations,
     place,
     place_states,
@@ -33,7 +34,6 @@ from dap3d_core.assembly.evaluate import (
 )
 from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
-    evaluate_forces,
     factorise,
     linearise,
     power_of_drivers,

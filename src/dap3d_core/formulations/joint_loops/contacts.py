@@ -38,11 +38,7 @@ from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.joint.reduce import reduce_nodes
 from dap3d_core.formulations.joint.spread import body_accelerations, spread_tree
 from dap3d_core.formulations.joint_loops import kept_rows
-from dap3d_core.formulations.joint_loops.equations import (
-    factorise,
-    power_of_kept_drivers,
-    solve,
-)
+from dap3d_core.formulations.joint_loops.equations import factorise, power_of_kept_drivers, solve
 from dap3d_core.formulations.joint_loops.layout import FIRST, FIRST_ROW, ROW_COUNT
 from dap3d_core.formulations.joint_loops.loads import (
     lacking_accelerations,

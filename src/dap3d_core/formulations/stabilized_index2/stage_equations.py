@@ -20,12 +20,11 @@ from typing import Any, ClassVar
 import attrs
 
 from dap3d_core.assembly.arrays import Floats, Integers, System
-from dap3d_core.assembly.evaluate import rates, state_rates, zero
+from dap3d_core.assembly.evaluate import evaluate_forces, rates, state_rates, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
 from dap3d_core.assembly.offsets import coordinate_offset, states_offset, velocity_offset
 from dap3d_core.assembly.state_update import add_displacement
 from dap3d_core.formulations.common.constraints import (
-    evaluate_forces,
     linearise,
     power_of_drivers,
     residuals,

@@ -24,23 +24,14 @@ from dap3d_core.integrators.radau.order import set_tolerances
 from dap3d_core.integrators.radau.rounding import measure_stage_noise
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.step import advance
-from dap3d_core.integrators.radau.tableau import (
-    FEWEST,
-    MOST_STAGES,
-    ORDERS,
-    STAGES,
-    radau_method,
-)
+from dap3d_core.integrators.radau.tableau import FEWEST, MOST_STAGES, ORDERS, STAGES, radau_method
 from dap3d_core.integrators.stepping.integration import Integration, Refusals
 from dap3d_core.integrators.stepping.restore import check_alike, check_pivots, restored
 from dap3d_core.integrators.stepping.rounding import SMALLEST_ATOL
 from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.compiler.types import FLOAT, Signature
 from dap3d_core.kernels.runtime.cache import table_of
-from dap3d_core.kernels.runtime.function_lists import (
-    LOOP_LIST,
-    procedure_signature,
-)
+from dap3d_core.kernels.runtime.function_lists import LOOP_LIST, procedure_signature
 from dap3d_core.linear.lu.plan import LuPlan, StateNode, make_lu_plan
 from dap3d_core.linear.ordering.ordering import JointNode
 from dap3d_core.model import Model

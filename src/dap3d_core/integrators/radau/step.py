@@ -36,11 +36,7 @@ from dap3d_core.integrators.stepping.integration_state import (
     Function,
     Y,
 )
-from dap3d_core.integrators.stepping.output import (
-    may_step,
-    needs_dense,
-    project_state,
-)
+from dap3d_core.integrators.stepping.output import may_step, needs_dense, project_state
 from dap3d_core.integrators.stepping.rounding import can_measure, record_failure
 from dap3d_core.integrators.stepping.step_control import (
     LARGEST,

@@ -10,12 +10,7 @@ from typing import Any, ClassVar
 import attrs
 
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
-from dap3d_core.integrators.runge_kutta.step import (
-    find_first_stage,
-    finish_step,
-    step,
-    step_error,
-)
+from dap3d_core.integrators.runge_kutta.step import find_first_stage, finish_step, step, step_error
 from dap3d_core.integrators.runge_kutta.sums import ABSCISSA, combine
 from dap3d_core.integrators.stepping.event_location import is_cut_at_sample, next_length
 from dap3d_core.integrators.stepping.integration_state import (
@@ -34,11 +29,7 @@ from dap3d_core.integrators.stepping.singular_poses import (
     is_near_singularity,
     limit_step_at_singularity,
 )
-from dap3d_core.integrators.stepping.step_control import (
-    count_turns,
-    end_of_step,
-    first_step,
-)
+from dap3d_core.integrators.stepping.step_control import count_turns, end_of_step, first_step
 from dap3d_core.integrators.stepping.switch_values import count_from_far_edges
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
@@ -110,13 +101,7 @@ def plan_step(
 
 @compiled
 def after_step(
-    work: RungeKuttaState,
-    lanes: Lanes,
-    k: int,
-    steps: int,
-    functions: Any,
-    system: Any,
-    loops: Any,
+    work: RungeKuttaState, lanes: Lanes, k: int, steps: int, functions: Any, system: Any, loops: Any
 ) -> None:
     """What ``advance`` does behind a step of a lane that had taken so many."""
     rhs = functions[0]

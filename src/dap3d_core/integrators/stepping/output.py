@@ -33,13 +33,7 @@ STALLED_STEP, ATTEMPTS, STALL_WORK = 1e-9, 1000, 10_000_000
 
 @compiled
 def project_state(
-    work: Any,
-    t: float,
-    y: Floats,
-    project: Function,
-    system: Any,
-    loops: Any,
-    here: bool = False,
+    work: Any, t: float, y: Floats, project: Function, system: Any, loops: Any, here: bool = False
 ) -> int:
     """Project y where that is on; the failure, or RUNNING.
 

@@ -104,11 +104,7 @@ class _Widener(VectorWriter):
         self._conditions: set[str] = set()
 
     def check(self, name: str, text: str) -> None:
-        """As of ``VectorWriter``.
-
-        Raises:
-            CompileError: it decides by a number.
-        """
+        """As of ``VectorWriter``; CompileError where it decides by a number."""
         if self._has_condition(text):
             raise CompileError("decides by a number that differs from scene to scene")
         if "fptosi double" in text:

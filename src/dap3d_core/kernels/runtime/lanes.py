@@ -128,11 +128,7 @@ class WideArrays:
     """
 
     def __init__(
-        self,
-        arrays: Arrays,
-        count: int,
-        names: Collection[str],
-        buffers: Buffers | None = None,
+        self, arrays: Arrays, count: int, names: Collection[str], buffers: Buffers | None = None
     ) -> None:
         """Args:
         arrays: of one scene.

@@ -101,12 +101,7 @@ def record_of(values: dict[str, Any], contacts: ContactTable) -> RunMetadata:
 
 
 def define(
-    dataset: Any,
-    summary: ModelSummary,
-    record: RunMetadata,
-    nt: int,
-    *,
-    with_error: bool = False,
+    dataset: Any, summary: ModelSummary, record: RunMetadata, nt: int, *, with_error: bool = False
 ) -> int:
     """Defines a new file and writes all but the rows.
 

@@ -67,10 +67,7 @@ class EquilibriumSolution:
 
 
 def find_rest(
-    evaluator: Evaluator,
-    u: Floats,
-    angles: Floats | None = None,
-    states: Floats | None = None,
+    evaluator: Evaluator, u: Floats, angles: Floats | None = None, states: Floats | None = None
 ) -> EquilibriumSolution:
     """The equilibrium that a model comes to from a state u (13 n,) on the constraints.
 

@@ -81,11 +81,7 @@ def least_change(
 
 
 def scaled_system(
-    evaluator: Evaluator,
-    rows: ConstraintRows,
-    residual: Floats,
-    held: Integers | None,
-    metric: str,
+    evaluator: Evaluator, rows: ConstraintRows, residual: Floats, held: Integers | None, metric: str
 ) -> tuple[Floats, Floats]:
     """D (m, 6 n) and the residual (m,) in coordinates whose least squares are the least change."""
     length = evaluator.model.length

@@ -120,10 +120,7 @@ def run_beside(
 
 
 def neighbours_of(
-    compiled: CompiledModel,
-    parameter: SceneParameter,
-    given: dict[str, Any],
-    base: Run,
+    compiled: CompiledModel, parameter: SceneParameter, given: dict[str, Any], base: Run
 ) -> Neighbours:
     """Neighbours of a run by a parameter.
 

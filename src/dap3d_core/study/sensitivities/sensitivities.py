@@ -164,10 +164,7 @@ class Sensitivities:
 
     @checked
     def save(
-        self,
-        path: str | os.PathLike[str],
-        quantities: Sequence[str] = (),
-        force: bool = False,
+        self, path: str | os.PathLike[str], quantities: Sequence[str] = (), force: bool = False
     ) -> None:
         """Write ``to_xarray`` to a NetCDF-4 file, whole or not at all.
 

@@ -340,11 +340,7 @@ def _raise(client: Any, outcome: Any, part: Integers) -> NoReturn:
 
 @contextmanager
 def _requests(client: Any) -> Iterator[None]:
-    """Requests to the scheduler.
-
-    Raises:
-        ClusterError: it is gone.
-    """
+    """Requests to the scheduler; ClusterError where it is gone."""
     try:
         yield
     except Exception as error:  # of a client that has closed meanwhile: a type of its own

@@ -298,10 +298,7 @@ def _field(spec: FieldSpec, rng: random.Random) -> Any:
 
 
 def _values(
-    type_info: TypeInfo,
-    fields: dict[str, Any],
-    poses: Mapping[str, BodyPose],
-    rng: random.Random,
+    type_info: TypeInfo, fields: dict[str, Any], poses: Mapping[str, BodyPose], rng: random.Random
 ) -> dict[str, Any]:
     """Values of fields, ends of a vector between points, and constants of ``prepare``."""
     instance = type_info.type(**fields)
