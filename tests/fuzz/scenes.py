@@ -196,6 +196,7 @@ class Maker:
         if self.draw(st.integers(0, 3)) == 0:
             fields = {"radius": 0.05} if RUBS.get(type_) else {}
             if type_ in RUBS:
+                fields |= {"v_tol": 1e-3} if self.draw(st.booleans()) else {}  # else it sticks
                 self.scene.add_force("friction", joint=joint, mu=self.draw(part), **fields)
 
     # ---------------------------------------------------------------- forces

@@ -183,8 +183,7 @@ class BodyCoordinates(Coordinates):
 
     def start(self, u: Floats) -> Floats:
         """As of ``Coordinates``."""
-        y: Floats = self.evaluator.integrated(u)
-        return y
+        return self.evaluator.integrated(u)
 
     def body_states(self, y: Floats) -> Floats:
         """As of ``Coordinates``."""

@@ -110,6 +110,12 @@ class Model:
         return len(self.contact_laws)
 
     @property
+    def loaded_contacts(self) -> list[int]:
+        """Places of contacts that are friction of a joint by its load, among the joints."""
+        loaded = (group for group in self.contacts if group.loaded is not None)
+        return [k for group in loaded for k in group.members.tolist()]
+
+    @property
     def contact_names(self) -> tuple[str, ...]:
         """Names of points of contacts, ``NAME#1`` of those of several."""
         return tuple(self.joint_names[len(self.joint_names) - self.contact_count :])
@@ -156,8 +162,7 @@ class Model:
             if other is group:
                 break
             first += other.count * len(other.type_info.layout.angles)
-        found: Integers = first + width * np.asarray(places)[:, None] + np.arange(width)
-        return found
+        return first + width * np.asarray(places)[:, None] + np.arange(width)
 
     @cached_property
     def angle_names(self) -> tuple[str, ...]:

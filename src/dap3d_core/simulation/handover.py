@@ -166,8 +166,7 @@ def time_left(lengths: Floats, span: float) -> float:
 def _lengths(evaluator: Evaluator, t: float, y: Floats) -> Floats:
     found = np.zeros(at.MEASURES - at.PROJECTED + evaluator.length_count)
     evaluator.functions[PROJECT](t, y.copy(), found, evaluator.system, evaluator.loops)
-    lengths: Floats = found[at.MEASURES - at.PROJECTED :]
-    return lengths
+    return found[at.MEASURES - at.PROJECTED :]
 
 
 def crossing_notes(crossed: Sequence[float]) -> list[str]:

@@ -89,7 +89,7 @@ def _series(result: Result, name: str) -> dict[str, Any]:
 
 def _about(result: Result, scene: Scene, notes: list[str]) -> dict[str, Any]:
     ledger = {name: attrs.asdict(entry) for name, entry in result.ledger.items()}
-    about: dict[str, Any] = _finite(
+    return _finite(
         {
             "title": result.record.title or "scene without a name",
             "description": str(scene.description),
@@ -107,7 +107,6 @@ def _about(result: Result, scene: Scene, notes: list[str]) -> dict[str, Any]:
             "scene": result.scene_text,
         }
     )
-    return about
 
 
 def _finite(value: Any) -> Any:

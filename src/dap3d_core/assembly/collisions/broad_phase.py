@@ -1,8 +1,5 @@
 """Pairs of shapes that may touch: a grid of cells, and the few larger ones one by one."""
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled

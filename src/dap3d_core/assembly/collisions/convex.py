@@ -7,9 +7,6 @@ of these are tried, the last two by Newton's method from what ``nearest`` finds.
 is no more than the gap, so that one too many does no harm.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 
 from dap3d_core.assembly.collisions.distance import (

@@ -1,8 +1,5 @@
 """All points where the shapes of a model may touch at one pose."""
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import attrs
 import numpy as np
 

@@ -218,8 +218,7 @@ class TreeCoordinates(Coordinates):
     def inertia_places(self, bodies: Integers) -> Integers:
         """(7 b,) indices in the tree's constants of the mass and inertia of each."""
         first = CONSTANT_WIDTH * self._node_of[bodies] + MASS
-        places: Integers = (first[:, None] + np.arange(7)).ravel()
-        return places
+        return (first[:, None] + np.arange(7)).ravel()
 
     def inertias(self, bodies: Integers, mass: Floats, Jp: Floats) -> Floats:
         """(k, 7 b) numbers for ``inertia_places`` of masses (k, b) and inertias (k, b, 3, 3)."""
@@ -297,13 +296,11 @@ class TreeCoordinates(Coordinates):
         """(n + 1,) the node that each body is."""
         body = self.nodes.body
         has_mass = np.flatnonzero(body >= 0)
-        nodes: Integers = has_mass[np.argsort(body[has_mass])]
-        return nodes
+        return has_mass[np.argsort(body[has_mass])]
 
     @property
     def _tree(self) -> TreeArrays:
-        tree: TreeArrays = self.evaluator.system.tree
-        return tree
+        return self.evaluator.system.tree
 
 
 def cost_over_standard(model: Model, plan: Plan) -> float:

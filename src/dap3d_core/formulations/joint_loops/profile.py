@@ -4,9 +4,6 @@ George, Liu, Computer Solution of Large Sparse Positive Definite Systems (1981),
 diagonal 1/d is stored.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System

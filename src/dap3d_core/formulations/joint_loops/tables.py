@@ -244,5 +244,4 @@ def _pivots(evaluator: Evaluator, y: Floats, part: float) -> Floats:
     kept = evaluator.system.tree.kept
     kept.settings[PART_OF_ROW] = part
     evaluator.functions[RHS](0.0, y, np.zeros_like(y), evaluator.system, evaluator.loops)
-    pivots: Floats = 1.0 / kept.matrix[kept.profile[:, PLACE] + np.arange(len(kept.profile))]
-    return pivots
+    return 1.0 / kept.matrix[kept.profile[:, PLACE] + np.arange(len(kept.profile))]

@@ -1,8 +1,5 @@
 """Impulses of rows: A Lambda = b, where some push and do not pull."""
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers

@@ -9,9 +9,6 @@ Ordinary Differential Equations I (HNW), III.5 (recursions of Krogh for divided 
 whose notation this is written) and III.7.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from collections.abc import Sequence
 from typing import Any

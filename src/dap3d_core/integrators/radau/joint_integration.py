@@ -6,9 +6,6 @@ each component, by differences: its differentiated form, in lanes, would be code
 Python nor an exported model has. It only has to let the iteration converge.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from collections.abc import Iterator
 from typing import Any, ClassVar

@@ -1,8 +1,5 @@
 """Error of a step of a Runge-Kutta method, by its one or two estimates."""
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.integrators.runge_kutta.sums import combine

@@ -5,9 +5,6 @@ right-hand side beside those of stages are its own (step.py): its numbers are th
 A step near a singular pose is taken as that of a run alone.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any, ClassVar
 
 import attrs

@@ -18,9 +18,6 @@ cut into calls of ``advance``, its numbers are the same bit for bit. Source: Hai
 Wanner, Solving Ordinary Differential Equations I (HNW), II.4 to II.6.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from collections.abc import Sequence
 from typing import Any

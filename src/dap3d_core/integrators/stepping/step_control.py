@@ -4,9 +4,6 @@ Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (HNW)
 their codes DOPRI5 and DOP853.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from typing import Any
 

@@ -88,8 +88,7 @@ def differentiated_loop(type_info: TypeInfo, what: str, count: int) -> Entry:
         loop = write(type_info, what)
         assert loop is not None
         type_info.loops[key] = build_differentiated(loop, count)
-    made: Entry = type_info.loops[key]
-    return made
+    return type_info.loops[key]
 
 
 def _compiled_loop(type_info: TypeInfo, what: str, announce: Callable[[str], None] | None) -> Any:

@@ -111,8 +111,7 @@ class _Instances:
         """(m, length) places behind an index, from here on the instance's own."""
         self.idx[:, column] = length * (of * np.arange(len(self.idx)) + shift)
         self._places = max(self._places, length * of * len(self.idx))
-        places: Integers = self.idx[:, column, None] + np.arange(length)
-        return places
+        return self.idx[:, column, None] + np.arange(length)
 
     def run(self, entry: Entry, t: float, p0: int) -> list[Floats]:
         """(size, 1 + d) values and slopes: of the three outputs of a loop, and rates of states."""

@@ -110,8 +110,7 @@ class StateView:
         """(n, BODY_WIDTH) the bodies in the driver's arrays, placed."""
         if not self._is_placed:
             self._place()
-        body: Floats = self._evaluator.system.body[1:]
-        return body
+        return self._evaluator.system.body[1:]
 
     def _place(self) -> None:
         self._place_bodies()

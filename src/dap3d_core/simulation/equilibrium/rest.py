@@ -158,8 +158,7 @@ def _least(statics: Statics, D: Floats, force: Floats) -> Floats:
     if not len(D):
         return np.zeros(0)
     least = np.linalg.lstsq(D.T * statics.scale[:, None], statics.scale * force, rcond=RCOND)[0]
-    multipliers: Floats = -least
-    return multipliers
+    return -least
 
 
 def _with_brought(
@@ -258,8 +257,7 @@ def _least_solution(matrix: Floats, side: Floats) -> Floats:
     columns = np.max(np.abs(matrix / rows[:, None]), axis=0, initial=0.0)
     columns[columns == 0.0] = 1.0
     scaled = matrix / rows[:, None] / columns
-    found: Floats = np.linalg.lstsq(scaled, side / rows, rcond=OPEN)[0] / columns
-    return found
+    return np.linalg.lstsq(scaled, side / rows, rcond=OPEN)[0] / columns
 
 
 def findings(search: Search, stability: Stability, model: Model) -> Iterator[str]:

@@ -99,8 +99,7 @@ def violation(evaluator: Evaluator, u: Floats, t: float = 0.0) -> tuple[float, f
 
 def weights_of(evaluator: Evaluator) -> Floats:
     """(rows,) weights of the residuals of the model's rows (System.weight)."""
-    weight: Floats = evaluator.system.weight[evaluator.system.row]
-    return weight
+    return evaluator.system.weight[evaluator.system.row]
 
 
 def correct_initial(
@@ -308,8 +307,7 @@ def _failure(
     if len(still_open) > MOST_JOINTS:
         lines.append(f"  and {len(still_open) - MOST_JOINTS} joints more")
     names = ", ".join(model.body_names[b - 1] for b in held)
-    why = ["bodies that do not reach their joints, and",
-           "contradictory joints cannot be assembled"]  # fmt: skip
+    why = ["bodies that do not reach their joints, and", "contradictory joints cannot be assembled"]
     if is_far:
         why = ["the bodies were still on their way: give positions nearer to an assembled pose,",
                "unless the joints contradict each other"]  # fmt: skip
@@ -386,8 +384,7 @@ def _first_of(directions: Floats) -> Floats:
     """A unit vector (6 n,) of the space of orthonormal ones (k, 6 n), the same on any computer."""
     size = np.sum(directions**2, axis=0)
     k = int(np.argmax(size >= (1.0 - TIED) * np.max(size)))
-    first: Floats = directions[:, k] @ directions / size[k] ** 0.5
-    return first
+    return directions[:, k] @ directions / size[k] ** 0.5
 
 
 def _rank(values: Floats, part: float) -> int:

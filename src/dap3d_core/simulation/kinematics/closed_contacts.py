@@ -6,6 +6,8 @@ import numpy as np
 from dap3d_core.formulations.contacts.contact_rows import GAP, REACH, ContactRows, ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.scene import Mistake, SceneError
+from dap3d_core.scene.errors import MISSING
 from dap3d_core.simulation.errors import SimulationError
 
 #: Gap, as a part of the scene's length, and speed, of that length a second, below which what is
@@ -46,8 +48,19 @@ class ContactForces:
     """
 
     def __init__(self, evaluator: Evaluator) -> None:
-        """Args: the evaluator of the model, in which all contacts are open."""
-        self.table = ContactTable(evaluator)
+        """Args: the evaluator of the model, in which all contacts are open.
+
+        Raises:
+            SceneError: friction of a joint's load, or in three directions, sticks.
+        """
+        self.table = table = ContactTable(evaluator)
+        loaded = [c for c in range(table.count) if c in table.loads or table.gapless[c]]
+        if loaded:
+            what = "sticks, by the load of its joint: inverse dynamics does not know how much"
+            remedy = "give it a v_tol (w_tol), below which it fades"
+            raise SceneError(
+                [Mistake(table.names[c], MISSING, what, remedy=remedy) for c in loaded]
+            )
         self.outside: tuple[float, float, str] | None = None
 
     def at(self, t: float, u: Floats) -> Closed:
@@ -59,16 +72,16 @@ class ContactForces:
         columns, places, known = [], list[int](), np.zeros(len(rows.v))
         cones: dict[int, tuple[list[int], float]] = {}
         states = table.evaluator.states.copy()
-        closed = (near & (np.abs(slip[:, 0]) < still)) | (table.load == 1.0)
+        closed = (near & (np.abs(slip[:, 0]) < still)) | table.alone
         for c in np.flatnonzero(closed).tolist():
             normal, *across = rows.G[3 * c : 3 * c + 3]
             sliding = float(np.hypot(*slip[c, 1:])) > still
             way = slip[c, 1:] / np.hypot(*slip[c, 1:]) if sliding else np.zeros(2)
             friction = -table.mu[c] * (way @ across)
             own, first = [], len(places)
-            if table.load[c] and sliding:
+            if table.alone[c] and sliding:
                 known += friction
-            elif not table.load[c]:
+            elif not table.alone[c]:
                 own.append(normal + friction)
                 places.append(3 * c)
             for k, tangent in enumerate(across, 1):
@@ -132,7 +145,7 @@ class ContactForces:
         found = force.copy()
         for c, (places, mu) in closed.cones.items():
             x = force[places]
-            if self.table.load[c]:
+            if self.table.alone[c]:
                 found[places] = np.clip(x, -mu, mu)
                 continue
             if not places:

@@ -11,6 +11,7 @@ import numpy as np
 from dap3d_core.formulations.common.friction import PASSES, forces_by
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.model import Model
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, RunMetadata, RunStatistics, information
 from dap3d_core.result.arrays import Arrays
@@ -159,12 +160,7 @@ def _solved(
 ) -> Result:
     started, model = time.perf_counter(), evaluator.model
     chosen = actuators_of(compiled, evaluator, names)
-    known = {*model.brought_forces.values(), *model.contact_names}
-    if others := [n for n in model.iterated_forces if n not in known]:
-        raise SimulationError(
-            "inverse dynamics does not know Coulomb friction in joints, nor other forces that "
-            f"depend on their reactions: leave {', '.join(others)} out of the scene"
-        )
+    _refuse_iterated(model)
     held = np.ones(model.row_count, dtype=bool)
     held[[a.row for a in chosen if isinstance(a, DriverActuator)]] = False
     held[model.joint_row_count :] = False  # contacts hold by their forces
@@ -209,6 +205,17 @@ def _solved(
         actuation={a.name: forces.tau[:, k] for k, a in enumerate(chosen)},
     )
     return Result(summary, arrays, about, lambda: (model, lambda: compiled.evaluator))
+
+
+def _refuse_iterated(model: Model) -> None:
+    """SimulationError for forces that depend on reactions of joints."""
+    known = {*model.brought_forces.values(), *model.contact_names}
+    known -= {model.joint_names[k] for k in model.loaded_contacts}
+    if others := [n for n in model.iterated_forces if n not in known]:
+        raise SimulationError(
+            "inverse dynamics does not know Coulomb friction in joints, nor other forces that "
+            f"depend on their reactions: leave {', '.join(others)} out of the scene"
+        )
 
 
 def _forces(

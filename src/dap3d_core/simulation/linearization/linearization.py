@@ -260,14 +260,12 @@ class Linearization:
     @property
     def mode_eigenvalues(self) -> Complex:
         """(modes,) the eigenvalue of each mode: of a conjugate pair that with Im > 0."""
-        values: Complex = self._spectrum.values[self._of_modes]
-        return values
+        return self._spectrum.values[self._of_modes]
 
     @property
     def frequencies(self) -> Floats:
         """(modes,) natural frequency of each mode, Hz: ``|lambda|`` / (2 pi)."""
-        frequencies: Floats = np.abs(self.mode_eigenvalues) / (2.0 * np.pi)
-        return frequencies
+        return np.abs(self.mode_eigenvalues) / (2.0 * np.pi)
 
     @property
     def damping(self) -> Floats:
@@ -302,8 +300,7 @@ class Linearization:
         x = self.modes
         energy = np.real(np.conj(x) * (self.M @ x)).T
         energy = energy.reshape(len(energy), len(self.body_names), 6).sum(axis=2)
-        shares: Floats = energy / energy.sum(axis=1, keepdims=True)
-        return shares
+        return energy / energy.sum(axis=1, keepdims=True)
 
     @checked
     def motion(self, mode: int = 0, size: float = 0.1, instants: int = 60) -> Result:
@@ -351,8 +348,7 @@ def _balance(space: StateSpace, scale: Floats) -> Floats:
     into, out = np.abs(A[rest:, :rest]).sum(axis=1), np.abs(A[:rest, rest:]).sum(axis=0)
     is_coupled = (into > 0.0) & (out > 0.0)
     balanced = np.sqrt(np.where(is_coupled, out, 1.0) / np.where(is_coupled, into, 1.0))
-    found: Floats = np.where(is_coupled, balanced, 1.0)
-    return found
+    return np.where(is_coupled, balanced, 1.0)
 
 
 @checked

@@ -288,5 +288,4 @@ class _Assembly:
 
 def _times(J: Floats, w: Floats) -> Floats:
     """J w for each body."""
-    product: Floats = np.einsum("nij,nj->ni", J, w)
-    return product
+    return np.einsum("nij,nj->ni", J, w)

@@ -281,8 +281,7 @@ def _groups(model: Model, dependencies: Sequence[Dependency]) -> tuple[Shared, .
 
 def _gap(dependency: Dependency, side: Floats) -> Floats:
     """Part of a right-hand side that no motion fulfils, on a basis of the combinations."""
-    gap: Floats = dependency.combinations @ side[dependency.rows]
-    return gap
+    return dependency.combinations @ side[dependency.rows]
 
 
 def _size(dependency: Dependency, side: Floats, gradient: Floats) -> float:

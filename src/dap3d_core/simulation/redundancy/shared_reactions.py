@@ -187,8 +187,7 @@ class ShareSpread:
         finally:
             evaluator.states = own
         times = np.array([t for t, *_ in self._kept])
-        works: Floats = -np.trapezoid(powers, times, axis=0)
-        return works
+        return -np.trapezoid(powers, times, axis=0)
 
 
 def _other_shares(evaluator: Evaluator, t: float, u: Floats, Lam: Floats) -> Floats:
@@ -207,8 +206,7 @@ def _other_shares(evaluator: Evaluator, t: float, u: Floats, Lam: Floats) -> Flo
             np.einsum("ir,sr,jr->sij", N, c, N), -np.einsum("ir,sr,sr->si", N, c, own)[..., None]
         )
         shares[:, dependency.rows] += z[..., 0] @ N
-    other: Floats = shares / gradient
-    return other
+    return shares / gradient
 
 
 def _power(evaluator: Evaluator, t: float, Lam: Floats) -> float:

@@ -98,8 +98,7 @@ class Sensitivities:
 
     def final(self, quantity: str) -> Floats:
         """(p,) derivatives of a quantity at the end; of a vector (3, p). Errors as ``of``."""
-        final: Floats = self.of(quantity)[-1]
-        return final
+        return self.of(quantity)[-1]
 
     def derivative(self, function: Callable[[Result], Any]) -> Floats:
         """Derivatives (..., p) of what a smooth function computes of a result."""
@@ -424,8 +423,7 @@ class DifferentiatedRun(Run):
                 jumps.span = of.span
                 jumps.repeat_of(of)
                 change(jumps, run.present)
-                result: Floats = own.state[Y].copy()
-                return result
+                return own.state[Y].copy()
 
             change(of, integration)
             slopes = self._derivative(after, given, np.vstack([of_state, of_time]))
@@ -446,5 +444,4 @@ class DifferentiatedRun(Run):
 
 def _finite(x: Floats) -> Floats:
     """Numbers, with zero for those that are not finite: limits that are not set."""
-    numbers: Floats = np.where(np.isfinite(x), x, 0.0)
-    return numbers
+    return np.where(np.isfinite(x), x, 0.0)

@@ -152,8 +152,7 @@ class Kernels:
         arrays = _Plain(body, table, element.idx, element.par, own, np.zeros(len(own), object))
         outs = self._outs(object, element)
         self._plain[name](t, arrays, 0, 0, 1, *outs)
-        value: NDArray[Any] = self._value_in(name, table, outs, arrays.rates)
-        return value
+        return self._value_in(name, table, outs, arrays.rates)
 
     def _jumps_by(self, name: str) -> bool:
         """True for a kernel of the jumps of a force."""

@@ -200,8 +200,7 @@ class SampledType:
         """The value of ``make``, computed once for each name."""
         if name not in self._cache:
             self._cache[name] = make()
-        value: Cached = self._cache[name]
-        return value
+        return self._cache[name]
 
     def _sample(self, k: int, start: int = 0) -> Sample:
         title = f"{self.seed} {self.type.__qualname__} {k} {start}"

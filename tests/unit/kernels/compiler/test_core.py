@@ -153,9 +153,12 @@ NOT_CALLED = {
             "size_of solve_round try_pass assemble put_turned add_contact"
         ),
         "integrators.moreau.problem": "prepare_problem solve judge sweep finish refine_groups",
+        "integrators.moreau.restitution": (
+            "limit_bounces any_gains put_work part_without_gain mix"
+        ),
         "integrators.moreau.step": (
             "advance goes_on state_at meet take_velocities put_margins length_of deepest_of "
-            "put_bias put_hits work_done move part finish"
+            "put_bias put_hits work_done move part finish way_of closing_of put_means"
         ),
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",
