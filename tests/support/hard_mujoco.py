@@ -24,6 +24,7 @@ class HardOracle(Oracle):
         self.model = m = compiled(path)
         m.opt.cone, m.opt.solver = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtSolver.mjSOL_NEWTON
         m.opt.timestep, m.opt.tolerance, m.opt.noslip_tolerance = 5e-4, 0.0, 0.0
+        m.opt.ls_iterations, m.opt.ls_tolerance, m.opt.impratio = 200, 1e-6, 1.0
         m.opt.density = m.opt.viscosity = 0.0
         m.opt.wind[:] = m.dof_frictionloss[:] = 0.0
         m.geom_margin[:] = m.geom_gap[:] = m.jnt_margin[:] = 0.0
