@@ -14,6 +14,7 @@ from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.testing.checks import (
     branches,
+    contacts,
     forces,
     functions,
     joints,
@@ -191,6 +192,8 @@ def _of_joint(subject: SampledType) -> list[Check]:
     ]
     if "G" in subject.type_info.kernels:
         checks.insert(0, Check("G", subject, "", joints.gradient_of_unknowns))
+    if subject.type.is_contact and subject.type.grip is not None:
+        checks.append(Check("grip", subject, "", contacts.grip))
     checks += _of_jumps(subject)
     if "friction" in subject.type_info.kernels:
         checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))

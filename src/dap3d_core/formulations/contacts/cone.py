@@ -28,8 +28,9 @@ TINY = 1e-300
 
 
 def solve_cone(
-    A: Floats, b: Floats, mu: Any, more: Any = None, start: Any = None, tries: int = TRIES
-) -> tuple[Floats, float]:
+    A: Floats, b: Floats, mu: Any, more: Any = None, start: Any = None, tries: int = TRIES,
+    ratio: Any = None,
+) -> tuple[Floats, float]:  # fmt: skip
     """The solution x (3 m,), and the residual of the equations over its size.
 
     Args:
@@ -38,7 +39,14 @@ def solve_cone(
         more: (m,) normal impulses of an earlier phase, which widen the discs.
         start: (3 m,) where to begin.
         tries: at most; fewer where it is to be known whether there is a solution nearby.
+        ratio: (m,) of coefficients along t2 to mu, that along t1, where friction is in an ellipse.
     """
+    if ratio is not None and np.any(ratio != 1.0):  # stretched to a circle
+        stretch = np.column_stack([np.ones((len(ratio), 2)), ratio]).ravel()
+        start = None if start is None else start / np.where(stretch > 0.0, stretch, 1.0)
+        stretched = stretch[:, None] * A * stretch
+        x, left = solve_cone(stretched, stretch * b, mu, more, start, tries)
+        return stretch * x, left
     count = len(b) // 3
     mu, more = np.asarray(mu, dtype=float), np.zeros(count) if more is None else more
     x = np.zeros(len(b)) if start is None else start.copy()

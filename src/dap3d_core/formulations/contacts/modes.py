@@ -145,7 +145,8 @@ def _matrix(
     A, ways = full.copy(), _ways(table, rows, closed, sliding, limit)
     for k, c in enumerate(closed):
         if c in ways:
-            A[:, 3 * k] -= table.mu[c] * full[:, 3 * k + 1 : 3 * k + 3] @ ways[c]
+            across = full[:, 3 * k + 1 : 3 * k + 3]
+            A[:, 3 * k] -= table.mu[c] * across @ table.against(c, ways[c])
             if A[3 * k, 3 * k] <= 0.0 and not table.load[c]:
                 raise JamError(table.names[c])
     return A, ways
@@ -162,13 +163,14 @@ def _solve(
             b += A[:, 3 * k]
     mu = LOOSE * table.mu[closed] if loose else part * table.mu_s[closed]
     mu[[c in ways for c in closed]] = 0.0
-    x, left = solve_cone(A, b, mu, load, **more)
+    x, left = solve_cone(A, b, mu, load, ratio=table.ratio_s[closed], **more)
     if left > 1e-6 and not more:
         raise JamError(table.names[closed[0]])
     a = A @ x + b
     for k, c in enumerate(closed):
         if c in ways:
-            x[3 * k + 1 : 3 * k + 3] = -table.mu[c] * (x[3 * k] + load[k]) * ways[c]
+            against = table.against(c, ways[c])
+            x[3 * k + 1 : 3 * k + 3] = -table.mu[c] * (x[3 * k] + load[k]) * against
     return x, a
 
 
@@ -200,7 +202,8 @@ def _put(
         elif table.mu_s[c] == 0.0:
             mode, way = 1.0, np.zeros(2)
         elif np.hypot(*rate[1:]) > ZERO * big:
-            along = -force[1:] if table.mu[c] > 0.0 and np.any(force[1:]) else rate[1:]
+            is_known = table.mu[c] > 0.0 and np.any(force[1:])
+            along = table.slip_against(c, force[1:]) if is_known else rate[1:]
             mode, way = 1.0, along / np.hypot(*along)
         else:
             mode, way = 2.0, np.zeros(2)

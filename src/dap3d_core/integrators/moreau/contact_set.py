@@ -106,11 +106,13 @@ class ContactFinder:
         evaluator.states = stuck
         rows = evaluator.rows(t, u)
         evaluator.states = states
+        table.find_grips(t, u)
         own, count = evaluator.model.joint_row_count, table.count
         G = rows.dense()[own:].reshape(count, 3, -1, 6)
         G = np.concatenate([np.zeros((count, 3, 1, 6)), G], axis=2)
         each, (i, j) = np.arange(count), self._slots.T
         J = np.concatenate([G[each, :, i], G[each, :, j]], axis=2)
+        J[:, 2] *= table.ratio[:, None]  # an ellipse, stretched to a circle
         none = np.zeros((0, 2), dtype=np.int64)
         gaps: Floats = rows.C[own:].reshape(-1, 3)[:, 0]
         return ContactSet(self._slots, DECLARED + each, J, gaps, table.mu, table.e,
