@@ -75,6 +75,8 @@ def bind_functions(
         given.append(one)
     kernels = {n: _with_functions(k, given) for n, k in type_info.kernels.items()}
     outputs, knotted = dict(type_info.outputs), [one for one in given if one.knot_count]
+    if getattr(type_info.type, "is_contact", False):  # arguments are sought: most are of no state
+        knotted = []
     calling = (k for n in CALLING if (k := type_info.kernels.get(n)) and _called(k, knotted))
     if kernel := next(calling, None):
         distances = _distances(kernel, type_info, knotted)

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from inspect import signature
+from itertools import pairwise
 from typing import Any, ClassVar
 
 from dap3d_core.interface.fields import FieldSpec, choice, field_of, number, slot_of
@@ -158,9 +159,8 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     names_of = [n for n in (*DECLARED, *OPTIONAL) if getattr(class_, n, None) is not None]
     declared = {name: getattr(class_, name) for name in names_of}
     specs = _specs(class_)
-    kinds = {name: spec.kind for name, spec in specs.items()}
     has_j = any(slot_of(name) == "j" or spec.kind == "vector2" for name, spec in specs.items())
-    calls, wanted = _expressions(declared, kinds)
+    calls, wanted = _expressions(declared, specs)
     if not has_j:
         calls |= dict.fromkeys(("r_j", "v_j", "w_j"), "(0.0, 0.0, 0.0)")
     kernels = {f"{name}__": kernel for name, kernel in declared.items()}
@@ -189,23 +189,25 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
 
 
 def _expressions(
-    declared: Mapping[str, Callable[..., Any]], kinds: Mapping[str, str]
+    declared: Mapping[str, Callable[..., Any]], specs: Mapping[str, FieldSpec]
 ) -> tuple[dict[str, str], dict[str, list[str]]]:
     """Expressions for parameters of kernels, by what authors declare, and the names in each."""
     from dap3d_core.interface.codegen.kernel_arguments import parameters
 
+    kinds, slopes = {name: spec.kind for name, spec in specs.items()}, _slopes(specs)
     calls, wanted = dict[str, str](), dict[str, list[str]]()
     shorts = {"gap": "gap", "c": "at", "n": "normal", "e": "along", "grain": "grain"}
     for short, name in shorts.items():
         if name not in declared:
             continue
         names = parameters(declared[name])
-        changes = [_rate_name(n, kinds) for n in names]
+        changes = [slopes.get(n) or _rate_name(n, kinds) for n in names]
         calls[short] = f"{name}__({', '.join(names)})"
         calls[f"{short}_dot"] = f"rate_of__({name}__, ({_list(names)}), ({_list(changes)}))"
         wanted[short] = list(names)
-        found = [c.removeprefix("turned__(").split(",")[0] for c in changes]
-        wanted[f"{short}_dot"] = [*names, *(c for c in found if c not in ("None", "1.0"))]
+        found = [c.removeprefix("turned__(").strip("(,)").split(", ") for c in changes]
+        of_rates = [n for c in found for n in c if n not in ("None", "1.0", "") and n not in names]
+        wanted[f"{short}_dot"] = [*names, *of_rates]
     if "reach" in declared:
         wanted["reach"] = list(parameters(declared["reach"]))
         calls["reach"] = f"reach__({', '.join(wanted['reach'])})"
@@ -222,6 +224,23 @@ def _expressions(
         wanted |= {"grip": ["mu"], "hold": ["mu_s"]}
         calls |= {"grip": "lambda speed: mu", "hold": "mu_s"}
     return calls, wanted
+
+
+def _slopes(specs: Mapping[str, FieldSpec]) -> dict[str, str]:
+    """Names of functions that kernels call -> their partial derivatives, by name."""
+    found: dict[str, str] = {}
+    for name, spec in specs.items():
+        if spec.kind != "function" or not spec.argument:
+            continue
+        f = "f" if name == "function" else name
+        if spec.arguments == 1:
+            orders = [f"{f}{suffix}" for suffix in ("", "_dot", "_ddot", "_dddot")]
+            found |= {a: f"({b},)" for a, b in pairwise(orders)} | {orders[-1]: "()"}
+        else:
+            found |= {f: f"({f}_x, {f}_y)", f"{f}_x": f"({f}_xx, {f}_xy)"}
+            found |= {f"{f}_y": f"({f}_xy, {f}_yy)"}
+            found |= {f"{f}_{which}": "()" for which in ("xx", "xy", "yy")}
+    return found
 
 
 def _list(words: Any) -> str:
