@@ -148,8 +148,10 @@ class _Given:
         known = {n: f"note__(x__, {n})" if noted and self.knot_count else n for n in arguments}
         wanted = parameters(self.function.kernels["value"])
         passed = ", ".join(known.get(n) or self.name(n) for n in wanted)
-        value = f"{self.name('value')}({passed})[{self.calls[call]}]"
-        return f"lambda {', '.join(arguments)}: {value}"
+        value = f"{self.name('value')}({passed})"
+        if not noted:
+            value = f"once__(values__, {self.prefix!r}, ({', '.join(arguments)},), lambda: {value})"
+        return f"lambda {', '.join(arguments)}: {value}[{self.calls[call]}]"
 
 
 def _called(kernel: Callable[..., Any], given: Iterable[_Given]) -> dict[str, _Given]:
@@ -168,6 +170,8 @@ def _with_functions(
     expressions = {n: one.expression(n, noted=noted) for n, one in called.items()}
     numbers: list[str] = []
     names: dict[str, Any] = {"note__": note} if noted else {}
+    if not noted:
+        names["once__"], body = once, f"values__ = {{{{}}}}\n{body}"
     for one in called.values():
         value = one.function.kernels["value"]
         numbers += map(one.name, one.own(parameters(value)))
@@ -206,6 +210,16 @@ def bound_kernel(
     bound.kernels = (kernel, *names.values())  # wherever they were defined: in a notebook, say
     made: Callable[..., Any] = bound
     return made
+
+
+def once(
+    values: dict[Any, Any], f: str, arguments: tuple[Any, ...], call: Callable[[], Any]
+) -> Any:
+    """What a function f returns for these arguments, called at first: f and f_dot are one call."""
+    key = (f, *map(id, arguments))
+    if key not in values:
+        values[key] = arguments, call()  # kept, so that no other object takes their place
+    return values[key][1]
 
 
 def note(arguments: list[Any], x: Any) -> Any:
