@@ -1,6 +1,6 @@
 """Imports of all models in folders, compared with MuJoCo, Pinocchio and Drake.
 
-    python benchmarks/imported_models.py FOLDER... [--poses 100] [--csv FILE]
+    python benchmarks/imported_models.py FOLDER... [--poses 100] [--contacts] [--root R] [--csv F]
 
 needs the extra "peers"; a program that is not installed is left out. Each URDF, MJCF and SDF file
 is read by dap3d and by the programs that read its format: MuJoCo reads URDF and MJCF, Pinocchio
@@ -8,6 +8,10 @@ URDF, Drake SDF. A row has the largest relative differences of masses and inerti
 (m, 1) over random poses, and those of accelerations at five random states with random forces on
 all joints, relative to the largest. Contacts, limits, friction of joints, equalities, tendons and
 fluids are off. Files that are refused are listed with the reason.
+
+With --contacts MJCF files alone are compared with MuJoCo as it is hardest: moved for half a second
+from their first named keyframe or pose, then at rest, with rigid limits, contacts and friction. A
+row has the largest difference of accelerations relative to the largest, or 1, and the contacts.
 """
 
 import argparse
@@ -35,8 +39,17 @@ COLUMNS = ("mass", "inertia", "position", "rotation", "acceleration")
 MARKS = dict(zip(COLUMNS, (1e-12, 1e-12, 1e-12, 1e-12, 1e-9), strict=True))
 #: Suffix -> programs that read its files.
 PEERS = {".urdf": ("MuJoCo", "Pinocchio"), ".xml": ("MuJoCo",), ".sdf": ("Drake",)}
+#: Dry friction of joints, which is compared nowhere; words of what is soft in MuJoCo.
+FRICTION, SOFT = ("rot_friction", "tran_friction"), {"softness", "rigid"}
 #: States at which accelerations are compared.
 STATES = 5
+#: Time of motion before contacts are compared, and the step whose change of velocities counts, s:
+#: a gap of 1e-11 m closes in it.
+SETTLED, STEP = 0.5, 1e-6
+#: Mass centres of the same body are not further apart, m.
+NEAR = 1e-4
+#: Asked of accelerations with contacts.
+RIGID = 1e-3
 
 
 class PeerError(Exception):
@@ -78,8 +91,7 @@ def scene_at(model, state, *, balance_inertia):
     scene = scene_of(forced, Remarks(), options, names=names)
     for one in scene.inputs.values():
         one.value = 1.0
-    off = ("rot_friction", "tran_friction")
-    for name in [n for n, e in scene.forces.items() if e.type in off]:
+    for name in [n for n, e in scene.forces.items() if e.type in FRICTION]:
         del scene.forces[name]
     return scene, names
 
@@ -130,6 +142,41 @@ def differences(oracle, scene, names, *, accelerations):
     return errors, count
 
 
+def compare_contacts(path, root):
+    """The largest difference of accelerations with contacts; contacts of both; what is left out."""
+    from support.hard_mujoco import HardOracle
+
+    try:
+        oracle = HardOracle(path)
+    except ValueError as error:
+        raise PeerError(" ".join(str(error).split())) from None
+    if not oracle.model.nv:
+        raise PeerError("nothing moves")
+    model = read_articulation(path, root=root, shapes=False)[0]
+    oracle.use(model)
+    key, name = next(oracle.keys(), (None, None))
+    oracle.settle(SETTLED, key)
+    follow = {one.joint for one in model.couplings}
+    positions = {n: q for n, q in oracle.positions().items() if n not in follow}
+    scene, report = dap.import_model(path, root=root, contacts=True, limits="hard", key=name,
+                                     positions=positions)  # fmt: skip
+    for force in [n for n, e in scene.forces.items() if e.type in FRICTION]:
+        del scene.forces[force]
+    result = dap.simulate(scene, t_end=STEP, dt=STEP, contact_step=STEP, contact="stepping")
+    found = np.hstack([result.rd[-1] - result.rd[0], result.w[-1] - result.w[0]]) / STEP
+    places, pairs = {name: k for k, name in enumerate(scene.bodies)}, []
+    for name, (com, a) in oracle.accelerations():
+        apart = np.abs(result.r[0] - com).max(axis=1)  # of one without a name the nearest
+        if name in places or apart.min() < NEAR:
+            pairs.append((found[places.get(name, int(np.argmin(apart)))], a))
+    if not pairs:
+        raise PeerError("no body that both have")
+    largest = max(1.0, *(np.abs(a).max() for _, a in pairs))
+    worst = max(np.abs(here - a).max() for here, a in pairs) / largest
+    left = [one.text for one in report.left_out if one.motion and not SOFT & {*one.text.split()}]
+    return worst, (int(oracle.data.ncon), len(result.contacts.t)), left
+
+
 def accelerations_of(scene):
     """Accelerations of mass centres and angular accelerations, by body."""
     bodies = scene.bodies
@@ -144,6 +191,8 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--poses", type=int, default=100)
+    parser.add_argument("--contacts", action="store_true")
+    parser.add_argument("--root", type=Path, help="of all models; by default each folder given")
     parser.add_argument("--csv", type=Path)
     options = parser.parse_args()
     rows = []
@@ -152,19 +201,22 @@ def main():
         base = folder.parent if folder.is_file() else folder
         for path in (f for f in files if f.suffix in PEERS and _is_model(f)):
             for peer in PEERS[path.suffix]:
-                rows.append(_row(path, peer, options.poses, base))
+                if options.contacts and path.suffix != ".xml":
+                    continue
+                root = options.root or base
+                rows.append(_row(path, peer, options.poses, root, contacts=options.contacts))
                 _print(rows[-1], base)
-    _summarise(rows)
+    _summarise_contacts(rows) if options.contacts else _summarise(rows)
     if options.csv:
         with options.csv.open("w", newline="") as file:
-            columns = ("file", "peer", "end", "bodies", *COLUMNS, "seconds", "why")
+            columns = ("file", "peer", "end", "bodies", *COLUMNS, "contact", "seconds", "why")
             writer = csv.DictWriter(file, columns)
             writer.writeheader()
             writer.writerows(rows)
 
 
 def _print(row, base):
-    figures = "  ".join(f"{row[c]:8.1e}" for c in COLUMNS) if row["end"] == "ok" else ""
+    figures = "  ".join(f"{row[c]:8.1e}" for c in (*COLUMNS, "contact") if c in row)
     name = str(Path(row["file"]).relative_to(base))[-50:]
     print(f"{name:50} {row['peer']:9} {row['end']:8} {figures} {row['why'][:90]}", flush=True)
 
@@ -179,19 +231,32 @@ def _summarise(rows):
             print(f"  {column}: {sum(v <= mark for v in values)} of {len(values)} within {mark:g}")
 
 
+def _summarise_contacts(rows):
+    """Print how many models were read by both, and how many of those that touch are within."""
+    print(dict(Counter(row["end"] for row in rows)))
+    values = [row["contact"] for row in rows if row["end"] == "ok" and row["bodies"]]
+    print(f"  with contacts: {sum(v <= RIGID for v in values)} of {len(values)} within {RIGID:g}")
+    values = [row["contact"] for row in rows if row["end"] == "ok" and not row["bodies"]]
+    print(f"  without: {sum(v <= RIGID for v in values)} of {len(values)}")
+
+
 def _is_model(path):
     text = path.read_bytes()[:100_000]
     marks = {".xml": (b"<mujoco", b"<worldbody"), ".sdf": (b"<sdf", b"<link")}
     return all(mark in text for mark in marks.get(path.suffix, ()))
 
 
-def _row(path, peer, poses, root):
+def _row(path, peer, poses, root, *, contacts=False):
     """The row of a file: compared, refused by dap3d, or not read by the other program."""
     row = {"file": str(path), "peer": peer, "end": "ok", "why": "", "bodies": 0}
     began = time.process_time()
     try:
-        worst, row["bodies"] = compare(path, peer, poses, root)
-        row |= worst
+        if contacts:
+            row["contact"], (row["bodies"], mine), left = compare_contacts(path, root)
+            row["why"] = f"{row['bodies']} contacts, {mine} here; {'; '.join(left[:3])}"
+        else:
+            worst, row["bodies"] = compare(path, peer, poses, root)
+            row |= worst
     except (dap.SceneError, FormatError) as error:
         row |= {"end": "refused", "why": str(error).partition("\n")[0].rpartition("/")[2]}
     except PeerError as error:

@@ -89,6 +89,31 @@ dt = 0.05
 """
 #: What is edited: the plugin, its scene.
 EDITED = {"pushed": (FORCE, SCENE), "held": (JOINT, RODS)}
+#: Runs a four-bar until programs of it run; kernels are in the cache folder, programs are not.
+CHANGE_OVER = """
+import sys
+import time
+from functools import partial
+sys.path.insert(0, {here!r})
+import programs
+import dap3d_core as dap
+from dap3d_core.formulations.programs import change_over
+evaluator, integration = programs.integration_of(dap.compile({model!r}), 1e6, 1e-9)
+change, begun = change_over.ChangeOver(evaluator), time.perf_counter()
+while not any(record.programs for record in change_over._records.values()):
+    change.during(integration, partial(integration.advance, 2000))
+print(time.perf_counter() - begun)
+"""
+
+
+def change_over(folder, env):
+    """Wall seconds from the first step of a run to programs of its scene."""
+    for program in Path(env["DAP3D_CACHE_DIR"]).glob("program-*"):
+        program.unlink()
+    script = CHANGE_OVER.format(here=str(Path(__file__).parent), model=MODEL)
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, check=True, capture_output=True, env=env, cwd=folder)
+    return float(done.stdout)
 
 
 def seconds(command, env, folder):
@@ -115,7 +140,7 @@ def measure():
             "edit to result": (sources, str(folder / "pushed"), "--allow-code"),
             "edit to result, J and gamma derived": (sources, str(folder / "held"), "--allow-code"),
         }
-        times = {case: [] for case in cases}
+        times, changes = {case: [] for case in cases}, []
         for strength in range(REPEATS + 1):
             for name, (plugin, _) in EDITED.items():
                 (folder / name / "plugin.py").write_text(plugin.format(strength=-1.0 - strength))
@@ -128,6 +153,8 @@ def measure():
                 times[case].append(seconds([*command, "-o", "run.nc", "--force"], env, folder))
                 while list(cache.glob("*.ll")):  # optimisation in the background
                     time.sleep(0.05)
+            changes.append((change_over(folder, environment(folder / "warm run")),) * 2)
+        times["change-over to programs"] = changes
         # the first round fills caches, and compiles bytecode
         return [row(case, runs[1:]) for case, runs in times.items()]
 

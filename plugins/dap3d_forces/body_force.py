@@ -1,7 +1,19 @@
 """Constant force in body axes."""
 
-from dap3d_core.interface import Body, Force, Point, body, function, hookimpl, input_, point, vec3
+from dap3d_core.interface import (
+    Body,
+    Force,
+    Point,
+    body,
+    function,
+    hookimpl,
+    input_,
+    number,
+    point,
+    vec3,
+)
 from dap3d_core.kernels import cross, rotate, scale
+from dap3d_forces.bounds import bounds, within
 
 interface_version = 1
 
@@ -20,6 +32,11 @@ class BodyForce(Force):
     fp: tuple = vec3(unit="N", doc="components in body axes")
     function: str = function(doc="factor of fp, a function of time")
     input: str = input_(instead_of="function", doc="factor of fp, an input")
+    input_min: float = number(None, doc="least factor that an input gives, if any")
+    input_max: float = number(None, doc="greatest factor that it gives, if any")
+
+    def prepare(self, bodies):
+        return bounds(self, "input")
 
     def wrench(A_i, fp, s_P_i):
         F = rotate(A_i, fp)
@@ -37,8 +54,8 @@ class OfTime(BodyForce, function=True):
 class Actuated(BodyForce, input=True):
     """The force times an input."""
 
-    def wrench(A_i, fp, input, s_P_i):
-        F = rotate(A_i, scale(input, fp))
+    def wrench(A_i, fp, input, input_min, input_max, s_P_i):
+        F = rotate(A_i, scale(within(input, input_min, input_max), fp))
         return ((F, cross(s_P_i, F)),)
 
 

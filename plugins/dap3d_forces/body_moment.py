@@ -1,7 +1,8 @@
 """Constant moment in body axes."""
 
-from dap3d_core.interface import Body, Force, body, function, hookimpl, input_, vec3
+from dap3d_core.interface import Body, Force, body, function, hookimpl, input_, number, vec3
 from dap3d_core.kernels import rotate, scale
+from dap3d_forces.bounds import bounds, within
 
 interface_version = 1
 
@@ -20,6 +21,11 @@ class BodyMoment(Force):
     np: tuple = vec3(unit="N m", doc="components in body axes")
     function: str = function(doc="factor of np, a function of time")
     input: str = input_(instead_of="function", doc="factor of np, an input")
+    input_min: float = number(None, doc="least factor that an input gives, if any")
+    input_max: float = number(None, doc="greatest factor that it gives, if any")
+
+    def prepare(self, bodies):
+        return bounds(self, "input")
 
     def wrench(A_i, np):
         return ((ZERO, rotate(A_i, np)),)
@@ -35,8 +41,8 @@ class OfTime(BodyMoment, function=True):
 class Actuated(BodyMoment, input=True):
     """The moment times an input."""
 
-    def wrench(A_i, np, input):
-        return ((ZERO, rotate(A_i, scale(input, np))),)
+    def wrench(A_i, np, input, input_min, input_max):
+        return ((ZERO, rotate(A_i, scale(within(input, input_min, input_max), np))),)
 
 
 @hookimpl

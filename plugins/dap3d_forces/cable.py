@@ -83,8 +83,7 @@ class Driven(ElasticCable, function=True):
 class Wound(ElasticCable, input=True):
     """The change of the length is an input, held between settings."""
 
-    def wrench(r_points, s_points, v_points, on_points, body_count, length, pushes, k, c,
-               input):  # fmt: skip
+    def wrench(r_points, s_points, v_points, on_points, body_count, length, pushes, k, c, input):
         x = stretch(r_points, length + input)
         T = tension(x, length_rate(r_points, v_points), k, c, pushes)
         return pulled(T, r_points, s_points, on_points, body_count)

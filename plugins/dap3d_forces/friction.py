@@ -6,13 +6,16 @@ interface_version = 1
 
 
 class Friction(Force):
-    """Friction mu |N| S(v / v_tol), S = tanh, in a joint whose type says how it rubs (spec 6.1).
+    """Coulomb friction in a joint whose type says how it rubs (spec 6.1).
 
-    N is the load that the joint's multipliers lambda carry and v the sliding velocity; the
-    equations stand with the joint types: ``sph``, ``rev``, ``cyl``, ``tran``, ``disk`` (but for
-    slip ``xyz``). lambda depends on friction and friction on lambda, which are made to agree by
-    iteration. There is no sticking: below v_tol friction fades, and a body that should stick creeps
-    at a part of v_tol.
+    Where it slides it is mu |N|, against the sliding velocity v; at rest it sticks, exactly, by up
+    to mu_s |N|, as contacts do (docs/concepts/contact.md). N is the load that the joint's
+    multipliers lambda carry; the equations stand with the joint types: ``sph``, ``rev``, ``cyl``,
+    ``tran``, ``disk`` (but for slip ``xyz``). lambda depends on friction and friction on lambda:
+    both are solved for together.
+
+    With v_tol it is regularised, mu |N| S(v / v_tol), S = tanh, for runs that take no contacts:
+    below v_tol friction fades, and a body that should stick creeps at a part of v_tol.
 
     Redundant joints can share their load in many ways, each with another friction and motion: a run
     is refused, but with shared = "least", which goes on with the least lambda (method lsq) and
@@ -22,8 +25,9 @@ class Friction(Force):
     keyword = "friction"
     joint: str = joint(doc="the joint that rubs")
     mu: float = number(default=0.5, minimum=0.0, usual=(None, 10.0), doc="coefficient of friction")
+    mu_s: float = number(None, minimum=0.0, doc="the same where it sticks; mu by default")
     v_tol: float = number(
-        default=1e-3, unit="m/s", positive=True, doc="sliding velocity below which friction fades"
+        None, unit="m/s", positive=True, doc="velocity below which it fades; sticks without it"
     )
     radius: float = number(
         default=None,

@@ -58,7 +58,7 @@ class Motor(Force):
     """
 
     keyword = "motor"
-    synonyms = ("actuator", "rotational-motor")
+    synonyms = ("rotational-motor",)
     symbol = "ring"
     example: ClassVar[Mapping[str, str]] = {"torque": "2.0"}
     joint: str = joint_fields(
@@ -138,9 +138,7 @@ class Pushing(Motor, force=True, speed=False, position=False):
 class PushingAt(Motor, force=False, speed=True, position=False, coordinate="length"):
     """It moves along its axis at a speed."""
 
-    def wrench(
-        a_j, s_P_i, r_P_i, r_P_j, v_P_i, v_P_j, r_j, w_j, speed, limit, tolerance
-    ):  # fmt: skip
+    def wrench(a_j, s_P_i, r_P_i, r_P_j, v_P_i, v_P_j, r_j, w_j, speed, limit, tolerance):
         _, rate = along(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j)
         return pull(-limit * tanh((speed - rate) / tolerance), a_j, s_P_i, r_P_i, r_j)
 
@@ -158,7 +156,7 @@ class PushingTo(Motor, force=False, speed=False, position=True, coordinate="leng
 
     def wrench(
         a_j, s_P_i, r_P_i, r_P_j, v_P_i, v_P_j, r_j, w_j, x_0, position, position_dot, k, c, limit
-    ):  # fmt: skip
+    ):
         x, rate = along(a_j, r_P_i, r_P_j, v_P_i, v_P_j, w_j)
         F = saturated(k * (position - (x - x_0)) + c * (position_dot - rate), limit)
         return pull(-F, a_j, s_P_i, r_P_i, r_j)

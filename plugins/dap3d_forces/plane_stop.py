@@ -65,7 +65,7 @@ class PlaneStop(Force):
 
     def wrench(
         r_P_i, s_P_i, v_P_i, r_P_j, v_P_j, r_j, a_j, w_j, mass_i, mass_j, radius, k, zeta, m_c
-    ):  # fmt: skip
+    ):
         d = sub(r_P_i, r_P_j)
         g, g_dot = dot(a_j, d) - radius, dot(a_j, sub(sub(v_P_i, v_P_j), cross(w_j, d)))
         m = where(m_c > 0.0, m_c, reduced(mass_i, mass_j))

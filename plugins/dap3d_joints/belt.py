@@ -74,9 +74,7 @@ class Belt(Joint):
             rows.append(by_body((on_points[a], on_points[b]), ((of_a,), (of_b,)), body_count))
         return tuple(tuple(of_row[body][0] for of_row in rows) for body in range(body_count))
 
-    def gamma(
-        r_points, v_points, s_points_dot, w_points, rho, axis_i, axis_i_dot, n,
-    ):  # fmt: skip
+    def gamma(r_points, v_points, s_points_dot, w_points, rho, axis_i, axis_i_dot, n):
         found = []
         for a, b, e, m, _ in runs(r_points, rho, axis_i)[: n - 1]:
             d, d_dot = sub(r_points[b], r_points[a]), sub(v_points[b], v_points[a])

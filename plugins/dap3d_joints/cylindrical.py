@@ -1,6 +1,6 @@
 """Cylindrical joint: a body turns about an axis and slides along it."""
 
-from dap3d_core.interface import Joint, Vector, Vector2, hookimpl, vector, vector2
+from dap3d_core.interface import Contact, Joint, Vector, Vector2, hookimpl, vector, vector2
 from dap3d_core.kernels import add, cross, dot, neg, normals, row, scale, sub, tanh
 from dap3d_joints.coulomb import magnitude
 
@@ -80,6 +80,27 @@ class Cylindrical(Joint):
         F = scale(-load * tanh(v), a_j)
         moment = scale(-radius * load * tanh(turning), a_j)
         return (F, add(cross(s_P_i, F), moment)), (neg(F), neg(add(cross(arm, F), moment)))
+
+
+class SleeveSliding(Contact, of=Cylindrical):
+    """Friction that sticks along a rod."""
+
+    keyword, load = "friction", (2, 3)
+
+    def along(a_j):
+        return a_j
+
+    def at(r_P_i):
+        return r_P_i
+
+
+class SleeveTurning(Contact, of=Cylindrical):
+    """Friction that sticks about a rod."""
+
+    keyword, load = "friction", (2, 3)
+
+    def along(a_j):
+        return a_j
 
 
 @hookimpl

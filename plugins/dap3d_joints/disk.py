@@ -1,6 +1,6 @@
 """Thin rigid disk that rolls or slides on the ground plane z = 0."""
 
-from dap3d_core.interface import Body, Joint, body, choice, hookimpl, number
+from dap3d_core.interface import Body, Contact, Joint, body, choice, hookimpl, number
 from dap3d_core.kernels import add, cross, dot, row, scale, sqrt, sub, tanh, where
 from dap3d_joints.coulomb import against
 
@@ -147,6 +147,42 @@ class NoLongitudinalSlip(Disk, slip="tz"):
         v = dot(n, add(v_i, cross(w_i, s)))
         F = scale(-mu * pressed(lam[0]) * tanh(v / v_tol), n)
         return ((F, cross(s, F)),)
+
+
+class SlidingFriction(Contact, of=Sliding):
+    """Friction that sticks, in the plane."""
+
+    keyword, load = "friction", (0,)
+
+    def at(r_i, A_i, radius):
+        return add(r_i, contact(A_i, radius)[2])
+
+    def normal():
+        return Z
+
+
+class TrackFriction(Contact, of=NoLateralSlip):
+    """Friction that sticks, along the track."""
+
+    keyword, load = "friction", (0,)
+
+    def at(r_i, A_i, radius):
+        return add(r_i, contact(A_i, radius)[2])
+
+    def along(A_i, radius):
+        return contact(A_i, radius)[0]
+
+
+class LateralFriction(Contact, of=NoLongitudinalSlip):
+    """Friction that sticks, across the track."""
+
+    keyword, load = "friction", (0,)
+
+    def at(r_i, A_i, radius):
+        return add(r_i, contact(A_i, radius)[2])
+
+    def along(A_i, radius):
+        return contact(A_i, radius)[1]
 
 
 def axis(A):

@@ -109,17 +109,13 @@ class Gear(Joint):
     def prepare(self, bodies):
         return meshing(self, bodies)
 
-    def C(
-        r_P_i, r_P_j, a_i, u_i, m_i, u_j, m_j, teeth_i, teeth_j, radius_i, sense, helix, x_0
-    ):  # fmt: skip
+    def C(r_P_i, r_P_j, a_i, u_i, m_i, u_j, m_j, teeth_i, teeth_j, radius_i, sense, helix, x_0):
         g = sub(r_P_j, r_P_i)
         phi_i, phi_j = atan2(-dot(m_i, g), dot(u_i, g)), atan2(-dot(m_j, g), dot(u_j, g))
         roll = wrapped(teeth_i * phi_i + sense * teeth_j * phi_j)
         return radius_i / teeth_i * roll + tan(helix) * (dot(a_i, g) - x_0)
 
-    def J(
-        r_P_i, r_P_j, s_P_i, s_P_j, a_i, a_j, teeth_i, teeth_j, radius_i, sense, helix
-    ):  # fmt: skip
+    def J(r_P_i, r_P_j, s_P_i, s_P_j, a_i, a_j, teeth_i, teeth_j, radius_i, sense, helix):
         g, r_j = sub(r_P_j, r_P_i), sense * radius_i * teeth_j / teeth_i
         (k_i, e_i), (k_j, e_j) = line_rates(g, a_i), line_rates(g, a_j)
         axial = tan(helix)
@@ -147,16 +143,12 @@ class Gear(Joint):
 class BevelGear(Gear, bevel=True):
     """The axes meet."""
 
-    def C(
-        r_P_i, r_P_j, a_i, a_j, u_i, m_i, u_j, m_j, teeth_i, teeth_j, radius_i, sense, lever
-    ):  # fmt: skip
+    def C(r_P_i, r_P_j, a_i, a_j, u_i, m_i, u_j, m_j, teeth_i, teeth_j, radius_i, sense, lever):
         phi_i, phi_j = atan2(-dot(m_i, a_j), dot(u_i, a_j)), atan2(-dot(m_j, a_i), dot(u_j, a_i))
         roll = wrapped(teeth_i * phi_i + sense * teeth_j * phi_j)
         return radius_i / teeth_i * roll - lever * dot(cross(a_i, a_j), sub(r_P_j, r_P_i))
 
-    def J(
-        r_P_i, r_P_j, s_P_i, s_P_j, a_i, a_j, teeth_i, teeth_j, radius_i, sense, lever
-    ):  # fmt: skip
+    def J(r_P_i, r_P_j, s_P_i, s_P_j, a_i, a_j, teeth_i, teeth_j, radius_i, sense, lever):
         g, e = sub(r_P_j, r_P_i), turn_of(a_i, a_j, radius_i, sense * radius_i * teeth_j / teeth_i)
         F = scale(lever, cross(a_i, a_j))
         n_i = sub(e, scale(lever, cross(a_i, cross(a_j, g))))

@@ -39,7 +39,7 @@ class InLine(Joint):
 
     def gamma(
         n_j, m_j, n_j_dot, m_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j
-    ):  # fmt: skip
+    ):
         d, d_dot = sub(r_P_i, r_P_j), sub(v_P_i, v_P_j)
         return (
             offset_gamma(n_j, n_j_dot, d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j),

@@ -31,9 +31,7 @@ class InPlane(Joint):
     def J(a_j, s_P_i, r_P_i, r_j):
         return offset_rows(a_j, s_P_i, r_P_i, r_j)
 
-    def gamma(
-        a_j, a_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j
-    ):  # fmt: skip
+    def gamma(a_j, a_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j):
         d, d_dot = sub(r_P_i, r_P_j), sub(v_P_i, v_P_j)
         return offset_gamma(a_j, a_j_dot, d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j)
 

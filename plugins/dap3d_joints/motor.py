@@ -49,7 +49,7 @@ class Motor(Joint):
     """
 
     keyword, rows = "motor", 1
-    synonyms = ("actuator", "rotational-motor")
+    synonyms = ("rotational-motor",)
     symbol = "ring"
     drives = True
     example: ClassVar[Mapping[str, str]] = {"position": "0.5"}
@@ -157,7 +157,7 @@ class Moved(Motor, speed=False, coordinate="length"):
 
     def gamma(
         a_j, a_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j, position_ddot
-    ):  # fmt: skip
+    ):
         d, d_dot = sub(r_P_i, r_P_j), sub(v_P_i, v_P_j)
         return position_ddot + offset_gamma(a_j, a_j_dot, d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j)
 
@@ -171,9 +171,7 @@ class MovedAt(Moved, speed=True, coordinate="length"):
     def nu(speed):
         return speed
 
-    def gamma(
-        a_j, a_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j, speed_dot
-    ):  # fmt: skip
+    def gamma(a_j, a_j_dot, r_P_i, r_P_j, v_P_i, v_P_j, s_P_i_dot, s_P_j_dot, w_i, w_j, speed_dot):
         d, d_dot = sub(r_P_i, r_P_j), sub(v_P_i, v_P_j)
         return speed_dot + offset_gamma(a_j, a_j_dot, d, d_dot, s_P_i_dot, s_P_j_dot, w_i, w_j)
 

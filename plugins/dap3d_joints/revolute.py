@@ -1,6 +1,6 @@
 """Revolute joint: two bodies share a point and an axis through it."""
 
-from dap3d_core.interface import Joint, Point, Vector, hookimpl, point, vector
+from dap3d_core.interface import Contact, Joint, Point, Vector, hookimpl, point, vector
 from dap3d_core.kernels import (
     add,
     cross,
@@ -34,7 +34,8 @@ class Revolute(Joint):
 
     The manual writes a_j for a_i in rows 4 and 5, the same on the constraint manifold only; these
     are exact everywhere. Friction, on a pin of the radius given: a moment about a_j,
-    mu radius |lambda_1..3| S(radius w / v_tol) against w = a_j . (w_i - w_j) (spec 6.1).
+    mu radius |lambda_1..3| S(radius w / v_tol) against w = a_j . (w_i - w_j) (spec 6.1); without
+    v_tol it sticks.
     """
 
     keyword, rows = "rev", 5
@@ -72,6 +73,15 @@ class Revolute(Joint):
         sliding = radius * dot(a_j, sub(w_i, w_j))
         moment = scale(-radius * load * tanh(sliding / v_tol), a_j)
         return (ZERO, moment), (ZERO, neg(moment))
+
+
+class HingeFriction(Contact, of=Revolute):
+    """Friction that sticks, of a pin."""
+
+    keyword, load = "friction", (0, 1, 2)
+
+    def along(a_j):
+        return a_j
 
 
 @hookimpl

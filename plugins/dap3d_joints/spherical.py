@@ -1,6 +1,6 @@
 """Spherical joint: point P_i of body i and point P_j of body j stay together."""
 
-from dap3d_core.interface import Joint, Point, hookimpl, point
+from dap3d_core.interface import Contact, Joint, Point, hookimpl, point
 from dap3d_core.kernels import cross, eye, hstack, neg, scale, skew, sub
 from dap3d_joints.coulomb import against, magnitude
 
@@ -41,6 +41,12 @@ class Spherical(Joint):
         sliding = scale(radius, sub(w_i, w_j))
         moment = scale(radius, against(sliding, mu * magnitude(lam), v_tol))
         return (ZERO, moment), (ZERO, neg(moment))
+
+
+class BallFriction(Contact, of=Spherical):
+    """Friction that sticks, of a ball: it slides in every direction."""
+
+    keyword, load = "friction", (0, 1, 2)
 
 
 @hookimpl

@@ -80,9 +80,7 @@ class Leg(SphericalSpherical, function=True):
     def nu(length, counted, f, f_0, f_dot):
         return abs(length + f - counted * f_0) * f_dot
 
-    def gamma(
-        d, d_dot, w_i, w_j, s_P_i_dot, s_P_j_dot, length, counted, f, f_0, f_dot, f_ddot
-    ):  # fmt: skip
+    def gamma(d, d_dot, w_i, w_j, s_P_i_dot, s_P_j_dot, length, counted, f, f_0, f_dot, f_ddot):
         l = length + f - counted * f_0
         arms = dot(d, sub(cross(w_i, s_P_i_dot), cross(w_j, s_P_j_dot)))
         driven = abs(l) * f_ddot + where(l < 0.0, -1.0, 1.0) * f_dot * f_dot

@@ -1,6 +1,6 @@
 """Translational joint: a body slides along an axis without turning against the other."""
 
-from dap3d_core.interface import Joint, Vector, Vector2, hookimpl, matrix, vector, vector2
+from dap3d_core.interface import Contact, Joint, Vector, Vector2, hookimpl, matrix, vector, vector2
 from dap3d_core.kernels import (
     add,
     cross,
@@ -41,7 +41,8 @@ class Translational(Joint):
 
     On the constraints these are the manual's; it prints J = [0, -I], [0, I] and gamma = 0 for rows
     1 to 3. Friction, with N = lambda_4 n_j + lambda_5 m_j (spec 6.1): a force mu |N| S(v / v_tol)
-    along a_j at P_i, against the speed v of P_i along a_j as seen from body j.
+    along a_j at P_i, against the speed v of P_i along a_j as seen from body j; without v_tol it
+    sticks.
     """
 
     keyword, rows = "tran", 5
@@ -94,6 +95,18 @@ class Translational(Joint):
         v = dot(a_j, sub(sub(v_P_i, v_j), cross(w_j, arm)))
         F = scale(-mu * magnitude((lam[3], lam[4])) * tanh(v / v_tol), a_j)
         return (F, cross(s_P_i, F)), (neg(F), neg(cross(arm, F)))
+
+
+class SliderFriction(Contact, of=Translational):
+    """Friction that sticks, of a guide."""
+
+    keyword, load = "friction", (3, 4)
+
+    def along(a_j):
+        return a_j
+
+    def at(r_P_i):
+        return r_P_i
 
 
 def check_rotation(A):

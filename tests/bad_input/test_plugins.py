@@ -1,8 +1,6 @@
 """Types that are written or packaged wrongly: each is refused by name, and spoils nothing else.
-
 What a package may do wrong is in tests/unit/registry; here are a model's own files, what kernels do
-wrong, and what a file may do to the process that loads it.
-"""
+wrong, and what a file may do to the process that loads it."""
 
 import json
 import os

@@ -1,8 +1,6 @@
 """The Python interface used wrongly: refused in a sentence, or right bit for bit.
-
 Arrays of any make, objects shared by scenes, threads and processes, callbacks that raise or run the
-model again. Runs are compared with ``array_equal``: no tolerance, for nothing may differ.
-"""
+model again. Runs are compared with ``array_equal``: no tolerance, for nothing may differ."""
 
 import copy
 import multiprocessing

@@ -85,9 +85,7 @@ def test_joints_that_contradict_each_other_leave_nothing(run, tmp_path):
 
 def test_a_run_that_blows_up_keeps_finite_numbers(run, tmp_path):
     """A spring that pushes: its elongation is l0 cosh(sqrt(2 |k| / m) t), beyond all bounds.
-
-    Half |k| times its square is the first number beyond 1e100.
-    """
+    Half |k| times its square is the first number beyond 1e100."""
     text = pushed(f"{SPRING}\nk = -1e6", base=PAIR)
     code, _, err = run(text, "run", "scene.toml", "--t-end", "2", "--dt", "0.01")
     assert code == 3

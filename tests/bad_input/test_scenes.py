@@ -1,7 +1,5 @@
 """Scenes that are valid and yet wrong: refused, noted or allowed, with clear messages.
-
-Mistakes that the check of a scene finds are in tests/unit/scene/mistakes.py.
-"""
+Mistakes that the check of a scene finds are in tests/unit/scene/mistakes.py."""
 
 from itertools import groupby
 

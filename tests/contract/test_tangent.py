@@ -2,17 +2,14 @@
 
 import numpy as np
 import pytest
+from support.internals import Evaluator, call_kinds, join, specs_of, split
 from support.motions import Motion
+from support.rotations import rotation
 from support.scenes import case_names, cases, scene_for
 
 import dap3d_core as dap
 from dap3d_core.assembly.arrays import FRICTION
-from dap3d_core.assembly.evaluate import call_kinds
-from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.interface.fields import specs_of
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import rotation
-from dap3d_core.model.state_layout import join, split
 from dap3d_core.scene import check as checked
 from dap3d_core.simulation.linearization.tangent import tangent_matrices
 
@@ -81,10 +78,8 @@ def directions(rng, bodies):
 
 def compare(scene, tolerance=1e-9):
     """Compare all derivatives of a scene of three bodies at a random state off the constraints.
-
     Truncation: h^6 / 140 of seventh derivatives up to some 1e5 of the terms, with h = 2e-3 5e-14;
-    rounding: eps / h = 1e-13.
-    """
+    rounding: eps / h = 1e-13."""
     evaluator = Evaluator(build_model(checked(scene, REGISTRY)), "lsq")
     u, t, n = Motion(3, np.random.default_rng(100)).u(0.1), 0.1, 18
     rng = np.random.default_rng(1)

@@ -1,17 +1,15 @@
 """The contract of every registered type (spec 2): each check of the kit is a test.
-
 The standard types pass through the door that is there for everyone (``dap3d_core.testing``). The
 tests run over the registry: a new type is covered without a new test, and so are its variants.
-That the checks find errors is the subject of tests/unit/testing/checks.
-"""
+That the checks find errors is the subject of tests/unit/testing/checks."""
 
 import numpy as np
 import pytest
+from support.internals import Evaluator
 from support.motions import Motion, derivative
 from support.scenes import case_names, cases, scene_for
 
 import dap3d_core as dap
-from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
 from dap3d_core.scene import check as checked
 from dap3d_core.testing import checks_for
@@ -58,12 +56,10 @@ def test_standard_types_derive_nothing():
 @pytest.mark.parametrize("ground", [None, "j"], ids=["body-body", "body-ground"])
 def test_rows_of_a_scene(case, ground):
     """In a scene, too, d/dt C = D v - nu and d/dt (D v - nu) = D v_dot - gamma.
-
     Here the numbers go through scene, model and driver. Sixth-order differences with h = 3e-3 of
     functions whose seventh derivatives are of order 1e3 leave about 1e3 h^6 / 140 = 5e-15 of
     truncation (a driver's angle near the pose where it is undefined has derivatives a million times
-    as large) and eps / h = 1e-13 of rounding; 1e-8 of the largest term is asked for.
-    """
+    as large) and eps / h = 1e-13 of rounding; 1e-8 of the largest term is asked for."""
     keyword, values = case
     rng = np.random.default_rng(0)
     scene = scene_for(REGISTRY.get("joint", keyword), rng, ground=ground, values=values)

@@ -1,7 +1,5 @@
 """The command line as a user has it, in a folder of its own.
-
-The user's cache of compiled code is used, but where a test is about it.
-"""
+The user's cache of compiled code is used, but where a test is about it."""
 
 import os
 import subprocess
@@ -63,6 +61,12 @@ class CommandLine:
         out, err = self.capfd.readouterr()
         assert "Traceback" not in err, err
         return subprocess.CompletedProcess(arguments, code, out, err)
+
+    def succeed(self, *arguments, **variables):
+        """Run a command that ends well."""
+        done = self(*arguments, **variables)
+        assert done.returncode == 0, done.stderr
+        return done
 
 
 @pytest.fixture

@@ -20,11 +20,9 @@ def press(folder):
 def test_kinematics_and_inverse_dynamics_follow_each_other(dap3d):
     """The forces of the motion that kinematics has written are its own; from its table as well."""
     press(dap3d.folder)
-    done = dap3d("kinematics", "press.toml")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("kinematics", "press.toml")
     assert "press-kinematics.nc written" in done.stdout
-    done = dap3d("inverse", "press.toml", "press-kinematics.nc", "--json")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("inverse", "press.toml", "press-kinematics.nc", "--json")
     assert json.loads(done.stdout)["file"] == "press-inverse.nc"
     motion, forces = (dap.open(dap3d.folder / f"press-{name}.nc") for name in
                       ("kinematics", "inverse"))  # fmt: skip
@@ -32,8 +30,7 @@ def test_kinematics_and_inverse_dynamics_follow_each_other(dap3d):
     table = np.column_stack([motion.t, motion.r[:, 0, 0], motion.r[:, 0, 2]])
     np.savetxt(dap3d.folder / "motion.csv", table, delimiter=",", comments="",
                header="t [s],crank.r.x [m],crank.r.z [m]")  # fmt: skip
-    done = dap3d("inverse", "press.toml", "motion.csv", "--actuators", "motor", "--force")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("inverse", "press.toml", "motion.csv", "--actuators", "motor", "--force")
     assert "dap3d plot press-inverse.nc motor.actuation\n" in done.stdout  # what to look at next
     done = dap3d("plot", "press-inverse.nc", "motor.actuation", "-o", "a.png")
     assert (dap3d.folder / "a.png").exists(), done.stderr

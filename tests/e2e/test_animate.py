@@ -26,8 +26,7 @@ def runs(dap3d):
 
 @pytest.mark.slow
 def test_a_film(dap3d, runs):
-    done = dap3d("animate", "pen1.nc", "--speed", "0.5", "--fps", "10", "--size", "200")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("animate", "pen1.nc", "--speed", "0.5", "--fps", "10", "--size", "200")
     assert done.stderr == ""  # no bar where nobody looks at a terminal
     assert done.stdout.startswith("pen1.gif written (")
     assert "21 frames at 10 a second, 0.5 x real time" in done.stdout
@@ -41,8 +40,7 @@ def test_a_film(dap3d, runs):
 @pytest.mark.slow
 def test_a_run_at_t_0_alone_gives_a_snapshot(dap3d):
     dap.simulate("fourbar3", t_end=0.0).save(dap3d.folder / "a.nc")
-    done = dap3d("animate", "a.nc")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("animate", "a.nc")
     assert "a.png written" in done.stdout
     assert (dap3d.folder / "a.png").read_bytes().startswith(b"\x89PNG")
 
@@ -75,8 +73,7 @@ def test_a_film_shows_its_progress_in_a_narrow_terminal(dap3d, runs):
 @pytest.mark.slow
 def test_several_runs_are_told_apart_by_their_folders(dap3d, runs):
     """In an SVG, whose text stays text; a result that is named twice is a mistake."""
-    done = dap3d("plot", "pen1.nc", "sub/pen1.nc", "cone.r.z", "-o", "a.svg", "--width", "60")
-    assert done.returncode == 0, done.stderr
+    dap3d.succeed("plot", "pen1.nc", "sub/pen1.nc", "cone.r.z", "-o", "a.svg", "--width", "60")
     text = (dap3d.folder / "a.svg").read_text()
     assert ">sub/pen1<" in text
     assert f">{dap3d.folder.name}/pen1<" in text

@@ -34,8 +34,7 @@ def dap3d_forces():
 
 @pytest.mark.slow
 def test_a_standard_type_passes(dap3d):
-    done = dap3d("check-plugin", "sph", COLUMNS=60)
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("check-plugin", "sph", COLUMNS=60)
     assert max(map(len, done.stdout.splitlines())) <= 60
     assert "1 type checked: nothing is wrong" in done.stdout
     assert dap3d("check-plugin", "a", "-q").stdout == ""

@@ -139,9 +139,7 @@ def test_the_pages_of_the_example_package():
 @pytest.mark.slow
 def test_the_page_on_checking_types(tmp_path):
     """Its joint passes, as a file and by its test; with the error it speaks of, it says just that.
-
-    The test runs without compiling, which is the command's part.
-    """
+    The test runs without compiling, which is the command's part."""
     text = (REPOSITORY / "docs" / "how-to" / "check-plugin.md").read_text()
     joint, test = blocks(text, "python")
     (tmp_path / "plane.py").write_text(joint)

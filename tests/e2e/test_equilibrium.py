@@ -17,8 +17,7 @@ def folder(dap3d):
 
 
 def test_the_command_prints_poses_and_reactions(dap3d, folder):
-    done = dap3d("equilibrium", "toggle.toml", "-o", "rest.toml")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("equilibrium", "toggle.toml", "-o", "rest.toml")
     for words in ("toggle: stable equilibrium", "1 degree of freedom", "slider", "1.21885",
                   "J4", "rest.toml written"):  # fmt: skip
         assert words in done.stdout
@@ -47,14 +46,16 @@ def test_a_fall_is_a_message_and_exit_code_1(dap3d, folder):
 
 def test_a_run_starts_from_a_result_or_at_rest(dap3d, folder):
     assert dap3d("run", "toggle.toml", "--t-end", "0.1", "-o", "a.nc").returncode == 0
-    done = dap3d("run", "toggle.toml", "--from", "a.nc@0.05", "--t-end", "0.05", "-o", "b.nc")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed(
+        "run", "toggle.toml", "--from", "a.nc@0.05", "--t-end", "0.05", "-o", "b.nc"
+    )
     a, b = dap.open(folder / "a.nc"), dap.open(folder / "b.nc")
     k = int(np.argmin(np.abs(a.t - 0.05)))
     assert b.u[0] == pytest.approx(a.u[k], abs=1e-12)
     assert "the start is the state of toggle at t = 0.05 s" in " ".join(done.stdout.split())
-    done = dap3d("run", "toggle.toml", "--start", "equilibrium", "--t-end", "0.1", "-o", "c.nc")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed(
+        "run", "toggle.toml", "--start", "equilibrium", "--t-end", "0.1", "-o", "c.nc"
+    )
     assert np.max(np.abs(dap.open(folder / "c.nc").rd)) < 1e-12
 
 
@@ -96,8 +97,7 @@ def test_a_result_of_another_scene_is_refused(dap3d, folder):
 def test_a_scene_may_ask_for_its_equilibrium_and_a_wrong_word_has_its_line(dap3d, folder):
     text = (folder / "toggle.toml").read_text()
     (folder / "rest.toml").write_text(text + '\n[simulation]\nstart = "equilibrium"\nt_end = 0.1\n')
-    done = dap3d("run", "rest.toml")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("run", "rest.toml")
     assert "starts at an equilibrium" in done.stdout
     (folder / "wrong.toml").write_text(text + '\n[simulation]\nstart = "equilibrum"\nt_end = 0.1\n')
     done = dap3d("run", "wrong.toml")

@@ -1,7 +1,6 @@
 """Proof from outside: wheels in a fresh environment, with good and with broken packages.
-
-dap3d and every plugin are truly installed from wheels. Nothing of the working tree can be reached.
-"""
+dap3d and every plugin are truly installed from wheels. Nothing of the working tree can be
+reached."""
 
 import shlex
 import shutil
@@ -23,9 +22,7 @@ TARGET = ready.target_of(objects.processor().triple, objects.host_features())
 
 def environment_of_a_user(folder):
     """An environment with dap3d and dap3d-example from their wheels, and a plugin of a user.
-
-    The wheel of dap3d has ready-made objects for this machine, where there are such.
-    """
+    The wheel of dap3d has ready-made objects for this machine, where there are such."""
     there = Outside(folder)
     ready_made = {"DAP3D_READY_OBJECTS": TARGET, "DAP3D_READY_LEVEL": "0"} if TARGET else {}
     build(REPOSITORY, there.wheels, **ready_made)
@@ -243,9 +240,7 @@ def a_kernel_that_cannot_be_compiled_ends_a_run_with_one_message(outside, folder
 
 def the_tutorial_can_be_followed(outside):
     """Every file, script and command of it, in its order; scripts go on where the last one ended.
-
-    Its pip takes what is needed to build a package from here.
-    """
+    Its pip takes what is needed to build a package from here."""
     folder = outside.folder / "tutorial"
     folder.mkdir()
     page = (REPOSITORY / "docs" / "tutorials" / "your-own-joint.md").read_text()

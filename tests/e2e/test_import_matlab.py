@@ -17,8 +17,7 @@ import dap3d_core as dap
 @pytest.mark.slow
 def test_import_check_and_run(dap3d):
     """From a folder to a result, with a report on the way."""
-    done = dap3d("import-matlab", MODELS / "pen2", "-o", "pen2.toml")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("import-matlab", MODELS / "pen2", "-o", "pen2.toml")
     told = " ".join(done.stdout.split())
     assert "inBodies.m read 2 bodies" in told
     assert "inVectors2.m absent no vectors of type 2" in told
@@ -28,8 +27,7 @@ def test_import_check_and_run(dap3d):
     checked = json.loads(dap3d("check", "pen2.toml", "--json").stdout)
     # a ball joint and a revolute joint on two bodies (models/pen2)
     assert (checked["rows"], checked["dof"]) == (8, 4)
-    done = dap3d("run", "pen2.toml", "--t-end", "0.1", "--dt", "0.05", "--json")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("run", "pen2.toml", "--t-end", "0.1", "--dt", "0.05", "--json")
     assert json.loads(done.stdout)["status"] == "done"
 
 
@@ -40,16 +38,14 @@ def test_what_is_written_reads_as_the_scene_of_the_library(dap3d):
 
 
 def test_import_takes_the_folder_too(dap3d):
-    done = dap3d("import", MODELS / "ball1", "--stub")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("import", MODELS / "ball1", "--stub")
     assert "MATLAB model ball1" in done.stdout
     folder = dap3d.folder / "ball1"
     assert {one.name for one in folder.iterdir()} == {"scene.toml", "plugin.py"}
 
 
 def test_the_report_as_json(dap3d):
-    done = dap3d("import-matlab", MODELS / "ball1", "--stub", "--json")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("import-matlab", MODELS / "ball1", "--stub", "--json")
     found = json.loads(done.stdout)
     assert (found["scene"], found["plugin"]) == ("scene.toml", "plugin.py")
     assert found["holds"]["bodies"] == 1
@@ -64,8 +60,7 @@ def test_the_report_as_json(dap3d):
 
 @pytest.mark.slow
 def test_a_stub_is_written_only_when_asked_for_and_refused_until_it_is_filled_in(dap3d):
-    done = dap3d("import-matlab", MODELS / "ball1")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("import-matlab", MODELS / "ball1")
     assert "depth = Bodies(1).r(3) - 0.1;" in done.stdout
     assert "class UserForce(Force):" in done.stdout
     assert [p.name for p in dap3d.folder.iterdir()] == ["scene.toml"]
@@ -81,8 +76,7 @@ def test_a_stub_is_written_only_when_asked_for_and_refused_until_it_is_filled_in
 
 @pytest.mark.slow
 def test_lines_fit_a_narrow_terminal(dap3d):
-    done = dap3d("import-matlab", MODELS / "ball1", COLUMNS=60)
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("import-matlab", MODELS / "ball1", COLUMNS=60)
     assert max(len(line) for line in done.stdout.splitlines()) <= 60
 
 
@@ -125,8 +119,7 @@ def test_the_page_on_importing(dap3d):
         (dap3d.folder / "Cone" / f"{name}.m").write_text(block)
     assert len(files) == 5
     for line in re.findall(r"^    dap3d (.*)$", text, flags=re.MULTILINE):
-        done = dap3d(*shlex.split(line, comments=True))
-        assert done.returncode == 0, (line, done.stderr)
+        done = dap3d.succeed(*shlex.split(line, comments=True))
     (scene,) = blocks("toml")
     written = (dap3d.folder / "cone.toml").read_text()
     for table in scene.strip().split("\n\n"):

@@ -11,9 +11,9 @@ from support import hostile
 from support.browser import Opened, browser
 from support.pages import follow
 from support.process import REPOSITORY
+from support.rotations import to_global
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import to_global
 
 pytestmark = pytest.mark.slow  # a browser that draws without a graphics card
 
@@ -47,9 +47,6 @@ def opened(chromium, page):
     assert found.complaints == []
 
 
-# ---------------------------------------------------------------- the commands
-
-
 @pytest.fixture
 def file(dap3d):
     """A sweep in the folder of the command line."""
@@ -60,8 +57,7 @@ def file(dap3d):
 
 
 def test_plot_draws_a_sweep(dap3d, refuse, file):
-    done = dap3d("plot", file)
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("plot", file)
     assert "s.png written" in done.stdout
     cut = dap3d("plot", file, "J1.force.norm:max", "--at", f"{MASS}=2", "-o", "a.svg", "--json")
     assert json.loads(cut.stdout) == {
@@ -114,8 +110,7 @@ def afar(file):
 
 
 def test_view_makes_a_page_of_a_sweep(dap3d, refuse, file):
-    done = dap3d("view", file)
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("view", file)
     assert "s.html written" in done.stdout
     assert "6 points" in done.stdout
     told = json.loads(dap3d("view", file, "--force", "--json", "--quantity", "cone.r.z").stdout)
@@ -129,9 +124,6 @@ def test_view_makes_a_page_of_a_sweep(dap3d, refuse, file):
     assert "--model MODEL --allow-code" in refuse("view", "own.nc")
     assert "not run unless it is allowed" in refuse("view", "own.nc", "--model", "ball1")
     assert dap3d("view", "own.nc", "--model", "ball1", "--allow-code").returncode == 0
-
-
-# ---------------------------------------------------------------- the browser
 
 
 def test_sliders_choose_the_motion(opened, swept):

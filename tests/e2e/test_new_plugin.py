@@ -8,12 +8,11 @@ import tomllib
 from xml.etree import ElementTree
 
 import pytest
-from click.testing import CliRunner
+from support.command_line import output_of
 from support.outside import isolated, pip
 from support.process import environment
 
 import dap3d_core as dap
-from dap3d_core.cli.app import dap3d as group
 from dap3d_core.interface.hooks import EXTENSIONS, GROUPS
 
 #: Kind -> the file that the package brings to try it.
@@ -22,9 +21,7 @@ SAMPLES = dict.fromkeys((*GROUPS, *EXTENSIONS), "scene.toml") | {"importer": "mo
 
 def new_plugin(folder, *words):
     """Run the command, not in a process of its own, which would take longer; what it says."""
-    done = CliRunner().invoke(group, ["new-plugin", *map(str, words), "-o", str(folder)])
-    assert done.exit_code == 0, done.output
-    return done.output
+    return output_of("new-plugin", *words, "-o", folder)
 
 
 @pytest.mark.parametrize("kind", SAMPLES)
@@ -61,10 +58,10 @@ def test_the_badge_shows_what_check_plugin_says(tmp_path):
     """Its words and its colour are those of the JSON: right, wrong, and a check that broke off."""
     new_plugin(tmp_path, "mine", "--kind", "force")
     script = tmp_path / ".github" / "badge.py"
-    done = CliRunner().invoke(group, ["check-plugin", "weight", "fix", "--json"])
-    wrong = json.loads(done.output)
+    right = output_of("check-plugin", "weight", "fix", "--json")
+    wrong = json.loads(right)
     wrong["types"][0]["ok"] = False
-    texts = (done.output, json.dumps(wrong), done.output[:100])
+    texts = (right, json.dumps(wrong), right[:100])
     shown = ("2 of 2 types right", "1 of 2 types right", "not checked")
     colors = set()
     for text, words in zip(texts, shown, strict=True):
@@ -196,6 +193,5 @@ def test_json(tmp_path):
 def test_what_it_says_fits_60_columns(tmp_path, monkeypatch):
     """But for the folder, which has a line of its own."""
     monkeypatch.chdir(tmp_path)
-    done = CliRunner().invoke(group, ["new-plugin", "mine"], env={"COLUMNS": "60"})
-    assert done.exit_code == 0, done.output
-    assert max(map(len, done.output.splitlines())) <= 60
+    said = output_of("new-plugin", "mine", columns=60)
+    assert max(map(len, said.splitlines())) <= 60

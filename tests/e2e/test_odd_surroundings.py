@@ -28,9 +28,6 @@ def in_shell(words, folder, **variables):
     return found
 
 
-# ---------------------------------------------------------------- streams
-
-
 @has_full
 @pytest.mark.parametrize("option", ["", "--json"])
 def test_a_result_is_saved_though_its_words_are_lost(scene_file, option):
@@ -76,9 +73,7 @@ def test_a_width_of_no_columns_is_none(scene_file, monkeypatch, capfd, columns):
 @pytest.mark.slow
 def test_a_full_disk_is_named_and_what_was_computed_is_kept(scene_file):
     """On a disk of 2 MiB: a run that fills it, all that writes a file, and a cache there.
-
-    What the run has written is a result, and the run goes on once there is room.
-    """
+    What the run has written is a result, and the run goes on once there is room."""
     steps = 't_end = 600.0\nintegrator = "rk4"\nstep = 0.01'  # so many that rows come in chunks
     folder = scene_file(("t_end = 0.1", steps)).parent
     (folder / "disk").mkdir()
@@ -109,9 +104,6 @@ def test_a_full_disk_is_named_and_what_was_computed_is_kept(scene_file):
     names = ("a.nc", "a.csv", "a.html")
     assert others == [f"cannot write {name}: No space left on device" for name in names]
     assert dap.open(folder / "large.nc").t[-1] == 600.0
-
-
-# ---------------------------------------------------------------- files that are none
 
 
 @posix
@@ -166,9 +158,6 @@ def test_a_link_of_the_system_stays_and_its_pipe_is_refused(scene_file):
     assert sorted(p.name for p in folder.iterdir()) == ["fall.toml", "r.nc", "stdout"]
 
 
-# ---------------------------------------------------------------- the shell itself
-
-
 @posix
 def test_a_current_folder_that_is_gone_is_named(tmp_path):
     found = in_shell("mkdir gone && cd gone && rmdir ../gone && $DAP3D check pen1", tmp_path)
@@ -185,9 +174,6 @@ def test_ctrl_c_while_options_are_parsed_is_an_interruption(monkeypatch, capfd):
     monkeypatch.setattr(Command, "parse_args", interrupted)
     assert main(["models"]) == 130
     assert capfd.readouterr().err.strip() == "interrupted"
-
-
-# ---------------------------------------------------------------- limits
 
 
 linux = pytest.mark.skipif(not Path("/proc").exists(), reason="limits as Linux has them")
@@ -218,9 +204,6 @@ def test_a_limit_on_files_is_named_before_the_run(scene_file):
     assert found.returncode == 0, found
 
 
-# ---------------------------------------------------------------- variables of the environment
-
-
 @pytest.mark.parametrize("name", quickly(["nonsense", "../x", "x86-64-v2 ", "pentium4", "'"]))
 def test_an_unknown_processor_is_one_sentence(scene_file, name):
     """LLVM would end the process; the type whose kernels come first is not blamed."""
@@ -245,11 +228,11 @@ def test_an_unknown_backend_of_matplotlib_is_one_sentence(scene_file, dap3d, com
     assert "unexpected" not in found.stderr
 
 
-@pytest.mark.parametrize("option", ["--t inf", "--t=-inf", "--t nan", "--t 1e999", "--t x"])
-def test_a_time_that_is_not_finite_is_a_usage_error(scene_file, refuse, option):
-    assert "--t" in refuse("modes", scene_file(), *option.split())
-
-
-@pytest.mark.parametrize("limit", ["nan", "inf", "0", "-1"])
-def test_a_limit_of_loading_is_a_positive_time(refuse, limit):
-    assert "--limit" in refuse("plugins", "--no-compile", "--limit", limit)
+@pytest.mark.parametrize(
+    "words",
+    [f"modes pen1 {t}" for t in ("--t inf", "--t=-inf", "--t nan", "--t 1e999", "--t x")]
+    + [f"plugins --no-compile --limit {limit}" for limit in ("nan", "inf", "0", "-1")],
+)
+def test_times_that_are_none_are_usage_errors(refuse, words):
+    """Of a state, finite ones; of a limit of loading, positive ones."""
+    assert ("--t" if "modes" in words else "--limit") in refuse(*words.split())

@@ -95,3 +95,12 @@ def test_the_page_says_what_is_stored(beside):
     assert document.filled(text, data) == text
     for name in document.PARTS:
         assert f"<!-- {name} -->\n|" in text or f"<!-- {name} -->\nAll" in text
+
+
+@pytest.mark.slow
+def test_the_benchmarks_start():
+    """``benchmarks/run.py --help`` imports all of them."""
+    program = [sys.executable, str(REPOSITORY / "benchmarks" / "run.py"), "--help"]
+    done = subprocess.run(program, env=environment(), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "--only" in done.stdout

@@ -1,4 +1,4 @@
-"""``dap3d post`` as a user meets it: tables and files that other programs read."""
+"""``dap3d post`` and ``dap3d export`` as a user meets them: files that other programs read."""
 
 import csv
 import json
@@ -40,8 +40,7 @@ def table_of(file):
 
 @pytest.mark.slow
 def test_a_table_reads_back_bit_for_bit(dap3d, result):
-    done = dap3d("post", "pen1.nc", "-o", "all.csv", "--jac")
-    assert done.returncode == 0, done.stderr
+    dap3d.succeed("post", "pen1.nc", "-o", "all.csv", "--jac")
     column = table_of(dap3d.folder / "all.csv")
     for name, values in (
         ("t [s]", result.t),
@@ -70,15 +69,13 @@ def test_a_table_reads_back_bit_for_bit(dap3d, result):
 
 @pytest.mark.slow
 def test_a_table_of_picked_quantities(dap3d, result):
-    done = dap3d("post", "pen1.nc", "-o", "some.csv", "--select", "cone.r", "J1.force.norm")
-    assert done.returncode == 0, done.stderr
+    dap3d.succeed("post", "pen1.nc", "-o", "some.csv", "--select", "cone.r", "J1.force.norm")
     column = table_of(dap3d.folder / "some.csv")
     assert list(column) == [
         "t [s]", "cone.r.x [m]", "cone.r.y [m]", "cone.r.z [m]", "J1.force.norm [N]",
     ]  # fmt: skip
     assert column["J1.force.norm [N]"].tolist() == result.quantity("J1.force.norm").values.tolist()
-    twice = dap3d("post", "pen1.nc", "-o", "more.csv", "--select", "t", "--select", "energy.total")
-    assert twice.returncode == 0, twice.stderr
+    dap3d.succeed("post", "pen1.nc", "-o", "more.csv", "--select", "t", "--select", "energy.total")
     assert list(table_of(dap3d.folder / "more.csv")) == ["t [s]", "energy.total [J]"]
 
 
@@ -125,8 +122,7 @@ def test_what_was_written_as_json(dap3d, result):
 
 @pytest.mark.slow
 def test_a_scene_without_joints_has_no_rows_and_its_springs_have_quantities(dap3d, result):
-    done = dap3d("post", "bodies2.nc", "--jac", "-o", "b.nc")
-    assert done.returncode == 0, done.stderr
+    dap3d.succeed("post", "bodies2.nc", "--jac", "-o", "b.nc")
     with xarray.open_dataset(dap3d.folder / "b.nc") as data:
         assert {"r", "rPdd", "total_energy"} <= set(data.data_vars)
         assert not {"Lam", "Jac", "reaction_force"} & set(data.data_vars)
@@ -146,9 +142,8 @@ def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, result, r
     words = refuse("post", "ball1.nc", "contact.force", "-o", "a.csv", "--model", "ball1")
     assert "not run unless it is allowed" in words
     refuse("post", "ball1.nc", "-o", "a.csv", "--model", "ball9", "--allow-code")
-    done = dap3d("post", "ball1.nc", "contact.force", "-o", "a.csv", "--model", "ball1",
+    dap3d.succeed("post", "ball1.nc", "contact.force", "-o", "a.csv", "--model", "ball1",
                  "--allow-code")  # fmt: skip
-    assert done.returncode == 0, done.stderr
     column = table_of(dap3d.folder / "a.csv")
     assert set(column["contact.force.z [N]"]) == {0.0}  # it has not reached the ground
 
@@ -156,8 +151,7 @@ def test_types_of_the_model_itself_are_loaded_only_when_allowed(dap3d, result, r
 @pytest.mark.slow
 def test_reactions_that_cannot_be_had_are_left_out_and_told(dap3d, result):
     """The types of the joints are blocked, as if the package that brought them were gone."""
-    done = dap3d("post", "pen1.nc", "-o", "a.nc", DAP3D_BLOCK="dap3d")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("post", "pen1.nc", "-o", "a.nc", DAP3D_BLOCK="dap3d")
     assert "reactions are left out: the model of pen1.nc cannot be made again" in done.stderr
     with xarray.open_dataset(dap3d.folder / "a.nc") as data:
         assert "reaction_force" not in data
@@ -166,3 +160,30 @@ def test_reactions_that_cannot_be_had_are_left_out_and_told(dap3d, result):
     assert told["notes"][0].startswith("reactions are left out")
     assert dap3d("post", "pen1.nc", "--jac", "-o", "c.nc", DAP3D_BLOCK="dap3d").returncode == 2
     assert not (dap3d.folder / "c.nc").exists()
+
+
+@pytest.fixture
+def pen1(dap3d):
+    """A result in the folder of the command line."""
+    dap.simulate("pen1", t_end=0.1, dt=0.02).save(dap3d.folder / "pen1.nc")
+
+
+def test_each_format_has_its_file(dap3d, refuse, pen1):
+    for kind, suffix in (("vtk", "vtkhdf"), ("gltf", "glb"), ("mat", "mat"), ("csv", "csv")):
+        done = dap3d.succeed("export", "pen1.nc", "--format", kind)
+        assert f"pen1.{suffix} written" in done.stdout
+        assert "6 instants" in done.stdout
+        assert f"pen1.{suffix} exists" in refuse("export", "pen1.nc", "--format", kind)
+    told = dap3d("export", "pen1.nc", "-o", "a.glb", "--fps", "20", "--json")
+    found = json.loads(told.stdout)
+    assert (found["file"], found["format"], found["instants"]) == ("a.glb", "gltf", 3)
+    assert found["size_bytes"] == (dap3d.folder / "a.glb").stat().st_size
+    silent = dap3d("export", "pen1.nc", "-o", "a.glb", "--force", "-q")
+    assert (silent.returncode, silent.stdout, silent.stderr) == (0, "", "")
+
+
+def test_all_mistakes_are_told_at_once(refuse, dap3d, pen1):
+    (dap3d.folder / "pen1.mat").write_text("mine")
+    words = refuse("export", "pen1.nc", "-o", "pen1.mat", "--format", "csv", "--fps", "-1")
+    for told in ("its name says mat", "fps is a number above 0", "pen1.mat exists"):
+        assert told in words

@@ -10,8 +10,7 @@ import dap3d_core as dap
 
 
 def test_run_writes_a_result_and_says_what_was_done(dap3d):
-    done = dap3d("run", "pen1", "--t-end", "0.1")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("run", "pen1", "--t-end", "0.1")
     assert dap.open(dap3d.folder / "pen1.nc").t[-1] == 0.1
     for words in (
         "1 body",
@@ -30,8 +29,7 @@ def test_run_writes_a_result_and_says_what_was_done(dap3d):
 
 @pytest.mark.slow
 def test_json_is_one_object_with_the_same_facts(dap3d):
-    done = dap3d("run", "fourbar3", "--t-end", "0.1", "--json", "-o", "a.nc")
-    assert done.returncode == 0
+    done = dap3d.succeed("run", "fourbar3", "--t-end", "0.1", "--json", "-o", "a.nc")
     found = json.loads(done.stdout)
     expected = {"status": "done", "exit_code": 0, "file": "a.nc", "bodies": 3, "rows": 17, "dof": 1}
     assert {k: found[k] for k in expected} == expected
@@ -59,10 +57,8 @@ def test_the_corrected_initial_conditions_are_reported(dap3d):
 def test_strict_makes_changes_a_failure_and_saves_all_the_same(dap3d):
     """Velocities that the scene leaves open are for information; positions that were corrected by
     a millimetre are a change of what was given."""
-    calm = dap3d("run", "pen1", "--t-end", "0.1", "--strict")
-    assert calm.returncode == 0, calm.stdout + calm.stderr
-    told = dap3d("run", "fourbar3", "--t-end", "0.1", "--strict")
-    assert told.returncode == 0, told.stdout + told.stderr
+    dap3d.succeed("run", "pen1", "--t-end", "0.1", "--strict")
+    told = dap3d.succeed("run", "fourbar3", "--t-end", "0.1", "--strict")
     assert "for information: initial velocities" in told.stdout
     rough_four_bar().save(dap3d.folder / "rough.toml")
     noted = dap3d("run", "rough.toml", "--t-end", "0.1", "--strict")

@@ -147,8 +147,7 @@ def test_a_killed_sweep_goes_on(dap3d, whole):
         assert (series[done] == whole["cone.r.z:series"].values[done]).all()
         assert np.isnan(series[~done]).all()
         before, words = int(done.sum()), (*LONG, "--resume")
-    done = dap3d(*words, "--json")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed(*words, "--json")
     assert json.loads(done.stdout)["done"] == 60
     assert dap.open_sweep(dap3d.folder / "a.nc").identical(whole)
     assert not part.exists()
@@ -167,8 +166,7 @@ def test_a_signal_keeps_the_points(dap3d, whole):
     assert "what was computed until then is in a.nc.part" in err
     command = shlex.split(err.strip().splitlines()[-1])
     assert command == ["dap3d", *LONG, "--resume"]
-    done = dap3d(*command[1:])
-    assert done.returncode == 0, done.stderr
+    dap3d.succeed(*command[1:])
     assert dap.open_sweep(dap3d.folder / "a.nc").identical(whole)
 
 

@@ -1,10 +1,11 @@
-"""What a terminal shows: nothing wider than it, colours only where they are wanted."""
+"""What terminals and streams show: nothing too wide, colours only where wanted, closed streams."""
 
 import fcntl
 import os
 import pty
 import re
 import select
+import shlex
 import struct
 import subprocess
 import sys
@@ -12,6 +13,7 @@ import termios
 import time
 
 import pytest
+from tests.e2e.conftest import COMMAND, environment
 
 import dap3d_core as dap
 
@@ -117,3 +119,41 @@ def test_questions_can_be_left(dap3d):
     code, shown = in_terminal(dap3d, 80, "run", answers="\x03\n")
     assert code == 130
     assert "Traceback" not in shown
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        ("models > /dev/full", 1),
+        ("--help > /dev/full", 1),
+        ("models >&-", 0),
+        ("check no_such 2>&-", 2),
+        ("run <&-", 2),
+        ("models | true", 0),
+    ],
+)
+def test_streams_that_take_nothing(tmp_path, line, code):
+    script = f"set -o pipefail; {shlex.join(COMMAND)} {line}"
+    done = subprocess.run(
+        ["bash", "-c", script], cwd=tmp_path, env=environment(), capture_output=True, text=True
+    )
+    assert done.returncode == code, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "Exception ignored" not in done.stderr
+    assert len(done.stderr.splitlines()) <= 4
+
+
+@pytest.mark.slow
+def test_text_is_plain_where_the_encoding_is_ascii(tmp_path):
+    (tmp_path / "stein.toml").write_text('[scene]\nname = "fällt"\n', encoding="utf-8")
+    ascii_only = environment(LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0", COLUMNS="60")
+    done = subprocess.run(
+        [*COMMAND, "describe", "rev"], cwd=tmp_path, env=ascii_only, capture_output=True, check=True
+    )
+    assert done.stdout.isascii()
+    refused = subprocess.run(
+        [*COMMAND, "check", "stein.toml"], cwd=tmp_path, env=ascii_only, capture_output=True
+    )
+    assert refused.returncode == 2
+    assert b"Traceback" not in refused.stderr

@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support.browser import Opened, browser
+from support.rotations import to_global
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import to_global
 
 pytestmark = pytest.mark.slow  # a browser that draws without a graphics card
 
@@ -62,8 +62,7 @@ def pen1(dap3d):
 
 
 def test_the_command_writes_a_page(dap3d, refuse, pen1):
-    done = dap3d("view", "pen1.nc")
-    assert done.returncode == 0, done.stderr
+    done = dap3d.succeed("view", "pen1.nc")
     assert "pen1.html written" in done.stdout
     assert (dap3d.folder / "pen1.html").read_text().startswith("<!DOCTYPE html>")
     assert "pen1.html exists" in refuse("view", "pen1.nc")

@@ -1,9 +1,7 @@
 """Random scenes that touch with friction go on, or end with one clear error.
-
 Of balls and boxes, half of them with a linkage as well, that has limits, stops and friction.
-
-An input is the number of a scene. Energy is never gained, nothing sinks in, all numbers are finite.
-"""
+An input is the number of a scene. Energy is never gained, nothing sinks in, all numbers are
+finite."""
 
 import time
 

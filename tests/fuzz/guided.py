@@ -1,7 +1,5 @@
 """Coverage-guided fuzzing of the readers, from bytes: needs atheris (the extra "fuzz").
-
-Started by run.py, one process for each target. Nothing that is read is run.
-"""
+Started by run.py, one process for each target. Nothing that is read is run."""
 
 import argparse
 import json

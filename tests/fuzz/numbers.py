@@ -1,9 +1,7 @@
 """Valid files of which one number was changed, their checksums made right again.
-
 So made, or so damaged before they were written, files pass every seal. What is read of them must be
 refused in words, or be something that a run could have left: no crash of compiled code, no hang, no
-other exception, no warning. An input is the change, as JSON.
-"""
+other exception, no warning. An input is the change, as JSON."""
 
 import functools
 import json
@@ -17,11 +15,11 @@ from pathlib import Path
 import numpy as np
 from hypothesis import strategies as st
 from support.ended import EndedError
+from support.internals import Checkpoint, read_checkpoint, write_checkpoint
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
 from dap3d_core.result.file.checksum import write_checksums
-from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
 from fuzz.acceptable import examine_result, strict
 from fuzz.damage import seeds
 from fuzz.results import HANG, SEAL, in_child
@@ -75,9 +73,6 @@ def _leave(model, place, **settings):
         assert (place / "run.nc.checkpoint").exists()
     else:
         raise AssertionError("the run has ended by itself")
-
-
-# ------------------------------------------------------------------ places of numbers
 
 
 @functools.cache
@@ -153,9 +148,6 @@ def _put(value, path, new):
     return changed
 
 
-# ------------------------------------------------------------------ the changed file
-
-
 def make(change, place):
     """Write the changed file, with what belongs to it, into an empty folder; its path."""
     kind, name, what, where, value = change
@@ -202,9 +194,6 @@ def _as(dtype, value):
         limits = np.iinfo(dtype)
         value = min(max(int(value), limits.min), limits.max)
     return dtype.type(value)
-
-
-# ------------------------------------------------------------------ what must be true
 
 
 def check_change(data):

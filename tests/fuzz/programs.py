@@ -8,9 +8,9 @@ from support.at_all_levels import (
     programs,
     same_bits,
 )
+from support.internals import FLOAT, INT, Array
 
 from dap3d_core.kernels import atan2, exp, sin
-from dap3d_core.kernels.compiler.types import FLOAT, INT, Array
 
 VECTOR, MATRIX, INTEGERS = Array(FLOAT, 1), Array(FLOAT, 2), Array(INT, 1)
 #: How often a program is run, each time with other numbers.

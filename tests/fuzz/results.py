@@ -1,9 +1,7 @@
 """Files of results and sweeps with damaged bytes, and what must be true of reading them.
-
 The HDF5 library itself crashes on some damaged files and never ends on others, so a file is read
 in a child process. A file with a seal is refused before the library sees it; for others, as older
-programs wrote them, such an end is counted, and is no find (``CRASHED``, ``STUCK``).
-"""
+programs wrote them, such an end is counted, and is no find (``CRASHED``, ``STUCK``)."""
 
 import functools
 import os
@@ -75,9 +73,7 @@ def damaged_results(draw):
 
 def examine_file(path):
     """A file is read, or refused as a result; what was read can be asked for.
-
-    That of a sweep is not known by its damaged bytes, so each file is read as both.
-    """
+    That of a sweep is not known by its damaged bytes, so each file is read as both."""
     with strict(HANG):
         found = _read(open_result, path)
         if found is None:

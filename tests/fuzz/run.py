@@ -43,9 +43,6 @@ def keep(target, data, words, ending):
     return path
 
 
-# ---------------------------------------------------------------------------- worker
-
-
 def work(name, number, seconds):
     """Check inputs of a target; prints a JSON object after each batch."""
     from fuzz.targets import TARGETS
@@ -86,9 +83,6 @@ def _place_of(error):
     frames = [f for f in traceback.extract_tb(error.__traceback__) if str(ROOT) in f.filename]
     place = f"{Path(frames[-1].filename).name}:{frames[-1].lineno}: " if frames else ""
     return f"{place}{type(error).__name__}: {' '.join(str(error).split())[:200]}"
-
-
-# ---------------------------------------------------------------------------- parent
 
 
 class Worker:

@@ -1,17 +1,15 @@
 """Whole scenes at random, assembled by construction: poses first, then points and axes that meet.
-
 A scene is drawn as the text of its file; events, which a file has no place for, stand in comments
-at its top (``events_of``).
-"""
+at its top (``events_of``)."""
 
 import json
 import math
 
 import numpy as np
 from hypothesis import strategies as st
+from support.rotations import rotation
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
 
 EVENT = "# event: "
 METHODS = ("auto", "auto", "standard", "penalty", "lsq", "unconstrained")
@@ -198,6 +196,7 @@ class Maker:
         if self.draw(st.integers(0, 3)) == 0:
             fields = {"radius": 0.05} if RUBS.get(type_) else {}
             if type_ in RUBS:
+                fields |= {"v_tol": 1e-3} if self.draw(st.booleans()) else {}  # else it sticks
                 self.scene.add_force("friction", joint=joint, mu=self.draw(part), **fields)
 
     # ---------------------------------------------------------------- forces

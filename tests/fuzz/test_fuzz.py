@@ -1,7 +1,5 @@
 """Random and damaged inputs are dealt with as they should be: what they end in, and what is said.
-
-The same inputs each time; ``make fuzz`` tries others. Each check says what must be true.
-"""
+The same inputs each time; ``make fuzz`` tries others. Each check says what must be true."""
 
 import importlib.util
 

@@ -76,8 +76,6 @@ def check_quantity(data):
     return "found"
 
 
-# ---------------------------------------------------------------------------- command lines
-
 COMMANDS = ("run", "run", "run", "check", "check", "plot", "post", "info", "models", "plugins",
             "describe",
             "import-matlab", "resume", "animate", "export", "new-plugin", "", "--help", "Run",

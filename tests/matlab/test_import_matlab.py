@@ -7,11 +7,11 @@ import sys
 import numpy as np
 import pytest
 from support.matlab import write
+from support.rotations import rotation
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
-from dap3d_core.model.rotations import rotation
-from dap3d_matlab.import_matlab import translate
+from dap3d_matlab.importer import translate
 from dap3d_matlab.translate.bodies import parameters_of, rotation_of
 
 
@@ -130,14 +130,6 @@ def test_colours(read, mistakes):
     assert "from 0 to 1" in mistakes(inBodies=bodies("B1.color = [1 2 0];"))[0]
 
 
-def test_what_the_program_works_out_is_left_out_with_a_word(read):
-    _, report = read(inBodies=bodies("B1.m_inv = 3; B1.irc = 1;"))
-    assert [t.partition(": ")[2] for t in told(report.unused)] == [
-        "B1.m_inv is worked out by the program: not read",
-        "B1.irc is worked out by the program: not read",
-    ]
-
-
 def test_the_place_in_the_array_is_the_number(read):
     """The number of a body is its place in the array, whatever its variable is called."""
     text = "B1 = Body_struct; B1.mass = 2; B2 = Body_struct; B2.mass = 3; B3 = B1;\n"
@@ -246,18 +238,14 @@ def force_of(word):
 
 
 @pytest.mark.parametrize("word", FORCES)
-def test_forces(read, word):
+def test_forces(read, tmp_path, word):
+    """As joints; they are accepted by their types."""
     scene, report = read(inForces=force_of(word))
     assert scene.forces["F1"].type == word
     assert scene.forces["F1"].fields == FORCES[word][1]
     assert report.unused == []
-
-
-@pytest.mark.parametrize("word", FORCES)
-def test_forces_are_accepted_by_their_types(tmp_path, word):
-    if word not in dap.load_registry().keywords("force"):
-        pytest.fail(f"the type {word} is not installed")
-    scene, _ = dap.import_matlab(write(tmp_path, inForces=force_of(word)))
+    assert word in dap.load_registry().keywords("force")
+    scene, _ = dap.import_matlab(write(tmp_path / "again", inForces=force_of(word)))
     assert scene.forces["F1"].type == word
 
 
@@ -372,13 +360,20 @@ def test_a_friction_force_of_the_file(read, mistakes):
     assert "has a mu of its own" in found[0]
 
 
-def test_what_a_type_does_not_take_is_left_out_with_a_word(read):
-    line = "J1.iPindex = 1; J1.jPindex = 2; J1.el = 3; J1.mrows = 3; J1.disk = 'xyz';"
-    _, report = read(inJoints=joint(line))
-    assert [t.partition(": ")[2] for t in told(report.unused)] == [
-        "J1.el has no meaning for the type sph: not read",
-        "J1.mrows is worked out by the program: not read",
-    ]
+@pytest.mark.parametrize(
+    ("files", "words"),
+    [
+        ({"inBodies": bodies("B1.m_inv = 3; B1.irc = 1;")},
+         ["B1.m_inv is worked out by the program", "B1.irc is worked out by the program"]),
+        ({"inJoints": joint("J1.iPindex = 1; J1.jPindex = 2; J1.el = 3; J1.mrows = 3; "
+                            "J1.disk = 'xyz';")},
+         ["J1.el has no meaning for the type sph", "J1.mrows is worked out by the program"]),
+    ],
+    ids=["body", "joint"],
+)  # fmt: skip
+def test_what_is_not_taken_is_left_out_with_a_word(read, files, words):
+    _, report = read(**files)
+    assert [t.partition(": ")[2] for t in told(report.unused)] == [f"{w}: not read" for w in words]
 
 
 def test_animation(read, mistakes):

@@ -254,9 +254,7 @@ BINDING = {"+": 1, "-": 1, "*": 2, "/": 2, "^": 4}
 
 class Formula:
     """A random formula as text, with its value by a parser of its own (precedence climbing).
-
-    Second derivation of the order of precedence: binding powers in place of a grammar.
-    """
+    Second derivation of the order of precedence: binding powers in place of a grammar."""
 
     def __init__(self, rng):
         self.rng = rng

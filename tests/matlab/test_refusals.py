@@ -36,9 +36,6 @@ def changed(name, old, new):
     return {name: text.replace(old, new)}
 
 
-# ---------------------------------------------------------------- folders and files
-
-
 def test_folders_that_hold_no_model(tmp_path):
     (tmp_path / "empty").mkdir()
     (tmp_path / "other").mkdir()
@@ -101,9 +98,6 @@ def test_other_line_ends_and_a_mark_at_the_start_change_nothing(tmp_path):
         other = {n: mark + t.encode().replace(b"\n", end) for n, t in files.items()}
         found, _ = dap.import_matlab(write(tmp_path / "model", **other))
         assert found == expected
-
-
-# ---------------------------------------------------------------- within files
 
 
 def test_all_mistakes_of_all_files_at_once(refused):
@@ -190,9 +184,6 @@ def test_arrays_that_are_not_there_or_of_another_kind(refused):
     text = SMALL["inVectors1.m"] + "Vectors = Vectors1;\n"
     (found,) = refused(inVectors1=text)
     assert "makes both Vectors1 and Vectors" in found
-
-
-# ---------------------------------------------------------------- any bytes at all
 
 
 @pytest.mark.parametrize(

@@ -1,7 +1,5 @@
 """Every shipped model gives the numbers of its expected.toml, each within the tolerance there.
-
-The form of these files: models/README.md.
-"""
+The form of these files: models/README.md."""
 
 import tomllib
 from functools import cache

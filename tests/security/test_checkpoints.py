@@ -1,7 +1,5 @@
 """A checkpoint from elsewhere: no number of it is an index of compiled code before it is checked.
-
-Its checksums are right, as whoever wants to do harm would make them.
-"""
+Its checksums are right, as whoever wants to do harm would make them."""
 
 import json
 import math
@@ -11,6 +9,7 @@ import pytest
 from fuzz.numbers import PATIENCE, RUNS, check_change, folder, make
 from fuzz.results import in_child
 from support.ended import EndedError, ended_at, leave, shorten_chunks
+from support.internals import Checkpoint, read_checkpoint, write_checkpoint
 from support.results import same_bits
 
 import dap3d_core as dap
@@ -19,7 +18,6 @@ from dap3d_core.integrators.adams.formulas import AdamsState
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.simulation import CheckpointError, CompiledModel
-from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
 
 
 def crafted(run, what, where, value):
@@ -38,10 +36,21 @@ COUNTS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["stage_count", "next_report", "row_count"])
-def test_an_index_out_of_its_array_is_refused(name):
+@pytest.mark.parametrize(
+    ("run", "what", "where", "value"),
+    [
+        *(("pen1", "0.integer", INTEGERS[name], 10**7)
+          for name in ("stage_count", "next_report", "row_count")),
+        # an order that adams methods do not have
+        *(("adams", "0.integer", INTEGERS[name], 14) for name in ("next_order", "last_order")),
+        # row exchanges of an implicit integration stay in their blocks
+        *(("radau", *place, value) for place in (("0.pivots", 0), ("0.matrix.body_first", 1))
+          for value in (-1, 10**7)),
+    ],
+)  # fmt: skip
+def test_an_index_out_of_its_array_is_refused(run, what, where, value):
     """They crashed, or let the file write where it liked."""
-    assert crafted("pen1", "0.integer", INTEGERS[name], 10**7) == "checkpoint refused"
+    assert crafted(run, what, where, value) == "checkpoint refused"
 
 
 def test_the_command_refuses_it_as_any_damaged_file(tmp_path, capsys):
@@ -50,11 +59,6 @@ def test_the_command_refuses_it_as_any_damaged_file(tmp_path, capsys):
     words = "".join(capsys.readouterr().err.split())  # a long path is broken over lines
     expected = f"cannot resume from {path}: row_count is 48, which no run can have"
     assert "".join(expected.split()) in words
-
-
-def test_an_order_that_adams_methods_do_not_have_is_refused():
-    for name in ("next_order", "last_order"):
-        assert crafted("adams", "0.integer", INTEGERS[name], 14) == "checkpoint refused"
 
 
 @pytest.mark.slow
@@ -68,12 +72,6 @@ def test_every_integer_that_is_no_count_is_limited(run, state):
     for name, place in indices.items():
         value = -(10**7) if name in COUNTS else 10**7
         assert crafted(run, "0.integer", place, value) == "checkpoint refused", place
-
-
-def test_row_exchanges_of_an_implicit_integration_stay_in_their_blocks():
-    for value in (-1, 10**7):
-        assert crafted("radau", "0.pivots", 0, value) == "checkpoint refused"
-        assert crafted("radau", "0.matrix.body_first", 1, value) == "checkpoint refused"
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,6 @@
 """The current folder may be that of a stranger's model: no file in it governs what dap3d does.
-
 But for the files that a command names. matplotlib reads a settings file there when it is
-imported, so each test is a process of its own.
-"""
+imported, so each test is a process of its own."""
 
 import os
 

@@ -1,8 +1,6 @@
 """Words of any length are read in a time that grows with their length alone, and never hang.
-
 Patterns that look again from each letter take the square: hours for these. The tests hold by coming
-to their end.
-"""
+to their end."""
 
 import pytest
 from support.falling import SCENE

@@ -1,7 +1,5 @@
 """What a process does while it loads, checks, describes, imports and shows what is not trusted.
-
-The interpreter tells an audit hook of all that is opened, imported, compiled and run.
-"""
+The interpreter tells an audit hook of all that is opened, imported, compiled and run."""
 
 import ast
 import json

@@ -88,19 +88,14 @@ WRONG = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("name", "value"), WRONG)
-def test_attributes_of_another_form(changed, name, value):
-    path = changed(lambda d: d.setncattr_string(name, json.dumps(value)))
-    with pytest.raises(ResultError, match="damaged"):
-        dap.open(path)
+NO_JSON = [("notes", "[" * 100_000), ("settings", ""), ("statistics", "{"), ("versions", "nan"),
+           ("events", '{"a": 1' + "0" * 5000 + "}")]  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ("name", "text"),
-    [("notes", "[" * 100_000), ("settings", ""), ("statistics", "{"), ("versions", "nan"),
-     ("events", '{"a": 1' + "0" * 5000 + "}")],
-)  # fmt: skip
-def test_attributes_that_are_no_json(changed, name, text):
+    ("name", "text"), [*((name, json.dumps(value)) for name, value in WRONG), *NO_JSON]
+)
+def test_attributes_of_another_form_and_no_json(changed, name, text):
     path = changed(lambda d: d.setncattr_string(name, text))
     with pytest.raises(ResultError, match="damaged"):
         dap.open(path)

@@ -1,7 +1,5 @@
 """Scene files that are made to take memory or files that are not theirs.
-
-Nests, long keys and long numbers: tests/unit/scene/files/test_read_toml.py.
-"""
+Nests, long keys and long numbers: tests/unit/scene/files/test_read_toml.py."""
 
 import os
 

@@ -61,10 +61,8 @@ def turn(axis, angle):
 
 def accelerations(q, q_dot, tau):
     """q_ddot (6,) by the recursive Newton-Euler algorithm, column by column of the mass matrix.
-
     Craig, Introduction to Robotics, 6.5: velocities outwards, forces inwards, in ground axes. All
-    columns, and the moments at rest, are found at once.
-    """
+    columns, and the moments at rest, are found at once."""
     rates, seconds = np.zeros((7, 6)), np.vstack([np.eye(6), np.zeros(6)])
     rates[6] = q_dot
     gravity = np.zeros((7, 3))

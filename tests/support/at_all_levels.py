@@ -7,9 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 from hypothesis import strategies as st
 
-from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.objects import OPTIMISED, UNOPTIMISED, compile_ir, load, processor
-from dap3d_core.kernels.compiler.units import Entry
+from support.internals import Entry, Program
 
 _count = count()
 
@@ -73,8 +72,6 @@ def same_bits(one, other):
         one[~nan].tobytes() == np.asarray(other)[~nan].tobytes()
     )
 
-
-# ------------------------------------------------------------------ random programs
 
 FLOATS, WHOLES = ("a", "b", "c", "d"), ("i", "j", "k")
 

@@ -48,9 +48,8 @@ def catenary(n, span):
 
 def toggle(angle, *, weight=True, k=200.0, reach=1.2):
     """Two rods of 1 m and 1 kg, hinged, that move a slider along x against a spring: it snaps.
-
-    The crank is at an angle to x; the spring, 200 N/m, is unstretched with the slider at x = 1.2 m.
-    """
+    The crank is at an angle to x; the spring, 200 N/m, is unstretched with the slider at x = 1.2
+    m."""
     scene = dap.Scene(name="toggle")
     c, s = math.cos(angle), math.sin(angle)
     half = math.cos(angle / 2), 0.0, math.sin(angle / 2), 0.0

@@ -1,7 +1,5 @@
 """What shared libraries of Windows and macOS import and export, read from the files.
-
-Sources: Microsoft, PE Format; Apple, mach-o/loader.h and mach-o/nlist.h.
-"""
+Sources: Microsoft, PE Format; Apple, mach-o/loader.h and mach-o/nlist.h."""
 
 import struct
 

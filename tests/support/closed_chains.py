@@ -1,7 +1,5 @@
 """A four-bar linkage, a leg like Cassie's, a delta robot and a Stewart platform.
-
-Each is a function that returns its motion in minimal coordinates and its joints, in global axes.
-"""
+Each is a function that returns its motion in minimal coordinates and its joints, in global axes."""
 
 import numpy as np
 

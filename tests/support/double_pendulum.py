@@ -53,10 +53,8 @@ def series(state, order):
 
 def states(times, start=LEVEL, digits=50):
     """The motion at the instants ``times``, ascending from 0: six decimals each.
-
     A step is so long that its last terms are below 10^-digits, and the series has a term for
-    each digit and a few: steps are then some tenths of the radius of convergence.
-    """
+    each digit and a few: steps are then some tenths of the radius of convergence."""
     order, found = digits + 10, []
     with localcontext() as context:
         context.prec = digits

@@ -1,19 +1,15 @@
 """Graphs of bodies and joints, with random blocks as those of joints, and the dense matrix.
-
 The rows of a random joint are of one size and do not feel a common rigid motion of its bodies, as
 those of joints: each body gets a random orthogonal 6 x 6 frame X, and a joint the blocks R X of its
 bodies, with rows R that are orthonormal and that add up to zero over the bodies (ground takes its
-share). The static order relies on that.
-"""
+share). The static order relies on that."""
 
 import numpy as np
 
 from dap3d_core.linear.ldlt.factor import assemble, factor
-from dap3d_core.linear.ldlt.plan import make_plan
 from dap3d_core.linear.ldlt.saddle_point import solve_saddle
+from support.internals import make_plan
 from support.plain import jit_is_on
-
-# ------------------------------------------------------------------ graphs
 
 
 def chain(n, rows=3):
@@ -84,9 +80,7 @@ def three_body_joints(rng):
 
 def gears_to_ground(rng):
     """Two hubs, one on the other, and a joint of the inner one's arms that also takes ground.
-
-    Its loop runs through ground and thus through the outer hub, which is dear and waits long.
-    """
+    Its loop runs through ground and thus through the outer hub, which is dear and waits long."""
     joints = [((1, 0), 2), ((2, 1), 6), ((3, 2), 6), ((4, 2), 6), ((3, 0, 4), 2)]
     joints += [((k, 1), 2) for k in range(5, 15)] + [((k, 2), 2) for k in range(15, 18)]
     return 17, [*joints, ((5, 6), 3), ((7, 8), 3), ((9, 10), 3)]
@@ -218,10 +212,8 @@ def full_case(name, seed=0):
 
 def check_solution(case):
     """The program solves [I D^T; D 0] (a; -lambda) = (g; gamma) as LU with pivoting does.
-
     It works on D D^T, whose condition is that of D squared: the relative error is some rounding
-    times that. 1e3 is for growth along the elimination; 3 was the worst of 3000 random graphs.
-    """
+    times that. 1e3 is for growth along the elimination; 3 was the worst of 3000 random graphs."""
     rng = np.random.default_rng(1)
     m, columns = case.dense.shape
     g, gamma = rng.normal(size=columns), rng.normal(size=m)

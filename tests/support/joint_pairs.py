@@ -40,9 +40,8 @@ def unit(rng, size=3):
 
 def pair(seed=1, *, on_ground=False):
     """A scene of body i and body j, or ground, as drawn: nothing is on a constraint.
-
-    Points P_i, P_j, vector d from the one to the other, axes a_i, b_i and the triad a_j, n_j, m_j.
-    """
+    Points P_i, P_j, vector d from the one to the other, axes a_i, b_i and the triad a_j, n_j,
+    m_j."""
     rng = np.random.default_rng(seed)
     scene = dap.Scene(name="pair")
     names = {"i": "body", "j": "ground" if on_ground else "base"}

@@ -3,7 +3,7 @@
 import numpy as np
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
+from support.rotations import rotation
 
 #: Joints that close a loop, in the order in which they are drawn.
 CLOSING = ("sph", "sph-sph", "univ", "rev")
@@ -11,9 +11,7 @@ CLOSING = ("sph", "sph-sph", "univ", "rev")
 
 def add_loops(scene, seed, count, keywords=CLOSING):
     """Add joints between bodies drawn at random, or a body and ground, closed as these stand.
-
-    Whether rows of theirs depend on others is left to chance.
-    """
+    Whether rows of theirs depend on others is left to chance."""
     rng = np.random.default_rng(seed)
     bodies = ["ground", *scene.bodies]
     for n in range(count):

@@ -104,9 +104,7 @@ def bent_chain(n):
 
 def four_bar_row(count, angle=0.0):
     """IFToMM A02: ``count`` parallelograms side by side on revolutes; cranks turned by an angle.
-
-    Cranks upright at angle 0; at 90 degrees all links are in line.
-    """
+    Cranks upright at angle 0; at 90 degrees all links are in line."""
     scene = dap.Scene(name=f"{count} four-bars")
     along = np.array([-np.sin(angle), np.cos(angle), 0.0])
     p = (np.cos(angle / 2), 0.0, 0.0, np.sin(angle / 2))

@@ -1,9 +1,7 @@
 """Motion of mechanisms in minimal coordinates, from closed forms of their poses.
-
 An implementation of its own: d'Alembert's principle over all bodies. Jacobians are complex steps,
 exact to rounding, and second derivatives along the motion differences of these of the fourth
-order, which err by about STEP^4 = 1e-12.
-"""
+order, which err by about STEP^4 = 1e-12."""
 
 import attrs
 import numpy as np

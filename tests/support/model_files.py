@@ -1,7 +1,5 @@
 """Mechanisms as files of URDF, SDF and MJCF, written from places in global axes.
-
-A writer of its own, for tests of what reads such files.
-"""
+A writer of its own, for tests of what reads such files."""
 
 import attrs
 import numpy as np

@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from dap3d_core.model.state_layout import join
+from support.internals import join
 
 #: Sixth-order central differences of the first derivative.
 OFFSETS = np.array([-3, -2, -1, 1, 2, 3])

@@ -1,9 +1,7 @@
 """Mechanisms with one freedom by closed forms of their poses, differentiated in high precision.
-
 A mechanism is a function of the crank's angle that returns for each body the place of its mass
 centre (3) and its axes (3 x 3, columns) in mpmath's numbers. With T = I(q) q_dot^2 / 2 and the
-potential V(q), Lagrange's equation gives the driving moment I q_ddot + I' q_dot^2 / 2 + V'.
-"""
+potential V(q), Lagrange's equation gives the driving moment I q_ddot + I' q_dot^2 / 2 + V'."""
 
 import mpmath as mp
 import numpy as np

@@ -1,9 +1,7 @@
 """Virtual environments of a user, into which wheels are installed.
-
 What dap3d depends on is lent from the environment of the tests, package by package, without
 anything of dap3d: to download llvmlite, scipy and the rest again would take minutes and prove
-nothing. Nothing of the working tree can be reached.
-"""
+nothing. Nothing of the working tree can be reached."""
 
 import importlib.util
 import json

@@ -1,9 +1,7 @@
 """Pages whose every example is run, in the order in which a reader would.
-
 A block whose first line is ``# NAME`` or ``<!-- NAME -->``, with a suffix, is a file of that name;
 other blocks of Python are one script, each going on where the last one ended; indented lines that
-begin with ``dap3d`` are commands.
-"""
+begin with ``dap3d`` are commands."""
 
 import os
 import re

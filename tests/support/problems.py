@@ -16,9 +16,7 @@ def pendulum():
 
 def four_bar():
     """IFToMM A02 with N = 1, made free of redundancy.
-
-    The cranks turn on revolutes, the coupler hangs on two spherical joints.
-    """
+    The cranks turn on revolutes, the coupler hangs on two spherical joints."""
     scene = dap.Scene(name="A02")
     for k in range(2):
         crank, low, pivot = f"crank{k}", f"low{k}", f"pivot{k}"
@@ -45,9 +43,7 @@ def free_body(Jp, w, **more):
 
 def heavy_top(theta, spin, precession):
     """G4: symmetric heavy top in steady precession.
-
-    The mass centre is 0.1 m from the pivot; A = 0.02 about the pivot, C = 0.005.
-    """
+    The mass centre is 0.1 m from the pivot; A = 0.02 about the pivot, C = 0.005."""
     import numpy as np
 
     c, s = np.cos(theta), np.sin(theta)
@@ -104,7 +100,7 @@ def everything():
     for n, (i, j) in enumerate([(first, bodies[0]), (first, last), (last, "ground"),
                                 ("loose", last), ("loose", "ground")]):  # fmt: skip
         scene.add_force("ptp", f"spring{n}", P_i=f"{i}.O", P_j=f"{j}.O", k=20.0 + n, l0=0.3, c=0.5)
-    scene.add_force("friction", "rub", joint=joint, mu=0.2, radius=0.05)
+    scene.add_force("friction", "rub", joint=joint, mu=0.2, radius=0.05, v_tol=1e-3)
     scene.add_function("a", "turn", coeff=(0.0, 0.3, 0.1))
     scene.add_joint("rel-rot", "motor", body_i=first, a_j="ground.z", function="turn")
     return scene

@@ -1,9 +1,7 @@
 """Calls of the core's compiled functions, recorded in plain Python and repeated as machine code.
-
 Records copies of the arguments of each function at some of its calls, with what plain Python
 returned and left in the arrays. ``differences`` then compiles all recorded functions at every level
-and compares each call in all bits. For a process of its own: it switches the compiler off.
-"""
+and compares each call in all bits. For a process of its own: it switches the compiler off."""
 
 import importlib
 import inspect
@@ -16,30 +14,27 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.compiler.derivatives import differentiate
-from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.trace import trace
-from dap3d_core.kernels.compiler.types import (
-    COMPLEX,
-    DTYPES,
-    FLOAT,
-    INT,
-    NOTHING,
-    Array,
-    CompileError,
-    Known,
-    Signature,
-    Table,
-    Tuple,
-)
-from dap3d_core.kernels.compiler.units import Entry, Functions, address_of, type_of
+from dap3d_core.kernels.compiler.types import COMPLEX, DTYPES, NOTHING, Known, Table, Tuple
+from dap3d_core.kernels.compiler.units import Functions, address_of, type_of
 from dap3d_core.kernels.runtime import cache
-from dap3d_core.kernels.runtime.array_struct import Arrays, pointer
 from dap3d_core.kernels.runtime.cache import Compiled
 from dap3d_core.kernels.runtime.function_lists import LOOP
 from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.kernels.runtime.loop_modules import array_members
 from dap3d_core.kernels.runtime.source_digest import COMPILED_LAYERS
 from support.at_all_levels import all_made_of, function_of, same_bits, targets
+from support.internals import (
+    FLOAT,
+    INT,
+    Array,
+    Arrays,
+    CompileError,
+    Entry,
+    Program,
+    Signature,
+    pointer,
+)
 
 #: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.
 CALLS = {1, 2, 7, 40, 200}

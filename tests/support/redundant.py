@@ -11,9 +11,8 @@ UPRIGHT = (1 / 12, 1e-3, 1 / 12)  # the same rod along y
 
 def four_bars(count):
     """IFToMM A02: ``count`` parallelograms in a row, every joint a spatial revolute.
-
-    2 count + 1 rods of 1 m and 1 kg; cranks upright at the start, couplers level, vx(B0) = 1 m/s.
-    """
+    2 count + 1 rods of 1 m and 1 kg; cranks upright at the start, couplers level, vx(B0) = 1
+    m/s."""
     scene = dap.Scene(name=f"A02 of {count}")
     for k in range(count + 1):
         crank = f"crank{k}"
@@ -62,10 +61,8 @@ def bricard():
 
 def bennett(turn=1.1):
     """Three links of lengths 1, 2, 1 m on four revolutes, the fourth link is ground: one freedom.
-
     By Bennett's condition: sin(twist) over length is the same for all; opposite links are equal.
-    Its closure gives the second angle: tan(turn / 2) tan(second / 2) is a number of the twists.
-    """
+    Its closure gives the second angle: tan(turn / 2) tan(second / 2) is a number of the twists."""
     twists, lengths = (np.pi / 6, np.pi / 2), (1.0, 2.0)
     ratio = np.sin(0.5 * sum(twists)) / np.sin(0.5 * (twists[1] - twists[0]))
     second = 2.0 * np.arctan(ratio / np.tan(0.5 * turn))
@@ -147,9 +144,7 @@ def driven_four_bar():
 
 def dead_centre():
     """A slider-crank of 1 m and 2 m, driven by its slider: x = 3 - (1 - t)^2 / 2.
-
-    At its dead centre, t = 1 s, the crank may swing to either side and the rod about its axis.
-    """
+    At its dead centre, t = 1 s, the crank may swing to either side and the rod about its axis."""
     angle, other = (float(v) for v in dead_centre_angles(np.zeros(1))[:, 0])
     scene = dap.Scene(name="dead centre")
     for name, length, mass_moment, turn, first in (

@@ -3,16 +3,15 @@
 import numpy as np
 
 import dap3d_core as dap
-from dap3d_core.interface.fields import slot_of, specs_of
-from dap3d_core.model.rotations import rotation
+from dap3d_core.interface.fields import slot_of
 from dap3d_core.testing.samples.sampled_type import own_values
+from support.internals import specs_of
+from support.rotations import rotation
 
 
 def cases(registry, kind):
     """(keyword, values of fields) for each type of a kind as it is, and for each of its variants.
-
-    A type whose variants leave no place for itself is there by its variants alone.
-    """
+    A type whose variants leave no place for itself is there by its variants alone."""
     found = []
     for row in registry.listing():
         if row.kind == kind and row.state == "ok":
@@ -59,6 +58,9 @@ def scene_for(type_info, rng, *, ground=None, values=None):
         value = _field(scene, name, spec, owner, rng, values.get(name))
         if value is not None:
             fields[name] = value
+    for low in [name for name in fields if name.endswith("_min")]:
+        ends = low, f"{low[:-3]}max"
+        fields |= zip(ends, sorted(fields[end] for end in ends), strict=True)
     for name, spec in specs_of(type_info.type).items():
         if spec.kind == "vector2":
             del fields[name]

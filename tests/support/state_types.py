@@ -14,9 +14,7 @@ K, C, L0, MASS, X0, Z0 = 50.0, 3.0, 1.0, 2.0, 1.5, 0.1
 
 class Maxwell(Force):
     """Spring and damper in series between two points; z is the elongation of the damper.
-
-    z_dot = k/c (l - l0 - z)
-    """
+    z_dot = k/c (l - l0 - z)"""
 
     keyword = "test-maxwell"
     states = ("z",)

@@ -23,10 +23,8 @@ def _axis(p, k):
 
 def stewart(platform, leg, push, *, spins=True):
     """Platform of ``platform`` kg on legs of two bodies of ``leg`` kg each, under ``push`` N.
-
     Legs that do not spin about their own axes stand on universal joints, with the cross along y of
-    the leg and a ground vector ``cross0``, ... of its z at the start.
-    """
+    the leg and a ground vector ``cross0``, ... of its z at the start."""
     scene = dap.Scene(name="stewart")
     J = 0.1 * platform
     scene.add_body("top", mass=platform, Jp=[J, J, 2.0 * J], r=[0.0, 0.0, 1.0])

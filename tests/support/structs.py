@@ -4,7 +4,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, Arrays
+from support.internals import INTEGERS, MATRIX, Arrays
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

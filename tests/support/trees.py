@@ -28,10 +28,8 @@ def mixed_chain(n):
 
 def random_tree(n, seed=0, joints=JOINTS, free=0.0, lag=5):
     """A tree of n bodies on joints drawn from some types, closed where it is given, and weight.
-
     Every body hangs on one of the ``lag`` before it, or is free with a probability; of half of the
-    joints the child is body i, of the others body j.
-    """
+    joints the child is body i, of the others body j."""
     rng = np.random.default_rng(seed)
     scene = dap.Scene(name=f"random tree {seed} of {n}")
     r, A = [np.zeros(3)], [np.eye(3)]
@@ -92,6 +90,6 @@ def _unit(x):
 
 
 def _rotation(p):
-    from dap3d_core.model.rotations import rotation
+    from support.rotations import rotation
 
     return rotation(np.asarray(p))

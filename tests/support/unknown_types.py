@@ -29,9 +29,7 @@ class RoundAgain(OnCurve):
 
 class SlidingEllipsoid(Joint):
     """An ellipsoid about the mass centre of body i touches the plane z = 0 at (x, y, z) on it.
-
-    Rows: the point is on the surface, and on the plane; the normals are parallel there.
-    """
+    Rows: the point is on the surface, and on the plane; the normals are parallel there."""
 
     keyword, rows, unknowns = "ellipsoid", 4, ("x", "y", "z")
     body_i: Body = body()

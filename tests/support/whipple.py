@@ -1,10 +1,8 @@
 """Linear equations of the Whipple bicycle, from the appendix of the benchmark paper.
-
 J. P. Meijaard, J. M. Papadopoulos, A. Ruina, A. L. Schwab: Linearized dynamics equations for the
 balance and steer of a bicycle: a benchmark and review, Proc. R. Soc. A 463 (2007) 1955-1982,
 appendix A: M q'' + v C1 q' + (g K0 + v^2 K2) q = 0 of lean (to the right) and steer (to the right).
-Its axes: x forward, y to the right, z downward. Numbers are those of its table 1.
-"""
+Its axes: x forward, y to the right, z downward. Numbers are those of its table 1."""
 
 import numpy as np
 

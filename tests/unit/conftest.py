@@ -1,7 +1,5 @@
 """Shared by unit tests: distributions to install; fewer examples with kernels as plain Python.
-
-`make test` tries properties on all examples.
-"""
+`make test` tries properties on all examples."""
 
 import sys
 import textwrap

@@ -48,9 +48,7 @@ def test_small_motions_follow_the_linear_equations(speed):
 @pytest.mark.parametrize(("speed", "grows"), [(3.0, True), (5.0, False)])
 def test_growth_of_the_weave(speed, grows):
     """The rate of a run, seen along the left eigenvector of the weave, is its eigenvalue.
-
-    Unstable below 4.29 m/s, stable up to 6.02 m/s.
-    """
+    Unstable below 4.29 m/s, stable up to 6.02 m/s."""
     result = leaning(speed)
     values, left = np.linalg.eig(system(speed).T)
     weave = int(np.argmax(np.where(values.imag > 0.0, values.real, -np.inf)))

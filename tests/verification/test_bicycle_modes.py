@@ -1,10 +1,8 @@
 """Eigenvalues of the Whipple bicycle against the benchmark of Meijaard and others, to 12 digits.
-
 J. P. Meijaard, J. M. Papadopoulos, A. Ruina, A. L. Schwab: Linearized dynamics equations for the
 balance and steer of a bicycle: a benchmark and review, Proc. R. Soc. A 463 (2007) 1955-1982. The
 bicycle is built from its table 1; the expected eigenvalues are those of the matrices that the paper
-prints, M q'' + v C1 q' + (g K0 + v^2 K2) q = 0, and at v = 0 and 5 m/s those of its table 2.
-"""
+prints, M q'' + v C1 q' + (g K0 + v^2 K2) q = 0, and at v = 0 and 5 m/s those of its table 2."""
 
 import numpy as np
 import pytest
@@ -55,9 +53,7 @@ def bicycle(speed):
 @pytest.mark.parametrize("speed", [float(v) for v in range(11)])
 def test_eigenvalues(speed):
     """Weave, capsize and castering at every speed; all other eigenvalues are exactly zero.
-
-    They are the place (x, y), heading, both wheels' angles, and the speed.
-    """
+    They are the place (x, y), heading, both wheels' angles, and the speed."""
     K, C = 9.81 * K0 + speed**2 * K2, speed * C1
     inverse = np.linalg.inv(M)
     matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-inverse @ K, -inverse @ C]])

@@ -118,9 +118,7 @@ def belt(crossed, by_joints=False):
 @pytest.mark.parametrize(("crossed", "by_joints"), [(False, False), (True, False), (False, True)])
 def test_a_belt_carries_a_moment(crossed, by_joints):
     """Steady acceleration: the rigid ratio, T_tight - T_slack = moment / r, and bearing loads.
-
-    The vibration of the belt decays with c/m of some 1e5 1/s; 1e-6 is far above what is left.
-    """
+    The vibration of the belt decays with c/m of some 1e5 1/s; 1e-6 is far above what is left."""
     r_a, r_b, J_a, J_b, M, T_0 = 0.1, 0.25, 0.02, 0.05, 2.0, 300.0
     result = dap.simulate(belt(crossed, by_joints), t_end=0.5, dt=0.25, integrator="radau")
     ratio = (-1.0 if crossed else 1.0) * r_a / r_b
@@ -175,10 +173,8 @@ def tangents(places, radii):
 @pytest.mark.parametrize("name", RIGID)
 def test_a_rigid_belt_couples_speeds_and_loads_bearings(name):
     """Closed forms: rho w is one speed; M = J w_dot + rho (T_out - T_in); loads are tensions.
-
     The rows are kept at each step, so that speeds after 10 s, of some 1e3 rad/s, are in ratio to
-    rounding; multipliers have that of the solution of the equations.
-    """
+    rounding; multipliers have that of the solution of the equations."""
     places, radii, fields = RIGID[name]
     moment = 0.5 if radii[-1] > 0.0 and not fields else -0.5
     result = dap.simulate(rigid_belt(places, radii, fields, moment), t_end=10.0, dt=1.0)
@@ -203,9 +199,7 @@ def test_a_rigid_belt_couples_speeds_and_loads_bearings(name):
 
 def test_a_rigid_belt_on_a_carrier():
     """Willis: with the wheel a held, (w_b - w_c) r_b = -w_c r_a; the carrier is driven at 2 rad/s.
-
-    Rows of velocities hold to rounding.
-    """
+    Rows of velocities hold to rounding."""
     scene = dap.Scene(name="carrier")
     scene.add_body("carrier", mass=1.0, Jp=JP, r=[0.5, 0.0, 0.0], r_dot=[0.0, 1.0, 0.0],
                    w=[0.0, 0.0, 2.0])  # fmt: skip
@@ -241,10 +235,8 @@ def test_two_pulleys_of_a_belt_on_one_body_are_refused():
 
 def test_a_belt_stores_energy():
     """Pulleys swing against each other on a belt without damping, and a span becomes slack.
-
     About equal angles, k' = 2 k r^2 of both spans and I' = J_a J_b / (J_a + J_b): the first swing
-    is w = sqrt(k' / I'); the energy is 2 T_0^2 / (2 k) at the start. Steps leave 1e-9 of it.
-    """
+    is w = sqrt(k' / I'); the energy is 2 T_0^2 / (2 k) at the start. Steps leave 1e-9 of it."""
     for pretension, spin in ((300.0, 1.0), (20.0, 5.0)):
         scene = belt(False)
         del scene.forces["motor"]

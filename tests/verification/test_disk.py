@@ -1,7 +1,5 @@
 """The disk on the ground (spec 5) against closed forms.
-
-Tolerances: rtol 1e-11 over a second or two leaves some 1e-9 of the largest coordinate.
-"""
+Tolerances: rtol 1e-11 over a second or two leaves some 1e-9 of the largest coordinate."""
 
 import numpy as np
 import pytest
@@ -14,9 +12,7 @@ MASS, RADIUS, AXIAL, ACROSS, G = 2.0, 0.5, 0.3, 0.2, 9.81
 
 def disk(slip, *, lean=np.pi / 2, **motion):
     """A disk whose plane stands at an angle ``lean`` to the ground, its axis in the x-z plane.
-
-    The top leans towards -x; upright it rolls along y.
-    """
+    The top leans towards -x; upright it rolls along y."""
     scene = dap.Scene(name="disk")
     # eta = y is turned to (sin lean, 0, cos lean)
     turn = np.array([[0, np.sin(lean), -np.cos(lean)], [-1, 0, 0], [0, np.cos(lean), np.sin(lean)]])
@@ -37,11 +33,9 @@ def disk(slip, *, lean=np.pi / 2, **motion):
 @pytest.mark.parametrize("lean", [0.6, 1.2])
 def test_a_coin_rolls_in_a_circle(lean):
     """Steady rolling without slip: the centre goes round a circle of radius b at the rate Omega.
-
     Newton and Euler for the mass centre, with theta the lean, J_t and J_a the inertias across and
     along the axis: Omega^2 = m g R cos / (sin (J_t cos + (J_a / R + m R) b)), the spin about the
-    axis is -Omega b / R in all.
-    """
+    axis is -Omega b / R in all."""
     b, s, c = 0.8, np.sin(lean), np.cos(lean)
     square = MASS * G * RADIUS * c / (s * (ACROSS * c + (AXIAL / RADIUS + MASS * RADIUS) * b))
     rate, eta = np.sqrt(square), np.array([s, 0.0, c])
@@ -83,9 +77,7 @@ def test_a_disk_slides_where_it_may():
 
 def test_a_push_across_is_carried_without_lateral_slip():
     """nz: a push at the point of contact, across the track, is met by the ground and moves nothing.
-
-    z and tz give way to it: there the disk starts with a = F / m + (F R) R / J_t.
-    """
+    z and tz give way to it: there the disk starts with a = F / m + (F R) R / J_t."""
     for slip, moves in (("nz", False), ("z", True), ("tz", True)):
         scene = disk(slip)
         scene.add_point("low", "coin", _contact(scene))
@@ -98,7 +90,7 @@ def test_a_push_across_is_carried_without_lateral_slip():
 
 def _contact(scene):
     """The lowest point of the upright disk in its own axes."""
-    from dap3d_core.model.rotations import rotation
+    from support.rotations import rotation
 
     A = rotation(np.array(scene.bodies["coin"].p))
     return A.T @ (0.0, 0.0, -RADIUS)

@@ -1,8 +1,6 @@
 """Drivers at position level, and a point on a plane, against closed forms.
-
 Tolerances: what stands at position level is held to 1e-11 by projection; rtol 1e-11 elsewhere
-leaves some 1e-9.
-"""
+leaves some 1e-9."""
 
 import numpy as np
 import pytest
@@ -100,10 +98,8 @@ def slide(length):
 @pytest.mark.parametrize(("length", "start"), [(None, 1.0), (1.6, 1.2)])
 def test_a_bead_is_pushed_along_a_turning_arm(length, start):
     """drive-tran: arm_x . (r_bead - r_arm) = length + f, also where the arm turns (spec 4.8).
-
     Left out, the length makes C = 0 at the start. With rho the distance from the axle, the guide
-    gives the Coriolis force 2 m Omega rho', and the driver m (rho'' - Omega^2 rho).
-    """
+    gives the Coriolis force 2 m Omega rho', and the driver m (rho'' - Omega^2 rho)."""
     result = dap.simulate(slide(length), t_end=1.0, dt=0.1, **TIGHT)
     t, turn = result.t, 2.0 * result.t
     rho = start + 0.3 * t + 0.2 * t**2

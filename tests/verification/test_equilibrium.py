@@ -1,8 +1,6 @@
 """Static equilibria against closed forms and equations of one coordinate.
-
 Poses are exact to rounding: some units in the last place of the largest coordinate, through the
-condition of the equations, which is below 100 in all these scenes (``ULP`` has both).
-"""
+condition of the equations, which is below 100 in all these scenes (``ULP`` has both)."""
 
 import math
 
@@ -21,10 +19,8 @@ ULP = 100 * np.finfo(float).eps
 
 def rods_of_catenary(n, span):
     """Mass centres (n, 2) and the horizontal force of n rods of 1 m and 1 kg over a span.
-
     A rod's middle carries V = (n - 1) / 2 - k weights, so tan(angle) = V / H with H in weights;
-    the cosines add up to the span. One equation for H.
-    """
+    the cosines add up to the span. One equation for H."""
     V = 0.5 * (n - 1) - np.arange(n)
     H = brentq(lambda H: np.sum(1 / np.hypot(1.0, V / H)) - span, 1e-3, 1e3, xtol=1e-15, rtol=1e-15)
     c, s = 1 / np.hypot(1.0, V / H), (V / H) / np.hypot(1.0, V / H)
@@ -63,20 +59,18 @@ def test_the_top_between_both_valleys_is_an_unstable_equilibrium():
     assert "rod" in found.notes[0]
 
 
-@pytest.mark.parametrize("angle", [0.0, 1e-6, 2.0, math.pi - 1e-7])
-def test_a_pendulum_comes_to_hang_from_wherever_it_starts(angle):
+@pytest.mark.parametrize(
+    ("angle", "is_inverted"),
+    [(0.0, False), (1e-6, False), (2.0, False), (math.pi - 1e-7, False), (math.pi, True),
+     (math.pi - 1e-11, True)],
+)  # fmt: skip
+def test_a_pendulum_comes_to_hang_unless_it_starts_upright(angle, is_inverted):
+    """There it stays, and is unstable."""
     found = dap.equilibrium(at_rest.pendulum(angle))
-    assert found.r[0] == pytest.approx([0.0, 0.0, -1.0], abs=1e-15)
-    assert found.stable
+    assert found.r[0] == pytest.approx([0.0, 0.0, 1.0 if is_inverted else -1.0], abs=1e-15)
+    assert found.stable is not is_inverted
     assert found.reaction("J1")["i"].force == pytest.approx([0.0, 0.0, 2 * G], abs=1e-13)
-
-
-@pytest.mark.parametrize("angle", [math.pi, math.pi - 1e-11])
-def test_an_inverted_pendulum_that_starts_there_stays_and_is_unstable(angle):
-    found = dap.equilibrium(at_rest.pendulum(angle))
-    assert found.r[0] == pytest.approx([0.0, 0.0, 1.0], abs=1e-15)
-    assert not found.stable
-    assert "unstable" in found.notes[0]
+    assert ("unstable" in "".join(found.notes)) is is_inverted
 
 
 def test_a_quarter_car_sinks_into_its_springs():
@@ -135,10 +129,8 @@ def test_a_parallelogram_falls_from_its_singular_pose(angle):
 
 def reduced_ziegler(load, c):
     """M, C, K of the two angles of Ziegler's column about upright, both from the vertical.
-
     Rods of mass 1, length 1, J = 0.1 about their middles; springs 10, dampers c; a load along the
-    upper rod does the virtual work load (angle 0 - angle 1) d(angle 0).
-    """
+    upper rod does the virtual work load (angle 0 - angle 1) d(angle 0)."""
     M = np.array([[0.1 + 0.25 + 1.0, 0.5], [0.5, 0.1 + 0.25]])
     pair = np.array([[2.0, -1.0], [-1.0, 1.0]])
     K = 10.0 * pair - load * np.array([[1.0, -1.0], [0.0, 0.0]])
@@ -162,9 +154,7 @@ def test_a_column_under_a_following_load_flutters(load, c):
 
 def test_a_ball_between_pushing_springs_leaves_the_top_that_it_comes_to():
     """Started on the line of both it slides to their middle, which is a ridge, and off it.
-
-    Springs of 3 m at +-2 m: rest is on the circle of radius sqrt(5) m about the line.
-    """
+    Springs of 3 m at +-2 m: rest is on the circle of radius sqrt(5) m about the line."""
     found = dap.equilibrium(at_rest.two_springs((0.3, 0.0, 0.0), 3.0))
     assert found.r[0, 0] == pytest.approx(0.0, abs=1e-14)
     assert math.hypot(*found.r[0, 1:]) == pytest.approx(math.sqrt(5), rel=1e-14)
@@ -190,26 +180,27 @@ def test_a_soft_spring_lets_a_ball_sink_far():
     assert dap.equilibrium(scene).r[0] == pytest.approx([0, 0, -9810.0], abs=9810 * ULP)
 
 
-def test_a_spring_without_first_order_stiffness_holds():
+def across_a_spring():
     """A bead on a line across an unstretched spring: V is of fourth order."""
     scene = at_rest.ball(weight=False)
     scene.add_joint("tran", P_i="ball.O", P_j="ground.O", a_j="ground.z")
     scene.add_point("wall", "ground", (1.0, 0.0, 0.0))
     scene.add_force("ptp", P_i="ball.O", P_j="wall", k=100.0, l0=1.0)
-    found = dap.equilibrium(scene)
-    assert found.stable
-    assert found.indifferent == 0
+    return scene
 
 
-def test_a_balanced_lamp_is_indifferent():
+def balanced_lamp():
     """A spring of free length zero carries the rod at every angle: k h = m g (Carwardine 1932)."""
     scene = at_rest.pendulum(1.0)
     scene.add_point("hook", "ground", (0.0, 0.0, 0.5))
     scene.add_force("ptp", P_i="rod.O", P_j="hook", k=2 * G / 0.5, l0=0.0)
-    found = dap.equilibrium(scene)
-    assert found.indifferent == 1
-    assert found.stable
-    assert found.steps == 0
+    return scene
+
+
+@pytest.mark.parametrize(("make", "indifferent"), [(across_a_spring, 0), (balanced_lamp, 1)])
+def test_without_first_order_stiffness_it_holds_or_is_indifferent(make, indifferent):
+    found = dap.equilibrium(make())
+    assert (found.stable, found.indifferent, found.steps) == (True, indifferent, 0)
 
 
 @pytest.mark.slow

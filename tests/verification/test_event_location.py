@@ -1,8 +1,7 @@
 """Events and switches that are passed twice within a step, and fixed steps across switches.
-
 Closed forms of free flight; the pendulum by elliptic integrals (SciPy). Instants are compared with
-what a height known to rounding, or to the tolerance of the run, over the speed of passing leaves.
-"""
+what a height known to rounding, or to the tolerance of the run, over the speed of passing
+leaves."""
 
 import numpy as np
 import pytest
@@ -60,9 +59,6 @@ def time_near_turn(d):
         rtol=1e-13, atol=1e-15, events=reached, first_step=1e-4, method="DOP853",
     )  # fmt: skip
     return found.t_events[0][0]
-
-
-# ------------------------------------------------------------------ events of a script
 
 
 @pytest.mark.parametrize("d", [1e-2, 1e-4, 1e-6, 1e-8])
@@ -227,9 +223,6 @@ def test_turning_points_close_to_each_other(rise):
             assert [x for x, _ in found] == pytest.approx([a, a + d], abs=1e-2 * d + 1e-13 / d)
 
 
-# ------------------------------------------------------------------ switches of types
-
-
 @pytest.mark.parametrize(
     ("integrator", "settings"),
     [("dop853", TIGHT), ("dopri5", TIGHT), ("adams", TIGHT), ("radau", TIGHT),
@@ -260,10 +253,8 @@ def test_a_stop_just_before_a_turning_point(integrator, settings, method, d):
 )
 def test_no_step_samples_the_law_behind_a_stop(integrator, settings):
     """A bouncing ball, in closed form: no stage lies in contact before the ball touches.
-
     Its damper would take 2800 m/s^2 at once. Instants are known to some roundings of 1 m over
-    4 m/s, which bounces add up.
-    """
+    4 m/s, which bounces add up."""
     scene = dap.Scene(name="drop")
     scene.add_body("b", mass=1.0, Jp=(1.0, 1.0, 1.0), r=(0.0, 0.0, 1.0))
     scene.add_force("weight")

@@ -1,7 +1,5 @@
 """Switches against closed forms: contact, grazing, a disk that lies down, chatter.
-
-Tolerances: rtol 1e-12 leaves some 1e-11 of the largest coordinate after a few pieces of motion.
-"""
+Tolerances: rtol 1e-12 leaves some 1e-11 of the largest coordinate after a few pieces of motion."""
 
 import numpy as np
 import pytest
@@ -217,9 +215,7 @@ def test_the_first_crossings_are_kept(registry):
 @pytest.mark.parametrize(("integrator", "tolerance"), [("dop853", 1e-11), ("radau", 1e-8)])
 def test_a_disk_that_lies_down(integrator, tolerance):
     """On smooth ground the centre falls straight; theta is the angle to the ground.
-
-    (J + m R^2 c^2) theta'' = m R^2 s c theta'^2 - m g R c, integrated by scipy.
-    """
+    (J + m R^2 c^2) theta'' = m R^2 s c theta'^2 - m g R c, integrated by scipy."""
     mass, radius, across, lean = 2.0, 0.5, 0.2, 0.8
     scene = dap.Scene(name="disk")
     # the body's y axis is turned to (sin lean, 0, cos lean)
@@ -310,10 +306,8 @@ def tool_velocity(t):
 )
 def test_an_arm_whose_tool_vibrates_at_500_hz(integrator, settings):
     """All changes of sign are found: of a velocity of the tool, and of a clock, at long steps too.
-
     Independently: products of rotations at 20 000 instants, 1000 in a period. Velocities there are
-    off by what the run is, 1e-5 m/s of 9 m/s at most; accelerations are 3e4 m/s^2.
-    """
+    off by what the run is, 1e-5 m/s of 9 m/s at most; accelerations are 3e4 m/s^2."""
     t_end = 0.04
     events = [
         dap.Event("link5.rd.y", name="tool"),

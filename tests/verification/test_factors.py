@@ -1,7 +1,5 @@
 """Forces and drivers whose factor is a function of time or an input, against closed forms.
-
-Tolerances: rtol 1e-11 over a second leaves some 1e-10.
-"""
+Tolerances: rtol 1e-11 over a second leaves some 1e-10."""
 
 import numpy as np
 import pytest

@@ -1,7 +1,5 @@
 """Springs along axes and of balls, and dry friction of hinges and sliders, against closed forms.
-
-Tolerances: rtol 1e-11 over some seconds leaves some 1e-9 of the largest coordinate.
-"""
+Tolerances: rtol 1e-11 over some seconds leaves some 1e-9 of the largest coordinate."""
 
 import numpy as np
 import pytest
@@ -101,9 +99,7 @@ def test_a_bead_on_a_turning_rod(fields):
 @pytest.mark.parametrize("c", [0.0, 0.4])
 def test_a_ball_spring_swings_about_any_axis(c):
     """J phi'' + c phi' + k phi = 0 of a body with three equal moments, about its rest.
-
-    Up to 2.9 rad, close to half a turn.
-    """
+    Up to 2.9 rad, close to half a turn."""
     J, k, phi = 0.3, 3.0, 2.9
     axis = np.array([1.0, 2.0, -2.0]) / 3.0
     rest = np.array([0.8, 0.0, 0.6, 0.0])  # Euler parameters of the orientation without moment

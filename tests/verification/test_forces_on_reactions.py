@@ -45,9 +45,7 @@ def test_a_brake_pressed_by_another_joint(method, integrator):
 
 def test_a_tyre_loaded_by_its_contact():
     """A locked slide of a wheel: forward and spin velocities meet at the rate of the load's slip.
-
-    With N = m g, u = v - R w decays as exp(-k N (1 / m + R^2 / J) t), by the change of momentum.
-    """
+    With N = m g, u = v - R w decays as exp(-k N (1 / m + R^2 / J) t), by the change of momentum."""
     m, J, R, k = 20.0, 0.9, 0.3, 0.05
     scene = dap.Scene(name="tyre")
     scene.add_body("wheel", mass=m, Jp=(0.5, J, 0.5), r=(0, 0, R), w=(0.0, 10.0, 0.0))

@@ -1,4 +1,4 @@
-"""Functions by points and by pieces: spline, step, and the warning of c."""
+"""Functions by points and by pieces, the warning of c, and rows on the rate of a function."""
 
 import numpy as np
 import pytest
@@ -89,9 +89,8 @@ def test_a_step_is_the_cubic():
 
 def test_a_hump_that_leaves_its_range_says_so():
     """spec 7: u_m = 0.4 undershoots by 1.9 %, 0.3 by 130 %; between 0.43 and 0.57 nothing is said.
-
-    The example of the manual dips to 0.78856 on its way from 1 to 0.8, which is within its range.
-    """
+    The example of the manual dips to 0.78856 on its way from 1 to 0.8, which is within its
+    range."""
 
     def said(**fields):
         import warnings
@@ -113,3 +112,47 @@ def test_a_hump_that_leaves_its_range_says_so():
     fields = {"x_start": 0.0, "x_end": 1.0, "f_end": 0.0, "x_max": 0.3, "f_max": 2.0}
     (note,) = driven("c", **fields).model.notes
     assert note.startswith("function curve (c): reaches -2.6")
+
+
+PLUGIN = """
+from dap3d_core.interface import Joint, Point, function, hookimpl, number, point
+
+interface_version = 1
+
+
+class Lead(Joint):
+    \"\"\"x of P_i is f + T f_dot.\"\"\"
+
+    keyword, rows = "lead", 1
+    drives = True
+    P_i: Point = point()
+    T: float = number()
+    function: str = function()
+
+    def C(r_P_i, f, f_dot, T):
+        return r_P_i[0] - f - T * f_dot
+
+
+@hookimpl
+def dap3d_joints():
+    return [Lead]
+"""
+
+
+@pytest.mark.parametrize("integrator", ["dop853", "radau"])
+def test_a_row_on_the_rate_of_a_function(integrator, tmp_path):
+    """Positions and accelerations of the harmonic function in closed form, to 1e-11 by rounding.
+    The row holds the motion exactly, whatever the steps are."""
+    (tmp_path / "plugin.py").write_text(PLUGIN)
+    made = dap.Scene(name="lead")
+    made.add_body("slide", mass=2.0, Jp=[0.1, 0.1, 0.1], r=[0.3 * 0.5 * 4.0, 0.0, 0.0])
+    made.add_function("harmonic", "f", amplitude=0.5, frequency=4.0)
+    made.add_joint("lead", "drive", P_i="slide.O", T=0.3, function="f")
+    made.save(tmp_path)
+    result = dap.simulate(str(tmp_path), t_end=1.0, dt=0.1, allow_code=True, integrator=integrator)
+    f = [0.5 * 4.0**n * np.sin(4.0 * result.t + n * np.pi / 2) for n in range(4)]
+    np.testing.assert_allclose(result.r[:, 0, 0], f[0] + 0.3 * f[1], atol=1e-11)
+    np.testing.assert_allclose(result.rd[:, 0, 0], f[1] + 0.3 * f[2], atol=1e-11)
+    np.testing.assert_allclose(result.rdd[:, 0, 0], f[2] + 0.3 * f[3], atol=1e-11)
+    force = result.reaction("drive")["i"].force[:, 0]
+    np.testing.assert_allclose(force, 2.0 * (f[2] + 0.3 * f[3]), atol=1e-10)

@@ -180,14 +180,13 @@ def test_a_pressure_angle_presses_a_wheel_in_a_ring_inwards():
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_rubbing_bearings_carry_the_whole_tooth_force(method):
     """With F along the tangent both bearings carry F / cos(20 deg), and brake by mu r of it.
-
-    Far beyond v_tol: T - r_a F - mu r F / cos = J alpha, r_b F - mu r F / cos = J alpha / 2.
-    """
+    Far beyond v_tol: T - r_a F - mu r F / cos = J alpha, r_b F - mu r F / cos = J alpha / 2."""
     scene = wheels(a=(0.0, 0.0), b=(0.3, 0.0))
     pair(scene, "a", "b", teeth_i=20, teeth_j=40)
     torque(scene, "a", 5.0)
     for name in "ab":
-        scene.add_force("friction", f"rub_{name}", joint=f"hinge_{name}", mu=0.3, radius=0.02)
+        scene.add_force("friction", f"rub_{name}", joint=f"hinge_{name}", mu=0.3, radius=0.02,
+                        v_tol=1e-3)  # fmt: skip
     result = dap.simulate(scene, method=method, t_end=0.2, dt=0.1, **TIGHT)
     brake = 0.3 * 0.02 / math.cos(math.radians(20.0))
     alpha, F = np.linalg.solve([[J, 0.1 + brake], [J / 2, brake - 0.2]], [5.0, 0.0])

@@ -134,11 +134,9 @@ def test_a_grid_that_cannot_be(fields, words):
 
 def test_a_ball_on_measured_terrain():
     """Minimal coordinates x, y by SciPy, whose Lagrangian has the height and its derivatives.
-
     m (1 + h_x^2) x'' + m h_x h_y y'' + m h_x (h_xx x'^2 + 2 h_xy x' y' + h_yy y'^2) + m g h_x = 0.
     J and gamma are derived from C alone, with f_x to f_yy in their places. To the runs' own
-    tolerance, 1e-12 a step and some 1e3 steps.
-    """
+    tolerance, 1e-12 a step and some 1e3 steps."""
     surface, g = spline(Z), 9.81
 
     def rhs(_t, q):

@@ -1,8 +1,6 @@
 """Errors that grow: exponentially in a chaotic motion, with a power of time in one that repeats.
-
 The double pendulum is known to 30 digits from its own equations (support/double_pendulum.py), the
-flips of a free body by Jacobi's elliptic functions (benchmarks/hard/flips.py).
-"""
+flips of a free body by Jacobi's elliptic functions (benchmarks/hard/flips.py)."""
 
 import sys
 from decimal import Decimal, localcontext
@@ -60,8 +58,7 @@ def test_the_double_pendulum_by_taylor_series():
 def test_it_says_from_when_on_a_chaotic_motion_is_lost(motion, rtol):
     """Not after it is (but for one instant), and not more than four seconds, two decades, before;
     until then the estimate is at least a third of the true error, and the error grows as two
-    neighbouring motions part: their tenfold time is an average over these 20 s, so within 40 %.
-    """
+    neighbouring motions part: their tenfold time is an average over these 20 s, so within 40 %."""
     t, places, apart = motion
     result = simulated(22.0, rtol)
     true = np.linalg.norm(result.r[:, 1, :2] - places, axis=1)
@@ -86,9 +83,6 @@ def test_the_note_on_a_lost_motion_is_a_warning():
 
 def test_no_note_where_digits_remain():
     assert not any("beyond 0.001" in note for note in simulated(2.0, 1e-8).notes)
-
-
-# ---------------------------------------------------------------------------- flips
 
 
 def test_the_instants_of_the_flips():

@@ -1,10 +1,8 @@
 """Branches that guard a formula guard what is derived from it, and the derivatives of that.
-
 Each type leaves a formula to be derived and guards it where it has no value by itself: a root, a
 quotient, an angle, a power or a logarithm at zero, in one branch or nested ones, in helpers, by
 ==, ~ and &. Expected numbers are limits in closed form. Where a series stands for a function its
-first term left out is below 1e-12 within the guard.
-"""
+first term left out is below 1e-12 within the guard."""
 
 import numpy as np
 import pytest
@@ -140,9 +138,7 @@ def test_guarded_points_are_linearised(type_):
 @pytest.mark.parametrize("integrator", ["dop853", "radau"])
 def test_a_run_begins_at_a_guarded_point(integrator):
     """Thrown from it with 0.01 m/s: x = v / w sin(w t), as far as the spring is linear.
-
-    Its cubic term shifts the frequency by 3/8 x^2 / 10, with x = 1.7 mm 1e-7 of the phase.
-    """
+    Its cubic term shifts the frequency by 3/8 x^2 / 10, with x = 1.7 mm 1e-7 of the phase."""
     compiled = held_by(Outside, ZERO)
     scene = compiled.scene
     scene.bodies["b"].r_dot = (0.01, 0.0, 0.0)
@@ -156,9 +152,7 @@ def test_a_run_begins_at_a_guarded_point(integrator):
 
 class Lock(Joint):
     """The rotation vector of body i is that about z which a function of time prescribes.
-
-    2 atan2(|e|, e0) e / |e| of the Euler parameters, guarded at zero.
-    """
+    2 atan2(|e|, e0) e / |e| of the Euler parameters, guarded at zero."""
 
     keyword, rows, ground_axes = "guarded-lock", 3, True
     body_i: Body = body()
@@ -178,9 +172,7 @@ class Lock(Joint):
 @pytest.mark.parametrize("rate", [0.0, 0.5])
 def test_a_joint_keeps_the_guards_of_its_position(rate):
     """Identity is on the manifold: J is the identity there, and nu the prescribed rate.
-
-    The body follows it through the guard and beyond, at 0.5 rad/s over one second.
-    """
+    The body follows it through the guard and beyond, at 0.5 rad/s over one second."""
     scene = dap.Scene(name="locked")
     scene.add_body("b", mass=1.0, Jp=(0.1, 0.2, 0.3), w=(0.0, 0.0, rate))
     scene.add_function("a", "turn", coeff=(0.0, rate, 0.0))

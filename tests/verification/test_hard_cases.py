@@ -1,9 +1,7 @@
 """Cases of docs/reference/hard-cases.md: what the page says passes does, and references are right.
-
 The cases stand in benchmarks/hard, with their references and what limits their errors: 1000 times
 rtol, and the reason where it is more. Details of many of them are tested elsewhere; the page says
-where. What is not: contact, masses of 1 and 1e9 kg, other units, long runs.
-"""
+where. What is not: contact, masses of 1 and 1e9 kg, other units, long runs."""
 
 import json
 import sys
@@ -12,10 +10,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support import mechanisms, redundant
+from support.internals import store_reference_pivots
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import near_singular_rows, store_reference_pivots
+from dap3d_core.formulations.pivots import near_singular_rows
 
 sys.path.append(str(REPOSITORY / "benchmarks"))
 
@@ -79,9 +78,6 @@ def test_a_ball_bounces_until_it_lies(integrator, rtol):
     assert result.ledger["energy"].ok
 
 
-# ---------------------------------------------------------------------------- the references
-
-
 def test_the_pendulum_by_elliptic_functions():
     """Published digits of A01 at 1, 10 and 100 s, which have 16 of them: 1e-13 at 50 periods."""
     found = references.pendulum(np.array([1.0, 10.0, 100.0]))
@@ -129,9 +125,6 @@ def test_the_cart_keeps_momentum_and_energy():
     assert energy[~np.isnan(energy)] == pytest.approx(0.0, abs=1e-11)
 
 
-# ---------------------------------------------------------------------------- masses and units
-
-
 @pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6, 1e7, 3e7, 1e8, 1e9])
 def test_different_masses_are_no_singular_pose(ratio):
     """1 to 1e9 kg hang on a rod of 1 kg: steps as for 1e2 kg, though a pivot is 1/ratio of another
@@ -172,10 +165,8 @@ def test_velocities_are_projected_though_old_factors_do_not_serve():
 
 def test_other_units_give_the_same_motion():
     """A03 in mm, g and ms and in SI, the same 500 steps of dop853: to 1e-11 of its size.
-
     Factors of 1000 are no powers of two, so every number is rounded, and the motion multiplies that
-    by some 1e3.
-    """
+    by some 1e3."""
     si = dap.simulate(dap.load("A03"), t_end=0.05, dt=0.005, step=1e-4)
     mm = dap.simulate(scenes.squeezer_in_mm(), t_end=50.0, dt=5.0, step=0.1)
     assert mm.r / 1e3 == pytest.approx(si.r, abs=1e-11 * np.max(np.abs(si.r)))
@@ -183,14 +174,9 @@ def test_other_units_give_the_same_motion():
     assert mm.p == pytest.approx(si.p, abs=1e-11)
 
 
-# ---------------------------------------------------------------------------- long time
-
-
 def held(result):
     """|p| to the last digit of 1; residuals below what the projection calls zero.
-
-    That is 1e-15 times 1 + the largest coordinate or speed, here below 6: and a few roundings.
-    """
+    That is 1e-15 times 1 + the largest coordinate or speed, here below 6: and a few roundings."""
     found = long_time.drifts(result)
     assert np.max(found["p"]) <= EPS
     if "C" in found:
@@ -233,9 +219,6 @@ def test_at_rounding_drifts_grow_with_the_root_of_the_steps(run, step):
     limit = 8.0 * EPS * np.sqrt(result.stats.steps)
     assert np.max(found["energy"]) < limit
     assert "L" not in found or np.max(found["L"]) < limit
-
-
-# ---------------------------------------------------------------------------- the page
 
 
 def test_the_page_shows_its_figures():

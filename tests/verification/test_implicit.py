@@ -23,8 +23,6 @@ def radau(scene, t, **settings):
     return dap.simulate(scene, t_end=t, integrator="radau", **({"dt": t} | settings))
 
 
-# ---------------------------------------------------------------------------- stiff scenes
-
 #: A05: height of the slider (benchmarks, section 1).
 GOVERNOR = {0.05: 0.506100897244, 0.1: 0.5238364755696, 0.5: 0.7432494247863}
 
@@ -46,10 +44,8 @@ def test_governor(governor, t):
 @pytest.mark.slow
 def test_governor_in_a_fiftieth_of_the_steps(governor):
     """A05 over 10 s at e = 1e-3 (benchmarks, section 0): 50 times fewer steps than rk4 needs.
-
     rk4 is unstable above 3.4e-4 s (its interval 2.785 over the eigenvalue -8117 1/s), so it takes
-    29 400 steps. The reference is this method at 1e-9, which the test above holds to the digits.
-    """
+    29 400 steps. The reference is this method at 1e-9, which the test above holds to the digits."""
     t, dt = 10.0, 0.1
     fine = radau(governor, t, dt=dt, rtol=1e-9, atol=1e-11)
     coarse = radau(governor, t, dt=dt, rtol=1e-2, atol=1e-4)
@@ -60,10 +56,9 @@ def test_governor_in_a_fiftieth_of_the_steps(governor):
 
 def test_stiff_spring_is_a_rod():
     """A spring of 1e9 N/m instead of the rod of A01: the pendulum's closed form to its stretch.
-
     The stretch is tension / stiffness, below 3e-8 m; with the tension it changes the period by as
-    much. The spring's own frequency is 3.2e4 1/s, for which rk4 (2.785 over it) takes 11 350 steps.
-    """
+    much. The spring's own frequency is 3.2e4 1/s, for which rk4 (2.785 over it) takes 11 350
+    steps."""
     scene = dap.Scene(name="spring pendulum")
     scene.add_body("bob", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(-1.0, 0.0, 0.0))
     scene.add_force("ptp", "spring", P_i="bob.O", P_j="ground.O", k=1e9, l0=1.0)
@@ -78,9 +73,6 @@ def test_stiff_spring_is_a_rod():
     assert abs(radial) < 1e-6
 
 
-# ---------------------------------------------------------------------------- orders
-
-
 def order_of(errors, ratio=2.0):
     return np.log(errors[:-1] / errors[1:]) / np.log(ratio)
 
@@ -91,9 +83,7 @@ PENDULUM = np.array([0.98629175113187532, -0.16501085312554117, 0.29690551591631
 
 def test_order_on_the_pendulum():
     """A01 with fixed steps: order 5 within 0.2 in position, velocity and reported tension.
-
-    Index-3 codes lose an order in each of them in turn.
-    """
+    Index-3 codes lose an order in each of them in turn."""
     found = []
     for n in (20, 40, 80):
         result = radau(
@@ -109,8 +99,7 @@ def test_order_on_the_pendulum():
 def test_the_order_rises_where_the_error_limits_the_steps(rtol, steps):
     """A01 over 10 s at 100 instants, nearly all within steps, by Jacobi's functions. Three stages
     alone take 1774 and 8400 steps: a hundredth of the tolerance is 10^(4/3 / 4) = 3.2 to 4.6 times
-    the steps of order 5, and 1.8 times those of order 13.
-    """
+    the steps of order 5, and 1.8 times those of order 13."""
     result = radau(problems.pendulum(), 10.0, dt=0.1, rtol=rtol, atol=rtol / 100)
     x, y, vx, vy = references.pendulum(result.t).T
     found = np.column_stack([result.r[:, 0, :2], result.rd[:, 0, :2]])
@@ -169,10 +158,8 @@ def test_order_of_the_multipliers_of_the_stages():
 
 def test_multipliers_of_the_heavy_top_do_not_oscillate():
     """G4, fast precession: the force at the pivot at every step against the closed form, order 5.
-
     In steady precession the centre goes round at radius l sin(theta): F = m (r_ddot + g z). An
-    oscillation from step to step would not fall with h^5, for its sum does not.
-    """
+    oscillation from step to step would not fall with h^5, for its sum does not."""
     theta, W = np.radians(30.0), 56.7367666236016186
     found = []
     for n in (100, 200):
@@ -210,8 +197,7 @@ def test_components_at_zero_do_not_loosen_the_iteration(w, rtol):
     """A rod that turns 24 times about a hinge, against SciPy: components that stay zero have the
     absolute tolerance, below the rounding of the large ones. The iteration for all of them ended at
     a tenth of the tolerance for that, with an error of 5e-6 at 1e-10. A step adds up to rtol, some
-    6000 do, and 24 turns make of it an angle 150 times as large: 150 rtol is a tenth of it.
-    """
+    6000 do, and 24 turns make of it an angle 150 times as large: 150 rtol is a tenth of it."""
     scene = dap.Scene(name="spun")
     c, s = np.cos(1.0), np.sin(1.0)
     scene.add_body("b", mass=1.0, Jp=(1 / 12, 1 / 12, 1 / 12), r=(s, 0.0, -c),

@@ -76,9 +76,7 @@ def test_a_parcel_creeps_down_a_vibrating_incline_on_which_it_would_rest():
 
 def test_a_ball_rolls_in_a_groove_and_boxes_slide_beside_it():
     """In a V of half angle a it rolls on a radius R sin a: g sin / (1 + 0.4 / sin^2 a).
-
-    A box slides by g (sin - mu cos), and takes another along that stands on it.
-    """
+    A box slides by g (sin - mu cos), and takes another along that stands on it."""
     scene, half, R = dap.Scene(name="groove"), np.radians(40.0), 0.05
     for name, side in (("left", 1.0), ("right", -1.0)):
         scene.add_vector(name, "ground", (np.sin(SLOPE) * np.sin(half), side * np.cos(half),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.rotations import rotation
 from support.stewart import stewart
 
 import dap3d_core as dap
@@ -9,19 +10,12 @@ import dap3d_core as dap
 GRAVITY = np.array([0.0, 0.0, -9.81])
 
 
-def matrix(p):
-    """The rotation matrix of Euler parameters."""
-    e0, e = p[0], p[1:]
-    skew = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
-    return (2 * e0 * e0 - 1) * np.eye(3) + 2 * (np.outer(e, e) + e0 * skew)
-
-
 class Body:
     """Motion, and inertial force and moment, of a body of a result at an instant."""
 
     def __init__(self, result, name, k, mass, J):
         b = result.summary.body_index[name]
-        self.A = matrix(result.p[k, b])
+        self.A = rotation(result.p[k, b])
         self.r, w = result.r[k, b], result.w[k, b]
         inertia = self.A @ np.diag(J) @ self.A.T
         self.force = mass * (result.rdd[k, b] - GRAVITY)  # what all but the weight gives
@@ -30,9 +24,7 @@ class Body:
 
 def test_driven_legs_of_a_stewart_platform_bear_what_newton_and_euler_say():
     """Thirteen bodies: each leg as a beam about its foot, then six equations of the platform.
-
-    1e-10 of the largest force: rounding times the condition of the equations, some hundred.
-    """
+    1e-10 of the largest force: rounding times the condition of the equations, some hundred."""
     scene = stewart(50.0, 2.0, 100.0, spins=False)
     result = dap.kinematics(scene, t_end=0.5, dt=0.1)
     heads = {k: np.array(scene.points[f"head{k}"].sPp) for k in range(6)}
@@ -104,9 +96,7 @@ def lines_of(scene, body):
 @pytest.mark.parametrize("number", [6, 8])
 def test_tensions_of_a_platform_are_those_of_newton_and_euler(number):
     """As many legs as freedoms: their one solution; more: the least of all, and a note.
-
-    The motion is that of a run of the platform on springs: its accelerations are exact.
-    """
+    The motion is that of a run of the platform on springs: its accelerations are exact."""
     motion = dap.simulate(platform_on_lines(number, spring=True), t_end=0.3, dt=0.1)
     scene = platform_on_lines(number, spring=False)
     result = dap.inverse(scene, motion, [f"leg{k}" for k in range(number)])

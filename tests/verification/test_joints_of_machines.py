@@ -1,8 +1,6 @@
 """Joints screw, planar, parallel, inline, inplane and cv, and the bushing, against closed forms.
-
 Runs at rtol 1e-11: errors of some 1e-10 of what moves are to be expected, tolerances are ten times
-that.
-"""
+that."""
 
 import numpy as np
 import pytest
@@ -192,9 +190,7 @@ def test_a_bushing_swings_in_each_of_six_directions(axis):
 
 def test_a_bushing_by_its_whole_matrix():
     """Small motions obey M x'' + C x' + K x = 0 with 6 x 6 matrices, whose frequencies modes have.
-
-    Eigenvalues of the symmetric problem by numpy; they agree to rounding.
-    """
+    Eigenvalues of the symmetric problem by numpy; they agree to rounding."""
     rng = np.random.default_rng(4)
     half = rng.normal(size=(6, 6)) * np.array([500.0] * 3 + [30.0] * 3)
     k = half @ half.T + np.diag(STIFF)

@@ -25,10 +25,8 @@ def case(name):
 @pytest.mark.parametrize("name", [SLIDER, FOURBAR, WISHBONE])
 def test_motion_and_driving_moment_are_those_of_the_closed_form(name):
     """Positions, velocities, accelerations and the driver's multiplier, to 1e-12.
-
     Rounding alone is left: eps times the condition of the rows, of order ten here, and for
-    accelerations and moments times the squared rate, below 50.
-    """
+    accelerations and moments times the squared rate, below 50."""
     mechanism, scene, q_0, (_, c2, c3) = case(name)
     t_end, steps = (2.0, 4) if name != WISHBONE else (0.5, 2)  # its closed form takes seconds
     result = dap.kinematics(scene, t_end=t_end, dt=t_end / steps)

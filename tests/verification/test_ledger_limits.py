@@ -1,8 +1,6 @@
 """The ledger says no to nonsense, and yes to motions that are as exact as was requested.
-
 Its limits stay within a hundredth of the scene's scales, whatever the tolerances and however far a
-run has blown up.
-"""
+run has blown up."""
 
 import numpy as np
 import pytest
@@ -82,10 +80,8 @@ def test_no_alarm_where_a_motion_is_as_exact_as_requested(name, integrator, rtol
 
 def test_the_work_of_radau_is_as_exact_as_its_motion():
     """x = 1.3 cos 2 t; the work of the spring is 2 (1.3^2 - x^2), in J.
-
     Its rate, 4 x x_dot, changes twice as fast as the motion: a method of order 13 has 2^13 times
-    the relative error of it. Powers at stages that the iteration had not found yet gave 2e-9.
-    """
+    the relative error of it. Powers at stages that the iteration had not found yet gave 2e-9."""
     result = dap.simulate(
         oscillator(), t_end=20.0, dt=0.05, rtol=1e-12, atol=1e-14, integrator="radau"
     )

@@ -1,9 +1,7 @@
 """Types of more than three bodies, through every formulation and integrator, with derived formulas.
-
 A string of constant length runs from one weight to four others: the sum of its four parts is
 constant. It has no mass, and all its points are mass centres: particles, whose motion numpy and
-SciPy find without anything of dap3d.
-"""
+SciPy find without anything of dap3d."""
 
 import numpy as np
 import pytest

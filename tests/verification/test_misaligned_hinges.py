@@ -1,9 +1,7 @@
 """A door on hinges that do not quite agree: it swings, is refused in words, or stands still.
-
 Strictly it is locked by any misalignment, with reactions that grow as its inverse. Joints are put
 together to 1e-8 and no more, so that below this hinges count as redundant and the door swings as
-the one with hinges in line does.
-"""
+the one with hinges in line does."""
 
 import sys
 

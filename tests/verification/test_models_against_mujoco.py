@@ -167,6 +167,56 @@ def test_exported_meshes_are_found_at_the_default_place(tmp_path, monkeypatch):
         assert mujoco.MjModel.from_xml_path(target).nmesh == 2
 
 
+KEYED = """<mujoco><compiler angle="radian"/><worldbody>
+  <body name="hand" mocap="true" pos="1 0 0"><geom size="0.1"/></body>
+  <body name="a" pos="0 0 1"><freejoint/><geom type="box" size="0.1 0.2 0.3" pos="0.1 0 0"/>
+    <body name="b"><joint name="b" type="ball"/><geom type="box" size="0.3 0.2 0.1" pos="0 0 0.2"/>
+    </body><frame pos="0.2 0 0" euler="0 0 0.3"><body name="c"><joint name="c" ref="0.4"/>
+    <joint name="s" type="slide" axis="1 0 0"/><geom size="0.1" pos="0 0.1 0"/></body></frame>
+    </body></worldbody><actuator><position joint="c" kp="3"/><general joint="s" dyntype="filter"/>
+  <motor joint="c"/></actuator><keyframe><key name="low" qpos="0 0 0.5 1 0 0 0 1 0 0 0 0 0"/>
+  <key name="high" qpos="0.3 -0.2 2 0.6 0 0.8 0 0.8 0.6 0 0 -0.7 0.2" mpos="0 0 3" mquat="0 1 0 0"
+  qvel="0.1 0.2 0.3 -0.4 0.5 0.6 1 -1 0.5 0.3 -0.2" act="0.6" ctrl="0.1 0.2 0.3"/></keyframe>
+  </mujoco>"""
+
+
+@pytest.mark.parametrize("key", ["low", "high"])
+def test_a_keyframe_is_where_the_scene_starts(tmp_path, key):
+    """Poses, velocities, controls and activations, and the accelerations with these."""
+    path = tmp_path / "a.xml"
+    path.write_text(KEYED)
+    oracle = Oracle(path)
+    oracle.mujoco.mj_resetDataKeyframe(oracle.model, oracle.data, oracle.model.key(key).id)
+    oracle.mujoco.mj_forward(oracle.model, oracle.data)
+    scene, report = dap.import_model(path, key=key)
+    assert not report.left_out
+    assert [one.value for one in scene.inputs.values()] == oracle.data.ctrl.tolist()
+    result = dap.simulate(scene, t_end=0.0)
+    for name in "abc":
+        b, k = oracle.model.body(name).id, list(scene.bodies).index(name)
+        velocity = np.zeros(6)
+        oracle.mujoco.mj_objectVelocity(
+            oracle.model, oracle.data, oracle.mujoco.mjtObj.mjOBJ_BODY, b, velocity, 0
+        )
+        np.testing.assert_allclose(result.r[0, k], oracle.data.xipos[b], rtol=0, atol=1e-14)
+        np.testing.assert_allclose(result.w[0, k], velocity[:3], rtol=0, atol=1e-14)
+        found = np.concatenate([result.rdd[0, k], result.wd[0, k]])
+        expected = oracle.acceleration(b, oracle.group(b)[1])
+        # the link between the two joints of c has 1e-11 of its mass
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    (hand,) = [one.fields["at"] for one in scene.shapes.values() if one.fields["body"] == "ground"]
+    np.testing.assert_allclose(hand, oracle.data.xpos[oracle.model.body("hand").id], atol=1e-15)
+
+
+@pytest.mark.parametrize(("key", "said"), [("middle", "it has low, high"), ("", "no keyframe ''")])
+def test_a_keyframe_that_is_not_there_is_refused(tmp_path, key, said):
+    (tmp_path / "a.xml").write_text(KEYED)
+    with pytest.raises(dap.SceneError, match=said):
+        dap.import_model(tmp_path / "a.xml", key=key)
+    with pytest.raises(dap.SceneError, match="has no keyframes"):
+        dap.import_model(DATA / "arm.urdf", key=key)
+
+
 def test_motors_and_servos():
     """Inputs through gears, on sliders and a hinge with a spring; servos with gains and biases."""
     oracle = Oracle(DATA / "cart.xml")

@@ -1,17 +1,15 @@
 """Eigenvalues of linearised scenes against closed forms, to 1e-10 of each.
-
 Expected values come from formulas of textbooks or from matrices of minimal coordinates, none of
-which this code has.
-"""
+which this code has."""
 
 import numpy as np
 import pytest
 from scipy.linalg import eigvals
+from support.rotations import rotation
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
+from dap3d_core.simulation.linearization.linearization import lowest_eigenvalues
 from dap3d_core.simulation.linearization.operating_point import operating_point
-from dap3d_core.simulation.linearization.sparse_modes import lowest_eigenvalues
 
 G = 9.81
 ROD = [1 / 12, 1 / 12, 1e-3]
@@ -53,10 +51,8 @@ def test_compound_pendulum():
 
 def test_weights_that_springs_carry():
     """Where loads balance but for rounding, at rest, it is an equilibrium: f alone is no scale.
-
     A ball under two springs of 40 N/m and 1 m, drawn out by m g / k each: up and down
-    sqrt(k_sum / m), sideways sqrt(g / length) of the drawn length, as a pendulum.
-    """
+    sqrt(k_sum / m), sideways sqrt(g / length) of the drawn length, as a pendulum."""
     scene = dap.Scene(name="balance")
     scene.add_body("ball", mass=2.0, Jp=[0.06] * 3, r=[0, 0, -1.0 - 2.0 * G / 80.0])
     for name in ("one", "other"):
@@ -83,9 +79,7 @@ def test_inverted_pendulum():
 
 def test_parallelogram():
     """Three rods, a closed loop with three redundant rows: omega^2 = 6/5 g / l.
-
-    Lagrange: (2/3 m + m) l^2 phi'' = -(2 m l / 2 + m l) g phi.
-    """
+    Lagrange: (2/3 m + m) l^2 phi'' = -(2 m l / 2 + m l) g phi."""
     scene = dap.Scene(name="parallelogram")
     scene.add_body("left", mass=1.0, Jp=np.diag(ROD), r=[0, 0, -0.5])
     scene.add_body("right", mass=1.0, Jp=np.diag(ROD), r=[1, 0, -0.5])
@@ -147,9 +141,7 @@ def test_furuta_pendulum():
 @pytest.mark.parametrize("count", [3, 12])
 def test_chain_of_point_masses(count):
     """A string with equal masses: omega^2 l / g are the zeros of the Laguerre polynomial L_n.
-
-    Each frequency is there in both planes. Masses spin freely: 3 n zero pairs besides.
-    """
+    Each frequency is there in both planes. Masses spin freely: 3 n zero pairs besides."""
     scene = dap.Scene(name="string")
     for k in range(count):
         scene.add_body(f"b{k}", mass=1.0, Jp=0.1 * np.eye(3), r=[0, 0, -k - 1.0])
@@ -187,9 +179,7 @@ def test_line_of_masses():
 @pytest.mark.slow
 def test_thousand_bodies():
     """The lowest ten modes of a line of a thousand masses, from sparse matrices.
-
-    omega_1 is 1/640 of omega_n; of omega^2 that is 2e-6, which leaves 1e-10 of rounding.
-    """
+    omega_1 is 1/640 of omega_n; of omega^2 that is 2e-6, which leaves 1e-10 of rounding."""
     lin = dap.linearize(line_of_masses(1000))
     expected = 20.0 * np.sin(np.arange(1, 11) * np.pi / 2002)
     np.testing.assert_allclose(2 * np.pi * lin.frequencies, expected, rtol=RTOL)
@@ -227,11 +217,9 @@ def disk(R, m, spin):
 @pytest.mark.parametrize("factor", [0.5, 0.999, 1.001, 3.0])
 def test_rolling_disk(factor):
     """A disk that rolls upright: stable above omega^2 = g / (3 R) (Neimark and Fufaev, 1972).
-
     lambda^2 = -C (C + m R^2) omega^2 / (A (A + m R^2)) + m g R / (A + m R^2), with A and C the
     inertias about a diameter and the axle. Of the eight states six have eigenvalue zero: place,
-    heading, spin and the speeds of the last two.
-    """
+    heading, spin and the speeds of the last two."""
     R, m = 0.3, 2.0
     A, C, rolling = m * R * R / 4, m * R * R / 2, m * R * R
     spin = factor * np.sqrt(G / (3 * R))
@@ -275,9 +263,7 @@ def test_sleeping_top():
 
 def test_nutation_of_a_precessing_top():
     """Nutation about steady precession: A x^2 = V''(tilt), V the effective potential.
-
-    V = (p_phi - p_psi cos)^2 / (2 A sin^2) + m g h cos, its second derivative by hand below.
-    """
+    V = (p_phi - p_psi cos)^2 / (2 A sin^2) + m g h cos, its second derivative by hand below."""
     tilt, turn = 0.6, 4.0
     c, s = np.cos(tilt), np.sin(tilt)
     spin = (A * turn**2 * c + MGH) / (C * turn)  # steady precession
@@ -295,10 +281,8 @@ def test_nutation_of_a_precessing_top():
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_satellite(axis):
     """Spin about a principal axis: lambda^2 = omega^2 (J2 - J1)(J3 - J2) / (J1 J3) for the middle.
-
     In general -(J_s - J_a)(J_s - J_b) omega^2 / (J_a J_b) about axis s. Position and heading of the
-    body are neutral; where the axis points, seen from the body, turns with omega.
-    """
+    body are neutral; where the axis points, seen from the body, turns with omega."""
     J, spin = np.array([1.0, 2.0, 3.0]), 5.0
     p = np.array([0.9, 0.1, 0.3, -0.2]) / np.linalg.norm([0.9, 0.1, 0.3, -0.2])
     scene = dap.Scene(name="satellite")
@@ -315,10 +299,8 @@ def test_satellite(axis):
 
 def test_spinning_structure():
     """Two masses on a spring that turn about each other: radial x^2 = k / mu + 3 omega^2.
-
     mu = m / 2 the reduced mass, the orbit as long as the spring's pull holds it. From the central
-    force: mu (r'' - h^2 / r^3) = -k (r - l), r'' = -(k / mu + 3 omega^2) dr.
-    """
+    force: mu (r'' - h^2 / r^3) = -k (r - l), r'' = -(k / mu + 3 omega^2) dr."""
     m, k, l0, spin = 2.0, 50.0, 1.0, 3.0
     length = k * l0 / (k - 0.5 * m * spin**2)
     scene = dap.Scene(name="dumb-bell")
@@ -335,10 +317,8 @@ def test_spinning_structure():
 
 def test_governor():
     """A rod on a hinge of a shaft that a driver turns: it swings about its angle in steady turn.
-
     With I, I_3 across and along the rod, about its hinge, c = cos of the angle from the vertical:
-    (I - I_3) W^2 c = m g l, and I x^2 = -(I - I_3) W^2 (2 c^2 - 1) + m g l c.
-    """
+    (I - I_3) W^2 c = m g l, and I x^2 = -(I - I_3) W^2 (2 c^2 - 1) + m g l c."""
     turn, m, half = 6.0, 1.0, 0.5
     across, along = 1 / 12 + m * half**2, 1e-3
     c = m * G * half / ((across - along) * turn**2)
@@ -365,9 +345,7 @@ def test_governor():
 
 def test_the_campbell_diagram_of_the_rotor_model():
     """Tilting J_t z.. + (c_r - i W J_p) z. + k_r z = 0, and translation, at each speed W.
-
-    Without its unbalance, with which the state is no steady motion and numbers change by 8e-6.
-    """
+    Without its unbalance, with which the state is no steady motion and numbers change by 8e-6."""
     scene = dap.load("rotor")
     scene.parameters["e"] = scene.parameters["acceleration"] = 0.0
     found = dap.modes_over(scene, "parameters.speed", [0.0, 150.0, 400.0])

@@ -135,9 +135,7 @@ def test_a_motor_saturates(kind, field, name):
 @pytest.mark.parametrize(("kind", "name"), [("rev", "angle"), ("tran", "length")])
 def test_a_speed_within_a_limit(kind, name):
     """I e' = -L tanh(e / c) of the error e: sinh(e / c) falls by exp(-L t / (I c)).
-
-    Under a load it is missed by c artanh(load / L).
-    """
+    Under a load it is missed by c artanh(load / L)."""
     limit, tolerance, speed = 4.0, 0.5, 3.0
     inertia = J if kind == "rev" else M
     scene = machine(kind)
@@ -161,9 +159,7 @@ def test_a_speed_within_a_limit(kind, name):
 )
 def test_a_prescribed_speed(way, swapped, kind, name):
     """The rate is the speed, whichever body is i; the multiplier is inertia times acceleration.
-
-    Rows are kept to 1e-10.
-    """
+    Rows are kept to 1e-10."""
     value, _ = WAYS[way]
     scene = machine(kind, swapped)
     which = {"coordinate": name} if (kind, name) == ("cyl", "length") else {}
@@ -273,18 +269,15 @@ def test_kinematics_over_the_coordinate_of_a_motor():
         ("joint", {"speed": 1.0, "limit": 2.0}, r"the force motor has it: \[forces.NAME\]"),
         ("joint", {"speed": 1.0, "a_j": "ground.x"}, "give joint or a_j, not both"),
         ("force", {}, "give torque, force, speed or position"),
-        (
-            "force",
-            {"position": 1.0},
-            "a position needs k here; one that is held exactly is a joint",
-        ),
+        ("force", {"position": 1.0},
+         "a position needs k here; one that is held exactly is a joint"),
         ("force", {"speed": 1.0}, "a speed needs a limit here; without one it is a joint motor"),
         ("force", {"torque": 1.0, "force": 1.0}, "give torque or force, not both"),
         ("force", {"position": 1.0, "speed": 1.0}, "give speed or position, not both"),
         ("force", {"force": 1.0}, "the coordinate is an angle, which a torque changes"),
         ("force", {"torque": 1.0, "limit": -1.0}, "limit = -1.0: should be greater than 0"),
     ],
-)
+)  # fmt: skip
 def test_a_wrong_motor_is_refused(table, fields, words):
     scene = machine()
     add = scene.add_joint if table == "joint" else scene.add_force

@@ -1,10 +1,8 @@
 """Names are what is written: no letter stands for another, composed or not.
-
 Python's parser takes identifiers in Unicode's form NFKC, in which a micro sign is a Greek mu, a
 ligature its letters, a full-width letter an ASCII one. Scenes do not: such names are different, and
 each must give its own number. What is the same text by Unicode (form NFC: an e with an accent as
-one character or as two) is one name. The expected numbers are those that the scenes give.
-"""
+one character or as two) is one name. The expected numbers are those that the scenes give."""
 
 import unicodedata
 

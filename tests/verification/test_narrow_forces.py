@@ -1,7 +1,6 @@
 """Functions of an argument that act over less than a step goes by: no step passes over them.
-
-References are integrals over the way: a body that is braked by F(x) leaves with v^2 = 1 - 2 W / m.
-"""
+References are integrals over the way: a body that is braked by F(x) leaves with v^2 = 1 - 2 W /
+m."""
 
 import numpy as np
 import pytest

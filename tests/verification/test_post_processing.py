@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 from support import problems
+from support.rotations import rotation
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
 
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}
 STEP = 1e-3
@@ -115,14 +115,9 @@ def test_multipliers_fulfil_the_equations_of_motion(result):
     np.testing.assert_allclose(found, joints, atol=1e-9 * (1 + np.abs(joints).max()))
 
 
-# ---------------------------------------------------------------------------- reactions
-
-
 def test_tension_of_the_pendulum():
     """A01 over 10 s: the rod pulls the bob towards the pivot with -3 m g y, to 1e-8 (closed form).
-
-    28.294567206067251 N at t = 10 s: elliptic functions (benchmarks.md, A01).
-    """
+    28.294567206067251 N at t = 10 s: elliptic functions (benchmarks.md, A01)."""
     result = dap.simulate(problems.pendulum(), t_end=10.0, dt=0.1, rtol=1e-11, atol=1e-13)
     on, r = result.reaction("rod"), result.r[:, 0]
     tension = -3 * 9.81 * r[:, 1]
@@ -157,9 +152,7 @@ def test_hanging_chain():
 
 def test_shelf_on_an_upright_hinge():
     """A shelf of 3 kg at rest, 0.4 m from its hinge: the hinge bears m g and the moment m g a.
-
-    The shelf is turned by 30 deg about the upright axis: in its own axes all stays as it was.
-    """
+    The shelf is turned by 30 deg about the upright axis: in its own axes all stays as it was."""
     mass, arm, turn = 3.0, 0.4, np.radians(30.0)
     out = np.array([np.cos(turn), np.sin(turn), 0.0])
     across = np.array([-np.sin(turn), np.cos(turn), 0.0])

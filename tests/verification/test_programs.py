@@ -1,9 +1,7 @@
 """Programs of scenes: every shipped model, formulation and integrator has the bits of general code.
-
 Elements with unknowns, states, friction and tables among them, as far as the scenes of the example
 package have them. Rows are compared as numbers: 0.0 equals -0.0. Programs are optimised in the long
-verification, and in unit/formulations/programs.
-"""
+verification, and in unit/formulations/programs."""
 
 from types import SimpleNamespace
 

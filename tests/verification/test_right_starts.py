@@ -57,9 +57,7 @@ CHAINS = [
 @pytest.mark.parametrize(("lengths", "end"), CHAINS)
 def test_a_chain_drawn_straight_is_assembled(lengths, end, joint):
     """Its bars lie end to end, from the origin to its pivot; a note says how they were turned.
-
-    A residual of 1e-10 m closes a joint (simulation/initial/assemble.py).
-    """
+    A residual of 1e-10 m closes a joint (simulation/initial/assemble.py)."""
     result = dap.simulate(straight(lengths, end, joint=joint), t_end=0.0, dt=0.1)
     ends = ends_of(result, lengths)
     np.testing.assert_allclose(ends[0, 0], 0.0, atol=2e-10)
@@ -138,9 +136,6 @@ def test_a_chain_that_lies_straight_in_its_place_stays():
     assert not any("turned by" in note for note in result.notes)
 
 
-# ------------------------------------------------------------------ springs without a length
-
-
 def sprung(*, k=4.0, c=0.0, r=(0.0, 0.0, 0.0), v=(0.0, 0.5, 0.0), weight=False, **fields):
     """A body of 1 kg on a spring to the origin."""
     scene = dap.Scene(name="sprung")
@@ -216,16 +211,13 @@ def test_a_spring_without_natural_length_may_begin_at_its_anchor(name, integrato
     np.testing.assert_allclose(result.energy.potential, spring + weight, atol=1e-12)
 
 
-def test_rate_and_tension_at_the_anchor_are_those_of_the_motion():
+def test_rate_tension_and_stiffness_at_the_anchor_are_those_beside_it():
+    """Of the motion; at rest w = sqrt(k / m) = 2 rad/s in three directions."""
     result = dap.simulate(sprung(c=1.0), t_end=1.0, dt=0.1)
     assert result.quantity("spring.length_rate").values[0] == pytest.approx(0.5)
     assert result.quantity("spring.tension").values[0] == pytest.approx(0.5)  # c 0.5 m/s
-
-
-def test_stiffness_at_the_anchor_is_that_beside_it():
-    """Both have w = sqrt(k / m) = 2 rad/s along x."""
     values = dap.linearize(sprung(v=(0.0, 0.0, 0.0))).eigenvalues
-    assert np.sort(np.abs(values.imag))[-6:] == pytest.approx(2.0)  # in three directions
+    assert np.sort(np.abs(values.imag))[-6:] == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize(

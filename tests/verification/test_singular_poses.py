@@ -1,9 +1,7 @@
 """Redundant rows, and motion through singular poses, against closed equations and published digits.
-
 The reference of A02 is its one closed equation, solved to 1e-12; the error e is that of
 benchmarks.md, section 0. Between rtol 1e-8 and the end lie ten crossings or so of the pose with all
-links in line, and ten seconds that multiply an error by about 100.
-"""
+links in line, and ten seconds that multiply an error by about 100."""
 
 import numpy as np
 import pytest
@@ -68,9 +66,7 @@ def test_four_bars_through_every_crossing(count, integrator):
 @pytest.mark.parametrize("rtol", [1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12])
 def test_independent_rows_cross_as_well_at_every_tolerance(rtol):
     """The standard formulation, N = 1 made free of redundancy: the error follows the tolerance.
-
-    It is some 100 times the tolerance, and its part of a step's error is at least a hundredth.
-    """
+    It is some 100 times the tolerance, and its part of a step's error is at least a hundredth."""
     result = dap.simulate(problems.four_bar(), t_end=10.0, dt=0.5, rtol=rtol, atol=rtol / 100)
     assert result.method == "standard"
     expected = redundant.four_bars_tip(1, result.t)
@@ -150,9 +146,8 @@ def crossings_of(result):
 def test_the_implicit_integrator_is_taken_across(make, rtol):
     """A02, N = 1, with and without redundant rows: radau stopped at the first or second crossing.
     At 1e-6 its own steps reach across all of them but one, as they fall.
-
-    Ten seconds multiply an error by about 100, and steps of radau may have 5 times the tolerance.
-    """
+    Ten seconds multiply an error by about 100, and steps of radau may have 5 times the
+    tolerance."""
     result = dap.simulate(
         make(), t_end=10.0, dt=0.5, integrator="radau", rtol=rtol, atol=rtol / 100
     )
@@ -182,9 +177,8 @@ def test_an_event_within_a_crossing_of_the_implicit_integrator():
 def test_where_the_implicit_integrator_cannot_be_taken_across_the_remedy_is_told(settings):
     """Steps are not placed about a pose where projection is off, or they are fixed; at looser
     tolerances one goes across by itself.
-
-    The time of the pose, y = 0, is foretold from the last step to a part of a step (4 m/s, 0.01 s).
-    """
+    The time of the pose, y = 0, is foretold from the last step to a part of a step (4 m/s, 0.01
+    s)."""
     with pytest.raises(dap.SimulationError, match="radau cannot cross the singular pose at") as e:
         dap.simulate(redundant.four_bars(1), t_end=2.0, dt=0.1, integrator="radau", **settings)
     assert "dop853 and auto can" in str(e.value)
@@ -209,9 +203,8 @@ def test_door_on_two_hinges():
 @pytest.mark.parametrize("rtol", [1e-8, 1e-10, 1e-11, 1e-12])
 def test_a_dead_centre_that_is_singular_in_two_ways(rtol):
     """The measure falls with the square of the distance: from 1e-11 on the run stopped ahead of it.
-
-    Closed form. Work beside the pose is known to 1e-9 J, by which the energy line at 1e-12 is off.
-    """
+    Closed form. Work beside the pose is known to 1e-9 J, by which the energy line at 1e-12 is
+    off."""
     result = dap.simulate(
         redundant.dead_centre(), t_end=2.0, dt=0.08, integrator="dop853", rtol=rtol, atol=rtol / 100
     )

@@ -192,7 +192,7 @@ def bearings():
     scene.add_joint("test-bearing", "b1", P_i="wheel.O", P_j="ground.O", a_i="wheel.z",
                     stiffness=100.0, g=0.01, **axes)  # fmt: skip
     scene.add_force("weight", "gravity")
-    scene.add_force("friction", "rubbing", joint="b1", mu=0.3)
+    scene.add_force("friction", "rubbing", joint="b1", mu=0.3, v_tol=1e-3)
     return scene
 
 

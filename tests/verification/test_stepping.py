@@ -163,6 +163,33 @@ def test_a_pair_without_loss_keeps_its_energy():
     assert energy[-1] == pytest.approx(energy[0], rel=1e-12)
 
 
+@pytest.mark.parametrize(("e", "left"), [(1.0, 1.0), (0.9, 0.0)])
+def test_a_ball_that_bounces_has_the_energy_of_its_height(e, left):
+    """20 s at 10 ms: all of it, or none where it has come to rest; limit: rounding."""
+    result = dap.simulate(ball(height=1.0, v=0.0, e=e), t_end=20.0, dt=1.0, contact_step=1e-2)
+    energy = result.energy.total - 2.0 * G * 0.1
+    assert abs(energy[-1] / energy[0] - left) < 1e-12
+
+
+@pytest.mark.parametrize(("mu", "most"), [(0.0, 0.03), (0.5, 1e-3)])
+def test_a_box_that_tumbles_does_not_gain_energy(mu, most):
+    """e = 1, 20 s at 1 ms; limits: of order h, of some 40 impacts. By Newton's law alone: 0.033."""
+    scene = dap.Scene(name="box")
+    scene.add_body("box", mass=1.0, Jp=[0.01, 0.015, 0.02], r=[0, 0, 1.1], w=[1.0, 2.0, 3.0])
+    scene.add_shape("box", body="box", size=[0.4, 0.3, 0.1], collides=True)
+    result = dap.simulate(collide(scene, mu=mu, e=1.0), t_end=20.0, dt=0.1, contact_step=1e-3)
+    change = result.energy.total / result.energy.total[0] - 1.0
+    assert change.max() < most
+    assert mu > 0.0 or change.min() > -most
+
+
+def test_what_rests_on_a_slope_has_no_work_of_friction():
+    """Limit: rounding of what friction would take at the speed of one step of falling, 0.01 J."""
+    result = dap.simulate(slope(), t_end=2.0, dt=1.0, contact_step=5e-3)
+    words = next(note for note in result.notes if "friction took" in note)
+    assert float(re.search(r"friction took (\S+) J", words)[1]) < 1e-12
+
+
 def test_stepping_tends_to_events():
     """A ball dropped onto a floor, e = 0: where it is after 0.5 s differs by the order of h."""
     declared = dap.Scene(name="declared")

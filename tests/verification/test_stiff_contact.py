@@ -1,8 +1,6 @@
 """Stiff contact and friction with the implicit integrator: closed forms and SciPy's Radau.
-
 Rounding must not excuse errors of stiff directions (docs/decisions/0071), and a run that does not
-get on says why. Scenes of thin bodies, for which rounding is measured, are in test_scales.py.
-"""
+get on says why. Scenes of thin bodies, for which rounding is measured, are in test_scales.py."""
 
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Springs about an axis (rot_sda) and springs given by a function, against closed forms.
-
-Tolerances: rtol 1e-11 over some seconds leaves some 1e-9 of the largest angle.
-"""
+Tolerances: rtol 1e-11 over some seconds leaves some 1e-9 of the largest angle."""
 
 import numpy as np
 import pytest
@@ -44,9 +42,7 @@ def damped(t, x, speed, k, c):
 @pytest.mark.parametrize(("k", "c"), [(3.0, 0.0), (3.0, 0.4)])
 def test_a_torsion_pendulum(k, c):
     """The wheel swings as the damped oscillator does, about the angle of no moment.
-
-    The angle is that of ground relative to the wheel: theta = -angle.
-    """
+    The angle is that of ground relative to the wheel: theta = -angle."""
     scene = spring(wheel(0.8, 2.0), k=k, c=c, theta_0=-0.3)
     result = dap.simulate(scene, t_end=2.0, dt=0.1, **TIGHT)
     expected = 0.3 + damped(result.t, 0.5, 2.0, k, c)
@@ -150,13 +146,3 @@ def test_a_spring_on_a_line_by_a_function():
         one_dimensional(law, 1.4, 0.0, 2.0, result.t), abs=1e-8
     )
     assert result.ledger["energy"].ok
-
-
-def test_a_spring_without_length_is_named():
-    """ptp: where its points coincide it has no direction; a scene that starts so is refused where
-    one is needed."""
-    scene = dap.Scene(name="no length")
-    scene.add_body("mass", mass=2.0, Jp=(1.0, 1.0, 1.0))
-    scene.add_force("ptp", "spring", P_i="mass.O", P_j="ground.O", k=10.0, l0=0.1)
-    with pytest.raises(dap.SceneError, match=r"forces\.spring: .*coincide at the start"):
-        dap.simulate(scene, t_end=0.1)

@@ -1,7 +1,6 @@
 """Angles that count whole turns: between reports, in files, sweeps and checkpoints; long steps.
-
-The wheel is wound up by 100 rad/s: x = 100 sin t, 16 turns and back, 1.6 turns between two reports.
-"""
+The wheel is wound up by 100 rad/s: x = 100 sin t, 16 turns and back, 1.6 turns between two
+reports."""
 
 import attrs
 import numpy as np
@@ -58,20 +57,6 @@ def test_a_file_of_an_older_program_has_no_turns_and_says_so(tmp_path):
     assert sum("holds no turns" in note for note in read.notes) == 1
 
 
-def test_a_resumed_run_keeps_its_turns(tmp_path):
-    class Enough(Exception):
-        pass
-
-    def stop(t, t_end):
-        if t > 1.4:
-            raise Enough
-
-    path = tmp_path / "run.nc"
-    with pytest.raises(Enough):
-        dap.simulate(winding(), dt=0.001, output=path, checkpoint=np.inf, progress=stop)
-    check(dap.resume(tmp_path / "run.nc.checkpoint"))
-
-
 def test_the_points_of_a_sweep_keep_their_turns():
     def moment(result):
         return float(result.force("spring").on["i"].moment[-1, 2])
@@ -85,9 +70,8 @@ def test_the_points_of_a_sweep_keep_their_turns():
 @pytest.mark.parametrize("rtol", [1e-3, 1e-4])
 def test_long_steps_do_not_lose_turns(rtol):
     """At loose tolerances a step turns the wheel by more than half a turn.
-
-    A turn that is lost changes the speed by 2 pi k / J for the time of a step, some 1 rad/s each.
-    """
+    A turn that is lost changes the speed by 2 pi k / J for the time of a step, some 1 rad/s
+    each."""
     result = dap.simulate(winding(), integrator="dop853", rtol=rtol, atol=rtol / 100.0)
     assert 3.0 * 2.0 / np.pi * SPEED / result.stats.steps > np.pi / 2.0
     np.testing.assert_allclose(result.w[:, 0, 2], SPEED * np.cos(result.t), atol=SPEED * 100 * rtol)

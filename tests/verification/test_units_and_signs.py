@@ -1,14 +1,11 @@
 """Signs of drivers and actuators against the coordinates of joints; loads of legs and wheels.
-
-Units of outputs: test_units_of_outputs.py.
-"""
+Units of outputs: test_units_of_outputs.py."""
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.command_line import output_of
 
 import dap3d_core as dap
-from dap3d_core.cli.app import dap3d
 
 TIGHT = {"rtol": 1e-11, "atol": 1e-13}
 #: (body i, body j): ground on either side, and two free bodies in both orders.
@@ -18,12 +15,6 @@ INERTIA, MASS = {"a": 0.2, "b": 0.5}, {"a": 2.0, "b": 3.0}
 #: Of a driver f(t) = 0.3 t + 0.2 t^2, and of its end after 1 s.
 LAW, TRAVEL = (0.0, 0.3, 0.2), 0.5
 EFFORT = 0.7
-
-
-def described(type_):
-    done = CliRunner().invoke(dap3d, ["describe", type_])
-    assert done.exit_code == 0
-    return done.output
 
 
 def pair(joint, i, j):
@@ -68,29 +59,18 @@ SLIDES = [
 
 
 @pytest.mark.parametrize(("i", "j"), ORDERS)
-@pytest.mark.parametrize("joint", ["rev", "cyl"])
-@pytest.mark.parametrize(("type_", "fields", "sense"), TURNS)
-def test_a_driver_of_rotation_moves_the_angle(type_, fields, sense, joint, i, j):
-    """The angle is f(t) - f(0): drive-rot; the types of the manual: its negative.
-
-    Position level to 1e-11 by projection; velocity level to the tolerance, some 1e-10.
-    """
-    scene, axis = pair(joint, i, j)
+@pytest.mark.parametrize("is_cylindrical", [False, True])
+@pytest.mark.parametrize(
+    ("kind", "type_", "fields", "sense"),
+    [("angle", *turn) for turn in TURNS] + [("length", *slide) for slide in SLIDES],
+)
+def test_a_driver_moves_its_coordinate(kind, type_, fields, sense, is_cylindrical, i, j):
+    """By f(t) - f(0): drive-rot and drive-tran; the types of the manual: by its negative.
+    Position level to 1e-11 by projection; velocity level to the tolerance, some 1e-10."""
+    scene, axis = pair("cyl" if is_cylindrical else {"angle": "rev", "length": "tran"}[kind], i, j)
     scene.add_joint(type_, "drive", body_i=i, body_j=j, a_j=axis, **fields)
-    angle, rate = moved(scene, "angle")
-    assert angle == pytest.approx(sense * TRAVEL, abs=1e-9)
-    assert rate == pytest.approx(sense * 0.7, abs=1e-9)
-
-
-@pytest.mark.parametrize(("i", "j"), ORDERS)
-@pytest.mark.parametrize("joint", ["tran", "cyl"])
-@pytest.mark.parametrize(("type_", "fields", "sense"), SLIDES)
-def test_a_driver_of_translation_moves_the_length(type_, fields, sense, joint, i, j):
-    """The length is f(t) - f(0): drive-tran; rel-tran of the manual: its negative."""
-    scene, axis = pair(joint, i, j)
-    scene.add_joint(type_, "drive", body_i=i, body_j=j, a_j=axis, **fields)
-    length, rate = moved(scene, "length")
-    assert length == pytest.approx(sense * TRAVEL, abs=1e-9)
+    moved_by, rate = moved(scene, kind)
+    assert moved_by == pytest.approx(sense * TRAVEL, abs=1e-9)
     assert rate == pytest.approx(sense * 0.7, abs=1e-9)
 
 
@@ -109,35 +89,32 @@ def reduced(values, i, j):
     return 1.0 / sum(1.0 / values[name] for name in {i, j} - {"ground"})
 
 
-@pytest.mark.parametrize(("i", "j"), ORDERS)
-@pytest.mark.parametrize("joint", ["rev", "cyl"])
-@pytest.mark.parametrize(
-    "fields", [{}, {"turns": True}, {"input": "u"}, {"input": "u", "turns": True},
-               {"function": "zero"}, {"function": "zero", "input": "u", "turns": True}]
-)  # fmt: skip
-def test_a_positive_moment_of_an_actuator_increases_the_angle(fields, joint, i, j):
-    """n_a t^2 / (2 I), with the reduced inertia I."""
-    scene, axis = pair(joint, i, j)
-    scene.add_function("a", "zero", coeff=(0.0, 0.0, 0.0))
-    v_i, v_j = (f"{n}.x" for n in (i, j))
-    scene.add_force("rot_sda", "m", v_i=v_i, v_j=v_j, axis=axis, n_a=EFFORT, **fields)
-    expected = 0.5 * EFFORT / reduced(INERTIA, i, j)
-    assert moved(scene, "angle")[0] == pytest.approx(expected, abs=1e-8)
+#: Coordinate, and what an actuator has besides its effort.
+ACTUATORS = [
+    *(("angle", fields) for fields in (
+        {}, {"turns": True}, {"input": "u"}, {"input": "u", "turns": True}, {"function": "zero"},
+        {"function": "zero", "input": "u", "turns": True})),
+    *(("length", fields) for fields in (
+        {}, {"input": "u"}, {"function": "zero"}, {"function": "zero", "input": "u"})),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("i", "j"), ORDERS)
-@pytest.mark.parametrize("joint", ["tran", "cyl"])
-@pytest.mark.parametrize(
-    "fields", [{}, {"input": "u"}, {"function": "zero"}, {"function": "zero", "input": "u"}]
-)
-def test_a_positive_force_of_an_actuator_increases_the_length(fields, joint, i, j):
-    """f_a t^2 / (2 m), with the reduced mass m: tran_sda."""
-    scene, axis = pair(joint, i, j)
+@pytest.mark.parametrize("is_cylindrical", [False, True])
+@pytest.mark.parametrize(("kind", "fields"), ACTUATORS)
+def test_a_positive_effort_of_an_actuator_increases_its_coordinate(
+    kind, fields, is_cylindrical, i, j
+):
+    """n_a t^2 / (2 I) and f_a t^2 / (2 m), with the reduced inertia I and mass m."""
+    scene, axis = pair("cyl" if is_cylindrical else {"angle": "rev", "length": "tran"}[kind], i, j)
     scene.add_function("a", "zero", coeff=(0.0, 0.0, 0.0))
-    ends = {"P_i": f"{i}.O", "P_j": f"{j}.O", "a_j": axis}
-    scene.add_force("tran_sda", "m", **ends, f_a=EFFORT, **fields)
-    expected = 0.5 * EFFORT / reduced(MASS, i, j)
-    assert moved(scene, "length")[0] == pytest.approx(expected, abs=1e-8)
+    if kind == "angle":
+        scene.add_force("rot_sda", "m", v_i=f"{i}.x", v_j=f"{j}.x", axis=axis, n_a=EFFORT, **fields)
+    else:
+        ends = {"P_i": f"{i}.O", "P_j": f"{j}.O", "a_j": axis}
+        scene.add_force("tran_sda", "m", **ends, f_a=EFFORT, **fields)
+    expected = 0.5 * EFFORT / reduced(INERTIA if kind == "angle" else MASS, i, j)
+    assert moved(scene, kind)[0] == pytest.approx(expected, abs=1e-8)
 
 
 @pytest.mark.parametrize(("i", "j"), ORDERS)
@@ -174,9 +151,7 @@ def test_a_plane_moves_a_point_along_its_normal():
 @pytest.mark.parametrize("kind", ["turn", "slide", "leg"])
 def test_inverse_dynamics_finds_actions_that_increase_the_coordinate(kind, i, j):
     """The actuation of drivers and of actuators is q'' times the reduced inertia, of one sign.
-
-    q'' = 0.4; splines through positions are not needed: the motion is a result.
-    """
+    q'' = 0.4; splines through positions are not needed: the motion is a result."""
     scene, axis = pair("rev" if kind == "turn" else "tran", i, j)
     if kind == "turn":
         scene.add_joint("drive-rot", "drive", body_i=i, body_j=j, a_j=axis, function="law")
@@ -216,7 +191,7 @@ def test_kinematics_over_a_driver_moves_the_coordinate_along(type_, i, j):
                                    "tran_sda", "ptp", "rP", "sph-sph"])  # fmt: skip
 def test_describe_says_the_sign_in_its_first_lines(type_):
     """Which way a positive function, force or moment moves the coordinate."""
-    text = described(type_)[:900]
+    text = output_of("describe", type_)[:900]
     words = ("increases", "decreases")
     assert any(word in " ".join(text.split()) for word in words)
 
@@ -288,9 +263,7 @@ def test_bodies_of_a_joint_to_ground_may_be_exchanged(type_, method, integrator)
 @pytest.mark.parametrize(("place", "sense"), [(-5.0, -1.0), (0.8, 1.0)])
 def test_lambda_of_a_leg_times_its_length_is_its_force(function, place, sense):
     """200 kg that hang or stand: lambda |d| = -+ m (g + l''), negative in tension.
-
-    The leg of 5 m pulls, that of 0.8 m pushes, at whose end guides keep the load.
-    """
+    The leg of 5 m pulls, that of 0.8 m pushes, at whose end guides keep the load."""
     m, g, pace = 200.0, 9.81, 0.3
     scene = dap.Scene(name="leg")
     scene.add_body("load", mass=m, Jp=(5.0, 5.0, 5.0), r=(0.0, 0.0, place))
@@ -347,6 +320,6 @@ def test_couples_transmit_moments_alone():
 @pytest.mark.parametrize("type_", ["couple", "follow"])
 def test_describe_says_what_bearings_of_wheels_carry(type_):
     """In its first lines: moments alone, and nothing of the tooth force."""
-    text = " ".join(described(type_).split())[:500]
+    text = " ".join(output_of("describe", type_).split())[:500]
     assert "transmits moments" in text
     assert "bearings" in text

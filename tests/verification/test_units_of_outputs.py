@@ -6,10 +6,9 @@ import json
 import netCDF4
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from support.command_line import output_of
 
 import dap3d_core as dap
-from dap3d_core.cli.app import dap3d
 from dap3d_core.scene import parse
 from dap3d_core.scene.expressions.expression import OPERATORS, WORDS
 from dap3d_core.scene.expressions.units import (
@@ -214,26 +213,20 @@ def test_a_declared_unit_is_everywhere(tmp_path, monkeypatch):
     """Table, JSON, NetCDF, MATLAB, data set, plot, sweep and saved scene have it, or none."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.toml").write_text(PENDULUM + DECLARED)
-
-    def run(*words):
-        done = CliRunner().invoke(dap3d, [*words])
-        assert done.exit_code == 0, done.output
-        return done.output
-
-    run("run", "s.toml", "--t-end", "0.5", "--dt", "0.1", "-o", "s.nc")
+    output_of("run", "s.toml", "--t-end", "0.5", "--dt", "0.1", "-o", "s.nc")
     names = ("lean", "turns", "heading")
-    report = json.loads(run("post", "s.nc", "--select", *names, "-o", "s.csv", "--json"))
+    report = json.loads(output_of("post", "s.nc", "--select", *names, "-o", "s.csv", "--json"))
     with open("s.csv") as file:
         head, *rows = csv.reader(file)
     assert head == ["t [s]", "lean [rad]", "turns", "heading [deg]"]
     assert float(rows[-1][3]) == pytest.approx(np.degrees(float(rows[-1][1])), rel=1e-14)
     assert '"unit": "deg"' in json.dumps(report)
-    run("post", "s.nc", "-o", "post.nc")
+    output_of("post", "s.nc", "-o", "post.nc")
     with netCDF4.Dataset("post.nc") as file:
         assert file["heading"].units == "deg"
         assert file["lean"].units == "rad"
         assert "units" not in file["turns"].ncattrs()
-    run("export", "s.nc", "--format", "mat", "-o", "s.mat")
+    output_of("export", "s.nc", "--format", "mat", "-o", "s.mat")
     from scipy.io import loadmat
 
     units = loadmat("s.mat", simplify_cells=True)["units"]
@@ -250,7 +243,7 @@ def test_a_declared_unit_is_everywhere(tmp_path, monkeypatch):
     swept = dap.sweep("s.toml", {"bodies.rod.mass": [1.0, 2.0]}, outputs=outputs, t_end=0.2)
     assert swept["heading:max"].attrs["units"] == "deg"
     assert "units" not in swept["turns:max"].attrs
-    described = json.loads(run("describe", "s.toml", "--json"))["model"]["outputs"]
+    described = json.loads(output_of("describe", "s.toml", "--json"))["model"]["outputs"]
     assert {o["name"]: o["unit"] for o in described} == {"lean": "rad", "turns": "",
                                                         "heading": "deg"}  # fmt: skip
     assert {o["name"]: o["expression"] for o in described}["heading"] == "h.angle * 180 / pi"

@@ -1,7 +1,5 @@
 """Joints with unknowns of their own against minimal coordinates, which SciPy integrates.
-
-Tolerances: 1e-9 of motions of some m in runs with rtol 1e-11.
-"""
+Tolerances: 1e-9 of motions of some m in runs with rtol 1e-11."""
 
 import numpy as np
 import pytest
@@ -128,9 +126,7 @@ def touching_rate(R, w):
 
 def accelerations(R, w, rolls):
     """(v_dot, w_dot) of the ellipsoid: momentum about its centre, and contact at all levels.
-
-    Rolling: v = -w x rho. Sliding: of that the vertical part, and a vertical force alone.
-    """
+    Rolling: v = -w x rho. Sliding: of that the vertical part, and a vertical force alone."""
     rho, rho_dot = touching(R), touching_rate(R, w)
     J = R @ np.diag(INERTIA) @ R.T
     held = np.arange(3) if rolls else np.array([2])

@@ -4,15 +4,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
+from support.rotations import rotation
 
 import dap3d_core as dap
 
 G = 9.81
-
-
-def rotation(p):
-    e0, e = p[0], np.array(p[1:])
-    return (e0**2 - e @ e) * np.eye(3) + 2 * np.outer(e, e) + 2 * e0 * np.cross(np.eye(3), e)
 
 
 def steiner(m, d):
@@ -24,9 +20,7 @@ def steiner(m, d):
 )
 def test_two_welded_bodies_fly_as_one(method, integrator):
     """The free motion of the compound body, of summed mass and inertia, is theirs.
-
-    Steps at 1e-11 over 1 s leave less than 1e-8 of the motion.
-    """
+    Steps at 1e-11 over 1 s leave less than 1e-8 of the motion."""
     m, J = np.array([2.0, 0.7]), np.array([[0.3, 0.2, 0.1], [0.05, 0.02, 0.04]])
     p2 = np.array([0.5, -0.5, 0.1, 0.7]) / np.linalg.norm([0.5, -0.5, 0.1, 0.7])
     r = np.array([[0.0, 0.0, 0.0], [0.4, -0.2, 0.3]])
@@ -116,9 +110,7 @@ def test_inverse_dynamics_of_a_leg():
 @pytest.mark.parametrize("rise", [0.0, 0.7])
 def test_a_periodic_spline(rise):
     """SciPy's periodic spline and a straight line, over three periods before and after the first.
-
-    What the slider does is the function and its derivatives, to rounding of arguments up to 10.
-    """
+    What the slider does is the function and its derivatives, to rounding of arguments up to 10."""
     x = np.array([0.3, 0.9, 1.4, 2.0, 2.3, 3.1])
     y = np.array([0.0, 0.4, 0.1, -0.3, 0.2, rise])
     slope = rise / (x[-1] - x[0])

@@ -1,79 +1,205 @@
-"""Actuators of MJCF: motors, and servos whose law is a spring and a damper."""
+"""Actuators of MJCF: motors and servos of joints and fixed tendons, motors at sites."""
 
-from math import sqrt
+from collections import Counter
+from math import pi, sqrt
+from typing import Any
+
+import attrs
+import numpy as np
 
 from dap3d_core.interface.formats import (
     LEAST,
+    UNBOUNDED,
     Actuator,
     FormatError,
     Joint,
     JointInertia,
     XmlElement,
 )
-from dap3d_formats.mjcf.document import ACTUATORS
+from dap3d_formats.mjcf.constraints import SCALAR, tendon_of
+from dap3d_formats.mjcf.keyframes import Keyframe, actuators_of
 from dap3d_formats.mjcf.reader import MjcfReader
 
-#: Joints with one coordinate.
-SCALAR = ("revolute", "prismatic")
+Bounds = tuple[float, float]
 
 
-def read_actuators(reader: MjcfReader, inertia: JointInertia) -> None:
-    """Read actuators on joints whose force is linear; others are left out, remarked.
+def read_actuators(reader: MjcfReader, inertia: JointInertia, keyframe: Keyframe) -> None:
+    """Read actuators whose force is linear within bounds; others are left out, remarked.
 
     Args:
         reader: of the bodies, which have been read.
         inertia: of the joints where the model starts.
+        keyframe: the controls and activations at the start.
 
     Raises:
-        FormatError: one names a joint that is not there.
+        FormatError: one names a joint, tendon or site that is not there.
     """
     document = reader.document
     options = document.root.all("option")
     disabled = {g for one in options for g in one.numbers("actuatorgroupdisable", None, ())}
-    for holder in document.root.all("actuator"):
-        for given in holder:
-            if given.name not in ACTUATORS or given.name == "plugin":
-                continue
-            element = document.settled(given, "main")
-            if element.number("group", 0.0) in disabled:
-                text = "an actuator of a group that is disabled"
-                document.source.remarks.leave_out(given.place, text)
-            else:
-                _read(reader, element, inertia)
+    elements = actuators_of(document)
+    starts = keyframe.controls(elements, [_dynamics(one) != "none" for one in elements])
+    acting = []
+    for element, start in zip(elements, starts, strict=True):
+        if element.number("group", 0.0) in disabled:
+            text = "an actuator of a group that is disabled"
+            document.source.remarks.leave_out(element.place, text)
+        elif element.name != "plugin":
+            acting.append((element, _targets(reader, element), start))
+    reading = ActuatorReader(reader, inertia, [(e, targets) for e, targets, _ in acting])
+    for one in acting:
+        reading.read(*one)
 
 
-def _read(reader: MjcfReader, element: XmlElement, inertia: JointInertia) -> None:
-    remarks = reader.document.source.remarks
-    name = element.get("name") or f"actuator{len(reader.model.actuators) + 1}"
-    joint = element.get("joint") or element.get("jointinparent")
-    law = _law(element)
-    if joint is None or law is None:
-        what = "its law" if joint else "on tendons, sites and bodies"
-        remarks.leave_out(element.place, f"an actuator <{element.name}>: {what}", motion=True)
-        return
-    if joint not in reader.model.joints:
-        raise FormatError(f"actuator {name}: there is no joint {joint!r}", element.place)
-    target = reader.model.joints[joint]
-    if target.kind not in SCALAR:
-        text = "actuators of joints with several coordinates"
-        remarks.leave_out(element.place, text, motion=True)
-        return
-    gear = element.numbers("gear", None, (1.0,))[0]
-    gain, constant, position, rate = law
-    if rate > 0.0 and gain == -position:
-        moved = inertia.of(joint)
-        if moved is None:
-            text = "dampratio: links without mass, or too many, for a mass matrix"
-            remarks.leave_out(element.place, text, motion=True)
-        rate *= -_critical(gain, gear, moved or 0.0)
-    _add_law(target, gear * constant + gear * gear * position * target.reference,
-             -gear * gear * position, -gear * gear * rate)  # fmt: skip
-    if gear * constant and not target.stiffness[0]:
-        remarks.leave_out(element.place, "a constant force of an actuator", motion=True)
-    if position or rate:
-        text = "a servo is an input, and a spring and a damper of its joint"
-        remarks.translate(element.place, text)
-    reader.model.actuators.append(Actuator(name, joint, gear * gain, element.place))
+def _dynamics(element: XmlElement) -> str:
+    """How the control of an actuator acts: "none", or the kind of its state."""
+    lag = "timeconst" in element.attributes and element.number("timeconst") > 0.0
+    kinds = {"cylinder": "filter", "intvelocity": "integrator", "muscle": "muscle",
+             "position": "filterexact" if lag else "none"}  # fmt: skip
+    usual = kinds.get(element.name, "none")
+    return element.get("dyntype") or usual if element.name in ("general", "plugin") else usual
+
+
+def _targets(reader: MjcfReader, element: XmlElement) -> list[tuple[str, float]]:
+    """The joints that an actuator acts on, with the factors of its force."""
+    gear, joints = element.numbers("gear", None, (1.0,))[0], reader.model.joints
+    name = element.get("joint") or element.get("jointinparent")
+    targets = [] if name is None else [(name, gear)]
+    if "tendon" in element.attributes:
+        tendon = tendon_of(reader, element, "tendon")
+        parts = tendon.all("joint") if tendon.name == "fixed" else []
+        targets = [(t.require("joint"), gear * t.number("coef")) for t in parts]
+    for name, _ in targets:
+        if name not in joints:
+            raise FormatError(f"<{element.name}>: there is no joint {name!r}", element.place)
+    return targets if all(joints[name].kind in SCALAR for name, _ in targets) else []
+
+
+@attrs.define(eq=False)
+class ActuatorReader:
+    """Reads actuators, each with what it acts on.
+
+    Attributes:
+        reader: of the bodies.
+        inertia: of the joints.
+        elements: with the joints that they act on, and the factors of their forces.
+    """
+
+    reader: MjcfReader
+    inertia: JointInertia
+    elements: list[tuple[XmlElement, list[tuple[str, float]]]]
+
+    def read(
+        self, element: XmlElement, targets: list[tuple[str, float]], start: tuple[float, float]
+    ) -> None:
+        """Read one actuator, with its activation and control at the start."""
+        place, law, activation = element.place, _law(element), self._activation(element)
+        actuator = Actuator(
+            self._name(element), "", place=place, control=self._control(element),
+            force=self._range(element, "force"), start=start, **activation or {},
+        )  # fmt: skip
+        why = ""
+        if law is None or activation is None:
+            why = "its law"
+        elif "site" in element.attributes:
+            why = self._act_at_site(element, attrs.evolve(actuator, gear=law[0]), law)
+        elif not targets:
+            why = "on this tendon or body, or a joint of several coordinates"
+        elif len(targets) > 1 and any(law[1:]):
+            why = "a servo of a tendon of several joints"
+        else:
+            for joint, gear in targets:
+                self._act_in_joint(element, attrs.evolve(actuator, joint=joint, gear=gear), law)
+        if why:
+            text = f"an actuator <{element.name}>: {why}"
+            self.reader.document.source.remarks.leave_out(place, text, motion=True)
+
+    def _name(self, element: XmlElement) -> str:
+        names = {one.name for one in self.reader.model.actuators}
+        return element.get("name") or f"actuator{len(names) + 1}"
+
+    def _act_in_joint(self, element: XmlElement, actuator: Actuator, law: Any) -> None:
+        """Add an actuator of a joint, whose ``gear`` is that of the transmission."""
+        remarks, (gain, constant, position, rate) = self.reader.document.source.remarks, law
+        target, gear = self.reader.model.joints[actuator.joint], actuator.gear
+        if rate > 0.0 and gain == -position:
+            moved = self.inertia.of(actuator.joint)
+            if moved is None:
+                text = "dampratio: links without mass, or too many, for a mass matrix"
+                remarks.leave_out(element.place, text, motion=True)
+            rate *= -_critical(gain, gear, moved or 0.0)
+        ends = sorted(gear * bound for bound in actuator.force) if gear else (0.0, 0.0)
+        force = self._within_joint(element, actuator.joint, (ends[0], ends[1]))
+        bias = gear * constant + gear * gear * position * target.reference
+        stiffness, damping = -gear * gear * position, -gear * gear * rate
+        whole = force == UNBOUNDED and not actuator.activation
+        if whole and not (bias and not stiffness + target.stiffness[0]):
+            _add_law(target, bias, stiffness, damping)
+            bias = stiffness = damping = 0.0
+            if position or rate:
+                text = "a servo is an input, and a spring and a damper of its joint"
+                remarks.translate(element.place, text)
+        self.reader.model.actuators.append(attrs.evolve(
+            actuator, gear=gear * gain, force=force, bias=bias, stiffness=stiffness,
+            damping=damping,
+        ))  # fmt: skip
+
+    def _within_joint(self, element: XmlElement, joint: str, force: Bounds) -> Bounds:
+        """The bounds of the force of an actuator, within those of all actuators of its joint."""
+        given = self.reader.force_ranges.get(joint, UNBOUNDED)
+        count = Counter(name for _, targets in self.elements for name, _ in targets)[joint]
+        if given != UNBOUNDED and count > 1:
+            text = "actuatorfrcrange of a joint with several actuators"
+            self.reader.document.source.remarks.leave_out(element.place, text, motion=True)
+            return force
+        low, high = np.clip(force, *given).tolist()
+        return low, high
+
+    def _act_at_site(self, element: XmlElement, actuator: Actuator, law: Any) -> str:
+        """Add a force and moment at a site, in its axes; why not, or "".
+
+        Its length is zero, so that a spring has no effect.
+        """
+        link, frame = self.reader.site(element, "site")
+        if actuator.activation or actuator.force != UNBOUNDED or law[1] or law[3]:
+            return "of a site but a motor without forcerange"
+        if "refsite" in element.attributes:
+            return "of a site with a refsite"
+        gear = (*element.numbers("gear", None, (1.0,)), *[0.0] * 6)[:6]
+        wrench = tuple(actuator.gear * x for x in gear)
+        self.reader.model.actuators.append(
+            attrs.evolve(actuator, link=link, at=frame, wrench=wrench)
+        )
+        return ""
+
+    def _range(self, element: XmlElement, key: str) -> Bounds:
+        """The bounds ctrlrange, forcerange or actrange, where they hold."""
+        return self.reader.document.bounds(element, f"{key}range", f"{key}limited")
+
+    def _control(self, element: XmlElement) -> Bounds:
+        inherited, joint = element.number("inheritrange", 0.0), element.get("joint")
+        if element.name == "position" and inherited > 0.0 and joint in self.reader.model.joints:
+            target = self.reader.model.joints[joint]
+            low, high = target.limits[0].lower, target.limits[0].upper
+            mean, half = (low + high) / 2.0 + target.reference, (high - low) / 2.0
+            return mean - inherited * half, mean + inherited * half
+        if self.reader.document.disables("clampctrl"):
+            return UNBOUNDED
+        return self._range(element, "ctrl")
+
+    def _activation(self, element: XmlElement) -> dict[str, Any] | None:
+        """How the control acts by a state: none, a lag, an integral; None for others."""
+        kind = _dynamics(element)
+        if kind == "none":
+            return {"activation": ""}
+        if kind not in ("integrator", "filter", "filterexact"):
+            return None
+        time = element.numbers("dynprm", None, (1.0,))[0]
+        if kind == "integrator":
+            found: dict[str, Any] = {"activation": "integral"}
+        else:
+            found = {"activation": "lag", "time": element.number("timeconst", time)}
+        return found | {"active": self._range(element, "act")}
 
 
 def _critical(kp: float, gear: float, inertia: float) -> float:
@@ -98,7 +224,16 @@ def _law(element: XmlElement) -> tuple[float, float, float, float] | None:
     if element.name == "velocity":
         kv = element.number("kv", 1.0)
         return kv, 0.0, 0.0, -kv
-    plain = {"dyntype": ("none",), "gaintype": ("fixed",), "biastype": ("none", "affine")}
+    if element.name == "intvelocity":
+        kp = element.number("kp", 1.0)
+        return kp, 0.0, -kp, -element.number("kv", 0.0)
+    if element.name == "cylinder":
+        area = element.number("area", 1.0)
+        if "diameter" in element.attributes:
+            area = pi / 4.0 * element.number("diameter") ** 2
+        b0, b1, b2 = element.numbers("bias", 3, (0.0, 0.0, 0.0))
+        return area, b0, b1, b2
+    plain = {"gaintype": ("fixed",), "biastype": ("none", "affine")}
     if element.name != "general" or any(
         element.get(key, words[0]) not in words for key, words in plain.items()
     ):

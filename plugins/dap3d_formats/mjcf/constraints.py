@@ -1,12 +1,18 @@
 """Equalities of MJCF, with the tendons that they hold."""
 
+import attrs
+import numpy as np
+
 from dap3d_core.interface.formats import (
+    UNBOUNDED,
     WORLD,
     Coupling,
     FormatError,
     Frame,
     Joint,
+    Limits,
     Place,
+    Tendon,
     XmlElement,
     from_quaternion,
     held,
@@ -24,7 +30,8 @@ def read_equalities(reader: MjcfReader) -> None:
         FormatError: one names something that is not there.
     """
     remarks, document = reader.document.source.remarks, reader.document
-    for holder in document.root.all("equality"):
+    holders = document.root.all("equality")
+    for holder in () if document.disables("equality", "constraint") else holders:
         for given in holder:
             element = document.settled_equality(given)
             if element.get("active", "true") == "false":
@@ -50,7 +57,7 @@ def _close(reader: MjcfReader, element: XmlElement) -> None:
     name = reader.free_joint(element.get("name") or f"{element.name}{len(model.joints) + 1}")
     kind = "ball" if element.name == "connect" else "fixed"
     if "site1" in element.attributes:
-        ends = [_site(reader, element, key) for key in ("site1", "site2")]
+        ends = [reader.site(element, key) for key in ("site1", "site2")]
         (parent, in_parent), (child, in_child) = ends
     else:
         parent, child = _link(reader, element, "body1"), _link(reader, element, "body2")
@@ -73,13 +80,6 @@ def _weld(reader: MjcfReader, element: XmlElement, parent: str, child: str) -> t
         return _relative(reader, parent, child), Frame()
     anchor = Frame(element.numbers("anchor", 3, (0.0, 0.0, 0.0)))
     return Frame(relpose[:3], from_quaternion(relpose[3:])) @ anchor, anchor
-
-
-def _site(reader: MjcfReader, element: XmlElement, key: str) -> tuple[str, Frame]:
-    name = element.require(key)
-    if name not in reader.sites:
-        raise FormatError(f"{key} of <{element.name}>: there is no site {name!r}", element.place)
-    return reader.sites[name]
 
 
 def _relative(reader: MjcfReader, of: str, other: str) -> Frame:
@@ -127,13 +127,57 @@ def _couple(reader: MjcfReader, element: XmlElement) -> None:
     )
 
 
+def tendon_of(reader: MjcfReader, element: XmlElement, key: str) -> XmlElement:
+    """The tendon that an element names.
+
+    Raises:
+        FormatError: it is not there.
+    """
+    name, holders = element.require(key), reader.document.root.all("tendon")
+    found = next((t for holder in holders for t in holder if t.get("name") == name), None)
+    if found is None:
+        raise FormatError(f"there is no tendon {name!r}", element.place)
+    return _settled_tendon(reader, found)
+
+
+def _settled_tendon(reader: MjcfReader, tendon: XmlElement) -> XmlElement:
+    """A tendon with the attributes of its class, which all tendons share."""
+    settled = reader.document.settled(attrs.evolve(tendon, name="tendon"), "main")
+    return attrs.evolve(settled, name=tendon.name)
+
+
+def read_tendons(reader: MjcfReader) -> None:
+    """Read spatial tendons between two sites; others that act are left out, remarked.
+
+    Raises:
+        FormatError: one names a site that is not there.
+    """
+    tendons = [t for holder in reader.document.root.all("tendon") for t in holder.all("spatial")]
+    for k, given in enumerate(tendons, 1):
+        tendon = _settled_tendon(reader, given)
+        low, high = reader.document.bounds(tendon, "range", "limited")
+        stiffness, damping = (tendon.numbers(key, None, (0.0,))[0]
+                              for key in ("stiffness", "damping"))  # fmt: skip
+        if not (stiffness or damping or (low, high) != UNBOUNDED):
+            continue
+        rest = tendon.numbers("springlength", None, (-1.0,))
+        if [part.name for part in tendon] != ["site", "site"] or len(set(rest)) > 1:
+            text = "forces and limits of spatial tendons but between two sites"
+            reader.document.source.remarks.leave_out(tendon.place, text, motion=True)
+            continue
+        (one, at), (other, there) = (reader.site(site, "site") for site in tendon)
+        apart = (_pose(reader, one) @ at).r - (_pose(reader, other) @ there).r
+        length = float(np.linalg.norm(apart)) if rest[0] < 0.0 else rest[0]
+        reader.model.tendons.append(Tendon(
+            tendon.get("name") or f"tendon{k}", ((one, at.r), (other, there.r)), stiffness,
+            damping, length, Limits(low, high), tendon.place,
+        ))  # fmt: skip
+
+
 def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:
     """The length of a fixed tendon of two joints stays constant: c1 q1 + c2 q2 = 0."""
     remarks, name = reader.document.source.remarks, element.require("tendon1")
-    tendons = [t for holder in reader.document.root.all("tendon") for t in holder]
-    tendon = next((t for t in tendons if t.get("name") == name), None)
-    if tendon is None:
-        raise FormatError(f"there is no tendon {name!r}", element.place)
+    tendon = tendon_of(reader, element, "tendon1")
     terms = tendon.all("joint")
     simple = tendon.name == "fixed" and len(terms) == 2 and "tendon2" not in element.attributes
     polycoef = element.numbers("polycoef", None, (0.0, 1.0))

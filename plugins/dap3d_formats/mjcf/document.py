@@ -6,6 +6,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.formats import (
+    UNBOUNDED,
     FormatError,
     Frame,
     Source,
@@ -118,6 +119,20 @@ class Document:
     def angle(self, value: float) -> float:
         """An angle in rad, as the compiler reads it."""
         return value if self.compiler.get("angle", "degree") == "radian" else value * pi / 180.0
+
+    def disables(self, *names: str) -> bool:
+        """True if a flag of one of these names is off."""
+        flags = [flag for option in self.root.all("option") for flag in option.all("flag")]
+        return any(flag.get(name) == "disable" for flag in flags for name in names)
+
+    def bounds(self, element: XmlElement, key: str, limited: str) -> tuple[float, float]:
+        """Two bounds, infinite where they do not hold: attributes such as range and limited."""
+        holds = element.get(limited, "auto")
+        given = key in element.attributes and self.flag("autolimits", True)
+        if holds == "true" or (holds == "auto" and given):
+            low, high = element.numbers(key, 2, unbounded=True)
+            return low, high
+        return UNBOUNDED
 
     def frame(self, element: XmlElement) -> Frame:
         """The frame of an element: pos, with quat, axisangle, euler, xyaxes or zaxis.

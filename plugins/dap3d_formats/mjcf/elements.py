@@ -6,18 +6,19 @@ _SOLVER = "settings of a solver"
 _CONTACT = "contact properties; bodies do not touch each other"
 _DRAWING = "drawing"
 _SOFT = "softness of limits and equalities"
-_LAW = "the law of an actuator; one that is linear is an input, a spring and a damper"
+_LAW = "the law of an actuator; one that is linear within bounds is taken"
 _FRAME = taken("pos quat axisangle xyaxes zaxis euler")
 _ACTUATOR = (
-    taken("name class joint jointinparent gear kp kv gaintype gainprm biastype biasprm dyntype")
-    | taken("group")
+    taken(
+        "name class joint jointinparent tendon site gear kp kv gaintype gainprm biastype biasprm "
+        "dyntype dynprm timeconst group ctrllimited forcelimited actlimited ctrlrange forcerange "
+        "actrange inheritrange area diameter bias"
+    )
     | translated("dampratio", "damping, by the mass matrix where the model starts")
-    | noted("user", _DRAWING)
-    | moves("tendon site refsite cranksite slidersite cranklength body slidersite", _LAW)
+    | noted("user actdim lengthrange", _DRAWING)
+    | moves("refsite cranksite slidersite cranklength body", _LAW)
     | moves(
-        "ctrllimited forcelimited actlimited ctrlrange forcerange actrange lengthrange actdim "
-        "dynprm actearly plugin "
-        "timeconst inheritrange kd gain bias area diameter scale range force vmax fpmax fvmax "
+        "actearly plugin kd gain scale range force vmax fpmax fvmax "
         "lmin lmax vmin tausmooth input nsample interp delay armature damping ffrange velrange "
         "cogging controller inductance lugre motorconst nominal resistance saturation thermal imax "
         "ki posrange slewmax",
@@ -50,13 +51,14 @@ MJCF: Table = {
         "apirate mpr_iterations mpr_tolerance collision",
         _SOLVER,
     ),
-    "flag": taken() | taken("gravity")
-    | moves(
-        "constraint equality frictionloss limit contact passive spring damper clampctrl warmstart "
-        "filterparent actuation refsafe sensor midphase eulerdamp autoreset nativeccd island "
-        "override energy fwdinv invdiscrete multiccd sleep diagexact ipc speculative",
-        "what a solver leaves out",
-    ),
+    "flag": taken()
+    | taken("gravity constraint equality frictionloss limit contact clampctrl")
+    | noted(
+        "warmstart refsafe sensor midphase eulerdamp autoreset nativeccd island energy fwdinv "
+        "invdiscrete multiccd sleep diagexact ipc speculative",
+        _SOLVER,
+    )
+    | moves("passive spring damper filterparent actuation override", "what a solver leaves out"),
     "size": noted("", "memory of a simulator"),
     "visual": noted("", _DRAWING),
     "statistic": noted("", _DRAWING),
@@ -80,18 +82,19 @@ MJCF: Table = {
     "model": noted("", "models that <attach> would take"),
     "worldbody": taken(),
     "body": taken() | _FRAME | taken("name childclass")
-    | translated("mocap", "a part of ground")
-    | moves("gravcomp", "compensation of gravity: add a force")
+    | translated("mocap", "a part of ground, at its pose or that of the keyframe")
+    | taken("gravcomp")
     | noted("user sleep fuse simple", "data of a simulator"),
     "frame": taken() | _FRAME | taken("name childclass"),
     "inertial": taken() | _FRAME | taken("mass diaginertia fullinertia"),
     "joint": taken()
     | taken("name class type pos axis range limited ref springref stiffness damping armature")
-    | translated("frictionloss", "it fades at low rates, and does not stick")
+    | translated("frictionloss", "it sticks; with contacts it fades at low rates")
     | translated("springdamper", "stiffness and damping, by the mass matrix where the model starts")
     | moves("springyield", "springs do not yield")
     | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
-    | moves("actuatorfrcrange actuatorfrclimited actuatorgravcomp", "limits of actuators")
+    | taken("actuatorfrcrange actuatorfrclimited")
+    | translated("actuatorgravcomp", "gravcomp is no part of what actuatorfrcrange bounds")
     | noted("group user align", _DRAWING),
     "freejoint": taken() | taken("name") | noted("group align", _DRAWING),
     "geom": taken() | _FRAME
@@ -127,8 +130,11 @@ MJCF: Table = {
     "flexvert": noted("", "deformable bodies"),
     "distance": moves("", "distances"),
     "tendon": taken(),
-    "default/tendon": noted("", "tendons but those of equalities"),
-    "fixed": translated("", "where an equality holds it; else left out") | taken("name class")
+    "default/tendon": taken() | moves(
+        "frictionloss armature actuatorfrclimited actuatorfrcrange springyield margin "
+        "solreflimit solimplimit solreffriction solimpfriction", "of tendons",
+    ) | taken("class limited range stiffness damping springlength group width material rgba user"),
+    "fixed": translated("", "where an equality or an actuator takes it") | taken("name class")
     | moves(
         "group limited actuatorfrclimited range actuatorfrcrange solreflimit solimplimit "
         "solreffriction solimpfriction frictionloss margin springlength width material rgba "
@@ -136,25 +142,37 @@ MJCF: Table = {
         "forces and limits of tendons",
     ),
     "fixed/joint": taken() | taken("joint coef"),
-    "spatial": moves("", "tendons over sites and pulleys"),
+    "spatial": translated("", "between two sites a spring, a damper and rigid stops")
+    | taken("name class limited range stiffness damping springlength")
+    | noted("group width material rgba user", _DRAWING)
+    | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
+    | moves("frictionloss armature actuatorfrclimited actuatorfrcrange springyield",
+            "friction, armature and bounds of tendons"),
+    "spatial/site": taken() | taken("site"),
+    "spatial/geom": noted("", "wrapping"), "pulley": noted("", "pulleys"),
     "actuator": taken(),
-    **dict.fromkeys(("motor", "general", "position", "velocity"), taken() | _ACTUATOR),
     **dict.fromkeys(
-        ("intvelocity", "damper", "cylinder", "muscle", "adhesion",
+        ("motor", "general", "position", "velocity", "intvelocity", "cylinder"),
+        taken() | _ACTUATOR,
+    ),
+    **dict.fromkeys(
+        ("damper", "muscle", "adhesion",
          "dcmotor", "orientation", "pid"),
         moves("", _LAW) | _ACTUATOR,
     ),
     "actuator/plugin": noted("", "plugins of a simulator are not run"),
     "sensor": noted("", "sensors"),
-    "keyframe": noted("", "poses; --position gives the start"),
+    "keyframe": taken(),
+    "key": translated("", "where the scene starts, with --key")
+    | taken("name qpos qvel act ctrl mpos mquat") | noted("time plastic", "runs start at 0"),
 }  # fmt: skip
 
 #: Where shapes are to meet each other.
 CONTACTS: Table = {
     **MJCF,
-    "geom": dict(MJCF["geom"]) | taken("contype conaffinity friction")
+    "geom": dict(MJCF["geom"]) | taken("contype conaffinity friction priority")
     | translated("condim", "of 1 smooth, else friction along the surface alone")
-    | moves("priority solmix solref solimp margin gap", "contacts are rigid"),
+    | moves("solmix solref solimp margin gap", "contacts are rigid"),
     "contact": taken(),
     "exclude": taken() | taken("name body1 body2"),
     "pair": moves("", "pairs of geoms of their own"),

@@ -8,7 +8,9 @@ import numpy as np
 
 from dap3d_core.interface.formats import (
     NOWHERE,
+    UNBOUNDED,
     WORLD,
+    Actuator,
     Articulation,
     Exporter,
     FormatError,
@@ -83,7 +85,7 @@ class _Writer:
         if model.actuators:
             text.open("actuator")
             for one in model.actuators:
-                text.empty("motor", name=one.name, joint=one.joint, gear=words([one.gear]))
+                self._actuator(one)
             text.close("actuator")
         text.close("mujoco")
         return text.text()
@@ -208,6 +210,24 @@ class _Writer:
             attributes["rgba"] = words([*rgb, 1.0])
         self.text.empty("geom", **attributes)
 
+    def _actuator(self, one: Actuator) -> None:
+        """A motor, or a <general> with its law, bounds and activation."""
+        common = {"name": one.name, "joint": one.joint}
+        bounds = {"ctrlrange": one.control, "forcerange": one.force, "actrange": one.active}
+        law, time = (one.bias, -one.stiffness, -one.damping), one.time
+        if not (any(law) or one.activation) and one.force == UNBOUNDED:
+            self.text.empty("motor", **common, gear=words([one.gear]), **_ranges(bounds))
+            return
+        gain, dynamics = one.gear, {}
+        if one.activation == "lag":
+            dynamics = {"dyntype": "filter", "dynprm": words([time])}
+        elif one.activation:  # MuJoCo's integral has no time constant
+            gain, dynamics = gain / time, {"dyntype": "integrator"}
+            bounds["actrange"] = (one.active[0] * time, one.active[1] * time)
+        bias = {"biastype": "affine", "biasprm": words(law)} if any(law) else {}
+        self.text.empty("general", **common, gainprm=words([gain]), **bias, **dynamics,
+                        **_ranges(bounds))  # fmt: skip
+
     def _equalities(self) -> None:
         if not self.loops and not self.model.couplings:
             return
@@ -241,3 +261,12 @@ class _Writer:
             self.remarks.translate(NOWHERE, text)
             further = frame.r + frame.A @ joint.axes[0]
             self.text.empty("connect", name=f"{joint.name}_2", **ends, anchor=words(further))
+
+
+def _ranges(bounds: dict[str, tuple[float, float]]) -> dict[str, str]:
+    """Bounds as attributes; an infinite one is a large number beside one that is finite."""
+    return {
+        key: words(min(max(x, -UNLIMITED), UNLIMITED) for x in pair)
+        for key, pair in bounds.items()
+        if isfinite(pair[0]) or isfinite(pair[1])
+    }

@@ -85,18 +85,21 @@ class Geoms:
 
     def _contact(self, geom: XmlElement) -> Contact | None:
         """How a geom meets others; None where contacts are not asked for, or it meets none."""
-        bits = [int(geom.number(name, 1.0)) for name in ("contype", "conaffinity")]
+        bits = [int(geom.number(name, 1.0)) % 2**32 for name in ("contype", "conaffinity")]
         if not self.document.source.contacts or not any(bits):
             return None
+        if self.document.disables("contact", "constraint"):
+            return None
         friction = geom.numbers("friction", None, (1.0,))
-        return Contact(friction[0], geom.number("condim", 3.0) < 3.0, *bits)
+        smooth, priority = geom.number("condim", 3.0) < 3.0, int(geom.number("priority", 0.0))
+        return Contact(friction[0], smooth, bits[0], bits[1], priority)
 
     def _mesh_shape(self, geom: XmlElement, frame: Frame, common: Any) -> Geometry | None:
         asset = self._asset(geom)
         if "file" not in asset.attributes:
-            self.document.source.remarks.leave_out(
-                geom.place, "meshes without a file are not drawn"
-            )
+            meets = common["contact"] is not None
+            text = f"meshes without a file are not drawn{', and meet no others' if meets else ''}"
+            self.document.source.remarks.leave_out(geom.place, text, motion=meets)
             return None
         path = self.document.source.locate(self._file(asset), asset.place)
         if path is None:

@@ -13,9 +13,10 @@ class MjcfImporter(Importer):
         """The model in a file."""
         from dap3d_formats.element_table import note_elements
         from dap3d_formats.mjcf.actuators import read_actuators
-        from dap3d_formats.mjcf.constraints import read_equalities
+        from dap3d_formats.mjcf.constraints import read_equalities, read_tendons
         from dap3d_formats.mjcf.document import Document
         from dap3d_formats.mjcf.elements import CONTACTS, MJCF
+        from dap3d_formats.mjcf.keyframes import Keyframe
         from dap3d_formats.mjcf.reader import MjcfReader
         from dap3d_formats.mjcf.replicate import expand_replicas
 
@@ -25,9 +26,12 @@ class MjcfImporter(Importer):
         expand_replicas(document)
         reader = MjcfReader(document)
         reader.read_bodies()
+        keyframe = Keyframe.of(document, reader.model)
         reader.scale_masses()
         inertia = reader.inertia()
         reader.scale_springs(inertia)
+        read_tendons(reader)
         read_equalities(reader)
-        read_actuators(reader, inertia)
+        read_actuators(reader, inertia, keyframe)
+        keyframe.start(reader.model, reader.mocap)
         return reader.model

@@ -9,6 +9,7 @@ import numpy as np
 
 from dap3d_core.interface.formats import (
     LEAST,
+    UNBOUNDED,
     WORLD,
     Articulation,
     FormatError,
@@ -42,6 +43,8 @@ class MjcfReader:
         given: names of bodies and joints in the file, which those without a name do not take.
         joints: names of the joints that have been read.
         springdampers: joint -> time constant and damping ratio that give its spring and damper.
+        force_ranges: joint -> bounds of the force of its actuators.
+        mocap: names of bodies that a user would move.
     """
 
     document: Document
@@ -51,6 +54,8 @@ class MjcfReader:
     given: set[str] = attrs.Factory(set)
     joints: set[str] = attrs.Factory(set)
     springdampers: dict[str, tuple[float, ...]] = attrs.Factory(dict)
+    force_ranges: dict[str, tuple[float, float]] = attrs.Factory(dict)
+    mocap: list[str] = attrs.Factory(list)
 
     def __attrs_post_init__(self) -> None:
         root = self.document.root
@@ -69,25 +74,27 @@ class MjcfReader:
         for option in document.root.all("option"):
             x, y, z = option.numbers("gravity", 3, (0.0, 0.0, -9.81))
             model.gravity = (x, y, z)
-            for flag in option.all("flag"):
-                if flag.get("gravity") == "disable":
-                    model.gravity = (0.0, 0.0, 0.0)
+        if document.disables("gravity"):
+            model.gravity = (0.0, 0.0, 0.0)
         for world in document.root.all("worldbody"):
             self._contents(world, WORLD, Frame(), "main")
         if not model.links:
             raise FormatError("holds no <body>", document.root.place)
+        ground = ""
         for world in document.root.all("worldbody"):
-            self._world_shapes(world)
+            ground = self._world_shapes(world)
         for contact in document.root.all("contact"):
             for pair in contact.all("exclude"):
                 ends = pair.require("body1"), pair.require("body2")
                 for name in ends:
-                    if name not in model.links and document.source.contacts:
+                    if name not in (*model.links, WORLD) and document.source.contacts:
                         raise FormatError(f"there is no body {name}", pair.place)
-                model.excluded.append(ends)
+                if ground in model.links or WORLD not in ends:
+                    one, other = (ground if name == WORLD else name for name in ends)
+                    model.excluded.append((one, other))
 
-    def _world_shapes(self, world: XmlElement) -> None:
-        """The geoms of the world, as a link that is fixed to it."""
+    def _world_shapes(self, world: XmlElement) -> str:
+        """The geoms of the world, as a link that is fixed to it; its name."""
         geoms = self._gathered(world, ("geom",), Frame(), "main")
         shapes = [self.geoms.geometry(geom, frame) for geom, frame in geoms]
         link = Link(self._free_link("world_shapes"), place=world.place)
@@ -96,6 +103,7 @@ class MjcfReader:
             name = self._free(f"{link.name}_fixed")
             self.model.links[link.name] = link
             self.model.joints[name] = Joint(name, "fixed", WORLD, link.name, place=world.place)
+        return link.name
 
     def _contents(self, holder: XmlElement, link: str, frame: Frame, childclass: str) -> None:
         """Bodies and sites in a body or frame."""
@@ -110,6 +118,18 @@ class MjcfReader:
                 if child.get("name"):
                     self.sites[child.require("name")] = (link, frame @ self._site(settled))
 
+    def site(self, element: XmlElement, key: str) -> tuple[str, Frame]:
+        """The link of a site that an element names, and its frame there.
+
+        Raises:
+            FormatError: it is not there.
+        """
+        name = element.require(key)
+        if name not in self.sites:
+            what = f"{key} of <{element.name}>: there is no site {name!r}"
+            raise FormatError(what, element.place)
+        return self.sites[name]
+
     def _site(self, site: XmlElement) -> Frame:
         if "fromto" in site.attributes:
             ends = np.array(site.numbers("fromto", 6)).reshape(2, 3)
@@ -122,7 +142,9 @@ class MjcfReader:
         if name in model.links or name == WORLD:
             raise FormatError(f"there are two bodies {name}", element.place)
         childclass = element.get("childclass") or outer
-        link = Link(name, place=element.place)
+        if element.get("mocap") == "true":
+            self.mocap.append(name)
+        link = Link(name, place=element.place, gravcomp=element.number("gravcomp", 0.0))
         here = frame @ document.frame(element)
         joints = self._gathered(element, ("joint", "freejoint"), Frame(), childclass)
         geoms = self._gathered(element, ("geom",), Frame(), childclass)
@@ -266,16 +288,19 @@ class MjcfReader:
             if any(others):
                 text = f"{attribute} of a joint: higher coefficients of its polynomial"
                 self.document.source.remarks.leave_out(element.place, text, motion=True)
+        if self.document.disables("frictionloss", "constraint"):
+            joint.friction = (0.0,)
         joint.rest = (turned(element.number("springref", 0.0)) - reference,)
         both = element.numbers("springdamper", 2, (0.0, 0.0))
         if min(both) > 0.0:
             self.springdampers[joint.name] = both
         elif any(both):
             raise FormatError("both numbers of springdamper are above 0", element.place)
-        limited = element.get("limited", "auto")
-        if limited == "true" or (limited == "auto" and "range" in element.attributes
-                                 and self.document.flag("autolimits", True)):  # fmt: skip
-            low, high = element.numbers("range", 2, unbounded=True)
+        keys = ("actuatorfrcrange", "actuatorfrclimited")
+        self.force_ranges[joint.name] = self.document.bounds(element, *keys)
+        low, high = self.document.bounds(element, "range", "limited")
+        if (low, high) != UNBOUNDED and not self.document.disables("limit", "constraint"):
+            limited = element.get("limited", "auto")
             if joint.kind == "ball":
                 joint.limits = (Limits(upper=self.document.angle(high)),)
             elif low != high or limited == "true":  # of equal ones MuJoCo makes no limit

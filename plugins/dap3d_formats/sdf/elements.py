@@ -64,7 +64,7 @@ SDF: Table = {
     "dissipation": moves("", "stops are critically damped"),
     "dynamics": taken(), "damping": taken(), "spring_reference": taken(),
     "spring_stiffness": taken(),
-    "friction": translated("", "it fades at low rates, and does not stick"),
+    "friction": translated("", "it sticks; with contacts it fades at low rates"),
     "mimic": translated("", "a joint follow of the same rates, and the start by ratio and offset")
     | taken("joint axis"),
     "multiplier": taken(), "offset": taken(), "reference": taken(),
@@ -95,6 +95,14 @@ SDF: Table = {
 #: Where shapes are to meet each other.
 CONTACTS: Table = {
     **SDF,
-    "surface": moves("", "but mu of ode: contacts are rigid"), "plane": taken(), "normal": taken(),
+    "plane": taken(), "normal": taken(),
+    "surface": taken(), "surface/friction": taken(), "friction/ode": taken(), "mu": taken(),
+    **dict.fromkeys(("mu2", "fdir1", "slip1", "slip2"),
+                    moves("", "friction is that of mu in all directions")),
+    "friction/bullet": moves("", "friction is that of ode"), "torsional": moves("", "spin"),
+    "bounce": taken(), "restitution_coefficient": taken(),
+    "threshold": translated("", "without it, or of 1000 m/s and above, nothing bounces"),
+    "surface/contact": moves("", "contacts are rigid"), "soft_contact": moves("", "rigid, too"),
+    "max_contacts": noted("", "all points count"),
     "self_collide": taken(),
 }  # fmt: skip

@@ -14,6 +14,7 @@ from dap3d_core.interface.formats import (
     Inertial,
     Joint,
     Link,
+    Remarks,
     Source,
     XmlElement,
     from_quaternion,
@@ -24,6 +25,9 @@ from dap3d_formats.element_table import note_elements
 from dap3d_formats.sdf.elements import CONTACTS, SDF
 from dap3d_formats.sdf.frames import FrameGraph
 
+#: Speed below which nothing bounces from which on nothing ever does, m/s: the default is 1e5.
+FAST = 1e3
+
 
 class SdfReader:
     """Reads the models of one file into one articulation."""
@@ -33,7 +37,7 @@ class SdfReader:
         self.version = _version(root)
         self.frames = FrameGraph()
         self.model = Articulation(source.path.stem, gravity=(0.0, 0.0, -9.8), fixed_base=False,
-                                  friction_of_pair=min, place=root.place)  # fmt: skip
+                                  coefficient_of_pair=min, place=root.place)  # fmt: skip
         self.elements: list[tuple[XmlElement, str]] = []
         self.self_collide: set[str] = set()
         self.static: list[str] = []  # what names of links in static models begin with
@@ -199,7 +203,7 @@ class SdfReader:
         common: dict[str, Any] = {"pose": pose, "collision": collision, "place": shape.place}
         common["color"] = _color(element.first("material"))
         if collision and self.source.contacts:
-            common["contact"] = _contact(element)
+            common["contact"] = _contact(element, self.remarks)
         if shape.name == "box":
             return Geometry("box", numbers(shape, "size", 3), **common)
         if shape.name == "sphere":
@@ -270,12 +274,26 @@ def _version(root: XmlElement) -> tuple[int, ...]:
         raise FormatError(f"version {root.get('version')!r} is no version", root.place) from None
 
 
-def _contact(collision: XmlElement) -> Contact:
-    """How a collision meets others: its coefficient of friction, 1 where none is given."""
-    found: XmlElement | None = collision
-    for name in ("surface", "friction", "ode", "mu"):
+def _contact(collision: XmlElement, remarks: Remarks) -> Contact:
+    """How a collision meets others: its coefficients of friction, 1 by default, and restitution."""
+    mu = _below(collision, "surface", "friction", "ode", "mu")
+    e = _below(collision, "surface", "bounce", "restitution_coefficient")
+    threshold = _below(collision, "surface", "bounce", "threshold")
+    coefficient = 0.0
+    if e is not None and threshold is not None and threshold.content(1)[0] < FAST:
+        coefficient = e.content(1)[0]
+        if threshold.content(1)[0] > 0.0:
+            text = "threshold of <bounce>: it bounces below that speed, too"
+            remarks.translate(threshold.place, text, motion=True)
+    return Contact(1.0 if mu is None else mu.content(1)[0], e=coefficient)
+
+
+def _below(element: XmlElement, *names: str) -> XmlElement | None:
+    """The element at the end of a chain of children, or None."""
+    found: XmlElement | None = element
+    for name in names:
         found = None if found is None else found.first(name)
-    return Contact() if found is None else Contact(found.content(1)[0])
+    return found
 
 
 def _color(material: XmlElement | None) -> str:

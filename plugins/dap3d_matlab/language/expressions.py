@@ -1,5 +1,6 @@
 """Evaluates MATLAB expressions of a small part of the language."""
 
+import math
 import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -7,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dap3d_core.registry.suggestions import nearest
-from dap3d_matlab.language.builtins import CONSTANTS, FUNCTIONS, call
 from dap3d_matlab.language.operators import (
     EXTRAS,
     OPERATIONS,
@@ -20,11 +20,40 @@ from dap3d_matlab.language.operators import (
 )
 from dap3d_matlab.language.parse import SourceFile, text_of
 from dap3d_matlab.language.structures import MAKERS
-from dap3d_matlab.language.values import Broken, Numbers, Struct, kind_of, make, size_of
+from dap3d_matlab.language.values import (
+    LARGEST_MATRIX,
+    Broken,
+    Numbers,
+    Struct,
+    kind_of,
+    make,
+    size_of,
+)
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
+_CONSTANTS = {"pi": math.pi}
+
+#: Functions of each element of a matrix.
+_ELEMENTWISE: dict[str, Callable[[Numbers], Numbers]] = {
+    "sqrt": np.sqrt,
+    "abs": np.abs,
+    "sin": np.sin,
+    "cos": np.cos,
+    "tan": np.tan,
+    "asin": np.arcsin,
+    "acos": np.arccos,
+    "atan": np.arctan,
+    "exp": np.exp,
+    "deg2rad": np.deg2rad,
+}
+_FILLED: dict[str, Callable[[int, int], Numbers]] = {
+    "zeros": lambda rows, columns: np.zeros((rows, columns)),
+    "ones": lambda rows, columns: np.ones((rows, columns)),
+    "eye": lambda rows, columns: np.eye(rows, columns),
+}
+_FUNCTIONS = (*_ELEMENTWISE, "atan2", "norm", "diag", *_FILLED)
 #: Maximal nesting of brackets.
 DEEPEST = 50
 #: Maximal number of entries of all arrays in the expressions of a file: some seconds of work.
@@ -43,6 +72,44 @@ _OUTSIDE = {
     "boolean": "a truth value",
     "superclass": "a class",
 }
+
+
+def _call(name: str, values: list[Numbers], node: "Node") -> Numbers:
+    """The value of one of ``_FUNCTIONS``.
+
+    Raises:
+        RefusalError: the arguments do not fit, or the value is not finite and real.
+    """
+    if name in _FILLED:
+        return _filled(name, values, node)
+    count = 2 if name == "atan2" else 1
+    if len(values) != count:
+        words = "one argument" if count == 1 else f"{count} arguments"
+        raise RefusalError(node, f"the function {name} takes {words} here")
+    with np.errstate(all="ignore"):
+        if name in _ELEMENTWISE:
+            return checked(_ELEMENTWISE[name](values[0]), node)
+        if name == "atan2":
+            if values[0].shape != values[1].shape:
+                raise RefusalError(node, "the arguments of atan2 have different sizes")
+            return checked(np.arctan2(*values), node)
+        if name == "norm":
+            if min(values[0].shape) != 1:
+                raise RefusalError(node, "norm takes a vector here")
+            return checked(np.array([[float(np.linalg.norm(values[0]))]]), node)
+    vector = values[0]
+    if min(vector.shape) != 1 or vector.size > 10:
+        raise RefusalError(node, "diag takes a vector here")
+    return np.diag(vector.ravel())
+
+
+def _filled(name: str, values: list[Numbers], node: "Node") -> Numbers:
+    sizes = [v for value in values for v in value.ravel().tolist()] or [1.0]
+    if len(sizes) > 2 or not all(s.is_integer() and 0 <= s <= LARGEST_MATRIX for s in sizes):
+        raise RefusalError(node, f"the function {name} takes one or two sizes here")
+    rows, columns = int(sizes[0]), int(sizes[-1])
+    check_size(rows * columns, node)
+    return _FILLED[name](rows, columns)
 
 
 def _length(value: Any) -> int:
@@ -131,16 +198,16 @@ class Expressions:
             if isinstance(value, Broken):
                 raise ReportedError
             return value
-        if name in CONSTANTS:
-            return np.array([[CONSTANTS[name]]])
+        if name in _CONSTANTS:
+            return np.array([[_CONSTANTS[name]]])
         if name in MAKERS:
             return make(MAKERS[name], self.source.place(node))
         raise self._unknown(node, name)
 
     def _unknown(self, node: "Node", name: str) -> RefusalError:
-        if name in FUNCTIONS:
+        if name in _FUNCTIONS:
             return RefusalError(node, f"the function {name} needs arguments")
-        known = [*self.variables, *CONSTANTS, *FUNCTIONS, *MAKERS]
+        known = [*self.variables, *_CONSTANTS, *_FUNCTIONS, *MAKERS]
         return RefusalError(node, f"{name} is not defined in this file", "", nearest(name, known))
 
     def _matrix(self, node: "Node") -> Any:
@@ -193,13 +260,13 @@ class Expressions:
             return self.element(node, self._name(name_node), arguments)
         if name in MAKERS and not arguments:
             return make(MAKERS[name], self.source.place(node))
-        if name not in FUNCTIONS:
+        if name not in _FUNCTIONS:
             what = f"the function {name} is outside the language that is read; nothing is run"
-            near = nearest(name, [*FUNCTIONS, *MAKERS, *self.variables])
-            remedy = "" if near else f"functions that are read: {', '.join(FUNCTIONS)}"
+            near = nearest(name, [*_FUNCTIONS, *MAKERS, *self.variables])
+            remedy = "" if near else f"functions that are read: {', '.join(_FUNCTIONS)}"
             raise RefusalError(node, what, remedy, near)
         values = [numbers(self.value(n), n) for n in arguments]
-        return call(name, values, node)
+        return _call(name, values, node)
 
     def element(self, node: "Node", value: Any, arguments: list["Node"]) -> Any:
         """An element of a matrix or of an array of structures."""

@@ -138,8 +138,7 @@ class Grammar:
             raise file_error(source.path, f"joins more than {CHAIN} names by dots")
         if len(data) > QUICK:
             self._try(data, source.path)
-        root: Node = self._parser.parse(data).root_node
-        return root
+        return self._parser.parse(data).root_node
 
     def _try(self, data: bytes, path: Path) -> None:
         """Parse in pieces, within limits of time and memory."""

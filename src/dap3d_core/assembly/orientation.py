@@ -1,8 +1,5 @@
 """Rotation matrix and unit Euler parameters of a body, from Euler parameters of any length."""
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 import numpy as np

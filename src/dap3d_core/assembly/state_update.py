@@ -1,8 +1,5 @@
 """Changes of a state: displacements, changes of velocity, in the bodies' scaled coordinates."""
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import numpy as np
 
 from dap3d_core.assembly.arrays import LENGTH, Floats, System

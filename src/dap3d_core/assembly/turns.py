@@ -8,9 +8,6 @@ coordinates) is taken from there, whatever the length of the step.
 Joints with one or two rotations are counted; the motion is that of assembly/motion/coordinates.py.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from typing import Any
 

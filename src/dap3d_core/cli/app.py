@@ -41,8 +41,7 @@ class _Commands(Mapping[str, click.Command]):
 
     def __getitem__(self, name: str) -> click.Command:
         module = COMMANDS[name]
-        command: click.Command = getattr(import_module(module), module.rpartition(".")[2])
-        return command
+        return getattr(import_module(module), module.rpartition(".")[2])
 
     def __iter__(self) -> Iterator[str]:
         return iter(COMMANDS)

@@ -86,6 +86,7 @@ def import_model(
     strict: bool = False,
     allow_code: bool = False,
     arguments: Mapping[str, Any] | None = None,
+    key: str | None = None,
     positions: Mapping[str, float | Sequence[float]] | None = None,
     rates: Mapping[str, float | Sequence[float]] | None = None,
     registry: Registry | None = None,
@@ -99,13 +100,13 @@ def import_model(
         root: the folder that files which the model names must lie in; by default that of the file.
         free_base: links without a joint to a parent are free, where the format leaves it open.
         keep_fixed: fixed joints between moving links stay joints.
-        balance_inertia: principal moments of inertia that no body has are replaced by their mean.
+        balance_inertia: principal moments that no body has are replaced by their mean.
         limits: of joints: "soft", critically damped springs; "hard", where a rate ends; "off".
         contacts: shapes that meet others in the file do, by time stepping; else none does.
         shapes: links have their shapes; without, files of meshes are not looked for.
         strict: refuse a model of which something would be left out.
-        allow_code: evaluate the expressions of a xacro file.
-        arguments: of a xacro file, by name.
+        allow_code, arguments: evaluate the expressions of a xacro file; its arguments by name.
+        key: name of the keyframe of MJCF that it starts at, with its controls.
         positions, rates: of joints at the start, by name, as the file counts; coupled ones follow.
         registry: the installed types; by default all.
 
@@ -117,14 +118,13 @@ def import_model(
     """
     file = _path(path)
     if (folders := _folder_importer(file, format)) is not None:
-        return _read_folder(folders, file, registry, strict=strict, given=any(
-            (packages, root, free_base, keep_fixed, balance_inertia, arguments, positions, rates))
-        )  # fmt: skip
+        given = (packages, root, free_base, keep_fixed, balance_inertia, arguments, key, positions)
+        return _read_folder(folders, file, registry, strict=strict, given=any((*given, rates)))
     try:
         options = ImportOptions(free_base, keep_fixed, balance_inertia, limits, contacts=contacts)
         model, source, keyword = read_articulation(
             file, format=format, packages=packages, root=root, allow_code=allow_code, shapes=shapes,
-            contacts=contacts, arguments=arguments)  # fmt: skip
+            contacts=contacts, arguments=arguments, key=key)  # fmt: skip
         options.positions.update(_coordinates(positions, model, positions=True))
         options.rates.update(_coordinates(rates, model, positions=False))
         return _checked_scene(model, source, keyword, options, registry, strict)
@@ -251,6 +251,7 @@ def read_articulation(
     shapes: bool = True,
     contacts: bool = False,
     arguments: Mapping[str, Any] | None = None,
+    key: str | None = None,
 ) -> tuple[Articulation, SourceFiles, str]:
     """The model in a file before it becomes a scene, its files, and the importer's keyword.
 
@@ -267,13 +268,15 @@ def read_articulation(
     if not os.path.isdir(folder):
         raise FormatError(f"root: {folder} is no folder")
     given = {name: str(value) for name, value in _named("arguments", arguments).items()}
-    source = SourceFiles(file, folder, folders, allow_code, shapes, contacts, given)
+    source = SourceFiles(file, folder, folders, allow_code, shapes, contacts, given, key=key)
     importer, keyword = _importer(source, format)
     try:
         model = importer.read(source)
         if source.unused:
             what = f"takes no argument {min(source.unused)!r}"
             raise FormatError(what, None, "arguments are those that a xacro file declares")
+        if source.key is not None:
+            raise FormatError(f"has no keyframes, and so none {source.key!r}")
         return model, source, keyword
     except (FormatError, PluginError):
         raise

@@ -157,7 +157,13 @@ def _contacts_of(
         rows[:, equations.ROW] = integers[:, layout.integers]
         rows[:, equations.BODY_I : equations.BODY_I + slots] = integers[:, :slots]
         rows[:, equations.STATE] = integers[:, layout.integers - 1]
-        rows[:, equations.LOADED] = group.type_info.type.along is not None  # type: ignore[attr-defined]
+        type_: Any = group.type_info.type
+        rows[:, equations.LOADED] = type_.along is not None and not type_.load
+        if group.loaded is not None:
+            joints = plan.joint_row[group.loaded]
+            rows[:, equations.LOAD] = joints + type_.load[0]
+            rows[:, equations.LOADS] = len(type_.load)
+            rows[:, equations.PUSHES] = type_.pushes
         table[group.members - first] = rows
     return table
 
@@ -315,6 +321,8 @@ def _integers_of(group: Group, plan: Plan, model: Model) -> Integers:
         joints = group.members if group.joints is None else group.joints
         parts.append(plan.joint_row[joints][:, None])
         parts.append(np.array([plan.joint_block[m] for m in joints], dtype=np.int64))
+        if group.loaded is not None:
+            parts.append(plan.joint_row[group.loaded][:, None])
     elif kind == "function":
         parts.append(1 + group.members[:, None])
     for read in group.read:

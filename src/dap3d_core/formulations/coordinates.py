@@ -12,7 +12,7 @@ from dap3d_core.assembly.arrays import Floats, Integers
 from dap3d_core.assembly.evaluate import place_bodies
 from dap3d_core.formulations import ACCEPTED, FUNCTIONS, REPORT, RHS, WATCH
 from dap3d_core.kernels.runtime.cache import prepared
-from dap3d_core.model.rotations import to_body, to_global
+from dap3d_core.model.rotations import euler_rates, to_body, to_global
 from dap3d_core.model.state_layout import COORDINATES, VELOCITIES, split
 
 
@@ -104,6 +104,10 @@ class Coordinates(ABC):
         """
 
     @abstractmethod
+    def displace(self, y: Floats, moved: Floats) -> None:
+        """Move the bodies of a state y by small r and rotation vectors (6 n,), global axes."""
+
+    @abstractmethod
     def u_dot(self, t: float, u: Floats) -> Floats:
         """du/dt (13 n,), as of ``Evaluator.rhs``."""
 
@@ -179,8 +183,7 @@ class BodyCoordinates(Coordinates):
 
     def start(self, u: Floats) -> Floats:
         """As of ``Coordinates``."""
-        y: Floats = self.evaluator.integrated(u)
-        return y
+        return self.evaluator.integrated(u)
 
     def body_states(self, y: Floats) -> Floats:
         """As of ``Coordinates``."""
@@ -205,6 +208,13 @@ class BodyCoordinates(Coordinates):
         after[self.evaluator.model.integrated_layout["states"]] = states
         after[-1] += work
         return after
+
+    def displace(self, y: Floats, moved: Floats) -> None:
+        """As of ``Coordinates``."""
+        r, p, *_ = split(self.evaluator.bodies_of(y))
+        parts = moved.reshape(-1, 2, 3)
+        r += parts[:, 0]
+        p += euler_rates(p, parts[:, 1])
 
     def u_dot(self, t: float, u: Floats) -> Floats:
         """As of ``Coordinates``."""

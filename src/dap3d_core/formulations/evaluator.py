@@ -274,8 +274,7 @@ class Evaluator:
     @property
     def inputs(self) -> Floats:
         """(inputs,) the values that elements read, a copy."""
-        values: Floats = self.system.F[self.model.input_rows, 0]
-        return values
+        return self.system.F[self.model.input_rows, 0]
 
     def set_inputs(self, values: ArrayLike) -> None:
         """Set the values that elements read, (inputs,); they hold until they are set again."""
@@ -302,8 +301,7 @@ class Evaluator:
         """(functions, 4) values of the functions of time and their first three derivatives at t."""
         s = self.system
         self._call(VALUE, t, s.force, s.force, s.force)
-        values: Floats = s.F[1:, :4].copy()
-        return values
+        return s.F[1:, :4].copy()
 
     def set_penalty(self, alpha: float, Omega: float, mu: float) -> None:
         """Numbers of the penalty formulation; Omega in 1/s."""
@@ -321,8 +319,7 @@ class Evaluator:
 
     def body_state(self, y: Floats) -> Floats:
         """The state y in coordinates of bodies of one that is integrated."""
-        state: Floats = self.coordinates.body_states(y[None])[0]
-        return state
+        return self.coordinates.body_states(y[None])[0]
 
     def bodies_of(self, y: Floats) -> Floats:
         """View of the bodies' part (13 n,) of a state y in coordinates of bodies."""
@@ -334,8 +331,7 @@ class Evaluator:
         y: in coordinates of bodies.
         """
         self.states = y[self.model.integrated_layout["states"]].copy()
-        u: Floats = u_from_y(y[None], len(self.states))[0]
-        return u
+        return u_from_y(y[None], len(self.states))[0]
 
     def body_rows(self, rows: Floats) -> Floats:
         """Reported rows (k, 1 + y + report_size) with y in coordinates of bodies."""
@@ -369,8 +365,7 @@ class Evaluator:
         with self.coordinates.at(np.asarray(u, dtype=float)) as y:
             out = np.zeros_like(y)
             self.functions[RHS](float(t), y, out, self.system, self.loops)
-        rates: Floats = out[len(out) - 1 - len(self.states) : -1].copy()
-        return rates
+        return out[len(out) - 1 - len(self.states) : -1].copy()
 
     @IGNORE_FLOAT_ERRORS
     def rates(self, t: float, u: ArrayLike, v_dot: Floats) -> Floats:
@@ -392,8 +387,7 @@ class Evaluator:
         the three levels, and inputs.
         """
         out = self.coordinates.report(float(t), np.asarray(u, dtype=float))
-        whole: Floats = self.with_inputs(out[None])[0]
-        return whole
+        return self.with_inputs(out[None])[0]
 
     @IGNORE_FLOAT_ERRORS
     def applied_forces(self, t: float, u: ArrayLike) -> Floats:

@@ -13,9 +13,6 @@ numpy.linalg.lstsq or pinv give. Where forces depend on multipliers acceleration
 either: such forces read those of least lambda . w lambda (decision 0074), which are then reported.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 import numpy as np

@@ -9,9 +9,6 @@ solved by the block LDL^T of linear/ldlt/factor.py: no product alpha D^T D is fo
 masses' digits would be lost. Rows may depend on each other. C is zero on rows that have none.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import ALPHA, MU, OMEGA, WRENCH, Floats, System

@@ -63,5 +63,4 @@ def pivots(evaluator: Evaluator, t: float) -> Floats:
     inverse = np.ones(plan.row_size)
     for size, first, diagonal, *_ in plan.nodes[:-1]:
         inverse[first : first + size] = system.K[diagonal : diagonal + size * size : size + 1]
-    result: Floats = np.abs(1.0 / inverse[system.row])
-    return result
+    return np.abs(1.0 / inverse[system.row])

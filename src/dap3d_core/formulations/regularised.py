@@ -1,8 +1,5 @@
 """Accelerations where rows may depend on each other, by rows of finite weight (lsq.py)."""
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 import numpy as np

@@ -8,9 +8,6 @@ Manual: analysis_s; spec 9.
 solved by the block LDL^T of linear/ldlt/factor.py. Needs independent rows.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import EVEN, LENGTH, SINGULAR, Floats, System

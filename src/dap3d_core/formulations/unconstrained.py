@@ -1,8 +1,5 @@
 """Unconstrained formulation: M v_dot = g, for scenes without joints (manual: analysis_uc)."""
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import ENERGY, SCRATCH, TURNED, VALUE, WRENCH, Floats, System

@@ -112,7 +112,8 @@ class Joint(TypeBase):
     It may also define:
 
     * ``friction``  the wrench of its Coulomb friction on each body, as a force returns it; takes
-      ``lam`` (its multipliers), ``mu``, ``v_tol``, ``radius``; a force ``friction`` switches it on;
+      ``lam`` (its multipliers), ``mu``, ``v_tol``, ``radius``; a force ``friction`` with ``v_tol``
+      switches it on, one without switches on the ``grips``;
     * ``switch``    a number, or a tuple of numbers, smooth in time. With ``switch_words`` the run
       ends with this message where one becomes negative; without, the integration restarts where
       one changes its sign: there the element's law takes another branch (docs/how-to/events.md);
@@ -147,6 +148,7 @@ class Joint(TypeBase):
         states: names of states of its own, or name -> length; with them come the fields ``NAME_0``,
             initial values, and ``NAME_atol``, absolute tolerances.
         symbol: symbol in pictures, one of SYMBOLS; "": drawn from the declared fields.
+        grips: its friction that sticks, types derived from ``Contact`` with ``of=`` it.
         brings: a field, the keyword of a force and the field by which that names a joint: where the
             first is not zero the joint brings such a force, with its own fields of the same names.
             Its wrench is part of the joint's reaction, and moves nothing where joints carry it.
@@ -165,6 +167,7 @@ class Joint(TypeBase):
     brings: ClassVar[tuple[str, ...]] = ()
     unilateral: ClassVar[tuple[int, ...]] = ()
     unilateral_words: ClassVar[str] = ""
+    grips: ClassVar[tuple[Any, ...]] = ()
     unknowns: ClassVar[tuple[str, ...]] = ()
     periodic: ClassVar[tuple[str, ...]] = ()
 

@@ -45,6 +45,7 @@ class Group:
         numbers: (m, par_width) their numbers, as the layout says.
         tables: (instance, offset in its numbers, rows) of each table; the offset takes its place.
         joints: (m,) of friction, the joints it acts in; None for all else.
+        loaded: (m,) of friction that sticks, the joints whose load it has; None for all else.
         read: of forces that read reactions, the joint of each instance by field: groups of m.
     """
 
@@ -56,6 +57,7 @@ class Group:
     tables: tuple[tuple[int, int, Floats], ...] = ()
     joints: Integers | None = None
     read: tuple["Group", ...] = ()
+    loaded: Integers | None = None
 
     @property
     def keyword(self) -> str:
@@ -79,6 +81,7 @@ class Group:
             numbers=self.numbers[places],
             tables=tuple(tables),
             joints=None if self.joints is None else self.joints[places],
+            loaded=None if self.loaded is None else self.loaded[places],
             read=tuple(group.take(places) for group in self.read),
         )
 
@@ -139,6 +142,18 @@ class Grouping:
             ),
             by_type.values(),
         )
+
+    def loaded_groups(
+        self, instances: Sequence[Instance], index: Mapping[str, int]
+    ) -> tuple[Group, ...]:
+        """``groups`` of all that has rows, in the order of ``index``: by name."""
+        groups = self.groups(instances, range(len(instances)))
+        return tuple(
+            attrs.evolve(group, loaded=np.array([index[instances[k].values["joint"]]
+                                                 for k in group.members.tolist()], dtype=np.int64))
+            if getattr(group.type_info.type, "load", ()) else group
+            for group in groups
+        )  # fmt: skip
 
     def friction(
         self, forces: Sequence[tuple[int, Instance]], joints: Mapping[str, tuple[int, Instance]]

@@ -31,8 +31,7 @@ def breaks_of(function: Instance) -> Floats:
     except Exception as error:
         reason = f"{type(error).__name__}: {error}"
         raise PluginError(f"{where_is(type_)}.breaks failed: {reason}") from error
-    finite: Floats = found[np.isfinite(found)]
-    return finite
+    return found[np.isfinite(found)]
 
 
 def breaks_are_told(function: Instance) -> bool:

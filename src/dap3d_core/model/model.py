@@ -31,6 +31,7 @@ from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
 
 if TYPE_CHECKING:
     from dap3d_core.model.element_states import ElementState
+    from dap3d_core.scene.expressions.expression import Expression
 
 #: Sizes, m, of ordinary scenes: their tolerances are in metres as they are.
 ORDINARY = 0.03, 30.0
@@ -65,6 +66,7 @@ class Model:
         contact_laws: (contacts,) law of impact of each point of contact; they are the last joints.
         collisions: the shapes that collide; None where there are none.
         breaks: of joints that may be released, name -> N at which they break; inf: not by itself.
+        active: of those that hold only while an expression is positive, that.
         motions: of the joints (assembly/motion); joint_angles: those that are counted. None until
             they are looked for.
     """
@@ -100,11 +102,18 @@ class Model:
     contact_laws: tuple[str, ...] = ()
     collisions: CollisionShapes | None = None
     breaks: Mapping[str, float] = attrs.Factory(dict)
+    active: Mapping[str, "Expression"] = attrs.Factory(dict)
 
     @property
     def contact_count(self) -> int:
         """Number of points of contacts: they are the last of the joints."""
         return len(self.contact_laws)
+
+    @property
+    def loaded_contacts(self) -> list[int]:
+        """Places of contacts that are friction of a joint by its load, among the joints."""
+        loaded = (group for group in self.contacts if group.loaded is not None)
+        return [k for group in loaded for k in group.members.tolist()]
 
     @property
     def contact_names(self) -> tuple[str, ...]:
@@ -153,8 +162,7 @@ class Model:
             if other is group:
                 break
             first += other.count * len(other.type_info.layout.angles)
-        found: Integers = first + width * np.asarray(places)[:, None] + np.arange(width)
-        return found
+        return first + width * np.asarray(places)[:, None] + np.arange(width)
 
     @cached_property
     def angle_names(self) -> tuple[str, ...]:
@@ -337,7 +345,7 @@ def build_model(checked: ValidatedScene) -> Model:
     poses = _Poses(checked)
     holding = checked.holding
     rows = np.array([_rows(j) for j in holding], dtype=np.int64)
-    mask = [_position_mask(j) for j in holding]
+    mask = [j.type_info.type.constraint_mask() for j in holding]  # type: ignore[attr-defined]
     groups = _Groups(checked, poses)
     model = Model(
         body_names=tuple(checked.body_names),
@@ -369,6 +377,7 @@ def build_model(checked: ValidatedScene) -> Model:
         collisions=checked.collisions,
         contact_laws=tuple(contact.values["law"] for contact in checked.contacts),
         breaks={j.name: j.breaks_at for j in checked.joints if j.breaks_at is not None},
+        active={j.name: j.active for j in checked.joints if j.active is not None},
     )
     for value in attrs.astuple(model, recurse=False):
         if isinstance(value, np.ndarray):
@@ -400,6 +409,9 @@ class _Groups:
         def made(kind: str, elements: Sequence[tuple[int, Instance]]) -> tuple[Group, ...]:
             places, instances = [k for k, _ in elements], [i for _, i in elements]
             try:
+                if kind == "joint":
+                    index = {name: k for name, (k, _) in joints.items()}
+                    return by_kind[kind].loaded_groups(instances, index)
                 return by_kind[kind].groups(instances, places)
             except PrepareError as error:
                 faults.extend(_faults(kind, names[kind], error))
@@ -441,11 +453,6 @@ def _faults(
 
 def _rows(joint: Instance) -> int:
     return joint.type_info.row_count
-
-
-def _position_mask(joint: Instance) -> tuple[bool, ...]:
-    mask: tuple[bool, ...] = joint.type_info.type.constraint_mask()  # type: ignore[attr-defined]
-    return mask
 
 
 class _Poses(dict[int, BodyPose]):

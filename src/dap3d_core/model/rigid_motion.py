@@ -43,8 +43,7 @@ def turned(p: Floats, a: Floats) -> Floats:
     """Vectors A a (..., 3) of unit Euler parameters p (..., 4)."""
     e = p[..., 1:]
     half = cross(e, a)
-    vectors: Floats = a + 2.0 * (p[..., :1] * half + cross(e, half))
-    return vectors
+    return a + 2.0 * (p[..., :1] * half + cross(e, half))
 
 
 def matrices(p: Floats) -> Floats:
@@ -100,8 +99,7 @@ def rotation_vector(p: Floats) -> Floats:
     p = np.where(p[..., :1] < 0.0, -p, p)
     sine = np.linalg.norm(p[..., 1:], axis=-1, keepdims=True)
     angle = 2.0 * np.arctan2(sine, p[..., :1])
-    vector: Floats = np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 2.0) * p[..., 1:]
-    return vector
+    return np.where(sine > 0.0, angle / np.where(sine > 0.0, sine, 1.0), 2.0) * p[..., 1:]
 
 
 def adjoint(a: Pose) -> Floats:

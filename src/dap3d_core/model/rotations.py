@@ -40,8 +40,7 @@ def _apply(A: Floats, vector: ArrayLike) -> Floats:
     """A a for each pair, written out: the same bits whether one vector is turned or many."""
     a = np.asarray(vector, dtype=float)
     x, y, z = a[..., None, 0], a[..., None, 1], a[..., None, 2]
-    turned: Floats = A[..., 0] * x + A[..., 1] * y + A[..., 2] * z
-    return turned
+    return A[..., 0] * x + A[..., 1] * y + A[..., 2] * z
 
 
 def roll_pitch_yaw(p: ArrayLike) -> Floats:
@@ -78,15 +77,13 @@ def euler_rates(p: Floats, w: Floats) -> Floats:
     """p_dot (..., 4) of p (..., 4) and global angular velocities (..., 3): half (0, w) times p."""
     scalar = -np.sum(w * p[..., 1:], axis=-1, keepdims=True)
     vector = p[..., :1] * w + np.cross(w, p[..., 1:])
-    rates: Floats = 0.5 * np.concatenate([scalar, vector], axis=-1)
-    return rates
+    return 0.5 * np.concatenate([scalar, vector], axis=-1)
 
 
 def angular_velocities(p: Floats, p_dot: Floats) -> Floats:
     """Global angular velocities (..., 3) of p (..., 4) and its rates p_dot (..., 4): 2 G p_dot."""
     e0, e, rate = p[..., :1], p[..., 1:], p_dot[..., 1:]
-    w: Floats = 2.0 * (-e * p_dot[..., :1] + e0 * rate + np.cross(e, rate))
-    return w
+    return 2.0 * (-e * p_dot[..., :1] + e0 * rate + np.cross(e, rate))
 
 
 def skew(a: ArrayLike) -> Floats:

@@ -99,7 +99,8 @@ def symbol_of(entry: Entry | PairEntry) -> str:
 def units_of(prepared: PreparedRun, directions: Directions | None) -> list[Unit | PairUnit]:
     """The units of compiled code that a run calls, each once."""
     entries: list[Entry | PairEntry] = list(prepared.image.functions.values())
-    entries += [one.entry for one in prepared.advances]
+    for one in prepared.advances:
+        entries += [one.entry] if one.completes is None else [one.entry, one.completes]
     entries += [prepared.jumps.entry] if prepared.jumps else []
     entries += directions.entries if directions else []
     return list({entry.unit.name: entry.unit for entry in entries}.values())
@@ -118,6 +119,7 @@ def data_of(
     lines += _enumeration("J", JumpArrays.indices("real"))
     lines += _enumeration("JI", JumpArrays.indices("integer"))
     lines += _memory(prepared)
+    lines += _completion(prepared)
     lines += _jumps(prepared)
     lines += _start(prepared, variables)
     lines += _elements(prepared, elements)
@@ -243,6 +245,20 @@ def _loop(prepared: PreparedRun, k: int, one: Advance) -> list[str]:
     return [
         f"void {symbol}({types}, int64_t);",
         f"static void advance_{k}(int64_t *w, int64_t budget) {{ {symbol}({given}, budget); }}",
+    ]
+
+
+def _completion(prepared: PreparedRun) -> list[str]:
+    """The function complete, which puts means of steps of contacts into a row."""
+    one = prepared.advances[0]
+    if one.completes is None:
+        return ["#define COMPLETES 0"]
+    symbol = symbol_of(one.completes)
+    given = ", ".join(f"w + {prepared.image.at(part)}" for part in one.arguments[:2])
+    return [
+        "#define COMPLETES 1",
+        f"void {symbol}(void *, void *, double *, int64_t);",
+        f"static void complete(int64_t *w, double *row) {{ {symbol}({given}, row, ROW); }}",
     ]
 
 

@@ -4,7 +4,7 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -266,6 +266,8 @@ def export_model(
     rtol: float | None = None,
     atol: float | None = None,
     step: float | None = None,
+    contact: str | None = None,
+    contact_step: float | None = None,
     strict: bool = False,
     force: bool = False,
     allow_code: bool = False,
@@ -283,8 +285,8 @@ def export_model(
             where it has none the motion of its bodies.
         parameters: numbers that may be set, such as "forces.spring.k".
         platforms: "linux", "windows", "macos", "linux-arm64" ...; by default this one.
-        fmi: version of an FMU, 3 or 2. t_end, ..., step: settings as of ``simulate``.
-        strict, force: refuse a scene of which something would be left out; overwrite what exists.
+        fmi: version of an FMU, 3 or 2. t_end, ..., contact_step: settings as of ``simulate``.
+        strict, force: refuse to leave something out; overwrite what exists.
         allow_code, registry: as of ``compile``.
 
     Raises:
@@ -297,23 +299,22 @@ def export_model(
     chosen: dict[str, Any] = {
         "outputs": outputs, "parameters": parameters, "platforms": platforms, "t_end": t_end,
         "method": method, "integrator": integrator, "rtol": rtol, "atol": atol, "step": step,
+        "contact": contact, "contact_step": contact_step,
     }  # fmt: skip
     given = {name: value for name, value in chosen.items() if value is not None}
     if kind not in NATIVE_FORMATS:
-        for name in given:
-            raise refusal(f"{name} is of formats {', '.join(NATIVE_FORMATS)}, not of {kind}")
-        _require_format(kind)
+        _require_format(kind, given)
         return export_text(scene, path, format=kind, strict=strict, force=force, registry=registry)
     if path is None:
         raise refusal(f"format {kind} needs a path", "give that of the file or folder")
-    return export_native(
-        scene, path, format=kind, fmi=fmi, strict=strict, force=force, allow_code=allow_code,
-        registry=registry, **given,
-    )  # fmt: skip
+    given |= {"strict": strict, "force": force, "allow_code": allow_code, "registry": registry}
+    return export_native(scene, path, format=kind, fmi=fmi, **given)
 
 
-def _require_format(kind: str) -> None:
-    """Refuse a format that there is not; names those of models, and the nearest."""
+def _require_format(kind: str, given: Iterable[str]) -> None:
+    """Refuse settings of other formats, and a format that there is not; names the nearest."""
+    for name in given:
+        raise refusal(f"{name} is of formats {', '.join(NATIVE_FORMATS)}, not of {kind}")
     exporters = extensions("exporter")
     if kind in exporters.keywords:
         return

@@ -43,15 +43,12 @@ if TYPE_CHECKING:
 
     from dap3d_core.simulation.linearization.linearization import Linearization
     from dap3d_core.study.equilibrium_path import EquilibriumPath
-    from dap3d_core.study.fit.fit_result import Fit
     from dap3d_core.study.modes_over import ModesOver
 
     Drawable = (
         Result | Mapping[str, Result] | Fit | Linearization | ModesOver | EquilibriumPath
         | xarray.Dataset
     )  # fmt: skip
-    from dap3d_core.simulation.linearization.linearization import Linearization
-    from dap3d_core.study.equilibrium_path import EquilibriumPath
 
 #: Backends that matplotlib falls back on where it cannot open windows.
 FILE_BACKENDS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
@@ -92,15 +89,10 @@ def picture_of(
     if hasattr(result, "turning"):
         if x is not None or at:
             raise ValueError("a path of equilibria is drawn over its parameter: leave x and at out")
-
         return EquilibriumPathPicture(cast("EquilibriumPath", result), names)
     drawn = result.values() if isinstance(result, Mapping) else [result]
-    is_result = all(isinstance(one, Result) for one in drawn)
-    if (
-        not is_result
-        and not hasattr(result, "mode_eigenvalues")
-        and not hasattr(result, "measured")
-    ):
+    are_runs = all(isinstance(one, Result) for one in drawn)
+    if not (are_runs or hasattr(result, "mode_eigenvalues") or hasattr(result, "measured")):
         words = (
             "a Result, a dictionary of these, a Fit, a Linearization, a ModesOver, an "
             "EquilibriumPath or the data of a sweep"
@@ -109,17 +101,15 @@ def picture_of(
         raise TypeError(f"the argument result should be {words}, not {result!r}{reader}")
     if at:
         raise ValueError("at chooses points of a sweep; this is none")
-    if isinstance(result, (Result, Mapping)):
+    if are_runs:
         return curve_picture(cast("Result | Mapping[str, Result]", result), names, x)
     if x is not None:
         raise ValueError("a fit or a linearisation has an x axis of its own: leave x out")
     if hasattr(result, "mode_eigenvalues"):
         if names:
             raise ValueError("of a linearisation the eigenvalues are drawn: leave names out")
-
         return EigenvaluePicture(cast("Linearization", result))
-
-    return fit_picture(result, names)
+    return FitPicture.of(cast("Fit", result), names)
 
 
 @checked
@@ -239,31 +229,25 @@ class EigenvaluePicture(OnePanel):
 
     def draw_on(self, ax: Axes) -> Axes:
         """Draw on axes of the user."""
-        return draw_eigenvalues(ax, self.linearization)
-
-
-def draw_eigenvalues(ax: Axes, linearization: "Linearization") -> Axes:
-    """Draw the eigenvalues of a linearisation on axes; returns these."""
-    values = linearization.eigenvalues
-    size = float(np.max(np.abs(values), initial=0.0)) or 1.0
-    real = np.where(np.abs(values.real) > REAL_PART_ROUNDING * size, values.real, 0.0)
-    grows = real > 0.0
-    ax.axvline(0.0, color="0.6", linewidth=0.8)
-    ax.plot(real[~grows], values.imag[~grows], "o", color=PALETTE[0], markersize=4.5)
-    ax.plot(real[grows], values.imag[grows], "X", color=PALETTE[1], markersize=5.5)
-    modes = linearization.mode_eigenvalues
-    for k, value in enumerate(modes[:MOST_LABELS]):
-        x = value.real if abs(value.real) > REAL_PART_ROUNDING * size else 0.0
-        if abs(value) > 0.0:
-            ax.annotate(str(k + 1), (x, value.imag), xytext=(4, 3), textcoords="offset points",
-                        fontsize=LETTERS)  # fmt: skip
-    if not np.any(real):
-        ax.set_xlim(-size, size)
-    ax.margins(0.12)
-    ax.set_xlabel("real part [1/s]", fontsize=LETTERS)
-    ax.set_ylabel("imaginary part [rad/s]", fontsize=LETTERS)
-    style_axes(ax)
-    return ax
+        values = self.linearization.eigenvalues
+        size = float(np.max(np.abs(values), initial=0.0)) or 1.0
+        real = np.where(np.abs(values.real) > REAL_PART_ROUNDING * size, values.real, 0.0)
+        grows = real > 0.0
+        ax.axvline(0.0, color="0.6", linewidth=0.8)
+        ax.plot(real[~grows], values.imag[~grows], "o", color=PALETTE[0], markersize=4.5)
+        ax.plot(real[grows], values.imag[grows], "X", color=PALETTE[1], markersize=5.5)
+        for k, value in enumerate(self.linearization.mode_eigenvalues[:MOST_LABELS]):
+            x = value.real if abs(value.real) > REAL_PART_ROUNDING * size else 0.0
+            if abs(value) > 0.0:
+                ax.annotate(str(k + 1), (x, value.imag), xytext=(4, 3), textcoords="offset points",
+                            fontsize=LETTERS)  # fmt: skip
+        if not np.any(real):
+            ax.set_xlim(-size, size)
+        ax.margins(0.12)
+        ax.set_xlabel("real part [1/s]", fontsize=LETTERS)
+        ax.set_ylabel("imaginary part [rad/s]", fontsize=LETTERS)
+        style_axes(ax)
+        return ax
 
 
 class Panel(NamedTuple):
@@ -384,6 +368,14 @@ class FitPicture(Picture):
     fit: Fit
     outputs: list[str]
 
+    @classmethod
+    def of(cls, fit: Fit, outputs: Sequence[str]) -> "FitPicture":
+        """Of outputs, by default of all; unknown ones are an UnknownNameError."""
+        for name in outputs:
+            if name not in fit.measured:
+                raise unknown("output of the fit", name, fit.measured)
+        return cls(fit, list(dict.fromkeys(outputs)) or list(fit.measured))
+
     @property
     def height(self) -> float:
         """A suitable height of the figure, inches."""
@@ -431,11 +423,3 @@ class FitPicture(Picture):
         if (reach > 0.0).any():
             limit = 1.15 * np.nanmax(reach)
             below.set_ylim(-limit, limit)
-
-
-def fit_picture(fit: Fit, outputs: Sequence[str]) -> FitPicture:
-    """Picture of outputs of a fit, by default of all; unknown ones are an UnknownNameError."""
-    for name in outputs:
-        if name not in fit.measured:
-            raise unknown("output of the fit", name, fit.measured)
-    return FitPicture(fit, list(dict.fromkeys(outputs)) or list(fit.measured))

@@ -126,16 +126,12 @@ def _candidates(bench: Bench, fixed: list[Setting]) -> Iterator[Setting]:
 
 def _others(first: Setting, settings: Iterable[Setting]) -> list[Setting]:
     """Settings with another integrator or method than the first, the most different ones first."""
-
-    def similarity(setting: Setting) -> tuple[bool, bool, bool]:
-        return (
-            setting.method in APPROXIMATE,
-            setting.integrator == first.integrator,
-            setting.method == first.method,
-        )
-
-    others = [s for s in settings if (s.integrator, s.method) != (first.integrator, first.method)]
-    return sorted(others, key=similarity)
+    integrator, method = first.integrator, first.method
+    others = [s for s in settings if (s.integrator, s.method) != (integrator, method)]
+    return sorted(
+        others,
+        key=lambda s: (s.method in APPROXIMATE, s.integrator == integrator, s.method == method),
+    )
 
 
 def _reference(

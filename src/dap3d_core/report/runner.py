@@ -40,8 +40,6 @@ CAP_S = 5.0
 LIMIT_S = 30.0
 #: Expected duration of a rung, relative to the previous one.
 GROWTH = 1.6
-
-
 _STEP_LEFT_OUT = (
     "the scene's step of {:g} s is left out where the integrator chooses its step; take it out of "
     "the scene to run so"
@@ -94,7 +92,9 @@ def report(
         ValueError: ``repeat``, ``limit_s`` or ``target_error`` is not positive.
     """
     repeat = (1 if quick else 5) if repeat is None else repeat
-    _check_positive(repeat=repeat, limit_s=limit_s, target_error=target_error)
+    for name, value in dict(repeat=repeat, limit_s=limit_s, target_error=target_error).items():
+        if value is not None and not 0.0 < value < math.inf:
+            raise ValueError(f"{name} is {value}; it must be a positive number")
     given = scene if isinstance(scene, Scene) else load(scene)
     requested = dict(t_end=t_end, dt=dt, correct=correct, project=project)
     used = _prepared(given, requested, methods, integrators, tolerances, steps)
@@ -104,12 +104,6 @@ def report(
     if given.simulation.step is not None:
         maker.notes.append(_STEP_LEFT_OUT.format(given.simulation.step))
     return maker.make(chosen(integrators, MEASURED), rtols, steps, target_error, quick=quick)
-
-
-def _check_positive(**numbers: float | None) -> None:
-    for name, value in numbers.items():
-        if value is not None and not 0.0 < value < math.inf:
-            raise ValueError(f"{name} is {value}; it must be a positive number")
 
 
 def _prepared(

@@ -1,4 +1,4 @@
-"""Contacts of shapes that meet anywhere, a row for each point that pushes at a reported instant."""
+"""Contacts as a table, a row for each point that pushes at a reported instant."""
 
 from typing import TYPE_CHECKING, Any, Self
 
@@ -17,10 +17,14 @@ FIELDS = {
     "t": (("contact",), "s", "instant of the report"),
     "pair": (("contact", "side"), "1", "shapes i and j, places in contact_shape"),
     "mode": (("contact",), "1", "1 slides, 2 sticks"),
-    "gap": (("contact",), "m", "distance of both surfaces as the step began"),
-    "point": (("contact", "axis"), "m", "halfway between both surfaces as the step began"),
-    "normal": (("contact", "axis"), "1", "unit vector from shape j to shape i"),
-    "force": (("contact", "axis"), "N", "on shape i, mean of the step that ends at t"),
+    "gap": (("contact",), "m", "distance of both surfaces, of shapes as the step began"),
+    "point": (
+        ("contact", "axis"),
+        "m",
+        "of contact, of shapes halfway between both surfaces as the step began",
+    ),
+    "normal": (("contact", "axis"), "1", "unit vector from j to i"),
+    "force": (("contact", "axis"), "N", "on i, of shapes the mean of the step that ends at t"),
 }
 #: Columns of rows as integrations collect them.
 WIDTH = 14
@@ -28,17 +32,21 @@ WIDTH = 14
 
 @attrs.frozen(eq=False, repr=False)
 class ContactTable:
-    """Contacts of shapes, k of them, by rising instants; global axes.
+    """Contacts, k of them, by rising instants; global axes.
+
+    Of shapes that collide a row has means and places of the step that ends at its instant; of
+    declared contacts what holds there.
 
     Attributes:
-        names: of the shapes of the scene that collide.
+        names: of the shapes of the scene that collide; then ``ground`` and the bodies, where there
+            are declared contacts.
         t: (k,) s, one of the reported instants.
-        pair: (k, 2) shapes i and j, places in ``names``.
+        pair: (k, 2) shapes or bodies i and j, places in ``names``.
         mode: (k,) 1 slides, 2 sticks.
-        gap: (k,) m, as the step that ends at t began.
-        point: (k, 3) m, halfway between both surfaces then.
-        normal: (k, 3) unit vectors from shape j to shape i.
-        force: (k, 3) N on shape i, the mean of that step.
+        gap: (k,) m, of shapes as the step that ends at t began.
+        point: (k, 3) m, of shapes halfway between both surfaces then.
+        normal: (k, 3) unit vectors from j to i.
+        force: (k, 3) N on i, of shapes the mean of that step.
     """
 
     names: tuple[str, ...]
@@ -61,7 +69,7 @@ class ContactTable:
         return len(self.t)
 
     def __repr__(self) -> str:
-        return f"<ContactTable: {len(self)} contacts of {len(self.names)} shapes>"
+        return f"<ContactTable: {len(self)} contacts of {len(self.names)} shapes and bodies>"
 
     def __eq__(self, other: object) -> bool:
         same = isinstance(other, ContactTable) and self.names == other.names
@@ -70,7 +78,7 @@ class ContactTable:
     __hash__ = None  # type: ignore[assignment]
 
     def of(self, shape: str, other: str | None = None) -> "ContactTable":
-        """The rows of a shape, or of a pair, with it as shape i: normal and force on it.
+        """The rows of a shape or body, or of a pair, with it as i: normal and force on it.
 
         Raises:
             UnknownNameError: there is no such shape that collides.
@@ -89,6 +97,15 @@ class ContactTable:
     def at(self, t: Floats) -> "ContactTable":
         """The rows of some of the reported instants."""
         return self._part(np.isin(self.t, t))
+
+    def joined(self, other: "ContactTable") -> "ContactTable":
+        """The rows of both, by rising instants."""
+        if not self.names:
+            return other
+        parts = {n: np.concatenate([getattr(self, n), getattr(other, n)]) for n in FIELDS}
+        parts["pair"][len(self) :] += len(self.names)
+        names = (*self.names, *other.names)
+        return ContactTable(names, **parts)._part(np.argsort(parts["t"], kind="stable"))
 
     def _part(self, chosen: Any) -> "ContactTable":
         return attrs.evolve(self, **{name: getattr(self, name)[chosen] for name in FIELDS})

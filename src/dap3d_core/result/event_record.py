@@ -7,8 +7,8 @@ import attrs
 
 #: A switch that restarted the integration, or ended the run; an event that stopped it, was
 #: recorded, or changed parameters of a force or velocities; a jump of velocities by elements; a
-#: joint that has broken or was let go.
-KINDS = ("switch", "end", "stop", "record", "change", "jump", "break")
+#: joint that has broken or was let go, joints that hold again.
+KINDS = ("switch", "end", "stop", "record", "change", "jump", "break", "engage")
 #: The same of contacts (docs/concepts/contact.md).
 CONTACT_KINDS = ("touch", "impact", "lift", "slip", "stick", "rest", "jam")
 
@@ -22,11 +22,11 @@ class EventRecord:
     """A switch or an event at a located instant.
 
     Attributes:
-        name: of the event; of a joint that breaks its own; of a switch ``force NAME`` or ``joint
-            NAME``; of a jump those of all elements whose impulses acted.
+        name: of the event; of joints that end or hold again their own; of a switch ``force NAME``
+            or ``joint NAME``; of a jump those of all elements whose impulses acted.
         t: s.
         direction: +1 if its function rose through its level, -1 if it fell; of a jump that of the
-            first switch, 0 without one.
+            first switch, 0 without one; of joints that end or hold 0.
         kind: one of ``KINDS``, or of ``CONTACT_KINDS``.
         u: (13 n) the state, of events and before jumps; None for switches.
         changes: force -> field -> new value of changed parameters.
@@ -62,6 +62,8 @@ class EventRecord:
             return f"t = {self.t:.9g} s: jump by {self.name}: work {self.work:.6g} J{''.join(of)}"
         if self.kind == "break":
             return f"t = {self.t:.9g} s: joint {self.name} ends"
+        if self.kind == "engage":
+            return f"t = {self.t:.9g} s: {self.name} holds: work {self.work:.6g} J"
         if self.kind in ("switch", "end"):
             way = f": its switch became {'positive' if self.direction > 0 else 'negative'}"
         else:

@@ -22,6 +22,7 @@ from dap3d_core.scene.errors import MISSING, Key, MistakeList, dotted
 from dap3d_core.scene.expressions.expression import fault_of_word
 from dap3d_core.scene.scene import Scene
 from dap3d_core.scene.tables import (
+    ACTIVE,
     GROUND,
     NAMED,
     NO_TURN,
@@ -293,7 +294,8 @@ class _Part:
         for old, entry in getattr(self.part, table).items():
             name = self.names[old]
             if isinstance(entry, Element):
-                fields = {k: self._field(k, v) for k, v in entry.fields.items()}
+                fields = {k: self._output(v) if table == "joints" and k == ACTIVE else
+                          self._field(k, v) for k, v in entry.fields.items()}  # fmt: skip
                 if table == "forces" and not self._names_a_part(entry.fields):
                     self._left_out.append(old)
                     continue

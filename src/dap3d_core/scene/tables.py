@@ -138,8 +138,9 @@ class Simulation:
 
 #: Keys of joints whose coordinate a contact limits (contacts/read_contacts.py).
 LIMITS = ("lower", "upper", "e")
-#: Key of joints that end where their force becomes larger (validate/joint_fields.py).
-BREAKS_AT = "breaks_at"
+#: Keys of joints that end where their force becomes larger, and that hold only while an expression
+#: is positive (validate/joint_fields.py).
+RELEASES = BREAKS_AT, ACTIVE = "breaks_at", "active"
 HEADER_KEYS = frozenset({"name", "description", "schema"})
 #: Tables of the scene file with named entries, and the class of an entry.
 NAMED: dict[str, type] = {

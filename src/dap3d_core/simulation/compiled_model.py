@@ -5,7 +5,7 @@ import os
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn, Self
@@ -152,11 +152,19 @@ class CompiledModel:
             *(information(f"{note}") for note in cache_notes()),
         ]
         self._redundancy: Redundancy | None = None
-        if scene.outputs:
+        self._check_expressions()
+        self.compile_time = time.perf_counter() - started
+
+    def _check_expressions(self) -> None:
+        """SceneError for expressions that no result of the scene would have."""
+        if self.scene.outputs:
             from dap3d_core.simulation.output.check_outputs import check_outputs
 
-            check_outputs(scene, self.scene_text, self.evaluator)
-        self.compile_time = time.perf_counter() - started
+            check_outputs(self.scene, self.scene_text, self.evaluator)
+        if self.model.active:
+            from dap3d_core.simulation.output.active_joints import check_active
+
+            check_active(self.scene, self.scene_text, self.evaluator)
 
     def _take_method(self, requested: str, announce: Announce) -> None:
         """Set the method and its reason, with the evaluator and the start that led to them."""
@@ -328,8 +336,15 @@ class CompiledModel:
         state: "StartState | None" = None,
     ) -> InitialState:
         """As ``start``, with an evaluator."""
+        active: AbstractContextManager[object] = nullcontext()
+        if self.model.active:
+            from dap3d_core.simulation.output.active_joints import only_active
+
+            u = self.model.u0 if state is None else state.u
+            active = only_active(self.scene_text, evaluator, u)
         try:
-            start = find_start(evaluator, *key, state)
+            with active:
+                start = find_start(evaluator, *key, state)
         except AssemblyError as error:
             raise self._located(error) from error
         mistakes = undefined_directions(self.scene, self.model, start.u, self.model.size)

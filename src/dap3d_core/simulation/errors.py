@@ -49,8 +49,9 @@ def refuse_breaks(model: Any, what: str) -> None:
     """Refuse what does not know that joints break; as above."""
     for joint in model.breaks:
         raise SimulationError(
-            f"{what} does not take joints that may break yet, and the scene has some ({joint}): "
-            "leave breaks_at out, or run the scene (simulate), which does"
+            f"{what} does not take joints that may break or hold at times yet, and the scene has "
+            f"some ({joint}): leave breaks_at and active out, or run the scene (simulate), which "
+            "does"
         )
 
 

@@ -51,9 +51,12 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
     if model.contact_count:
         if requested in ("auto", "lsq"):
             return "lsq", "the scene has contacts"
+        takes_joint = not (model.breaks or model.loaded_contacts)
+        if requested == "joint" and takes_joint:
+            return "joint", "asked for"
         raise SimulationError(
             f"method {requested} does not fit: the scene has contacts, whose rows hold and let go; "
-            "use lsq or auto"
+            f"use {'lsq, joint' if takes_joint else 'lsq'} or auto"
         )
     if model.breaks:
         return _method_of_breaks(model, requested)
@@ -74,16 +77,16 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
 def _method_of_breaks(model: Model, requested: str) -> tuple[str, str]:
     """As ``choose_method``, of a model with joints that may be released."""
     some_joint = next(iter(model.breaks))
-    if model.contact_count or model.collisions is not None:
+    if model.collisions is not None:
         raise SimulationError(
-            f"joint {some_joint} has breaks_at, which is not known beside contacts yet: leave it "
-            "out, or the contacts"
+            f"joint {some_joint} may break or holds at times, which shapes that collide do not "
+            "take yet: leave breaks_at and active out, or declare the contacts"
         )
     if requested in ("auto", "lsq"):
-        return "lsq", "joints may break"
+        return "lsq", "joints may break or hold at times"
     raise SimulationError(
-        f"method {requested} does not fit: joint {some_joint} may break (breaks_at), and its rows "
-        "are zero then; use lsq or auto"
+        f"method {requested} does not fit: joint {some_joint} may end (breaks_at, active), and its "
+        "rows are zero then; use lsq or auto"
     )
 
 

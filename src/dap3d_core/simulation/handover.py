@@ -69,7 +69,9 @@ def switch_integrator(run: RunState) -> None:
     """Continue with the other one of the explicit and the implicit integrator."""
     present = run.present
     if not present.implicit:
-        run.notes.append(change_note(present.t))
+        until = f"{EXPLICIT.name} until t = {present.t:.6g} s"
+        note = f"integrator auto: {until}, then {IMPLICIT.name}: {WHY_STIFF}"
+        run.notes.append(information(note))
     integrator = EXPLICIT if present.implicit else IMPLICIT
     options = run.options | {"first_step": None}
     integration = integrator.make(run.evaluator, present.y, run.times, **options)
@@ -90,12 +92,6 @@ def take_over(integration: Integration, before: Integration) -> None:
     if not integration.implicit:
         forget_measures(work)
     integration.restart()
-
-
-def change_note(t: float) -> str:
-    """Note on where integrator auto has gone on with the implicit one."""
-    until = f"{EXPLICIT.name} until t = {t:.6g} s"
-    return information(f"integrator auto: {until}, then {IMPLICIT.name}: {WHY_STIFF}")
 
 
 def stiffness_notes(integrations: Sequence[Integration], integrator: str) -> list[str]:
@@ -170,8 +166,7 @@ def time_left(lengths: Floats, span: float) -> float:
 def _lengths(evaluator: Evaluator, t: float, y: Floats) -> Floats:
     found = np.zeros(at.MEASURES - at.PROJECTED + evaluator.length_count)
     evaluator.functions[PROJECT](t, y.copy(), found, evaluator.system, evaluator.loops)
-    lengths: Floats = found[at.MEASURES - at.PROJECTED :]
-    return lengths
+    return found[at.MEASURES - at.PROJECTED :]
 
 
 def crossing_notes(crossed: Sequence[float]) -> list[str]:

@@ -1,7 +1,7 @@
 """One run: initial conditions, integration in chunks, the result and its notes."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -9,7 +9,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.pivots import store_reference_pivots
-from dap3d_core.integrators import IMPLICIT, Integration, Status
+from dap3d_core.integrators import IMPLICIT, STEPPING, Integration, Status
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.integrators.stepping.singular_poses import begin_singular
 from dap3d_core.kernels.array_types import Floats
@@ -18,7 +18,6 @@ from dap3d_core.result import Computed, Result, ResultError, information
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.errors import RedundantError, SimulationError, refuse_breaks
 from dap3d_core.simulation.failure.refused_steps import refusal_notes
-from dap3d_core.simulation.failure.stepping import stepping_notes
 from dap3d_core.simulation.handover import (
     crossing_notes,
     hand_over,
@@ -56,6 +55,11 @@ BUFFER_NUMBERS = 1_000_000
 MUCH_WORK = 3_000_000
 #: A second run, for the error, leaves a singular pose by a first step of this part.
 SECOND_RUN_FACTOR = 0.8
+#: A residual above this part of the largest impulse is a warning, and an overlap above this part of
+#: the length of the scene.
+UNSOLVED = 1e-3
+#: Overlaps at the start above this part of the length of the scene are told.
+LEAST_OVERLAP = 1e-8
 
 
 class Run(RunState):
@@ -88,7 +92,14 @@ class Run(RunState):
         self.started = time.perf_counter()
         if self.event_locator:
             self.event_locator.take_rows = self._take_rows
-        self.begin(self._integration(self._start()))
+        try:
+            if self.event_locator:
+                self.event_locator.release_inactive(self.start)
+            self.begin(self._integration(self._start()))
+        except BaseException:
+            if self.event_locator:
+                self.event_locator.put_back()
+            raise
 
     def finish(self) -> Result:
         """Integrate from the present state to the end.
@@ -347,3 +358,29 @@ class Run(RunState):
         if ratio is None or ratio >= WORTHWHILE:
             return []
         return [information(in_joint_coordinates(ratio))]
+
+
+def stepping_notes(integrations: Sequence[Integration], length: float) -> list[str]:
+    """Residual, overlap and work of friction of a run by time stepping; none of other runs.
+
+    length: of the scene, m.
+    """
+    states = [one.work for one in integrations if one.name == STEPPING.name]
+    if not states:
+        return []
+    residual, deepest = max(w.largest_residual for w in states), max(w.deepest for w in states)
+    taken = abs(sum(w.friction_work for w in states))
+    words = (
+        f"contacts were solved to {residual:.2g} of the largest impulse of a step, bodies overlap "
+        f"by {deepest:.2g} m at most; friction took {taken:.6g} J"
+    )
+    notes: list[str] = [information(words)]
+    if residual > UNSOLVED:
+        notes = [f"{words}: where bodies rest is not to be trusted; give a shorter contact_step"]
+    elif deepest > UNSOLVED * length:
+        notes = [f"{words}: joints or drivers hold them where they cannot move apart"]
+    if (overlap := states[0].overlap_at_start) > LEAST_OVERLAP * length:
+        notes.append(
+            f"bodies overlapped by {overlap:.2g} m at the start, and were moved apart: move them"
+        )
+    return notes

@@ -205,7 +205,7 @@ class RunState:
     def record(self, status: str, more_notes: Sequence[str] = ()) -> RunMetadata:
         """The metadata of the result so far."""
         counts, events = self.statistics(), self.events()
-        changes = any(event.changes for event in events)
+        changes = any(event.changes or event.kind == "engage" for event in events)
         changes |= self.jumps is not None and self.jumps.lose
         return RunMetadata(
             scene_text=self.compiled.scene_text,

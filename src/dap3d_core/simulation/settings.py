@@ -2,7 +2,7 @@
 
 import os
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import attrs
@@ -18,7 +18,7 @@ from dap3d_core.model import Model
 from dap3d_core.result.note import information
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
 from dap3d_core.scene.validate.settings import notes_of
-from dap3d_core.settings import METHODS
+from dap3d_core.settings import METHODS, SETTINGS
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.explain import takes_joint_coordinates
@@ -63,19 +63,32 @@ def _with_contact_engine(compiled: CompiledModel, settings: Simulation) -> Simul
 
 
 def _refuse_sticking(model: Model) -> None:
-    """SceneError: friction of joints sticks, which steps of contacts do not know."""
-    if name := _sticking(model):
+    """SceneError: friction of joints sticks, or a law is a type's own: steps do not know these."""
+    name = _sticking(model)
+    if name.partition("#")[0] in {n.partition("#")[0] for n in _of_laws(model)}:
+        what = "has a law of friction of its type, which events follow, and time stepping does not"
+        remedy = "take contact = 'events', or a type of contact without grip"
+        raise SceneError([Mistake(f"contacts.{name}", MISSING, what, remedy=remedy)])
+    if name:
         what = "sticks, which events follow, and time stepping of contacts does not"
         remedy = "give it a w_tol, or v_tol, below which it fades"
         raise SceneError([Mistake(f"forces.{name}", MISSING, what, remedy=remedy)])
 
 
 def _sticking(model: Model) -> str:
-    """A friction of joints that sticks; "" where there is none."""
+    """A friction of joints that sticks, or a contact of its own law; "" where there is none."""
+    if laws := _of_laws(model):
+        return laws[0]
     for group in model.contacts:
         if group.type_info.type.along is not None:  # type: ignore[attr-defined]
             return model.joint_names[int(group.members[0])]
     return ""
+
+
+def _of_laws(model: Model) -> list[str]:
+    """Contacts whose law of friction is that of their type."""
+    groups = [group for group in model.contacts if getattr(group.type_info.type, "grip", None)]
+    return [model.joint_names[int(member)] for group in groups for member in group.members]
 
 
 def contact_engine_reason(model: Model, contact: str) -> str:
@@ -99,6 +112,35 @@ def settings_notes(compiled: CompiledModel, settings: Simulation) -> list[str]:
         why = contact_engine_reason(compiled.model, settings.contact) or "asked for"
         words = f"contacts by stepping, h = {settings.step:g} s: {why}; errors are of order h"
         notes.append(information(words))
+    return notes
+
+
+def replaced_notes(
+    compiled: CompiledModel, settings: Simulation, asked: Mapping[str, Any]
+) -> list[str]:
+    """Notes on settings of steps that mean nothing, or another thing, where contacts are stepped.
+
+    Args:
+        compiled: of the run.
+        settings: of the run, as of ``settings_of``.
+        asked: what it was called with.
+    """
+    if not integrator_named(settings.integrator).steps_contacts:
+        return []
+    of_scene, given = compiled.scene.simulation, {}
+    for name in ("integrator", "step", "atol", "rtol"):
+        value, written = asked.get(name), getattr(of_scene, name)
+        if value is None and written != SETTINGS[name].default:
+            value = written
+        if value is not None and (name.endswith("tol") or value != getattr(settings, name)):
+            given[name] = value
+    notes: list[str] = []
+    if "rtol" in given:
+        what = "the part of the largest impulse to which the impulses of a step are solved"
+        notes.append(information(f"rtol {given.pop('rtol'):g} is {what}"))
+    if given:
+        left = ", ".join(f"{name} {value}" for name, value in given.items())
+        notes.append(f"{left} left out: contacts are stepped, by contact_step and rtol alone")
     return notes
 
 

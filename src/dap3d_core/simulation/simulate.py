@@ -13,7 +13,12 @@ from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.output.monitor import RunProgress
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks, Progress
-from dap3d_core.simulation.settings import check_checkpoint, compiled_for, settings_of
+from dap3d_core.simulation.settings import (
+    check_checkpoint,
+    compiled_for,
+    replaced_notes,
+    settings_of,
+)
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.control.controller import Controller
@@ -67,6 +72,7 @@ def simulate(
         run = Run(compiled, simulation, callbacks, events,
                   output=output, force=force, estimate_error=estimate_error,
                   start=given_state(start, compiled), controllers=controllers)  # fmt: skip
+        run.notes += replaced_notes(compiled, simulation, settings)
         if checkpoint is not None:
             run.save_every(checkpoint, force=force)
         return run.execute()

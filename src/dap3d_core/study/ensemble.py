@@ -143,8 +143,7 @@ class Ensemble:
                 from dap3d_core.study.batch.batch import batch_runner
 
                 self._of_thread.runner = batch_runner(self.reduction, self.times)
-        runner: BatchRunner | None = self._of_thread.runner
-        return runner
+        return self._of_thread.runner
 
     def _row_width(self) -> int:
         return 2 + 20 * self.compiled.model.body_count + self.compiled.model.row_count + 4

@@ -175,8 +175,7 @@ class EquilibriumPath:
         for name in quantities:
             found = self.quantity(name)
             dimensions = ("point", f"component of {name}")[: found.values.ndim]
-            data[name] = (dimensions, found.values,
-                          {"units": found.unit, "long_name": found.label})  # fmt: skip
+            data[name] = (dimensions, found.values, {"units": found.unit, "long_name": found.label})
         about = {"units": self.unit, "long_name": self.parameter}
         marks = {name: ("point", getattr(self, name)) for name in MARKS}
         labels = {"body": list(names), "axis": list(AXES), "euler": list(EULER)}
@@ -367,10 +366,7 @@ class _Family:
         report = evaluator.report(0.0, u)
         report[layout["v_dot"]] = 0.0
         report[layout["Lam"]] = least_multipliers(self.statics.statics, u)[0]
-        row: Floats = np.concatenate(
-            [[0.0], evaluator.integrated(u), report[: evaluator.report_size]]
-        )
-        return row
+        return np.concatenate([[0.0], evaluator.integrated(u), report[: evaluator.report_size]])
 
     def quantity(self, name: str, points: list[PathPoint], rows: Floats) -> Quantity:
         """A quantity of points with their rows (k, ...)."""

@@ -263,8 +263,11 @@ def _fields(checked: ValidatedScene, path: tuple[str, ...]) -> Iterator[_Field]:
             instances = [*instances, *checked.contacts]
         # of a contact of several points, NAME#1 and so on, the first
         instance = next(one for one in instances if one.name.partition("#")[0] == path[1])
-        yield from _element_fields(holder, path, instance)
         type_: Any = instance.type_info.type
+        own = instance
+        if getattr(type_, "load", ()):  # friction of a joint: what its force gives
+            own = attrs.evolve(own, type_info=checked.registry.get("force", holder.type))
+        yield from _element_fields(holder, path, own)
         for name in LIMITS if table == "joints" and type_.limit else ():
             unit = "1" if name == "e" else "rad" if type_.coordinate == "angle" else "m"
             if _is_numeric(value := holder.fields.get(name)):

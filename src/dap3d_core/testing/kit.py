@@ -18,7 +18,6 @@ from dap3d_core.testing.checks import (
     forces,
     functions,
     joints,
-    plain_kernels,
     purity,
     states,
 )
@@ -150,7 +149,10 @@ def checks_for(type_: Any, *, poses: int = POSES, seed: int = SEED) -> list[Chec
 def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
     if poses < 1:
         raise ValueError(f"poses is {poses}; a check takes one or more")
-    of_kind = {"joint": _of_joint, "force": _of_force, "function": _of_function}
+    of_kind: dict[str, Callable[[SampledType], list[Check]]] = {
+        "joint": _of_joint, "force": _of_force,
+        "function": lambda subject: [Check("derivatives", subject, "", functions.derivatives)],
+    }  # fmt: skip
     checks = []
     for subject in sampled_types(type_info, seed, poses):
         by_joint = "its formulas are the friction of its joint, which is checked with that"
@@ -165,7 +167,7 @@ def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
         checks.append(Check("branches", subject, "", branches.switches))
         checks.append(Check("rest", subject, "", branches.rest))
         checks.append(Check("purity", subject, "", purity.purity))
-        checks.append(Check("plain", subject, "", plain_kernels.plain))
+        checks.append(Check("plain", subject, "", purity.plain))
         checks.append(Check("compiled", subject, "", purity.compiled))
     return checks
 
@@ -175,8 +177,8 @@ def _of_joint(subject: SampledType) -> list[Check]:
     no_form = "" if "C_dot" in subject.kernels.names() else "it defines no C_dot"
     ground = joints.against_ground(subject)
     turns = fewer = ""
-    if subject.type.is_contact and subject.type.along is not None:
-        fewer = "it has one row, and two that stay zero"
+    if subject.type.is_contact and subject.type.is_friction_alone():
+        fewer = "" if all(subject.type.holds) else "some of its three rows stay zero"
     elif subject.type.is_contact and subject.type.at is None:
         turns = "its gap is an angle, whose rows are those of bodies that turn about its normal"
     checks = [
@@ -265,10 +267,6 @@ def _of_jumps(subject: SampledType) -> list[Check]:
     if subject.type.unilateral:
         checks.append(Check("unilateral", subject, "", jumps.pushing))
     return checks
-
-
-def _of_function(subject: SampledType) -> list[Check]:
-    return [Check("derivatives", subject, "", functions.derivatives)]
 
 
 def _reason(error: Exception) -> str:

@@ -1,11 +1,9 @@
 """Reference for the model `A03`, Andrews' squeezing mechanism: planar, in complex numbers.
-
 The coordinates are the angles of the seven bodies against x, so a place is a sum of terms
 c exp(i angle) and its derivatives are exact. The three loops that close at E leave one freedom:
 the accelerations are a particular solution of the closure plus the one motion that it allows, whose
 amount follows from virtual power. No multiplier, no Jacobian of a joint in body coordinates.
-`simulated` is the spatial mechanism once more in the generic simulator `kkt`.
-"""
+`simulated` is the spatial mechanism once more in the generic simulator `kkt`."""
 
 from functools import cache
 
@@ -118,10 +116,8 @@ def flat(x: complex) -> tuple[float, float, float]:
 
 def quantities(t: float) -> dict[str, Array]:
     """Return every quantity that `expected.toml` may name, at `t`.
-
     The reactions are those that Newton's law needs for this motion: 41 unknowns, 42 equations, of
-    which "imbalance" is the residual.
-    """
+    which "imbalance" is the residual."""
     y = trajectory().at(t)
     angles, speeds = y[:7], y[7:]
     turning = second(angles, speeds)

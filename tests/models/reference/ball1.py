@@ -1,8 +1,6 @@
 """Reference for the model `ball1`: a bouncing ball, in closed form from piece to piece.
-
 Off the ground the ball falls freely; in contact m z'' = -k (z - R) - c z' - m g is a damped
-oscillator. A piece ends where z = R, found by bracketing to the last bit; nothing is integrated.
-"""
+oscillator. A piece ends where z = R, found by bracketing to the last bit; nothing is integrated."""
 
 from functools import cache
 from typing import NamedTuple

@@ -1,8 +1,6 @@
 """Reference for the model `bicycle`: the benchmark of Meijaard, Papadopoulos, Ruina, Schwab (2007).
-
 Four bodies, three hinges and two rolling disks in the generic simulator `kkt`. The paper has z
-downward; here it is upward, which turns the sign of z and of the products of inertia.
-"""
+downward; here it is upward, which turns the sign of z and of the products of inertia."""
 
 from functools import cache
 

@@ -1,9 +1,7 @@
 """Reference for the model `bodies2`: two free bodies, two spring-dampers, weight.
-
 Two derivations. `quaternions` integrates Newton-Euler with Euler parameters and the global angular
 velocity; `momenta` integrates rotation matrices and the angular momenta, so it uses neither
-quaternions nor Euler's equations. They agree to the digits of the `bodies2` checks.
-"""
+quaternions nor Euler's equations. They agree to the digits of the `bodies2` checks."""
 
 from functools import cache
 

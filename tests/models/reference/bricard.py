@@ -29,9 +29,7 @@ JP = [np.where(np.diff(NODES, axis=0)[k] != 0, ALONG, ACROSS) for k in range(5)]
 
 def motion(angles: Array, speeds: Array, turning: Array) -> tuple[Array, ...]:
     """Return r, p, (v, w) and (v_dot, w_dot) of the five rods, and the pose of the fifth's end.
-
-    `angles`, `speeds` and `turning` are a, b and their derivatives.
-    """
+    `angles`, `speeds` and `turning` are a, b and their derivatives."""
     by_joint = [TURNS @ x for x in (angles, speeds, turning)]
     tip, tip_dot, tip_ddot, w, w_dot = (np.zeros(3) for _ in range(5))
     p, parts = np.array([1.0, 0.0, 0.0, 0.0]), []

@@ -1,8 +1,6 @@
 """Reference for the model `crane`: a double pendulum on a rope of given length, by SciPy.
-
 Angles of rope and load from the vertical are the coordinates. Complex numbers are points of the
-y-z plane; a unit vector that hangs at an angle q is u = -i exp(i q), and u' = i u q'.
-"""
+y-z plane; a unit vector that hangs at an angle q is u = -i exp(i q), and u' = i u q'."""
 
 from functools import cache
 

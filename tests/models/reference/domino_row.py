@@ -1,7 +1,5 @@
 """Reference for the model `domino_row`: the first domino about its edge until it meets the second.
-
-When all are at rest, the last one lies flat, and the table carries their weight.
-"""
+When all are at rest, the last one lies flat, and the table carries their weight."""
 
 import numpy as np
 from rigid import Array

@@ -1,8 +1,6 @@
 """Reference for the model `engine`: the slider-crank in closed form, bearing loads by Newton.
-
 The crank angle is counted from top dead centre. The rod is loaded by the piston at its small end,
-which with its own inertia gives the load of the crank pin; the crankshaft is balanced.
-"""
+which with its own inertia gives the load of the crank pin; the crankshaft is balanced."""
 
 import numpy as np
 from rigid import Array

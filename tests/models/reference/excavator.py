@@ -1,9 +1,7 @@
 """Reference for the model `excavator`: angles by the law of cosines, forces by moments.
-
 A cylinder and the two arms that it joins are a triangle at the hinge, of which two sides are
 constant: l^2 = a^2 + b^2 - 2 a b cos(phi). Its force has the moment about the hinge that everything
-outwards of it needs.
-"""
+outwards of it needs."""
 
 from typing import NamedTuple
 

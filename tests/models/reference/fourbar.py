@@ -1,10 +1,8 @@
 """The driven spatial four-bar in closed form: what `fourbar3.py` and `fourbar2.py` share.
-
 The crank angle is alpha = -2 pi t about +x: the driver prescribes the angular velocity of j (the
 ground) relative to i (the crank), so the crank turns backwards. T is the crank tip and
 B = O + 7 e(phi), e = cos(phi) z + sin(phi) u, the follower tip. The loop closes at |B - T| = 6.4,
-linear in (cos phi, sin phi). Velocities and accelerations follow by differentiating it.
-"""
+linear in (cos phi, sin phi). Velocities and accelerations follow by differentiating it."""
 
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -39,9 +37,7 @@ def crank_tip(t: float) -> Branch:
 
 def follower_angle(t: float) -> tuple[float, float, float]:
     """Return phi, phi_dot and phi_ddot, on the branch that starts near phi = 0.
-
-    2 * 7 (O - T).e(phi) = 6.4^2 - 7^2 - |O - T|^2 reads a cos(phi) + b sin(phi) = c.
-    """
+    2 * 7 (O - T).e(phi) = 6.4^2 - 7^2 - |O - T|^2 reads a cos(phi) + b sin(phi) = c."""
     T, T_dot, T_ddot = crank_tip(t)
     w = PIVOT - T
     a, b = w @ Z, w @ U
@@ -94,11 +90,9 @@ COUPLER_TURN = Trajectory(_coupler_rate, np.array(COUPLER_P0))
 
 def coupler(t: float) -> tuple[Array, Array, Array, Array]:
     """Return r, p, (v, w) and (v_dot, w_dot) of the coupler.
-
     Its spin about its own line is the one freedom left. It starts without spin (minimum-norm
     velocities), nothing turns it about that line and its transverse inertias are equal, so it never
-    spins: w = a x a_dot. Its pose p therefore needs one quadrature.
-    """
+    spins: w = a x a_dot. Its pose p therefore needs one quadrature."""
     T, a = crank_tip(t), coupler_axis(t)
     r, v, v_dot = (x + COUPLER / 2 * y for x, y in zip(T, a, strict=True))
     rates = np.concatenate([v, np.cross(a.x, a.dx)])
@@ -114,10 +108,8 @@ def driver_moment(
     parts: Sequence[Callable[[float], tuple[Array, Array, Array, Array]]],
 ) -> float:
     """Return the moment of the driver on the crank about x [N m], without any Jacobian.
-
     The driver is all that does work from outside, so its power is the rate of the kinetic and the
-    spring energy. `inertias` holds mass and principal inertias of each body, `parts` its motion.
-    """
+    spring energy. `inertias` holds mass and principal inertias of each body, `parts` its motion."""
     power = 0.0
     for (mass, Jp), part in zip(inertias, parts, strict=True):
         _, p, v, v_dot = part(t)

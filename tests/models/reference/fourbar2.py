@@ -1,8 +1,6 @@
 """Reference for the model `fourbar2`: crank and follower as bodies, the coupler a massless link.
-
 The motion is that of `fourbar3`; the reactions are those that Newton's law needs for it (12
-unknowns, 12 equations). `simulated` integrates the same system with the generic simulator `kkt`.
-"""
+unknowns, 12 equations). `simulated` integrates the same system with the generic simulator `kkt`."""
 
 from functools import cache
 

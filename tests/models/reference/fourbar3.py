@@ -1,10 +1,8 @@
 """Reference for the model `fourbar3`: crank, coupler and follower as bodies.
-
 Positions, velocities and accelerations come in closed form (`fourbar`); the reactions are those
 that Newton's law needs for these accelerations (17 unknowns, 18 equations, residual checked). The
 moment of the driver is found once more from the power balance, without any Jacobian. `simulated`
-integrates the same system with the generic simulator `kkt`.
-"""
+integrates the same system with the generic simulator `kkt`."""
 
 from functools import cache
 

@@ -1,10 +1,8 @@
 """Reference for the model `fourbar4`: that of `fourbar3` with its ground link as a fourth body.
-
 The link stays at rest, so the motion is that of `fourbar`, in closed form; the reactions are those
 that Newton's law needs for it (23 unknowns, 24 equations, residual checked). What the fixing joint
 carries is found once more in `held` from the balance of the whole mechanism, without any Jacobian.
-`simulated` integrates the same system with the generic simulator `kkt`.
-"""
+`simulated` integrates the same system with the generic simulator `kkt`."""
 
 from functools import cache
 
@@ -56,9 +54,7 @@ def driver_moment(t: float) -> float:
 
 def held(t: float) -> Array:
     """Return what the fixing joint exerts on the link: force, moment about its mass centre.
-
-    Nothing else acts from outside, so it is the rate of the momentum of the moving bodies.
-    """
+    Nothing else acts from outside, so it is the rate of the momentum of the moving bodies."""
     force, moment = np.zeros(3), np.zeros(3)
     for body, part in zip(SYSTEM.bodies, PARTS, strict=True):
         r, p, v, v_dot = part(t)

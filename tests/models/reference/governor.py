@@ -1,11 +1,9 @@
 """Reference for the model `A05`, the stiff flyball governor: three coordinates in closed form.
-
 Both arms stand at the same angle beta below the horizontal, the slider at the height s, and all
 turns at the rate L / J(beta), L the angular momentum about the shaft, which is kept. Lagrange's
 equations for beta and s follow by hand. The reactions are those that Newton's law needs for this
 motion (20 unknowns, 24 equations, residual checked). `simulated` is the whole mechanism once more
-in the generic simulator `kkt`.
-"""
+in the generic simulator `kkt`."""
 
 from functools import cache
 

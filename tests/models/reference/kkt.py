@@ -1,12 +1,9 @@
 """A small, dense, generic simulator of constrained rigid bodies, for reference only.
-
 Only the position-level equation C of a constraint is written down (for the driver, its
 velocity-level equation). Its Jacobian and the right-hand side gamma of its accelerations come from
 exact time derivatives along a motion of constant velocities, so none of the printed formulas for
 them is used. The accelerations solve the whole system [M, -D^T; D, 0] (v_dot, lambda) = (g, gamma).
-
-Body -1 is the ground. Velocities are ordered (v, w) a body, in global axes.
-"""
+Body -1 is the ground. Velocities are ordered (v, w) a body, in global axes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -22,9 +19,7 @@ GROUND = -1
 @dataclass(frozen=True)
 class Body:
     """A rigid body with its mass centre at its origin, and its state at the start.
-
-    `Jp` is the inertia matrix in the axes of the body, or its diagonal.
-    """
+    `Jp` is the inertia matrix in the axes of the body, or its diagonal."""
 
     name: str
     mass: float
@@ -167,9 +162,7 @@ class Moment(NamedTuple):
 @dataclass
 class System:
     """Bodies, joints, one optional driver, springs, moments and weight.
-
-    With `redundant` rows the multipliers are those of least norm; the accelerations are unique.
-    """
+    With `redundant` rows the multipliers are those of least norm; the accelerations are unique."""
 
     bodies: list[Body]
     joints: list[Joint]
@@ -327,10 +320,8 @@ class System:
         self, r: Array, p: Array, v: Array, v_dot: Array | None = None
     ) -> dict[str, Array]:
         """Return every quantity that `expected.toml` may name.
-
         With `v_dot` given, the multipliers are those that these accelerations need; they must be
-        unique, and the residual of that balance is "imbalance".
-        """
+        unique, and the residual of that balance is "imbalance"."""
         A = np.array([rotation(x) for x in p])
         M, (g, potential) = self.mass_matrix(A), self.loads(r, A, v)
         C, D, nu, _ = self.constraints(r, A, v)

@@ -1,8 +1,6 @@
 """Further joints of the generic simulator `kkt`, each by its position-level equations alone.
-
 A rolling disk has none for its slip: there the velocity of the material point at the contact is
-given, and differentiated by a complex step.
-"""
+given, and differentiated by a complex step."""
 
 import numpy as np
 from kkt import GROUND, Fixed, Jet, Joint, Motion, dot
@@ -32,9 +30,7 @@ def cyl(name: str, P_i: Fixed, P_j: Fixed, a_i: Fixed, a_j: Fixed) -> Joint:
 
 def turned(m: Motion, i: int, j: int) -> list[Jet]:
     """Return the three rows that keep the axes of j along those of i, their rate w_j - w_i there.
-
-    Row x is (z_i . y_j - y_i . z_j) / 2, and so on in cyclic order.
-    """
+    Row x is (z_i . y_j - y_i . z_j) / 2, and so on in cyclic order."""
     axes = [[m.direction(Fixed(b, tuple(e))) for e in np.eye(3)] for b in (i, j)]
     rows = []
     for k in range(3):
@@ -68,9 +64,7 @@ def fix(name: str, body: int, r0: tuple[float, float, float]) -> Joint:
 
 def contact(eta: Array, radius: float) -> tuple[Array, Array, Array]:
     """Return the arm from the centre of a disk to its lowest point, and the directions t and n.
-
-    `eta` is the normal of the disk; t lies in the disk and in the ground, n = t x z.
-    """
+    `eta` is the normal of the disk; t lies in the disk and in the ground, n = t x z."""
     k = np.array([0.0, 0.0, 1.0])[:, None]
     sine = np.sqrt(1 - eta[2] ** 2)
     return -radius / sine * (k - eta[2] * eta), cross(k, eta) / sine, (eta - eta[2] * k) / sine

@@ -1,9 +1,7 @@
 """Reference for the model `motion_platform`: closure of the legs by iteration, forces by J^-T.
-
 With the rows u_k . (v + w x s_k) = l_k_dot of the six legs the pose follows from the lengths, and
 velocities and accelerations from their rates. The legs have no mass: their six forces together are
-what Newton's and Euler's law ask for.
-"""
+what Newton's and Euler's law ask for."""
 
 import numpy as np
 from rigid import Array

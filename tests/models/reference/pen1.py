@@ -1,8 +1,6 @@
 """Reference for the model `pen1`: a spinning cone on a spherical joint.
-
 The motion comes from the generic simulator `kkt`; `closed_form` gives position, velocities and
-accelerations once more from elliptic functions (`heavy_top`).
-"""
+accelerations once more from elliptic functions (`heavy_top`)."""
 
 from functools import cache
 

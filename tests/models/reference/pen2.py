@@ -1,8 +1,6 @@
 """Reference for the model `pen2`: a rod on a spherical joint, a spinning cylinder on a revolute.
-
 The motion comes from the generic simulator `kkt`; `closed_form` gives positions, velocities and
-accelerations once more from elliptic functions (`heavy_top`).
-"""
+accelerations once more from elliptic functions (`heavy_top`)."""
 
 from functools import cache
 

@@ -1,10 +1,9 @@
 """Reference for the model `planetary`: closed form, by Willis and Newton.
-
 All wheels turn in fixed ratios, so the torque on the sun accelerates one inertia: the sum of
 J ratio^2, and of m (d ratio)^2 for the planet, which the carrier takes along. The tooth force of
 the ring is what accelerates the planet about its centre, beside that of the sun. At the pressure
-angle each tooth presses besides: sun and planet apart, the planet from the ring towards the axis.
-"""
+angle each tooth presses besides: sun and planet apart, the planet from the ring towards the
+axis."""
 
 import numpy as np
 from rigid import Array

@@ -1,10 +1,8 @@
 """Reference for the model `quarter_car`: two coordinates, by SciPy.
-
 The height of the chassis and the angle of the lower arm are the coordinates. The loop of the
 wishbones and the tie rod closes for an angle in closed form; polynomials through poses at
 Chebyshev's points are differentiated for the first and second derivatives. Virtual power of all
-forces and of the masses' accelerations gives the motion.
-"""
+forces and of the masses' accelerations gives the motion."""
 
 from functools import cache
 
@@ -42,9 +40,7 @@ def about(axis: Array, angle: float) -> Array:
 
 def closing_angle(axis: Array, arm: Array, to: Array, distance: float) -> float:
     """Return the smaller turn of `arm` that brings its tip to a distance from `to`.
-
-    |R arm - to|^2 is a + b cos + c sin of the angle.
-    """
+    |R arm - to|^2 is a + b cos + c sin of the angle."""
     along = axis * (axis @ arm)
     b, c = -2.0 * to @ (arm - along), -2.0 * to @ np.cross(axis, arm)
     a = arm @ arm + to @ to - 2.0 * to @ along

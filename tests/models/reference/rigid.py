@@ -1,8 +1,6 @@
 """Rotations, springs and a careful integration: what the reference simulators share.
-
 Nothing here comes from the program under test. Quaternions are p = (e0, e1, e2, e3), body to
-ground; vectors are numpy arrays of length 3; SI units.
-"""
+ground; vectors are numpy arrays of length 3; SI units."""
 
 from collections.abc import Callable
 
@@ -71,10 +69,8 @@ def spring(
 
 class Trajectory:
     """The solution of y' = rhs(t, y), y(0) = y0, at any instants that are asked for.
-
     Every instant is the end of a step: the dense output of DOP853 is of lower order than its
-    steps and would cost digits. States already known are the starting points of later ones.
-    """
+    steps and would cost digits. States already known are the starting points of later ones."""
 
     def __init__(
         self,

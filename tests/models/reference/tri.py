@@ -51,9 +51,7 @@ def speeds(t: float, u: float, u_dot: float) -> tuple[Array, Array]:
 
 def body(k: int, t: float, u: float, u_dot: float) -> tuple[Array, Array, Array]:
     """Return velocity, its derivative by u, and acceleration of a body, in the axes of the frame.
-
-    Third components are those of the yaw.
-    """
+    Third components are those of the yaw."""
     (ahead, side, yaw), (ahead_dot, side_dot, yaw_dot) = speeds(t, u, u_dot)
     x, y = PLACE[k]
     velocity = np.array([ahead - yaw * y, side + yaw * x, yaw])
@@ -121,10 +119,8 @@ def motion(t: float) -> tuple[Array, Array, Array, Array]:
 
 def loads(u_dot: float) -> tuple[float, float]:
     """Return the load of the front wheel and of each rear wheel at the start, where nothing turns.
-
     Moments about the ground under the rear axle, in the plane of symmetry: of the torque, the
-    weights, the accelerated masses and of what speeds the front wheel up about its axle.
-    """
+    weights, the accelerated masses and of what speeds the front wheel up about its axle."""
     turning = JP[2][1] * u_dot / RADIUS - TORQUE
     for m, (x, _), z in zip(MASS, PLACE, HEIGHT, strict=True):
         turning += m * (u_dot * z - GRAVITY * (x + BEHIND))

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.internals import BODY_WIDTH, compiled
+from support.rotations import rotation
 
 from dap3d_core.assembly.orientation import orient_by_state
-from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P
-from dap3d_core.model.rotations import rotation
+from dap3d_core.kernels.runtime.loop_support import A, P
 
 
 @compiled

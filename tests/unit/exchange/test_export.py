@@ -228,7 +228,7 @@ def test_matlab_finds_every_array_with_its_unit(result, tmp_path):
 
 
 def test_a_table_is_that_of_the_post_processor(result, tmp_path):
-    from dap3d_core.result.quantities.csv_table import columns_of, write_csv
+    from support.internals import columns_of, write_csv
 
     dap.export(result, tmp_path / "a.csv")
     write_csv(result, tmp_path / "b.csv", columns_of(result))

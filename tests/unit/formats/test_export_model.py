@@ -19,7 +19,7 @@ def places(scene):
     """Points and vectors of all joints and forces in global axes, by element and field."""
     bodies = {"ground": (np.zeros(3), np.eye(3))}
     for name, body in scene.bodies.items():
-        from dap3d_core.model.rotations import rotation
+        from support.rotations import rotation
 
         bodies[name] = np.array(body.r), rotation(np.array(body.p))
     found = {}
@@ -156,11 +156,9 @@ def test_dry_friction_and_a_spring_of_a_slider_read_back(tmp_path, format):
     assert {one.text for one in report.left_out} <= {"initial velocities", GRAVITY}
     back, _ = dap.import_model(tmp_path / f"a{SUFFIX[format]}")
     back.forces.pop("gravity", None)
-    ends = []
-    for one in (scene, back):
-        state = [(*b.r, *b.p) for b in one.bodies.values()]
-        state += [(*b.r_dot, *b.w) for b in scene.bodies.values()]
-        ends.append(dap.compile(one).rhs(0.0, np.concatenate(state))[-12:])
+    for name, body in back.bodies.items():
+        body.r_dot, body.w = scene.bodies[name].r_dot, scene.bodies[name].w
+    ends = [dap.simulate(one, t_end=0.0).v_dot for one in (scene, back)]
     assert np.abs(ends[0]).max() > 0.5
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-12)
 
@@ -212,11 +210,39 @@ def test_angles_in_degrees_and_forces_that_name_a_joint_read_back(tmp_path, join
     assert {one.text for one in report.left_out} <= {"initial velocities"}
     back, _ = dap.import_model(tmp_path / "a.xml")
     back.forces.pop("gravity", None)
-    starts = dap.compile(scene).model.u0, dap.compile(back).model.u0
-    np.testing.assert_allclose(starts[0][:14], starts[1][:14], rtol=0, atol=1e-14)
-    ends = [dap.compile(one).rhs(0.0, starts[0])[-12:] for one in (scene, back)]
+    for name, body in back.bodies.items():
+        body.r_dot, body.w = scene.bodies[name].r_dot, scene.bodies[name].w
+    starts = [dap.simulate(one, t_end=0.0) for one in (scene, back)]
+    for part in ("r", "p"):
+        np.testing.assert_allclose(*(getattr(one, part) for one in starts), rtol=0, atol=1e-14)
+    ends = [one.v_dot for one in starts]
     assert np.abs(ends[0]).max() > 0.05
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("format", ["urdf", "mjcf"])
+def test_limits_of_joints_read_back(tmp_path, format):
+    """Rigid ones, with a slider whose bodies are exchanged in the file: the same scene again."""
+    scene = dap.Scene(name="limited")
+    scene.add_body("arm", mass=2.0, Jp=(0.2, 0.3, 0.4))
+    scene.add_body("block", mass=1.0, Jp=(0.1, 0.2, 0.25), r=(0.2, 0.0, 0.0))
+    scene.add_joint("rev", "pin", P_i="arm.O", P_j="ground.O", a_i="arm.y", a_j="ground.y",
+                    lower="-30 deg", upper=1.2)  # fmt: skip
+    scene.add_joint("tran", "way", P_i="arm.O", P_j="block.O", a_j="block.x", lower=-0.1, upper=0.3,
+                    e=0.5)  # fmt: skip
+    report = dap.export_model(scene, tmp_path / f"a{SUFFIX[format]}", format=format)
+    assert any("e of the limits of a joint" in one.text for one in report.left_out)
+    back, _ = dap.import_model(tmp_path / f"a{SUFFIX[format]}", limits="hard")
+    ends = {name: [joint.fields[key] for key in ("lower", "upper")]
+            for name, joint in back.joints.items()}  # fmt: skip
+    assert ends["pin"] == pytest.approx([-np.pi / 6.0, 1.2], rel=1e-14)
+    assert ends["way"] == pytest.approx([-0.1, 0.3], rel=1e-14)
+    ways = []
+    for one in (scene, back):  # the sense of the length is the same
+        one.bodies["block"].r_dot = (-1.0, 0.0, 0.0)
+        one.forces.clear()
+        ways.append(dap.simulate(one, t_end=0.2, dt=0.2).quantity("way.length").values[-1])
+    assert ways[0] == pytest.approx(ways[1], abs=1e-9) != 0.0
 
 
 def test_what_acts_in_a_closed_loop_is_listed():
@@ -297,6 +323,29 @@ def test_actuators_read_back(tmp_path):
             np.testing.assert_allclose(force.fields[key], other, rtol=0, atol=1e-14)
     left = dap.export_model(scene, format="urdf").left_out
     assert sum("actuator" in str(one) for one in left) == 3
+
+
+BOUNDED = """<motor name="turn" joint="q" gear="-3" ctrlrange="-1 2" forcerange="-2 3"/>
+  <position name="servo" joint="p" kp="5" kv="0.5" forcerange="-1 4" ctrlrange="-9 0.3"/>
+  <general name="push" joint="s" dyntype="filter" dynprm="0.2" gainprm="4" actrange="0 1"/>
+  <intvelocity name="on" joint="p" kp="3" actrange="-1 1"/></actuator>"""
+
+
+def test_bounds_and_activations_of_actuators_read_back(tmp_path):
+    text = DRIVEN.partition("<position")[0] + BOUNDED + "</mujoco>"
+    (tmp_path / "a.xml").write_text(text)
+    scene, _ = dap.import_model(tmp_path / "a.xml", positions={"p": 0.3})
+    assert not dap.export_model(scene, tmp_path / "b.xml", format="mjcf").left_out
+    back, _ = dap.import_model(tmp_path / "b.xml")
+    assert_same(scene, back)
+    made = [one for one in scene.forces.values() if one.type == "actuator"]
+    assert len(made) == 4
+    for force in made:
+        other = back.forces[force.name].fields
+        for key, value in force.fields.items():
+            assert other[key] == (
+                pytest.approx(value, rel=1e-14) if type(value) is float else value
+            )
 
 
 def test_a_joint_that_closes_a_loop_has_no_actuator(tmp_path):

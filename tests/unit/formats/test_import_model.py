@@ -5,9 +5,9 @@ from itertools import combinations
 import numpy as np
 import pytest
 from support.process import REPOSITORY
+from support.rotations import rotation
 
 import dap3d_core as dap
-from dap3d_core.model.rotations import rotation
 
 ARM = REPOSITORY / "tests" / "data" / "formats" / "arm.urdf"
 
@@ -240,8 +240,78 @@ def test_geoms_meet_as_in_the_file(tmp_path):
     first = report.translated[0]
     assert first.motion
     assert "1e-06 of the mass that it carries" in first.text
-    with pytest.raises(dap.SceneError, match="hard"):
-        imported(tmp_path, CONTACTS, contacts=True, limits="hard")
+
+
+def test_limits_beside_contacts_are_rigid(tmp_path):
+    """An arm falls on its limit and stays there; its friction fades, for stepping.
+
+    What overlaps is moved apart step by step, to 1e-9 of a turn at least.
+    """
+    text = """<compiler angle="radian"/><worldbody><geom type="plane" size="1 1 1" pos="0 0 -5"/>
+      <body name="b">
+      <joint name="j" axis="0 1 0" range="-9 0.3" frictionloss="0.1"/>
+      <geom size="0.1" pos="1 0 0" mass="1"/></body></worldbody>"""
+    scene, report = imported(tmp_path, text, contacts=True, limits="hard")
+    assert scene.forces["j_friction"].fields["w_tol"] == 0.01
+    assert "limits of a joint are rigid" in " ".join(one.text for one in report.translated)
+    result = dap.simulate(scene, t_end=1.0, dt=0.5)
+    assert result.quantity("j.angle").values[-1] == pytest.approx(0.3, abs=1e-9)
+
+
+EXCLUDED = """<worldbody><geom name="floor" type="plane" size="1 1 1"/>
+<body name="post"><geom type="box" size="0.1 0.1 0.1"/></body>
+<body name="a"><freejoint/><geom size="0.1"/></body>
+<body name="b"><freejoint/><geom size="0.1"/><body name="c"><geom size="0.1"/></body></body>
+</worldbody><contact><exclude body1="post" body2="a"/><exclude body1="c" body2="a"/>{}</contact>"""
+ALL = {("a", "b"), ("a", "world_shapes"), ("b", "post"), ("b", "world_shapes"), ("c", "post"),
+       ("c", "world_shapes")}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("more", "fewer"),
+    [
+        ("", set()),
+        ('<exclude body1="a" body2="b"/>', {("a", "b")}),
+        ('<exclude body1="world" body2="b"/>', {("b", "world_shapes")}),
+    ],
+)
+def test_links_stay_apart_from_those_that_the_file_names_alone(tmp_path, more, fewer):
+    """And meet what else is fixed to these: the floor beside a post, one link of a body of two."""
+    scene, _ = imported(tmp_path, EXCLUDED.format(more), contacts=True)
+    apart, meeting = {frozenset(pair) for pair in scene.collisions.exclude}, set()
+    for (a, one), (b, other) in combinations(scene.shapes.items(), 2):
+        one, other = one.fields, other.fields
+        bits = one.get("group", 1) & other.get("meets", 1) | other.get("group", 1) & one.get(
+            "meets", 1
+        )
+        bodies = frozenset((one["body"], other["body"]))
+        if len(bodies) == 2 and bodies not in apart and bits:
+            meeting.add(tuple(sorted(name.rpartition("_")[0] for name in (a, b))))
+    assert meeting == ALL - fewer
+
+
+@pytest.mark.parametrize("flag", ["contact", "constraint", "limit", "frictionloss", "equality"])
+def test_flags_that_disable_something_are_heeded(tmp_path, flag):
+    text = f"""<option><flag {flag}="disable"/></option><worldbody><geom type="plane" size="1 1 1"/>
+      <body name="b"><joint name="j" range="-1 1" frictionloss="1"/><geom size="0.1"/></body>
+      <body name="c"><joint name="k"/><geom size="0.1" pos="1 0 0"/></body></worldbody>
+      <equality><joint joint1="j" joint2="k"/></equality>"""
+    scene, _ = imported(tmp_path, text, contacts=True, limits="hard")
+    there = {
+        "contact": any(shape.fields.get("collides") for shape in scene.shapes.values()),
+        "limit": "lower" in scene.joints["j"].fields,
+        "frictionloss": any(one.type == "rot_friction" for one in scene.forces.values()),
+        "equality": any(one.type == "follow" for one in scene.joints.values()),
+    }
+    off = set(there) if flag == "constraint" else {flag}
+    assert {name for name, found in there.items() if not found} == off
+
+
+def test_friction_of_a_pair_is_that_of_the_one_with_priority(tmp_path):
+    text = CONTACTS.replace('friction="0.2"', 'friction="0.2" priority="1"')
+    scene, _ = imported(tmp_path, text, contacts=True)
+    floor, box = (scene.shapes[n].fields["material"] for n in ("world_shapes_plane", "a_box"))
+    assert scene.materials[floor].with_[box]["mu"] == 0.2
 
 
 def test_a_box_of_a_file_slides_by_the_friction_of_its_pair(tmp_path):
@@ -337,6 +407,22 @@ def test_collisions_of_sdf_meet_beside_what_is_seen(tmp_path):
     assert [one["mu"] for one in pair.values()] == [0.4]
     scene, _ = dap.import_model(tmp_path / "a.sdf")
     assert [shape.fields["radius"] for shape in scene.shapes.values()] == [2.0]
+
+
+@pytest.mark.parametrize(("threshold", "e"), [("", None), ("<threshold>0.01</threshold>", 0.5)])
+def test_restitution_of_sdf_acts_above_its_threshold(tmp_path, threshold, e):
+    """Which is 1e5 m/s by default, as in Gazebo; the smaller one of a pair holds."""
+    bounce = f"<bounce><restitution_coefficient>{{}}</restitution_coefficient>{threshold}</bounce>"
+    text = SDF.replace("<friction>", bounce.format(0.8) + "<friction>")
+    surface = f"<surface>{bounce.format(0.5)}</surface>"
+    text = text.replace(
+        "1</radius></sphere></geometry>", f"1</radius></sphere></geometry>{surface}"
+    )
+    (tmp_path / "a.sdf").write_text(text)
+    scene, report = dap.import_model(tmp_path / "a.sdf", contacts=True)
+    (pair,) = (m.with_ for m in scene.materials.values() if m.with_)
+    assert [one.get("e") for one in pair.values()] == [e]
+    assert any("bounces below that speed" in one.text for one in report.translated) == bool(e)
 
 
 BALL = "<collision name='c'><geometry><sphere><radius>1</radius></sphere></geometry></collision>"

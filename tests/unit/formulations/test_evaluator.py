@@ -1,23 +1,20 @@
 """A model evaluated at any state: accelerations, multipliers, residuals, power.
-
 The dense saddle-point systems of tests/models/reference/kkt.py judge them: these know positions
 alone, and get Jacobian and accelerations by exact differentiation along a motion. States are taken
-at random, far off the constraints, where a simplified row would show.
-"""
+at random, far off the constraints, where a simplified row would show."""
 
 import numpy as np
 import pytest
+from support.internals import correct_initial, join, split
 from support.motions import G, Motion
 from support.process import REPOSITORY
+from support.rotations import rotation, to_body
 
 import dap3d_core as dap
 from dap3d_core.formulations import RHS
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import rotation, to_body
-from dap3d_core.model.state_layout import join, split
 from dap3d_core.scene import check
-from dap3d_core.simulation.initial.assemble import correct_initial
 
 REFERENCE = REPOSITORY / "tests/models/reference"
 #: Relative: condition numbers up to 1e5 of matrices that are inverted by another method.
@@ -189,9 +186,6 @@ def test_layout_of_the_rates(name, length, machines):
     assert close(np.hstack([a, w_dot]), report, 1e-11)  # rounding of p, times the condition
 
 
-# ------------------------------------------------------------------ inertia in any axes
-
-
 def in_other_axes(turns):
     """pen2 with a spring and a damper, its bodies described in axes turned by these matrices."""
     rod, cylinder = turns
@@ -239,9 +233,6 @@ def test_accelerations_do_not_depend_on_the_axes_of_a_body():
         found.append(evaluator.report(0.0, u))
     assert close(found[1][:12], found[0][:12], 1e-12)
     assert found[1][20:23] == pytest.approx(found[0][20:23], rel=1e-11)  # potential, |C|, |D v|
-
-
-# ------------------------------------------------------------------ power
 
 
 def power_and_rate(evaluator, t, u):

@@ -3,19 +3,18 @@
 import numpy as np
 import pytest
 from support import mechanisms, problems, redundant
+from support.internals import Evaluator, correct_initial
 from support.own_types import registry_of
 from support.plain import in_another_process, long_in_plain_python
 from support.process import run
+from support.rotations import rotation
 
 import dap3d_core as dap
 from dap3d_core.formulations import PROJECT, RHS
-from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface import Joint, Point, Vector, number, point, vector
 from dap3d_core.kernels import cross, dot, eye, hstack, neg, normals, row, scale, skew, sub
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import rotation
 from dap3d_core.scene import check
-from dap3d_core.simulation.initial.assemble import correct_initial
 
 REDUNDANT = {
     "door": mechanisms.door,
@@ -63,10 +62,9 @@ def report_of(evaluator, u):
 @pytest.mark.parametrize("name", REDUNDANT | INDEPENDENT)
 def test_lsq_gives_the_accelerations_and_the_least_multipliers(name):
     """Against S lambda = gamma - D M^-1 g by numpy's pinv: the least |lambda|.
-
     Accelerations to 1e-11 of those without joints, out of which they come by subtraction; condition
-    numbers of S are up to 1e4. Multipliers to rounding over LEAST_PART = 1e-5, some passes of it.
-    """
+    numbers of S are up to 1e4. Multipliers to rounding over LEAST_PART = 1e-5, some passes of
+    it."""
     evaluator, free = machines_of((REDUNDANT | INDEPENDENT)[name](), "lsq", "unconstrained")
     u = moving(evaluator)
     M, a_free, rows = parts(evaluator, free, u)
@@ -128,9 +126,6 @@ def test_lsq_and_standard_agree_where_rows_are_independent(name):
         assert other == pytest.approx(one, abs=1e-11 * np.max(np.abs(one)))
 
 
-# ------------------------------------------------------------------ scaled rows
-
-
 class Sized(Joint):
     """A revolute joint whose rows are all multiplied by ``size``."""
 
@@ -181,9 +176,6 @@ def test_the_motion_does_not_depend_on_the_size_of_rows(size):
     assert sized.rdd[0] == pytest.approx(plain.rdd[0], abs=1e-12)
 
 
-# ------------------------------------------------------------------ which one is taken
-
-
 def test_auto_takes_lsq_where_rows_are_redundant():
     """Already compiled for it, with the reason; the run says which joints, and goes."""
     compiled = dap.compile(mechanisms.door(0.02))
@@ -229,9 +221,7 @@ def test_only_the_chosen_formulation_is_imported(method):
 @pytest.mark.parametrize("method", ["standard", "lsq", "penalty"])
 def test_projection_after_a_right_hand_side_is_the_same(method):
     """It takes over what rhs has left at this state; soft springs of penalty are not among that.
-
-    The state is 1e-4 off; rounding of the same arithmetic on numbers of 1 to 10.
-    """
+    The state is 1e-4 off; rounding of the same arithmetic on numbers of 1 to 10."""
     evaluator = dap.compile(problems.chain(3), method=method).evaluator
     evaluator.set_penalty(10.0, 10.0, 1.0)
     u = evaluator.model.u0 + 1e-4 * np.random.default_rng(5).normal(size=evaluator.model.u0.size)

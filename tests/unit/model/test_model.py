@@ -132,9 +132,6 @@ def test_a_scene_without_elements_has_empty_groups():
     assert model.position_row.shape == (0,)
 
 
-# ------------------------------------------------------------------ what prepare refuses
-
-
 class Fussy(Force):
     """Its constants depend on a number of the scene; some it cannot have."""
 
@@ -254,8 +251,6 @@ def test_a_number_left_out_is_found_by_prepare_or_kept_where_given():
     (group,) = build_model(check(s, REGISTRY)).forces
     assert group.numbers[:, group.type_info.layout.numbers["l0"][0]].tolist() == [1.0, 7.0]
 
-
-# ------------------------------------------------------------------ kinematics of many at once
 
 RNG = np.random.default_rng(3)
 MANY = RNG.normal(size=(5, 4, 4)), RNG.normal(size=(5, 4, 3))

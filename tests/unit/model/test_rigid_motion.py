@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from support.rotations import rotation, to_global
 
 from dap3d_core.model.rigid_motion import (
     Pose,
@@ -17,7 +18,6 @@ from dap3d_core.model.rigid_motion import (
     skew,
     turned,
 )
-from dap3d_core.model.rotations import rotation, to_global
 
 
 def matrix(pose):

@@ -1,7 +1,5 @@
 """A compiler of C, without which nothing here can be built.
-
-Slow tests build optimised libraries.
-"""
+Slow tests build optimised libraries."""
 
 import shutil
 

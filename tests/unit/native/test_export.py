@@ -3,10 +3,13 @@
 import shutil
 import subprocess
 
+import attrs
 import numpy as np
 import pytest
 
 import dap3d_core as dap
+from dap3d_core.assembly.collisions import placed_shapes
+from dap3d_core.integrators.moreau import arrays
 from dap3d_core.native.build import own_platform
 
 SPRING = """
@@ -73,18 +76,21 @@ def differences(scene, folder, t_end, count=20, **settings):
     return np.array_equal(np.array(rows), expected)
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize("integrator", ["dop853", "dopri5", "rk4", "adams", "radau", "auto"])
-def test_a_run_has_the_bits_of_simulate(tmp_path, integrator):
-    step = 1e-3 if integrator == "rk4" else None
-    assert differences(dap.load("pen1"), tmp_path, 0.5, integrator=integrator, step=step)
-
-
 @pytest.mark.every(3)
-@pytest.mark.parametrize("model", ["tri", "fourbar2", "bodies2"])
-def test_so_have_runs_with_break_points_angles_and_no_joints(tmp_path, model):
-    t_end = 3.5 if model == "tri" else 0.5
-    assert differences(dap.load(model), tmp_path, t_end, integrator="dop853")
+@pytest.mark.parametrize(
+    ("model", "t_end", "settings"),
+    [
+        # break points, angles, no joints
+        ("tri", 3.5, {"integrator": "dop853"}),
+        ("pen1", 0.5, {"integrator": "dop853"}),
+        ("fourbar2", 0.5, {"integrator": "dop853"}),
+        ("pen1", 0.5, {"integrator": "rk4", "step": 1e-3}),
+        ("bodies2", 0.5, {"integrator": "dop853"}),
+        *(("pen1", 0.5, {"integrator": name}) for name in ("dopri5", "adams", "radau", "auto")),
+    ],
+)
+def test_a_run_has_the_bits_of_simulate(tmp_path, model, t_end, settings):
+    assert differences(dap.load(model), tmp_path, t_end, **settings)
 
 
 def test_so_have_runs_in_joint_coordinates(tmp_path):
@@ -293,12 +299,73 @@ def test_an_output_that_is_named_twice_is_one(tmp_path):
     assert made.outputs == ("cart.r.x", "cart.r.y", "cart.r.z")
 
 
-def test_contacts_are_refused(tmp_path):
+def falling_ball():
+    """A ball that falls onto a floor, by time stepping."""
     scene = dap.Scene(name="ball")
-    scene.add_body("ball", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(0.0, 0.0, 1.0))
-    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.15], r_dot=[3.0, 0, 0])
+    scene.add_shape("sphere", body="ball", radius=0.1, collides=True)
+    scene.add_shape("plane", body="ground", collides=True)
+    scene.add_material("surface", mu=0.3)
+    scene.add_collisions(material="surface")
+    scene.add_force("weight", "gravity")
+    scene.simulation = attrs.evolve(scene.simulation, contact_step=4e-3)
+    return scene
+
+
+def declared_ball():
+    """A ball that slides on a plane, then rolls; a declared contact."""
+    scene = dap.Scene(name="declared")
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.1], r_dot=[3.0, 0, 0])
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, mu=0.3)
+    scene.add_force("weight", "gravity")
+    return scene
+
+
+@pytest.mark.parametrize(("make", "more", "settings"), [
+    (falling_ball, ["ball.rdd"], {}),
+    (declared_ball, ["ball.rdd"], {"contact": "stepping", "contact_step": 2e-3}),
+    (lambda: dap.load("quadruped"), ["trunk.rdd", "front_left_hinge.i.force"], {}),
+])  # fmt: skip
+def test_steps_of_contacts_have_the_bits_of_simulate(tmp_path, make, more, settings):
+    """Accelerations and loads of joints are means of the step here, too."""
+    scene, t_end = make(), 0.3
+    names = [*states_of(scene), *more]
+    made, library = exported(scene, tmp_path, outputs=names, **settings)
+    result = dap.simulate(scene, t_end=t_end, dt=0.03, **settings)
+    run, rows = library.start(t_end), []
+    for t in result.t:
+        assert run.step_to(t)
+        rows.append(run.values(made.outputs))
+    expected = np.hstack([result.quantity(name).values for name in names])
+    assert np.array_equal(np.array(rows), expected)
+
+
+def test_friction_is_a_parameter_of_stepped_contacts(tmp_path):
+    scene, name = falling_ball(), "materials.surface.mu"
+    made, library = exported(scene, tmp_path, outputs=["ball.r"], parameters=[name])
+    run = library.start(0.3)
+    run[name] = 0.1
+    run.step_to(0.3)
+    scene.materials["surface"].mu = 0.1
+    expected = dap.simulate(scene, t_end=0.3, dt=0.3).r[-1, 0]
+    assert np.array_equal(run.values(made.outputs), expected)
+    with pytest.raises(dap.SceneError, match=r"parameter bodies\.ball\.mass cannot be set"):
+        exported(scene, tmp_path, parameters=["bodies.ball.mass"])
+
+
+def test_a_run_ends_where_contacts_have_no_room(tmp_path, monkeypatch):
+    """The ball has one point, and there is room for none."""
+    for module, name in ((placed_shapes, "ROOM"), (arrays, "MOST_POINTS")):
+        monkeypatch.setattr(module, name, 0)
+    _, library = exported(falling_ball(), tmp_path, outputs=["ball.r"])
+    run = library.start(1.0)
+    with pytest.raises(dap.SimulationError, match=r"t = 0\.0[6-9]\d* s: more contacts came near"):
+        run.step_to(1.0)  # it falls by 0.05 m within 0.1 s
+
+
+def test_contacts_that_events_follow_are_refused(tmp_path):
     with pytest.raises(dap.SimulationError, match="export does not take contacts yet"):
-        dap.export_model(scene, tmp_path / "ball.fmu", format="fmu")
+        dap.export_model(declared_ball(), tmp_path / "ball.fmu", format="fmu")
 
 
 def test_a_folder_of_another_model(tmp_path):

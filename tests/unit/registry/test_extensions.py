@@ -1,7 +1,5 @@
 """Importers and exporters by their entry points, each in a guard of its own.
-
-Plugins here are real distributions on sys.path: a module, and a dist-info with entry points.
-"""
+Plugins here are real distributions on sys.path: a module, and a dist-info with entry points."""
 
 import pytest
 
@@ -67,21 +65,14 @@ def test_a_broken_format_is_told_and_hurts_no_other(install, tmp_path, text, wor
     assert dap.import_model(tmp_path / "a.urdf")[1].format == "urdf"
 
 
-def test_two_packages_with_one_format_are_told(install):
+def test_formats_that_two_packages_bring_unknown_and_blocked_ones(install, monkeypatch):
     install("rods", GOOD, *ROD)
     install("bars", GOOD, *ROD)
     with pytest.raises(PluginError, match=r"brought by distribution bars .* and .* rods"):
         extensions("importer").load("rod")
-
-
-def test_an_unknown_format_has_the_nearest(install):
     with pytest.raises(PluginError, match=r"no importer 'urfd'; did you mean 'urdf'"):
         extensions("importer").load("urfd")
-
-
-def test_a_blocked_format_is_left_out(install, monkeypatch):
-    install("rods", GOOD, *ROD)
-    monkeypatch.setenv("DAP3D_BLOCK", "rods:rod")
+    monkeypatch.setenv("DAP3D_BLOCK", "rods:rod, bars:rod")
     assert "rod" not in extensions("importer").keywords
 
 
@@ -164,24 +155,15 @@ def test_the_listing_has_every_kind_with_its_state(install, kind):
         (lambda text: text.replace("return [", "return 3 or ["), "'int' object is not iterable"),
         (lambda text: text.replace("    return [", "    return 0 and ["), "none with the keyword"),
         (lambda text: "raise SystemExit(3)\n", "SystemExit: 3"),
+        # keeps a core busy for the seconds that the listing allows
+        pytest.param(lambda text: "while True: pass\n", "not loaded after 0.3 s",
+                     marks=pytest.mark.slow),
     ],
-    ids=["syntax", "import", "number", "nothing", "exit"],
-)
+    ids=["syntax", "import", "number", "nothing", "exit", "never loaded"],
+)  # fmt: skip
 def test_the_listing_says_what_is_wrong_with_one_and_lists_all_others(install, kind, change, words):
-    one_is_broken(install, kind, change(KINDS[kind][0]), words)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-def test_the_listing_does_not_wait_for_one_that_is_never_loaded(install, kind):
-    """It keeps a core busy for the seconds that the listing allows."""
-    one_is_broken(install, kind, "while True: pass\n", "not loaded after 0.3 s")
-
-
-def one_is_broken(install, kind, text, words):
-    """The listing says so of an extension with this text, and has all others."""
-    keyword = KINDS[kind][1]
-    install("parts", text, keyword, f"dap3d.{kind}s")
+    text, keyword = KINDS[kind]
+    install("parts", change(text), keyword, f"dap3d.{kind}s")
     found = listed(kind, 0.3)
     assert found[keyword].state == "broken"
     assert words in found[keyword].reason

@@ -1,19 +1,15 @@
 """The registry: installed types are found by keyword, and a broken plugin only breaks itself.
-
-Plugins here are real distributions on sys.path: a module, and a dist-info with entry points.
-"""
+Plugins here are real distributions on sys.path: a module, and a dist-info with entry points."""
 
 import json
 import os
 import shutil
-import subprocess
 import sys
 import textwrap
 import time
 from pathlib import Path
 
 import pytest
-from support.plain import in_another_process
 
 import dap3d_core as dap
 from dap3d_core.interface import PluginError
@@ -293,13 +289,20 @@ def test_the_advice_on_a_collision_works_and_costs_no_other_type(install, monkey
     assert {i.distribution: i.state for i in listing if i.state == "ok"} == {distribution: "ok"}
 
 
-def test_a_blocked_type_says_who_blocked_it(install, monkeypatch):
+def test_keywords_of_another_kind_unknown_kinds_and_blocked_types(install, monkeypatch):
     install("dap3d-push", GOOD)
-    monkeypatch.setenv("DAP3D_BLOCK", "dap3d-push")
+    with pytest.raises(LookupError, match="'push' is a force type and belongs under forces"):
+        dap.load_registry().get("joint", "push")
+    with pytest.raises(ValueError, match="joint, force, function"):
+        dap.load_registry().get("joints", "sph")
+    monkeypatch.setenv("DAP3D_BLOCK", "dap3d-push, dap3d")
     registry = dap.load_registry()
     assert "push" not in registry.keywords("force")
     with pytest.raises(UnknownTypeError, match="DAP3D_BLOCK leaves dap3d-push out"):
         registry.get("force", "push")
+    with pytest.raises(UnknownTypeError) as caught:  # another name of a blocked type
+        registry.get("joint", "hinge")
+    assert caught.value.nearest is None
 
 
 def test_an_unknown_keyword_names_the_nearest_and_all(install):
@@ -314,17 +317,6 @@ def test_an_unknown_keyword_names_the_nearest_and_all(install):
         assert word in str(caught.value)
     with pytest.raises(LookupError, match="did you mean 'push'"):
         registry.get("force", "PUSH")
-
-
-def test_a_keyword_of_another_kind_says_where_it_belongs(install):
-    install("dap3d-push", GOOD)
-    with pytest.raises(LookupError, match="'push' is a force type and belongs under forces"):
-        dap.load_registry().get("joint", "push")
-
-
-def test_an_unknown_kind_is_an_error_of_the_caller():
-    with pytest.raises(ValueError, match="joint, force, function"):
-        dap.load_registry().get("joints", "sph")
 
 
 def test_an_entry_point_that_names_no_module_is_broken(install):
@@ -399,21 +391,6 @@ def test_what_a_plugin_changes_in_the_process_is_put_back(install, tmp_path, cap
     assert any("working folder" in note for note in registry.notes)
     assert any("numpy" in note for note in registry.notes)
     assert capsys.readouterr().out == "", "what it prints does not mix with results"
-
-
-@in_another_process
-def test_finding_types_imports_nothing_heavy_and_no_plugin():
-    code = """
-    import sys
-    from dap3d_core.registry import load_registry
-    assert "sph" in load_registry().keywords("joint")
-    heavy = ["numpy", "scipy", "llvmlite", "matplotlib", "rich", "click", "dap3d_joints"]
-    print([m for m in heavy if m in sys.modules])
-    """
-    answer = subprocess.run(
-        [sys.executable, "-c", textwrap.dedent(code)], capture_output=True, text=True, check=True
-    )
-    assert answer.stdout.strip() == "[]"
 
 
 # ---------------------------------------------------------------------------- a model's own file
@@ -498,13 +475,6 @@ def test_other_names_of_a_type_lead_to_its_keyword(kind, word, keyword):
     with pytest.raises(UnknownTypeError, match=f"did you mean '{keyword}'") as caught:
         dap.load_registry().get(kind, word)
     assert caught.value.nearest == keyword
-
-
-def test_names_of_blocked_types_lead_nowhere(monkeypatch):
-    monkeypatch.setenv("DAP3D_BLOCK", "dap3d")
-    with pytest.raises(UnknownTypeError) as caught:
-        dap.load_registry().get("joint", "hinge")
-    assert caught.value.nearest is None
 
 
 def test_no_two_types_of_a_kind_share_another_name():

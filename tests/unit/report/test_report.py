@@ -143,14 +143,17 @@ def test_what_timings_cannot_tell_goes_by_evaluations(timing):
     assert "takes the least work of 3 settings" in advice.reason
 
 
-def test_evaluations_of_another_integrator_count_at_their_own_cost():
-    """One of radau costs a factorisation or more: few of them are no sign of little work."""
-    runs = [run("a", 20.0, 1e-7, repeats=1, rhs=2000), run("b", 30.0, 1e-7, repeats=1, rhs=300)]
-    assert recommend(runs, None, 1e-5).run is runs[0]
-
-
-def test_timings_that_can_tell_decide():
-    runs = [run("a", 20.0, 1e-7, spread=1.0, rhs=900), run("a", 23.0, 1e-7, spread=1.0, rhs=100)]
+@pytest.mark.parametrize(
+    ("timing", "integrator", "time_s", "evaluations"),
+    [
+        # of radau one costs a factorisation or more: few of them are no sign of little work
+        (dict(repeats=1), "b", 30.0, (2000, 300)),
+        (dict(spread=1.0), "a", 23.0, (900, 100)),  # timings that can tell
+    ],
+)
+def test_evaluations_do_not_decide(timing, integrator, time_s, evaluations):
+    runs = [run(name, t, 1e-7, rhs=rhs, **timing) for name, t, rhs in
+            zip(("a", integrator), (20.0, time_s), evaluations, strict=True)]  # fmt: skip
     assert recommend(runs, None, 1e-5).run is runs[0]
 
 
@@ -181,9 +184,7 @@ def test_a_target_that_cannot_be_reached_or_told_is_said_so():
 @long_in_plain_python
 def test_every_integrator_is_measured_and_errors_fall_with_the_tolerance(small):
     """Of the pendulum from rest, over 0.2 s; in each ladder the last error is far below the first.
-
-    Three rungs span six decades of tolerance, or a factor of 16 in the step of an order of 4.
-    """
+    Three rungs span six decades of tolerance, or a factor of 16 in the step of an order of 4."""
     assert small.status == "done"
     assert not small.failed
     assert {r.integrator for r in small.runs} == set(MEASURED)
@@ -277,9 +278,7 @@ def test_the_recommended_setting_gives_the_motion_that_was_measured(small):
 @long_in_plain_python
 def test_a_run_that_fails_is_a_row_with_its_reason(monkeypatch):
     """A spring of 1e12 N/m with a fixed step far beyond its period of 6 us: it blows up.
-
-    A rough reference will do.
-    """
+    A rough reference will do."""
     monkeypatch.setattr("dap3d_core.report.reference.TIGHTEST", (1e-5, 1e-4))
     scene = dap.Scene(name="stiff")
     scene.add_body("bob", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(1.0, 0.0, 0.0))

@@ -81,3 +81,49 @@ def test_a_page_has_an_arrow_for_each_pair(result):
     values = np.frombuffer(base64.b64decode(floor["values"]), dtype="<f4").reshape(-1, 3)
     assert values[1:] == pytest.approx(result.contacts.of("a_ball", "floor").force, rel=1e-6)
     assert not values[0].any()
+
+
+def sliding():
+    """A ball that slides on the floor at first; one that bounces; an arm at its limit, a moment."""
+    scene = dap.Scene(name="declared")
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.1], r_dot=[3, 0, 0])
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, mu=0.3)
+    scene.add_body("drop", mass=1.0, Jp=[0.01] * 3, r=[0, 1, 0.6])
+    scene.add_contact("ball_plane", "pad", P_i="drop.O", radius=0.1, e=1.0)
+    scene.add_body("arm", mass=1.0, Jp=[0.1] * 3, r=[0.5, 5, 0])
+    scene.add_point("end", "arm", (-0.5, 0.0, 0.0))
+    scene.add_point("seat", "ground", (0.0, 5.0, 0.0))
+    scene.add_joint("rev", "hinge", P_i="end", P_j="seat", a_i="arm.y", a_j="ground.y", upper=0.0)
+    scene.add_force("weight", "gravity", gravity=G)
+    return scene
+
+
+def test_declared_contacts_have_rows_at_all_reported_instants(tmp_path):
+    """The ball slides until t = 2/7 3 / (0.3 g) = 0.291 s, the other is in the air at reports."""
+    result = dap.simulate(sliding(), t_end=0.5, dt=0.1, rtol=1e-10, atol=1e-12)
+    table = result.contacts
+    assert np.all(result.contact("hinge_upper").normal_force > 4.0)
+    assert table.names == ("ground", "ball", "drop", "arm")
+    assert table.t.tolist() == result.t.tolist()
+    assert np.all(table.pair == [1, 0])
+    assert table.mode.tolist() == [1, 1, 1, 2, 2, 2]
+    weight = 2.0 * G
+    slides, rolls = [-0.3 * weight, 0.0, weight], [0.0, 0.0, weight]
+    assert np.abs(table.force - np.array(3 * [slides] + 3 * [rolls])).max() < 1e-9
+    assert np.abs(table.normal - [0.0, 0.0, 1.0]).max() < 1e-15
+    assert np.abs(table.point - result.r[:, 0] * [1.0, 1.0, 0.0]).max() < 1e-12
+    assert np.abs(table.of("ground", "ball").force + table.force).max() == 0.0
+    result.save(tmp_path / "declared.nc")
+    assert dap.open(tmp_path / "declared.nc").contacts == table
+
+
+def test_shapes_and_declared_contacts_are_in_one_table():
+    scene = stack()
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 3, 0.1])
+    scene.add_contact("ball_plane", "ground_floor", P_i="ball.O", radius=0.1, mu=0.3)
+    result = dap.simulate(scene, **GIVEN)
+    own, shapes = result.contacts.of("ball", "ground"), result.contacts.of("floor")
+    assert own.force == pytest.approx(np.tile([0.0, 0.0, 2.0 * G], (4, 1)), abs=1e-9)
+    assert len(result.contacts.of("a_ball", "floor")) == 4
+    assert np.all(np.diff(result.contacts.t) >= 0.0)
+    assert len(own) + len(shapes) + len(result.contacts.of("top_ball")) == len(result.contacts)

@@ -1,13 +1,10 @@
 """A result gives back the motion that was put into it: closed-form motions, laws of mechanics."""
 
-import json
 import pickle
-import subprocess
-import sys
 
 import numpy as np
 import pytest
-from support.plain import in_another_process
+from support.internals import Evaluator, join, y_from_u
 from support.results import (
     ARM,
     MASS,
@@ -19,14 +16,10 @@ from support.results import (
     model_of,
     result_of,
 )
+from support.rotations import to_global
 
 import dap3d_core as dap
-from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.model.rotations import to_global
-from dap3d_core.model.state_layout import join, y_from_u
 from dap3d_core.result import ResultError, RunStatistics, UnknownNameError
-
-# ---------------------------------------------------------------------------- motion
 
 
 def test_stored_arrays_are_those_of_the_rows():
@@ -83,9 +76,6 @@ def test_stored_arrays_cannot_be_changed_by_accident():
 def test_rows_of_another_width_are_refused():
     with pytest.raises(ValueError, match=r"\(nt, 28\), not \(5, 4\)"):
         result_of(circling_scene(), np.zeros((5, 4)))
-
-
-# ---------------------------------------------------------------------------- joints
 
 
 def test_reaction_is_the_centripetal_force_and_its_opposite_on_the_ground():
@@ -195,9 +185,6 @@ def test_the_machine_is_made_once_and_only_when_needed():
     assert made == [1]
 
 
-# ---------------------------------------------------------------------------- what the run says
-
-
 def test_what_the_run_says_of_itself():
     stats = RunStatistics(steps=7, rejected=1, rhs=90, projections=8, wall_time_s=0.5)
     result, _, _ = circling(
@@ -237,13 +224,3 @@ def test_versions_name_what_the_numbers_depend_on():
     versions = circling()[0].versions
     assert set(versions) == {"dap3d", "numpy", "llvmlite", "python"}
     assert versions["numpy"] == np.__version__
-
-
-@in_another_process
-def test_importing_results_brings_in_no_compiler_and_no_plots():
-    code = (
-        "import dap3d_core.result, sys, json; print(json.dumps([m for m in"
-        " ('llvmlite', 'scipy', 'matplotlib', 'netCDF4', 'xarray', 'pandas') if m in sys.modules]))"
-    )
-    out = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert json.loads(out.stdout) == []

@@ -46,28 +46,16 @@ BODY_MISTAKES = [
     ("Jp = [0.5, 0.5, 0.1]", "Jp = [1, nan, 1]", "bodies.crank.Jp", ["entry 2"]),
     ("Jp = [0.5, 0.5, 0.1]", "Jp = [1e-320, 1e-320, 1e-320]", "bodies.crank.Jp", ["1e-100"]),
     ("Jp = [0.5, 0.5, 0.1]", "Jp = [0.1, 0.1, 1e-15]", "bodies.crank.Jp", ["inertia is zero"]),
-    (
-        "Jp = [0.5, 0.5, 0.1]",
-        "Jp = [[0.1, 0], [0, 0.1]]",
-        "bodies.crank.Jp",
-        ["three rows", "2 entries"],
-    ),
-    (
-        "Jp = [0.5, 0.5, 0.1]",
-        "Jp = [[[1], [0], [0]], [[0], [1], [0]], [[0], [0], [1]]]",
-        "bodies.crank.Jp",
-        ["row 1", "entry 1", "a list of 1"],
-    ),
+    ("Jp = [0.5, 0.5, 0.1]", "Jp = [[0.1, 0], [0, 0.1]]", "bodies.crank.Jp",
+     ["three rows", "2 entries"]),
+    ("Jp = [0.5, 0.5, 0.1]", "Jp = [[[1], [0], [0]], [[0], [1], [0]], [[0], [0], [1]]]",
+     "bodies.crank.Jp", ["row 1", "entry 1", "a list of 1"]),
     ("[0.0, 0.5, 0.1]", "[0.0, 0.5, 0.2]", "bodies.rocker.Jp", ["symmetric", "(2, 3)", "(3, 2)"]),
     ("[0.0, 0.5, 0.1]", "[0.0, 0.5]", "bodies.rocker.Jp", ["row 2", "has 2"]),
     ("[0.0, 0.5, 0.1]", "[0.0, nan, 0.1]", "bodies.rocker.Jp", ["row 2", "entry 2"]),
     ("[0.5, 0.0, 0.0], [0.0", "[0.05, 0.0, 0.0], [0.0", "bodies.rocker.Jp", ["triangle"]),
-    (
-        "[0.0, 0.5, 0.1], [0.0, 0.1, 0.5]",
-        "[0, 0.5, 0.5], [0, 0.5, 0.5]",
-        "bodies.rocker.Jp",
-        ["zero"],
-    ),
+    ("[0.0, 0.5, 0.1], [0.0, 0.1, 0.5]", "[0, 0.5, 0.5], [0, 0.5, 0.5]", "bodies.rocker.Jp",
+     ["zero"]),
     ("[0.0, 0.5, 0.1], [0.0, 0.1, 0.5]", "[0, 1, 2], [0, 2, 1]", "bodies.rocker.Jp", ["positive"]),
     ('color = "tab:blue"', "color = 3", "bodies.crank.color", ["colour"]),
     ("[bodies.crank]", '[bodies."a.b"]\nmass = 1.0\n[bodies.crank]', "bodies.a.b", ["no dot"]),
@@ -77,7 +65,7 @@ BODY_MISTAKES = [
     ("[bodies.crank]", '[bodies."a "]\n[bodies.crank]', "bodies.a ", ["ends with a space"]),
     ("[bodies.crank]", '[bodies.""]\nmass = 1.0\n[bodies.crank]', "bodies.", ["not empty"]),
     ("[bodies.crank]", '[bodies."a\\nb"]\nmass = 1.0\n[bodies.crank]', "bodies.", ["line breaks"]),
-]
+]  # fmt: skip
 REFERENCE_MISTAKES = [
     ('body = "rocker"', 'body = "roker"', "points.B.body", ["no body", "'rocker'?"]),
     ('body = "rocker"', 'body = "Rocker"', "points.B.body", ["did you mean 'rocker'?"]),
@@ -100,12 +88,8 @@ REFERENCE_MISTAKES = [
     ('P_j = "ground.O"', "P_j = 3", "joints.J1.P_j", ["name of a point", "number 3", "'C'"]),
     ('P_j = "ground.O"', "P_j = true", "joints.J1.P_j", ["name of a point"]),
     ('P_j = "ground.O"', 'P_j = ""', "joints.J1.P_j", ["no point ''"]),
-    (
-        'a_j = "ground.x"\n\n',
-        'a_j = "ground.w"\n\n',
-        "joints.J1.a_j",
-        ["offer as vectors: x, y, z"],
-    ),
+    ('a_j = "ground.x"\n\n', 'a_j = "ground.w"\n\n', "joints.J1.a_j",
+     ["offer as vectors: x, y, z"]),
     ('a_i = "axis"', 'a_i = "axes"', "joints.J1.a_i", ["no vector", "'axis'?"]),
     ('a_i = "axis"', 'a_i = "A"', "joints.J1.a_i", ["no vector 'A'"]),
     ('d = "d1"', 'd = "d2"', "joints.J4.d", ["no vector between two points 'd2'", "there are d1"]),
@@ -116,14 +100,10 @@ REFERENCE_MISTAKES = [
     ('function = "motor"', 'function = "moter"', "joints.J3.function", ["'motor'?"]),
     ('function = "motor"', "function = 1", "joints.J3.function", ["number 1", "'motor'"]),
     ('body_i = "crank"', 'body_i = "krank"', "joints.J3.body_i", ["no body", "'crank'?"]),
-]
+]  # fmt: skip
 ELEMENT_MISTAKES = [
-    (
-        'type = "rev"',
-        'type = "revolute"',
-        "joints.J1.type",
-        ["no joint type 'revolute'", "did you mean 'rev'?"],
-    ),
+    ('type = "rev"', 'type = "revolute"', "joints.J1.type",
+     ["no joint type 'revolute'", "did you mean 'rev'?"]),
     ('type = "rev"', 'type = "Rev"', "joints.J1.type", ["did you mean 'rev'?"]),
     ('type = "rev"', "type = 3", "joints.J1.type", ["text"]),
     ('type = "rev"\n', "", "joints.J1.type", ["required", "sph"]),
@@ -140,31 +120,15 @@ ELEMENT_MISTAKES = [
     ("wgt = [0.0, 0.0, -1.0]", "wgt = [0.0, -1.0]", "forces.g.wgt", ["3 numbers", "has 2"]),
     ("coeff = [0.0, 6.28, 0.0]", "coeff = [0, 6, 0, 0]", "functions.motor.coeff", ["has 4"]),
     ("coeff = [0.0, 6.28, 0.0]\n", "", "functions.motor.coeff", ["required", "3 numbers"]),
-    (
-        'P_i = "B"\nP_j = "A"',
-        'P_i = "A"\nP_j = "crank.O"',
-        "joints.J2.P_j",
-        ["body i and body j are both crank"],
-    ),
-    (
-        'a_i = "axis"',
-        'a_i = "rocker.x"',
-        "joints.J1.a_i",
-        ["a_i is on rocker", "P_i on crank", "one body"],
-    ),
-    (
-        'a_j = "ground.x"\nfunction',
-        'a_j = "rocker.x"\nfunction',
-        "joints.J3.a_j",
-        ["a_j is on rocker", "body_j", "ground", 'write body_j = "rocker"'],
-    ),
-    (
-        "[joints.J3]",
-        '[joints.J2b]\ntype = "sph"\nP_i = "B"\nP_j = "A"\n\n[joints.J3]',
-        "joints.J2b",
-        ["the same as J2"],
-    ),
-]
+    ('P_i = "B"\nP_j = "A"', 'P_i = "A"\nP_j = "crank.O"', "joints.J2.P_j",
+     ["body i and body j are both crank"]),
+    ('a_i = "axis"', 'a_i = "rocker.x"', "joints.J1.a_i",
+     ["a_i is on rocker", "P_i on crank", "one body"]),
+    ('a_j = "ground.x"\nfunction', 'a_j = "rocker.x"\nfunction', "joints.J3.a_j",
+     ["a_j is on rocker", "body_j", "ground", 'write body_j = "rocker"']),
+    ("[joints.J3]", '[joints.J2b]\ntype = "sph"\nP_i = "B"\nP_j = "A"\n\n[joints.J3]', "joints.J2b",
+     ["the same as J2"]),
+]  # fmt: skip
 SETTING_MISTAKES = [
     ("schema = 1", "schema = 2", "scene.schema", ["newer", "reads up to 1"]),
     ("schema = 1", 'schema = "1"', "scene.schema", ["whole number"]),

@@ -136,9 +136,7 @@ def folder(tmp_path):
 
 def test_a_turned_sub_assembly_moves_as_it_does_alone(folder):
     """Its motion is that of its own file in axes turned with it, weight included.
-
-    Two runs at a relative tolerance of 1e-10.
-    """
+    Two runs at a relative tolerance of 1e-10."""
     result = dap.simulate(folder)
     turn = Rotation.from_euler("xyz", [0.0, np.radians(20.0), np.radians(90.0)])
     for name, length, R, origin in (
@@ -252,10 +250,13 @@ def test_mistakes_of_a_part_stand_in_its_file(folder):
         assert (str(leg), leg.read_text().splitlines().index(new) + 1, key) in found
 
 
-def test_a_text_includes_nothing():
+def test_a_text_includes_nothing_and_an_expression_turns_nothing():
     scene = parse('[include.a]\nfile = "x.toml"\n')
     with pytest.raises(dap.SceneError, match="a text has no folder"):
         dap.compile(scene)
+    scene = dap.Scene(parameters={"a": 1.0})
+    with pytest.raises(dap.SceneError, match="expressions may move a sub-assembly, not turn it"):
+        dap.include(scene, "b", dap.load("pen1"), {"rpy": [0.0, 0.0, "= a"]})
 
 
 SLIDER = """
@@ -336,8 +337,7 @@ torque = 0.3
 )
 def test_what_is_taken_from_ground_unwritten_is_turned_too(sides, axis):
     """A slider keeps its orientation to the axes of ground, from either side: it starts where its
-    own file has it. Euler parameters are correct to rounding, as is the correction of the start.
-    """
+    own file has it. Euler parameters are correct to rounding, as is the correction of the start."""
     text = SLIDER.replace("SIDES", sides).replace("AXIS", axis)
     if "line" in sides:
         text += '\n[vectors2.line]\nP_i = "block.O"\nP_j = "ground.O"\n'
@@ -371,10 +371,3 @@ def test_points_that_are_left_out_are_those_of_the_part():
     fields = scene.joints["a/planet_and_ring"].fields
     assert fields["P_j"] == "a/ground O"
     assert "P_i" not in fields, "that is the hinge's"
-
-
-def test_a_turn_by_an_expression_is_refused():
-    scene = dap.Scene(parameters={"a": 1.0})
-    part = dap.load("pen1")
-    with pytest.raises(dap.SceneError, match="expressions may move a sub-assembly, not turn it"):
-        dap.include(scene, "b", part, {"rpy": [0.0, 0.0, "= a"]})

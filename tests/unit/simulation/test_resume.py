@@ -172,19 +172,29 @@ def test_checkpoints_are_written_now_and_then(tmp_path, monkeypatch):
     assert all(rows == there for _, rows, there in seen)
 
 
-def test_a_run_that_is_killed_before_its_first_checkpoint_is_due_is_resumed(tmp_path):
-    """There is one from the beginning, with no row yet; without asking there is none."""
+@pytest.mark.parametrize(
+    ("every", "at"),
+    [
+        # killed before its first checkpoint is due: there is one from the beginning, with no row
+        (1e6, {"run.nc.checkpoint": 0.0, "run.nc.part": 0.0}),
+        # killed between two checkpoints: rows behind one are made again
+        (1e-9, {"run.nc.checkpoint": 0.2, "run.nc.part": 0.4}),
+    ],
+)
+def test_a_run_that_is_killed_is_resumed(every, at, tmp_path):
+    """From the files that it leaves, as they are at some moments."""
     kept = tmp_path / "kept"
     kept.mkdir()
 
     def watch(standing):
-        if not list(kept.iterdir()):
-            for name in ("run.nc.checkpoint", "run.nc.part"):
+        for name, t in at.items():
+            if standing.t >= t and not (kept / name).exists():
                 shutil.copy(tmp_path / name, kept / name)
 
     settings = {"output": tmp_path / "run.nc", "watch": watch} | SHORT
-    whole = dap.simulate(problems.pendulum(), checkpoint=1e6, **settings)
-    assert read_checkpoint(kept / "run.nc.checkpoint").header["rows"] == 0
+    whole = dap.simulate(problems.pendulum(), checkpoint=every, **settings)
+    rows = read_checkpoint(kept / "run.nc.checkpoint").header["rows"]
+    assert rows == 0 if every == 1e6 else rows < len(dap.open(kept / "run.nc.part").t)
     assert same_bits(dap.resume(kept / "run.nc.checkpoint"), whole)
     assert [f.name for f in kept.iterdir()] == ["run.nc"]
 
@@ -209,26 +219,6 @@ def test_a_checkpoint_that_another_run_has_written_since_stays(tmp_path):
     dap.simulate(problems.pendulum(), output=tmp_path / "run.nc", checkpoint=1e6, force=True,
                  watch=watch, **SHORT)  # fmt: skip
     assert checkpoint.read_bytes() == theirs
-
-
-def test_a_checkpoint_older_than_its_rows_is_resumed(tmp_path):
-    """As after SIGKILL between two checkpoints: rows behind it are made again."""
-    kept = tmp_path / "kept"
-    kept.mkdir()
-
-    def watch(standing):
-        for name, t in (("run.nc.checkpoint", 0.2), ("run.nc.part", 0.4)):
-            if standing.t > t and not (kept / name).exists():
-                shutil.copy(tmp_path / name, kept / name)
-
-    whole = dap.simulate(
-        problems.pendulum(), output=tmp_path / "run.nc", checkpoint=1e-9, watch=watch, **SHORT
-    )
-    assert len(dap.open(kept / "run.nc.part").t) > read_checkpoint(
-        kept / "run.nc.checkpoint"
-    ).header["rows"]  # fmt: skip
-    assert same_bits(dap.resume(kept / "run.nc.checkpoint"), whole)
-    assert [f.name for f in kept.iterdir()] == ["run.nc"]
 
 
 def test_a_callback_that_fails_keeps_all_even_with_an_error_of_the_system(tmp_path):

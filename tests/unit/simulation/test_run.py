@@ -1,10 +1,16 @@
-"""Notes of one run."""
+"""Notes of one run.
+
+Notes on what time stepping of contacts left unsolved.
+"""
+
+from types import SimpleNamespace
 
 import pytest
 from support import problems
 
 import dap3d_core as dap
 from dap3d_core.simulation import run
+from dap3d_core.simulation.run import stepping_notes
 
 
 @pytest.mark.parametrize(
@@ -18,3 +24,37 @@ def test_a_long_run_whose_method_was_left_open_says_that_joint_is_quicker(
     monkeypatch.setattr(run, "MUCH_WORK", work)
     result = dap.simulate(problems.chain(10), t_end=0.01, dt=0.01, method=method)
     assert any("method joint would take some 0." in note for note in result.notes) == is_noted
+
+
+def ran(residual, overlap=0.0):
+    work = SimpleNamespace(largest_residual=residual, deepest=1e-12, friction_work=-2.0,
+                           overlap_at_start=overlap)  # fmt: skip
+    return SimpleNamespace(name="moreau", work=work)
+
+
+@pytest.mark.parametrize(("residual", "severity"), [(1e-4, "information"), (1e-2, "warning")])
+def test_what_is_not_solved_is_a_warning(residual, severity):
+    (note,) = stepping_notes([ran(residual)], 1.0)
+    assert (getattr(note, "severity", "warning"), "2 J" in note) == (severity, True)
+    assert ("shorter contact_step" in note) == (severity == "warning")
+
+
+def test_what_is_driven_into_another_is_a_warning():
+    scene = dap.Scene(name="press")
+    scene.add_body("b", mass=1.0, r=(0.0, 0.0, 0.5), r_dot=(0.0, 0.0, -1.0))
+    scene.add_joint("tran", "guide", P_i="b.O", P_j="ground.O", a_j="ground.z")
+    scene.add_function("a", "down", coeff=(0.5, -1.0, 0.0))
+    scene.add_joint("drive-tran", joint="guide", function="down")
+    scene.add_shape("sphere", body="b", radius=0.5, collides=True)
+    scene.add_shape("plane", body="ground", collides=True)
+    result = dap.simulate(scene, t_end=0.02, dt=0.02, contact_step=5e-3)
+    assert result.r[-1, 0, 2] == pytest.approx(0.48, abs=1e-6)
+    (note,) = (note for note in result.notes if "overlap by" in note)
+    assert "drivers hold them" in note
+    assert getattr(note, "severity", "warning") == "warning"
+
+
+def test_overlaps_are_parts_of_the_length_of_the_scene():
+    assert len(stepping_notes([ran(0.0, 1e-6)], 1.0)) == 2
+    assert len(stepping_notes([ran(0.0, 1e-6)], 1e3)) == 1
+    assert stepping_notes([SimpleNamespace(name="dop853")], 1.0) == []

@@ -11,8 +11,6 @@ from scipy import stats
 import dap3d_core as dap
 from dap3d_core.study.design import DESIGNS, design_of
 
-# ---------------------------------------------------------------------------- grids
-
 
 @pytest.mark.parametrize(
     ("spec", "values"),
@@ -46,9 +44,6 @@ def test_a_grid_has_all_combinations_the_last_number_fastest():
     assert found.size == 6
     expected = [(a, b, 9.0) for a in (1.0, 2.0) for b in (1.0, 2.0, 3.0)]
     assert found.points().tolist() == [list(point) for point in expected]
-
-
-# ---------------------------------------------------------------------------- samples
 
 
 @pytest.mark.parametrize("design", DESIGNS)
@@ -89,9 +84,6 @@ def test_a_share_at_the_end_is_finite():
     assert np.isfinite(varied.quantiles(np.array([0.0, 1.0]))).all()
     (listed,) = design_of({"a": "1,2"}, 2).varied
     assert listed.quantiles(np.array([0.0, 1.0])).tolist() == [1.0, 2.0]
-
-
-# ---------------------------------------------------------------------------- mistakes
 
 
 @pytest.mark.parametrize(

@@ -37,9 +37,7 @@ def test_rotations_are_those_of_the_model():
 
 def test_rates_are_those_of_finite_moves():
     """Bodies and functions of time, along a direction with turns; central differences, h = 1e-5.
-
-    They leave some h^2 = 1e-10 of truncation and 1e-16 / h of rounding.
-    """
+    They leave some h^2 = 1e-10 of truncation and 1e-16 / h of rounding."""
     state, rng = some_state(), np.random.default_rng(0)
     along = Direction(rng.normal(size=(BODIES, 3)), rng.normal(size=(BODIES, 3)), 0.7)
     ahead, back = state.moved(along, 1e-5), state.moved(along, -1e-5)

@@ -4,9 +4,6 @@ Sources: Gottschalk, Lin, Manocha, OBBTree (1996), for the fifteen axes; Sutherl
 Reentrant polygon clipping (1974).
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 
 from dap3d_core.assembly.collisions.records import add

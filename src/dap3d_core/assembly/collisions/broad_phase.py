@@ -1,32 +1,85 @@
 """Pairs of shapes that may touch: a grid of cells, and the few larger ones one by one."""
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
-import numpy as np
-
-from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.assembly.collisions.placed_shapes import PlacedShapes
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
-#: Per cent of the shapes that fit into a cell.
-FIT = 95.0
+#: Part of the shapes that fit into a cell.
+FIT = 0.95
 
 
 @compiled
-def meet(
-    i: int, j: int, centre: Floats, reach: Floats, body: Integers, pairs: Integers, count: int
-) -> int:
-    """Append a pair whose balls overlap, of two bodies; the count, which may be beyond the room."""
-    if body[i] == body[j]:
-        return count
-    most, square = reach[i] + reach[j], 0.0
+def find_pairs(s: PlacedShapes, bodies: int) -> None:
+    """Put the pairs whose balls overlap, or that may touch a plane; bodies: without ground."""
+    s.pair_count = 0
+    if s.solids.size > 1:
+        grid_pairs(s, bodies)
+    for p in range(s.planes.size):
+        plane = s.planes[p]
+        axes, c = s.axes[plane], s.centre[plane]
+        for k in range(s.solids.size):
+            i = s.solids[k]
+            d, height = s.centre[i], 0.0
+            for x in range(3):
+                height += (d[x] - c[x]) * axes[3 * x + 2]
+            if height <= s.reach[i] + s.near[i] + s.near[plane]:
+                add_pair(s, i, plane, bodies)
+
+
+@compiled
+def add_pair(s: PlacedShapes, i: int, j: int, bodies: int) -> None:
+    """Append a pair that is to meet; its count may be beyond the room."""
+    a, b = s.body[i], s.body[j]
+    if a == b or (s.bits[i, 0] & s.bits[j, 1] == 0 and s.bits[j, 0] & s.bits[i, 1] == 0):
+        return
+    key = min(a, b) * (bodies + 1) + max(a, b)
+    low, high = 0, s.apart.size
+    while low < high:
+        middle = (low + high) // 2
+        if s.apart[middle] < key:
+            low = middle + 1
+        else:
+            high = middle
+    if low < s.apart.size and s.apart[low] == key:
+        return
+    count = s.pair_count
+    if count < s.pairs.shape[0]:
+        s.pairs[count, 0], s.pairs[count, 1] = i, j
+    s.pair_count = count + 1
+
+
+@compiled
+def meet(s: PlacedShapes, i: int, j: int, bodies: int) -> None:
+    """Append a pair if its balls overlap."""
+    most, square = s.reach[i] + s.near[i] + (s.reach[j] + s.near[j]), 0.0
     for k in range(3):
-        square += (centre[i, k] - centre[j, k]) * (centre[i, k] - centre[j, k])
-    if square > most * most:
-        return count
-    if count < pairs.shape[0]:
-        pairs[count, 0], pairs[count, 1] = i, j
-    return count + 1
+        square += (s.centre[i, k] - s.centre[j, k]) * (s.centre[i, k] - s.centre[j, k])
+    if square <= most * most:
+        add_pair(s, i, j, bodies)
+
+
+@compiled
+def ranked(x: Floats, rank: int) -> float:
+    """The number of a rank among those of x, which are exchanged.
+
+    Source: Hoare, Algorithm 65: Find (Comm. ACM 4, 1961).
+    """
+    low, high = 0, x.size - 1
+    while low < high:
+        pivot, i, j = x[rank], low, high
+        while i <= j:
+            while x[i] < pivot:
+                i += 1
+            while pivot < x[j]:
+                j -= 1
+            if i <= j:
+                x[i], x[j] = x[j], x[i]
+                i, j = i + 1, j - 1
+        if j < rank:
+            low = i
+        if rank < i:
+            high = j
+    return x[rank]
 
 
 @compiled
@@ -36,66 +89,54 @@ def place_of(x: int, y: int, z: int, size: int) -> int:
 
 
 @compiled
-def grid_pairs(
-    small: Integers, large: Integers, cells: Integers, centre: Floats, reach: Floats,
-    body: Integers, head: Integers, following: Integers, pairs: Integers,
-) -> int:  # fmt: skip
-    """Pairs of balls that overlap; their number, which may be beyond the room for them.
+def fill_cells(s: PlacedShapes) -> tuple[int, int]:
+    """Sort the solids into those that fit into a cell, which are put there, and others; counts."""
+    count = s.solids.size
+    for k in range(count):
+        s.sorted[k] = s.reach[s.solids[k]] + s.near[s.solids[k]]
+    fit, small, large = ranked(s.sorted, int(FIT * (count - 1))), 0, 0
+    for k in range(count):
+        i = s.solids[k]
+        if s.reach[i] + s.near[i] <= fit:
+            s.small[small] = i
+            small += 1
+        else:
+            s.large[large] = i
+            large += 1
+    for c in range(3):
+        least = s.centre[s.small[0], c]
+        for k in range(small):
+            least = min(least, s.centre[s.small[k], c])
+        for k in range(small):
+            s.cells[k, c] = 1 + int((s.centre[s.small[k], c] - least) / (2.0 * fit))
+    for k in range(2 * small + 1):
+        s.head[k] = -1
+    for a in range(small):
+        at = place_of(s.cells[a, 0], s.cells[a, 1], s.cells[a, 2], 2 * small + 1)
+        s.following[a] = s.head[at]
+        s.head[at] = a
+    return small, large
 
-    Args:
-        small, large: shapes no wider than a cell, and others.
-        cells: (k, 3) of the small ones, from 1 on.
-        centre, reach: (m, 3), (m,) of the balls of all, m.
-        body: (m,); shapes of one body make no pairs, and those of ground ask for none.
-        head, following: tables of -1, of more places than small shapes, and as many.
-        pairs: (capacity, 2), an output.
-    """
-    count = 0
-    for a in range(small.size):
-        at = place_of(cells[a, 0], cells[a, 1], cells[a, 2], head.size)
-        following[a] = head[at]
-        head[at] = a
-    for a in range(small.size):
-        i = small[a]
-        for near in range(27 if body[i] > 0 else 0):
+
+@compiled
+def grid_pairs(s: PlacedShapes, bodies: int) -> None:
+    """Append the pairs of solids whose balls overlap; those of ground ask for none."""
+    small, large = fill_cells(s)
+    cells = s.cells
+    for a in range(small):
+        i = s.small[a]
+        for near in range(27 if s.body[i] > 0 else 0):
             x, y, z = cells[a, 0] + near // 9 - 1, cells[a, 1] + near // 3 % 3 - 1, near % 3 - 1
             z += cells[a, 2]
-            b = head[place_of(x, y, z, head.size)]
+            b = s.head[place_of(x, y, z, 2 * small + 1)]
             while b >= 0:
                 if cells[b, 0] == x and cells[b, 1] == y and cells[b, 2] == z:
-                    j = small[b]
-                    if body[j] == 0 or b > a:
-                        count = meet(i, j, centre, reach, body, pairs, count)
-                b = following[b]
-    for a in range(large.size):
-        for b in range(small.size):
-            count = meet(large[a], small[b], centre, reach, body, pairs, count)
-        for b in range(a + 1, large.size):
-            count = meet(large[a], large[b], centre, reach, body, pairs, count)
-    return count
-
-
-def near_pairs(
-    shapes: Integers, centre: Floats, reach: Floats, body: Integers, room: int
-) -> Integers:
-    """(k, 2) pairs of those of some shapes whose balls overlap, in an order that is reproducible.
-
-    Args:
-        shapes: indices, of shapes that have an end.
-        centre, reach, body: of all shapes, as of ``grid_pairs``.
-        room: pairs that are expected.
-    """
-    if len(shapes) < 2:
-        return np.zeros((0, 2), dtype=np.int64)
-    own = reach[shapes]
-    fit = float(np.percentile(own, FIT, method="lower"))
-    small, large = shapes[own <= fit], shapes[own > fit]
-    places = centre[small]
-    cells = 1 + ((places - places.min(axis=0)) / (2.0 * fit)).astype(np.int64)
-    while True:
-        pairs = np.zeros((room, 2), dtype=np.int64)
-        head, following = np.full(2 * len(small) + 1, -1), np.zeros(len(small), dtype=np.int64)
-        count = grid_pairs(small, large, cells, centre, reach, body, head, following, pairs)
-        if count <= room:
-            return pairs[:count]
-        room = count
+                    j = s.small[b]
+                    if s.body[j] == 0 or b > a:
+                        meet(s, i, j, bodies)
+                b = s.following[b]
+    for a in range(large):
+        for b in range(small):
+            meet(s, s.large[a], s.small[b], bodies)
+        for b in range(a + 1, large):
+            meet(s, s.large[a], s.large[b], bodies)

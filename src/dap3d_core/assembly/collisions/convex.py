@@ -7,9 +7,6 @@ of these are tried, the last two by Newton's method from what ``nearest`` finds.
 is no more than the gap, so that one too many does no harm.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 
 from dap3d_core.assembly.collisions.distance import (
@@ -252,34 +249,32 @@ def part_best(
 
 @compiled
 def touch_convex(
-    pairs: Integers, kind: Integers, centre: Floats, axes: Floats, size: Floats, corners: Integers,
+    i: int, j: int, kind: Integers, centre: Floats, axes: Floats, size: Floats, corners: Integers,
     vertices: Floats, margin: Floats, work: Floats, which: Integers, found: Floats, count: int,
 ) -> int:  # fmt: skip
-    """As ``touch``, of pairs for which there is no formula.
+    """Append the points of shapes i and j for which there is no formula; the new count.
 
     Args:
-        pairs, kind, centre, axes, size, margin, which, found: as of ``touch``.
-        corners: (m, 2) first of the vertices of a hull, and their number.
-        vertices: (k, 3) m, in the axes of their shapes.
+        i, j: two shapes, of which i has the higher kind.
+        kind, size, corners, vertices: of all shapes, as in ``CollisionShapes``.
+        centre, axes: (m, 3), (m, 9) m, rows of the matrices of their axes.
+        margin: (m,) m; points nearer than the sum of both are found.
         work: (ROWS, 3) scratch.
+        which, found: outputs, as in records.py.
         count: of points that there are already.
     """
-    for k in range(pairs.shape[0]):
-        i, j = pairs[k, 0], pairs[k, 1]
-        if kind[i] < kind[j] or (kind[i] == kind[j] and i > j):
-            i, j = j, i
-        radius, most = radius_of(i, kind, size), margin[i] + margin[j]
-        if kind[j] == PLANE:
-            for r in range(3):
-                work[BEST, r] = axes[j, 3 * r + 2]
-            support(i, -1.0, work[BEST], kind, centre, axes, size, corners, vertices, work[PI])
-            for r in range(3):
-                work[PJ, r] = work[PI, r] - centre[j, r]
-            gap = dot(work[PJ], work[BEST]) - radius
-        else:
-            radius += radius_of(j, kind, size)
-            gap = part_best(i, j, most, kind, centre, axes, size, corners, vertices, work) - radius
-        if gap < most:
-            count = put_points(i, j, gap, most, kind, centre, axes, size, corners, vertices, work,
-                               work[BEST], which, found, count)  # fmt: skip
-    return count
+    radius, most = radius_of(i, kind, size), margin[i] + margin[j]
+    if kind[j] == PLANE:
+        for r in range(3):
+            work[BEST, r] = axes[j, 3 * r + 2]
+        support(i, -1.0, work[BEST], kind, centre, axes, size, corners, vertices, work[PI])
+        for r in range(3):
+            work[PJ, r] = work[PI, r] - centre[j, r]
+        gap = dot(work[PJ], work[BEST]) - radius
+    else:
+        radius += radius_of(j, kind, size)
+        gap = part_best(i, j, most, kind, centre, axes, size, corners, vertices, work) - radius
+    if gap >= most:
+        return count
+    return put_points(i, j, gap, most, kind, centre, axes, size, corners, vertices, work,
+                      work[BEST], which, found, count)  # fmt: skip

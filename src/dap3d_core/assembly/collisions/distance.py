@@ -4,9 +4,6 @@ Source: Gilbert, Johnson, Keerthi, A fast procedure for computing the distance b
 objects (1988). Nearest points of simplices are found by trying all faces of them.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 
 from dap3d_core.assembly.collisions.supports import radius_of, support

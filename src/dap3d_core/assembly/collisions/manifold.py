@@ -1,8 +1,5 @@
 """Points where two convex solids may touch, given the direction that parts them best."""
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 
 from dap3d_core.assembly.collisions.distance import dot

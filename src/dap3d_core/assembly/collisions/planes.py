@@ -1,8 +1,5 @@
 """Shapes at a plane: gaps of centres, ends, corners and rims."""
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 
 from dap3d_core.assembly.collisions.records import add

@@ -1,8 +1,5 @@
 """Balls and capsules at boxes, balls at cylinders: nearest points of solids."""
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 
 from dap3d_core.assembly.collisions.records import add

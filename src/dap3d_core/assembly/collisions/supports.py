@@ -3,9 +3,6 @@
 A capsule is its axis here, a sphere its centre; their radii are added to distances.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 
 from dap3d_core.assembly.collisions.boxes import dot_axis

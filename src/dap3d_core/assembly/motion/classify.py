@@ -285,8 +285,7 @@ def _common(one: Floats, other: Floats) -> tuple[Floats, Integers]:
 def _seen_from_j(joints: ClosedJoints, pose: Pose, free: Floats) -> Floats:
     """Orthonormal columns of spaces of twists in the axes of body j, at its mass centre."""
     scaled = Pose(pose.r / joints.rows.length, pose.p)
-    Q: Floats = np.linalg.qr(adjoint(scaled) @ free)[0]
-    return Q
+    return np.linalg.qr(adjoint(scaled) @ free)[0]
 
 
 def _aligned(

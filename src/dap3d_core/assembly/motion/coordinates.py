@@ -103,8 +103,7 @@ def relative_motion(
 
 def _of(values: Floats, bodies: Integers, ground: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Floats:
     """(nt, m, k) of bodies, of which 0 is ground."""
-    taken: Floats = np.where((bodies > 0)[:, None], values[:, bodies - 1], ground)
-    return taken
+    return np.where((bodies > 0)[:, None], values[:, bodies - 1], ground)
 
 
 def coordinates(motion: JointMotions, pose: Pose) -> Floats:
@@ -141,16 +140,14 @@ def _angle_of(p: Floats, axis: Floats) -> Floats:
 
 def _principal(angle: Floats) -> Floats:
     """The same angles in (-pi, pi]."""
-    wrapped: Floats = angle - TURN * np.ceil(angle / TURN - 0.5)
-    return wrapped
+    return angle - TURN * np.ceil(angle / TURN - 0.5)
 
 
 def _angle_about(u: Floats, v: Floats, axis: Floats) -> Floats:
     """Angles in (-pi, pi] from u to v about axes, of vectors (..., m, 3)."""
     along_u, along_v = np.sum(u * axis, axis=-1), np.sum(v * axis, axis=-1)
     sine = np.sum(axis * cross(u, v), axis=-1)
-    angle: Floats = np.arctan2(sine, np.sum(u * v, axis=-1) - along_u * along_v)
-    return angle
+    return np.arctan2(sine, np.sum(u * v, axis=-1) - along_u * along_v)
 
 
 def _two_angles(motion: JointMotions, gone: Pose, one: int, two: int) -> tuple[Floats, Floats]:
@@ -182,8 +179,7 @@ def coordinate_rates(motion: JointMotions, q: Floats, twist: Floats) -> Floats:
     if [part.kind for part in motion.parts] == [BALL]:
         axes = motion.screws[..., 3:]
         vector = np.einsum("mda,...md->...ma", axes, q)
-        rate: Floats = np.einsum("mda,...ma->...md", axes, _vector_rate(vector, twist[..., 3:]))
-        return rate
+        return np.einsum("mda,...ma->...md", axes, _vector_rate(vector, twist[..., 3:]))
     columns: list[Floats] = []
     pose = identity(1)
     for k in reversed(range(len(motion.parts))):  # seen from behind the parts that follow
@@ -201,8 +197,7 @@ def _vector_rate(vector: Floats, w: Floats) -> Floats:
     # (1 - half cot half) / (2 half)^2, which begins with 1/12
     factor = np.where(half > 1e-4, (1.0 - safe / np.tan(safe)) / (4.0 * safe**2), 1.0 / 12.0)
     across = cross(vector, w)
-    rate: Floats = w + 0.5 * across + factor * cross(vector, across)
-    return rate
+    return w + 0.5 * across + factor * cross(vector, across)
 
 
 def count_turns(motion: JointMotions, t: Floats, q: Floats, q_dot: Floats) -> None:

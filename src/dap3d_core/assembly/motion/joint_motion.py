@@ -95,8 +95,7 @@ class JointMotions:
         twist = self.screws[:, self.columns[part]][:, 0]
         if self.parts[part].kind != SCREW:
             return np.zeros(len(twist))
-        pitch: Floats = np.sum(twist[:, :3] * twist[:, 3:], axis=-1)
-        return pitch
+        return np.sum(twist[:, :3] * twist[:, 3:], axis=-1)
 
     def units(self, length: float) -> Floats:
         """(d,) of each coordinate, 1 rad for an angle and a length, m, for a length."""

@@ -172,8 +172,7 @@ def _fixed(group: Group, kind: str) -> Iterator[tuple[str, str, Floats]]:
 
 def _feet(screws: Floats) -> Floats:
     """Points (..., 3) on the axes of unit twists (..., 6), next to the origin."""
-    feet: Floats = cross(screws[..., 3:], screws[..., :3])
-    return feet
+    return cross(screws[..., 3:], screws[..., :3])
 
 
 def _are_small(vectors: Floats, size: float) -> bool:

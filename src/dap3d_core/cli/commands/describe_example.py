@@ -44,8 +44,7 @@ def example_of(type_info: "TypeInfo", registry: "Registry") -> str:
 
 def _arguments(function: "TypeInfo") -> int:
     """How many arguments a function type takes."""
-    count: int = function.type.arguments  # type: ignore[attr-defined]
-    return count
+    return function.type.arguments  # type: ignore[attr-defined]
 
 
 def _has_friction(type_info: "TypeInfo") -> bool:

@@ -245,10 +245,7 @@ def follow(
 
     with (
         PreparationProgress(quiet=quiet or as_json) as progress,
-        options.over_values(over) as (
-            name,
-            values,
-        ),
+        options.over_values(over) as (name, values),
     ):
         path = dap.equilibrium_path(scene, name, values, start=start, allow_code=allow_code,
                                     announce=progress.announce)  # fmt: skip

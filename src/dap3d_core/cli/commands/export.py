@@ -1,15 +1,31 @@
 """``dap3d export``: a result, or a model, as a file for another program."""
 
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
-from dap3d_core.cli.commands import export_native as native
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusing
+
+#: Options of the formats c and fmu alone, by parameter.
+NATIVE_OPTIONS = {
+    "quantities": click.option(
+        "--quantity", "quantities", multiple=True, metavar="NAME",
+        help="c, fmu: an output, such as load.r.z, once for each; those of the MODEL by default."),
+    "parameters": click.option(
+        "--parameter", "parameters", multiple=True, metavar="NAME",
+        help="c, fmu: a number that may be set, such as forces.spring.k, once for each."),
+    "platforms": click.option(
+        "--platform", "platforms", multiple=True, metavar="NAME",
+        help="c, fmu: linux, windows, macos, or linux-arm64 ..., once for each; this one by "
+        "default."),
+    "fmi": click.option("--fmi", type=click.Choice(["3", "2"]), default=None,
+                        help="fmu: version of the standard; 3 by default."),
+}  # fmt: skip
 
 
 @command(
@@ -22,7 +38,7 @@ from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusi
     options.FPS, options.MODEL_OF_RESULT, options.ALLOW_CODE,
     click.option("--strict", is_flag=True,
                  help="Refuse a MODEL if something would be left out."),
-    *native.OPTIONS.values(),
+    *NATIVE_OPTIONS.values(),
     options.FORCE, options.JSON, options.QUIET,
 )  # fmt: skip
 def export(
@@ -59,11 +75,13 @@ def export(
     """
     from dap3d_core.exchange import result_exporters
 
-    if native.is_native(kind, output):
-        return native.export_native(result, kind, output, strict=strict, force=force,
-                                    allow_code=allow_code, as_json=as_json,
-                                    **of_native)  # fmt: skip
-    native.refuse_native(of_native)
+    if kind in ("c", "fmu") or (kind is None and str(output or "").endswith(".fmu")):
+        return _export_native(result, kind, output, strict=strict, force=force,
+                              allow_code=allow_code, as_json=as_json, **of_native)  # fmt: skip
+    words = {"quantities": "--quantity", "parameters": "--parameter", "platforms": "--platform"}
+    for name, value in of_native.items():
+        if value:
+            raise Refused(f"{words.get(name, f'--{name}')} is of formats c and fmu")
     if kind is not None and kind not in result_exporters():
         return _export_model(result, kind, output, strict=strict, force=force, as_json=as_json)
     return _export_result(result, kind, output, fps=fps, model=model, allow_code=allow_code,
@@ -121,8 +139,7 @@ def _export_model(
         hint = f"did you mean {near!r}? " if near else ""
         raise Refused(f"--format {kind}: unknown; {hint}formats: {', '.join(known)}")
     scene = dap.load(model)
-    name = Path(model).stem if Path(model).is_file() else Path(model).name
-    target = Path(output) if output is not None else Path(name + formats.load(kind).suffix)
+    target = Path(output or _name_of(model) + formats.load(kind).suffix)
     writable(target, force=force, sources=(scene.path,))
     try:
         report = dap.export_model(scene, target, format=kind, strict=strict, force=True)
@@ -138,4 +155,61 @@ def _export_model(
     console.say(f"{target} written")
     console.section("said in another way", remarks["translated"])
     console.section("left out", remarks["left_out"])
+    return DONE
+
+
+def _name_of(model: str) -> str:
+    return Path(model).stem if Path(model).is_file() else Path(model).name
+
+
+def _export_native(
+    model: str,
+    kind: str | None,
+    output: str | None,
+    *,
+    quantities: Sequence[str],
+    parameters: Sequence[str],
+    platforms: Sequence[str],
+    fmi: str | None,
+    strict: bool,
+    force: bool,
+    allow_code: bool,
+    as_json: bool,
+) -> int:
+    """Write a model as a C library or an FMU."""
+    import dap3d_core as dap
+    from dap3d_core.cli.console.console import count, print_json, stdout
+    from dap3d_core.cli.framework.paths import writable
+
+    kind = kind or "fmu"
+    target = Path(output or _name_of(model) + (".fmu" if kind == "fmu" else ""))
+    scene = dap.load(model)
+    if kind == "fmu" or not target.exists():
+        writable(target, force=force, sources=(scene.path,))
+    try:
+        made: Any = dap.export_model(
+            scene, target, format=kind, outputs=list(quantities) or None,
+            parameters=list(parameters), platforms=list(platforms), fmi=int(fmi or 3),
+            strict=strict, force=force, allow_code=allow_code,
+        )  # fmt: skip
+    except FileExistsError as error:
+        raise Refused(f"{target} exists; --force overwrites it") from error
+    except OSError as error:
+        raise Refused(f"cannot write {target}: {error.strerror or error}") from error
+    data = {
+        "file": str(target), "format": kind, "platforms": made.platforms, "inputs": made.inputs,
+        "parameters": made.parameters, "outputs": made.outputs, "left_out": made.left_out,
+    }  # fmt: skip
+    if as_json:
+        print_json(data)
+        return DONE
+    console = stdout()
+    contents = ", ".join(
+        count(len(names), noun)
+        for names, noun in ((made.inputs, "input"), (made.parameters, "parameter"),
+                            (made.outputs, "output"))
+        if names
+    )  # fmt: skip
+    console.say(f"{target} written: {contents}; {', '.join(made.platforms)}")
+    console.section("left out", list(made.left_out))
     return DONE

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
                  help="The folder of a package, for files package://NAME/...; may be repeated."),
     click.option("--root", type=click.Path(), metavar="FOLDER",
                  help="Files that the model names must lie in it; by default the file's folder."),
+    click.option("--key", metavar="NAME", help="Start at a keyframe of MJCF, with its controls."),
     click.option("--position", "positions", multiple=True, metavar="JOINT=VALUE",
                  help="Start a joint there, in rad or m, as the file counts them (qpos of MJCF); "
                  "several numbers with commas. Joints that are coupled with it follow. May be "
@@ -59,6 +60,7 @@ def import_model(
     kind: str | None,
     packages: tuple[str, ...],
     root: str | None,
+    key: str | None,
     positions: tuple[str, ...],
     limits: str,
     contacts: bool,
@@ -93,7 +95,7 @@ def import_model(
         file, format=kind, packages=_pairs("--package", packages), root=root, free_base=free_base,
         keep_fixed=keep_fixed, balance_inertia=balance_inertia, limits=limits,
         contacts=contacts, shapes=not no_shapes, strict=strict, allow_code=allow_code,
-        arguments=_pairs("--arg", arguments, ":="), positions=_numbers(positions),
+        arguments=_pairs("--arg", arguments, ":="), key=key, positions=_numbers(positions),
     )  # fmt: skip
     folder = Path(output or Path(file).resolve().stem)
     if folder.is_file():

@@ -94,13 +94,6 @@ def _split_notes(data: dict[str, Any]) -> tuple[str, list[str]]:
     return reasons[0] if reasons else "", [n for n in data["notes"] if not n.startswith(choice)]
 
 
-def _warnings(data: dict[str, Any]) -> list[str]:
-    """The notes that report a change of the request; others are information."""
-    from dap3d_core.result.note import warnings_of
-
-    return list(warnings_of(_split_notes(data)[1]))
-
-
 def _violations(data: dict[str, Any]) -> list[str]:
     """The entries of the ledger that are beyond their limits."""
     return [
@@ -177,11 +170,14 @@ def report_run(
     outcome: RunOutcome, model: str, target: Path, *, strict: bool, as_json: bool, quiet: bool
 ) -> int:
     """Report a run that was saved; returns the exit code."""
+    from dap3d_core.result.note import warnings_of
+
     data = run_data(outcome.result)
     initial = _correction(outcome)
     violations = _violations(data)
     code = outcome.code
-    if strict and code == exit_codes.DONE and (violations or _warnings(data)):
+    warnings = list(warnings_of(_split_notes(data)[1]))
+    if strict and code == exit_codes.DONE and (violations or warnings):
         code = exit_codes.FAILED
     if as_json:
         about = {"model": model, "file": str(target), **data, "initial": initial}

@@ -49,8 +49,7 @@ def command(
 
 def signals_of(ctx: click.Context) -> SignalHandler:
     """The signal handler of a running command."""
-    handler: SignalHandler = ctx.meta["dap3d.signals"]
-    return handler
+    return ctx.meta["dap3d.signals"]
 
 
 class Command(click.Command):

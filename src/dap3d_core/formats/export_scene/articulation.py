@@ -5,11 +5,16 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.formats.export_scene.elements import ALIGNED, SceneElements, SceneJoint, leave_out
-from dap3d_core.formats.export_scene.model_builder import ModelBuilder
+from dap3d_core.formats.export_scene.actuators import add_actuators
+from dap3d_core.formats.export_scene.elements import (
+    ALIGNED,
+    ModelBuilder,
+    SceneElements,
+    SceneJoint,
+    leave_out,
+)
 from dap3d_core.interface.formats.articulation import (
     WORLD,
-    Actuator,
     Articulation,
     Coupling,
     Geometry,
@@ -22,7 +27,7 @@ from dap3d_core.interface.formats.frames import Frame, axis_angle, from_quaterni
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.scene.scene import Scene
-from dap3d_core.scene.tables import BREAKS_AT, GROUND, LIMITS, Element
+from dap3d_core.scene.tables import GROUND, RELEASES, Element
 
 #: Kinds of joints whose points may be apart along the axis.
 SLIDERS = ("prismatic", "cylindrical")
@@ -34,9 +39,12 @@ SAME = 1e-12
 FRICTION = {
     "rot_friction": ("revolute", "axis", "n_c"), "tran_friction": ("prismatic", "a_j", "f_c"),
 }  # fmt: skip
+#: Kind of a shape -> the fields of its size, and a factor: a model has semi-axes of an ellipsoid.
+SIZES = {
+    "box": (("size",), 1.0), "sphere": (("radius",), 1.0),
+    "cylinder": (("radius", "length"), 1.0), "ellipsoid": (("size",), 0.5),
+}  # fmt: skip
 NO_JOINT = "no force on the coordinate of a joint"
-#: Kind of a joint -> the type of force, in axes of its body, that acts on its coordinate.
-TYPES = {"revolute": "np", "prismatic": "fp"}
 
 
 def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
@@ -63,14 +71,10 @@ def articulation_of(scene: Scene, remarks: Remarks) -> Articulation:
     add_gravity(builder, scene)
     add_forces(builder, scene)
     for limited in scene.joints.values():
-        if not limited.fields.keys().isdisjoint(LIMITS):
-            leave_out(
-                remarks,
-                limited,
-                "lower and upper of a joint, where a rot_stop or plane_stop is written",
-            )
-        if BREAKS_AT in limited.fields:
-            leave_out(remarks, limited, "breaks_at of a joint, which holds here")
+        if limited.fields.get("e"):
+            leave_out(remarks, limited, "e of the limits of a joint")
+        for key in limited.fields.keys() & set(RELEASES):
+            leave_out(remarks, limited, f"{key} of a joint, which holds here throughout")
     for contact in scene.contacts.values():
         leave_out(remarks, contact, "contacts of other programs yield")
     for body in elements.bodies:
@@ -131,6 +135,8 @@ def _add_joint(builder: ModelBuilder, joint: SceneJoint, *, closes: bool) -> Non
         builder.in_link(joint.body_j, there), builder.in_link(joint.body_i, here),
         axes=tuple(tuple(axis.tolist()) for axis in joint.axes), closes=closes,
     )  # fmt: skip
+    fields = builder.elements.scene.joints[joint.name].fields
+    made.limits = (Limits(fields.get("lower", -inf), fields.get("upper", inf)),)
     d, slides = (j @ there).r - (i @ here).r, joint.kind in SLIDERS
     if slides:  # along the axis it is free
         axis = i.A @ joint.axes[0]
@@ -158,20 +164,14 @@ def geometries_of(builder: ModelBuilder, scene: Scene, body: str) -> list[Geomet
         if "axis" in fields:
             A = turned_to(np.asarray(fields["axis"], dtype=float))
         pose = builder.in_link(body, Frame(fields.get("at", (0.0, 0.0, 0.0)), A))
-        if element.type == "box":
-            size = tuple(map(float, fields["size"]))
-            geometries.append(Geometry("box", size, pose, color=color))
-        elif element.type == "sphere":
-            geometries.append(Geometry("sphere", (float(fields["radius"]),), pose, color=color))
-        elif element.type == "cylinder":
-            size = (float(fields["radius"]), float(fields["length"]))
-            geometries.append(Geometry("cylinder", size, pose, color=color))
-        elif element.type == "ellipsoid":
-            size = tuple(0.5 * float(edge) for edge in fields["size"])
-            geometries.append(Geometry("ellipsoid", size, pose, color=color))
-        elif element.type == "mesh":
+        kind = str(element.type)
+        if kind == "mesh":
             scale = (float(fields.get("scale", 1.0)),) * 3
-            geometries.append(Geometry("mesh", (), pose, fields["file"], scale, color))
+            geometries.append(Geometry(kind, (), pose, fields["file"], scale, color))
+        elif kind in SIZES:
+            names, factor = SIZES[kind]
+            size = factor * np.ravel([fields[name] for name in names])
+            geometries.append(Geometry(kind, tuple(size.tolist()), pose, color=color))
         else:
             leave_out(builder.remarks, element, "no shape of a model", motion=False)
     return geometries
@@ -397,18 +397,14 @@ def _add_rotors(builder: ModelBuilder) -> None:
                 builder.remarks.leave_out(NOWHERE, text, motion=True)
                 continue
             pairs.append((joint.name, float(fields.get("ratio", 1.0))))
-        leader = next((one for one, ratio in pairs if ratio == 1.0), None)
-        if leader is None:
+        place = next((k for k, (_, ratio) in enumerate(pairs) if ratio == 1.0), None)
+        if place is None:
             text = f"wheel {name}: no joint turns as it does"
             builder.remarks.leave_out(NOWHERE, text, motion=True)
             continue
+        leader, _ = pairs.pop(place)
         builder.placed[leader].armature = (rotor.inertia,)
-        first = True
-        for one, ratio in pairs:
-            if one == leader and first:
-                first = False
-                continue
-            builder.model.couplings.append(Coupling("", one, leader, ratio))
+        builder.model.couplings += [Coupling("", one, leader, ratio) for one, ratio in pairs]
 
 
 def _followed(builder: ModelBuilder, fields: dict[str, Any]) -> SceneJoint | None:
@@ -423,57 +419,3 @@ def _followed(builder: ModelBuilder, fields: dict[str, Any]) -> SceneJoint | Non
             if abs(along - 1.0) <= ALIGNED:
                 return joint
     return None
-
-
-def add_actuators(builder: ModelBuilder, scene: Scene) -> set[str]:
-    """Add inputs that are factors of forces on the coordinate of one joint.
-
-    Returns:
-        the names of these forces.
-    """
-    taken: set[str] = set()
-    for name, given in scene.inputs.items():
-        users = [e for e in (*scene.forces.values(), *scene.joints.values())
-                 if e.fields.get("input") == name]  # fmt: skip
-        for joint in builder.elements.joints:
-            gear = _gear(builder, joint, users)
-            if gear:
-                builder.model.actuators.append(Actuator(name, joint.name, gear))
-                taken |= {element.name for element in users}
-                if given.value:
-                    text = f"the value of input {name} at the start"
-                    builder.remarks.leave_out(NOWHERE, text, motion=True)
-                break
-    return taken
-
-
-def _gear(builder: ModelBuilder, joint: SceneJoint, users: list[Element]) -> float:
-    """Force on the coordinate of a joint for an input of 1; 0.0 if that is not what acts."""
-    if joint.kind not in TYPES or builder.placed[joint.name].closes:
-        return 0.0
-    type_ = TYPES[joint.kind]
-    acting = {_body_of(builder, e): e for e in users if e.type == type_}
-    moving = [one for one in (joint, joint.reversed()) if one.body_i != GROUND]
-    if len(acting) != len(users) or acting.keys() != {one.body_i for one in moving}:
-        return 0.0
-    forces = [np.asarray(acting[one.body_i].fields[type_], dtype=float) for one in moving]
-    gear = float(forces[0] @ moving[0].axes[0])
-    apart = max(np.abs(f - gear * one.axes[0]).max() for f, one in zip(forces, moving, strict=True))
-    if apart > ALIGNED * abs(gear):
-        return 0.0
-    if type_ == "fp":  # on one line
-        places = [builder.elements.at(_point_of(acting[one.body_i])) for one in moving]
-        axis = builder.elements.bodies[moving[0].body_i].pose.A @ moving[0].axes[0]
-        if np.abs(np.cross(places[-1] - places[0], axis)).max() > ALIGNED:
-            return 0.0
-    return gear
-
-
-def _body_of(builder: ModelBuilder, element: Element) -> str:
-    """The body on which a force acts."""
-    return builder.elements.point(_point_of(element))[0]
-
-
-def _point_of(element: Element) -> str:
-    """The point at which a force acts."""
-    return str(element.fields.get("P_i") or f"{element.fields['body_i']}.O")

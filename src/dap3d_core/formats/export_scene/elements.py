@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
+from dap3d_core.interface.formats.articulation import WORLD, Articulation, Joint
 from dap3d_core.interface.formats.frames import Frame, from_quaternion
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Remarks
 from dap3d_core.kernels.array_types import Floats
@@ -178,3 +179,30 @@ def leave_out(remarks: Remarks, element: Element, why: str, *, motion: bool = Tr
     """Remark that an element of a scene is left out."""
     text = f"{element.name} of type {element.type}: {why}"
     remarks.leave_out(NOWHERE, text, motion=motion)
+
+
+@attrs.define(eq=False)
+class ModelBuilder:
+    """A model that is made of a scene.
+
+    Attributes:
+        elements: the elements of the scene, with their frames.
+        remarks: of the export.
+        model: the model so far.
+        origin: body -> the origin of its link in its axes at its mass centre.
+        placed: joint of the scene -> that of the model.
+    """
+
+    elements: SceneElements
+    remarks: Remarks
+    model: Articulation
+    origin: dict[str, np.ndarray] = attrs.Factory(dict)
+    placed: dict[str, Joint] = attrs.Factory(dict)
+
+    def link(self, body: str) -> str:
+        """The link of a body."""
+        return WORLD if body == GROUND else body
+
+    def in_link(self, body: str, frame: Frame) -> Frame:
+        """A frame of a body at its mass centre, in its link."""
+        return Frame(frame.r - self.origin.get(body, np.zeros(3)), frame.A)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dap3d_core.formats.import_scene.joints import NamedEnds, from_ground
+from dap3d_core.formats.import_scene.joints import from_ground, named_ends
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
 from dap3d_core.formats.import_scene.start import couples
 from dap3d_core.interface.formats.articulation import Articulation, Joint
@@ -41,7 +41,7 @@ def wheel_of(builder: SceneBuilder, joint: Joint, mass: float, inertia: float) -
 
 def follow(builder: SceneBuilder, joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
     """Couple the coordinate of a joint with a wheel."""
-    ends = NamedEnds(builder, from_ground(builder, joint))
+    ends = named_ends(builder, from_ground(builder, joint))
     name = builder.names.free("joints", f"{ends.name}_{suffix}")
     builder.scene.add_joint(
         "follow", name, body_i=ends.child, a_j=ends.vector("j", ends.joint.axes[0], "_axis"),

@@ -1,5 +1,6 @@
 """Joints of a model as joints of a scene: body i is the child, body j the parent."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -18,14 +19,9 @@ def add_joint(builder: SceneBuilder, joint: Joint) -> None:
     Raises:
         FormatError: no type of the scene is this joint.
     """
-    adders = {
-        "revolute": _revolute, "prismatic": _prismatic, "fixed": _fixed, "ball": _ball,
-        "universal": _universal, "cylindrical": _cylindrical, "screw": _screw,
-    }  # fmt: skip
-    if joint.kind not in adders:
+    if joint.kind not in _ADDERS:
         raise FormatError(f"joint {joint.name}: no type of the scene is {joint.kind}", joint.place)
-    ends = JointEnds(builder, from_ground(builder, joint))
-    adders[joint.kind](ends)
+    _ADDERS[joint.kind](JointEnds(builder, from_ground(builder, joint)))
 
 
 def from_ground(builder: SceneBuilder, joint: Joint) -> Joint:
@@ -38,11 +34,13 @@ def from_ground(builder: SceneBuilder, joint: Joint) -> Joint:
 class JointEnds:
     """The two ends of a joint in a scene, with points and vectors made as they are needed."""
 
-    def __init__(self, builder: SceneBuilder, joint: Joint) -> None:
+    def __init__(self, builder: SceneBuilder, joint: Joint, name: str = "") -> None:
+        """Args: the scene; a joint of the model; its name in the scene, where it has one."""
         self.builder, self.joint, self.scene = builder, joint, builder.scene
         self.child, self.on_child = builder.attached(joint.child, joint.in_child)
         self.parent, self.on_parent = builder.attached(joint.parent, joint.in_parent)
-        self.name = builder.names.of("joints", joint.name, joint.place, builder.remarks)
+        names = builder.names
+        self.name = name or names.of("joints", joint.name, joint.place, builder.remarks)
 
     def point(self, end: str, offset: Any = (0.0, 0.0, 0.0), suffix: str = "") -> str:
         """The name of a point at the joint's origin on the child ("i") or the parent ("j").
@@ -81,14 +79,9 @@ class JointEnds:
         return (self.child, self.on_child) if end == "i" else (self.parent, self.on_parent)
 
 
-class NamedEnds(JointEnds):
+def named_ends(builder: SceneBuilder, joint: Joint) -> JointEnds:
     """The ends of a joint that has its name in the scene already."""
-
-    def __init__(self, builder: SceneBuilder, joint: Joint) -> None:
-        self.builder, self.joint, self.scene = builder, joint, builder.scene
-        self.child, self.on_child = builder.attached(joint.child, joint.in_child)
-        self.parent, self.on_parent = builder.attached(joint.parent, joint.in_parent)
-        self.name = builder.names.scene_names["joints", joint.name]
+    return JointEnds(builder, joint, builder.names.scene_names["joints", joint.name])
 
 
 def _add(ends: JointEnds, keyword: str, **fields: Any) -> None:
@@ -99,10 +92,6 @@ def _add_about_axis(ends: JointEnds, keyword: str, **more: float) -> None:
     axis = ends.joint.axes[0]
     _add(ends, keyword, P_i=ends.point("i"), P_j=ends.point("j"), a_i=ends.vector("i", axis),
          a_j=ends.vector("j", axis), **more)  # fmt: skip
-
-
-def _revolute(ends: JointEnds) -> None:
-    _add_about_axis(ends, "rev")
 
 
 def _prismatic(ends: JointEnds) -> None:
@@ -141,9 +130,10 @@ def _universal(ends: JointEnds) -> None:
          n_j=ends.vector("j", first))  # fmt: skip
 
 
-def _cylindrical(ends: JointEnds) -> None:
-    _add_about_axis(ends, "cyl")
-
-
-def _screw(ends: JointEnds) -> None:
-    _add_about_axis(ends, "screw", pitch=ends.joint.pitch)
+#: Kind of a joint of a model -> what adds it.
+_ADDERS: dict[str, Callable[[JointEnds], None]] = {
+    "revolute": lambda ends: _add_about_axis(ends, "rev"),
+    "cylindrical": lambda ends: _add_about_axis(ends, "cyl"),
+    "screw": lambda ends: _add_about_axis(ends, "screw", pitch=ends.joint.pitch),
+    "prismatic": _prismatic, "fixed": _fixed, "ball": _ball, "universal": _universal,
+}  # fmt: skip

@@ -6,7 +6,7 @@ import attrs
 
 from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.rigid_groups import RigidGroup
-from dap3d_core.interface.formats.articulation import WORLD, Joint
+from dap3d_core.interface.formats.articulation import WORLD, Contact, Joint
 from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.interface.formats.joint_inertia import JointInertia
 from dap3d_core.interface.formats.remarks import Remarks
@@ -23,10 +23,11 @@ class SceneBuilder:
         member: link -> its group, and its frame in it.
         groups: by name.
         bodies: group -> name of its body.
-        surfaces: coefficient of friction, and whether a shape is smooth -> name of a material.
+        surfaces: how shapes meet others, but for their bits -> name of a material.
         names: names in the scene.
         inertia: the inertias that joints see.
         limits: what becomes of limits of joints: "off", "soft" or "hard".
+        stepped: shapes meet each other, by time stepping.
     """
 
     scene: Scene
@@ -35,9 +36,15 @@ class SceneBuilder:
     member: dict[str, tuple[str, Frame]]
     inertia: JointInertia
     limits: str
+    stepped: bool = False
     names: Names = attrs.Factory(Names)
     bodies: dict[str, str] = attrs.Factory(dict)
-    surfaces: dict[tuple[float, bool], str] = attrs.Factory(dict)
+    surfaces: dict[Contact, str] = attrs.Factory(dict)
+
+    @property
+    def takes_contacts(self) -> bool:
+        """True where the method takes contacts, among them rigid limits and sticking friction."""
+        return bool(self.scene.simulation.method != "joint")
 
     def attached(self, link: str, frame: Frame) -> tuple[str, Frame]:
         """A frame of a link as body and frame in its axes at its mass centre."""

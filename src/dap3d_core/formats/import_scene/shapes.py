@@ -17,9 +17,10 @@ from dap3d_core.interface.formats.articulation import (
     Link,
 )
 from dap3d_core.interface.formats.frames import Frame, quaternion
-from dap3d_core.scene.tables import GROUND
 from dap3d_core.scene.validate.shapes import MESHES
 
+#: (link, group, meets) in the file -> (group, meets) in the scene.
+Bits = Mapping[tuple[str, int, int], tuple[int, int]]
 #: Folder of the meshes next to a scene.
 FOLDER = "meshes"
 
@@ -51,12 +52,10 @@ def _plain(stem: str) -> str:
     return "".join(c if c.isalnum() or c in "-_" else "_" for c in stem)
 
 
-def add_shapes(
-    builder: SceneBuilder, link: Link, meshes: MeshFiles, bits: Mapping[str, tuple[int, int]]
-) -> None:
+def add_shapes(builder: SceneBuilder, link: Link, meshes: MeshFiles, bits: Bits) -> None:
     """Add the shapes of a link: those that are seen, or of contacts where it has no others.
 
-    And those that meet others; bits: ``bits_beside_ground``.
+    And those that meet others; bits: of ``bits_of_shapes``.
     """
     seen = [shape for shape in link.geometries if not shape.collision] or link.geometries
     for shape in link.geometries:
@@ -65,45 +64,87 @@ def add_shapes(
         body, at = builder.attached(link.name, shape.pose)
         for keyword, fields in _shapes(builder, shape, at, meshes):
             name = builder.names.free("shapes", f"{usable(link.name)}_{keyword}")
-            given = fields | _meeting(builder, shape.contact, bits.get(link.name))
+            given = fields | _meeting(builder, link.name, shape.contact, bits)
             builder.scene.add_shape(keyword, name, body=body, color=shape.color or None, **given)
 
 
 def _meeting(
-    builder: SceneBuilder, contact: Contact | None, bits: tuple[int, int] | None
+    builder: SceneBuilder, link: str, contact: Contact | None, bits: Bits
 ) -> dict[str, Any]:
-    """Fields of a shape that meets others; bits: in place of its own."""
+    """Fields of a shape that meets others."""
     if contact is None:
         return {}
-    key = (contact.mu, contact.smooth)
+    key = attrs.evolve(contact, group=1, meets=1)
     name = builder.surfaces.setdefault(key, f"surface{len(builder.surfaces) + 1}")
-    group, meets = bits or (contact.group, contact.meets)
+    group, meets = bits[link, contact.group, contact.meets]
     given = {"group": group, "meets": meets}
     return {"collides": True, "material": name} | {n: x for n, x in given.items() if x != 1}
 
 
-def bits_beside_ground(builder: SceneBuilder, model: Articulation) -> dict[str, tuple[int, int]]:
-    """(group, meets) of links that do not move and of those that stay apart from them.
+def bits_of_shapes(builder: SceneBuilder, model: Articulation) -> Bits:
+    """(group, meets) of shapes, by link and by those in the file: pairs of links may stay apart.
 
-    ``exclude`` of bodies would keep the latter from all of ground, a floor too. Each set of links
-    that do not move has a bit of its own, 4 and on, and those that move and do not meet all of
-    them have 2; so both meet what has the usual bits, 1 and 1.
+    ``exclude`` of bodies would keep all that is fixed to one from all that is fixed to the other,
+    as a floor of ground. A link that stays apart from a part of a body, or of ground, has bits of
+    its own, and what it meets has them, too.
     """
-    if model.base_meets:
-        return {}
+    shapes = dict.fromkeys(
+        (name, shape.contact.group, shape.contact.meets)
+        for name, link in model.links.items()
+        for shape in link.geometries
+        if shape.contact is not None
+    )
+    apart, special = _apart(builder, model)
+    free = iter(k for k in range(32) if not any((g | m) >> k & 1 for _, g, m in shapes))
+    own: dict[Any, int] = {}
+    for link, *bits in shapes:
+        kind = (frozenset(apart.get(link, ())), *bits)
+        if link not in special or kind in own:
+            continue
+        if (bit := next(free, None)) is not None:
+            own[kind] = 1 << bit
+        else:
+            text = "that a link stays apart from a part of a body: bits for 32 groups are taken"
+            builder.remarks.leave_out(model.links[link].place, text, motion=True)
+    found = {}
+    for link, group, meets in shapes:
+        more = sum(bit for (others, g, m), bit in own.items()
+                   if link not in others and g & meets | group & m)  # fmt: skip
+        bit = own.get((frozenset(apart.get(link, ())), group, meets)) if link in special else None
+        found[link, group, meets] = (bit, more) if bit else (group, meets | more)
+    return found
+
+
+def _apart(builder: SceneBuilder, model: Articulation) -> tuple[dict[str, set[str]], set[str]]:
+    """Links that stay apart from others, and those of them that ``exclude`` does not keep so."""
     apart: dict[str, set[str]] = {}
-    for pair in (*model.excluded, *_joined(model)):
-        groups = [builder.member[link][0] for link in pair]
-        for link, (own, other) in zip(pair, (groups, groups[::-1]), strict=True):
-            if own == WORLD != other and link != WORLD:
-                apart.setdefault(link, set()).add(other)
-    kinds = list(dict.fromkeys(frozenset(others) for others in apart.values()))
-    bits = {link: (4 << kinds.index(frozenset(others)), 1) for link, others in apart.items()}
-    for link, (group, _) in builder.member.items():
-        met = [k for k, others in enumerate(kinds) if group not in others]
-        if group != WORLD and len(met) < len(kinds):
-            bits[link] = (2, 3 + sum(4 << k for k in met))
-    return bits
+    special, whole = set(), bodies_apart(builder, model)
+    joined = () if model.base_meets else _joined(model)
+    for pair in (*model.excluded, *joined):
+        groups = tuple(builder.member[link][0] for link in pair)
+        if groups[0] == groups[1] or (WORLD not in groups and pair not in model.excluded):
+            continue
+        for link, other in (pair, pair[::-1]):
+            apart.setdefault(link, set()).add(other)
+        if tuple(sorted(groups)) not in whole:
+            special.add(pair[groups[0] != WORLD])
+    return apart, special
+
+
+def bodies_apart(builder: SceneBuilder, model: Articulation) -> dict[tuple[str, ...], None]:
+    """Pairs of groups that move, of which all links that have shapes stay apart."""
+    pairs = {frozenset(pair) for pair in (*model.excluded, *_beyond_rows(model))}
+    meeting: dict[str, list[str]] = {}
+    for name, link in model.links.items():
+        if any(shape.contact for shape in link.geometries):
+            meeting.setdefault(builder.member[name][0], []).append(name)
+    groups = (sorted(builder.member[link][0] for link in pair) for pair in pairs)
+    return {
+        (one, other): None
+        for one, other in sorted(groups)
+        if one != other and WORLD not in (one, other)
+        and all({a, b} in pairs for a, b in product(meeting.get(one, ()), meeting.get(other, ())))
+    }  # fmt: skip
 
 
 def _joined(model: Articulation) -> Iterator[tuple[str, str]]:
@@ -122,19 +163,23 @@ def _joined(model: Articulation) -> Iterator[tuple[str, str]]:
 def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
     """Add the materials of the shapes that meet, and pairs of bodies that do not."""
     surfaces = list(builder.surfaces.items())
-    for k, ((mu, smooth), name) in enumerate(surfaces):
-        pairs = {
-            other: {"mu": 0.0 if smooth and and_smooth else model.friction_of_pair(mu, mu_other)}
-            for (mu_other, and_smooth), other in surfaces[k + 1 :]
-        }
+    for k, (one, name) in enumerate(surfaces):
+        pairs = {other: _coefficients(model, one, two) for two, other in surfaces[k + 1 :]}
         given: dict[str, Any] = {"with_": pairs} if pairs else {}
-        builder.scene.add_material(name, mu=0.0 if smooth else mu, **given)
-    bodies = [tuple(builder.bodies[builder.member[link][0]] for link in pair)
-              for pair in (*model.excluded, *_beyond_rows(model))]  # fmt: skip
-    if not model.base_meets:  # of those that do not move by bits
-        bodies = [pair for pair in bodies if GROUND not in pair]
-    apart = dict.fromkeys(tuple(sorted(pair)) for pair in bodies if pair[0] != pair[1])
-    builder.scene.add_collisions(exclude=tuple(apart))
+        builder.scene.add_material(name, **_coefficients(model, one, one), **given)
+    pairs_apart = bodies_apart(builder, model)
+    builder.scene.add_collisions(
+        exclude=tuple(tuple(sorted(builder.bodies[one] for one in pair)) for pair in pairs_apart)
+    )
+
+
+def _coefficients(model: Articulation, one: Contact, other: Contact) -> dict[str, float]:
+    """Friction and restitution of a pair: of the one that has priority, if one has."""
+    if one.priority != other.priority:
+        one = other = max(one, other, key=lambda contact: contact.priority)
+    mu = 0.0 if one.smooth and other.smooth else model.coefficient_of_pair(one.mu, other.mu)
+    e = model.coefficient_of_pair(one.e, other.e)
+    return {"mu": mu} | ({"e": e} if e else {})
 
 
 def _beyond_rows(model: Articulation) -> Iterator[tuple[str, str]]:

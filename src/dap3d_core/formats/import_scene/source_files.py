@@ -34,6 +34,7 @@ class SourceFiles:
         contacts: whether shapes are to meet each other.
         arguments: of macros, by name.
         unused: names of arguments that the file has not asked for.
+        key: the keyframe that the model starts at, until an importer takes it.
         remarks: of the import.
         text: replaces the contents of the file, as the output of a macro processor.
     """
@@ -46,6 +47,7 @@ class SourceFiles:
     contacts: bool = False
     arguments: Mapping[str, str] = attrs.Factory(dict)
     unused: set[str] = attrs.Factory(lambda self: set(self.arguments), takes_self=True)
+    key: str | None = None
     remarks: Remarks = attrs.Factory(Remarks)
     text: bytes | str | None = None
     _open: list[Path] = attrs.Factory(list)
@@ -115,7 +117,9 @@ class SourceFiles:
         if not os.path.isfile(path) and required:
             raise FormatError(f"there is no file {uri}, whose mass properties count", place)
         if not os.path.isfile(path):
-            self.remarks.leave_out(place, f"there is no file {uri}: its shape is not drawn")
+            text = f"there is no file {uri}: its shape is not drawn"
+            text += ", and meets no others" if self.contacts else ""
+            self.remarks.leave_out(place, text, motion=self.contacts)
             return None
         return path
 
@@ -143,12 +147,8 @@ class SourceFiles:
         root, name = self.folder, uri.strip()
         scheme, separator, rest = name.partition("://")
         if separator and scheme in ("package", "model"):
-            package, _, name = rest.partition("/")
-            if package not in self.packages:
-                remedy = f"name its folder with --package {package}=FOLDER, or leave shapes out "
-                remedy += "with --no-shapes"
-                raise FormatError(f"{uri}: the package {package} is not known", place, remedy)
-            root = base = self.packages[package]
+            package, _, name = rest.lstrip("/").partition("/")
+            root = base = self._package(package, uri, place)
         elif separator and scheme == "file":
             name = rest
         elif separator:
@@ -164,6 +164,25 @@ class SourceFiles:
             raise FormatError(f"{uri!r} is no path: {error}", place) from None
         remedy = "copy it there, or import with --root FOLDER, a folder that holds both"
         raise FormatError(f"{uri!r} lies outside of the folder of the model", place, remedy)
+
+    def _package(self, package: str, uri: str, place: Place) -> Path:
+        """The folder of a package: given, or of its name above the file or next to such a folder.
+
+        Raises:
+            FormatError: it is not known.
+        """
+        if package in self.packages:
+            return self.packages[package]
+        root = self.folder.resolve()
+        for folder in self.path.resolve().parents:
+            if package and folder.is_relative_to(root):
+                if folder.name == package:
+                    return folder
+                if os.path.isdir(folder / package):
+                    return folder / package
+        remedy = f"name its folder with --package {package}=FOLDER, or that which holds it with "
+        remedy += "--root, or leave shapes out with --no-shapes"
+        raise FormatError(f"{uri}: the package {package} is not known", place, remedy)
 
     def _read(self, path: Path, place: Place) -> bytes:
         try:

@@ -5,9 +5,6 @@ Each formulation compiles what it uses of them. ``part`` says which matrix is fa
 As None it is known when the code is compiled, so that ``standard`` has no line of the other.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from collections.abc import Callable
 from typing import Any
 

@@ -7,9 +7,6 @@ those of more passes (Anderson, J. ACM 12 (1965) 547): brakes that load themselv
 of its own, settle in as many passes as there are. Spec 6.1.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from collections.abc import Callable
 from typing import Any
 

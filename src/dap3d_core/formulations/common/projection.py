@@ -15,9 +15,6 @@ joint_loops/kept_rows.py):
     is_poor                 whether the pose is close to a singular one, and lengths that say so
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import TOLERANCE_C, TOLERANCE_V, Floats, System

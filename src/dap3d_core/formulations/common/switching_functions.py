@@ -1,8 +1,5 @@
 """Evaluated at accepted states: revolution counters and switching functions."""
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import ANGLE, DOUBTFUL, KNOT, SCRATCH, SWITCH, Floats, System

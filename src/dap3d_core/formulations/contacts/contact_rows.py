@@ -1,7 +1,7 @@
 """The contacts of a model at one state: gaps, rows, forces, as arrays of Python."""
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -20,6 +20,13 @@ FRICTION, SLIP, PLACE = slice(2, 5), slice(5, 8), slice(8, 11)
 REACH, FORCE, WIDTH = 11, slice(12, 15), 15
 #: Those of a law of friction of its own, behind them: coefficients that slide, and that stick.
 SLIDING, STICKING, LAW_WIDTH = slice(0, 2), slice(2, 4), 4
+#: Velocities that are set are met to this part of their size.
+HELD = 1e-9
+
+
+def length_of(vector: Floats) -> float:
+    """The length of a vector of one component or more."""
+    return float(reduce(np.hypot, vector))
 
 
 class ContactTable:
@@ -32,7 +39,10 @@ class ContactTable:
         newton: (m,) True where the law of impact is Newton's.
         turns: (m,) 1 of those whose gap or slip is an angle, 0 of others.
         movable: (m,) True of those that a scene may have moved until they touch.
-        load: (m,) 1 of friction that is the same under any load, of which mu is the size; else 0.
+        alone: (m,) True of friction without a gap: of joints.
+        holds: (m, 3) True of the rows that act where it sticks.
+        gapless: (m,) 1 where the first row is one of slip, and not along a normal; else 0.
+        loads: contact -> rows of the joint whose load its friction has, and whether they push.
         mode, way, near: (m,), (m, 3), (m, 3) where each has them among the states of elements.
     """
 
@@ -42,7 +52,10 @@ class ContactTable:
         self.evaluator, self.count = evaluator, model.contact_count
         first = len(model.joint_names) - self.count
         self.names = model.contact_names
-        self.turns, self.load = np.zeros((2, self.count))
+        self.turns = np.zeros(self.count)
+        self.alone = np.zeros(self.count, dtype=bool)
+        self.holds = np.ones((self.count, 3), dtype=bool)
+        self.loads: dict[int, tuple[Integers, bool]] = {}
         self.newton = np.array([law == "newton" for law in model.contact_laws], dtype=bool)
         self.numbers = {name: np.zeros(self.count) for name in ("mu", "mu_s", "e")}
         self.movable = np.array(["#" not in name for name in self.names], dtype=bool)
@@ -54,7 +67,12 @@ class ContactTable:
         for group in model.contacts:
             which, layout = group.members - first, group.type_info.layout
             type_: Any = group.type_info.type
-            self.turns[which], self.load[which] = type_.at is None, type_.along is not None
+            self.turns[which], self.alone[which] = type_.at is None, type_.is_friction_alone()
+            self.holds[which] = type_.holds
+            if group.loaded is not None:
+                starts = model.joint_start[group.loaded][:, None] + type_.load
+                self.loads |= {int(c): (rows, type_.pushes)
+                               for c, rows in zip(which, starts, strict=True)}  # fmt: skip
             self.movable[which] &= not type_.is_smooth
             for name, values in self.numbers.items():
                 values[which] = group.numbers[:, layout.numbers[name][0]]
@@ -64,6 +82,7 @@ class ContactTable:
             loop = loop_list([compiled_loop(group.type_info, "tension")])
             width = WIDTH + LAW_WIDTH * (type_.grip is not None)
             self._loops.append((loop, evaluator.system.groups[q], which, width))
+        self.gapless = (self.alone & self.holds[:, 0]).astype(float)
         self.way: Integers = self.mode[:, None] + np.arange(1, 4)
         self.near: Integers = self.mode[:, None] + np.arange(4, 7)
         self.mu, self.mu_s, self.e = (self.numbers[n] for n in ("mu", "mu_s", "e"))
@@ -71,6 +90,10 @@ class ContactTable:
             if switch.is_contact:
                 place = int(switch.group.members[switch.place]) - first
                 self.switches[place, switch.part] = k
+
+    def across(self, c: int) -> slice:
+        """The rows of slip of a contact."""
+        return slice(0 if self.gapless[c] else 1, 3)
 
     @IGNORE_FLOAT_ERRORS
     def outputs(self, t: float, u: Floats, Lam: Floats | None = None) -> Floats:
@@ -129,7 +152,7 @@ class ContactTable:
     def slip_against(self, c: int, force: Floats) -> Floats:
         """(2,) the direction in which a contact begins to slip against friction at its limit."""
         along = -force if self.ratio_s[c] == 1.0 else -force / [1.0, self.ratio_s[c] ** 2]
-        found: Floats = along / np.hypot(*along)
+        found: Floats = along / length_of(along)
         return found
 
 
@@ -141,6 +164,8 @@ class ContactRows:
         G: (3 m, 6 n) rows, normal first.
         frames: (m, 3, 3) normal and tangents.
         P: (6 n, 6 n) changes of velocity by impulses, with the joints held.
+        load: (m,) of friction alone, by which mu is multiplied: of friction of a constant size 1,
+            of that of a joint what was put there last (modes.py); else 0.
     """
 
     @IGNORE_FLOAT_ERRORS
@@ -151,9 +176,10 @@ class ContactRows:
         self.states = evaluator.states
         rows = self._stuck(u)
         D, own = rows.dense(), model.joint_row_count
-        self.D, self.G = D[:own], D[own:]
+        self.D, self.G, self._nu = D[:own], D[own:], rows.nu[:own]
         self.C = rows.C[own:].reshape(-1, 3)[:, 0]
         self._free: Floats | None = None
+        self._free_multipliers: Any = None
         _, p, v, w = split(u)
         self.v = np.hstack([v, w]).ravel()
         n = model.body_count
@@ -165,9 +191,16 @@ class ContactRows:
             self.M[k, k] = A[b] @ model.Jp[b] @ A[b].T
             self.inverse[k, k] = A[b] @ np.linalg.inv(model.Jp[b]) @ A[b].T
         self.P = self.inverse
+        self.load = table.alone.astype(float)
+        self._reaction = np.zeros((own, 3 * table.count))
         if own:
             held = self.inverse @ self.D.T
-            self.P = self.inverse - held @ np.linalg.pinv(self.D @ held, rcond=1e-12) @ held.T
+            mobility = self.D @ held
+            self.P = self.inverse - held @ np.linalg.pinv(mobility, rcond=1e-12) @ held.T
+            if table.loads:  # of rows that depend on each other the least, as equations.py has them
+                s = 1.0 / np.sqrt(np.maximum(np.diag(mobility), 1e-300))
+                least = np.linalg.pinv(s[:, None] * mobility * s, rcond=1e-12)
+                self._reaction = -s[:, None] * (least @ (s[:, None] * held.T @ self.G.T))
         self.W = self.G @ self.P @ self.G.T
 
     @cached_property
@@ -186,7 +219,8 @@ class ContactRows:
         """The rows at a state u (13 n,), as if all contacts stuck."""
         evaluator, table = self._table.evaluator, self._table
         stuck = self.states.copy()
-        stuck[table.mode], stuck[table.near.ravel()] = 2.0, 0.0
+        stuck[table.mode] = 2.0
+        stuck[table.way.ravel()] = stuck[table.near.ravel()] = 0.0
         evaluator.states = stuck
         rows = evaluator.rows(self.t, u)
         evaluator.states = self.states
@@ -201,14 +235,61 @@ class ContactRows:
             gamma = self._stuck(u).gamma[table.evaluator.model.joint_row_count :]
             apart[table.mode] = 0.0
             evaluator.states = apart
-            v_dot = evaluator.report(self.t, u)[: len(self.v)]
+            report = evaluator.report(self.t, u)
+            v_dot, own = report[: len(self.v)], evaluator.model.joint_row_count
+            self._free_multipliers = report[evaluator.model.report_layout["Lam"]][:own]
             evaluator.states = self.states
             self._free = self.G @ v_dot - gamma
         return self._free
 
+    def loads_by(self, x: Floats) -> Floats:
+        """(m,) loads of friction alone where contacts have the forces x (3 m,), in their frames."""
+        if self._free_multipliers is None:
+            _ = self.free
+        loads = self._table.alone.astype(float)
+        lam = self._free_multipliers + self._reaction @ x
+        for c, (rows, pushes) in self._table.loads.items():
+            loads[c] = max(lam[rows[0]], 0.0) if pushes else np.linalg.norm(lam[rows])
+        return loads
+
+    @cached_property
+    def feels(self) -> Any:
+        """(m, m) True where a force of the second contact changes slip or load of the first."""
+        count = len(self.W) // 3
+        size = np.abs(self.W).max(initial=0.0)
+        found = np.abs(self.W).reshape(count, 3, -1, 3).max(axis=(1, 3)) > 1e-14 * size
+        changes, least = np.abs(self._reaction), 1e-14 * np.abs(self._reaction).max(initial=0.0)
+        for c, (rows, _) in self._table.loads.items():
+            found[c] |= (changes[rows] > least).reshape(-1, count, 3).any(axis=(0, 2))
+        return found | found.T if self._table.loads else found
+
+    @property
+    def closing(self) -> Floats:
+        """(m,) rates of gaps; zero where there is none."""
+        found: Floats = np.where(self._table.gapless > 0.0, 0.0, self.slip[:, 0])
+        return found
+
     def change(self, dv: Floats) -> None:
         """Change the velocities by dv (6 n,)."""
-        self.v, self._free = self.v + dv, None
+        self.v, self._free, self._free_multipliers = self.v + dv, None, None
+
+    def follow(self, given: Sequence[tuple[Floats, float]] = ()) -> bool:
+        """Bring velocities onto the joints by impulses in them, and rows to what they are given.
+
+        Args:
+            given: rows (6 n + 6,), ground first, and changes of their rates.
+
+        Returns:
+            False where joints hold what a row is to change.
+        """
+        R = np.array([row[6:] for row, _ in given]).reshape(-1, len(self.v))
+        target = R @ self.v + [change for _, change in given]
+        for N, P, rates in ((self.D, self.inverse, self._nu), (R, self.P, target)):
+            if len(N):
+                held = P @ N.T
+                self.change(held @ np.linalg.pinv(N @ held, rcond=1e-12) @ (rates - N @ self.v))
+        missed, size = np.abs(R @ self.v - target), np.abs(target)
+        return bool(np.all(missed <= HELD * np.maximum(size.max(initial=0.0), 1.0)))
 
     @property
     def slip(self) -> Floats:
@@ -234,7 +315,7 @@ class ContactRows:
         It brings ``values`` (m,), gaps or their rates, of held contacts to zero, and of others that
         would be less than zero by more than a slack.
         """
-        N, active = self.G[::3], list(held)
+        N, active = self.G[::3], [c for c in held if not self._table.gapless[c]]
         normal, x = self.W[::3, ::3], np.zeros(0)
         for _ in range(len(others) + 1):
             block = normal[np.ix_(active, active)]

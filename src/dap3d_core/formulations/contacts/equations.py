@@ -1,10 +1,13 @@
 """Right-hand side, projection, report and switches of scenes with contacts (lsq.py has the rows).
 
-Sliding friction is linear in the normal force of its contact. So the rows are factored once and
-solved once more for each contact that slides, by its friction of a normal force of one; what these
-forces are follows from as many equations:
+Sliding friction is linear in the normal force of its contact, or in the load of its joint. So the
+rows are factored once and solved once more for each contact that slides, by its friction of a
+normal force of one; what these forces are follows from as many equations:
 
     N = N_0 + L N,    L_rs the normal force at r by friction of a normal force of one at s.
+
+The load of a joint is the root of a sum of squares of multipliers, which are linear in N: Newton's
+method finds N. Where there is no such N friction jams, and nothing is returned but not-a-numbers.
 
 The compliance of the rows is so large that multipliers of rows that depend on each other have no
 rounding of their own: they are the least ones. Passes (lsq.py) remove what it changes. Where rows
@@ -51,9 +54,14 @@ PART, SMALLER, LEAST = 1e-4, 1e-3, 1e-11
 #: rounding alone, which rows that depend on each other enlarge.
 PASSES, FALLING, SETTLED, NOISE = 12, 0.1, 1e-12, 1e-9
 #: Columns of ``System.contacts``: of each point its loop and where its integers and numbers begin,
-#: its first row, its bodies, its first state; 1 of friction that is the same under any load.
-LOOP, INTEGERS, NUMBERS, ROW, BODY_I, BODY_J, STATE, LOADED, COLUMNS = range(9)
-#: Places in a column, from its end.
+#: its first row, its bodies, its first state; 1 of friction that is the same under any load; of
+#: friction of a joint the first row of its load, how many they are, 1 where that pushes alone.
+LOOP, INTEGERS, NUMBERS, ROW, BODY_I, BODY_J, STATE, LOADED, LOAD, LOADS, PUSHES, COLUMNS = range(
+    12
+)
+#: Passes of Newton's method for loads, and the part that the last one changes.
+LOAD_PASSES, LOAD_SETTLED = 50, 1e-14
+#: Places in a column, from its end: of its contact, of the normal force, of its power.
 PLACE, FORCE, POWER = 1, 2, 3
 #: Of a contact's states: mode; then the direction of sliding, and from here on what it is given.
 NEAR = 4
@@ -67,7 +75,7 @@ def memory_size(bodies: int, rows: int, contacts: int) -> int:
     Applied forces; forces of one contact; of each contact that slides a ``column``; equations of
     their normal forces, and what solves them.
     """
-    return 12 * bodies + contacts * (6 * bodies + rows + POWER + 2 * contacts + 1)
+    return 12 * bodies + contacts * (6 * bodies + rows + POWER + 2 * contacts + 2)
 
 
 @compiled
@@ -185,7 +193,8 @@ def friction_of_one(t: float, c: int, own: Floats, system: System, loops: Any) -
     states[near] = states[near + 1] = states[near + 2] = 0.0
     zero(own)
     zero(system.multipliers)
-    system.multipliers[system.contacts[c, ROW]] = -1.0
+    place = system.contacts[c, LOAD] if system.contacts[c, LOADS] > 0 else system.contacts[c, ROW]
+    system.multipliers[place] = -1.0
     force = system.friction[size : 2 * size]
     own[own.shape[0] - POWER] = force_of(t, c, force, own[:size], system, loops)
     states[near], states[near + 1], states[near + 2] = given
@@ -206,8 +215,10 @@ def add_columns(t: float, system: System, loops: Any) -> int:
             solve_rows(system, own[:size])
             for k in range(x.shape[0]):
                 own[size + k] = x[k]
-            own[own.shape[0] - PLACE] = float(contacts[c, ROW])
+            own[own.shape[0] - PLACE] = float(c)
             count += 1
+    if has_loads(system, count):
+        return count
     A = inverse(system, count)
     for r in range(count):
         place = row_of(system, r)
@@ -219,10 +230,25 @@ def add_columns(t: float, system: System, loops: Any) -> int:
 
 
 @compiled_into
-def row_of(system: System, c: int) -> int:
-    """The normal row of contact c of those that slide."""
+def contact_of(system: System, c: int) -> int:
+    """Contact c of those that slide among all."""
     own = column(system, c)
     return int(own[own.shape[0] - PLACE])
+
+
+@compiled_into
+def row_of(system: System, c: int) -> int:
+    """The normal row of contact c of those that slide."""
+    return int(system.contacts[contact_of(system, c), ROW])
+
+
+@compiled_into
+def has_loads(system: System, count: int) -> bool:
+    """True if friction of a joint is among what slides."""
+    found = 0
+    for c in range(count):
+        found |= system.contacts[contact_of(system, c), LOADS] > 0
+    return found != 0
 
 
 @compiled_into
@@ -237,10 +263,13 @@ def add_friction(system: System, count: int) -> None:
     """Add friction to ``acceleration`` and ``multipliers``, which were found without it."""
     A, x, size = inverse(system, count), system.multipliers, system.acceleration.shape[0]
     N = A[2 * count * count :]
-    for r in range(count):
-        N[r] = 0.0
-        for s in range(count):
-            N[r] -= A[2 * count * r + count + s] * x[row_of(system, s)]
+    if has_loads(system, count):
+        solve_loads(system, count)
+    else:
+        for r in range(count):
+            N[r] = 0.0
+            for s in range(count):
+                N[r] -= A[2 * count * r + count + s] * x[row_of(system, s)]
     for r in range(count):
         own = column(system, r)
         for k in range(size):
@@ -248,6 +277,74 @@ def add_friction(system: System, count: int) -> None:
         for k in range(x.shape[0]):
             x[k] += N[r] * own[size + k]
         own[own.shape[0] - FORCE] += N[r]
+
+
+@compiled
+def solve_loads(system: System, count: int) -> None:
+    """Changes N of normal forces and loads, from ``multipliers`` found without them.
+
+    Not numbers where friction jams.
+    """
+    A = inverse(system, count)
+    N, rest = A[2 * count * count :], A[2 * count * count + count :]
+    for r in range(count):
+        N[r] = 0.0
+    settled, before, step, largest_load = 0, np.inf, 0.0, 0.0
+    for _ in range(LOAD_PASSES):
+        for r in range(count):
+            rest[r] = fill_load(system, count, r, A[2 * count * r :])
+        invert(A, count)
+        step = largest_load = 0.0
+        for r in range(count):
+            change = 0.0
+            for s in range(count):
+                change += A[2 * count * r + count + s] * rest[s]
+            N[r] += change
+            own = column(system, r)
+            step = max(step, abs(change))
+            largest_load = max(largest_load, abs(N[r] + own[own.shape[0] - FORCE]))
+        stands = step <= NOISE * largest_load and step > FALLING * before
+        if step <= LOAD_SETTLED * largest_load or stands:
+            settled += 1
+            if settled > 1 or not is_differentiated():
+                return  # derivatives follow a pass later
+        before = step
+    if not step <= NOISE * largest_load:
+        N[0] = np.inf - np.inf
+
+
+@compiled
+def fill_load(system: System, count: int, r: int, A: Floats) -> float:
+    """What is left of an equation of ``solve_loads``; its derivatives by N into A (2 count,)."""
+    x, total, size = system.multipliers, system.total, system.acceleration.shape[0]
+    N, own = inverse(system, count)[2 * count * count :], column(system, r)
+    c = contact_of(system, r)
+    first, loads = system.contacts[c, LOAD], system.contacts[c, LOADS]
+    for s in range(count):
+        A[s] = A[count + s] = 1.0 if r == s else 0.0
+    if loads == 0:  # a normal force, of a pass
+        row = system.contacts[c, ROW]
+        rest = -x[row] - N[r]
+        for s in range(count):
+            slope = column(system, s)[size + row]
+            rest -= slope * N[s]
+            A[s] += slope
+        return rest
+    square = 0.0
+    for row in range(first, first + loads):
+        y = total[row] + x[row]
+        for s in range(count):
+            y += column(system, s)[size + row] * N[s]
+        if system.contacts[c, PUSHES] != 0 and y > 0.0:  # multipliers are -lambda
+            y = 0.0
+        square += y * y
+        for s in range(count):
+            A[s] -= y * column(system, s)[size + row]
+    load = np.sqrt(square) if square > 0.0 else 0.0
+    for s in range(count):
+        same = 1.0 if r == s else 0.0
+        A[s] = same + (A[s] - same) / (load if load > 0.0 else 1.0)
+    return load - own[own.shape[0] - FORCE] - N[r]
 
 
 @compiled

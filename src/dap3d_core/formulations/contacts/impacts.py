@@ -67,8 +67,8 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
     work, exchanged = np.zeros(table.count), 0.0
     e = table.e.copy()
     for k in range(ROUNDS):
-        slip = rows.slip
-        approach = [c for c in touching if slip[c, 0] < -AT_REST * length]
+        slip, closing = rows.slip, rows.closing
+        approach = [c for c in touching if closing[c] < -AT_REST * length]
         if not approach:
             break
         last = k == ROUNDS - 1
@@ -94,7 +94,7 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
 
 def _stop_low_rocking(rows: ContactRows, touching: list[int], length: float) -> list[int]:
     """Hold what would be back from a height too low to tell from rest, as of rocking: which."""
-    v, a = rows.slip[:, 0], -rows.free[::3]
+    v, a = rows.closing, -rows.free[::3]
     limit = 2.0 * LAST_HEIGHT * length * a
     low = [c for c in touching if v[c] > AT_REST * length and v[c] ** 2 < limit[c]]
     _hold_low(rows, low, [c for c in touching if c not in low])
@@ -103,7 +103,7 @@ def _stop_low_rocking(rows: ContactRows, touching: list[int], length: float) -> 
 
 def _hold_low(rows: ContactRows, low: list[int], others: list[int]) -> None:
     if low:
-        rows.change(rows.lifted(rows.slip[:, 0], low, others))
+        rows.change(rows.lifted(rows.closing, low, others))
 
 
 def _spread(x: Floats, contacts: list[int], count: int) -> Floats:
@@ -116,16 +116,16 @@ def _impulses(table: ContactTable, rows: ContactRows, contacts: list[int], e: Fl
     """(3 k,) impulses of one round."""
     which = rows.rows_of(contacts)
     A, u, mu = rows.W[np.ix_(which, which)], rows.slip[contacts].ravel(), table.mu[contacts]
-    of, newton = e[contacts], table.newton[contacts]
+    of, newton, gapless = e[contacts], table.newton[contacts], table.gapless[contacts]
     b = u.copy()
     b[::3] += np.where(newton, of, 0.0) * np.minimum(u[::3], 0.0)
     ratio = table.ratio[contacts]
-    first, _ = solve_cone(A, b, mu, ratio=ratio)
-    more = np.where(newton, 0.0, of) * first[::3]
+    first, _ = solve_cone(A, b, mu, gapless=gapless, ratio=ratio)
+    more = np.where(newton, 0.0, of) * first[::3]  # friction of joints alone has none
     if not more.any():
         return first
     given = np.kron(more, [1.0, 0.0, 0.0])
-    second, _ = solve_cone(A, u + A @ (first + given), mu, more, ratio=ratio)
+    second, _ = solve_cone(A, u + A @ (first + given), mu, more, gapless=gapless, ratio=ratio)
     return first + second + given
 
 

@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.contacts.cone import solve_cone
-from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
+from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable, length_of
 from dap3d_core.kernels.array_types import Floats, Integers
 
 #: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
@@ -21,6 +21,8 @@ INSIDE = tuple(1.0 - 0.5**k for k in range(1, 31))
 #: Part of its cone in which friction of contacts that share stays where they begin to slip: what it
 #: leaves shows which of them do, and where to.
 LOOSE = 1.0 - 1e-6
+#: Passes for the loads of joints, the part that the last one changes, and a load that holds all.
+LOAD_PASSES, LOAD_SETTLED, LARGE = 60, 1e-12, 1e200
 
 
 class JamError(ValueError):
@@ -33,13 +35,16 @@ class Modes:
 
     Attributes:
         mode: (m,) 0 open, 1 slides, 2 sticks.
-        way: (m, 3) unit vectors of sliding, zero where none is known.
+        way: (m, 3) unit vectors of sliding, zero where none is known; of friction alone that
+            sticks 1.0 for rows that do not hold, as others hold what they would.
         near: (m, 3) forces on body i of those that share what they carry.
+        force: (m, 3) forces with which they were found, in the frames of the contacts.
     """
 
     mode: Floats
     way: Floats
     near: Floats
+    force: Floats
 
 
 def find_modes(
@@ -61,17 +66,59 @@ def find_modes(
         JamError: a contact jams.
     """
     limit = STILL * max(1.0, table.evaluator.model.length)
-    slip = rows.slip
-    found = Modes(*(np.zeros((table.count, *shape)) for shape in ((), (3,), (3,))))
-    for group in _groups(rows, [c for c in touching if slip[c, 0] < limit]):
-        _put_modes(table, rows, group, sliding, leaving, limit, found)
+    closing = rows.closing
+    found = Modes(*(np.zeros((table.count, *shape)) for shape in ((), (3,), (3,), (3,))))
+    for group in _groups(rows, [c for c in touching if closing[c] < limit]):
+        if table.loads.keys().isdisjoint(group):
+            _put_modes(table, rows, group, sliding, leaving, limit, found)
+        else:
+            _put_loaded(table, rows, group, sliding, leaving, limit, found)
     return found
+
+
+def _put_loaded(
+    table: ContactTable, rows: ContactRows, group: list[int], sliding: dict[int, Floats],
+    leaving: list[int], limit: float, found: Modes,
+) -> None:  # fmt: skip
+    """The modes of a group with friction of joints: found by loads that they give themselves.
+
+    What may stick is held at first, however large its load: friction that raises its own load by
+    more than itself holds. Then each pass takes the loads of the one before, extrapolated from
+    those of as many passes as there are loads (Anderson, J. ACM 12 (1965) 547).
+    """
+    mine = [c for c in group if c in table.loads]
+    ways, none = _ways(table, rows, group, sliding, limit), np.zeros(len(rows.G))
+    slides = np.array([c in ways for c in mine])
+    loads = np.where(slides, rows.loads_by(none)[mine], LARGE)
+    taken: list[Floats] = []
+    rests: list[Floats] = []
+    for k in range(LOAD_PASSES):
+        rows.load[mine] = loads
+        for values in attrs.astuple(found, recurse=False):
+            values[group] = 0.0
+        _put_modes(table, rows, group, sliding, leaving, limit, found)
+        force = np.zeros_like(found.force)
+        force[group] = found.force[group]
+        given = rows.loads_by(force.ravel())[mine]
+        rest = given - loads
+        if np.abs(rest).max() <= LOAD_SETTLED * max(given.max(), loads.max()):
+            return
+        if k == 0 and not slides.all():
+            loads = np.where(slides, loads, given)
+            continue
+        taken, rests = [*taken, loads][-len(mine) - 1 :], [*rests, rest][-len(mine) - 1 :]
+        loads = given
+        if len(rests) > 1:
+            changes, moves = np.diff(rests, axis=0).T, np.diff(taken, axis=0).T
+            share = np.linalg.lstsq(changes, rest, rcond=1e-10)[0]
+            loads = given - (moves + changes) @ share
+        loads = np.maximum(loads, 0.0)
+    raise JamError(table.names[mine[int(np.argmax(np.abs(rest)))]])
 
 
 def _groups(rows: ContactRows, closed: list[int]) -> list[list[int]]:
     """Contacts that feel each other's forces, together."""
-    size = np.abs(rows.W).max(initial=0.0)
-    blocks = np.abs(rows.W).reshape(len(rows.W) // 3, 3, -1, 3).max(axis=(1, 3)) > 1e-14 * size
+    blocks = rows.feels
     left, found = list(closed), []
     while left:
         group = [left.pop(0)]
@@ -126,8 +173,8 @@ def _ways(
     """Directions (2,) of the contacts that slide."""
     found = {}
     for c in closed:
-        u = rows.slip[c, 1:]
-        size = float(np.hypot(*u))
+        u = rows.slip[c, table.across(c)]
+        size = length_of(u)
         if size > limit:
             found[c] = u / size
         elif c in sliding:
@@ -144,10 +191,10 @@ def _matrix(
     full = rows.W[np.ix_(which, which)]
     A, ways = full.copy(), _ways(table, rows, closed, sliding, limit)
     for k, c in enumerate(closed):
-        if c in ways:
+        if c in ways and not table.gapless[c]:
             across = full[:, 3 * k + 1 : 3 * k + 3]
             A[:, 3 * k] -= table.mu[c] * across @ table.against(c, ways[c])
-            if A[3 * k, 3 * k] <= 0.0 and not table.load[c]:
+            if A[3 * k, 3 * k] <= 0.0 and not table.alone[c]:
                 raise JamError(table.names[c])
     return A, ways
 
@@ -157,20 +204,24 @@ def _solve(
     part: float = 1.0, *, loose: bool = False, **more: Any,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Forces (3 k,) with sliding friction, and accelerations; A, ways: of ``_matrix``."""
-    b, load = rows.free[rows.rows_of(closed)].copy(), table.load[closed]
+    b, load = rows.free[rows.rows_of(closed)].copy(), rows.load[closed]
     for k, c in enumerate(closed):
-        if c in ways and load[k]:  # the column of its normal row is what a load of one does
-            b += A[:, 3 * k]
+        if c in ways and table.gapless[c]:
+            b -= load[k] * table.mu[c] * A[:, 3 * k : 3 * k + 3] @ ways[c]
+        elif c in ways and table.alone[c]:  # in its first column is what a load of one does
+            b += load[k] * A[:, 3 * k]
     mu = LOOSE * table.mu[closed] if loose else part * table.mu_s[closed]
     mu[[c in ways for c in closed]] = 0.0
-    x, left = solve_cone(A, b, mu, load, ratio=table.ratio_s[closed], **more)
+    gapless, ratio = table.gapless[closed], table.ratio_s[closed]
+    x, left = solve_cone(A, b, mu, load, gapless=gapless, ratio=ratio, **more)
     if left > 1e-6 and not more:
         raise JamError(table.names[closed[0]])
     a = A @ x + b
     for k, c in enumerate(closed):
         if c in ways:
+            pressing = load[k] if table.gapless[c] else x[3 * k] + load[k]
             against = table.against(c, ways[c])
-            x[3 * k + 1 : 3 * k + 3] = -table.mu[c] * (x[3 * k] + load[k]) * against
+            x[3 * k : 3 * k + 3][table.across(c)] = -table.mu[c] * pressing * against
     return x, a
 
 
@@ -194,22 +245,61 @@ def _put(
     x = x if inner is None else inner
     for k, c in enumerate(closed):
         force, rate, frame = x[3 * k : 3 * k + 3], a[3 * k : 3 * k + 3], rows.frames[c]
-        is_pushed = force[0] > 0.0 or table.load[c]
+        across = table.across(c)
+        is_pushed = force[0] > 0.0 or table.alone[c]
         if not is_pushed and (rate[0] > ZERO * big or (len(closed) == 1 and rate[0] > -ZERO)):
             continue  # it opens
         if c in ways:
             mode, way = 1.0, ways[c]
         elif table.mu_s[c] == 0.0:
-            mode, way = 1.0, np.zeros(2)
-        elif np.hypot(*rate[1:]) > ZERO * big:
-            is_known = table.mu[c] > 0.0 and np.any(force[1:])
-            along = table.slip_against(c, force[1:]) if is_known else rate[1:]
-            mode, way = 1.0, along / np.hypot(*along)
+            mode, way = 1.0, np.zeros_like(rate[across])
+        elif length_of(rate[across]) > ZERO * max(big, _stops(table, rows, c)):
+            has_force = table.mu[c] > 0.0 and np.any(force[across])
+            along = table.slip_against(c, force[across]) if has_force else rate[across]
+            mode, way = 1.0, along / length_of(along)
         else:
-            mode, way = 2.0, np.zeros(2)
-        found.mode[c], found.way[c] = mode, way @ frame[1:]
-        if shares or table.load[c]:  # what its row adds has next to no rounding then
-            found.near[c] = force @ frame if mode == 2.0 else force[0] * frame[0]
+            mode, way = 2.0, np.zeros_like(rate[across])
+        found.mode[c], found.way[c], found.force[c] = mode, way @ frame[across], force
+        if shares or table.alone[c]:  # what its row adds has next to no rounding then
+            normal = 0.0 if table.gapless[c] else force[0]
+            found.near[c] = force @ frame if mode == 2.0 else normal * frame[0]
+    if shares:
+        _leave_to_others(table, rows, closed, found)
+
+
+def _stops(table: ContactTable, rows: ContactRows, c: int) -> float:
+    """The rate of slip that friction alone could change: less than a part of it is rounding."""
+    own = np.diag(rows.W)[3 * c : 3 * c + 3]
+    return float(table.mu_s[c] * rows.load[c] * own.max()) if table.alone[c] else 0.0
+
+
+def _leave_to_others(
+    table: ContactTable, rows: ContactRows, closed: list[int], found: Modes
+) -> None:
+    """Let rows of friction alone not hold where others, and the joints, hold what they would.
+
+    They carry what was found for them; joints and rows would divide that between them otherwise.
+    """
+    alone = [c for c in closed if table.alone[c] and found.mode[c] == 2.0]
+    mine = [(c, k) for c in alone for k in np.flatnonzero(table.holds[c]).tolist()]
+    others = [3 * c + k for c in closed if not table.alone[c] for k in range(3)
+              if found.mode[c] > (0.5 if k == 0 else 1.5)]  # fmt: skip
+    mobility, left = rows.W, dict.fromkeys(mine)
+    least, kept = DEPENDENT * np.abs(mobility).max(), others
+    while left:
+        back = np.linalg.pinv(mobility[np.ix_(kept, kept)], rcond=DEPENDENT, hermitian=True)
+        own = {at: 3 * at[0] + at[1] for at in left}
+        free = {
+            at: mobility[q, q] - mobility[q, kept] @ back @ mobility[kept, q]
+            for at, q in own.items()
+        }
+        best = max(free, key=lambda at: float(free[at]))
+        if free[best] <= least:
+            break
+        kept = [*kept, own[best]]
+        del left[best]
+    for c, k in left:
+        found.way[c, k] = 1.0
 
 
 def _share(table: ContactTable, closed: list[int], A: Floats) -> bool:
@@ -221,9 +311,8 @@ def _share(table: ContactTable, closed: list[int], A: Floats) -> bool:
 
 def _own_rows(table: ContactTable, closed: list[int]) -> Integers:
     """Rows along which contacts act: of smooth ones the normal, of friction alone the second."""
-    acts = np.ones((len(closed), 3), dtype=bool)
-    acts[:, 1:] = (table.mu_s[closed] > 0.0)[:, None]
-    acts[table.load[closed] > 0.0] = False, True, False
+    acts = table.holds[closed]
+    acts[:, 1:] &= (table.alone[closed] | (table.mu_s[closed] > 0.0))[:, None]
     return np.flatnonzero(acts)
 
 

@@ -112,6 +112,7 @@ class TreeCoordinates(Coordinates):
     def function(self, k: int) -> Any:
         """As of ``Coordinates``."""
         name = "joint_loops" if self.kept else "joint"
+        name += ".contacts" if self.evaluator.model.contact_count else ""
         return getattr(import_module(f"dap3d_core.formulations.{name}"), FUNCTIONS[k])
 
     @property
@@ -161,6 +162,8 @@ class TreeCoordinates(Coordinates):
                 f"method joint takes some {self._cost_ratio:.2g} times as long as standard or lsq "
                 "here: its kept rows meet far from ground, or many of them do; auto takes those"
             )
+        elif self.evaluator.model.contact_count:
+            pass  # friction of contacts is linear in their multipliers
         elif forces := self.evaluator.model.iterated_forces:
             notes.append(
                 "method joint takes two to three times as long as standard here: at each pass of "
@@ -191,7 +194,7 @@ class TreeCoordinates(Coordinates):
         """The state y of the constants as they are, with states of elements; kept rows judged."""
         y[self.nodes.layout["states"]] = self.evaluator.states
         if self.kept:
-            from dap3d_core.formulations.joint_loops.reference_pivots import judge_kept_rows
+            from dap3d_core.formulations.joint_loops.tables import judge_kept_rows
 
             judge_kept_rows(self.evaluator, y)
         return y
@@ -215,8 +218,7 @@ class TreeCoordinates(Coordinates):
     def inertia_places(self, bodies: Integers) -> Integers:
         """(7 b,) indices in the tree's constants of the mass and inertia of each."""
         first = CONSTANT_WIDTH * self._node_of[bodies] + MASS
-        places: Integers = (first[:, None] + np.arange(7)).ravel()
-        return places
+        return (first[:, None] + np.arange(7)).ravel()
 
     def inertias(self, bodies: Integers, mass: Floats, Jp: Floats) -> Floats:
         """(k, 7 b) numbers for ``inertia_places`` of masses (k, b) and inertias (k, b, 3, 3)."""
@@ -256,6 +258,13 @@ class TreeCoordinates(Coordinates):
         after[-1] += work
         return after
 
+    def displace(self, y: Floats, moved: Floats) -> None:
+        """As of ``Coordinates``: a change of rates, for a unit of time."""
+        from dap3d_core.formulations.joint_loops.kept_rows import add_displacement
+
+        change = self.with_jump(y, moved, self.evaluator.states, 0.0) - y
+        add_displacement(y, change, self.evaluator.system)
+
     def u_dot(self, t: float, u: Floats) -> Floats:
         """As of ``Coordinates``."""
         _, p, v, w = split(u)
@@ -287,13 +296,11 @@ class TreeCoordinates(Coordinates):
         """(n + 1,) the node that each body is."""
         body = self.nodes.body
         has_mass = np.flatnonzero(body >= 0)
-        nodes: Integers = has_mass[np.argsort(body[has_mass])]
-        return nodes
+        return has_mass[np.argsort(body[has_mass])]
 
     @property
     def _tree(self) -> TreeArrays:
-        tree: TreeArrays = self.evaluator.system.tree
-        return tree
+        return self.evaluator.system.tree
 
 
 def cost_over_standard(model: Model, plan: Plan) -> float:
@@ -309,8 +316,10 @@ def cost_over_standard(model: Model, plan: Plan) -> float:
 def _tree_and_reasons(model: Model) -> tuple[ModelMotions, SpanningForest, dict[int, str]]:
     """Motions of joints, the joints of a tree, and why others keep their rows."""
     motions = model.motions or classify(model)
+    count = len(model.joint_names)
+    of_contacts = range(count - model.contact_count, count)
     ends: dict[int, tuple[int, int]] = {}
-    reasons = dict(motions.refused)
+    reasons = dict(motions.refused) | dict.fromkeys(of_contacts, "it is a contact")
     for group in motions.motions:
         joints = group.joints.tolist()
         if reason := unsuitable_motion(group):

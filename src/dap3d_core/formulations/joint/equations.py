@@ -8,9 +8,6 @@
 Multipliers are computed only where they are reported or friction needs them.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 import numpy as np

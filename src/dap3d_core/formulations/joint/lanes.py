@@ -3,9 +3,6 @@
 For trees that are too large for a program of their own (formulations/programs).
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import System

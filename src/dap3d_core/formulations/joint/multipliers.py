@@ -5,9 +5,6 @@ whose rows D^ give D^^T lambda = a^ - g^, six equations in scaled coordinates fo
 unknowns. What it does to the parent is taken from that one's, and so on.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.metric import in_body_axes, scaled
 from dap3d_core.formulations.joint.node_layout import (

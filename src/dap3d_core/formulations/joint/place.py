@@ -4,9 +4,6 @@ What the accelerations are without q_ddot comes with it. Featherstone, Rigid Bod
 Algorithms (2008), 7.3, here about the joint's point and along the global axes.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System

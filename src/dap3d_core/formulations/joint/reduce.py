@@ -8,9 +8,6 @@ Featherstone, Rigid Body Dynamics Algorithms (2008), 7.2; Jain, Robot and Multib
 6.1. Here about the joint's point and along the global axes, where nothing has to be turned.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System

@@ -151,8 +151,7 @@ class Reference:
         if not np.all(np.isfinite(columns)):  # a run that failed: its cause is looked for
             return np.full((*v.shape[:-1], len(group.motions)), np.nan)
         twists = np.concatenate([v, w], axis=-1)
-        rates: Floats = np.einsum("kab,...kb->...ka", np.linalg.pinv(columns), twists)
-        return rates
+        return np.einsum("kab,...kb->...ka", np.linalg.pinv(columns), twists)
 
 
 def inertias_about(s: Floats, mass: Floats, Jp: Floats) -> Floats:

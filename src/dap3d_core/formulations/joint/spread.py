@@ -3,9 +3,6 @@
 Featherstone, Rigid Body Dynamics Algorithms (2008), 7.3.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.formulations.joint.node_layout import (
     ACCELERATION,

@@ -9,9 +9,6 @@
 The same S moves a state onto the kept rows: those of the tree cannot be violated.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import SINGULAR, Floats, System

@@ -3,9 +3,6 @@
 The rows of the tree itself cannot be violated.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 import numpy as np

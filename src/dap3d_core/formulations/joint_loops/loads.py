@@ -10,9 +10,6 @@ factorization of the joint-space inertia matrix for branched kinematic trees (20
 Multibody Dynamics (2011), 10.4.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System

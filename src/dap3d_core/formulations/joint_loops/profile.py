@@ -4,9 +4,6 @@ George, Liu, Computer Solution of Large Sparse Positive Definite Systems (1981),
 diagonal 1/d is stored.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, System
@@ -64,10 +61,16 @@ def weigh_kept_rows(system: System, part: float) -> None:
                 x, y, z = scaled_moment(k, x, y, z)
                 shift = (D[d] * D[d] + D[d + 1] * D[d + 1] + D[d + 2] * D[d + 2]) * k[0] * k[0]
                 kept.compliance[cuts[c + FIRST] + r] += shift + x * x + y * y + z * z
+    contacts = system.contacts.shape[0] > 0
     for j in range(kept.compliance.shape[0]):
         diagonal = kept.matrix[kept.profile[j, PLACE] + j]
         least = LEAST_FREE * kept.compliance[j]
-        kept.compliance[j] = part * where(least > diagonal, least, diagonal)
+        if contacts and kept.compliance[j] == 0.0:  # a row that does not hold
+            kept.compliance[j] = 1.0
+        elif contacts:  # what rows share depends on these: as of contacts/equations.py
+            kept.compliance[j] = part * kept.compliance[j]
+        else:
+            kept.compliance[j] = part * where(least > diagonal, least, diagonal)
 
 
 @compiled

@@ -6,9 +6,11 @@ from collections.abc import Iterator, Sequence
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import Integers
+from dap3d_core.assembly.arrays import Floats, Integers
 from dap3d_core.assembly.tree_arrays import KeptRowArrays
+from dap3d_core.formulations import RHS
 from dap3d_core.formulations.coordinates import UnsuitableError
+from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.joint.node_layout import (
     FIXED,
     FREE,
@@ -19,8 +21,17 @@ from dap3d_core.formulations.joint.node_layout import (
     SPHERICAL,
 )
 from dap3d_core.formulations.joint.tree_nodes import TreeNodes
-from dap3d_core.formulations.joint_loops.layout import CUT_WIDTH, END_WIDTH, PAIR_WIDTH, STEP_WIDTH
+from dap3d_core.formulations.joint_loops.layout import (
+    CUT_WIDTH,
+    END_WIDTH,
+    PAIR_WIDTH,
+    PART_OF_ROW,
+    PLACE,
+    STEP_WIDTH,
+)
+from dap3d_core.formulations.joint_loops.profile import PART
 from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.linear.ldlt.factor import SINGULAR_PIVOT_RATIO
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.linear.ordering.spanning_forest import CARRY
 from dap3d_core.model import Group, Model
@@ -29,6 +40,10 @@ from dap3d_core.model import Group, Model
 FREEDOMS = {FIXED: 0, REVOLUTE: 1, PRISMATIC: 1, SPHERICAL: 3, FREE: 6}
 #: Numbers that the tables and arrays may hold: 800 MB.
 MOST_NUMBERS = 100_000_000
+#: Compliances by which rows are judged, as parts of their diagonals.
+SMALL = 1e-9
+#: They are divided by this; a pivot that falls by its root or more has nothing else.
+LESS = 16.0
 
 
 @attrs.frozen(eq=False)
@@ -207,3 +222,26 @@ def kept_calls(
 
 def _table(rows: Sequence[Sequence[int]], width: int) -> Integers:
     return np.array(rows, dtype=np.int64).reshape(-1, width)
+
+
+@IGNORE_FLOAT_ERRORS
+def judge_kept_rows(evaluator: Evaluator, y: Floats) -> None:
+    """Find out whether kept rows depend on each other at a state, and store their pivots.
+
+    The pivot of a row that depends on others is what compliances make of it, and follows them.
+    """
+    kept: KeptRowArrays = evaluator.system.tree.kept
+    if evaluator.model.contact_count:  # those that close make other pivots
+        kept.smallest[:], kept.settings[PART_OF_ROW] = 0.0, PART
+        return
+    more, less = (_pivots(evaluator, y, part) for part in (SMALL, SMALL / LESS))
+    redundant = ~(more < np.sqrt(LESS) * less)
+    kept.smallest[:] = np.where(redundant, 0.0, SINGULAR_PIVOT_RATIO * less)
+    kept.settings[PART_OF_ROW] = PART if redundant.any() else 0.0
+
+
+def _pivots(evaluator: Evaluator, y: Floats, part: float) -> Floats:
+    kept = evaluator.system.tree.kept
+    kept.settings[PART_OF_ROW] = part
+    evaluator.functions[RHS](0.0, y, np.zeros_like(y), evaluator.system, evaluator.loops)
+    return 1.0 / kept.matrix[kept.profile[:, PLACE] + np.arange(len(kept.profile))]

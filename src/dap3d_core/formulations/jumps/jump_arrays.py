@@ -174,8 +174,7 @@ class JumpElements:
     def arrays(self, evaluator: Evaluator, held: Evaluator, given: int, rounds: int) -> JumpArrays:
         """Arrays of the law, for so many rows that are given at the most, and so many rounds."""
         tables = {k: np.array(v, dtype=np.int64) for k, v in self._tables.items()}
-        for name, width in (("rows", ROW_WIDTH), ("kicks", KICK_WIDTH),
-                            ("resets", RESET_WIDTH)):  # fmt: skip
+        for name, width in (("rows", ROW_WIDTH), ("kicks", KICK_WIDTH), ("resets", RESET_WIDTH)):
             tables[name] = tables[name].reshape(-1, width)
         R, size = len(tables["rows"]), 6 * (evaluator.model.body_count + 1)
         m, states = R + given, len(evaluator.states)
@@ -212,5 +211,4 @@ def _state_places(evaluator: Evaluator, q: int, group: Group) -> Integers:
     layout, system = group.type_info.layout, evaluator.system
     width = stride(group.type_info)
     first = system.idx[system.groups[q, 0] + layout.integers - 1 :: width][: group.count]
-    places: Integers = first[:, None] + np.arange(layout.state_width)
-    return places
+    return first[:, None] + np.arange(layout.state_width)

@@ -130,16 +130,10 @@ class JumpLaw:
         jump(float(t), *self.arguments(j))
         if j.missed != -1:
             raise ImpossibleJumpError(names[j.missed] if j.missed >= 0 else "")
-        evaluator.states = states = y_states(evaluator, j.y)
+        evaluator.states = states = j.y[evaluator.model.integrated_layout["states"]].copy()
         acted = [names[k] for k in np.flatnonzero(j.acting).tolist()]
         dv = j.v[NOW] - j.v[BEFORE]
         return Jump(
             j.y.copy(), dv, j.work, j.exchanged, states, tuple(dict.fromkeys(acted)),
             j.switches[SIDE].copy(), j.rounds,
         )  # fmt: skip
-
-
-def y_states(evaluator: Evaluator, y: Floats) -> Floats:
-    """(states,) of elements in a state in coordinates of bodies."""
-    states: Floats = y[evaluator.model.integrated_layout["states"]].copy()
-    return states

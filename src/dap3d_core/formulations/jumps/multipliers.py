@@ -1,8 +1,5 @@
 """Impulses of rows: A Lambda = b, where some push and do not pull."""
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -126,14 +123,7 @@ def least_solution(m: int, A: Floats, b: Floats, acts: Integers, x: Floats, spac
     for i in range(m):
         for k in range(m):
             S[i, k] = 0.5 * (A[i, k] + A[k, i]) if (acts[i] != 0) & (acts[k] != 0) else 0.0
-            V[i, k] = 1.0 if i == k else 0.0
-    for _ in range(SWEEPS):
-        left = 0
-        for i in range(m):
-            for k in range(i):
-                left += rotate(m, S, V, k, i)
-        if left == 0:
-            break
+    diagonalise(m, S, V)
     for k in range(m):
         x[k] = 0.0
     for q in range(m):
@@ -145,6 +135,21 @@ def least_solution(m: int, A: Floats, b: Floats, acts: Integers, x: Floats, spac
             for k in range(m):
                 if acts[k] != 0:
                     x[k] += part * V[k, q]
+
+
+@compiled
+def diagonalise(m: int, S: Floats, V: Floats) -> None:
+    """Turn a symmetric matrix (m, m) into its eigenvalues; V: its eigenvectors, by columns."""
+    for i in range(m):
+        for k in range(m):
+            V[i, k] = 1.0 if i == k else 0.0
+    for _ in range(SWEEPS):
+        left = 0
+        for i in range(m):
+            for k in range(i):
+                left += rotate(m, S, V, k, i)
+        if left == 0:
+            break
 
 
 @compiled

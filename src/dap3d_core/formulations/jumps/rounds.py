@@ -1,8 +1,5 @@
 """The rounds of a jump, compiled (law.py says what they do)."""
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 import numpy as np
@@ -52,9 +49,8 @@ RATE_ROUNDING = 1e-13
 
 @compiled
 def jump(
-    t: float, j: JumpArrays, system: System, loops: Any, of_held: Any, held: System,
-    held_loops: Any,
-) -> None:  # fmt: skip
+    t: float, j: JumpArrays, system: System, loops: Any, of_held: Any, held: System, held_loops: Any
+) -> None:
     """The jump at time t and state ``j.y``, which becomes that after it.
 
     Args:
@@ -80,9 +76,8 @@ def jump(
 
 @compiled
 def begin(
-    t: float, j: JumpArrays, system: System, loops: Any, of_held: Any, held: System,
-    held_loops: Any,
-) -> None:  # fmt: skip
+    t: float, j: JumpArrays, system: System, loops: Any, of_held: Any, held: System, held_loops: Any
+) -> None:
     """Factors, velocities and switches at the state before."""
     j.work = j.exchanged = 0.0
     j.rounds, j.missed = 0, -1
@@ -349,9 +344,8 @@ def remember(j: JumpArrays, q: int, Lam: float) -> None:
 
 @compiled
 def reset(
-    t: float, j: JumpArrays, system: System, loops: Any, of_held: Any, held: System,
-    held_loops: Any,
-) -> int:  # fmt: skip
+    t: float, j: JumpArrays, system: System, loops: Any, of_held: Any, held: System, held_loops: Any
+) -> int:
     """States that elements reset, and velocities that follow the joints; whether these change."""
     count, found = system.states.shape[0], 0
     first = j.y.shape[0] - 1 - count
@@ -381,9 +375,8 @@ def reset(
 
 @compiled
 def stop(
-    t: float, j: JumpArrays, system: System, loops: Any, of_held: Any, held: System,
-    held_loops: Any,
-) -> None:  # fmt: skip
+    t: float, j: JumpArrays, system: System, loops: Any, of_held: Any, held: System, held_loops: Any
+) -> None:
     """Stop what still approaches, of all rows that push and have answered."""
     size, found = j.P.shape[0], 0
     zero(j.P)

@@ -23,9 +23,6 @@ Arrays of the differentiated loops have ``WIDTH`` numbers for each of the plain 
 its derivatives, called slopes, by the directions.
 """
 
-# An element of an array is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from typing import Any, ClassVar
 

@@ -25,9 +25,7 @@ from dap3d_core.kernels.runtime.function_lists import LoopArrays, loop_list
 from dap3d_core.kernels.runtime.loop_modules import build_differentiated
 from dap3d_core.model import Group, Model
 
-_KINDS = {
-    "wrench": WRENCH_ELEMENT, "acceleration": JOINT_ELEMENT, "friction": FRICTION_ELEMENT
-}  # fmt: skip
+_KINDS = {"wrench": WRENCH_ELEMENT, "acceleration": JOINT_ELEMENT, "friction": FRICTION_ELEMENT}
 #: The same of types with states of their own, as their derivatives by states need them.
 _WITH_STATES = {"rate": RATE_ELEMENT, "position": POSITION_ELEMENT}
 #: Members of ``Tangent`` that differentiated loops write, and what is made of it.

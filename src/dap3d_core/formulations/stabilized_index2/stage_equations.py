@@ -15,9 +15,6 @@ so that a body has twelve unknowns.
 A row without a position level has mu = 0 as its equation.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any, ClassVar
 
 import attrs

@@ -10,9 +10,6 @@ All of them are blocks of the matrix of a stage, in which the states of an eleme
 (linear/lu/plan.py).
 """
 
-# An element of an array is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import Integers, System

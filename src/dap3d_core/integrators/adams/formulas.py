@@ -5,9 +5,6 @@ Differential Equations I), III.5, whose recursions are those of Krogh; sigma and
 orders are those of Shampine, Gordon, Computer Solution of Ordinary Differential Equations (1975).
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from collections.abc import Container, Mapping
 from typing import Any, ClassVar
 

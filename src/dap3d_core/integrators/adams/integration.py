@@ -82,8 +82,7 @@ class AdamsIntegration(Integration):
         """(n,) dy/dt at ``t``, a copy; None where it is not known."""
         if self.work.first_stage_valid == 0:
             return None
-        slope: Floats = self.work.differences[0].copy()
-        return slope
+        return self.work.differences[0].copy()
 
     @property
     def order(self) -> int:

@@ -9,9 +9,6 @@ Ordinary Differential Equations I (HNW), III.5 (recursions of Krogh for divided 
 whose notation this is written) and III.7.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -249,7 +246,7 @@ def plan(work: AdamsState, h: float, k: int, here: float, below: float, lower: b
             highest[i] = h * f[k + 1, i]
         size = work.error_size
         above = work.table[CONSTANT, k + 1] * scaled_largest(
-            highest, y, y, size, work.rtol, work.tolerance, h
+            work.state[SCRATCH], highest, y, y, size, work.rtol, work.tolerance, h
         )
         if k > 1 and below <= min(here, above):
             order, error = k - 1, below

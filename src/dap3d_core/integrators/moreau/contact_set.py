@@ -1,127 +1,160 @@
 """The contacts of a model near one pose, of its shapes and of those that are declared."""
 
-from typing import TYPE_CHECKING
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
 
-import attrs
-import numpy as np
+import math
+from typing import Any
 
-from dap3d_core.assembly.collisions.find import ShapeFinder
-from dap3d_core.formulations.contacts.contact_rows import ContactTable
-from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.model.state_layout import split
-
-if TYPE_CHECKING:
-    from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
+from dap3d_core.assembly.arrays import ACCELERATION, POSITION, System
+from dap3d_core.assembly.collisions.find import find_touches
+from dap3d_core.assembly.evaluate import call_kinds, place
+from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: Of keys of declared contacts, which are beyond those of shapes.
 DECLARED = 2**52
+#: Points of a pair of shapes that keys tell apart.
+POINTS = 256
+#: Mode of a contact that sticks, and states after it: way and what is nearest, three of each.
+STUCK, NEAREST = 2.0, 4
 
 
-@attrs.frozen(eq=False)
-class ContactSet:
-    """Contacts, m of them.
+@compiled
+def find_contacts(
+    t: float, y: Floats, most: float, s: StepArrays, system: System, loops: Any
+) -> bool:
+    """Find the contacts at an integrated state y; False without room.
 
-    Attributes:
-        bodies: (m, 2) i and j, ground 0.
-        key: (m,) a number that a contact keeps.
-        J: (m, 3, 12) rows of the velocity of body i less that of body j: normal, then tangents.
-        gap: (m,) m.
-        mu, e: (m,).
-        shapes: (k, 2) of the first k, which are of shapes.
-        point: (k, 3) of these, m, global axes.
+    Shapes are nearer than the margins of bodies, declared contacts than ``most``.
     """
-
-    bodies: Integers
-    key: Integers
-    J: Floats
-    gap: Floats
-    mu: Floats
-    e: Floats
-    shapes: Integers
-    point: Floats
-
-    def some(self, chosen: Integers) -> "ContactSet":
-        """A part of the contacts, without what is of shapes alone."""
-        names = ("bodies", "key", "J", "gap", "mu", "e")
-        return attrs.evolve(self, **{name: getattr(self, name)[chosen] for name in names})
-
-
-class ContactFinder:
-    """Finds the contacts of a model."""
-
-    def __init__(self, evaluator: Evaluator) -> None:
-        """Args: the evaluator of the model."""
-        model = evaluator.model
-        self._evaluator = evaluator
-        self.shapes: CollisionShapes | None = model.collisions
-        self._finder = None if self.shapes is None else ShapeFinder(self.shapes)
-        self.table = ContactTable(evaluator) if model.contact_count else None
-        slots = model.joint_slots[len(model.joint_slots) - model.contact_count :]
-        self._slots = np.array([(s[0], s[1] if len(s) > 1 else 0) for s in slots], dtype=np.int64)
-        #: (n + 1,) m, how far shapes reach from the mass centres of their bodies.
-        self.reach = np.zeros(model.body_count + 1)
-        if self.shapes is not None:
-            far = np.linalg.norm(self.shapes.at, axis=1) + self.shapes.reach
-            np.maximum.at(self.reach, self.shapes.body, far)
-        self.reach[0] = 0.0
-
-    def find(self, t: float, u: Floats, margin: Floats) -> ContactSet:
-        """Contacts at a state u (13 n,), those of shapes within margins (n + 1,) of bodies, m."""
-        found = self._of_shapes(u, margin)
-        if self.table is None:
-            return found
-        declared = self._declared(t, u)
-        names = ("bodies", "key", "J", "gap", "mu", "e")
-        both = {n: np.concatenate([getattr(found, n), getattr(declared, n)]) for n in names}
-        return attrs.evolve(found, **both)
-
-    def _of_shapes(self, u: Floats, margin: Floats) -> ContactSet:
-        if self._finder is None or self.shapes is None:
-            none = np.zeros((0, 2), dtype=np.int64)
-            zero = np.zeros(0)
-            return ContactSet(none, none[:, 0], np.zeros((0, 3, 12)), zero, zero, zero,
-                              none, np.zeros((0, 3)))  # fmt: skip
-        r, p, _, _ = split(u)
-        touches, shapes = self._finder.find(r, p, margin), self.shapes
-        bodies = shapes.body[touches.shapes]
-        first, second = shapes.material[touches.shapes].T
-        centres = np.concatenate([np.zeros((1, 3)), r])[bodies]
-        E = frames(touches.normal)
-        arms = touches.point[:, None, :] - centres
-        turned = np.cross(arms[:, :, None, :], E[:, None])
-        J = np.concatenate([E, turned[:, 0], -E, -turned[:, 1]], axis=2)
-        return ContactSet(
-            bodies, touches.key, J, touches.gap, shapes.mu[first, second], shapes.e[first, second],
-            touches.shapes, touches.point,
-        )  # fmt: skip
-
-    def _declared(self, t: float, u: Floats) -> ContactSet:
-        """The declared contacts, as if all stuck."""
-        evaluator, table = self._evaluator, self.table
-        assert table is not None
-        states = evaluator.states
-        stuck = states.copy()
-        stuck[table.mode], stuck[table.near.ravel()] = 2.0, 0.0
-        evaluator.states = stuck
-        rows = evaluator.rows(t, u)
-        evaluator.states = states
-        table.find_grips(t, u)
-        own, count = evaluator.model.joint_row_count, table.count
-        G = rows.dense()[own:].reshape(count, 3, -1, 6)
-        G = np.concatenate([np.zeros((count, 3, 1, 6)), G], axis=2)
-        each, (i, j) = np.arange(count), self._slots.T
-        J = np.concatenate([G[each, :, i], G[each, :, j]], axis=2)
-        J[:, 2] *= table.ratio[:, None]  # an ellipse, stretched to a circle
-        none = np.zeros((0, 2), dtype=np.int64)
-        gaps: Floats = rows.C[own:].reshape(-1, 3)[:, 0]
-        return ContactSet(self._slots, DECLARED + each, J, gaps, table.mu, table.e,
-                          none, np.zeros((0, 3)))  # fmt: skip
+    place_poses(y, s)
+    s.contact_count = s.touch_count = 0
+    if s.shapes.kind.size > 0:
+        if not find_touches(s.shapes, s.poses, s.margin):
+            return False
+        s.touch_count = s.shapes.point_count
+    s.contact_count = s.touch_count + s.declared_gap.size
+    if s.contact_count > s.key.size:
+        return False
+    for c in range(s.touch_count):
+        put_touch(c, s)
+    if s.declared_gap.size > 0:
+        evaluate_rows(t, y, s, system, loops)
+        s.contact_count = s.touch_count
+        for k in range(s.declared_gap.size):
+            if system.residual[s.declared_gap[k]] < most:
+                put_declared(k, s, system)
+    return True
 
 
-def frames(normal: Floats) -> Floats:
-    """(m, 3, 3) normals and two tangents of each."""
-    axis = np.eye(3)[np.argmin(np.abs(normal), axis=1)]
-    first = np.cross(normal, axis)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return np.stack([normal, first, np.cross(normal, first)], axis=1)
+@compiled
+def place_poses(y: Floats, s: StepArrays) -> None:
+    """Take poses from an integrated state, and with them moments of inertia in global axes."""
+    s.poses[0, 3] = 1.0
+    for b in range(1, s.poses.shape[0]):
+        pose, first = s.poses[b], 7 * (b - 1)
+        for k in range(7):
+            pose[k] = y[first + k]
+        turn_tensor(pose, s.Jp[b], s.spin[b])
+        turn_tensor(pose, s.Jp_inverse[b], s.spin_inverse[b])
+
+
+@compiled
+def axes_of(p: Floats, k: int) -> tuple[float, float, float]:
+    """Row k of the rotation matrix of a pose, whose Euler parameters may have any length."""
+    a, x, y, z = p[3], p[4], p[5], p[6]
+    h = 2.0 / ((a * a + x * x) + (y * y + z * z))
+    if k == 0:
+        return 1.0 - h * (y * y + z * z), h * (x * y - z * a), h * (x * z + y * a)
+    if k == 1:
+        return h * (x * y + z * a), 1.0 - h * (x * x + z * z), h * (y * z - x * a)
+    return h * (x * z - y * a), h * (y * z + x * a), 1.0 - h * (x * x + y * y)
+
+
+@compiled
+def turn_tensor(pose: Floats, J: Floats, out: Floats) -> None:
+    """Put A J A^T of a symmetric J, by rows."""
+    for i in range(3):
+        a, b, c = axes_of(pose, i)
+        d = a * J[0] + b * J[3] + c * J[6]
+        e = a * J[1] + b * J[4] + c * J[7]
+        f = a * J[2] + b * J[5] + c * J[8]
+        for k in range(3):
+            u, v, w = axes_of(pose, k)
+            out[3 * i + k] = d * u + e * v + f * w
+
+
+@compiled
+def put_touch(c: int, s: StepArrays) -> None:
+    """Make contact c of a point where shapes may touch."""
+    shapes = s.shapes
+    which, found, J = shapes.which[c], shapes.found[c], s.J[c]
+    i, j = which[0], which[1]
+    a, b = shapes.body[i], shapes.body[j]
+    s.bodies[c, 0], s.bodies[c, 1] = a, b
+    s.key[c] = (i * shapes.kind.size + j) * POINTS + which[2]
+    s.gap[c] = found[6]
+    first, second = shapes.material[i], shapes.material[j]
+    s.mu[c], s.e[c] = shapes.mu[first, second], shapes.e[first, second]
+    put_frame(found[3], found[4], found[5], J)
+    for r in range(3):
+        x, y, z = J[12 * r], J[12 * r + 1], J[12 * r + 2]
+        for side in range(2):
+            pose, sign, k = s.poses[a if side == 0 else b], 1.0 - 2.0 * side, 12 * r + 6 * side
+            p, q, w = found[0] - pose[0], found[1] - pose[1], found[2] - pose[2]
+            J[k], J[k + 1], J[k + 2] = sign * x, sign * y, sign * z
+            J[k + 3], J[k + 4] = sign * (q * z - w * y), sign * (w * x - p * z)
+            J[k + 5] = sign * (p * y - q * x)
+
+
+@compiled
+def put_frame(x: float, y: float, z: float, J: Floats) -> None:
+    """Put a normal and two tangents at the begin of the rows of a contact."""
+    a, b, c = abs(x), abs(y), abs(z)
+    if a <= b and a <= c:
+        p, q, r = 0.0, z, -y
+    elif b <= c:
+        p, q, r = -z, 0.0, x
+    else:
+        p, q, r = y, -x, 0.0
+    length = math.sqrt(p * p + q * q + r * r)
+    p, q, r = p / length, q / length, r / length
+    J[0], J[1], J[2] = x, y, z
+    J[12], J[13], J[14] = p, q, r
+    J[24], J[25], J[26] = y * r - z * q, z * p - x * r, x * q - y * p
+
+
+@compiled
+def evaluate_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any) -> None:
+    """Evaluate rows of joints and of declared contacts, these as if all stuck."""
+    place(t, y, system, loops)
+    for k in range(s.declared_mode.size):
+        first = s.declared_mode[k]
+        system.states[first] = STUCK
+        for i in range(3):
+            system.states[first + NEAREST + i] = 0.0
+    if s.declared_gap.size > 0:
+        residual = system.residual
+        for k in range(residual.size):
+            residual[k] = 0.0
+        call_kinds(POSITION, POSITION, t, system, loops, residual, residual, residual)
+    call_kinds(ACCELERATION, ACCELERATION, t, system, loops, system.D, system.gamma, system.nu)
+    for q in range(s.row_place.size):
+        for k in range(6):
+            s.D[q, k] = system.D[s.row_place[q] + k]
+
+
+@compiled
+def put_declared(k: int, s: StepArrays, system: System) -> None:
+    """Make a contact of one that is declared."""
+    c = s.contact_count
+    s.contact_count = c + 1
+    s.bodies[c, 0], s.bodies[c, 1] = s.declared_bodies[k, 0], s.declared_bodies[k, 1]
+    s.key[c], s.gap[c] = DECLARED + k, system.residual[s.declared_gap[k]]
+    s.mu[c], s.e[c] = s.declared_mu[k], s.declared_e[k]
+    for side in range(6):
+        first = s.declared_place[k, side]
+        for i in range(6):
+            s.J[c, 6 * side + i] = system.D[first + i] if first >= 0 else 0.0

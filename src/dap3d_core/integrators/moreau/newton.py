@@ -11,15 +11,18 @@ regular however rows depend on each other. Large weights make few rounds, and co
 taken back where rounds no longer help.
 """
 
-from collections.abc import Callable
-from functools import partial
-from typing import Any
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
 
-import attrs
+import math
+
 import numpy as np
 
-from dap3d_core.integrators.moreau.dense import solve_dense
+from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.integrators.moreau.dense import solve_blocks, solve_square
+from dap3d_core.integrators.moreau.groups import block_at
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.cache import compiled
 
 #: Weights times the masses that rows feel: at first, and how they are taken back, at most.
 WEIGHT, LESS, LEAST = 1e5, 1e-2, 1.0
@@ -29,175 +32,360 @@ HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
 TINY = 1e-300
-#: Unknowns up to which all matrices are dense, so small that numpy starts no threads; and up to
-#: which that of a pass is: scalar elimination is quicker then.
-SMALL, DENSE = 60, 150
+#: Unknowns up to which the matrix of a pass is a square; that of more has blocks.
+SMALL = 60
+
+
+@compiled
+def put_projected(z: Floats, mu: float, out: Floats) -> None:
+    """Put the impulse next to z that Coulomb's law allows, given the normal one."""
+    push, size = max(0.0, z[0]), max(math.sqrt(z[1] * z[1] + z[2] * z[2]), TINY)
+    part = min(1.0, mu * push / size)
+    out[0], out[1], out[2] = push, part * z[1], part * z[2]
+
+
+@compiled
+def put_slopes(z: Floats, mu: float, B: Floats) -> None:
+    """Put the derivatives of ``projected``, (9,) by rows."""
+    push, size = max(0.0, z[0]), max(math.sqrt(z[1] * z[1] + z[2] * z[2]), TINY)
+    part, d, e = min(1.0, mu * push / size), z[1] / size, z[2] / size
+    slides, pushes = 1.0 if mu * push < size else 0.0, 1.0 if push > 0.0 else 0.0
+    B[0], B[1], B[2] = pushes, 0.0, 0.0
+    B[3], B[6] = slides * pushes * mu * d, slides * pushes * mu * e
+    B[4], B[8] = part * (1.0 - slides * d * d), part * (1.0 - slides * e * e)
+    B[5] = B[7] = -part * slides * d * e
+
+
+@compiled
+def put_missed(x: Floats, u: Floats, mu: float, r: float, out: Floats) -> None:
+    """Put what an impulse misses Coulomb's law by at a velocity.
+
+    r: mass that the rows feel, kg, which makes an impulse of a velocity.
+    """
+    z0, z1, z2 = x[0] - r * u[0], x[1] - r * u[1], x[2] - r * u[2]
+    rim, size = mu * max(x[0], 0.0), math.sqrt(z1 * z1 + z2 * z2)
+    part = rim / max(size, TINY) if size > rim else 1.0
+    out[0], out[1], out[2] = x[0] - max(0.0, z0), x[1] - z1 * part, x[2] - z2 * part
 
 
 def project(z: Floats, mu: Floats) -> Floats:
-    """The impulses (m, 3) next to z (m, 3) that Coulomb's law allows, given the normal ones."""
-    push, size = np.maximum(0.0, z[:, 0]), np.maximum(np.hypot(z[:, 1], z[:, 2]), TINY)
-    part = np.minimum(1.0, mu * push / size)
-    return np.column_stack([push, part[:, None] * z[:, 1:]])
+    """(m, 3) impulses next to z (m, 3) that Coulomb's law allows, given the normal ones."""
+    found = np.zeros_like(z)
+    for rows in zip(z, mu, found, strict=True):
+        put_projected(*rows)
+    return found
 
 
 def slopes(z: Floats, mu: Floats) -> Floats:
     """(m, 3, 3) derivatives of ``project``."""
-    push, size = np.maximum(0.0, z[:, 0]), np.maximum(np.hypot(z[:, 1], z[:, 2]), TINY)
-    part, d = np.minimum(1.0, mu * push / size), z[:, 1:] / size[:, None]
-    slides = mu * push < size
-    B = np.zeros((len(mu), 3, 3))
-    B[:, 0, 0] = push > 0.0
-    B[:, 1:, 0] = np.where(slides & (push > 0.0), mu, 0.0)[:, None] * d
-    across = np.eye(2) - slides[:, None, None] * d[:, :, None] * d[:, None, :]
-    B[:, 1:, 1:] = part[:, None, None] * across
-    return B
+    found = np.zeros((len(mu), 9))
+    for rows in zip(z, mu, found, strict=True):
+        put_slopes(*rows)
+    return found.reshape(-1, 3, 3)
 
 
 def distance(x: Floats, u: Floats, mu: Floats, r: Floats) -> Floats:
-    """(m, 3) what impulses x (m, 3) miss Coulomb's law by at velocities u (m, 3).
-
-    r: (m,) masses that the rows feel, kg, which make impulses of velocities.
-    """
-    z = x - r[:, None] * u
-    found = np.empty_like(x)
-    found[:, 0] = x[:, 0] - np.maximum(0.0, z[:, 0])
-    rim, size = mu * np.maximum(x[:, 0], 0.0), np.hypot(z[:, 1], z[:, 2])
-    part = np.where(size > rim, rim / np.maximum(size, TINY), 1.0)
-    found[:, 1:] = x[:, 1:] - z[:, 1:] * part[:, None]
+    """(m, 3) what impulses x miss Coulomb's law by at velocities u, both (m, 3)."""
+    found = np.zeros_like(x)
+    for rows in zip(x, u, mu, r, found, strict=True):
+        put_missed(*rows)
     return found
 
 
-@attrs.frozen(eq=False)
-class Rows:
-    """The equations of one group of bodies, sparse where they are many.
-
-    Attributes:
-        M, inverse: (6 n, 6 n) masses and their inverse.
-        J, D: (3 m, 6 n), (k, 6 n) rows of contacts and joints.
-        b: (3 m,) u = J v + b.
-        free: (6 n,) velocities without impulses.
-        mu, r: (m,) friction, and masses that rows feel, kg.
-        s: (k,) the same of joints.
-    """
-
-    M: Any
-    inverse: Any
-    J: Any
-    D: Any
-    b: Floats
-    free: Floats
-    mu: Floats
-    r: Floats
-    s: Floats
-
-    def velocities(self, x: Floats, y: Floats) -> Floats:
-        """(6 n,) with impulses (m, 3), (k,)."""
-        found: Floats = self.free + self.inverse @ (self.J.T @ x.ravel() + self.D.T @ y)
-        return found
-
-    def residual(self, x: Floats, y: Floats) -> float:
-        """What the law and the joints are missed by, a part of the largest impulse."""
-        v = self.velocities(x, y)
-        left = np.abs(distance(x, (self.J @ v + self.b).reshape(-1, 3), self.mu, self.r)).max()
-        joints = np.abs(self.s * (self.D @ (v - self.free))).max(initial=0.0)
-        largest = max(np.abs(x).max(), np.abs(y).max(initial=0.0))
-        return float(max(left, joints) / (largest + TINY))
+# ------------------------------------------------------------------ velocities and residuals
 
 
-def newton(rows: Rows, x: Floats, y: Floats, tolerance: float) -> tuple[Floats, Floats, float]:
-    """Impulses x (m, 3), y (k,) and their residual.
+@compiled
+def put_velocities(s: StepArrays, v: Floats) -> None:
+    """Put the velocities of a group with impulses x and y."""
+    for q in range(s.used_count):
+        b = s.used[q]
+        for k in range(6):
+            v[b, k] = s.free[b, k]
+    for q in range(s.chosen_count):
+        c = s.chosen[q]
+        first, second, moved = v[s.bodies[c, 0]], v[s.bodies[c, 1]], s.moved[c]
+        x0, x1, x2 = s.x[c, 0], s.x[c, 1], s.x[c, 2]
+        for k in range(6):
+            first[k] += x0 * moved[k] + x1 * moved[12 + k] + x2 * moved[24 + k]
+            second[k] += x0 * moved[6 + k] + x1 * moved[18 + k] + x2 * moved[30 + k]
+    if s.y.size > 0:
+        clear(s, s.rest)
+        add_pull(s, s.y, s.rest)
+        for b in range(1, v.shape[0]):
+            add_inverse(s, b, s.rest[b], v[b])
 
-    Args:
-        rows: of a group.
-        x, y: where it begins.
-        tolerance: of the residual.
-    """
-    best, weight = (x, y, rows.residual(x, y)), WEIGHT
-    v = rows.velocities(x, y)
+
+@compiled
+def clear(s: StepArrays, out: Floats) -> None:
+    """Put zero for the bodies of a group."""
+    for q in range(s.used_count):
+        for k in range(6):
+            out[s.used[q], k] = 0.0
+
+
+@compiled
+def add_pull(s: StepArrays, y: Floats, out: Floats) -> None:
+    """Add D^T y."""
+    for k in range(y.size):
+        for q in range(s.row_start[k], s.row_start[k + 1]):
+            row = out[s.row_body[q]]
+            for i in range(6):
+                row[i] += s.D[q, i] * y[k]
+
+
+@compiled
+def times_inverse(s: StepArrays, b: int, x: Floats, out: Floats) -> None:
+    """Put M^-1 x of body b, six numbers."""
+    spin, m = s.spin_inverse[b], s.mass_inverse[b]
+    for k in range(3):
+        out[k] = m * x[k]
+        out[3 + k] = spin[3 * k] * x[3] + spin[3 * k + 1] * x[4] + spin[3 * k + 2] * x[5]
+
+
+@compiled
+def add_inverse(s: StepArrays, b: int, x: Floats, out: Floats) -> None:
+    """Add M^-1 x of body b."""
+    spin, m = s.spin_inverse[b], s.mass_inverse[b]
+    for k in range(3):
+        out[k] += m * x[k]
+        out[3 + k] += spin[3 * k] * x[3] + spin[3 * k + 1] * x[4] + spin[3 * k + 2] * x[5]
+
+
+@compiled
+def velocity_of(s: StepArrays, c: int, v: Floats) -> tuple[float, float, float]:
+    """Normal and tangential velocities of contact c of velocities of bodies."""
+    a, b, J = v[s.bodies[c, 0]], v[s.bodies[c, 1]], s.J[c]
+    u0, u1, u2 = 0.0, 0.0, 0.0
+    for k in range(6):
+        u0 += J[k] * a[k] + J[6 + k] * b[k]
+        u1 += J[12 + k] * a[k] + J[18 + k] * b[k]
+        u2 += J[24 + k] * a[k] + J[30 + k] * b[k]
+    return u0, u1, u2
+
+
+@compiled
+def speed_of(s: StepArrays, k: int, v: Floats) -> float:
+    """D v of row k of joints."""
+    found = 0.0
+    for q in range(s.row_start[k], s.row_start[k + 1]):
+        row = v[s.row_body[q]]
+        for i in range(6):
+            found += s.D[q, i] * row[i]
+    return found
+
+
+@compiled
+def left_at(s: StepArrays, c: int, v: Floats) -> float:
+    """What contact c misses the law by."""
+    u = s.u[c]
+    u[0], u[1], u[2] = velocity_of(s, c, v)
+    u[0] += s.bias[c]
+    put_missed(s.x[c], u, s.mu[c], s.r[c], u)
+    return max(abs(u[0]), abs(u[1]), abs(u[2]))
+
+
+@compiled
+def residual_of(s: StepArrays) -> float:
+    """What the law and the joints are missed by, a part of the largest impulse."""
+    put_velocities(s, s.trial)
+    left, largest = 0.0, 0.0
+    for q in range(s.chosen_count):
+        c = s.chosen[q]
+        left = max(left, left_at(s, c, s.trial))
+        largest = max(largest, abs(s.x[c, 0]), abs(s.x[c, 1]), abs(s.x[c, 2]))
+    for k in range(s.y.size):
+        speed = speed_of(s, k, s.trial) - speed_of(s, k, s.free)
+        left, largest = max(left, abs(s.s[k] * speed)), max(largest, abs(s.y[k]))
+    return left / (largest + TINY)
+
+
+# ------------------------------------------------------------------ rounds
+
+
+@compiled
+def newton(s: StepArrays, tolerance: float) -> float:
+    """Improve the impulses x and y of a group; the residual."""
+    left, weight = residual_of(s), WEIGHT
+    put_velocities(s, s.v)
     for _ in range(ROUNDS):
-        if best[2] <= tolerance:
+        if left <= tolerance:
             break
-        v = _round(rows, v, x, y, weight, INNER * max(0.1 * tolerance, min(best[2], 1e-3)))
-        x, y = _impulses(rows, v, x, y, weight)
-        left = rows.residual(x, y)
-        if left > HELPS * best[2]:
+        solve_round(s, weight, INNER * max(0.1 * tolerance, min(left, 1e-3)))
+        exchange(s)
+        new = residual_of(s)
+        if new > HELPS * left:
             weight *= LESS
-        if left < best[2]:
-            best = x, y, left
-        elif weight < LEAST:
-            break
+        if new < left:
+            left = new
         else:
-            x, y = best[:2]
-            v = rows.velocities(x, y)
-    return best
+            exchange(s)
+            if weight < LEAST:
+                break
+            put_velocities(s, s.v)
+    return left
 
 
-def _argument(rows: Rows, v: Floats, x: Floats, weight: float) -> Floats:
-    """(m, 3) what is projected."""
-    found: Floats = x - weight * rows.r[:, None] * (rows.J @ v + rows.b).reshape(-1, 3)
-    return found
+@compiled
+def exchange(s: StepArrays) -> None:
+    """Exchange the impulses x and y with those that were tried."""
+    for q in range(s.chosen_count):
+        x, push = s.x[s.chosen[q]], s.push[s.chosen[q]]
+        for k in range(3):
+            x[k], push[k] = push[k], x[k]
+    for k in range(s.y.size):
+        s.y[k], s.pull[k] = s.pull[k], s.y[k]
 
 
-def _impulses(rows: Rows, v: Floats, x: Floats, y: Floats, weight: float) -> tuple[Floats, Floats]:
-    """The impulses at velocities v, given those that the round began with."""
-    pull: Floats = y - weight * rows.s * (rows.D @ (v - rows.free))
-    return project(_argument(rows, v, x, weight), rows.mu), pull
+@compiled
+def put_rest(s: StepArrays, v: Floats, weight: float, R: Floats) -> float:
+    """Put what velocities v leave of the equations of a round; its square in M^-1.
+
+    ``push`` and ``pull`` become the impulses there, z what is projected.
+    """
+    for k in range(s.y.size):
+        speed = speed_of(s, k, v) - speed_of(s, k, s.free)
+        s.pull[k] = s.y[k] - weight * s.s[k] * speed
+    clear(s, R)
+    add_pull(s, s.pull, R)
+    for q in range(s.used_count):
+        b = s.used[q]
+        row, spin, m = R[b], s.spin[b], s.mass[b]
+        d, e, f = v[b, 3] - s.free[b, 3], v[b, 4] - s.free[b, 4], v[b, 5] - s.free[b, 5]
+        for k in range(3):
+            row[k] = m * (v[b, k] - s.free[b, k]) - row[k]
+            row[3 + k] = spin[3 * k] * d + spin[3 * k + 1] * e + spin[3 * k + 2] * f - row[3 + k]
+    for q in range(s.chosen_count):
+        c = s.chosen[q]
+        u0, u1, u2 = velocity_of(s, c, v)
+        part, z, J = weight * s.r[c], s.z[c], s.J[c]
+        z[0] = s.x[c, 0] - part * (u0 + s.bias[c])
+        z[1], z[2] = s.x[c, 1] - part * u1, s.x[c, 2] - part * u2
+        put_projected(z, s.mu[c], s.push[c])
+        p, y, w = s.push[c, 0], s.push[c, 1], s.push[c, 2]
+        first, second = R[s.bodies[c, 0]], R[s.bodies[c, 1]]
+        for k in range(6):
+            first[k] -= J[k] * p + J[12 + k] * y + J[24 + k] * w
+            second[k] -= J[6 + k] * p + J[18 + k] * y + J[30 + k] * w
+    merit = 0.0
+    for q in range(s.used_count):
+        merit += size_of(R[s.used[q]], s.mass_inverse[s.used[q]], s.spin_inverse[s.used[q]])
+    return merit
 
 
-def _round(rows: Rows, v: Floats, x: Floats, y: Floats, weight: float, tolerance: float) -> Floats:
-    """Velocities that solve the equations of a round."""
+@compiled
+def size_of(x: Floats, m: float, spin: Floats) -> float:
+    """X . M x of six numbers, by the mass and the moments of inertia of a body."""
+    total = 0.0
+    for k in range(3):
+        turned = spin[3 * k] * x[3] + spin[3 * k + 1] * x[4] + spin[3 * k + 2] * x[5]
+        total += m * x[k] * x[k] + x[3 + k] * turned
+    return total
 
-    def rest(v: Floats) -> tuple[Floats, float]:
-        push, pull = _impulses(rows, v, x, y, weight)
-        R = rows.M @ (v - rows.free) - rows.J.T @ push.ravel() - rows.D.T @ pull
-        return R, float(R @ (rows.inverse @ R))
 
-    size = float(rows.free @ (rows.M @ rows.free)) + TINY
-    R, merit = rest(v)
+@compiled
+def solve_round(s: StepArrays, weight: float, tolerance: float) -> None:
+    """Bring v to where it solves the equations of a round; impulses there in push and pull."""
+    size = TINY
+    for q in range(s.used_count):
+        size += size_of(s.free[s.used[q]], s.mass[s.used[q]], s.spin[s.used[q]])
+    merit = put_rest(s, s.v, weight, s.rest)
     for _ in range(PASSES):
         if merit <= tolerance * tolerance * size:
-            break
-        B = slopes(_argument(rows, v, x, weight), rows.mu)
-        for symmetric in (False, True):
-            if symmetric:
-                B[:, 1:, 0] = 0.0
-            step = _solver(rows, B, weight)(-R)
-            for cut in range(CUTS):
-                new = v + 0.5**cut * step
-                left, found = rest(new)
-                if found < (1.0 - 0.1 * 0.5**cut) * merit:
-                    break
-            else:
-                continue
-            break
-        else:
-            return v
-        v, R, merit = new, left, found
-    return v
+            return
+        for q in range(s.chosen_count):
+            put_slopes(s.z[s.chosen[q]], s.mu[s.chosen[q]], s.B[s.chosen[q]])
+        better = try_pass(s, weight, merit)
+        if better < 0.0:
+            for q in range(s.chosen_count):
+                B = s.B[s.chosen[q]]
+                B[3] = B[6] = 0.0
+            better = try_pass(s, weight, merit)
+        if better < 0.0:
+            put_rest(s, s.v, weight, s.rest)
+            return
+        merit = better
 
 
-def _solver(rows: Rows, B: Floats, weight: float) -> Callable[[Floats], Floats]:
-    """Solves with the matrix of a Newton pass."""
-    m, size = len(rows.mu), len(rows.free)
-    blocks = weight * rows.r[:, None, None] * B
-    if size <= SMALL:
-        K = rows.M + rows.J.T @ (blocks @ rows.J.reshape(m, 3, size)).reshape(3 * m, size)
-        return partial(_solved, K + rows.D.T @ (weight * rows.s[:, None] * rows.D))
-    import scipy.sparse as sp
-    from scipy.sparse.linalg import splu
+@compiled
+def try_pass(s: StepArrays, weight: float, merit: float) -> float:
+    """Take a Newton step, or a part of it, with slopes B; the new merit, -1 if none is better."""
+    assemble(s, weight)
+    for q in range(s.used_count):
+        for k in range(6):
+            s.change[6 * q + k] = -s.rest[s.used[q], k]
+    if s.width == 6 * s.used_count:
+        solve_square(s.K, s.change, s.width)
+    else:
+        solve_blocks(s.K, s.change, s.used_count, s.entry_start, s.entries, s.parent, s.turned)
+    part = 1.0
+    for _ in range(CUTS):
+        for q in range(s.used_count):
+            b = s.used[q]
+            for k in range(6):
+                s.trial[b, k] = s.v[b, k] + part * s.change[6 * q + k]
+        found = put_rest(s, s.trial, weight, s.trial_rest)
+        if found < (1.0 - 0.1 * part) * merit:
+            for q in range(s.used_count):
+                b = s.used[q]
+                for k in range(6):
+                    s.v[b, k], s.rest[b, k] = s.trial[b, k], s.trial_rest[b, k]
+            return found
+        part *= 0.5
+    return -1.0
 
-    middle = sp.bsr_array((blocks, np.arange(m), np.arange(m + 1)), shape=(3 * m, 3 * m))
-    K = rows.M + rows.J.T @ (middle.tocsr() @ rows.J)
-    if len(rows.s):
-        K = K + rows.D.T @ (sp.diags_array(weight * rows.s) @ rows.D)
-    if size <= DENSE:
-        return partial(_solved, K.toarray())
-    solve: Callable[[Floats], Floats] = splu(K.tocsc()).solve
-    return solve
+
+@compiled
+def assemble(s: StepArrays, weight: float) -> None:
+    """Put the matrix of a Newton pass, M + J^T weight r B J + D^T weight s D."""
+    K = s.K
+    for k in range(s.matrix_size):
+        K[k] = 0.0
+    for q in range(s.used_count):
+        spin, m = s.spin[s.used[q]], s.mass[s.used[q]]
+        start = block_at(s, q, q)
+        for i in range(3):
+            K[start + i * s.width + i] = m
+            at = start + (3 + i) * s.width + 3
+            K[at], K[at + 1], K[at + 2] = spin[3 * i], spin[3 * i + 1], spin[3 * i + 2]
+    for q in range(s.chosen_count):
+        c = s.chosen[q]
+        for side in range(2):
+            first = s.place[s.bodies[c, side]]
+            if first >= 0:
+                turned = s.turned
+                put_turned(s.B[c], weight * s.r[c], s.J[c], 6 * side, turned)
+                for other in range(2):
+                    row = s.place[s.bodies[c, other]]
+                    if row >= 0:
+                        add_contact(s, block_at(s, row, first), s.J[c], 6 * other, turned)
+    for k in range(s.y.size):
+        for p in range(s.row_start[k], s.row_start[k + 1]):
+            for q in range(s.row_start[k], s.row_start[k + 1]):
+                start = block_at(s, s.place[s.row_body[p]], s.place[s.row_body[q]])
+                for i in range(6):
+                    at = start + i * s.width
+                    part = weight * s.s[k] * s.D[p, i]
+                    for j in range(6):
+                        K[at + j] += part * s.D[q, j]
 
 
-def _solved(K: Floats, R: Floats) -> Floats:
-    x = R.copy()
-    solve_dense(K, x)
-    return x
+@compiled
+def put_turned(B: Floats, weight: float, J: Floats, side: int, out: Floats) -> None:
+    """Put weight B J of the columns of one body, (18,)."""
+    for k in range(6):
+        a, b, c = weight * J[side + k], weight * J[12 + side + k], weight * J[24 + side + k]
+        out[k] = B[0] * a + B[1] * b + B[2] * c
+        out[6 + k] = B[3] * a + B[4] * b + B[5] * c
+        out[12 + k] = B[6] * a + B[7] * b + B[8] * c
+
+
+@compiled
+def add_contact(s: StepArrays, start: int, J: Floats, side: int, turned: Floats) -> None:
+    """Add J^T of one body times ``turned`` of another one to their block of K."""
+    K = s.K
+    for i in range(6):
+        a, b, c = J[side + i], J[12 + side + i], J[24 + side + i]
+        at = start + i * s.width
+        for k in range(6):
+            K[at + k] += a * turned[k] + b * turned[6 + k] + c * turned[12 + k]

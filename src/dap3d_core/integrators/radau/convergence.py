@@ -1,8 +1,5 @@
 """Convergence of the iteration of a Radau step: at its limit, or at rounding."""
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, MOST, NOISE, Y
 from dap3d_core.integrators.stepping.step_control import EPSILON

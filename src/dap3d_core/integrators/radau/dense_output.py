@@ -12,9 +12,6 @@ rates are known, and its integral is taken away. What is left is what the error 
 held to (integration.py).
 """
 
-# An element of an array is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import VALUE, Floats, System

@@ -3,9 +3,6 @@
 Source: as of newton.py.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System
@@ -76,7 +73,7 @@ def filter_error(
             for k in range(y.shape[0]):
                 work.R[0, k] += e[i] * work.Z[i, k] / h
         solve(h, work, system, tangent, matrix)
-        error = scaled_largest(work.R[0], y, work.state[TRIAL], work.error_size,
+        error = scaled_largest(argument, work.R[0], y, work.state[TRIAL], work.error_size,
                                work.rtol, work.tolerance, h)  # fmt: skip
         if not error >= 1.0:
             return error

@@ -1,25 +1,306 @@
-"""An integration by Radau IIA in joint coordinates."""
+"""An integration by Radau IIA in joint coordinates: y' = f(t, y), without rows.
 
+What joints hold is out of the coordinates, and rows that are kept on a tree are eliminated in f, as
+in any integration by method joint. The tangent is that of the whole right-hand side, one column for
+each component, by differences: its differentiated form, in lanes, would be code that neither plain
+Python nor an exported model has. It only has to let the iteration converge.
+"""
+
+import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, ClassVar
 
+import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import STEP
+from dap3d_core.assembly.arrays import LENGTH, STEP, Floats, Integers, System
+from dap3d_core.assembly.evaluate import zero
+from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND
+from dap3d_core.integrators.radau.convergence import size_of_change
+from dap3d_core.integrators.radau.error import filter_error, sum_work
 from dap3d_core.integrators.radau.integration import RadauIntegration
-from dap3d_core.integrators.radau.rates import (
-    RateTangent,
-    estimate_rate_error,
-    factorise_rates,
-    find_rate_slope,
-    find_rate_stages,
-    find_rate_tangent,
-    find_rate_work,
-    measure_rate_noise,
+from dap3d_core.integrators.radau.newton import (
+    UNFOUND,
+    iterate_stages,
+    method_index,
+    pair_count,
+    pole,
+    separate,
+    subtract_slope,
+    unite,
 )
+from dap3d_core.integrators.radau.state import TRIAL_SLOPE, RadauState
 from dap3d_core.integrators.stepping.integration import Integration
+from dap3d_core.integrators.stepping.integration_state import NOISE, OTHER, SCRATCH, TRIAL, Y
+from dap3d_core.integrators.stepping.rounding import ROUNDINGS, SAMPLES, change_digits
 from dap3d_core.kernels.compiler.types import Table
+from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, MATRIX, Arrays
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.linear.lu.factor import factor_lu, solve_lu
 from dap3d_core.linear.lu.plan import StateNode, make_lu_plan
+
+#: Step of a difference, as part of a component's size: short against the depth of stiff contact
+#: and against v_tol of friction, whose bends it must not reach over.
+PART = 1e-12
+#: Lengths of differences over bends, and their ratio; slopes that count as steeper.
+LEVELS, COARSER, STEEPER = 6, 16.0, 2.0
+#: A difference of more than this part of the largest rate may be a jump: it is one where the
+#: quotient over a step that is COARSER is smaller by more than the factor JUMPS.
+JUMP, JUMPS = 1e-7, 4.0
+#: Least size of a rate, as part of the scene's length (or of a radian) a second.
+LEAST_RATE = 1e-2
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class RateTangent(Arrays):
+    """df/dy, and the elimination program of a dense matrix."""
+
+    types: ClassVar[dict[str, Any]] = {
+        **dict.fromkeys(("nodes", "columns", "updates"), INTEGER_MATRIX),
+        "J": MATRIX,
+    }
+
+    nodes: Integers  # of linear.lu_plan.LuPlan, as the next two
+    columns: Integers
+    updates: Integers
+    bends: Floats  # (1,) as of ``Tangent``
+    J: Floats  # (N, N) of all components but the work
+
+
+@compiled
+def find_rate_tangent(
+    work: RadauState, system: System, loops: Any, tangent: RateTangent, functions: Any
+) -> None:
+    """The tangent at the predicted end of the step, as ``find_tangent``.
+
+    Once an iteration failed, of differences over steps of many lengths the steepest are taken:
+    those over the bend of a law that is flat where the motion is, as in jacobian.py. What jumps, as
+    the damping of a cable does where it becomes taut and a motion starts anew, has no slope: that
+    on its other side is taken.
+    """
+    rhs, y, J, bends = functions[0], work.state[SCRATCH], tangent.J, tangent.bends
+    f, changed, length = work.state[TRIAL], work.state[OTHER], system.settings[LENGTH]
+    at = work.t + work.tangent_step if work.has_last_step != 0 else work.t
+    for k in range(y.shape[0]):
+        y[k] = work.state[Y, k] + work.Z[work.stages - 1, k]
+    rhs(at, y, f, system, loops)
+    trials = 2 * LEVELS if bends[0] >= MAY_BEND else 1
+    n, jump = J.shape[0], 0.0
+    for i in range(n):
+        jump = max(jump, JUMP * abs(f[i]))
+    finite = abs(f[n]) < math.inf
+    work.rhs_count += 1
+    for j in range(n):
+        now, is_rate = y[j], j >= work.counts[0]
+        least = 0.0 if j >= work.counts[0] + work.counts[1] else length
+        step = PART * max(abs(now), LEAST_RATE * least if is_rate else least)
+        step, steepest, first, trial = step if step > 0.0 else PART, -1.0, 0.0, 0
+        for i in range(n):
+            J[i, j] = 0.0
+        while trial < trials or (steepest < 0.0 and trial < 2 * LEVELS):
+            h = step if trial % 2 == 0 else -step
+            slope = slopes(at, j, h, y, f, changed, work, system, loops, functions)
+            if jump < slope * step < math.inf:
+                far = slopes(at, j, COARSER * h, y, f, changed, work, system, loops, functions)
+                slope = slopes(at, j, h, y, f, changed, work, system, loops, functions)
+                slope = -1.0 if slope > JUMPS * far else slope
+            finite = finite and abs(changed[n]) < math.inf  # no power where forces jam
+            first = slope if steepest < 0.0 else first
+            if (slope >= 0.0 and slope > STEEPER * steepest) or not slope < math.inf:
+                steepest = slope
+                for i in range(n):
+                    J[i, j] = changed[i]
+            step *= COARSER if trial % 2 == 1 else 1.0
+            trial += 1
+        if steepest > STEEPER * first:
+            bends[0] = BENT
+        finite = finite and steepest < math.inf
+    work.jacobian_count += 1
+    work.tangent_needed, work.tangent_is_current = 0, 1 if finite else 0
+    work.factored_step = 0.0
+
+
+@compiled
+def slopes(
+    t: float, j: int, step: float, y: Floats, f: Floats, out: Floats, work: RadauState,
+    system: System, loops: Any, functions: Any,
+) -> float:  # fmt: skip
+    """Difference quotients of the rates f at y by component j into out; returns the largest."""
+    rhs, now, largest = functions[0], y[j], 0.0
+    y[j] = now + step
+    step = y[j] - now
+    rhs(t, y, out, system, loops)
+    work.rhs_count += 1
+    for i in range(y.shape[0] - 1):
+        out[i] = (out[i] - f[i]) / step
+        largest = max(largest, abs(out[i]))
+    y[j] = now
+    return largest
+
+
+@compiled
+def fill_dense(s: Any, K: Any, J: Floats) -> None:
+    """K = s - J, for real or complex s in 1/s."""
+    n = J.shape[0]
+    for i in range(n):
+        for j in range(n):
+            K[n * i + j] = -J[i, j]
+        K[(n + 1) * i] += s
+
+
+@compiled
+def factorise_rates(
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
+    functions: Any,
+) -> float:  # fmt: skip
+    """As ``factorise_both``."""
+    poles = work.method.poles[method_index(work.stages)]
+    nodes, columns, updates = tangent.nodes, tangent.columns, tangent.updates
+    work.factorisation_count += 1
+    work.factored_step = h
+    fill_dense(poles[0] / h, work.K, tangent.J)
+    regular = factor_lu(nodes, columns, updates, work.K, work.pivots)
+    for p in range(pair_count(work.stages) if regular else 0):
+        fill_dense(pole(poles, p, h), work.Kc[p], tangent.J)
+        regular = regular and factor_lu(nodes, columns, updates, work.Kc[p], work.pivotsc[p])
+    if regular:
+        return 0.0
+    work.factored_step = 0.0
+    return UNFOUND
+
+
+@compiled
+def evaluate_rates(
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
+    functions: Any,
+) -> None:  # fmt: skip
+    """Residuals F - A^-1 Z / h of the stages into R."""
+    rhs, y, argument = functions[0], work.state[Y], work.state[SCRATCH]
+    m = method_index(work.stages)
+    for i in range(work.stages):
+        for k in range(y.shape[0]):
+            argument[k] = y[k] + work.Z[i, k]
+        rhs(t + work.method.c[m, i] * h, argument, work.F[i], system, loops)
+        subtract_slope(i, h, work.method.inverse[m], work)
+    work.rhs_count += work.stages
+
+
+@compiled
+def solve_rates(
+    h: float, work: RadauState, system: System, tangent: RateTangent, functions: Any
+) -> None:
+    """R from the residuals of the stages to the changes; that of the work is none."""
+    stages, m = work.stages, method_index(work.stages)
+    separate(work.method.T_inverse[m], stages, work.R, work.xr, work.xc)
+    solve_lu(tangent.nodes, tangent.columns, work.K, work.pivots, work.xr)
+    for p in range(pair_count(stages)):
+        solve_lu(tangent.nodes, tangent.columns, work.Kc[p], work.pivotsc[p], work.xc[p])
+    unite(work.method.T[m], stages, work.xr, work.xc, work.R)
+    for i in range(stages):
+        work.R[i, work.R.shape[1] - 1] = 0.0
+
+
+@compiled
+def change_rates(h: float, work: RadauState, system: System) -> float:
+    """Add the changes in R to the stages; returns their norm."""
+    work.state_change = work.multiplier_change = 0.0
+    for i in range(work.stages):
+        size = size_of_change(work.R[i], h, work)
+        if not size <= work.state_change:
+            work.state_change = size
+        for k in range(work.Z.shape[1]):
+            work.Z[i, k] += work.R[i, k]
+    return work.state_change
+
+
+@compiled
+def find_rate_stages(
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
+    functions: Any,
+) -> float:  # fmt: skip
+    """As ``find_stages``."""
+    return iterate_stages(t, h, work, system, loops, tangent, functions, evaluate_rates,
+                          solve_rates, change_rates)  # fmt: skip
+
+
+@compiled
+def evaluate_rate(
+    t: float, y: Floats, work: RadauState, system: System, loops: Any, functions: Any
+) -> None:
+    """Rates at a state into R[0]."""
+    rhs = functions[0]
+    rhs(t, y, work.R[0], system, loops)
+
+
+@compiled
+def solve_rate(
+    h: float, work: RadauState, system: System, tangent: RateTangent, functions: Any
+) -> None:
+    """R[0] from a residual to the change, with the real matrix."""
+    x, residual = work.xr, work.R[0]
+    for k in range(x.shape[0]):
+        x[k] = residual[k]
+    solve_lu(tangent.nodes, tangent.columns, work.K, work.pivots, x)
+    for k in range(x.shape[0]):
+        residual[k] = x[k]
+    residual[residual.shape[0] - 1] = 0.0
+
+
+@compiled
+def estimate_rate_error(
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
+    functions: Any,
+) -> float:  # fmt: skip
+    """As ``estimate_error``."""
+    return filter_error(t, h, work, system, loops, tangent, functions, evaluate_rate, solve_rate)
+
+
+@compiled
+def find_rate_slope(
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
+    functions: Any,
+) -> float:  # fmt: skip
+    """dy/dt at the trial state, into TRIAL_SLOPE."""
+    rhs = functions[0]
+    work.rhs_count += 1
+    rhs(t + h, work.state[TRIAL], work.state[TRIAL_SLOPE], system, loops)
+    return 0.0
+
+
+@compiled
+def measure_rate_noise(
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
+    functions: Any,
+) -> float:  # fmt: skip
+    """As ``measure_stage_noise``."""
+    rhs, y, argument = functions[0], work.state[Y], work.state[SCRATCH]
+    noise = work.tolerance[NOISE]
+    m, size = method_index(work.stages), 0.0
+    for i in range(work.stages):
+        size += ROUNDINGS * abs(work.method.e[m, i]) / h
+    zero(noise)
+    work.rhs_count += SAMPLES + 1
+    rhs(t, y, work.R[1], system, loops)
+    for sample in range(SAMPLES):
+        change_digits(y, sample, argument)
+        rhs(t, argument, work.R[0], system, loops)
+        for k in range(y.shape[0]):
+            work.R[0, k] -= work.R[1, k]
+        solve_rate(h, work, system, tangent, functions)
+        for k in range(y.shape[0]):
+            noise[k] = max(noise[k], size * abs(work.R[0, k]))
+    return 0.0
+
+
+@compiled
+def find_rate_work(
+    t: float, h: float, work: RadauState, system: System, loops: Any, tangent: RateTangent,
+    functions: Any,
+) -> float:  # fmt: skip
+    """As ``find_work``."""
+    evaluate_rates(t, h, work, system, loops, tangent, functions)
+    sum_work(h, work)
+    return 0.0
 
 
 class JointRadauIntegration(RadauIntegration):

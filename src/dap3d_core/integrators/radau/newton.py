@@ -5,9 +5,6 @@ RADAU. The stages are decoupled by T into one real and one to three complex syst
 tangent. Norms are the largest scaled component, as in stepping/step_control.py.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from typing import Any
 

@@ -5,9 +5,6 @@ Source: Hairer, Wanner, Stiff differential equations solved by Radau methods (J.
 stages allow for longer ones; where it hardly converges, or the motion is rough, fewer stages serve.
 """
 
-# An element of an array is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from dap3d_core.integrators.radau.newton import method_index
 from dap3d_core.integrators.radau.state import ATOL, LIMIT, RTOL, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST

@@ -6,9 +6,6 @@ J^-1 delta, of the size of the last digits of the state that made it, however lo
 estimate of the error the stages have weights e of 12 in all for three, 66 for seven (newton.py).
 """
 
-# An element of an array is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import System

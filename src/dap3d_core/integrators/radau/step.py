@@ -6,9 +6,6 @@ Source: Hairer, Wanner, Solving Ordinary Differential Equations II, IV.8, VII.4,
 RADAU.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -131,7 +128,7 @@ def start(work: RadauState, rhs: Function, project: Function, system: System, lo
     work.has_last_step = 0
     work.convergence_factor = 1.0
     if work.fixed_step == 0.0 and work.h == 0.0:
-        work.h = first_step(work, work.k, rhs, system, loops)  # fmt: skip
+        work.h = first_step(work, work.k, rhs, system, loops)
 
 
 @compiled

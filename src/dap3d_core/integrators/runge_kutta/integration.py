@@ -8,7 +8,8 @@ import numpy as np
 
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.step import advance
-from dap3d_core.integrators.runge_kutta.tableau import Tableau, combinations
+from dap3d_core.integrators.runge_kutta.sums import combinations
+from dap3d_core.integrators.runge_kutta.tableau import Tableau
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.singular_poses import ROWS
 from dap3d_core.kernels.runtime.cache import jit_is_on, prepared

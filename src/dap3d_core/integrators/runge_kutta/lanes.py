@@ -5,9 +5,6 @@ right-hand side beside those of stages are its own (step.py): its numbers are th
 A step near a singular pose is taken as that of a run alone.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any, ClassVar
 
 import attrs
@@ -19,7 +16,7 @@ from dap3d_core.integrators.runge_kutta.step import (
     step,
     step_error,
 )
-from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA
+from dap3d_core.integrators.runge_kutta.sums import ABSCISSA, combine
 from dap3d_core.integrators.stepping.event_location import is_cut_at_sample, next_length
 from dap3d_core.integrators.stepping.integration_state import (
     GIVEN,
@@ -43,7 +40,6 @@ from dap3d_core.integrators.stepping.step_control import (
     first_step,
 )
 from dap3d_core.integrators.stepping.switch_values import count_from_far_edges
-from dap3d_core.integrators.stepping.vector_ops import combine
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGERS as INTEGER_VECTOR
 from dap3d_core.kernels.runtime.array_struct import MATRIX, Arrays

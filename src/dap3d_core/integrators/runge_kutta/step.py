@@ -18,18 +18,16 @@ cut into calls of ``advance``, its numbers are the same bit for bit. Source: Hai
 Wanner, Solving Ordinary Differential Equations I (HNW), II.4 to II.6.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from dap3d_core.integrators.runge_kutta.error import error_beyond_rounding, error_norm
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.stiffness import detect_stiffness
-from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA
+from dap3d_core.integrators.runge_kutta.sums import ABSCISSA, combine
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     is_sample_across,
@@ -37,6 +35,7 @@ from dap3d_core.integrators.stepping.event_location import (
     update_switches_after_step,
 )
 from dap3d_core.integrators.stepping.integration_state import (
+    GIVEN,
     NOT_FINITE,
     OTHER,
     RUNNING,
@@ -69,8 +68,6 @@ from dap3d_core.integrators.stepping.step_control import (
     combined_error,
     count_turns,
     end_of_step,
-    error_beyond_rounding,
-    error_norm,
     first_step,
     judge_turns,
     lands_near_singularity,
@@ -78,7 +75,7 @@ from dap3d_core.integrators.stepping.step_control import (
     step_floor,
     step_reduction,
 )
-from dap3d_core.integrators.stepping.vector_ops import all_finite, combine, copy, scaled_largest
+from dap3d_core.integrators.stepping.vector_ops import all_finite, copy, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import where, with_slopes
@@ -331,7 +328,7 @@ def project_stage(
     """Project the state x of a stage into the scratch row (x may be that); as it was: OTHER."""
     argument = work.state[SCRATCH]
     copy(work.state[OTHER], x)
-    copy(argument, x)
+    copy(argument, work.state[OTHER])  # which x may be
     project_state(work, t, argument, project, system, loops)
 
 
@@ -359,9 +356,8 @@ def projected_error_norm(
         project_state(work, t1, other, project, system, loops)
         for i in range(other.size):
             other[i] -= result[i]
-        size = scaled_largest(
-            other, y, result, work.error_size, work.rtol, work.tolerance, h, least
-        )
+        size = scaled_largest(work.state[GIVEN], other, y, result, work.error_size, work.rtol,
+                              work.tolerance, h, least)  # fmt: skip
         main = size if e == 0 else combined_error(main, size)
     return main
 
@@ -468,10 +464,11 @@ def take_dense_stages(
 def is_within_error(work: RungeKuttaState) -> bool:
     """True if the trial state differs from the other one by no more than a step may err."""
     y, trial, other = work.state[Y], work.state[TRIAL], work.state[OTHER]
+    ratios = work.state[SCRATCH]
     for i in range(other.size):
         other[i] -= trial[i]
     size = work.error_size
-    return scaled_largest(other, y, trial, size, work.rtol, work.tolerance, 0.0) <= 1.0
+    return scaled_largest(ratios, other, y, trial, size, work.rtol, work.tolerance, 0.0) <= 1.0
 
 
 @compiled

@@ -13,8 +13,8 @@ which the component grows clears the scene.
 """
 
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
+from dap3d_core.integrators.runge_kutta.sums import combine
 from dap3d_core.integrators.stepping.integration_state import OTHER, TRIAL, Y
-from dap3d_core.integrators.stepping.vector_ops import combine
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Steps between two looks; every step once one looked stiff. A prime: friction whose sign changes

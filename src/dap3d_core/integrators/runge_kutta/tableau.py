@@ -1,13 +1,11 @@
 """Explicit Runge-Kutta methods as data: coefficients, and parameters that control the step."""
 
 from collections.abc import Sequence
-from functools import cache
 
 import numpy as np
 from attrs import field, frozen
 from numpy.typing import ArrayLike
 
-from dap3d_core.integrators.stepping.vector_ops import GROUP, GROUPS, TERMS
 from dap3d_core.kernels.array_types import Floats
 
 
@@ -83,30 +81,3 @@ class Tableau:
     def error_uses_last_stage(self) -> bool:
         """True if the error estimate needs f at the result of the step."""
         return self.adaptive and bool(np.any(self.e[:, self.stages] != 0.0))
-
-
-#: First column of a row of ``combinations``, before those of vector_ops.py: abscissa of the stage.
-ABSCISSA = 0
-
-
-@cache
-def combinations(method: Tableau) -> Floats:
-    """The method's coefficients as the compiled core reads them: without the zeros, in one table.
-
-    One row for each row of a, then of e, then of d. A row's terms are filled up to whole groups of
-    ``GROUP`` with terms of weight zero.
-    """
-    coefficients = np.vstack([method.a, *method.e, *method.d])
-    groups = np.maximum(1, -(-np.count_nonzero(coefficients, axis=1) // GROUP))
-    table = np.zeros((len(coefficients), TERMS + 2 * GROUP * max(groups)))
-    table[: len(method.c), ABSCISSA] = method.c
-    table[:, GROUPS] = groups
-    for i, row in enumerate(coefficients):
-        (used,) = np.nonzero(row)
-        if len(used):
-            # filled up with a stage that is used anyway: nothing new meets the weight zero
-            stages = np.concatenate([used, np.repeat(used[-1:], GROUP * groups[i] - len(used))])
-            weights = np.where(np.arange(len(stages)) < len(used), row[stages], 0.0)
-            pairs = np.stack([weights.reshape(-1, GROUP), stages.reshape(-1, GROUP)], axis=1)
-            table[i, TERMS : TERMS + pairs.size] = pairs.ravel()
-    return table

@@ -6,9 +6,6 @@ constraints make of it there. Elsewhere, and with fixed steps on their grid, the
 instant.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -14,9 +14,6 @@ step mixes two laws, and the location needs no dense output, which would mix the
    the integration starts anew; where the switch ends the run, the state stays on the near side.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from typing import Any
 

@@ -52,8 +52,7 @@ class Refusals(NamedTuple):
 def off_constraints(y: Floats) -> Floats:
     """A state (n,) a little off its constraints: one pass of a projection brings it back."""
     noise = np.random.default_rng(0).standard_normal(y.size)
-    off: Floats = y + OFF * float(np.max(np.abs(y))) * noise
-    return off
+    return y + OFF * float(np.max(np.abs(y))) * noise
 
 
 class Integration(Restorable):
@@ -318,8 +317,7 @@ class Integration(Restorable):
     @property
     def y(self) -> Floats:
         """(n,) state at ``t``, a copy."""
-        y: Floats = self.work.state[at.Y].copy()
-        return y
+        return self.work.state[at.Y].copy()
 
     @property
     def trial(self) -> Floats:
@@ -345,8 +343,7 @@ class Integration(Restorable):
         """(n,) dy/dt at ``t``, a copy; None where it is not known."""
         if self.work.first_stage_valid == 0:
             return None
-        slope: Floats = self.work.k[0].copy()
-        return slope
+        return self.work.k[0].copy()
 
     @property
     def refusals(self) -> Refusals | None:
@@ -364,8 +361,7 @@ class Integration(Restorable):
 
         As measured last (stepping/rounding.py); zeros where it was not.
         """
-        noise: Floats = self.work.tolerance[at.NOISE].copy()
-        return noise
+        return self.work.tolerance[at.NOISE].copy()
 
     @property
     def t_stiff(self) -> float | None:
@@ -392,8 +388,7 @@ class Integration(Restorable):
     @property
     def crossings(self) -> Floats:
         """(k, 3) time, which switch, to which side (+1 or -1): the first ``LOGGED`` of them."""
-        found: Floats = self.work.crossings[: self.crossing_count].copy()
-        return found
+        return self.work.crossings[: self.crossing_count].copy()
 
     @property
     def crossing_count(self) -> int:

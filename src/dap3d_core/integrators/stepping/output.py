@@ -1,8 +1,5 @@
 """Output of a step: projected states, rows of the result."""
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from collections.abc import Callable
 from typing import Any
 

@@ -11,9 +11,6 @@ rounding of a stiff direction (radau/rounding.py), and an explicit one takes no 
 changes grow. A step may never be off by more than 1e-6 of the largest component of a kind for that.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 import numpy as np

@@ -11,9 +11,6 @@ evaluated on the constraints, where nothing but rounding is left of that error
 (docs/decisions/0007).
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from typing import Any
 

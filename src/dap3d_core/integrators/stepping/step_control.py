@@ -4,9 +4,6 @@ Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (HNW)
 their codes DOPRI5 and DOP853.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import math
 from typing import Any
 
@@ -21,10 +18,10 @@ from dap3d_core.integrators.stepping.integration_state import (
     Y,
 )
 from dap3d_core.integrators.stepping.output import NEAR_SINGULAR
-from dap3d_core.integrators.stepping.vector_ops import combine, scaled_beyond, scaled_largest
+from dap3d_core.integrators.stepping.vector_ops import copy, scaled_largest
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.scalar_math import where, with_slopes
+from dap3d_core.kernels.scalar_math import with_slopes
 
 #: A step is never shorter than this part of the time or of the whole span, sixteen roundings.
 EPSILON = 2.220446049250313e-16
@@ -54,10 +51,10 @@ STRETCH = 1.01
 def first_step(work: Any, k: Floats, rhs: Function, system: Any, loops: Any) -> float:
     """Starting step of HNW II.4: an Euler step guesses the second derivative. One call of rhs."""
     size, rtol, tolerance = work.error_size, work.rtol, work.tolerance
-    y, y1, f, f1 = work.state[Y], work.state[SCRATCH], k[0], k[1]
+    y, y1, f, f1 = work.state[Y], work.state[SCRATCH], k[0], k[1]  # y1: before and after, too
     t, t_end, floor = work.t, work.times[-1], step_floor(work)
-    d0 = scaled_largest(y, y, y, size, rtol, tolerance, 0.0)
-    d1 = scaled_largest(f, y, y, size, rtol, tolerance, 0.0)
+    d0 = scaled_largest(y1, y, y, y, size, rtol, tolerance, 0.0)
+    d1 = scaled_largest(y1, f, y, y, size, rtol, tolerance, 0.0)
     h = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
     h = max(min(h, t_end - t), floor)
     for i in range(y.size):
@@ -66,7 +63,7 @@ def first_step(work: Any, k: Floats, rhs: Function, system: Any, loops: Any) -> 
     rhs(min(t + h, t_end), y1, f1, system, loops)
     for i in range(y.size):
         f1[i] -= f[i]
-    d2 = scaled_largest(f1, y, y, size, rtol, tolerance, 0.0) / h
+    d2 = scaled_largest(y1, f1, y, y, size, rtol, tolerance, 0.0) / h
     if not d2 <= LARGEST:
         return h
     largest = max(d1, d2)
@@ -103,29 +100,6 @@ def end_of_step(work: Any) -> float:
 
 
 @compiled
-def error_norm(work: Any, h: float) -> float:
-    """Largest scaled error of the first components; 1 is just good enough.
-
-    The largest, as in the manual's ode45, and not HNW's root mean square: in a scene of many bodies
-    the mean would hide the error of the one that moves. Two estimates are combined as in HNW II.5:
-    |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2).
-    """
-    size, rtol, tolerance = work.error_size, work.rtol, work.tolerance
-    y, trial, error = work.state[Y], work.state[TRIAL], work.state[SCRATCH]
-    k, table, first = work.k, work.table, work.k.shape[0]
-    combine(error, 0.0, y, h, table, first, k)
-    main = scaled_largest(error, y, trial, size, rtol, tolerance, h)
-    of_work = work_error(work, h, error[error.size - 1])
-    if work.estimate_count == 1:
-        return where(of_work > main, of_work, main)
-    combine(error, 0.0, y, h, table, first + 1, k)
-    other = scaled_largest(error, y, trial, size, rtol, tolerance, h)
-    main = combined_error(main, other)
-    of_work = combined_error(of_work, work_error(work, h, error[error.size - 1]))
-    return where(of_work > main, of_work, main)
-
-
-@compiled
 def work_error(work: Any, h: float, error: float) -> float:
     """Scaled error of the work done in a long step, where that does not steer the step as the rest.
 
@@ -137,20 +111,6 @@ def work_error(work: Any, h: float, error: float) -> float:
         return 0.0
     most = max(work.largest_work, abs(work.state[Y, last]), abs(work.state[TRIAL, last]))
     return abs(error) / (work.tolerance[ABSOLUTE, last] + WORK_SLACK * work.rtol * most)
-
-
-@compiled
-def error_beyond_rounding(work: Any, h: float) -> float:
-    """As ``error_norm``, of what exceeds the rounding of time in the rates."""
-    size, rtol, tolerance = work.error_size, work.rtol, work.tolerance
-    y, trial, error = work.state[Y], work.state[TRIAL], work.state[SCRATCH]
-    k, first, last = work.k, work.k.shape[0], work.k[work.stage_count - 1]
-    main, rounding = 0.0, EPSILON * max(abs(work.t), abs(work.t + h))
-    for e in range(work.estimate_count):
-        combine(error, 0.0, y, h, work.table, first + e, k)
-        found = scaled_beyond(error, y, trial, k[0], last, rounding, size, rtol, tolerance)
-        main = found if e == 0 else combined_error(main, found)
-    return main
 
 
 @compiled
@@ -173,14 +133,16 @@ def accept(work: Any, t1: float, error: float) -> None:
     """Make the trial state the state, and choose the next step (PI controller of HNW's codes)."""
     state, k, h, result = work.state, work.k, t1 - work.t, work.stage_count
     work.t = t1
-    for i in range(state.shape[1]):
-        state[Y, i] = state[TRIAL, i]
-        k[0, i] = k[result, i]
+    copy(state[Y], state[TRIAL])
+    copy(k[0], k[result])
     work.step_count += 1
     if work.fixed_step != 0.0:
         work.segment_step += 1
         return
-    divisor = error**work.exponent / work.last_error**work.beta / work.safety
+    divisor = error**work.exponent
+    if work.beta != 0.0:
+        divisor /= work.last_error**work.beta
+    divisor /= work.safety
     factor = min(work.factor_max, max(work.factor_min, 1.0 / max(divisor, 1e-30)))
     if work.last_rejected != 0:
         factor = min(factor, 1.0)

@@ -1,8 +1,5 @@
 """The values of switches and their rates at a state; on which side of each the motion is."""
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 import numpy as np

@@ -88,8 +88,7 @@ def differentiated_loop(type_info: TypeInfo, what: str, count: int) -> Entry:
         loop = write(type_info, what)
         assert loop is not None
         type_info.loops[key] = build_differentiated(loop, count)
-    made: Entry = type_info.loops[key]
-    return made
+    return type_info.loops[key]
 
 
 def _compiled_loop(type_info: TypeInfo, what: str, announce: Callable[[str], None] | None) -> Any:
@@ -111,7 +110,7 @@ def _compiled_loop(type_info: TypeInfo, what: str, announce: Callable[[str], Non
 
 
 def compile_all(type_info: TypeInfo) -> None:
-    """Compile all loops of a type and of its variants.
+    """Compile all loops of a type, of its variants, and of its friction that sticks.
 
     Except kernels that call a function of an argument, and those of types with lists: they are
     compiled with the function and the lengths of a scene.
@@ -127,6 +126,11 @@ def compile_all(type_info: TypeInfo) -> None:
             compiled_loop(bind_friction(type_info), "friction")
     for _, variant in type_info.variants:
         compile_all(variant)
+    if grips := getattr(type_info.type, "grips", ()):
+        from dap3d_core.interface.examine.examine import examine
+
+        for grip in grips:
+            compile_all(examine(grip))
 
 
 def _calls_functions(type_info: TypeInfo) -> bool:

@@ -111,6 +111,11 @@ def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, Kernel
     if type_.is_contact:
         lam = f"({''.join(f'-out3[row + {k}], ' for k in range(3))})"
         offer("lam", (3,), lam, velocity=True, doc="its multipliers", derivable=False)
+        if load := type_.load:  # type: ignore[attr-defined]
+            joint = f"idx[b0 + {layout.integers + 1 + len(layout.slots)}]"
+            lam = f"({''.join(f'-out3[{joint} + {k}], ' for k in load)})"
+            doc = "multipliers of the joint that press its surfaces"
+            offer("lam_load", (len(load),), lam, velocity=True, doc=doc, derivable=False)
     for name, (at, shape) in layout.states.items():
         offer(name, shape, _state(at, shape), doc="state of the element", derivable=False)
     return names
@@ -288,8 +293,6 @@ def _offer_constant(offer: Callable[..., None], name: str, layout: InstanceLayou
 def stored(layout: InstanceLayout, name: str) -> str:
     """Expression for a number of an instance."""
     offset, shape = layout.numbers[name]
-    if shape == ():
-        return f"par[p1 + {offset}]"
     if shape == (3,):
         return f"vector_in(par, p1 + {offset})"
     if shape == (3, 3):

@@ -111,8 +111,7 @@ class _Instances:
         """(m, length) places behind an index, from here on the instance's own."""
         self.idx[:, column] = length * (of * np.arange(len(self.idx)) + shift)
         self._places = max(self._places, length * of * len(self.idx))
-        places: Integers = self.idx[:, column, None] + np.arange(length)
-        return places
+        return self.idx[:, column, None] + np.arange(length)
 
     def run(self, entry: Entry, t: float, p0: int) -> list[Floats]:
         """(size, 1 + d) values and slopes: of the three outputs of a loop, and rates of states."""
@@ -123,10 +122,12 @@ class _Instances:
         for first in range(0, max(len(self.seeds), 1), AT_ONCE):
             wide = DifferentiatedArrays(arrays, 1 + AT_ONCE)
             outs = np.zeros((3, size, 1 + AT_ONCE))
-            outs[1, : len(multipliers), 0] = multipliers
+            outs[1:, : len(multipliers), 0] = multipliers  # contacts read them behind outputs
             for lane, (name, at, slopes) in enumerate(self.seeds[first : first + AT_ONCE], 1):
-                numbers = outs[1] if name == "multipliers" else wide.matrix(self._arrays[name])
-                numbers[at, lane] = slopes
+                if name == "multipliers":
+                    outs[1:, at, lane] = slopes
+                else:
+                    wide.matrix(self._arrays[name])[at, lane] = slopes
             entry(t, wide, 0, p0, len(self.idx), *outs)
             parts.append([*outs, wide.matrix(arrays.rates)])
         return [

@@ -151,7 +151,10 @@ def rows_read(type_info: TypeInfo) -> dict[int, int]:
     The friction of a joint reads its own.
     """
     found = {j.integers + j.type_info.layout.integers: j.rows for j in type_info.joints}
-    return found or {type_info.layout.integers: type_info.row_count}
+    found = found or {type_info.layout.integers: type_info.row_count}
+    if load := getattr(type_info.type, "load", ()):  # of its joint, too
+        found |= {type_info.layout.integers + 1 + len(type_info.layout.slots): load[-1] + 1}
+    return found
 
 
 def reaction_lines(

@@ -208,8 +208,7 @@ def bound_kernel(
     line = kernel.__code__.co_firstlineno
     bound.__code__ = bound.__code__.replace(co_qualname=kernel.__qualname__, co_firstlineno=line)
     bound.kernels = (kernel, *names.values())  # wherever they were defined: in a notebook, say
-    made: Callable[..., Any] = bound
-    return made
+    return bound
 
 
 def once(

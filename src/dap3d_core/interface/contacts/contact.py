@@ -56,6 +56,13 @@ class Contact(Joint):
     ``prepare`` returns what it is where it slides, ``mu``, and the most where it sticks, ``mu_s``,
     N or N m.
 
+    Friction of a joint, ``class OfHinge(Contact, of=Hinge)``, has no gap either, but ``load``, the
+    rows of the joint whose multipliers together (the root of the sum of their squares) press its
+    surfaces; of a row in ``unilateral`` it is what pushes. It slides along ``along``, or in the
+    plane across ``normal``, or without both in every direction; at the point ``at``, or turns. The
+    fields that these functions name, points and vectors are those of the joint; ``mu``, ``mu_s``
+    and of what turns ``radius`` come from the force that switches the friction on.
+
     Rows, right-hand sides, slip and friction follow from them: one of the normal, two across it, of
     the velocity of body i at the point of contact less that of body j. The gap must be such that
     its rate is that velocity along the normal, as of every distance between smooth surfaces
@@ -67,39 +74,63 @@ class Contact(Joint):
             ``part``, 0 and so on, ``prepare`` reads: it returns what differs between them.
         is_smooth: without friction, and without fields of a material but ``e``.
         shared: of a variant of a force, the fields of that force that it has, too.
+        load: of friction of a joint, adjacent rows of the joint.
+        pushes: that load is of one row, and none where that pulls.
+        holds: which of its three rows act where it sticks.
     """
 
     kernel_names: ClassVar[tuple[str, ...]] = (  # type: ignore[assignment]
         *DECLARED, *OPTIONAL, *Joint.kernel_names, "tension"
     )  # fmt: skip
-    rows, holonomic = 3, (True, False, False)
+    rows = 3
+    holonomic: ClassVar[bool | tuple[bool, ...]] = (True, False, False)
     is_contact: ClassVar[bool] = True
     declared: ClassVar[tuple[str, ...]] = (*DECLARED, *OPTIONAL)
     points: ClassVar[int] = 1
     is_smooth: ClassVar[bool] = False
     shared: ClassVar[tuple[str, ...]] = ()
+    load: ClassVar[tuple[int, ...]] = ()
+    pushes: ClassVar[bool] = False
+    holds: ClassVar[tuple[bool, bool, bool]] = (True, True, True)
     at: ClassVar[Any] = None
     along: ClassVar[Any] = None
     grip: ClassVar[Any] = None
+    normal: ClassVar[Any] = None
 
     def __init_subclass__(cls, of: type[TypeBase] | None = None, **conditions: Any) -> None:
         if "kernel_names" not in vars(cls):
             cls.states = {"mode": 1, "way": 3, "near": 3}
             if of is not None:
-                specs = _specs(of)
-                _add_fields(cls, {name: field_of(specs[name]) for name in cls.shared})
+                _add_fields(cls, _shared_fields(cls, of))
             _add_material(cls)
-            if cls.along is not None or all(hasattr(cls, name) for name in DECLARED):
+            if cls.load:
+                pushing = getattr(of, "unilateral", ())
+                cls.holonomic = False
+                cls.pushes = len(cls.load) == 1 and pushing is not True and cls.load[0] in pushing
+            is_one = cls.load or cls.along is not None
+            if is_one or all(getattr(cls, name, None) is not None for name in DECLARED):
                 for name, kernel in _kernels(cls).items():
                     setattr(cls, name, kernel)
-        if of is not None:  # class RigidStop(Contact, of=SpringStop, k=False): without a stiffness
+            cls.holds = _holds(cls)
+        if of is not None and cls.load:
+            of.grips = (*vars(of).get("grips", ()), cls)  # type: ignore[attr-defined]
+        elif of is not None:  # class RigidStop(Contact, of=SpringStop, k=False): no stiffness
             of.variants, conditions = (*of.variants, (conditions, cls)), {}
         super().__init_subclass__(**conditions)
 
+    @classmethod
+    def is_friction_alone(cls) -> bool:
+        """True of what has no gap: it slides or sticks, and is never open."""
+        return bool(cls.load) or cls.along is not None
+
     def prepare(self, bodies: Mapping[str, Any]) -> dict[str, Any]:
-        """The coefficient of sticking friction where it is that of sliding."""
+        """The coefficient of sticking friction where it is that of sliding, those of moments."""
         given: Any = self
-        return {"mu_s": given.mu if given.mu_s is None else given.mu_s}
+        mu_s = given.mu if given.mu_s is None else given.mu_s
+        if not self.load:
+            return {"mu_s": mu_s}
+        arm = 1.0 if self.at is not None else given.radius
+        return {"mu": arm * given.mu, "mu_s": arm * mu_s}
 
 
 def hidden(value: Any) -> Any:
@@ -117,9 +148,12 @@ def _add_material(class_: type) -> None:
         "law": choice(LAWS, "poisson", doc="of impacts: whose coefficient e is"),
         "touch": choice((False, True), False, doc="the bodies are moved until they touch at t = 0"),
     }
-    if class_.is_smooth or class_.along is not None:  # type: ignore[attr-defined]
+    alone = class_.is_friction_alone()  # type: ignore[attr-defined]
+    if class_.is_smooth or alone:  # type: ignore[attr-defined]
         fields = {name: hidden(0.0) for name in ("e", "mu", "mu_s")}
-        fields |= {} if class_.along is not None else {"e": e}  # type: ignore[attr-defined]
+        fields |= {} if alone else {"e": e}
+        if class_.load and class_.at is None:  # type: ignore[attr-defined]
+            fields["radius"] = hidden(1.0)
     if class_.grip is not None:  # type: ignore[attr-defined]
         unread = {"mu", "mu_s"} - set(signature(class_.grip).parameters)  # type: ignore[attr-defined]
         fields |= {name: hidden(0.0) for name in unread}
@@ -135,6 +169,27 @@ def _add_fields(class_: type, fields: Mapping[str, Any]) -> None:
             setattr(class_, name, field)
             own[name] = Any
     class_.__annotations__ = own
+
+
+def _shared_fields(class_: Any, of: type[TypeBase]) -> dict[str, Any]:
+    """Fields that a class has of the force, or the joint, that it belongs to."""
+    from dap3d_core.interface.codegen.kernel_arguments import parameters
+
+    specs = _specs(of)
+    if not class_.load:
+        return {name: field_of(specs[name]) for name in class_.shared}
+    named = {n for k in ("along", "at", "normal") if k in vars(class_)
+             for n in parameters(vars(class_)[k])}  # fmt: skip
+    places = ("body", "point", "vector", "vector2")
+    return {n: field_of(s) for n, s in specs.items() if s.kind in places or n in named}
+
+
+def _holds(class_: Any) -> tuple[bool, bool, bool]:
+    """Rows of a contact that act where it sticks: normal, and two across it."""
+    if class_.is_friction_alone():
+        every = class_.along is None and class_.normal is None
+        return every, True, class_.along is None
+    return True, not class_.is_smooth, not class_.is_smooth
 
 
 def _specs(class_: type) -> dict[str, FieldSpec]:
@@ -154,7 +209,7 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     # imported here: finding types by keyword does not need kernels
     from dap3d_core.interface.codegen.kernel_arguments import parameters
     from dap3d_core.interface.codegen.specialise import bound_kernel
-    from dap3d_core.interface.contacts import grips, rates, rows, turning
+    from dap3d_core.interface.contacts import grips, loaded, rates, rows, turning
 
     names_of = [n for n in (*DECLARED, *OPTIONAL) if getattr(class_, n, None) is not None]
     declared = {name: getattr(class_, name) for name in names_of}
@@ -164,7 +219,7 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     if not has_j:
         calls |= dict.fromkeys(("r_j", "v_j", "w_j"), "(0.0, 0.0, 0.0)")
     kernels = {f"{name}__": kernel for name, kernel in declared.items()}
-    every = kernels | {"rate_of__": rates.rate_of, "turned__": rates.turned}
+    every: dict[str, Any] = kernels | {"rate_of__": rates.rate_of, "turned__": rates.turned}
 
     def bound(kernel: Callable[..., Any]) -> Any:
         own = parameters(kernel)
@@ -173,7 +228,9 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         return bound_kernel(kernel, given, needed, every)
 
     special: dict[str, Any] = turning.KERNELS if "at" not in declared else {}
-    if "along" in declared:
+    if class_.load:
+        special = loaded.kernels_of(calls, wanted, every, pushes=class_.pushes, has_j=has_j)
+    elif "along" in declared:
         special = grips.KERNELS if "at" in declared else grips.TURNING
     if special:
         return {name: bound(kernel) for name, kernel in special.items()}

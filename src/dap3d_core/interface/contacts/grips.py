@@ -8,7 +8,7 @@ The functions whose names begin with turning are of a moment about e.
 # Kernels take numbers of any kind: floats, and symbols of a trace.
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
-from dap3d_core.interface.contacts.rows import closed, held, rate, slip_of
+from dap3d_core.interface.contacts.rows import closed, held, holds, rate, slip_of
 from dap3d_core.kernels import cross, dot, maximum, neg, row, scale, sub, where
 
 _ZERO = (0.0, 0.0, 0.0)
@@ -20,9 +20,9 @@ def position():
     return 0.0
 
 
-def blocks(c, e, r_i, r_j, mode):
+def blocks(c, e, r_i, r_j, mode, way):
     """J of both bodies."""
-    u = where(held(mode), e, _ZERO)
+    u = where(holds(mode, way, 1), e, _ZERO)
     back = neg(u)
     return (
         (_NONE, row(u, cross(sub(c, r_i), u)), _NONE),
@@ -30,22 +30,22 @@ def blocks(c, e, r_i, r_j, mode):
     )
 
 
-def turning_blocks(e, mode):
+def turning_blocks(e, mode, way):
     """J of both bodies."""
-    u = where(held(mode), e, _ZERO)
+    u = where(holds(mode, way, 1), e, _ZERO)
     return (_NONE, row(_ZERO, u), _NONE), (_NONE, row(_ZERO, neg(u)), _NONE)
 
 
-def gamma(c_dot, e, e_dot, c, r_i, v_i, w_i, r_j, v_j, w_j, mode):
+def gamma(c_dot, e, e_dot, c, r_i, v_i, w_i, r_j, v_j, w_j, mode, way):
     """-J_dot v."""
     slip = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
     bent = sub(cross(w_i, sub(c_dot, v_i)), cross(w_j, sub(c_dot, v_j)))
-    return 0.0, where(held(mode), -dot(e_dot, slip) - dot(e, bent), 0.0), 0.0
+    return 0.0, where(holds(mode, way, 1), -dot(e_dot, slip) - dot(e, bent), 0.0), 0.0
 
 
-def turning_gamma(e_dot, w_i, w_j, mode):
+def turning_gamma(e_dot, w_i, w_j, mode, way):
     """-J_dot v."""
-    return 0.0, where(held(mode), -dot(e_dot, sub(w_i, w_j)), 0.0), 0.0
+    return 0.0, where(holds(mode, way, 1), -dot(e_dot, sub(w_i, w_j)), 0.0), 0.0
 
 
 def sense(e, way):

@@ -32,6 +32,14 @@ def held(mode):
     return mode > 1.5
 
 
+def holds(mode, way, k):
+    """True where row k of friction alone holds: where it sticks, but for those that others hold.
+
+    The components of ``way`` name these, 1.0; it is a direction of sliding in mode 1 alone.
+    """
+    return held(mode) & (way[k] < 0.5)
+
+
 def axis(n):
     """The axis of ground that a normal is farthest from."""
     x, y, z = (c * c for c in n)
@@ -39,14 +47,14 @@ def axis(n):
     return where(first, (1.0, 0.0, 0.0), where(y <= z, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
 
-def tangents(n, grain):
+def tangents(n, grain=None):
     """Two unit vectors across a normal, the first along a grain; None: any two."""
     a = cross(n, axis(n)) if grain is None else across(grain, n)
     first = scale(1.0 / sqrt(dot(a, a)), a)
     return first, cross(n, first)
 
 
-def tangent_rates(n, n_dot, grain, grain_dot):
+def tangent_rates(n, n_dot, grain=None, grain_dot=None):
     """Rates of ``tangents``."""
     if grain is None:
         a, a_dot = cross(n, axis(n)), cross(n_dot, axis(n))

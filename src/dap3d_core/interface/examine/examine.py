@@ -76,7 +76,9 @@ def examine(type_: type[TypeBase], seed: int = 1) -> TypeInfo:
     _check_named_fields(type_, layout)
     _check_reset(type_, layout)
     if has_states:
-        _check_state_names(type_, layout)
+        from dap3d_core.interface.examine.check_states import check_state_names
+
+        check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
     names = namespace(type_, layout)
     kernels: dict[str, Callable[..., Any]] = type_.kernels()
     outputs: dict[str, tuple[str, ...]] = {}
@@ -139,12 +141,6 @@ def _declares_states(type_: type[TypeBase], *, is_abstract: bool) -> bool:
 
     check_states(type_, is_abstract=is_abstract)
     return True
-
-
-def _check_state_names(type_: type[TypeBase], layout: InstanceLayout) -> None:
-    from dap3d_core.interface.examine.check_states import check_state_names
-
-    check_state_names(type_, layout, namespace(type_, attrs.evolve(layout, states={})))
 
 
 def _output(

@@ -1,6 +1,7 @@
 """The interface of file formats: what an importer returns and what an exporter is given."""
 
 from dap3d_core.interface.formats.articulation import (
+    UNBOUNDED,
     WORLD,
     Actuator,
     Articulation,
@@ -11,6 +12,7 @@ from dap3d_core.interface.formats.articulation import (
     Joint,
     Limits,
     Link,
+    Tendon,
 )
 from dap3d_core.interface.formats.format_types import (
     Exporter,
@@ -47,6 +49,7 @@ __all__ = [
     "INTERFACE_VERSION",
     "LEAST",
     "NOWHERE",
+    "UNBOUNDED",
     "WORLD",
     "Actuator",
     "Articulation",
@@ -68,6 +71,7 @@ __all__ = [
     "Remarks",
     "ResultExporter",
     "Source",
+    "Tendon",
     "XmlElement",
     "axis_angle",
     "euler_angles",

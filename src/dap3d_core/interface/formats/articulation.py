@@ -26,6 +26,8 @@ KINDS = {
 }  # fmt: skip
 #: Limits of this size and beyond are none, rad or m: files have 1e16, and the largest numbers.
 UNLIMITED = 1e6
+#: Bounds that are none.
+UNBOUNDED = (-inf, inf)
 
 
 def _floats(value: Any) -> Floats:
@@ -80,16 +82,20 @@ class Contact:
     """How a shape meets others.
 
     Attributes:
-        mu: coefficient of friction; of a pair see ``Articulation.friction_of_pair``.
+        mu: coefficient of friction; of a pair see ``Articulation.coefficient_of_pair``.
         smooth: without friction, but with shapes that are not smooth.
         group, meets: bits; a pair meets where ``group`` of one and ``meets`` of the other have one
             in common.
+        priority: of a pair the one with the larger decides alone.
+        e: coefficient of restitution.
     """
 
     mu: float = 1.0
     smooth: bool = False
     group: int = 1
     meets: int = 1
+    priority: int = 0
+    e: float = 0.0
 
 
 @attrs.define(eq=False)
@@ -101,12 +107,14 @@ class Link:
         inertial: its mass and inertia, or None for none.
         geometries: its shapes.
         place: its place in the file.
+        gravcomp: the part of its weight that is carried.
     """
 
     name: str
     inertial: Inertial | None = None
     geometries: list[Geometry] = attrs.Factory(list)
     place: Place = NOWHERE
+    gravcomp: float = 0.0
 
 
 def _lower(value: float) -> float:
@@ -215,18 +223,59 @@ class Coupling:
 
 @attrs.frozen(eq=False)
 class Actuator:
-    """A force on the coordinate of a joint: gear times the input.
+    """A force on the coordinate q of a joint, or a force and moment on a link, by an input u.
+
+        F = gear u + bias - stiffness q - damping q_dot
 
     Attributes:
-        name: its name in the file, which becomes that of an input.
-        joint: the joint.
+        name: its name in the file, which becomes that of an input; several may share one.
+        joint: the joint; "" for one of a link.
         gear: N m or N for an input of 1.
         place: its place in the file.
+        bias, stiffness, damping: see above; q as the joint counts it.
+        control, force, active: least and greatest u, F and activation, infinite for none.
+        activation: "lag" or "integral" where u acts by a state, with the time constant ``time``.
+        start: that state, and the input, where the model starts.
+        link, at, wrench: of a link, the frame and the (6,) force and moment for u = 1 in its axes.
     """
 
     name: str
     joint: str
     gear: float = 1.0
+    place: Place = NOWHERE
+    bias: float = 0.0
+    stiffness: float = 0.0
+    damping: float = 0.0
+    control: tuple[float, float] = UNBOUNDED
+    force: tuple[float, float] = UNBOUNDED
+    active: tuple[float, float] = UNBOUNDED
+    activation: str = ""
+    time: float = 1.0
+    start: tuple[float, float] = (0.0, 0.0)
+    link: str = ""
+    at: Frame = IDENTITY
+    wrench: tuple[float, ...] = ()
+
+
+@attrs.frozen(eq=False)
+class Tendon:
+    """A straight line between points of two links, with a spring, a damper and limits.
+
+    Attributes:
+        name: its name in the file.
+        ends: two links, and the points in their axes, (3,) each.
+        stiffness, damping: N/m, N s/m.
+        rest: the length without force, m.
+        limits: of its length, m.
+        place: its place in the file.
+    """
+
+    name: str
+    ends: tuple[tuple[str, Floats], tuple[str, Floats]]
+    stiffness: float = 0.0
+    damping: float = 0.0
+    rest: float = 0.0
+    limits: Limits = Limits()
     place: Place = NOWHERE
 
 
@@ -237,10 +286,11 @@ class Articulation:
     Attributes:
         name: of the model.
         links, joints: by name, in the order of the file.
-        couplings, actuators: in the order of the file.
+        couplings, actuators, tendons: in the order of the file.
         excluded: pairs of links whose shapes do not meet.
         base_meets: whether links meet those that do not move and that a joint holds them at.
-        friction_of_pair: the coefficient of two shapes that meet, of those of both: max or min.
+        coefficient_of_pair: friction and restitution of two shapes that meet, of those of both: max
+            or min.
         gravity: (3,) m/s^2.
         fixed_base: whether links without a joint to a parent are fixed to the world, rather than
             free; None where the format leaves it open.
@@ -253,9 +303,10 @@ class Articulation:
     joints: dict[str, Joint] = attrs.Factory(dict)
     couplings: list[Coupling] = attrs.Factory(list)
     actuators: list[Actuator] = attrs.Factory(list)
+    tendons: list[Tendon] = attrs.Factory(list)
     excluded: list[tuple[str, str]] = attrs.Factory(list)
     base_meets: bool = False
-    friction_of_pair: Callable[[float, float], float] = max
+    coefficient_of_pair: Callable[[float, float], float] = max
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     fixed_base: bool | None = None
     place: Place = NOWHERE

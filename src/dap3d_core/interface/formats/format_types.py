@@ -31,6 +31,7 @@ class Source(Protocol):
         arguments: values that the user gives for names in the file, as those of macros.
         unused: names of arguments; an importer removes those that the file has, and what is left is
             refused.
+        key: the keyframe that the model starts at; an importer that has them puts None there.
     """
 
     path: Path
@@ -40,6 +41,7 @@ class Source(Protocol):
     packages: Mapping[str, Path]
     arguments: Mapping[str, str]
     unused: set[str]
+    key: str | None
 
     def read_text(self) -> str:
         """The text of the file itself, UTF-8."""

@@ -185,10 +185,6 @@ class _Differentiator(VectorWriter):
 _D = _Differentiator
 
 
-def _sqrt(d: _D, y: str, x: str) -> list[str]:
-    return [d._number("fdiv", bits(0.5), y)]
-
-
 def _fabs(d: _D, y: str, x: str) -> list[str]:
     below = d._new(f"fcmp olt double {x}, {_ZERO}")
     return [d._new(f"select i1 {below}, double {bits(-1.0)}, double {_ONE}")]
@@ -198,30 +194,14 @@ def _negative(d: _D, word: str) -> str:
     return d._new(f"fneg double {word}")
 
 
-def _tan(d: _D, y: str, x: str) -> list[str]:
-    return [d._number("fadd", _ONE, d._number("fmul", y, y))]
-
-
-def _tanh(d: _D, y: str, x: str) -> list[str]:
-    return [d._number("fsub", _ONE, d._number("fmul", y, y))]
-
-
 def _asin(d: _D, y: str, x: str) -> list[str]:
     rest = d._number("fsub", _ONE, d._number("fmul", x, x))
     return [d._number("fdiv", _ONE, d._call("llvm.sqrt.f64", rest))]
 
 
-def _atan(d: _D, y: str, x: str) -> list[str]:
-    return [d._number("fdiv", _ONE, d._number("fadd", _ONE, d._number("fmul", x, x)))]
-
-
 def _atan2(d: _D, angle: str, y: str, x: str) -> list[str]:
     square = d._number("fadd", d._number("fmul", x, x), d._number("fmul", y, y))
     return [d._number("fdiv", x, square), d._number("fdiv", _negative(d, y), square)]
-
-
-def _hypot(d: _D, r: str, x: str, y: str) -> list[str]:
-    return [d._number("fdiv", x, r), d._number("fdiv", y, r)]
 
 
 def _pow(d: _D, y: str, x: str, n: str) -> list[str]:
@@ -232,21 +212,23 @@ def _pow(d: _D, y: str, x: str, n: str) -> list[str]:
 
 #: Of each function: writes its derivatives by its arguments, given its value and these.
 _FACTORS: dict[str, Callable[..., list[str]]] = {
-    "llvm.sqrt.f64": _sqrt,
+    "llvm.sqrt.f64": lambda d, y, x: [d._number("fdiv", bits(0.5), y)],
     "llvm.fabs.f64": _fabs,
     "sin": lambda d, y, x: [d._call("cos", x)],
     "cos": lambda d, y, x: [_negative(d, d._call("sin", x))],
-    "tan": _tan,
+    "tan": lambda d, y, x: [d._number("fadd", _ONE, d._number("fmul", y, y))],
     "sinh": lambda d, y, x: [d._call("cosh", x)],
     "cosh": lambda d, y, x: [d._call("sinh", x)],
-    "tanh": _tanh,
+    "tanh": lambda d, y, x: [d._number("fsub", _ONE, d._number("fmul", y, y))],
     "exp": lambda d, y, x: [y],
     "log": lambda d, y, x: [d._number("fdiv", _ONE, x)],
     "asin": _asin,
     "acos": lambda d, y, x: [_negative(d, _asin(d, y, x)[0])],
-    "atan": _atan,
+    "atan": lambda d, y, x: [
+        d._number("fdiv", _ONE, d._number("fadd", _ONE, d._number("fmul", x, x)))
+    ],
     "atan2": _atan2,
-    "hypot": _hypot,
+    "hypot": lambda d, r, x, y: [d._number("fdiv", x, r), d._number("fdiv", y, r)],
     "pow": _pow,
 }
 

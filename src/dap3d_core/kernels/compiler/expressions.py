@@ -72,6 +72,8 @@ class Expressions(Writer):
         argument = self.arguments.get(name)
         if isinstance(argument, t.Known) and name not in self.stored:
             return self._known(node, name, argument.value)
+        if name in self.constants:
+            return self.constants[name]
         if name in self.variables:
             return self.load(name)
         if name in self.stored:

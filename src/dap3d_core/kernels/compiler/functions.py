@@ -74,6 +74,8 @@ class FunctionCompiler(Expressions):
         self.stored = stored_names(self.node)
         #: Type and stack slots of each variable.
         self.variables: dict[str, tuple[Any, list[str]]] = {}
+        #: Names of loops over constants, which are constants in them.
+        self.constants: dict[str, t.Value] = {}
         #: Labels to continue at, and behind, each enclosing loop.
         self.loops: list[tuple[str, str]] = []
         self.result: Any = None
@@ -95,7 +97,10 @@ class FunctionCompiler(Expressions):
 
     def text(self, name: str, inlined: bool) -> str:
         """The text of the function."""
-        head = ", ".join(f"{w} %{n}.{k}.a" for n, type_ in self.arguments.items()
+        separate = {a.arg for a in self.node.args.args
+                    if getattr(a.annotation, "id", "") == "SeparateFloats"}  # fmt: skip
+        head = ", ".join(f"{w}{' noalias' * (n in separate and w == 'ptr')} %{n}.{k}.a"
+                         for n, type_ in self.arguments.items()
                          for k, w in enumerate(type_.words))  # fmt: skip
         attributes = "nounwind inlinehint" if inlined else "nounwind"
         lines = "\n".join(["entry:", *self.places, *self.lines])
@@ -225,9 +230,22 @@ class FunctionCompiler(Expressions):
             self.refuse(node, "a loop over what is no range", "write for k in range(...)")
         if any(isinstance(n, (ast.Break, ast.Continue)) for n in ast.walk(node)):
             self.refuse(node, "break or continue in a loop over a tuple", "loop over a range")
-        for item in t.items_of(over):
-            self._assign(node.target, item)
+        items, names = t.items_of(over), stored_names(node.target)
+        if not all(map(t.is_constant, items)) or names & self._stored_but_for(node.target):
+            names = set()
+        for item in items:
+            if names:
+                self.constants |= _named(node.target, item)
+            else:
+                self._assign(node.target, item)
             self.statements(node.body)
+        for name in names:
+            self.constants.pop(name, None)
+
+    def _stored_but_for(self, target: ast.expr) -> set[str]:
+        """Names that the function assigns to elsewhere than in the target of a loop."""
+        here = {id(n) for n in ast.walk(target)}
+        return {n.id for n in _stores(self.node) if id(n) not in here}
 
     def _count(self, node: ast.For, call: ast.Call) -> None:
         """``for k in range(...)``; assignments to k do not change the count."""
@@ -263,11 +281,23 @@ def _definitions(file: str, everywhere: bool) -> dict[int, ast.FunctionDef]:
     return {min([d.lineno for d in node.decorator_list] + [node.lineno]): node for node in found}
 
 
-@cache
-def stored_names(node: ast.FunctionDef) -> set[str]:
-    """Names that a function assigns to."""
+def _named(target: ast.expr, value: t.Value) -> dict[str, t.Value]:
+    """The parts of a value by the names that a loop gives them."""
+    if isinstance(target, ast.Name):
+        return {target.id: value}
+    parts = zip(target.elts, t.items_of(value), strict=True)  # type: ignore[attr-defined]
+    return {name: x for part, item in parts for name, x in _named(part, item).items()}
+
+
+def _stores(node: ast.AST) -> list[ast.Name]:
     names = (n for n in ast.walk(node) if isinstance(n, ast.Name))
-    return {n.id for n in names if isinstance(n.ctx, ast.Store)}
+    return [n for n in names if isinstance(n.ctx, ast.Store)]
+
+
+@cache
+def stored_names(node: ast.AST) -> set[str]:
+    """Names that a function, or a part of it, assigns to."""
+    return {n.id for n in _stores(node)}
 
 
 def definition(function: Callable[..., Any]) -> ast.FunctionDef:

@@ -146,8 +146,7 @@ def compile_ir(
     options.loop_interleaving = False
     builder = llvm.create_pass_builder(machine, options)
     builder.getModulePassManager().run(module, builder)
-    code: bytes = machine.emit_object(module)
-    return code
+    return machine.emit_object(module)
 
 
 def _check_room(size: int) -> None:

@@ -162,6 +162,12 @@ def items_of(value: Value) -> tuple[Value, ...]:
     return tuple(Value(item, tuple(next(words) for _ in item.words)) for item in value.type.items)
 
 
+def is_constant(value: Value) -> bool:
+    """True for a number that is known, or a tuple of such."""
+    is_tuple = isinstance(value.type, Tuple) and len(value.items) == len(value.type.items)
+    return value.constant is not None or (is_tuple and all(map(is_constant, value.items)))
+
+
 def wider(*types: Any) -> Any:
     """The common type of numbers; None where a type is no number's."""
     return max(types, key=NUMBERS.index) if all(type_ in NUMBERS for type_ in types) else None

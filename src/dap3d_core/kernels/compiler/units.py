@@ -198,8 +198,7 @@ def _words_of(types: Sequence[Any]) -> Callable[..., Any]:
     words = [_words_text(f"a{k}", type_, checks) for k, type_ in enumerate(types)]
     names = ", ".join(f"a{k}" for k in range(len(types)))
     source = f"lambda {names}: [{', '.join(filter(None, words))}]"
-    made: Callable[..., Any] = eval(source, checks)
-    return made
+    return eval(source, checks)
 
 
 def _words_text(name: str, type_: Any, checks: dict[str, Any]) -> str:

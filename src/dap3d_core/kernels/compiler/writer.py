@@ -239,8 +239,7 @@ def _power(writer: Writer, a: t.Value, b: t.Value) -> t.Value:
 def _complex_product(writer: Writer, a: t.Value, b: t.Value) -> t.Value:
     """(a0 b0 - a1 b1, a0 b1 + a1 b0)."""
     (a0, a1), (b0, b1), new = a.words, b.words, writer.new
-    p, q, r, s = (new(f"fmul double {x}, {y}")
-                  for x, y in ((a0, b0), (a1, b1), (a0, b1), (a1, b0)))  # fmt: skip
+    p, q, r, s = (new(f"fmul double {x}, {y}") for x, y in ((a0, b0), (a1, b1), (a0, b1), (a1, b0)))
     return t.Value(t.COMPLEX, (new(f"fsub double {p}, {q}"), new(f"fadd double {r}, {s}")))
 
 

@@ -282,5 +282,4 @@ class Differentiation:
 
 
 def _flat(array: Floats) -> Floats:
-    flat: Floats = array.reshape(-1).view(np.float64)
-    return flat
+    return array.reshape(-1).view(np.float64)

@@ -96,8 +96,7 @@ def _support_sources() -> list[str | bytes]:
 def python_loop(loop: Loop) -> Callable[..., None]:
     """The loop as a Python function."""
     text = source_of(loop)
-    made: Callable[..., None] = _module(loop, text, unit_names(loop, text)[1])["loop"]
-    return made
+    return _module(loop, text, unit_names(loop, text)[1])["loop"]
 
 
 def build_wide(loop: Loop, count: int) -> Entry:

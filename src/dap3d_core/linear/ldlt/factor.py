@@ -14,9 +14,6 @@ rows: it can be factored in any order, whatever the rank of D^ (Vanderbei, Symme
 matrices, SIAM J. Optim. 5, 1995).
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers

@@ -5,9 +5,6 @@ serves four products. Factors are stored as those of small nodes (factor.py), bu
 factored they are those of Cholesky, with inverse diagonal: products then need no third factor.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats, Integers

@@ -5,9 +5,6 @@ Inner loops run along rows, which compiled code turns into vector instructions; 
 empty, so factors that are zero are passed over.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.kernels.array_types import Integers

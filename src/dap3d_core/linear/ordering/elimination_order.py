@@ -272,8 +272,7 @@ def dissect(neighbours: Sequence[set[int]], weight: Sequence[int]) -> list[int]:
             depth[chosen[separator]] = level
             waiting += [(chosen[half], level + 1) for half in (left, right) if len(half)]
     deepest = int(np.max(depth, initial=-1))
-    stages: list[int] = np.where(depth < 0, 0, deepest + 1 - depth).tolist()
-    return stages
+    return np.where(depth < 0, 0, deepest + 1 - depth).tolist()
 
 
 def _pieces(graph: Any) -> list[Integers]:

@@ -130,7 +130,9 @@ class Directions:
 
     @classmethod
     def of(cls, prepared: PreparedRun, outputs: Outputs) -> "Directions | None":
-        """Those of a model; None where a function has no derivative."""
+        """Those of a model; None where a function has no derivative, or contacts are stepped."""
+        if prepared.advances[0].completes is not None:
+            return None
         try:
             return cls(prepared, outputs)
         except CompileError:

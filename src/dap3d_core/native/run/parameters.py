@@ -146,6 +146,9 @@ def _numbers(prepared: PreparedRun) -> Iterator[tuple[str, Any, Any]]:
         for name in ("real", "integer", "switches", "tolerance"):
             array = getattr(work, name)
             yield f"{k}.{name}", array, np.arange(array.size)
+        if one.completes is not None:  # masses, shapes, materials
+            for name, array in one.arguments[1].walk():
+                yield f"{k}.{name}", array, np.arange(array.size)
 
 
 @IGNORE_FLOAT_ERRORS

@@ -14,12 +14,16 @@ from dap3d_core.formulations.jumps.rounds import jump
 from dap3d_core.integrators import IMPLICIT, Integration
 from dap3d_core.integrators.adams.integration import AdamsIntegration
 from dap3d_core.integrators.adams.step import advance_adams
+from dap3d_core.integrators.moreau.impulses import complete_row
+from dap3d_core.integrators.moreau.integration import MoreauIntegration
+from dap3d_core.integrators.moreau.step import advance as advance_contacts
+from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.integrators.radau.integration import RadauIntegration
 from dap3d_core.integrators.radau.step import advance as advance_radau
 from dap3d_core.integrators.runge_kutta.integration import RungeKutta
 from dap3d_core.integrators.runge_kutta.step import advance
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.kernels.compiler.types import FLOAT, INT
+from dap3d_core.kernels.compiler.types import FLOAT, INT, Array
 from dap3d_core.kernels.compiler.units import Entry, type_of
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.cache import jit_is_on
@@ -30,11 +34,11 @@ from dap3d_core.registry import Registry
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
-from dap3d_core.simulation.errors import refuse_contacts
+from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.uncarried_contact import UncarriedContact
 from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.breakpoints import SEEN
-from dap3d_core.simulation.run_state import Callbacks
+from dap3d_core.simulation.run_state import Callbacks, jumps_of
 from dap3d_core.simulation.settings import compiled_for, settings_of
 from dap3d_core.simulation.stepwise.stepped_run import HORIZON, OpenRun
 from dap3d_core.study.batch import initial_state
@@ -73,11 +77,13 @@ class Advance:
         integration: as it begins.
         entry: the loop.
         arguments: structs and tables that it takes before the budget.
+        completes: puts into a row what a report does not know; of the first two arguments.
     """
 
     integration: Integration
     entry: Entry
     arguments: tuple[Any, ...]
+    completes: Entry | None = None
 
     @classmethod
     def of(cls, integration: Integration) -> "Advance":
@@ -86,15 +92,23 @@ class Advance:
         Raises:
             SceneError: its integrator cannot be exported.
         """
-        function: Any = {RungeKutta: advance, AdamsIntegration: advance_adams}.get(
-            type(integration)
-        )
+        function: Any = {
+            RungeKutta: advance, AdamsIntegration: advance_adams,
+            MoreauIntegration: advance_contacts,
+        }.get(type(integration))  # fmt: skip
+        completes = None
+        if isinstance(integration, MoreauIntegration):
+            integration.make_room()
+            more: Any = complete_row
+            structs = map(type_of, integration.loop_arguments[:2])
+            completes = more.compile([*structs, Array(FLOAT, 1)])
         if isinstance(integration, RadauIntegration):
             function = advance_radau
         elif function is None:
             raise refusal(f"integrator {integration.name} cannot be exported")
         given = integration.loop_arguments
-        return cls(integration, function.compile([*map(type_of, given), INT]), given)
+        entry = function.compile([*map(type_of, given), INT])
+        return cls(integration, entry, given, completes)
 
 
 @attrs.frozen(eq=False)
@@ -255,8 +269,15 @@ class PreparedRun:
         return Image(self.evaluator.loops, *parts, *self.more)
 
     def _refuse_jumps(self) -> None:
-        refuse_contacts(self.evaluator.model, "export")
         self.jumps: JumpCode | None = None
+        if integrator_named(self.run.settings.integrator).steps_contacts:
+            jumps_of(self.evaluator, self.run.settings)
+            return
+        if names := self.evaluator.model.contact_names:
+            raise SimulationError(
+                "export does not take contacts yet that events follow, and the scene has some "
+                f'({names[0].partition("#")[0]}): let steps follow them, contact = "stepping"'
+            )
         if any(s.jumps for s in self.evaluator.switches):
             self.jumps = JumpCode.of(self.evaluator)
 

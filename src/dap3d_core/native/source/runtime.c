@@ -16,7 +16,7 @@
 enum { RHS, PROJECT, REPORT, ACCEPTED, WATCH };
 /* Status of an integration (integration_state.py). */
 enum { RUNNING, FINISHED, STEP_FLOOR, NOT_FINITE, PROJECTION_FAILED, SWITCHED, CHATTERED, ENDED,
-       STIFF, JUMPED, STALLED };
+       STIFF, JUMPED, STALLED, NO_ROOM };
 #define HORIZON 1e5
 #define ALIKE 1e-9
 #define LARGEST 1e100
@@ -188,6 +188,9 @@ static void report(dap3d_model *m)
         memcpy(m->row + 1, y_of(m), 8 * STATES);
     m->row[0] = m->t;
     call(m, REPORT, m->t, m->row + 1, m->row + 1 + STATES, ROW - 1 - STATES);
+#if COMPLETES
+    complete(m->w, m->row);
+#endif
     call_elements(m);
     dap3d_outputs(numbers(m, BODIES), m->row + 1, numbers(m, VALUES),
                   numbers(m, VALUES_OF_ELEMENTS), m->outputs);
@@ -523,12 +526,13 @@ static int stopped(dap3d_model *m)
         "", "the run has reached its end", "the error requires a step that time cannot resolve",
         "rates or a state are not finite", "no state on the constraints was found",
         "a switch of the model ended the run", "a switch changed its sign again and again", "",
-        "the scene is stiff", "joints hold a velocity that is to jump", "steps are so short that the run would not end"};
+        "the scene is stiff", "joints hold a velocity that is to jump", "steps are so short that the run would not end",
+        "more contacts came near than the model has room for"};
     int64_t status = integer_of(m)[I_status];
     double t = status == FINISHED ? real_of(m)[R_t] : real_of(m)[R_t_stop];
     m->is_over = 1;
     snprintf(m->message, sizeof m->message, "the run stopped at t = %.9g s: %s", t,
-             words[status >= 0 && status <= STALLED ? status : 0]);
+             words[status >= 0 && status <= NO_ROOM ? status : 0]);
     return status == SWITCHED || status == FINISHED ? DAP3D_ENDED : DAP3D_ERROR;
 }
 

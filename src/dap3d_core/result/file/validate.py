@@ -171,7 +171,10 @@ def _is_event(value: Any) -> bool:
         and is_text(value.get("name"))
         and is_number(value.get("t"))
         and value.get("direction") in (-1, 0, 1)
-        and (value["direction"] != 0 or value.get("kind") in ("jump", *CONTACT_KINDS))
+        and (
+            value["direction"] != 0
+            or value.get("kind") in ("jump", "break", "engage", *CONTACT_KINDS)
+        )
         and value.get("kind") in KINDS + CONTACT_KINDS
         and all(_is_state(value.get(name)) for name in ("u", "u_after"))
         and is_number(value.get("work", 0.0))

@@ -1,15 +1,21 @@
 """Contacts evaluated at reported states: gap, forces, slip and mode."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
 
 from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.registry.arguments import checked
+from dap3d_core.result.contact_table import WIDTH, ContactTable
+from dap3d_core.result.errors import unknown
+from dap3d_core.scene.coerce import canonical
 
 if TYPE_CHECKING:
     from dap3d_core.formulations.evaluator import Evaluator
+    from dap3d_core.model import Model
     from dap3d_core.result.arrays import Arrays
 
 #: Separates the name of a contact from the number of one of its points.
@@ -85,9 +91,93 @@ def contact_outputs(evaluator: "Evaluator", arrays: "Arrays") -> dict[str, Conta
     }  # fmt: skip
 
 
+def contact_table(model: "Model", t: Floats, outputs: Mapping[str, ContactOutput]) -> ContactTable:
+    """The table of declared contacts that push at a point, with bodies in place of shapes.
+
+    Args:
+        model: of the result.
+        t: (nt,) the reported instants.
+        outputs: of all points of contacts, as of ``contact_outputs``.
+    """
+    rows = [np.zeros((0, WIDTH))]
+    for group in model.contacts:
+        type_: Any = group.type_info.type
+        for k in group.members if type_.at is not None and type_.along is None else ():
+            one = outputs[model.joint_names[k]]
+            pushes = (np.nan_to_num(one.mode) > 0) & (one.normal_force > 0.0)
+            N = one.normal_force[pushes, None]
+            pair = (*model.joint_slots[k], 0)[:2]  # what names one body touches ground
+            normal = (one.force - one.friction)[pushes] / N
+            rows.append(np.column_stack([
+                t[pushes], np.tile(pair, (len(N), 1)), one.mode[pushes], one.gap[pushes],
+                one.at[pushes], normal, one.force[pushes],
+            ]))  # fmt: skip
+    found = np.concatenate(rows)
+    order = np.argsort(found[:, 0], kind="stable")
+    return ContactTable.of_rows(("ground", *model.body_names), found[order])
+
+
 def together(outputs: Sequence[ContactOutput]) -> ContactOutput:
     """The output of a contact with several points; of one that of the point."""
     if len(outputs) == 1:
         return outputs[0]
     columns = zip(*(attrs.astuple(one, recurse=False) for one in outputs), strict=True)
     return ContactOutput(*(np.stack(column, axis=1) for column in columns))
+
+
+class ResultContacts:
+    """What a result says of contacts."""
+
+    @cached_property
+    def _points(self) -> dict[str, list[str]]:
+        """Names of the points of each contact."""
+        result: Any = self
+        return contact_names(result.summary.state_names)
+
+    @property
+    def contact_names(self) -> tuple[str, ...]:
+        """Names of the declared contacts, in the order of the scene."""
+        return tuple(self._points)
+
+    @cached_property
+    def contacts(self) -> ContactTable:
+        """Points at which bodies push on each other, at the reported instants.
+
+        Of shapes that collide at those after the start; of declared contacts, with bodies in place
+        of shapes.
+
+        Raises:
+            ResultError: as ``model``, where there are declared contacts.
+        """
+        result: Any = self
+        table: ContactTable = result.record.contacts.at(result.t)
+        if not self._points:
+            return table
+        return table.joined(contact_table(result.model, result.t, self._contact_outputs))
+
+    @checked
+    def contact(self, name: str) -> ContactOutput:
+        """A contact, evaluated at the reported states.
+
+        Args:
+            name: of a contact; of one with several points, ``NAME#1`` is the first alone.
+
+        Returns:
+            ``.gap`` (nt,) m, ``.normal_force`` (nt,) N, ``.friction`` (nt, 3) N on body i,
+            ``.slip`` (nt, 3) m/s, ``.mode`` (nt,) 0 open, 1 slides, 2 sticks, ``.at`` (nt, 3) m,
+            ``.force`` (nt, 3) N on body i, global axes; of k points (nt, k) and (nt, k, 3).
+
+        Raises:
+            UnknownNameError: there is no such contact; names the nearest.
+            ResultError: as ``model``.
+        """
+        name, every = canonical(name), self._points.values()
+        points = self._points.get(name) or [p for of in every for p in of if p == name]
+        if not points:
+            raise unknown("contact", name, self.contact_names)
+        return together([self._contact_outputs[point] for point in points])
+
+    @cached_property
+    def _contact_outputs(self) -> dict[str, ContactOutput]:
+        result: Any = self
+        return contact_outputs(result.evaluator, result.arrays)

@@ -14,8 +14,7 @@ Ends = Floats | tuple[Floats, Floats]
 def cubic(a: float, h: float | Floats, x: Ends, x_dot: Ends) -> Floats:
     """Hermite interpolation at a fraction ``a`` of a step h; x, x_dot (2, ...) at its ends."""
     s, b = a * a * (3.0 - 2.0 * a), a * (1.0 - a)
-    value: Floats = (1.0 - s) * x[0] + s * x[1] + b * h * ((1.0 - a) * x_dot[0] - a * x_dot[1])
-    return value
+    return (1.0 - s) * x[0] + s * x[1] + b * h * ((1.0 - a) * x_dot[0] - a * x_dot[1])
 
 
 def smooth_parts(result: Result) -> list[Result]:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import LISTED, ResultError, UnknownNameError
 from dap3d_core.result.model_summary import ModelSummary
+from dap3d_core.result.post.contact_output import POINT, contact_names
 from dap3d_core.result.quantities.catalogue import (
     ACTIONS,
     POINT_ARRAYS,
@@ -22,7 +24,6 @@ from dap3d_core.result.quantities.catalogue import (
     QuantityOwner,
     QuantitySource,
 )
-from dap3d_core.result.quantities.contacts import contact_quantity
 from dap3d_core.scene.coerce import canonical
 
 NORM = "norm"
@@ -70,7 +71,7 @@ def find(result: QuantitySource, name: str) -> Quantity:
     if name in result.summary.input_names:
         column = result.arrays.inputs[:, result.summary.input_names.index(name)]
         return Quantity(name, column, "input", f"input {name}", "1", (), "input")
-    if contact := contact_quantity(result, name):
+    if contact := _contact_quantity(result, name):
         return contact
     for kinds in (NAMED, ("force",)):
         for owner, attribute, component in _parsed(result, name, kinds):
@@ -283,7 +284,8 @@ def _attributes(result: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]
     names = ACTIONS if owner.slot else QUANTITIES[owner.kind]
     is_actuator = owner.name in result.record.actuation
     known = (name for name in names if name != ACTUATION or is_actuator)
-    return (*known, *own_names(result, owner), *_coordinate_names(result, owner))
+    own = (*states_of(result.summary, owner), *unknowns_of(result, owner))
+    return (*known, *own, *_coordinate_names(result, owner))
 
 
 def _fault(result: QuantitySource, owner: QuantityOwner, rest: list[str]) -> str:
@@ -367,11 +369,6 @@ def _has_own_angles(summary: ModelSummary) -> bool:
     return any(not name.startswith(JOINT_ANGLES) for name in names)
 
 
-def own_names(source: QuantitySource, owner: QuantityOwner) -> tuple[str, ...]:
-    """Names of the states and unknowns of an owner."""
-    return (*states_of(source.summary, owner), *unknowns_of(source, owner))
-
-
 def own_quantity(
     source: QuantitySource, name: str, owner: QuantityOwner, attribute: str, component: str
 ) -> Quantity | None:
@@ -391,3 +388,53 @@ def own_quantity(
         return Quantity(name, values, attribute, label, "SI", (), "state")
     values = source.arrays.states[:, list(columns.values())]
     return Quantity(name, values, attribute, label, "SI", tuple(columns), "state")
+
+
+class _Part(NamedTuple):
+    """Attribute of a ``ContactOutput``, what it is, its unit, whether it is a vector."""
+
+    attribute: str
+    label: str
+    unit: str
+    is_vector: bool = False
+
+
+CONTACT_QUANTITIES = {
+    "gap": _Part("gap", "gap", "m"),
+    "normal": _Part("normal_force", "normal force", "N"),
+    "friction": _Part("friction", "friction", "N", True),
+    "slip": _Part("slip", "slip", "m/s", True),
+    "mode": _Part("mode", "mode", "1"),
+}
+
+
+def _contact_quantity(source: QuantitySource, name: str) -> Quantity | None:
+    """A quantity of a contact, such as ``floor.friction.x``; None of a name of no contact.
+
+    Vectors by components or ``norm``; those of a contact with several points are of ``NAME#1``;
+    scalars of such a contact have a column for each point.
+
+    Raises:
+        UnknownNameError: the contact has no such quantity.
+    """
+    head, *rest = name.split(".")
+    names = contact_names(source.summary.state_names)
+    points = names.get(head.partition(POINT)[0])
+    if points is None or (POINT in head and head not in points):
+        return None
+    part = CONTACT_QUANTITIES.get(rest[0]) if rest else None
+    component = rest[1] if len(rest) == 2 else ""
+    several = len(points) > 1 and POINT not in head
+    allowed = (*AXES, "norm", "") if part is not None and part.is_vector else ("",)
+    if part is None or len(rest) > 2 or component not in allowed or (several and part.is_vector):
+        known = ", ".join(f"{head}.{n}" for n in CONTACT_QUANTITIES)
+        more = f"; vectors are those of a point, {points[0]}.slip.x" if several else ""
+        raise UnknownNameError(f"there is no quantity {name!r}; contact {head} has {known}{more}")
+    values = np.asarray(getattr(source.contact(head), part.attribute), dtype=float)
+    label = f"{part.label} of {head}" + (f", {component}" if component else "")
+    components = AXES if part.is_vector else tuple(points) if several else ()
+    if component:
+        column = np.linalg.norm(values, axis=1) if component == "norm" else None
+        values = values[:, AXES.index(component)] if column is None else column
+        components = ()
+    return Quantity(name, values, part.label, label, part.unit, components, "contact")

@@ -172,8 +172,7 @@ def _hull(report: Collector, shape: Shape) -> Floats:
     found = path.what if isinstance(path, Fault) else read_mesh(path, name)
     if not isinstance(found, str):
         try:
-            hull: Floats = found[0][ConvexHull(found[0]).vertices] * shape.values["scale"]
-            return hull
+            return found[0][ConvexHull(found[0]).vertices] * shape.values["scale"]
         except QhullError:
             found = f"{name} is flat: it has no convex hull"
     remedy = "a mesh that collides is read with the scene: load that from its folder"
@@ -185,5 +184,4 @@ def _turned_to(axis: Any) -> Floats:
     """Euler parameters that turn z to the direction of a vector."""
     x, y, z = np.array(axis) / np.linalg.norm(axis)
     p = np.array([1.0 + z, -y, x, 0.0] if z > -0.5 else [-y, 1.0 - z, 0.0, x])
-    found: Floats = p / np.linalg.norm(p)
-    return found
+    return p / np.linalg.norm(p)

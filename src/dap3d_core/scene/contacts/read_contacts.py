@@ -1,12 +1,14 @@
 """Reads contacts, with fields of their materials: one instance for each point that may touch."""
 
 from collections.abc import Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 import attrs
 
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.contacts.contact import HIDDEN, MATERIAL, SMOOTH, TOUCHES
+from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.scene.errors import MISSING
 from dap3d_core.scene.tables import Element
@@ -103,6 +105,43 @@ def read_rigid(report: Collector, types: Types, stops: Sequence[Instance]) -> li
                        remedy="give k, or leave it out")  # fmt: skip
         found.append(attrs.evolve(stop, values={"e": 0.0} | stop.values | SMOOTH | HIDDEN))
     return found
+
+
+def read_friction(
+    report: Collector, joints: Mapping[str, Instance], forces: Sequence[Instance]
+) -> list[Instance]:
+    """Friction of joints that sticks, as contacts; joints: those of the scene, by name."""
+    found = []
+    for force in forces:
+        joint = joints[force.values[force.type_info.friction_joint]]
+        given, key = force.values, ("forces", force.name)
+        if given.get("mu_s") is not None and given["mu_s"] < given["mu"]:
+            what = f"is less than mu = {given['mu']:g}; what slides would stick more than rest"
+            report.add((*key, "mu_s"), given["mu_s"], what)
+        grips = grips_of(joint.type_info)
+        for k, grip in enumerate(grips):
+            name = force.name if len(grips) == 1 else f"{force.name}#{k + 1}"
+            values = SMOOTH | joint.values | HIDDEN | {"e": 0.0, "part": float(k)}
+            values |= {n: given.get(n) for n in ("mu", "mu_s")} | {"joint": joint.name}
+            values["shared"] = given.get("shared")
+            if "radius" in grip.layout.numbers and "radius" not in joint.values:
+                values["radius"] = given.get("radius") or 1.0
+                if given.get("radius") is None and k + 1 == len(grips):
+                    what = f"is missing, which friction in {joint.type_info.type.keyword} needs"
+                    report.add((*key, "radius"), MISSING, what)
+            found.append(Instance(name, grip, joint.bodies, (), values))
+    return found
+
+
+def grips_of(joint: TypeInfo) -> tuple[TypeInfo, ...]:
+    """The friction that sticks of a type of joint."""
+    type_: Any = joint.type
+    return tuple(map(_examined, type_.grips))
+
+
+@cache
+def _examined(grip: Any) -> TypeInfo:
+    return examine(grip)
 
 
 def _with_material(report: Collector, types: Types, element: Element) -> Element:

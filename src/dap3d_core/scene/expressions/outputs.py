@@ -25,7 +25,7 @@ LONGEST_CHAIN = 50
 def read_outputs(report: Collector) -> dict[str, Expression]:
     """The outputs of a scene by name, those first that others name; mistakes are reported."""
     expressions = {}
-    numbers = _parameters(report)
+    numbers = parameters_of(report) if report.scene.outputs else {}
     for name, value in report.scene.outputs.items():
         key: Key = ("outputs", str(name))
         if fault := fault_of_quantity(report.scene, name):
@@ -42,10 +42,10 @@ def read_outputs(report: Collector) -> dict[str, Expression]:
     return _in_order(report, expressions)
 
 
-def _parameters(report: Collector) -> dict[str, float]:
-    """The parameters that outputs may name: not those with the name of another quantity."""
+def parameters_of(report: Collector) -> dict[str, float]:
+    """The parameters that expressions of quantities may name: not those named as a quantity is."""
     scene = report.scene
-    if not (scene.parameters and scene.outputs):
+    if not scene.parameters:
         return {}
     from dap3d_core.scene.expressions.parameters import values_of
 

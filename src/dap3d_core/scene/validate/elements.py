@@ -10,7 +10,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.scene.errors import MISSING, Key, dotted, shown
-from dap3d_core.scene.tables import BREAKS_AT, GROUND, LIMITS, ZERO, Element
+from dap3d_core.scene.tables import GROUND, LIMITS, RELEASES, ZERO, Element
 from dap3d_core.scene.validate.coerce_values import (
     READERS,
     Fault,
@@ -97,8 +97,8 @@ class Reader:
         self.kinds = {name: spec.kind for name, spec in specs.items()}
         self.lists = {name: spec for name, spec in specs.items() if spec.size}
         limits = LIMITS if getattr(type_info.type, "limit", "") else ()
-        breaks = (BREAKS_AT,) if table == "joints" else ()
-        self.known = dict.fromkeys([*specs, *self.ends, *limits, *breaks])
+        releases = RELEASES if table == "joints" else ()
+        self.known = dict.fromkeys([*specs, *self.ends, *limits, *releases])
         self.of_joints = {name: spec for name, spec in specs.items() if spec.gives}
         # Bodies and points that may be left out follow from the other fields of their slot.
         self.late = [

@@ -8,7 +8,7 @@ import attrs
 from dap3d_core.interface.codegen.reactions import joint_fields
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
-from dap3d_core.scene.tables import BREAKS_AT, GROUND, LIMITS, Element
+from dap3d_core.scene.tables import ACTIVE, BREAKS_AT, GROUND, LIMITS, RELEASES, Element
 from dap3d_core.scene.validate.geometry import Geometry, missing_words
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance
@@ -142,24 +142,33 @@ def brought_forces(
     return forces
 
 
-def read_breaks(
+def read_releases(
     report: Collector, joints: Iterable[Instance], forces: Collection[Instance]
 ) -> None:
-    """Give joints the force at which they break; forces: all of the scene."""
+    """Give joints the force at which they break, and what they are active by.
+
+    forces: all of the scene.
+    """
     for joint in joints:
-        value = report.scene.joints[joint.name].fields[BREAKS_AT]
-        what, remedy = _unbreakable(report, joint, forces), "leave breaks_at out"
+        fields = report.scene.joints[joint.name].fields
+        if what := _unreleasable(report, joint, forces):
+            key = next(key for key in RELEASES if key in fields)
+            report.add(("joints", joint.name, key), fields[key], what, remedy=f"leave {key} out")
+            continue
+        value = fields.get(BREAKS_AT, float("inf"))
         if isinstance(value, bool) or not isinstance(value, int | float) or not value > 0.0:
             what = "should be a positive force in N, inf of a joint that scripts alone release"
-            remedy = ""
-        if what:
-            report.add(("joints", joint.name, BREAKS_AT), value, what, remedy=remedy)
-        else:
-            joint.breaks_at = float(value)
+            report.add(("joints", joint.name, BREAKS_AT), value, what)
+            continue
+        joint.breaks_at = float(value)
+        if ACTIVE in fields:
+            from dap3d_core.scene.expressions.condition import read_condition
+
+            joint.active = read_condition(report, ("joints", joint.name, ACTIVE), fields[ACTIVE])
 
 
-def _unbreakable(report: Collector, joint: Instance, forces: Iterable[Instance]) -> str:
-    """Why a joint cannot break, "" where it can: what it does besides its rows would go on."""
+def _unreleasable(report: Collector, joint: Instance, forces: Iterable[Instance]) -> str:
+    """Why a joint cannot end, "" where it can: what it does besides its rows would go on."""
     type_info = joint.type_info
     own = {"switch", "impulse", "reset"} & set(type_info.kernels)
     if own or type_info.layout.states or type_info.layout.unknowns:

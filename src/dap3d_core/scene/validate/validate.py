@@ -9,7 +9,7 @@ from dap3d_core.interface.types import acts_on_all
 from dap3d_core.registry import Registry
 from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.scene import Scene
-from dap3d_core.scene.tables import BREAKS_AT, LIMITS, NAMED, fault_of_name
+from dap3d_core.scene.tables import LIMITS, NAMED, RELEASES, fault_of_name
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
 
@@ -101,12 +101,12 @@ def _read_signals(
 
     inputs = {}
     if report.scene.inputs:
-        from dap3d_core.scene.signals.inputs import read_inputs
+        from dap3d_core.scene.signals import read_inputs
 
         inputs = read_inputs(report)
     functions = read_elements(report, geometry, "functions", types)
     if any(combines(function.type_info) for function in functions):
-        from dap3d_core.scene.signals.combinations import combine_functions
+        from dap3d_core.scene.signals import combine_functions
 
         functions = combine_functions(report, functions)
     return inputs, functions
@@ -121,7 +121,8 @@ def _acting_forces(
     left: those that joints bring are left out, with a note, beside contacts.
     """
     joints, forces = others
-    forces = [force for force in forces if not force.type_info.type.is_contact]
+    forces = [force for force in forces
+              if not (force.type_info.type.is_contact or _sticks(force, joints))]  # fmt: skip
     if not any(joint.type_info.type.brings for joint in joints):  # type: ignore[attr-defined]
         return forces
     from dap3d_core.scene.validate.elements import read_elements
@@ -143,23 +144,40 @@ def _read_contacts(
         j for j in limited if any(key in report.scene.joints[j.name].fields for key in LIMITS)
     ]
     rigid = [force for force in forces if force.type_info.type.is_contact]
-    if not (report.scene.contacts or limited or rigid):
+    rubbing = [force for force in forces if _sticks(force, joints)]
+    if not (report.scene.contacts or limited or rigid or rubbing):
         return []
-    from dap3d_core.scene.contacts.read_contacts import limits_of, read_contacts, read_rigid
+    from dap3d_core.scene.contacts.read_contacts import (
+        limits_of,
+        read_contacts,
+        read_friction,
+        read_rigid,
+    )
 
     elements = report.scene.contacts | limits_of(report, limited)
     contacts = read_contacts(report, geometry, types, functions, elements) if elements else []
-    return [*contacts, *read_rigid(report, types, rigid)]
+    by_name = {joint.name: joint for joint in joints}
+    sticking = read_friction(report, by_name, rubbing)
+    return [*contacts, *read_rigid(report, types, rigid), *sticking]
+
+
+def _sticks(force: Instance, joints: list[Instance]) -> bool:
+    """True of friction of a joint that sticks: no velocity is given below which it fades."""
+    field = force.type_info.friction_joint
+    if not field or force.values.get("v_tol") is not None:
+        return False
+    joint = next((j for j in joints if j.name == force.values.get(field)), None)
+    return joint is not None and bool(joint.type_info.type.grips)  # type: ignore[attr-defined]
 
 
 def _check_together(report: Collector, joints: list[Instance], forces: list[Instance]) -> None:
-    """Report twins; read the forces at which joints break, where a scene has any."""
+    """Report twins; read when joints end and hold, where a scene has any that do not throughout."""
     _report_twins(report, joints=joints, forces=forces)
-    breaking = [j for j in joints if BREAKS_AT in report.scene.joints[j.name].fields]
-    if breaking:
-        from dap3d_core.scene.validate.joint_fields import read_breaks
+    ending = [j for j in joints if report.scene.joints[j.name].fields.keys() & set(RELEASES)]
+    if ending:
+        from dap3d_core.scene.validate.joint_fields import read_releases
 
-        read_breaks(report, breaking, forces)
+        read_releases(report, ending, forces)
 
 
 def _check_requires(report: Collector) -> str:
@@ -212,7 +230,7 @@ def _note_unused_signals(
             key = dotted(("functions", name))
             report.note(f"{key}: no joint and no force uses it", "functions left unused")
     if report.scene.inputs:
-        from dap3d_core.scene.signals.inputs import note_unread_inputs
+        from dap3d_core.scene.signals import note_unread_inputs
 
         note_unread_inputs(report, elements)
 

@@ -13,6 +13,7 @@ from dap3d_core.scene.scene import Scene
 if TYPE_CHECKING:
     from dap3d_core.kernels.array_types import Floats, Integers
     from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
+    from dap3d_core.scene.expressions.expression import Expression
 
 
 @attrs.define
@@ -34,6 +35,7 @@ class Instance:
         terms: of a function that combines functions, those.
         breaks_at: N, of a joint that may be released: it ends where its force becomes larger, by
             itself never where this is inf; None of what holds throughout.
+        active: of a joint that holds only while its value is positive; None of others.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Instance:
     others: tuple[int, ...] = ()
     terms: tuple["Instance", ...] = ()
     breaks_at: float | None = None
+    active: "Expression | None" = None
 
     @property
     def structure(self) -> Any:

@@ -8,7 +8,6 @@ import attrs
 
 from dap3d_core.scene.coerce import plain
 from dap3d_core.simulation.control.state_view import StateView
-from dap3d_core.simulation.events.event import several
 
 
 @attrs.frozen(kw_only=True)
@@ -47,12 +46,3 @@ class Controller:
     def title(self) -> str:
         """Name of the controller."""
         return self.name or str(getattr(self.update, "__name__", type(self.update).__name__))
-
-
-def checked_controllers(controllers: Any) -> tuple[Controller, ...]:
-    """The controllers of a run.
-
-    Raises:
-        TypeError: they are not several ``Controller``.
-    """
-    return several(controllers, Controller, "controllers")

@@ -16,10 +16,11 @@ from dap3d_core.model.state_layout import by_body
 from dap3d_core.result import information
 from dap3d_core.result.file.validate import is_number
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.control.controller import Controller, checked_controllers
+from dap3d_core.simulation.control.controller import Controller
 from dap3d_core.simulation.control.held_inputs import HeldInputs
 from dap3d_core.simulation.control.state_view import StateView
 from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.events.event import several
 from dap3d_core.simulation.events.locate import EventLocator
 
 #: Seconds of holds after which a run looks about: progress, checkpoints, Ctrl-C.
@@ -45,7 +46,7 @@ class SampledControl:
         controllers: Sequence[Controller],
         t_end: float,
     ) -> None:
-        self.controllers = checked_controllers(controllers)
+        self.controllers = several(controllers, Controller, "controllers")
         if not compiled.model.input_names:
             raise SimulationError(
                 "the scene has no inputs that a controller could set: declare [inputs.NAME], and "

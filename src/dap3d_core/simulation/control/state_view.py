@@ -110,8 +110,7 @@ class StateView:
         """(n, BODY_WIDTH) the bodies in the driver's arrays, placed."""
         if not self._is_placed:
             self._place()
-        body: Floats = self._evaluator.system.body[1:]
-        return body
+        return self._evaluator.system.body[1:]
 
     def _place(self) -> None:
         self._place_bodies()
@@ -128,10 +127,13 @@ class StateView:
             first, count = OF_BODIES[quantity]
             row = 1 + model.body_names.index(owner)
             if not component:
-                return read_only_view(self._evaluator.system.body[row, first : first + count])
+                view = self._evaluator.system.body[row, first : first + count]
+                view.flags.writeable = False
+                return lambda: view
             if component in AXES and count == 3:
                 flat = quick_view(self._evaluator.system.body.reshape(-1))
-                return _item(flat, row * BODY_WIDTH + first + AXES[component])
+                place = row * BODY_WIDTH + first + AXES[component]
+                return lambda: flat[place]
         if owner in model.joint_names and owner not in model.body_names and not component:
             found = self._coordinate(model.joint_names.index(owner), rest)
             if found is not None:
@@ -170,16 +172,6 @@ class StateView:
         values = result.quantity(name).values[0]
         self._is_placed = False
         return values if np.ndim(values) else float(values)
-
-
-def read_only_view(view: Floats) -> Getter:
-    """The function that returns a view that nobody may write to."""
-    view.flags.writeable = False
-    return lambda: view
-
-
-def _item(flat: Any, place: int) -> Getter:
-    return lambda: flat[place]
 
 
 class _Coordinate:

@@ -139,7 +139,7 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
             "(start=result)"
         )
     states = evaluator.states.copy()
-    states[table.mode], states[table.way.ravel()], states[table.near.ravel()] = found.mode, 0.0, 0.0
+    states[table.mode], states[table.way], states[table.near] = found.mode, found.way, 0.0
     evaluator.states = states
 
 
@@ -159,8 +159,7 @@ def _least(statics: Statics, D: Floats, force: Floats) -> Floats:
     if not len(D):
         return np.zeros(0)
     least = np.linalg.lstsq(D.T * statics.scale[:, None], statics.scale * force, rcond=RCOND)[0]
-    multipliers: Floats = -least
-    return multipliers
+    return -least
 
 
 def _with_brought(
@@ -259,8 +258,7 @@ def _least_solution(matrix: Floats, side: Floats) -> Floats:
     columns = np.max(np.abs(matrix / rows[:, None]), axis=0, initial=0.0)
     columns[columns == 0.0] = 1.0
     scaled = matrix / rows[:, None] / columns
-    found: Floats = np.linalg.lstsq(scaled, side / rows, rcond=OPEN)[0] / columns
-    return found
+    return np.linalg.lstsq(scaled, side / rows, rcond=OPEN)[0] / columns
 
 
 def findings(search: Search, stability: Stability, model: Model) -> Iterator[str]:
@@ -283,18 +281,14 @@ def findings(search: Search, stability: Stability, model: Model) -> Iterator[str
     if count:
         moves = describe_motion(model, stability.indifferent[0])
         others = f" and {count - 1} more" if count > 1 else ""
-        yield (
-            information(
-                f"indifferent: nothing drives or holds a freedom of {moves}{others}; "
-                "it is where the start has it"
-            )
+        yield information(
+            f"indifferent: nothing drives or holds a freedom of {moves}{others}; "
+            "it is where the start has it"
         )
     if not stability.is_symmetric:
-        yield (
-            information(
-                "forces without a potential act: stability is that of small motions, "
-                "with masses and dampers"
-            )
+        yield information(
+            "forces without a potential act: stability is that of small motions, "
+            "with masses and dampers"
         )
 
 
@@ -323,11 +317,9 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
         )
     rolling = model.row_owners(np.flatnonzero(~model.position_row & (rows.nu == 0.0)))
     if rolling:
-        yield (
-            information(
-                f"rolling joints constrain displacements as they do velocities: "
-                f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
-            )
+        yield information(
+            f"rolling joints constrain displacements as they do velocities: "
+            f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
         )
 
 

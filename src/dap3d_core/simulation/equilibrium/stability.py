@@ -95,8 +95,7 @@ def _growing_motions(motions: Floats, f: int) -> Floats:
     shapes = shapes[:f, (rates.real > GROWING * np.abs(rates).max()) & (rates.imag >= 0.0)]
     # the phase that leaves the largest real part
     phase = np.exp(-0.5j * np.angle(np.sum(shapes**2, axis=0)))
-    shape: Floats = (shapes * phase).real
-    return shape
+    return (shapes * phase).real
 
 
 class Fate(Enum):

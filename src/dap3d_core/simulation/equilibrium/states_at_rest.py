@@ -77,8 +77,7 @@ def _terms(own: StateDerivatives, states: Floats) -> Floats:
     """Sizes of what the rates are sums of."""
     by_states = abs(own.rate_by_states) @ np.abs(states)
     by_motion = abs(own.rate_by_displacement).sum(axis=1) + abs(own.rate_by_velocity).sum(axis=1)
-    found: Floats = by_states + NEARBY * np.asarray(by_motion).ravel()
-    return found
+    return by_states + NEARBY * np.asarray(by_motion).ravel()
 
 
 def unsettled_part(own: StateDerivatives, states: Floats) -> float:
@@ -108,5 +107,4 @@ def _scaled_inverse(matrix: Floats) -> Floats:
     """Pseudo-inverse of a matrix whose rows have units of their own."""
     size = np.max(np.abs(matrix), axis=1, keepdims=True)
     size[size == 0.0] = 1.0
-    found: Floats = np.linalg.pinv(matrix / size, rcond=OPEN) / size.T
-    return found
+    return np.linalg.pinv(matrix / size, rcond=OPEN) / size.T

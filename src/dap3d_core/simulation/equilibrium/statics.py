@@ -104,8 +104,7 @@ class Statics:
     def force(self, u: Floats) -> Floats:
         """(6 n,) scaled applied forces at a state, those of elements with their states settled."""
         self._settle(u)
-        applied: Floats = self.scale * self.evaluator.applied_forces(self.t, u).ravel()
-        return applied
+        return self.scale * self.evaluator.applied_forces(self.t, u).ravel()
 
     def _force_parts(self, u: Floats) -> Floats:
         """(6 n,) scaled forces added up by their magnitudes, type by type."""
@@ -117,8 +116,7 @@ class Statics:
             of_type = np.zeros_like(parts)
             call_loop(loops, q, self.t, s, s.groups[q], of_type, of_type, of_type)
             parts += np.abs(of_type)
-        sizes: Floats = self.scale * parts[6:]
-        return sizes
+        return self.scale * parts[6:]
 
     def _largest_nearby(self, u: Floats) -> float:
         """The largest force near a pose, N m: at the pose springs may hold each other."""
@@ -177,8 +175,7 @@ class Statics:
     def reduced(self, matrix: Any, pose: StaticPose) -> Floats:
         """(f, f) Z^T A Z of a matrix A (6 n, 6 n), scaled."""
         basis = self.scale[:, None] * pose.free
-        result: Floats = basis.T @ (matrix @ basis)
-        return result
+        return basis.T @ (matrix @ basis)
 
     def moved(self, u: Floats, x: Floats) -> Floats:
         """The state after a displacement x (6 n,), not closed."""

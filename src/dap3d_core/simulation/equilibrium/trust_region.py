@@ -86,8 +86,7 @@ def held_solution(matrix: Floats, side: Floats, size: float) -> Floats:
     """
     left, values, right = np.linalg.svd(matrix)
     held = values > zero_stiffness(values, size)
-    solution: Floats = right[held].T @ ((left.T @ side)[held] / values[held])
-    return solution
+    return right[held].T @ ((left.T @ side)[held] / values[held])
 
 
 def _gain(K: Floats, g: Floats, y: Floats) -> float:

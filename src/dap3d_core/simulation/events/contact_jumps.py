@@ -16,6 +16,7 @@ from dap3d_core.formulations.contacts.contact_rows import (
     SLIP,
     ContactRows,
     ContactTable,
+    length_of,
 )
 from dap3d_core.formulations.contacts.impacts import AT_REST, Impact, collide, repeat
 from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes
@@ -25,14 +26,12 @@ from dap3d_core.integrators import Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.contacts.rows import APART
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.model.rotations import euler_rates
-from dap3d_core.model.state_layout import split
 from dap3d_core.result import EventRecord
 from dap3d_core.result.note import information
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.scene.errors import MISSING
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps
+from dap3d_core.simulation.events.jumps import LOSSLESS, MOST_RECORDS, Jumps, rows_to
 
 #: Gaps, m of a scene of ordinary size, below which bodies touch: in a run, and where it begins.
 TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
@@ -40,6 +39,8 @@ TOUCHING, TOUCHING_AT_START = 1e-10, 1e-8
 HELD = 1e-10
 #: Slip, m/s, that is stopped where it goes through zero.
 STOPPED = 1e-6
+#: Mobility of a slip, as a part of that of free bodies, below which it is the pose that stops it.
+DEAD = 1e-12
 #: Ends of modes within this part of the run: what changes more often comes to no end.
 MOST_CHANGES, WITHIN = 500, 1e-6
 #: So many steps within this part of the run are too many: it would not come to an end.
@@ -113,19 +114,24 @@ class ContactJumps(Jumps):
             raise SceneError([self._overlap(int(k), -gaps[k]) for k in beyond])
         self._resolve(integration, [], TOUCHING_AT_START * length)
 
-    def _refuse_prescribed(self, rows: ContactRows, closed: list[int]) -> None:
-        """SimulationError: the joints leave no impulse of a contact that closes an effect."""
-        limit = -AT_REST * self._evaluator.model.length
+    def _movable(self, rows: ContactRows, closed: list[int]) -> list[int]:
+        """Contacts that joints leave an effect; those that touch a body that they hold do nothing.
+
+        Raises:
+            SimulationError: one closes, and joints prescribe that.
+        """
+        movable, limit = list[int](), -AT_REST * self._evaluator.model.length
         for c in closed:
             row = rows.G[3 * c]
-            if rows.W[3 * c, 3 * c] > HELD * (row @ rows.inverse @ row):
-                continue
-            if rows.slip[c, 0] < limit or rows.free[3 * c] < limit:
+            if self.table.alone[c] or rows.W[3 * c, 3 * c] > HELD * (row @ rows.inverse @ row):
+                movable.append(c)
+            elif rows.slip[c, 0] < limit or rows.free[3 * c] < limit:
                 raise SimulationError(
                     f"the run stopped at t = {rows.t:.9g} s: contact {self.table.names[c]} closes, "
                     "and joints or drivers prescribe the motion of its bodies: nothing that it "
                     "pushes with can stop them"
                 )
+        return movable
 
     def _overlap(self, k: int, depth: float) -> Mistake:
         """What is said of a contact whose gap is negative at the start."""
@@ -225,11 +231,27 @@ class ContactJumps(Jumps):
         states: Mapping[int, Floats],
         title: str,
     ) -> tuple[Floats, float]:
-        """Refused: what contacts make of it is not known yet."""
-        raise SimulationError(
-            f"the run stopped at t = {integration.t:.9g} s: event {title} sets velocities or "
-            "states, which a scene with contacts does not take yet; apply a force instead"
-        )
+        """As of ``Jumps``: joints carry it, and what then approaches collides.
+
+        Raises:
+            SimulationError: the joints do not allow such velocities.
+        """
+        evaluator, t, u = self._evaluator, integration.t, self._state_of(integration)
+        rows, own = ContactRows(self.table, t, u), evaluator.states.copy()
+        if not rows.follow(rows_to(u, bodies)):
+            raise self._impossible(t, title, bodies)
+        for first, numbers in states.items():
+            own[first : first + len(numbers)] = numbers
+        after = rows.with_velocities(rows.v)
+        v = u[-len(rows.v) :]
+        work = 0.5 * float(rows.v @ rows.M @ rows.v - v @ rows.M @ v)
+        self._go_on(integration, u, rows, np.zeros_like(v), own, work)
+        self.settle(integration)
+        return after, work
+
+    def settle(self, integration: Integration) -> None:
+        """Find velocities and modes anew, where joints have ended or velocities were set."""
+        self._resolve(integration, [], TOUCHING * self._evaluator.model.length)
 
     def _gaps(self, integration: Integration) -> Floats:
         u = self._state_of(integration)
@@ -263,7 +285,7 @@ class ContactJumps(Jumps):
         closed = [c for c in range(table.count) if c not in beyond
                   and (before[c] > 0.5 or near[c] or (c, 0) in ended)]  # fmt: skip
         sliding, leaving, stopped = self._what_ended(rows, outputs, before, ended)
-        self._refuse_prescribed(rows, closed)
+        closed = self._movable(rows, closed)
         impact = collide(table, rows, closed, evaluator.model.length)
         table.find_grips(t, rows.with_velocities(rows.v))
         try:
@@ -276,7 +298,7 @@ class ContactJumps(Jumps):
             ) from error
         held = [c for c in closed if modes.mode[c] > 0.5]
         others = [c for c in closed if modes.mode[c] < 0.5]
-        rows.change(rows.lifted(rows.slip[:, 0], held, others))
+        rows.change(rows.lifted(rows.closing, held, others))
         gaps = np.where(np.abs(outputs[:, GAP]) < touching, outputs[:, GAP], 0.0)
         moved = self._apart(rows, gaps, held, others)
         states = evaluator.states.copy()
@@ -295,7 +317,7 @@ class ContactJumps(Jumps):
         for c, (old, new) in enumerate(
             zip(before.astype(int), modes.mode.astype(int), strict=True)
         ):
-            if (kind := CHANGES.get((int(old), int(new)), "")) and (old or not table.load[c]):
+            if (kind := CHANGES.get((int(old), int(new)), "")) and (old or not table.alone[c]):
                 self._note(c, t, kind, u)
 
     def _apart(self, rows: ContactRows, gaps: Floats, held: list[int], others: list[int]) -> Floats:
@@ -305,7 +327,7 @@ class ContactJumps(Jumps):
         """
         rounding = POSITION_ROUNDING * self._evaluator.model.length
         still = AT_REST * self._evaluator.model.length
-        deep = [c for c in others if rows.slip[c, 0] < still and gaps[c] < -0.5 * rounding]
+        deep = [c for c in others if rows.closing[c] < still and gaps[c] < -0.5 * rounding]
         return rows.lifted(gaps, [*held, *deep], others, 2.0 * rounding)
 
     def _outputs(self, t: float, u: Floats) -> Floats:
@@ -325,11 +347,14 @@ class ContactJumps(Jumps):
             if part == 0:
                 continue
             if before[c] > 1.5:
-                force = rows.frames[c, 1:] @ outputs[c, FRICTION]
-                size = float(np.hypot(*force))
+                force = rows.frames[c, self.table.across(c)] @ outputs[c, FRICTION]
+                size = length_of(force)
                 if size > 0.0:
                     sliding[c] = self.table.slip_against(c, force)
-            elif float(np.hypot(*rows.slip[c, 1:])) < STOPPED * self._evaluator.model.length:
+            elif (
+                length_of(rows.slip[c, self.table.across(c)])
+                < STOPPED * self._evaluator.model.length
+            ):
                 self._stop(rows, c)
                 stopped.append(c)
         return sliding, leaving, stopped
@@ -348,7 +373,7 @@ class ContactJumps(Jumps):
         for c in decided.stopped:
             self._stop(rows, c)
         impact = repeat(table, rows, decided.impact)
-        rows.change(rows.lifted(rows.slip[:, 0], decided.held, []))
+        rows.change(rows.lifted(rows.closing, decided.held, []))
         modes = decided.modes
         states[table.mode], states[table.way], states[table.near] = (
             modes.mode,
@@ -356,18 +381,23 @@ class ContactJumps(Jumps):
             modes.near,
         )
         for c in np.flatnonzero(modes.mode == 1.0).tolist():
-            slip = rows.slip[c, 1:]
-            if float(np.hypot(*slip)) > STOPPED * evaluator.model.length:
-                states[table.way[c]] = slip / np.hypot(*slip) @ rows.frames[c, 1:]
+            slip, frame = rows.slip[c, table.across(c)], rows.frames[c, table.across(c)]
+            if length_of(slip) > STOPPED * evaluator.model.length:
+                states[table.way[c]] = slip / length_of(slip) @ frame
         moved = np.zeros(len(rows.v))
         self._go_on(integration, u, rows, moved, states, float(np.sum(impact.work)))
 
-    @staticmethod
-    def _stop(rows: ContactRows, c: int) -> None:
-        """Stop the slip of a contact, rounding of zero, without a change of its normal velocity."""
+    def _stop(self, rows: ContactRows, c: int) -> None:
+        """Stop the slip of a contact, rounding of zero, without a change of its normal velocity.
+
+        At a dead centre it passes through zero while the mechanism moves on.
+        """
         which = rows.rows_of([c])
+        free = np.einsum("ri,ij,rj->r", rows.G[which], rows.inverse, rows.G[which])
+        if np.diag(rows.W)[which].max() < DEAD * free.max():
+            return
         A, u = rows.W[np.ix_(which, which)], rows.slip[c].copy()
-        u[0] = 0.0
+        u[: self.table.across(c).start] = 0.0
         x = np.zeros(len(rows.G))
         x[which] = np.linalg.lstsq(A, -u, rcond=1e-12)[0]
         rows.kick(x)
@@ -380,10 +410,7 @@ class ContactJumps(Jumps):
         evaluator, work_state = self._evaluator, integration.work
         dv = rows.v - u[-len(rows.v) :]
         y = evaluator.coordinates.with_jump(integration.y, dv, states, work)
-        r, p, *_ = split(evaluator.bodies_of(y))
-        parts = moved.reshape(-1, 2, 3)
-        r += parts[:, 0]
-        p += euler_rates(p, parts[:, 1])
+        evaluator.coordinates.displace(y, moved)
         work_state.state[at.Y] = y
         integration.restart()
         evaluator.states = states

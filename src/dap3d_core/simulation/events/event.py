@@ -250,7 +250,7 @@ class Instant:
         """End a joint that has ``breaks_at``, for the rest of this run or until it is engaged.
 
         Raises:
-            ValueError: there is no such joint, or it has no ``breaks_at``.
+            ValueError: there is no such joint, it has no ``breaks_at``, or it has ``active``.
         """
         self._check_released(joint)
         self.released.append(joint)
@@ -262,16 +262,19 @@ class Instant:
         onto its rows by impulses in it and in other joints, which take energy.
 
         Raises:
-            ValueError: there is no such joint, or it has no ``breaks_at``.
+            ValueError: as of ``release``.
         """
         self._check_released(joint)
         self.engaged.append(joint)
-        self.changes.setdefault(joint, {})["engaged"] = True
 
     def _check_released(self, joint: str) -> None:
-        breaks = self._compiled.model.breaks
+        model = self._compiled.model
+        breaks = [name for name in model.breaks if name not in model.active]
+        if joint in model.active:
+            raise ValueError(f"joint {joint} is active by {model.active[joint].text!r}; release "
+                             "and engage it by an input there, which the event sets")  # fmt: skip
         if joint not in breaks:
-            known = f"there are {some(list(breaks), 20)}" if breaks else "there are none"
+            known = f"there are {some(breaks, 20)}" if breaks else "there are none"
             raise ValueError(
                 f"{joint!r} is no joint that may be released: {known}; give it breaks_at, inf "
                 "where it never breaks by itself"

@@ -1,6 +1,6 @@
 """Jumps of velocities in the course of a run: where switches cross, and at its start."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import Any
 
@@ -131,7 +131,7 @@ class Jumps:
             bodies: number of a body, from 0 -> (6,) its r_dot and omega, global axes; NaN leaves a
                 component to the joints.
             states: first place of a state among all -> its numbers.
-            title: of the event.
+            title: of what asks for it, with its kind.
 
         Raises:
             SimulationError: the joints do not allow such velocities.
@@ -143,14 +143,21 @@ class Jumps:
         for first, numbers in states.items():
             own[first : first + len(numbers)] = numbers
         try:
-            jump = self._law.jump(t, y, None, none, self._soon(integration), _rows_to(u, bodies))
+            jump = self._law.jump(t, y, None, none, self._soon(integration), rows_to(u, bodies))
         except ImpossibleJumpError as error:
-            names = ", ".join(self._evaluator.model.body_names[k] for k in bodies) or "no body"
-            raise SimulationError(
-                f"the run stopped at t = {t:.9g} s: event {title} sets a velocity of {names} that "
-                "the joints do not allow; set fewer components (None leaves one to the joints)"
-            ) from error
+            raise self._impossible(t, title, bodies) from error
         return self._take(integration, u, jump), jump.work
+
+    def settle(self, integration: Integration) -> None:
+        """Follow joints that have ended: velocities stay."""
+
+    def _impossible(self, t: float, title: str, bodies: Iterable[int]) -> SimulationError:
+        """The error where joints hold velocities that are set."""
+        names = ", ".join(self._evaluator.model.body_names[k] for k in bodies) or "no body"
+        return SimulationError(
+            f"the run stopped at t = {t:.9g} s: {title} sets a velocity of {names} that "
+            "the joints do not allow; set fewer components (None leaves one to the joints)"
+        )
 
     def _state_of(self, integration: Integration) -> Floats:
         u: Floats = self._evaluator.hold(self._evaluator.body_state(integration.y))
@@ -272,7 +279,7 @@ class Jumps:
             functions[ACCEPTED](t, y, np.ones(1), *arrays)
 
 
-def _rows_to(u: Floats, bodies: Mapping[int, Floats]) -> list[tuple[Floats, float]]:
+def rows_to(u: Floats, bodies: Mapping[int, Floats]) -> list[tuple[Floats, float]]:
     """Rows that bring velocities of bodies to the values given, and their changes."""
     v, rows = velocities_of(u), []
     for body, targets in bodies.items():

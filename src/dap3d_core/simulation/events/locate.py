@@ -22,13 +22,16 @@ from dap3d_core.result.post.smooth_parts import cubic
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_events
 from dap3d_core.simulation.events.sampling import Sampler
+from dap3d_core.simulation.initial.released_joints import ReleasedJoints
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation.events.breaking import ReleasedJoints
     from dap3d_core.simulation.events.jumps import Jumps
+    from dap3d_core.simulation.initial.start_state import StartState
 
 
 EPSILON = float(np.finfo(float).eps)
+#: Part of a run that shows to which side a number goes that is zero where the run begins.
+SOON = 1e-9
 #: Of the search for a root: bisection, which it falls back to, squared.
 MAX_ITERATIONS = 3000
 
@@ -53,8 +56,8 @@ class EventLocator:
     """Locates events during an integration.
 
     Attributes:
-        events: what is looked for: those of the script, ``of_script``, then ``breaks`` of joints.
-        released: joints that have ended; None where none may.
+        events: what is looked for: those of the script, ``of_script``, then those of joints.
+        released: joints that hold no more; None where all hold throughout.
         occurrences: what was found.
         numbers: of the forces, which events may change.
         jumps: of velocities, which events may set; made where one does.
@@ -67,14 +70,14 @@ class EventLocator:
     def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
         self.compiled = compiled
         self.of_script = checked_events(events, compiled.model.body_names)
-        self.breaks: tuple[Event, ...] = ()
+        self.events = self.of_script
         self.released: ReleasedJoints | None = None
         if compiled.model.breaks:
-            from dap3d_core.simulation.events import breaking
+            from dap3d_core.simulation.events.breaking import JointEvents
 
-            self.breaks = breaking.breaks_of(compiled.model)
-            self.released = breaking.ReleasedJoints(compiled.evaluator)
-        self.events = (*self.of_script, *self.breaks)
+            self._of_joints = JointEvents(compiled.model)
+            self.events += self._of_joints.events
+            self.released = ReleasedJoints(compiled.evaluator)
         self.numbers = Numbers(compiled)
         self.jumps: Jumps | None = None
         self.take_rows: Callable[[], None] = lambda: None
@@ -161,18 +164,33 @@ class EventLocator:
     def begin_anew(self, integration: Integration) -> None:
         """Look at the events again where what they watch may have jumped: that is no event.
 
-        But joints that carry too much there break, and others that have to carry more then.
+        But joints that carry too much there break, and others that have to carry more then; so do
+        joints end and hold again that are active by what has jumped.
         """
+        begins = not self._values
         self._values = self._all(self._instant(integration))
         self._sides = [float(np.sign(value)) for value in self._values]
         if self.released is None:
             return
-        values = self._values[len(self.of_script) :]
-        over = [event for event, value in zip(self.breaks, values, strict=True) if value > 0.0]
-        for event in over:
-            self._act(integration, event, 1)
-        if over:
+        sides = self._sides[len(self.of_script) :]
+        if begins and 0.0 in sides:
+            soon = SOON * integration.work.times[-1]
+            y = integration.y + soon * self._slope(integration)
+            later = Instant(self.compiled, integration.t + soon, y, self.numbers)
+            events = self.events[len(self.of_script) :]
+            sides = [side or float(np.sign(event.value(later)))
+                     for side, event in zip(sides, events, strict=True)]  # fmt: skip
+        if self._switch_joints(integration, *self._of_joints.due(sides, self.released.names)):
             self.begin_anew(integration)
+
+    def release_inactive(self, start: "StartState | None") -> None:
+        """End the joints that are not active where a run starts: None for the scene's start."""
+        model, compiled = self.compiled.model, self.compiled
+        if self.released is not None and model.active:
+            from dap3d_core.simulation.output.active_joints import inactive_joints
+
+            u = model.u0 if start is None else start.u
+            self.released.release(inactive_joints(compiled.scene_text, compiled.evaluator, u))
 
     def put_back(self) -> None:
         """Make numbers and joints those of the scene again."""
@@ -327,22 +345,25 @@ class EventLocator:
     def _take_notice(self, integration: Integration, here: Instant) -> None:
         """Act on the events that are past here."""
         self._values = self._all(here)
-        changes = False
+        changes, passed = False, [0.0] * len(self.events)
         for k, event in enumerate(self.events):
             side, value = self._sides[k], self._values[k]
             if not self._is_past(k, value):
                 self._sides[k] = side or float(np.sign(value))
                 continue
             self._sides[k] = float(np.sign(value))  # 0 where it is reached: until it leaves
-            if event.sense * side <= 0.0:
+            passed[k] = -side
+            if event.sense * side <= 0.0 and k < len(self.of_script):
                 changes |= self._act(integration, event, int(-side))
+        if self.released is not None:
+            due = self._of_joints.due(passed[len(self.of_script) :], self.released.names)
+            changes |= self._switch_joints(integration, *due)
         if changes:  # numbers may jump with them: that is no event
             self.begin_anew(integration)
 
     def _act(self, integration: Integration, event: Event, direction: int) -> bool:
         """Do what an event asks for; whether it changed numbers of forces, velocities, states."""
         here, kind = self._instant(integration), "change"
-        ended: list[EventRecord] = []
         if callable(event.action):
             event.action(here)
         else:
@@ -351,36 +372,47 @@ class EventLocator:
             integration.end()
         if here.changes:
             integration.restart()
-        if here.released:
-            ended = self._end_joints(integration, here, direction)
-            if event in self.breaks:
-                self.occurrences += ended
-                return True
         after, work = None, 0.0
         if here.inputs:
             self._set_inputs(here.inputs)
-        if here.engaged and self.released is not None:
-            self.released.engage(here.engaged, here.t, integration.y)
-        if here.velocities or here.states or here.inputs or here.engaged:
-            after, work = self._set_state(integration, event, here)
+        if here.velocities or here.states or here.inputs:
+            changed = here.velocities, here.states
+            after, work = self._jumps.set_state(integration, *changed, f"event {event.title}")
         self.occurrences.append(
             EventRecord(name=event.title, t=here.t, direction=direction, kind=kind, u=here.u,
                        changes=here.changes, u_after=after, work=work)
         )  # fmt: skip
-        self.occurrences += ended
-        return bool(here.changes or here.released)
+        switched = self._switch_joints(integration, here.released, here.engaged)
+        return bool(here.changes) or switched
 
-    def _end_joints(
-        self, integration: Integration, here: Instant, direction: int
-    ) -> list[EventRecord]:
-        """End joints from here on; a record of each that held until now."""
+    def _switch_joints(
+        self, integration: Integration, ending: Sequence[str], engaging: Sequence[str]
+    ) -> bool:
+        """End joints, and let others hold again; whether any of them did not before."""
+        if not (ending or engaging):
+            return False
         assert self.released is not None
-        names = self.released.release(here.released, here.t, integration.y)
-        integration.restart()
-        return [
-            EventRecord(name=name, t=here.t, direction=direction, kind="break", u=here.u)
-            for name in names
+        t, released = integration.t, self.released
+        u, ended = self._instant(integration).u, released.release(ending)
+        if ended:
+            integration.restart()
+            released.begin_anew(t, integration.y)
+        self.occurrences += [
+            EventRecord(name=name, t=t, direction=0, kind="break", u=u) for name in ended
         ]
+        if engaged := released.engage(engaging, t, integration.y):
+            name = "joint " + ", ".join(engaged)
+            after, work = self._jumps.set_state(integration, {}, {}, name)
+            released.check_velocities(engaged, t, after)
+            self.occurrences.append(
+                EventRecord(name=name, t=t, direction=0, kind="engage", u=u, u_after=after,
+                           work=work)
+            )  # fmt: skip
+        elif ended and self.jumps is not None:
+            self.jumps.settle(integration)
+        if switched := [*ended, *engaged]:
+            self._of_joints.refuse_endless(t, switched, float(integration.work.times[-1]))
+        return bool(switched)
 
     def _set_inputs(self, inputs: Mapping[int, float]) -> None:
         """Set inputs from here on; what was reported so far has those before."""
@@ -389,15 +421,14 @@ class EventLocator:
         values[list(inputs)] = list(inputs.values())
         self.compiled.evaluator.set_inputs(values)
 
-    def _set_state(
-        self, integration: Integration, event: Event, here: Instant
-    ) -> tuple[Floats, float]:
-        """Set velocities and states as an action asks for; u after it, and the work, J."""
+    @property
+    def _jumps(self) -> "Jumps":
+        """Jumps of the velocities of the run."""
         if self.jumps is None:
             from dap3d_core.simulation.events.jumps import Jumps
 
             self.jumps = Jumps(self.compiled.evaluator)
-        return self.jumps.set_state(integration, here.velocities, here.states, event.title)
+        return self.jumps
 
 
 def _are_numbers(values: Any, lengths: Collection[int]) -> bool:

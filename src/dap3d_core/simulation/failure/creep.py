@@ -108,8 +108,7 @@ def _parts_of_whole(
             reads = loops.law == "friction"
             loops.call(loops.law, time, force, minus_lambda if reads else None)
             size[n, c] = np.max(np.abs(force))
-    part: Floats = size[:, 0] / np.where(size[:, 1] > 0.0, size[:, 1], 1.0)
-    return part
+    return size[:, 0] / np.where(size[:, 1] > 0.0, size[:, 1], 1.0)
 
 
 def _longest(flags: Any) -> tuple[int, int]:

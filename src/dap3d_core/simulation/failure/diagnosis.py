@@ -11,11 +11,14 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.model import Group
 from dap3d_core.model.state_layout import by_body, velocities_of
+from dap3d_core.registry.suggestions import some
 from dap3d_core.scene.validate.coerce_values import LARGEST
 
 #: Where to look behind the last good state, as parts of the time.
 AHEAD = (0.0, 1e-12, 1e-9, 1e-6, 1e-3)
 
+#: Names that a message lists.
+MOST_NAMES = 6
 #: A row this many times the others, in its own units, indicates a pose that its joint cannot have.
 STEEP = 1e6
 #: A state or a rate, in SI units, beyond which no step succeeds for long: cubes soon overflow.
@@ -66,9 +69,30 @@ def _at(evaluator: Evaluator, t: float, y: Floats) -> str:
                 title = "contact" if group.type_info.type.is_contact else _title(kind)
                 return f"{title} {name} (type {group.keyword}) is {fault}"
     return (
-        _without_direction(evaluator, t, y)
+        _jammed(evaluator, t, y)
+        or _without_direction(evaluator, t, y)
         or _singular(evaluator, t)
         or _accelerated(evaluator, t, y)
+    )
+
+
+def _jammed(evaluator: Evaluator, t: float, y: Floats) -> str:
+    """The friction of joints that slides where no load agrees with it."""
+    model = evaluator.model
+    first = len(model.joint_names) - model.contact_count
+    loaded = [int(k) for group in model.contacts if group.loaded is not None for k in group.members]
+    if not loaded:
+        return ""
+    from dap3d_core.formulations.contacts.contact_rows import ContactTable
+
+    modes = evaluator.states[ContactTable(evaluator).mode]
+    slides = [model.joint_names[k] for k in loaded if modes[k - first] == 1.0]
+    u = evaluator.bodies_of(y)
+    if not slides or np.isfinite(evaluator.report(t, u)[model.report_layout["Lam"]]).all():
+        return ""
+    return (
+        f"friction {some(slides, MOST_NAMES)} slides and jams: it raises the load of its joint by "
+        "more than that load, or the pose is singular, and no motion with Coulomb's law goes on"
     )
 
 

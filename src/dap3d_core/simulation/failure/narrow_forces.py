@@ -73,11 +73,9 @@ def _branching(by_type: dict[Any, list[str]], type_info: dict[Any, TypeInfo]) ->
         kernels = type_info[type_].kernels
         if "switch" in kernels or not _chooses(type_info[type_]):
             continue
-        yield (
-            information(
-                f"{type_.kind}s.{names[0]}{_more(names)} ({type_.keyword}): its law has branches "
-                "and its type no switch: steps go across them, and may pass over a short one"
-            )
+        yield information(
+            f"{type_.kind}s.{names[0]}{_more(names)} ({type_.keyword}): its law has branches "
+            "and its type no switch: steps go across them, and may pass over a short one"
         )
 
 

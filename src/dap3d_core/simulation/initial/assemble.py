@@ -6,7 +6,7 @@ is not of ordinary size) and rotations in rad as they are (metric "unit", the ma
 by masses and inertias (metric "mass"): a heavy body then stays nearly where it is.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from itertools import pairwise
 
 import attrs
@@ -15,13 +15,21 @@ import numpy as np
 from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.linear.rank.rank import DENSE_ROWS
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import split, state_layout, velocities_of
 from dap3d_core.result import Note, information
 from dap3d_core.scene import Body, Scene
 from dap3d_core.simulation.errors import AssemblyError
-from dap3d_core.simulation.initial.least_change import displaced, finite_rows, least_change
-from dap3d_core.simulation.initial.singular_assembly import is_farther, rotations, ways_out
+from dap3d_core.simulation.initial.least_change import (
+    RCOND,
+    displaced,
+    displacements,
+    finite_rows,
+    least_change,
+    quadratic_part,
+    scaled_system,
+)
 
 #: Position residuals above this are corrected; Newton stops below it.
 TOLERANCE = 1e-10
@@ -39,6 +47,19 @@ FLAT = 1e-6
 MOST_LEFT = 2
 #: Joints that the message of a failure lists.
 MOST_JOINTS = 10
+#: Freedoms beyond which no way out is searched: the work grows with the square of them.
+MOST_FREE = 60
+#: Part of a gap that no first-order change closes at a singular pose, at least.
+OPEN = 0.9
+#: A rate of closing below this part of the largest, or of the length of the scene, is none.
+CLOSING = 1e-6
+#: Directions that close a gap equally well, but for this part, are equal.
+TIED = 1e-6
+#: Ways out that are tried; singular values above this part of the largest are no rounding: a way
+#: that ends at another singular pose, such as a folded one, is taken only where there is no other.
+MOST_WAYS, REGULAR = 4, 1e-4
+#: Rotations that a sentence gives, in rad from this on.
+MOST_BODIES, TURNED = 6, 1e-3
 
 
 @attrs.frozen(eq=False)
@@ -78,8 +99,7 @@ def violation(evaluator: Evaluator, u: Floats, t: float = 0.0) -> tuple[float, f
 
 def weights_of(evaluator: Evaluator) -> Floats:
     """(rows,) weights of the residuals of the model's rows (System.weight)."""
-    weight: Floats = evaluator.system.weight[evaluator.system.row]
-    return weight
+    return evaluator.system.weight[evaluator.system.row]
 
 
 def correct_initial(
@@ -111,7 +131,7 @@ def correct_initial(
     start = u
     held = np.array(sorted(hold), dtype=np.int64)
     u, passes = correct_positions(evaluator, u, t, held, metric, MOST_LEFT, tolerance)
-    branch = rotations(evaluator.model, start, u) if passes > MOST_PASSES else ""
+    branch = _rotations(evaluator.model, start, u) if passes > MOST_PASSES else ""
     rows = finite_rows(evaluator, t, u)
     residual = rows.product(velocities_of(u)) - rows.nu
     if _largest(residual) > 0.0:
@@ -214,13 +234,13 @@ def _leave(
 ) -> tuple[Floats, int] | None:
     """Assemble from a singular pose; None where that fails."""
     found = None
-    for change in ways_out(evaluator, u, rows, t, held, metric):
+    for change in _ways_out(evaluator, u, rows, t, held, metric):
         away = displaced(u, _step_limit(change, evaluator.model.size) * change)
         try:
             closed, passes = correct_positions(evaluator, away, t, held, metric, leaves - 1)
         except AssemblyError:
             continue
-        if is_farther(evaluator, closed, rows, t):
+        if _is_farther(evaluator, closed, rows, t):
             return closed, passes + 1
         found = found or (closed, passes + 1)
     return found
@@ -287,8 +307,7 @@ def _failure(
     if len(still_open) > MOST_JOINTS:
         lines.append(f"  and {len(still_open) - MOST_JOINTS} joints more")
     names = ", ".join(model.body_names[b - 1] for b in held)
-    why = ["bodies that do not reach their joints, and",
-           "contradictory joints cannot be assembled"]  # fmt: skip
+    why = ["bodies that do not reach their joints, and", "contradictory joints cannot be assembled"]
     if is_far:
         why = ["the bodies were still on their way: give positions nearer to an assembled pose,",
                "unless the joints contradict each other"]  # fmt: skip
@@ -322,3 +341,111 @@ def _without_gradient(evaluator: Evaluator, rows: ConstraintRows) -> str:
 
 def _cut(words: str, width: int) -> str:
     return words if len(words) <= width else f"{words[: width - 3]}..."
+
+
+def _ways_out(
+    evaluator: Evaluator, u: Floats, rows: ConstraintRows, t: float, held: Integers, metric: str
+) -> Iterator[Floats]:
+    """Displacements (n, 6) from a singular pose that close its gap, the smallest first.
+
+    No small change closes a gap there to first order: of a mechanism drawn straight, for example.
+    Along velocities v that the rows allow C changes by -gamma(v) s^2 / 2: the direction in which
+    that closes the gap with the least motion leads away. Of those that close it equally well, and
+    of the two signs, the one in which the first component that can be largest is positive.
+    """
+    if len(rows.C) > DENSE_ROWS:
+        return
+    D, gap = scaled_system(evaluator, rows, rows.C, held, metric)
+    is_free = np.repeat(~np.isin(np.arange(1, evaluator.model.body_count + 1), held), 6)
+    left, values, right = np.linalg.svd(D[:, is_free])
+    rank = _rank(values, RCOND)
+    beyond = gap - left[:, :rank] @ (left[:, :rank].T @ gap)
+    distance = float(np.linalg.norm(beyond))
+    if distance < OPEN * np.linalg.norm(gap) or not 0 < len(right) - rank <= MOST_FREE:
+        return
+    motions = np.zeros((len(right) - rank, len(is_free)))
+    motions[:, is_free] = right[rank:]
+    closing = _closing(evaluator, u, rows, t, held, metric, motions, beyond / distance)
+    rates, directions = np.linalg.eigh(closing)
+    least = CLOSING * max(-float(rates[0]), evaluator.model.length)
+    for _ in range(MOST_WAYS):
+        if not rates.size or not rates[-1] > least:
+            return
+        equal = rates >= (1.0 - TIED) * rates[-1]
+        yield displacements(
+            evaluator,
+            _first_of(directions[:, equal].T @ motions) * (2.0 * distance / rates[-1]) ** 0.5,
+            metric,
+        )
+        rates, directions = rates[~equal], directions[:, ~equal]
+
+
+def _first_of(directions: Floats) -> Floats:
+    """A unit vector (6 n,) of the space of orthonormal ones (k, 6 n), the same on any computer."""
+    size = np.sum(directions**2, axis=0)
+    k = int(np.argmax(size >= (1.0 - TIED) * np.max(size)))
+    return directions[:, k] @ directions / size[k] ** 0.5
+
+
+def _rank(values: Floats, part: float) -> int:
+    return int(np.sum(values > part * np.max(values, initial=0.0)))
+
+
+def _is_farther(evaluator: Evaluator, u: Floats, other: ConstraintRows, t: float) -> bool:
+    """True if the rows of a state are clearly more independent than those of a singular pose."""
+    parts = ((finite_rows(evaluator, t, u), REGULAR), (other, RCOND))
+    no_one = np.zeros(0, dtype=np.int64)
+    ranks = [
+        _rank(np.linalg.svd(scaled_system(evaluator, r, r.C, no_one, "unit")[0])[1], part)
+        for r, part in parts
+    ]
+    return ranks[0] > ranks[1]
+
+
+def _closing(
+    evaluator: Evaluator,
+    u: Floats,
+    rows: ConstraintRows,
+    t: float,
+    held: Integers,
+    metric: str,
+    ways: Floats,
+    direction: Floats,
+) -> Floats:
+    """(f, f) the quadratic form by which motions along ways (f, 6 n) close a gap, rows (m,)."""
+    still = u.copy()
+    velocities_of(still)[:] = 0.0
+
+    def closed(x: Floats) -> float:
+        gamma = quadratic_part(evaluator, still, displacements(evaluator, x, metric).ravel(), t)
+        return float(direction @ scaled_system(evaluator, rows, gamma, held, metric)[1])
+
+    f = len(ways)
+    form = np.zeros((f, f))
+    for i in range(f):
+        for j in range(i + 1):
+            both = closed(ways[i] + ways[j]) - closed(ways[i] - ways[j])
+            form[i, j] = form[j, i] = both / 4.0
+    return form
+
+
+def _rotations(model: Model, start: Floats, end: Floats) -> str:
+    """The rotations of bodies from one state (13 n,) to another, in words."""
+    p, q = split(start)[1], split(end)[1]
+    # q = d p, Euler parameters of the rotation between them: d = q p*
+    cosine = np.sum(p * q, axis=1)
+    sine = p[:, :1] * q[:, 1:] - q[:, :1] * p[:, 1:] - np.cross(q[:, 1:], p[:, 1:])
+    sine *= np.where(cosine < 0.0, -1.0, 1.0)[:, None]
+    size = np.linalg.norm(sine, axis=1)
+    angle = 2.0 * np.arctan2(size, np.abs(cosine))
+    order = [int(k) for k in np.argsort(-angle, kind="stable") if angle[k] > TURNED]
+    listed = [
+        f"{model.body_names[k]} turned by {angle[k]:.3g} rad about {_axis(sine[k] / size[k])}"
+        for k in sorted(order[:MOST_BODIES])
+    ]
+    more = [f"and {len(order) - MOST_BODIES} bodies more"] if len(order) > MOST_BODIES else []
+    return ", ".join([*listed, *more]) or "bodies moved without turning"
+
+
+def _axis(n: Floats) -> str:
+    return "[" + ", ".join(f"{c:.3g}" for c in np.where(np.abs(n) > TURNED, n, 0.0)) + "]"

@@ -50,8 +50,7 @@ def quadratic_part(evaluator: Evaluator, still: Floats, v: Floats, t: float) -> 
         moving = still.copy()
         velocities_of(moving)[:] = sign * v
         total += finite_rows(evaluator, t, moving).gamma
-    half: Floats = 0.5 * total
-    return half
+    return 0.5 * total
 
 
 def least_change(

@@ -325,8 +325,7 @@ def _third(cone: _Cone, v: Floats, a: Floats) -> Floats:
         velocities_of(state)[:] = v + s * a
         rows = finite_rows(cone.evaluator, cone.t + s, state)
         total += weight * cone.left @ (rows.product(a) - rows.gamma)
-    derivative: Floats = total / (12.0 * h)
-    return derivative
+    return total / (12.0 * h)
 
 
 def _at_rest(cone: _Cone) -> SingularStart | None:

@@ -139,8 +139,7 @@ def _turned(group: Group, name: str, numbers: Floats, A: Floats) -> Floats:
     """(..., m, 3) a point or vector of the instances of a group, in global axes."""
     offset, _ = group.type_info.layout.numbers[name]
     local = numbers[..., offset : offset + 3]
-    turned: Floats = np.einsum("...mrc,...mc->...mr", A[..., _bodies(group, name), :, :], local)
-    return turned
+    return np.einsum("...mrc,...mc->...mr", A[..., _bodies(group, name), :, :], local)
 
 
 def _bodies(group: Group, name: str) -> NDArray[np.int64]:

@@ -324,8 +324,7 @@ class _Fit:
 def _slopes(values: Floats) -> Floats:
     """Central differences (..., 6 n) of values (..., 12 n + 1) at the states of ``_Fit._near``."""
     count = values.shape[-1] // 2
-    slopes: Floats = (values[..., 1 : count + 1] - values[..., count + 1 :]) / (2.0 * SPAN)
-    return slopes
+    return (values[..., 1 : count + 1] - values[..., count + 1 :]) / (2.0 * SPAN)
 
 
 def misfit_notes(misfit: Mapping[str, float]) -> list[str]:

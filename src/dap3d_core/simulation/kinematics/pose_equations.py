@@ -71,13 +71,11 @@ class LinearisedRows:
             x = solve_triangular(self._R, self._Q.T @ scaled)
         else:
             x = np.linalg.lstsq(self.matrix, scaled, rcond=SINGULAR)[0]
-        solution: Floats = self._unit * x
-        return solution
+        return self._unit * x
 
     def product(self, x: Floats) -> Floats:
         """(m,) D x in units of the rows."""
-        product: Floats = self._gradient * (self.matrix @ (x / self._unit))
-        return product
+        return self._gradient * (self.matrix @ (x / self._unit))
 
     def adjoint(self, force: Floats) -> Floats:
         """(m,) multipliers whose D^T lambda is nearest to a force (6 n,); of these the least."""
@@ -91,8 +89,7 @@ class LinearisedRows:
 
     def left_out(self, left: Floats) -> Floats:
         """(m,) what each row's prescribed rate adds to the rate that no motion gives (``left``)."""
-        share: Floats = left * self.rows.nu / self._gradient
-        return share
+        return left * self.rows.nu / self._gradient
 
     def turned_from(self, other: "LinearisedRows") -> bool:
         """Whether a singular pose lies between two near poses: a determinant changes its sign."""
@@ -129,13 +126,11 @@ class ChosenRows:
     def least(self, side: Floats) -> Floats:
         """(6 n,) the least x with D x = side, side (rows,) of all rows."""
         scaled = self._left.T @ (side[self._chosen] / self._gradient)
-        least: Floats = self._right.T @ (scaled / self._values)
-        return least
+        return self._right.T @ (scaled / self._values)
 
     def onto(self, x: Floats, side: Floats) -> Floats:
         """The x (6 n,) nearest to one given with D x = side."""
-        nearest: Floats = self.free @ (self.free.T @ x) + self.least(side)
-        return nearest
+        return self.free @ (self.free.T @ x) + self.least(side)
 
     def residual(self, x: Floats, side: Floats) -> float:
         """Largest |D x - side|."""
@@ -174,7 +169,8 @@ def required_forces(evaluator: Evaluator, t: float, u: Floats, v_dot: Floats) ->
 
 def held_states(model: Model) -> list[str]:
     """Note that states of elements stay as they are; none where there are no states."""
-    if not model.state_count:
+    own = [state for state in model.element_states if state.element not in model.contact_names]
+    if not own:
         return []
-    names = ", ".join(f"{state.element}.{state.name}" for state in model.element_states)
+    names = ", ".join(f"{state.element}.{state.name}" for state in own)
     return [f"no motion is integrated: states of elements keep their initial values ({names})"]

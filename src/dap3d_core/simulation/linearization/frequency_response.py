@@ -57,8 +57,7 @@ def samples(modes: Floats, damping: Floats, first: float, last: float, count: in
     width = np.maximum(np.abs(damping), 1e-3)
     near = modes[:, None] * (1.0 + width[:, None] * np.linspace(-3.0, 3.0, 61))
     inside = near[(near >= first) & (near <= last)]
-    found: Floats = np.unique(np.concatenate([even, inside]))
-    return found
+    return np.unique(np.concatenate([even, inside]))
 
 
 def peaks(frequencies: Floats, values: Complex) -> list[Peak]:

@@ -9,18 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.linear.rank.rank import Dependency
 from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, information
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, eigenvalues_of
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, eigenvalues_of, order_of
 from dap3d_core.simulation.linearization.frequency_response import response
 from dap3d_core.simulation.linearization.inputs import inputs_of
 from dap3d_core.simulation.linearization.mode_motion import mode_motion
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint, operating_point
 from dap3d_core.simulation.linearization.outputs import Outputs, output_derivatives
-from dap3d_core.simulation.linearization.sparse_modes import lowest_eigenvalues
+from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
 from dap3d_core.simulation.linearization.state_space import DriverRows, StateSpace, state_space
+from dap3d_core.simulation.linearization.steady_motion import independent_rows
 
 Complex = NDArray[np.complex128]
 
@@ -32,6 +35,10 @@ FEW_MODES = 10
 REAL_PART_ROUNDING = 1e-9, 1e-12
 #: Eigenvalues within this part of i Omega are drifts of free bodies, seen from axes that turn.
 DRIFT = 1e-5
+#: sigma as a part of the frequency that the largest terms would give.
+SHIFT = 1e-4
+#: Eigenvalues below this part of sigma are zeros of rigid motions, which rounding has moved.
+ZERO = 1e-3
 
 
 class Linearization:
@@ -253,14 +260,12 @@ class Linearization:
     @property
     def mode_eigenvalues(self) -> Complex:
         """(modes,) the eigenvalue of each mode: of a conjugate pair that with Im > 0."""
-        values: Complex = self._spectrum.values[self._of_modes]
-        return values
+        return self._spectrum.values[self._of_modes]
 
     @property
     def frequencies(self) -> Floats:
         """(modes,) natural frequency of each mode, Hz: ``|lambda|`` / (2 pi)."""
-        frequencies: Floats = np.abs(self.mode_eigenvalues) / (2.0 * np.pi)
-        return frequencies
+        return np.abs(self.mode_eigenvalues) / (2.0 * np.pi)
 
     @property
     def damping(self) -> Floats:
@@ -295,8 +300,7 @@ class Linearization:
         x = self.modes
         energy = np.real(np.conj(x) * (self.M @ x)).T
         energy = energy.reshape(len(energy), len(self.body_names), 6).sum(axis=2)
-        shares: Floats = energy / energy.sum(axis=1, keepdims=True)
-        return shares
+        return energy / energy.sum(axis=1, keepdims=True)
 
     @checked
     def motion(self, mode: int = 0, size: float = 0.1, instants: int = 60) -> Result:
@@ -344,8 +348,7 @@ def _balance(space: StateSpace, scale: Floats) -> Floats:
     into, out = np.abs(A[rest:, :rest]).sum(axis=1), np.abs(A[:rest, rest:]).sum(axis=0)
     is_coupled = (into > 0.0) & (out > 0.0)
     balanced = np.sqrt(np.where(is_coupled, out, 1.0) / np.where(is_coupled, into, 1.0))
-    found: Floats = np.where(is_coupled, balanced, 1.0)
-    return found
+    return np.where(is_coupled, balanced, 1.0)
 
 
 @checked
@@ -394,3 +397,67 @@ def linearize(
 
 def _names(names: Sequence[str] | str) -> tuple[str, ...]:
     return (names,) if isinstance(names, str) else tuple(names)
+
+
+def lowest_eigenvalues(
+    equations: ScaledEquations, dependencies: Sequence[Dependency], count: int
+) -> Eigenvalues:
+    """The ``count`` eigenvalues nearest to zero, and displacements x^ (6 n, count) of each.
+
+    Of the sparse equations without independent coordinates: with y = (x^, v^, lambda, z), z of
+    elements with states, they are a pencil E y_dot = B y, E singular. Position rows stand as
+    D x^ = 0, rows of the velocity level alone as D v^ + G x^ = 0, redundant rows are left out.
+    Arnoldi iterations with (B - sigma E)^-1 E (scipy.sparse.linalg.eigs, ARPACK) find the
+    eigenvalues nearest to a small real sigma; those at infinity, which the constraints add, become
+    zero and stay out of the way.
+
+    Raises:
+        SimulationError: the iteration does not converge.
+    """
+    from scipy.sparse import block_array, block_diag, csc_array, eye_array
+    from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigs, splu
+
+    six = equations.K.shape[0]
+    chosen = independent_rows(equations.D.shape[0], dependencies)
+    position = equations.position_row[chosen]
+    D, G, F = equations.D[chosen], equations.G[chosen], equations.F[:, chosen]
+    identity = eye_array(six)
+    on_x = D.multiply(position[:, None]) + G.multiply(~position[:, None])
+    on_v = D.multiply(~position[:, None])
+    terms = [[equations.S, identity, None],
+                [-equations.K, -equations.C, D.T + F],
+                [on_x, on_v, None]]  # fmt: skip
+    masses = [identity, identity, csc_array((len(chosen), len(chosen)))]
+    if (own := equations.states) is not None:
+        by_rows = own.position[chosen].multiply(position[:, None])
+        by_rows = by_rows + own.velocity[chosen].multiply(~position[:, None])
+        for row, block in zip(terms, (None, own.force, by_rows), strict=True):
+            row.append(block)
+        terms.append([own.by_displacement, own.by_velocity, None, own.by_states])
+        masses.append(eye_array(own.by_states.shape[0]))
+    B, E = block_array(terms).tocsc(), block_diag(masses).tocsc()
+    largest = max(np.sqrt(_norm(equations.K)), _norm(equations.C), _norm(equations.S))
+    sigma = SHIFT * largest if largest > 0.0 else 1.0
+    factors = splu(csc_array(B - sigma * E))
+    size = B.shape[0]
+    operator = LinearOperator((size, size), lambda z: factors.solve(E @ np.asarray(z).ravel()))
+    start = operator @ (operator @ np.random.default_rng(1).standard_normal(size))
+    wanted = min(count, size - 2)
+    try:
+        theta, vectors = eigs(operator, k=wanted, v0=start, maxiter=100 * count, tol=1e-13)
+    except ArpackNoConvergence as error:
+        theta, vectors = error.eigenvalues, error.eigenvectors
+        if len(theta) < wanted:
+            raise SimulationError(
+                f"of the lowest {wanted} eigenvalues {len(theta)} were found; take fewer modes"
+            ) from error
+    values = sigma + 1.0 / theta
+    values[np.abs(values) < ZERO * sigma] = 0.0
+    order = order_of(values)
+    return Eigenvalues(values[order], vectors[:six, order])
+
+
+def _norm(matrix: Any) -> float:
+    """The largest sum of magnitudes in a row."""
+    sums = np.asarray(abs(matrix).sum(axis=1))
+    return float(np.max(sums, initial=0.0))

@@ -156,8 +156,7 @@ class _Own:
     def rates(self, x: Floats, v: Floats) -> Floats:
         """Rates (s, c) of the states, which are the last of c columns of displacements."""
         own = _placed(self.by_states, x.shape[1] - self.count, x.shape[1])
-        found: Floats = self.by_displacement @ x + self.by_velocity @ v + own
-        return found
+        return self.by_displacement @ x + self.by_velocity @ v + own
 
     @classmethod
     def of(cls, equations: ScaledEquations, six: int, rows: int) -> "_Own":
@@ -201,8 +200,7 @@ class _Rows:
 
     def pseudoinverse(self, y: Floats) -> Floats:
         """D^+ y."""
-        x: Floats = self.right @ (self.left.T @ y / self.values[:, None])
-        return x
+        return self.right @ (self.left.T @ y / self.values[:, None])
 
 
 class _Accelerations:

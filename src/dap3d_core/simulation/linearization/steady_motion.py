@@ -175,8 +175,7 @@ def _free(tangent: TangentMatrices, sets: Sequence[Any]) -> NDArray[np.bool_]:
         change = abs(matrix @ translations) - RCOND * (abs(matrix) @ translations)
         changed = change.tocoo()
         free[changed.col[changed.data > 0.0]] = False
-    each: NDArray[np.bool_] = np.all(free.reshape(-1, 3), axis=1)
-    return each
+    return np.all(free.reshape(-1, 3), axis=1)
 
 
 def _connected(tangent: TangentMatrices) -> list[Any]:

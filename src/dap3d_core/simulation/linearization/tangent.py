@@ -134,6 +134,18 @@ def tangent_matrices(
     )
 
 
+def _joints_read(model: Model, group: Group) -> list[tuple[Integers, int]]:
+    """The joints whose multipliers the instances of a group read, (m,) each, and their rows."""
+    joints = [j.members for j in group.read] if group.joints is None else [group.joints]
+    if group.type_info.type.is_contact:
+        joints = [group.members]
+    found = [(members, int(model.joint_rows[members[0]])) for members in joints]
+    if group.loaded is not None:
+        type_: Any = group.type_info.type
+        found.append((group.loaded, type_.load[-1] + 1))
+    return found
+
+
 def _check_states(model: Model, own: "StateDerivatives", t: float) -> None:
     """Refuses rates of states without derivatives; names the states."""
     wrong = ~np.isfinite(own.rates)
@@ -201,9 +213,7 @@ class _Assembly:
         self._add_by_motion(own.bodies, row, -slope, "stiffness", "damping")
         if kind == "friction":
             first = 12 * own.bodies.shape[1]
-            joints = [j.members for j in group.read] if group.joints is None else [group.joints]
-            for members in joints:
-                rows = int(self.model.joint_rows[members[0]])
+            for members, rows in _joints_read(self.model, group):
                 column = self.model.joint_start[members][:, None, None, None] + np.arange(rows)
                 part = slope[..., first : first + rows]
                 self.entries["friction_by_multipliers"].add(row[..., None], column, part)
@@ -278,5 +288,4 @@ class _Assembly:
 
 def _times(J: Floats, w: Floats) -> Floats:
     """J w for each body."""
-    product: Floats = np.einsum("nij,nj->ni", J, w)
-    return product
+    return np.einsum("nij,nj->ni", J, w)

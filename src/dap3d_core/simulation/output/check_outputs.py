@@ -3,6 +3,7 @@
 import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result import Result, ResultError, RunMetadata, UnknownNameError, find
 from dap3d_core.result.quantities.catalogue import SYSTEM
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError
@@ -36,9 +37,9 @@ def check_outputs(scene: Scene, scene_text: str, evaluator: Evaluator) -> None:
         raise SceneError(located(scene, mistakes))
 
 
-def probe_of(scene_text: str, evaluator: Evaluator) -> Result:
-    """A result of one instant: the initial state, without accelerations and multipliers."""
-    y = evaluator.integrated(evaluator.model.u0)
+def probe_of(scene_text: str, evaluator: Evaluator, u: Floats | None = None) -> Result:
+    """A result of one instant, without accelerations and multipliers: u (13 n,), or the start."""
+    y = evaluator.integrated(evaluator.model.u0 if u is None else u)
     row = np.concatenate([[0.0], y, np.zeros(evaluator.report_size)])
     record = RunMetadata(scene_text=scene_text)
     rows = evaluator.with_inputs(row[None])

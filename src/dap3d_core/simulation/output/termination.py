@@ -13,7 +13,7 @@ from dap3d_core.result import EventRecord, information
 from dap3d_core.simulation.failure.diagnosis import AHEAD, fastest_body, find_offender
 from dap3d_core.simulation.failure.refused_steps import describe_refusals
 from dap3d_core.simulation.failure.stall import describe_stall
-from dap3d_core.simulation.redundancy.contradictory_joints import find_contradiction
+from dap3d_core.simulation.redundancy.near_redundant import find_contradiction
 
 REASONS = {
     Status.STEP_FLOOR: "the step size fell to the resolution of time",

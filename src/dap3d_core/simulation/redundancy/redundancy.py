@@ -237,10 +237,21 @@ def rank_of(evaluator: Evaluator, rows: ConstraintRows) -> Rank:
     opening tilts rows that would depend on each other by as much.
     """
     model, blur = evaluator.model, fit_of(evaluator.model)
+    if model.active:
+        return _rank_of_active(model, rows.dense(), blur)
     if model.row_count <= FEW_ROWS or model.contact_count:
         return dense_rank(rows.dense(), blur)
     D = evaluator.blocks(rows)
     return sparse_rank(evaluator.plan, D, evaluator.system.row, 6 * model.body_count, blur)
+
+
+def _rank_of_active(model: Model, D: Floats, blur: float) -> Rank:
+    """The rank of the rows of joints that are there; those of joints that are not are zero."""
+    names = np.repeat(model.joint_names, np.diff(model.joint_start))[: len(D)]
+    there = np.flatnonzero(D.any(axis=1) | ~np.isin(names, list(model.active)))
+    rank = dense_rank(D[there], blur)
+    own = (attrs.evolve(d, rows=there[d.rows]) for d in rank.dependencies)
+    return attrs.evolve(rank, dependencies=tuple(own))
 
 
 def by_joint(model: Model, rows: Any) -> list[tuple[int, Any]]:
@@ -270,8 +281,7 @@ def _groups(model: Model, dependencies: Sequence[Dependency]) -> tuple[Shared, .
 
 def _gap(dependency: Dependency, side: Floats) -> Floats:
     """Part of a right-hand side that no motion fulfils, on a basis of the combinations."""
-    gap: Floats = dependency.combinations @ side[dependency.rows]
-    return gap
+    return dependency.combinations @ side[dependency.rows]
 
 
 def _size(dependency: Dependency, side: Floats, gradient: Floats) -> float:

@@ -75,20 +75,20 @@ def shared_laws(
         return ()  # at one pose alone
     changes = _changes(evaluator, redundancy.rank.dependencies, t, u)
     evaluator.place(t, _in_motion(u))
-    found: dict[int, set[str]] = {}
+    found: dict[str, set[str]] = {}
     for joint, change in changes.items():
         name = model.joint_names[joint]
-        for q, member, joints in _readers(evaluator):
+        for q, force, joints in _readers(evaluator):
             if name in joints and _depends(evaluator, q, t, change):
-                found.setdefault(member, set()).add(name)
+                found.setdefault(force, set()).add(name)
     return tuple(
         SharedLaw(
-            model.force_names[k],
-            tuple(sorted(found[k], key=model.joint_names.index)),
-            checked.forces[k].values.get(SHARED) == LEAST,
+            one.name,
+            tuple(sorted(found[one.name], key=model.joint_names.index)),
+            one.values.get(SHARED) == LEAST,
         )
-        for k in sorted(found)
-        if model.force_names[k] not in model.brought_forces.values()  # which joints carry
+        for one in (*checked.forces, *checked.contacts)
+        if one.name in found and one.name not in model.brought_forces.values()  # joints carry it
     )
 
 
@@ -187,8 +187,7 @@ class ShareSpread:
         finally:
             evaluator.states = own
         times = np.array([t for t, *_ in self._kept])
-        works: Floats = -np.trapezoid(powers, times, axis=0)
-        return works
+        return -np.trapezoid(powers, times, axis=0)
 
 
 def _other_shares(evaluator: Evaluator, t: float, u: Floats, Lam: Floats) -> Floats:
@@ -207,8 +206,7 @@ def _other_shares(evaluator: Evaluator, t: float, u: Floats, Lam: Floats) -> Flo
             np.einsum("ir,sr,jr->sij", N, c, N), -np.einsum("ir,sr,sr->si", N, c, own)[..., None]
         )
         shares[:, dependency.rows] += z[..., 0] @ N
-    other: Floats = shares / gradient
-    return other
+    return shares / gradient
 
 
 def _power(evaluator: Evaluator, t: float, Lam: Floats) -> float:
@@ -217,16 +215,17 @@ def _power(evaluator: Evaluator, t: float, Lam: Floats) -> float:
     return float(np.sum(force.reshape(-1, 6) * s.body[:, V : V + 6]))
 
 
-def _readers(evaluator: Evaluator) -> Iterator[tuple[int, int, set[str]]]:
-    """Loop, index of the force and names of the joints it reads, of each force on reactions."""
-    names = evaluator.model.joint_names
+def _readers(evaluator: Evaluator) -> Iterator[tuple[int, str, set[str]]]:
+    """Loop and name of each force on reactions, and names of the joints that it reads."""
+    names, forces = evaluator.model.joint_names, evaluator.model.force_names
     for q, (kind, group) in enumerate(evaluator.loop_groups):
         if kind != "friction":
             continue
         joints: list[Integers] = [read.members for read in group.read]
-        joints += [] if group.joints is None else [group.joints]
+        joints += [some for some in (group.joints, group.loaded) if some is not None]
+        own = names if group.type_info.type.is_contact else forces
         for k, member in enumerate(group.members.tolist()):
-            yield q, member, {names[int(of_force[k])] for of_force in joints}
+            yield q, own[member], {names[int(of_force[k])] for of_force in joints}
 
 
 def _changes(
@@ -256,6 +255,10 @@ def _in_motion(u: Floats) -> Floats:
 def _depends(evaluator: Evaluator, q: int, t: float, change: Floats) -> bool:
     """True if what a loop of forces on reactions gives changes with the multipliers."""
     group: Group = evaluator.loop_groups[q][1]
+    if group.loaded is not None:
+        load: Any = group.type_info.type
+        first = evaluator.model.joint_start[group.loaded][:, None] + load.load
+        return bool(np.abs(change[first]).max() > FORCE_CHANGE * np.abs(change).max())
     kernel = group.type_info.kernels.get("rate")
     if kernel and set(parameters(kernel)) & set(reaction_names(group.type_info.type)):
         return True

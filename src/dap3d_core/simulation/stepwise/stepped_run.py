@@ -31,7 +31,7 @@ from dap3d_core.simulation.initial.given_state import state_of
 from dap3d_core.simulation.output.termination import why_stopped
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks, jumps_of
-from dap3d_core.simulation.settings import compiled_for, settings_of
+from dap3d_core.simulation.settings import compiled_for, replaced_notes, settings_of
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.events.jumps import Jumps
@@ -99,33 +99,29 @@ class SteppedRun:
             SimulationError: the run cannot go on; what was computed is ``.result``.
         """
         with self._lock:
-            return self._step(dt, inputs)
-
-    def _step(self, dt: float, inputs: Mapping[str, float] | None) -> float:
-        """As ``step``, by the thread that has the lock."""
-        if self._failure:
-            raise SimulationError(self._failure, self.result())
-        hold = self._hold
-        t = hold.t
-        try:
-            end = t + dt
-            if not t < end < math.inf:
-                raise TypeError
-        except TypeError:
-            words = f"dt is {dt!r}; it should be a positive number of seconds"
-            raise ValueError(words) from None
-        if abs(end - self._t_end) <= ALIKE * dt:
-            end = self._t_end
-        if inputs and self._inputs.set(inputs):
-            jump(self._evaluator, hold, drives=self._inputs.drives)
-        if self._is_recorded:
-            self._log.add(t)
-        if self._run.jumps is not None:
-            self._run.jumps.span = min(USUAL_STEPS * dt, self._t_end)
-        if not hold.to(end) or self._run.until < math.inf:
-            self._go_on(end)
-        self.state.changed()
-        return end
+            if self._failure:
+                raise SimulationError(self._failure, self.result())
+            hold = self._hold
+            t = hold.t
+            try:
+                end = t + dt
+                if not t < end < math.inf:
+                    raise TypeError
+            except TypeError:
+                words = f"dt is {dt!r}; it should be a positive number of seconds"
+                raise ValueError(words) from None
+            if abs(end - self._t_end) <= ALIKE * dt:
+                end = self._t_end
+            if inputs and self._inputs.set(inputs):
+                jump(self._evaluator, hold, drives=self._inputs.drives)
+            if self._is_recorded:
+                self._log.add(t)
+            if self._run.jumps is not None:
+                self._run.jumps.span = min(USUAL_STEPS * dt, self._t_end)
+            if not hold.to(end) or self._run.until < math.inf:
+                self._go_on(end)
+            self.state.changed()
+            return end
 
     def reset(self, u: ArrayLike | None = None) -> None:
         """Begin again at t = 0, with the inputs of the scene; what was recorded is given up.
@@ -139,30 +135,28 @@ class SteppedRun:
             SimulationError: no state on the constraints was found near u.
         """
         with self._lock:
-            self._reset(u)
-
-    def _reset(self, u: ArrayLike | None) -> None:
-        """As ``reset``, by the thread that has the lock."""
-        run, evaluator = self._run, self._evaluator
-        run.integrations[:] = [self._integration]
-        run.crossed, run.until = [], math.inf
-        for array, first in self._start:
-            array[...] = first
-        self._inputs.replace(evaluator.model.input_values.tolist())
-        self._failure, self._log.count = "", 0
-        self._hold.forget()
-        if self._hold.integration is not self._integration:
-            self._attach()
-        self.state.changed()
-        if u is not None:
-            state = state_of(u, evaluator.model.body_names)
-            evaluator.start(0.0, state)
-            self._integration.work.state[Y] = evaluator.coordinates.start(state)
-            self._integration.restart()
-            if not self._integration.project():
-                raise SimulationError("no state that satisfies the constraints was found near u")
-        if run.jumps is not None:
-            run.jumps.restart(self._integration)
+            run, evaluator = self._run, self._evaluator
+            run.integrations[:] = [self._integration]
+            run.crossed, run.until = [], math.inf
+            for array, first in self._start:
+                array[...] = first
+            self._inputs.replace(evaluator.model.input_values.tolist())
+            self._failure, self._log.count = "", 0
+            self._hold.forget()
+            if self._hold.integration is not self._integration:
+                self._attach()
+            self.state.changed()
+            if u is not None:
+                state = state_of(u, evaluator.model.body_names)
+                evaluator.start(0.0, state)
+                self._integration.work.state[Y] = evaluator.coordinates.start(state)
+                self._integration.restart()
+                if not self._integration.project():
+                    raise SimulationError(
+                        "no state that satisfies the constraints was found near u"
+                    )
+            if run.jumps is not None:
+                run.jumps.restart(self._integration)
 
     def result(self) -> Result:
         """The states at the ends of all steps so far, with the inputs that act from there on.
@@ -170,18 +164,16 @@ class SteppedRun:
         Accelerations and reactions are computed here. Without ``record`` the present state alone.
         """
         with self._lock:
-            return self._result()
-
-    def _result(self) -> Result:
-        """As ``result``, by the thread that has the lock."""
-        log, t = self._log, self.t
-        record = self._run.record("stopped" if self._failure else "done")
-        more = {"t_end": t, "dt": None, "controllers": ["steps of a script"]}
-        record = attrs.evolve(record, settings=record.settings | more)
-        log.add(t)
-        rows = log.reports()
-        log.count -= 1
-        return Result.of_run(self._evaluator.model, rows, record, lambda: self.compiled.evaluator)
+            log, t = self._log, self.t
+            record = self._run.record("stopped" if self._failure else "done")
+            more = {"t_end": t, "dt": None, "controllers": ["steps of a script"]}
+            record = attrs.evolve(record, settings=record.settings | more)
+            log.add(t)
+            rows = log.reports()
+            log.count -= 1
+            return Result.of_run(
+                self._evaluator.model, rows, record, lambda: self.compiled.evaluator
+            )
 
     # ---------------------------------------------------------------- steps
 
@@ -270,6 +262,7 @@ def start(
     simulation = settings_of(compiled, t_end=end, dt=end, **settings)
     with compiled.borrow_evaluator():
         run = OpenRun(compiled, simulation, Callbacks(announce=announce))
+        run.notes += replaced_notes(compiled, simulation, settings)
         return SteppedRun(run, record=record)
 
 

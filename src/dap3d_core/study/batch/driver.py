@@ -5,9 +5,6 @@ Before it the loop sets numbers and the initial state, after it it stores rows. 
 are the same bit for bit whichever points ran before it, and as those of ``simulate``.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from collections.abc import Sequence
 from typing import Any, ClassVar
 

@@ -5,9 +5,6 @@ this uses the block factorisation (equal to rounding), and which also takes redu
 bodies and the mass metric. ``begin_...`` stores references of a start as ``Evaluator.start`` does.
 """
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 import numpy as np

@@ -4,9 +4,6 @@ The lanes take the stages of their steps together; all else each does by itself,
 and the bits of its run alone. A lane whose run has ended takes the next point.
 """
 
-# An element of an array, and what a compiled function returns, is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, ClassVar
 

@@ -3,11 +3,11 @@
 Most numbers of a scene are copied, unchanged, to entries that are known in advance: masses,
 stiffnesses, points, initial velocities. Others go through code of their types, or change more (a
 direction is normalised, a function has other breaks): then each point's model is rebuilt
-(study/batch/rebuild.py).
+(study/batch/batch.py).
 """
 
-from collections.abc import Iterator, Sequence
-from typing import Any
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -19,8 +19,9 @@ from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.element_states import INITIAL, TOLERANCE
+from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.types import Function
+from dap3d_core.interface.types import Function, TypeBase, acts_on_all, turns_of
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
 from dap3d_core.model.groups import Floats, Integers
@@ -30,7 +31,6 @@ from dap3d_core.scene.validate.bodies import SMALLEST_INERTIA, ZERO_INERTIA
 from dap3d_core.scene.validate.coerce_values import LARGEST
 from dap3d_core.simulation.initial.assemble import model_size
 from dap3d_core.simulation.initial.undefined_directions import are_undefined
-from dap3d_core.study.batch.prepare_dependence import Dependence, dependence_of
 from dap3d_core.study.parameters import SceneParameter
 
 Booleans = NDArray[np.bool_]
@@ -99,7 +99,7 @@ class ParameterMap:
         self._checked, self._evaluator = checked, evaluator
         self._elements = (*checked.joints, *checked.forces, *checked.functions)
         self._poses = poses_of(checked)
-        self._dependence: dict[int, Dependence] = {}
+        self._dependence: dict[int, _Dependence] = {}
         self.parameters = tuple(self._mapped(parameter) for parameter in parameters)
         self.moves_start = any(p.moves_start for p in self.parameters)
         self.keeps_poses = all(
@@ -279,7 +279,7 @@ class ParameterMap:
 
     # ------------------------------------------------------------------ entries of elements
 
-    def _reads(self, instance: Instance) -> Dependence:
+    def _reads(self, instance: Instance) -> "_Dependence":
         key = id(instance)
         if key not in self._dependence:
             n = len(self._checked.body_names)
@@ -371,3 +371,82 @@ def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> It
                 given = getattr(declared, end) if declared else element.fields.get(end)
                 if given == point:
                     yield end
+
+
+class _Dependence(NamedTuple):
+    """Dependence of the constants of an element.
+
+    Attributes:
+        fields: names of its own fields that are read.
+        poses: (body index, "r", "p", "A" or "Jp") that are read.
+        constants: names of the constants, which are no copies of fields.
+    """
+
+    fields: frozenset[str]
+    poses: frozenset[tuple[int, str]]
+    constants: frozenset[str]
+
+
+def dependence_of(
+    instance: Instance, poses: Mapping[int, BodyPose], body_count: int
+) -> _Dependence:
+    """Fields and poses that ``prepare`` reads for an element; none where its type has none.
+
+    It is run once on an element whose fields, and the bodies' poses, record that they are read.
+    Nothing else can change what it returns: with other values of what was not read it takes the
+    same way through its code.
+
+    Args:
+        instance: a checked element.
+        poses: of each body index, ground included.
+        body_count: for elements that act on each body.
+    """
+    type_: Any = instance.type_info.type
+    fields: set[str] = set()
+    read: set[tuple[int, str]] = set()
+    constants: set[str] = set()
+    if type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__()):
+        slots = instance.type_info.layout.slots
+        each = acts_on_all(type_)
+        for bodies in turns_of(type_, body_count) if each else [instance.bodies]:
+            recorded = {
+                slot: _RecordedPose(poses[body], body, read)
+                for slot, body in zip(slots, bodies, strict=True)
+            }
+            constants |= prepared(_recorded(instance, fields), recorded).keys()
+    return _Dependence(frozenset(fields), frozenset(read), frozenset(constants))
+
+
+def _recorded(instance: Instance, read: set[str]) -> Any:
+    """The element as ``prepare`` gets it, of a class that records reads of its fields."""
+    type_: Any = instance.type_info.type
+    specs = specs_of(type_)
+    ends = ("P_i", "P_j") if any(s.kind == "vector2" for s in specs.values()) else ()
+    names = frozenset((*specs, *ends))
+    initial = set(read)
+
+    class Recorded(type_):  # type: ignore[misc]
+        def __getattribute__(self, name: str) -> Any:
+            if name in names:
+                read.add(name)
+            return super().__getattribute__(name)
+
+    element = Recorded(**{name: v for name, v in instance.values.items() if name in specs})
+    for end in ends:
+        setattr(element, end, instance.values[end])
+    read.intersection_update(initial)  # without what its construction has read
+    return element
+
+
+class _RecordedPose(BodyPose):
+    """A pose that records what is read of it."""
+
+    def __init__(self, pose: BodyPose, body: int, read: set[tuple[int, str]]) -> None:
+        super().__init__(pose.r, pose.p, pose.A, pose.Jp)
+        object.__setattr__(self, "note", (body, read))
+
+    def __getattribute__(self, name: str) -> Any:
+        if name in ("r", "p", "A", "Jp"):
+            body, read = object.__getattribute__(self, "note")
+            read.add((body, name))
+        return super().__getattribute__(name)

@@ -1,8 +1,5 @@
 """Compiled start of a run in joint coordinates, and its states in those of bodies."""
 
-# What a compiled function returns is Any to mypy.
-# mypy: disable-error-code="no-any-return"
-
 from typing import Any
 
 from dap3d_core.assembly.arrays import VALUE, Floats, System

@@ -41,16 +41,14 @@ WITHOUT = ("rows", "crossings")
 def weights_of(offsets: tuple[int, ...]) -> Floats:
     """Weights of values at some offsets in the derivative at 0, of highest order."""
     powers = np.vander(np.array(offsets, dtype=float), increasing=True).T
-    first: Floats = np.linalg.solve(powers, np.eye(len(offsets))[1])
-    return first
+    return np.linalg.solve(powers, np.eye(len(offsets))[1])
 
 
 def differences(function: Callable[[float], Floats], step: float) -> Floats:
     """The derivative at 0 of a function, by central differences of sixth order."""
     offsets = OFFSETS[0]
     pairs = zip(offsets, weights_of(offsets), strict=True)
-    total: Floats = weighted([(w, function(k * step)) for k, w in pairs]) / step
-    return total
+    return weighted([(w, function(k * step)) for k, w in pairs]) / step
 
 
 def weighted(pairs: Sequence[tuple[float, Any]]) -> Any:

@@ -1,15 +1,20 @@
 """Public function ``sensitivities``: a run and its derivatives by parameters of the scene."""
 
+import copy
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Unpack
+from typing import TYPE_CHECKING, Any, Self, Unpack
 
 import attrs
 import numpy as np
 
+from dap3d_core.formulations.programs.change_over import ChangeOver
+from dap3d_core.integrators import Integration
+from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
+from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.suggestions import some
 from dap3d_core.result import Result, ResultError, RunMetadata, find
@@ -23,10 +28,11 @@ from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import compiled_for, settings_of
 from dap3d_core.simulation.simulate import given_state, start_word
 from dap3d_core.study.parameters import SceneParameter, parameters_named
-from dap3d_core.study.sensitivities.differentiated_run import DifferentiatedRun
 from dap3d_core.study.sensitivities.neighbours import (
     Neighbours,
     RunBeside,
+    arrays_of,
+    floats_of,
     neighbours_of,
     run_beside,
     total_derivative,
@@ -55,7 +61,7 @@ class Sensitivities:
     def __init__(
         self,
         result: Result,
-        runs: Sequence[DifferentiatedRun],
+        runs: "Sequence[DifferentiatedRun]",
         parameters: Sequence[SceneParameter],
     ) -> None:
         """Args: the result, runs with the derivatives by some parameters each, all of these."""
@@ -92,8 +98,7 @@ class Sensitivities:
 
     def final(self, quantity: str) -> Floats:
         """(p,) derivatives of a quantity at the end; of a vector (3, p). Errors as ``of``."""
-        final: Floats = self.of(quantity)[-1]
-        return final
+        return self.of(quantity)[-1]
 
     def derivative(self, function: Callable[[Result], Any]) -> Floats:
         """Derivatives (..., p) of what a smooth function computes of a result."""
@@ -255,7 +260,7 @@ def directions_of(count: int) -> tuple[int, int]:
     return directions, next(lanes for lanes in FAST if lanes >= directions)
 
 
-def _notes(compiled: CompiledModel, runs: Sequence[DifferentiatedRun]) -> list[str]:
+def _notes(compiled: CompiledModel, runs: "Sequence[DifferentiatedRun]") -> list[str]:
     """Notes on laws, and where an uncorrected start leaves its constraints with a parameter."""
     of_laws = notes_on_derivatives(compiled.checked)
     found = [
@@ -292,3 +297,151 @@ def _parameters(compiled: CompiledModel, names: Sequence[str]) -> tuple[ScenePar
         return parameters_named(compiled.checked, names)
     except SceneError as error:
         raise SceneError([attrs.evolve(m, key="by") for m in error.mistakes]) from None
+
+
+class DifferentiatedRun(Run):
+    """A run with its derivatives by some parameters.
+
+    Attributes:
+        neighbours: of each parameter.
+        base: the run at its start, for differences of what Python computes.
+        reported, slopes: (k, width) rows in coordinates of bodies, and (k, width, p) their
+            derivatives, in parts.
+        instants: time of each located event and jump -> (p,) its derivatives.
+    """
+
+    def carry(self, neighbours: Sequence[Neighbours], base: Run, lanes: int) -> Self:
+        """Carry derivatives from the start on; lanes: directions that code is compiled for."""
+        self.neighbours, self.base, self._lanes = list(neighbours), base, lanes
+        self.reported: list[Floats] = []
+        self.slopes: list[Floats] = []
+        self.instants: dict[float, Floats] = {}
+        return self
+
+    def begin(self, integration: Integration) -> None:
+        """As of ``RunState``: the integration is differentiated.
+
+        Raises:
+            SimulationError: it is the second one of the run.
+        """
+        if self.integrations:
+            raise SimulationError(
+                "derivatives end where an integrator hands over to another one; take one alone "
+                "(integrator radau, where the scene is stiff)"
+            )
+        super().begin(integration)
+        self._differentiation = Differentiation(1 + self._lanes)
+        integration.call = self._differentiation.call  # type: ignore[method-assign]
+        integration.rows = self._rows  # type: ignore[method-assign]
+        self._seed()
+        integration.compile()
+        if integration.takes_programs:
+            self.programs = self._programs()
+        if self.jumps is not None:
+            law = type(self.jumps)
+            self.jumps.begin = self._jumping(law.begin)  # type: ignore
+            self.jumps.apply = self._jumping(law.apply)  # type: ignore
+
+    def _slopes_of(self, array: Floats) -> Floats:
+        """(size, p) view of the derivatives of an array of the integration."""
+        return self._differentiation.slopes(array)[:, : len(self.neighbours)]
+
+    def _seed(self) -> None:
+        """Derivatives of all numbers at the start."""
+        for argument in self.present.loop_arguments:
+            self._differentiation.wide(argument)
+        arrays = floats_of(self)
+        ends = np.cumsum([array.size for array in arrays.values()])[:-1]
+        for j, beside in enumerate(self.neighbours):
+            found = beside.derivative(
+                lambda run: _finite(np.concatenate([*floats_of(run).values()]))
+            )
+            for array, slope in zip(arrays.values(), np.split(found, ends), strict=True):
+                self._slopes_of(array)[:, j] = slope
+
+    def _programs(self) -> ChangeOver:
+        """Programs of the scene in differentiated form; numbers that have slopes are loaded."""
+        evaluator = copy.copy(self.evaluator)
+        evaluator.functions = self._differentiation.wide(evaluator.functions)
+        evaluator.loops = self._differentiation.wide(evaluator.loops)
+        varied = {
+            name: np.flatnonzero(self._slopes_of(array).any(axis=1))
+            for name, array in evaluator.system.walk()
+            if array.dtype.kind == "f" and array.size
+        }
+        return ChangeOver(evaluator, varied, self._differentiation.count)
+
+    def _rows(self) -> Floats:
+        """As ``Integration.rows``; their derivatives are kept."""
+        integration = self.present
+        work, count = integration.work, int(integration.work.row_count)
+        raw = work.rows[:count].copy()
+        slopes = self._slopes_of(work.rows)[: count * work.rows.shape[1]]
+        slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
+        if count and not self.evaluator.coordinates.are_of_bodies:
+            slopes = self._derivative(lambda run, rows: run.evaluator.body_rows(rows), raw, slopes)
+        if count:
+            self.slopes.append(slopes)
+            self.reported.append(self.evaluator.body_rows(raw))
+        for row in work.crossings[: integration.crossing_count]:
+            place = int(np.flatnonzero(work.crossings[:, 0] == row[0])[0])
+            self.instants[float(row[0])] = self._slopes_of(work.crossings)[3 * place].copy()
+        return type(integration).rows(integration)
+
+    def _derivative(
+        self, function: Callable[[Run, Floats], Floats], x: Floats, slopes: Floats
+    ) -> Floats:
+        return total_derivative(function, self.neighbours, self.base, x, slopes)
+
+    def _jumping(self, change: Callable[..., None]) -> Callable[[Integration], None]:
+        """A jump of velocities, whose derivatives are those of the law that Python solves."""
+        of = self.jumps
+        assert of is not None
+
+        def jump(integration: Integration) -> None:
+            work = integration.work
+            present = [(name, array.copy()) for name, array in arrays_of(self)]
+            of_time = self._slopes_of(work.real)[work.indices("real")["t"]].copy()
+            of_state = self._slopes_of(work.state)[: work.state.shape[1]].copy()
+            given = np.append(work.state[Y], work.t)
+            system = {
+                name: self._slopes_of(array).copy()
+                for name, array in arrays_of(self)
+                if array.dtype.kind == "f" and not name.startswith("0.") and array.size
+            }
+
+            def after(run: Run, state: Floats) -> Floats:
+                arrays = dict(arrays_of(run))
+                offset, j = self._offset_of(run)
+                for name, array in present:
+                    arrays[name][...] = array
+                    if offset and name in system:
+                        arrays[name] += offset * system[name][:, j].reshape(array.shape)
+                own = run.present.work
+                own.state[Y], own.t = state[:-1], state[-1]
+                jumps = type(of)(run.evaluator)
+                jumps.span = of.span
+                jumps.repeat_of(of)
+                change(jumps, run.present)
+                return own.state[Y].copy()
+
+            change(of, integration)
+            slopes = self._derivative(after, given, np.vstack([of_state, of_time]))
+            self.instants[float(work.t)] = of_time
+            self._differentiation.take()
+            self._slopes_of(work.state)[: work.state.shape[1]] = slopes
+
+        return jump
+
+    def _offset_of(self, run: Run) -> tuple[float, int]:
+        """How far the parameter of a neighbour is from its value, and which one it is."""
+        for j, beside in enumerate(self.neighbours):
+            for offset, other in zip(beside.offsets, beside.runs, strict=True):
+                if other is run and run is not self.base:
+                    return offset, j
+        return 0.0, 0
+
+
+def _finite(x: Floats) -> Floats:
+    """Numbers, with zero for those that are not finite: limits that are not set."""
+    return np.where(np.isfinite(x), x, 0.0)

@@ -196,8 +196,7 @@ def _turning_of_unknowns(sample: Sample, along: Direction) -> Floats:
         slope = sample.slope("G", along)
     except Exception:  # of a kernel that takes floats alone
         slope = sample.difference("G", along)[0]
-    product: Floats = slope @ sample.state.unknowns[:, 1]
-    return product
+    return slope @ sample.state.unknowns[:, 1]
 
 
 def _forms(subject: SampledType) -> list[tuple[str, tuple[int, ...]]]:

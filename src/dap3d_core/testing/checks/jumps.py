@@ -245,8 +245,7 @@ def _kinetic(state: State) -> float:
 def _inertia(state: State, b: int) -> Floats:
     """(3, 3) inertia of a body, global axes."""
     A = rotation(state.p[b][None])[0]
-    J: Floats = A @ state.Jp[b].reshape(3, 3) @ A.T
-    return J
+    return A @ state.Jp[b].reshape(3, 3) @ A.T
 
 
 def _in_motion(subject: SampledType) -> list[tuple[Sample, State]]:
@@ -261,8 +260,7 @@ def _in_motion(subject: SampledType) -> list[tuple[Sample, State]]:
 def _rates(J: Floats, state: State) -> Floats:
     """(rows,) J v."""
     v = np.concatenate([state.v, state.w], axis=1)[1 : len(J) + 1]
-    rates: Floats = np.einsum("src,sc->r", J, v)
-    return rates
+    return np.einsum("src,sc->r", J, v)
 
 
 def _after(J: Floats, change: Floats, state: State) -> State | None:

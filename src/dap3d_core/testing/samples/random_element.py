@@ -152,8 +152,7 @@ class Kernels:
         arrays = _Plain(body, table, element.idx, element.par, own, np.zeros(len(own), object))
         outs = self._outs(object, element)
         self._plain[name](t, arrays, 0, 0, 1, *outs)
-        value: NDArray[Any] = self._value_in(name, table, outs, arrays.rates)
-        return value
+        return self._value_in(name, table, outs, arrays.rates)
 
     def _jumps_by(self, name: str) -> bool:
         """True for a kernel of the jumps of a force."""
@@ -271,18 +270,21 @@ def draw(
         for name, spec in specs_of(type_info.type).items()
     }
     slots, functions = type_info.layout.slots, type_info.layout.functions
+    load: tuple[int, ...] = getattr(type_info.type, "load", ())  # rows of a joint, behind its own
     rows = [k + 1 if f else 0 for k, f in enumerate(state.functions) if k < len(functions)]
     others = [rng.randrange(1, len(slots) + 1) for _ in type_info.layout.others]
     idx = [*range(1, len(slots) + 1), *rows, *others, *([0] if type_info.layout.states else [])]
     if type_info.type.kind == "joint":
         width = 6 * type_info.type.rows  # type: ignore[attr-defined]
         idx += [0, *(width * k for k in range(len(slots)))]
+        idx += [type_info.type.rows] if load else []  # type: ignore[attr-defined]
     elif type_info.type.kind == "function":
         idx += [1]
     poses = {s: pose(state.r[k + 1], state.p[k + 1]) for k, s in enumerate(slots)}
     values = _values(type_info, fields, poses, rng)
     shown = {n: v for n, v in fields.items() if isinstance(v, (bool, int, float, str, tuple))}
-    lam = numbers(rng, getattr(type_info.type, "rows", 0) or sample_size(type_info))
+    count = getattr(type_info.type, "rows", 0) + (load[-1] + 1 if load else 0)
+    lam = numbers(rng, count or sample_size(type_info))
     return RandomElement(shown, tuple(idx), tuple(_numbers(type_info, values, rng)), lam)
 
 

@@ -214,8 +214,7 @@ def _row_of_time(rng: random.Random, which: bool | str) -> TimeFunction | HeldIn
 
 def quaternion_product(a: Floats, b: Floats) -> Floats:
     """The quaternion products a o b of rows of four."""
-    product: Floats = (a[:, :, None] * b[:, None, :]).reshape(-1, 16) @ _PRODUCT
-    return product
+    return (a[:, :, None] * b[:, None, :]).reshape(-1, 16) @ _PRODUCT
 
 
 def rotation(p: Floats) -> Floats:

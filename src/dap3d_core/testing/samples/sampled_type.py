@@ -200,8 +200,7 @@ class SampledType:
         """The value of ``make``, computed once for each name."""
         if name not in self._cache:
             self._cache[name] = make()
-        value: Cached = self._cache[name]
-        return value
+        return self._cache[name]
 
     def _sample(self, k: int, start: int = 0) -> Sample:
         title = f"{self.seed} {self.type.__qualname__} {k} {start}"
@@ -223,7 +222,8 @@ class SampledType:
                 if layout.states:
                     own = np.array(numbers(rng, layout.state_width))
                     if self.type.is_contact:  # it sticks, so that all of its rows hold
-                        own = np.array([STICKS, *own[1:4], 0.0, 0.0, 0.0])
+                        way = np.zeros(3) if self.type.is_friction_alone() else own[1:4]
+                        own = np.array([STICKS, *way, 0.0, 0.0, 0.0])
                     state = attrs.evolve(state, own=own)
                 sample = Sample(self.kernels, element, state, grounded,
                                 f"pose {k + 1} off the manifold", self.seed)  # fmt: skip

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
+from support.internals import Pose, compose
 from support.joint_pairs import BETWEEN, STANDARD, compiled_pair, pair
 
 from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.joint_motion import Part
 from dap3d_core.assembly.motion.refusals import DEPENDENT, NOT_CONSTANT, NOT_INVARIANT, ON_TIME
-from dap3d_core.model.rigid_motion import Pose, compose
 from dap3d_core.simulation import CompiledModel
 from dap3d_core.testing.checks.motion import axis_words, motion_words
 

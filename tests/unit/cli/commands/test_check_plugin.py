@@ -3,8 +3,8 @@
 import json
 
 from click.testing import CliRunner
+from support.command_line import dap3d, output_of
 
-from dap3d_core.cli.app import dap3d
 from dap3d_joints import gear
 
 SLEEVE = '''
@@ -39,9 +39,7 @@ def dap3d_joints():
 
 
 def checked(*arguments):
-    done = CliRunner().invoke(dap3d, ["check-plugin", *arguments], env={"COLUMNS": "120"})
-    assert done.exit_code == 0, done.output
-    return done.output
+    return output_of("check-plugin", *arguments, columns=120)
 
 
 def test_the_motion_of_a_joint_is_told():

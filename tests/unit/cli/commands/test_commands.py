@@ -1,7 +1,5 @@
 """The command line used wrongly: one message that says what is allowed, and the right exit code.
-
-What a process of its own is not needed for runs in this one, with the streams of the process.
-"""
+What a process of its own is not needed for runs in this one, with the streams of the process."""
 
 import json
 import os
@@ -12,6 +10,7 @@ import threading
 
 import numpy as np
 import pytest
+from support.command_line import dap3d
 from support.falling import SCENE
 from tests.e2e.conftest import COMMAND, environment
 
@@ -94,15 +93,11 @@ REFUSED = [
     # analyses
     (("equilibrium", "pne1"), "did you mean 'pen1'"),
     (("equilibrium", "fall.toml", "--over", "bodies.stone.mass"), "write PARAMETER=FROM:TO:N"),
-    (
-        ("equilibrium", "fall.toml", "--over", "bodies.stnoe.mass=1:2:3"),
-        "did you mean 'bodies.stone.mass'",
-    ),
+    (("equilibrium", "fall.toml", "--over", "bodies.stnoe.mass=1:2:3"),
+     "did you mean 'bodies.stone.mass'"),
     (("equilibrium", "fall.toml", "--over", "bodies.stone.mass=1:2"), "add how many, 1:2:9"),
-    (
-        ("equilibrium", "fall.toml", "--over", "bodies.stone.mass=1:2:3", "-o", "rest.toml"),
-        "a figure is one of",
-    ),
+    (("equilibrium", "fall.toml", "--over", "bodies.stone.mass=1:2:3", "-o", "rest.toml"),
+     "a figure is one of"),
     (("equilibrium", "fall.toml", "--of", "stone.r.z"), "give --over PARAMETER=FROM:TO:N"),
     (("modes", "fall.toml", "--locus"), "give --over and --plot FILE.png"),
     (("kinematics", "pne1"), "did you mean 'pen1'"),
@@ -113,10 +108,8 @@ REFUSED = [
     (("sensitivities", "pne1", "--by", "bodies.stone.mass"), "did you mean 'pen1'"),
     (("sensitivities", "fall.toml"), "Missing option '--by'"),
     (("sensitivities", "fall.toml", "--by", "bodies.stnoe.mass"), "did you mean 'bodies.stone"),
-    (
-        ("sensitivities", "fall.toml", "--by", "bodies.stone.mass", "--of", "stnoe.r.z"),
-        "did you mean 'stone.r.z'",
-    ),
+    (("sensitivities", "fall.toml", "--by", "bodies.stone.mass", "--of", "stnoe.r.z"),
+     "did you mean 'stone.r.z'"),
     (("sensitivities", "fall.toml", "--by", "bodies.stone.mass", "-o", "x.docx"), ".nc"),
     # sweeps
     (("sweep",), "Missing argument 'MODEL'"),
@@ -125,10 +118,8 @@ REFUSED = [
     ((*SWEEP, *VARY), "--keep: a study needs at least one"),
     ((*SWEEP, "--vary", "bodies.stone.mass", *KEEP), "what varies is NAME=FORM"),
     ((*SWEEP, "--vary", "bodies.stnoe.mass=1,2", *KEEP), "did you mean 'bodies.stone.mass'"),
-    (
-        (*SWEEP, "--vary", "simulation.rtol=1e-6,1e-8", *KEEP, "--gradients"),
-        "this says how a run is computed",
-    ),
+    ((*SWEEP, "--vary", "simulation.rtol=1e-6,1e-8", *KEEP, "--gradients"),
+     "this says how a run is computed"),
     ((*SWEEP, *VARY, "--keep", "stnoe.r.z"), "did you mean 'stone.r.z'"),
     ((*SWEEP, *VARY, *KEEP, "--sample", "two"), "'two' is not a valid integer"),
     ((*SWEEP, *VARY, *KEEP, "--seed", "3"), "--seed is of samples"),
@@ -203,7 +194,7 @@ REFUSED = [
     (("import", "words", "--format", "urfd"), "did you mean 'urdf'"),
     (("import-matlab", "nothing"), "there is no such folder"),
     (("import-matlab", "sub"), "there is no inBodies.m"),
-]
+]  # fmt: skip
 
 
 def _name(words):
@@ -233,8 +224,6 @@ def test_a_mistake_is_told_and_changes_nothing(call, folder, words, said):
 
 def main_commands():
     """The commands that take --json."""
-    from dap3d_core.cli.app import dap3d
-
     return {
         name for name, command in dap3d.commands.items()
         if any("--json" in p.opts for p in command.params)
@@ -243,8 +232,6 @@ def main_commands():
 
 def test_every_command_tries_wrong_words():
     tried = {words[0] for words, _ in REFUSED}
-    from dap3d_core.cli.app import dap3d
-
     assert set(dap3d.commands) <= tried
     assert set(dap3d.commands) == main_commands()
 

@@ -52,9 +52,7 @@ def test_json(model, capsys):
 
 def test_table_fits_sixty_columns(model, capsys, monkeypatch):
     """Given values and turning points, with the coordinate that changes most; a picture.
-
-    To return is no failure; a note says how to go on.
-    """
+    To return is no failure; a note says how to go on."""
     monkeypatch.setenv("COLUMNS", "60")
     assert main([*model, "-o", "curve.png"]) == 0
     lines = capsys.readouterr().out.splitlines()
@@ -84,17 +82,13 @@ def test_path_that_ends_on_its_way(tmp_path, capsys, monkeypatch):
         (("--of", "bab.r.z"), "did you mean 'bob.r.z'"),
         (("-o", "path.toml"), ".png"),
         (("--over", "parameters.torqe=0:1:3"), "did you mean 'parameters.torque"),
+        # a scene is not written into a file of a picture's name
+        (("-o", "curve.png"), "give --over PARAMETER=FROM:TO:N"),
     ],
 )
-def test_what_is_refused(model, words, said, capsys):
+def test_what_is_refused(model, words, said, capsys, tmp_path):
     """One message, exit status 2."""
-    first = model[:2] if "--over" in words else model
+    first = model[:2] if "--over" in words or "curve.png" in words else model
     assert main([*first, *words]) == 2
     assert said in " ".join(capsys.readouterr().err.split())
-
-
-def test_a_picture_without_a_path_is_refused(model, capsys, tmp_path):
-    """A scene is not written into a file of a picture's name."""
-    assert main([*model[:2], "-o", "curve.png"]) == 2
-    assert "give --over PARAMETER=FROM:TO:N" in " ".join(capsys.readouterr().err.split())
     assert not (tmp_path / "curve.png").exists()

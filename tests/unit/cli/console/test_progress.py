@@ -72,14 +72,12 @@ def test_the_live_line_says_everything_from_60_columns_on(width, t_end, rate):
             assert words in line, (words, line)
 
 
-def test_the_live_line_keeps_its_width_in_the_course_of_a_run():
+def test_the_live_line_keeps_its_width_and_fits_any_terminal():
     lines = [live_line(standing(t, 20.0), 5.0 + 0.01 * t, 77) for t in (0.1, 3.0, 9.99, 15.0, 19.9)]
     assert len({len(line) for line in lines}) == 1
-
-
-def test_the_live_line_fits_any_terminal():
     for width in range(4, 60):
         assert len(live_line(standing(37.0), 0.01, width)) <= width
+    assert "about ? left" in plain_line(standing(0.1), 0.0)  # before the pace is known
 
 
 @pytest.mark.parametrize(
@@ -87,10 +85,6 @@ def test_the_live_line_fits_any_terminal():
 )
 def test_what_is_left_is_shown_as_by_a_clock(rate, words):
     assert live_line(standing(37.0), rate, 107).endswith(words)
-
-
-def test_before_the_pace_is_known():
-    assert "about ? left" in plain_line(standing(0.1), 0.0)
 
 
 def test_points_are_counted_with_their_rate_and_what_is_left(clock, capsys, monkeypatch):

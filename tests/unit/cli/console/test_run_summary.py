@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from support.internals import join
 
 from dap3d_core.cli.console.console import stdout
 from dap3d_core.cli.console.run_summary import MOST_BODIES, correction_data, show_correction
-from dap3d_core.model.state_layout import join
 
 
 def corrected(shifts):

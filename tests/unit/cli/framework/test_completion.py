@@ -7,10 +7,10 @@ import sys
 import attrs
 import pytest
 from click.shell_completion import ShellComplete
+from support.command_line import dap3d
 from support.plain import in_another_process
 
 import dap3d_core as dap
-from dap3d_core.cli.app import dap3d
 from dap3d_core.result import UnknownNameError, find, names_of
 
 MOTION = ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd")

@@ -24,15 +24,12 @@ def reported(error, debug=False):
     return done.exit_code, json.loads(done.stdout), done.stderr
 
 
-def test_an_unexpected_error_is_one_line_and_a_hint():
+def test_an_unexpected_error_is_one_line_and_a_hint_but_for_debug():
     code, data, err = reported(RuntimeError("two\nlines"))
     assert (code, data["exit_code"]) == (1, 1)
     assert data["error"] == "unexpected RuntimeError: two lines"
     assert "--debug" in err
     assert "Traceback" not in err
-
-
-def test_debug_shows_the_traceback():
     code, _, err = reported(RuntimeError("here"), debug=True)
     assert code == 1
     assert "RuntimeError: here" in err

@@ -3,8 +3,8 @@
 import attrs
 import click
 import pytest
+from support.command_line import dap3d
 
-from dap3d_core.cli.app import dap3d
 from dap3d_core.cli.framework.options import SETTINGS, Seconds, Tolerance
 from dap3d_core.scene import Simulation
 

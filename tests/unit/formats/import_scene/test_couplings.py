@@ -70,9 +70,7 @@ TENDON = """<tendon><fixed name="t">
 )
 def test_coupled_joints_share_their_inertia(tmp_path, suffix, text, armature):
     """q_1 = 2 q_2, a moment on the first: (4 I_1 + I_2 + wheel) q_2'' = 2 moment.
-
-    The wheel between them has the armature, or a millionth of the least inertia.
-    """
+    The wheel between them has the armature, or a millionth of the least inertia."""
     path = tmp_path / f"two{suffix}"
     path.write_text(text)
     scene, report = dap.import_model(path)

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.rotations import rotation
 
 import dap3d_core as dap
 from dap3d_core.formats.import_scene.source_files import SourceFiles
 from dap3d_core.interface.formats import FormatError
-from dap3d_core.model.rotations import rotation
 
 INNER = """
 <sdf version="1.9"><model name="finger">
@@ -31,6 +31,13 @@ OUTER = """
   <model name="base"><static>true</static><link name="block"/></model>
 </world></sdf>
 """
+
+CUBE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+TWO = """<robot name="r"><link name="base"/><link name="a"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1"/></inertial>
+<visual><geometry><mesh filename="{}"/></geometry></visual>
+<visual><geometry><mesh filename="{}"/></geometry></visual></link>
+<joint name="j" type="continuous"><parent link="base"/><child link="a"/></joint></robot>"""
 
 
 def test_frames_of_included_models(tmp_path):
@@ -70,3 +77,21 @@ def test_text_is_utf_8(tmp_path, data, found):
     except FormatError as error:
         text = str(error)
     assert text == found
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_a_package_above_or_beside_the_file_is_found_within_the_root(tmp_path, inside):
+    """Of its own name: the folder of a robot, or one next to it; none outside of the root."""
+    folder = tmp_path / "arms" / "urdf"
+    for place in (folder, tmp_path / "hands"):
+        place.mkdir(parents=True)
+    (tmp_path / "arms" / "a.obj").write_text(CUBE)
+    (tmp_path / "hands" / "b.obj").write_text(CUBE)
+    text = TWO.format("package://arms/a.obj", "package://hands/b.obj")
+    (folder / "m.urdf").write_text(text)
+    if inside:
+        scene, _ = dap.import_model(folder / "m.urdf", root=tmp_path)
+        assert sorted(path.name for path in scene.files.values()) == ["a.obj", "b.obj"]
+    else:
+        with pytest.raises(dap.SceneError, match="the package arms is not known"):
+            dap.import_model(folder / "m.urdf", root=folder)

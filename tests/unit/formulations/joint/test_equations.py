@@ -4,15 +4,13 @@ import attrs
 import numpy as np
 import pytest
 from support import trees
+from support.internals import correct_initial, pose, u_from_y
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.assembly.arrays import TOLERANCE_C, TOLERANCE_V
 from dap3d_core.formulations import PROJECT
-from dap3d_core.interface.body_pose import pose
-from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.simulation import CompiledModel
-from dap3d_core.simulation.initial.assemble import correct_initial
 
 #: Accelerations and multipliers of two factorisations of equations with condition numbers up to
 #: some 1e3 differ by rounding times that.
@@ -46,10 +44,13 @@ def differences(scene):
     return np.max(difference[:split]) / sizes[0], rest / sizes[1]
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_accelerations_and_multipliers_are_those_of_standard(seed):
-    """Random trees of revolute, spherical, cylindrical, translational, universal joints, free."""
-    a, multipliers = differences(trees.random_tree(2 + seed, seed, free=0.1))
+@pytest.mark.parametrize("tree", [*range(6), "pen1", "pen2", "A05"])
+def test_accelerations_and_multipliers_are_those_of_standard(tree):
+    """Random trees of revolute, spherical, cylindrical, translational, universal joints, free; all
+    shipped models without loops or rows of velocities; A05 has masses that differ by 1e3."""
+    is_shipped = isinstance(tree, str)
+    scene = dap.load(tree) if is_shipped else trees.random_tree(2 + tree, tree, free=0.1)
+    a, multipliers = differences(scene)
     assert a < ACCELERATIONS
     assert multipliers < MULTIPLIERS
 
@@ -67,14 +68,6 @@ def test_a_body_alone_accelerates_as_by_standard(joint, hangs):
         scene.add_body("bob", mass=0.3, Jp=(0.01, 0.02, 0.03), r=tip, w=(1.0, 2.0, 3.0))
         scene.add_joint("sph", "ball", P_i="bob.O", P_j="tip")
     assert max(differences(scene)) < ACCELERATIONS
-
-
-@pytest.mark.parametrize("name", ["pen1", "pen2", "A05"])
-def test_shipped_trees_have_the_accelerations_of_standard(name):
-    """All shipped models without loops or rows of velocities; A05 has masses that differ by 1e3."""
-    a, multipliers = differences(dap.load(name))
-    assert a < ACCELERATIONS
-    assert multipliers < MULTIPLIERS
 
 
 def test_friction_changes_the_multipliers_as_it_does_in_standard():
@@ -220,9 +213,7 @@ def test_turns_knots_and_events_are_those_of_standard():
 @pytest.mark.parametrize("holder", ["ground", "post"])
 def test_a_thin_rod_on_a_ball_turns_as_euler_says(thin, holder):
     """Euler's equations about the ball, in its axes; the spin about itself alone loses digits.
-
-    That of a moment is lost to rounding of the moments across, 5e-15 N m here, over its inertia.
-    """
+    That of a moment is lost to rounding of the moments across, 5e-15 N m here, over its inertia."""
     e, length, mass = np.array([0.8, 0.3, -0.4, 0.33]), 0.7, 2.0
     e /= np.linalg.norm(e)
     A, w = pose((0.0, 0.0, 0.0), e).A, np.array([0.3, -0.5, 0.7])
@@ -248,10 +239,8 @@ def test_a_thin_rod_on_a_ball_turns_as_euler_says(thin, holder):
 @pytest.mark.parametrize("on_ground", [False, True])
 def test_a_thin_rotor_alone_keeps_its_spin(on_ground):
     """Euler's equations of a symmetric body: nothing turns about its axis, at 1000 rad/s.
-
     A C of 1e-9 of the other moments would divide the rounding of moments summed in global axes:
-    1e-4 rad/s^2. In the rotor's axes that of w is left, 1e-13 rad/s times w across.
-    """
+    1e-4 rad/s^2. In the rotor's axes that of w is left, 1e-13 rad/s times w across."""
     e, w, J = (
         np.array([0.8, 0.3, -0.4, 0.33]),
         np.array([0.3, -0.5, 1e3]),

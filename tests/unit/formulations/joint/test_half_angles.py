@@ -12,10 +12,8 @@ EPSILON = np.finfo(float).eps
 @pytest.mark.parametrize("size", [1e-9, 1.0, 30.0, 1e5, 1e7])
 def test_half_angles_are_right_to_the_last_digit_but_one(size):
     """Of any angle, also beyond the range of the reduction; exact at multiples of pi to rounding.
-
     Half a unit in the last place of the reduction, one of the polynomial and of the result: below
-    two, relative to 1 where the function vanishes.
-    """
+    two, relative to 1 where the function vanishes."""
     rng = np.random.default_rng(2)
     quarters = np.pi * np.rint(rng.uniform(-size, size, size=20) / np.pi)
     q = np.concatenate([rng.uniform(-size, size, size=200), quarters, [0.0, -0.0]])

@@ -15,10 +15,8 @@ factors_of, solve_factored = map(inspect.unwrap, (reduce.factors_of, reduce.solv
 @pytest.mark.parametrize("light", [(1.0, 1e-9), (1e-3, 1e-6), (1e-9, 1e-9), (1e-6, 1e-12)])
 def test_a_pivot_loses_no_digits_about_its_heavy_axis(light):
     """Solutions for what acts along the heavy axis, of eigenvalues 1 and two light ones.
-
     Along it they are right to rounding; across by rounding over the least eigenvalue, some ten
-    operations of entries up to 1. Cofactors would lose the product of both light ones.
-    """
+    operations of entries up to 1. Cofactors would lose the product of both light ones."""
     rng = np.random.default_rng(3)
     for _ in range(20):
         Q = np.linalg.qr(rng.normal(size=(3, 3)))[0]

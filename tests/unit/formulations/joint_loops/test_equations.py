@@ -5,13 +5,13 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support import loops, problems, redundant, singular, trees
+from support.internals import split
 from support.plain import long_in_plain_python
 from unit.formulations.joint.test_equations import ACCELERATIONS, MULTIPLIERS, closed
 
 import dap3d_core as dap
 from dap3d_core.formulations.joint_loops import tables
 from dap3d_core.model.rigid_motion import matrices
-from dap3d_core.model.state_layout import split
 from dap3d_core.simulation import CompiledModel
 
 #: Singular values of the scaled Jacobian below this part of the largest belong to dependent rows:
@@ -23,10 +23,8 @@ LOOPS = 10.0
 
 def dense_solution(evaluator, u):
     """Accelerations and least multipliers of a state by singular values of the whole Jacobian.
-
     Of all accelerations that the rows permit those nearest to free motion in the metric of the
-    masses (Gauss); then the least lambda with D^T lambda = M v_dot - g.
-    """
+    masses (Gauss); then the least lambda with D^T lambda = M v_dot - g."""
     rows, forces, model = evaluator.rows(0.0, u), evaluator.applied_forces(0.0, u), evaluator.model
     _, p, _, w = split(u)
     A, n = matrices(p), model.body_count
@@ -61,32 +59,31 @@ def is_redundant(scene):
     return CompiledModel(scene, method="joint").redundancy().rank.redundant > 0
 
 
-@pytest.mark.every(4)
-@pytest.mark.parametrize("seed", range(8))
-def test_loops_have_the_accelerations_of_a_dense_solution(seed):
-    """Random trees with spherical, universal, revolute joints and rods that close loops."""
-    scene = loops.add_loops(trees.random_tree(3 + 2 * seed, seed), seed, 1 + seed // 3)
-    a, multipliers = differences(scene)
-    assert a < LOOPS * ACCELERATIONS
-    assert multipliers < LOOPS * MULTIPLIERS
+def with_loops(seed):
+    """A random tree with spherical, universal, revolute joints and rods that close loops."""
+    return loops.add_loops(trees.random_tree(3 + 2 * seed, seed), seed, 1 + seed // 3)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_redundant_loops_have_the_least_multipliers(seed):
+def with_twins(seed):
     """Hinges that are there twice: five of the ten rows of a door hold already."""
     scene = loops.add_twins(trees.random_tree(8, seed, joints=("rev", "sph")), seed, 2)
     assert is_redundant(scene)
-    a, multipliers = differences(scene)
-    assert a < LOOPS * ACCELERATIONS
-    assert multipliers < LOOPS * MULTIPLIERS
+    return scene
 
 
 @pytest.mark.parametrize(
-    "name", ["fourbar2", "fourbar3", "fourbar4", "tri", "bicycle", "A02-2", "A03", "A04", "N1"]
-)
-def test_shipped_models_have_the_accelerations_of_a_dense_solution(name):
-    """Rods, drivers, rows of velocities, wheels that roll, seven bodies, redundant rows."""
-    a, multipliers = differences(dap.load(name))
+    ("make", "of"),
+    [
+        *((with_loops, k) if k % 4 == 0 else pytest.param(with_loops, k, marks=pytest.mark.slow)
+          for k in range(8)),
+        *((with_twins, k) for k in range(3)),
+        # rods, drivers, rows of velocities, wheels that roll, seven bodies, redundant rows
+        *((dap.load, name) for name in ("fourbar2", "fourbar3", "fourbar4", "tri", "bicycle",
+                                        "A02-2", "A03", "A04", "N1")),
+    ],
+)  # fmt: skip
+def test_loops_have_the_accelerations_and_least_multipliers_of_a_dense_solution(make, of):
+    a, multipliers = differences(make(of))
     assert a < LOOPS * ACCELERATIONS
     assert multipliers < LOOPS * MULTIPLIERS
 
@@ -254,17 +251,19 @@ def test_rows_of_too_many_meetings_are_refused(monkeypatch):
         dap.compile(ladder(3), method="joint")
 
 
-@long_in_plain_python
-def test_redundant_rows_that_come_to_hold_a_motion_end_the_run():
-    """A car whose front wheels are steered by equal angles: they contradict each other."""
-    with pytest.raises(dap.SimulationError, match="have come to hold a motion that they left free"):
-        dap.simulate(singular.car(), method="joint", t_end=0.01, dt=0.005, rtol=1e-8)
-
-
-def test_a_singular_start_is_refused():
-    """Rows depend on each other at this pose alone; joint does not find the rates there."""
-    with pytest.raises(dap.SimulationError, match="singular pose, from which method joint"):
-        dap.simulate(singular.flat_parallelogram(), method="joint", t_end=0.1, dt=0.1)
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        # front wheels that are steered by equal angles contradict each other
+        pytest.param(singular.car, "have come to hold a motion that they left free",
+                     marks=long_in_plain_python),
+        # rows depend on each other at this pose alone; joint does not find the rates there
+        (singular.flat_parallelogram, "singular pose, from which method joint"),
+    ],
+)  # fmt: skip
+def test_motions_that_joint_does_not_find_are_refused(make, words):
+    with pytest.raises(dap.SimulationError, match=words):
+        dap.simulate(make(), method="joint", t_end=0.01, dt=0.005, rtol=1e-8)
 
 
 @long_in_plain_python

@@ -4,12 +4,12 @@ import re
 
 import llvmlite.binding as llvm
 import pytest
+from support.internals import off_constraints
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.formulations.programs.operations import operations
 from dap3d_core.formulations.programs.scene_program import write_program
-from dap3d_core.integrators.stepping.integration import off_constraints
 
 pytestmark = long_in_plain_python
 

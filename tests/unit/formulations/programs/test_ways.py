@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from support.internals import compiled, off_constraints
+from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.formulations import OUTCOMES, PROJECT
 from dap3d_core.formulations.programs.scene_program import load_programs, write_programs
-from dap3d_core.integrators.stepping.integration import off_constraints
 from dap3d_core.kernels.compiler import objects
-from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 

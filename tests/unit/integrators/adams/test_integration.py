@@ -5,12 +5,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from support import integrands as toys
 from support.integrands import finish, kepler, kepler_f, kepler_orbit, slope
+from support.internals import compiled, loop_list
 
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.adams import formulas as adams
 from dap3d_core.integrators.adams.integration import AdamsIntegration
-from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.runtime.function_lists import loop_list
 
 
 def start(rhs, y0, times, project=toys.no_constraint, report=toys.plain_report, **options):
@@ -19,9 +18,6 @@ def start(rhs, y0, times, project=toys.no_constraint, report=toys.plain_report, 
     run = AdamsIntegration(functions, toys.counting(calls), loop_list([]), y0, times, **options)
     run.calls = calls
     return run
-
-
-# ------------------------------------------------------------------ formulas
 
 
 @compiled
@@ -34,9 +30,7 @@ def predicted(work, h, k):
 def test_order_conditions_on_unequal_steps(k):
     """Rates that are a polynomial of degree k - 1 in time are integrated exactly; of degree k, with
     the corrector.
-
-    The differences are made here from their definition, HNW (III.5.3 and 5.8).
-    """
+    The differences are made here from their definition, HNW (III.5.3 and 5.8)."""
     rng = np.random.default_rng(k)
     h, ages = 0.7, np.concatenate([[0.0], np.cumsum(rng.uniform(0.4, 1.3, k + 1))])
     for degree in (k - 1, k):
@@ -62,9 +56,6 @@ def test_constants_are_those_of_the_literature():
     """|gamma*_j| of HNW, table III.1.2."""
     known = [1, 1 / 2, 1 / 12, 1 / 24, 19 / 720, 3 / 160, 863 / 60480]
     assert adams.make_table()[adams.CONSTANT, :7] == pytest.approx(known, rel=1e-14)
-
-
-# ------------------------------------------------------------------ accuracy
 
 
 def test_error_is_proportional_to_the_tolerance():
@@ -106,10 +97,8 @@ def test_orders_stay_right_when_equal_steps_come_to_an_end():
 @pytest.mark.parametrize("tol", [1e-5, 1e-7, 1e-9])
 def test_reports_do_not_steer_the_steps(tol):
     """A hundred reports or one: not a bit of the steps changes, not among equal ones either.
-
     The steps of an oscillator are equal for long, and coefficients stay from step to step then.
-    Each errs by the tolerance at most, and nothing multiplies errors.
-    """
+    Each errs by the tolerance at most, and nothing multiplies errors."""
     options, times = {"rtol": tol, "atol": tol}, np.linspace(0.0, 20.0, 101)
     alone = start(toys.oscillator, [0.0, 1.0], [0.0, 20.0], **options)
     often = start(toys.oscillator, [0.0, 1.0], times, **options)
@@ -130,9 +119,6 @@ def test_trailing_components_do_not_steer_the_step():
     finish(alone), finish(longer)
     assert alone.statistics == longer.statistics
     assert np.array_equal(alone.y, longer.y[:2])
-
-
-# ------------------------------------------------------------------ bookkeeping and trouble
 
 
 def test_chunks_change_no_bit():

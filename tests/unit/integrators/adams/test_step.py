@@ -46,10 +46,8 @@ def _precession(theta, spin, A=0.02, C=0.005, moment=0.1 * 9.81):
 @pytest.mark.slow
 def test_errors_follow_the_tolerances():
     """Andrews' mechanism with 100 reports, beside dop853 at 1e-12: no setting errs out of its turn.
-
     Errors of its 500 to 1100 steps are not multiplied: their sum is below 20 rtol of its size
-    (2.5 at the most). A single bad step would show in the balance of energy, too.
-    """
+    (2.5 at the most). A single bad step would show in the balance of energy, too."""
     model = dap.compile(dap.load("A03"))
     run = {"t_end": 0.05, "dt": 0.0005}
     other = dap.simulate(model, rtol=1e-12, atol=1e-14, **run)

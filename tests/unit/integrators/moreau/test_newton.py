@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from dap3d_core.integrators.moreau.dense import solve_dense
+from dap3d_core.integrators.moreau.dense import solve_blocks, solve_dense
 from dap3d_core.integrators.moreau.newton import distance, project, slopes
 
 
@@ -33,3 +33,22 @@ def test_elimination_solves_as_numpy_does():
     expected, found = np.linalg.solve(K, x), x.copy()
     solve_dense(K.copy(), found)
     assert np.abs(found - expected).max() < 1e-11  # condition of some hundreds
+
+
+def test_elimination_by_blocks_solves_as_numpy_does():
+    """An arrow and a chain of blocks, which elimination fills where the pattern says."""
+    rng, n = np.random.default_rng(3), 5
+    start, entries = np.array([0, 2, 4, 5, 6, 6]), np.array([1, 4, 4, 2, 4, 4])
+    K = np.zeros(36 * (n + 2 * len(entries)))
+    full = np.zeros((n, 6, n, 6))
+    for a in range(n):
+        full[a, :, a] = K[36 * a :][:36].reshape(6, 6)[:] = rng.standard_normal((6, 6))
+    for a in range(n):
+        for e in range(start[a], start[a + 1]):
+            for row, column, part in ((entries[e], a, 0), (a, entries[e], 1)):
+                block = K[36 * (n + 2 * e + part) :][:36].reshape(6, 6)
+                full[row, :, column] = block[:] = rng.standard_normal((6, 6))
+    x = rng.standard_normal(6 * n)
+    expected = np.linalg.solve(full.reshape(6 * n, 6 * n), x)
+    solve_blocks(K, x, n, start, entries, np.zeros(n, dtype=np.int64), np.zeros(36))
+    assert np.abs(x - expected).max() < 1e-11  # condition of some hundreds

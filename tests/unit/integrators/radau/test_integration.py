@@ -6,15 +6,14 @@ import sys
 import numpy as np
 import pytest
 from support import mechanisms, problems
-from support.plain import in_another_process, long_in_plain_python
+from support.internals import compiled, store_reference_pivots
+from support.plain import in_another_process, jit_is_on, long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.formulations.stabilized_index2.stage_equations import evaluate_stage, keep_frames
 from dap3d_core.integrators import Status
 from dap3d_core.integrators.radau.integration import RadauIntegration, estimate_tolerances
 from dap3d_core.integrators.radau.newton import factorise_both, find_tangent, solve_first
-from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 
 
 @compiled
@@ -28,9 +27,6 @@ def solve_at(t, h, y, multipliers, work, system, loops, tangent, matrix):
     evaluate_stage(t, y, multipliers, matrix.held, work.R[1], work.G[1], system, loops)
     keep_frames(system.body, work.frames[0])
     solve_first(h, work, system, tangent, matrix)
-
-
-# ---------------------------------------------------------------------------- tangent
 
 
 def sprung():
@@ -69,9 +65,7 @@ def integration(scene, times=(0.0, 1.0), method=None, **settings):
 @pytest.mark.parametrize("h", [1.0, 1e-2])
 def test_tangent_is_that_of_all_equations(scene, h):
     """s z - J z = r for the solution z, J by central differences of all equations in all unknowns.
-
-    Both kinds of differences err by some 1e-9 of the largest term.
-    """
+    Both kinds of differences err by some 1e-9 of the largest term."""
     run = integration(scene())
     evaluator, work, matrix = run.evaluator, run.work, run.matrix
     system, rows = evaluator.system, evaluator.plan.row_size
@@ -115,9 +109,6 @@ def test_tangent_is_that_of_all_equations(scene, h):
     expected = np.concatenate([residual, of_rows.ravel()])
     size = max(np.max(np.abs(term)) for term in (s * change, *terms, expected))
     assert np.max(np.abs(left - expected)) < 2e-8 * size
-
-
-# ---------------------------------------------------------------------------- method
 
 
 def test_tolerances_of_the_estimate_keep_their_ratio():
@@ -171,12 +162,6 @@ def test_body_without_joints():
     result = dap.simulate(scene, t_end=1.0, dt=1.0, integrator="radau", rtol=1e-10, atol=1e-12)
     w = (0.50197928606713736, 2.1789944461516021, 0.025711240346541824)
     assert result.wp[-1, 0] == pytest.approx(w, abs=1e-8)
-
-
-def test_a_fixed_step_without_stages_stops_the_run():
-    """Ten times the length of a swing: no stages are found, and nothing is reported as good."""
-    with pytest.raises(dap.SimulationError, match="the run stopped at t = 0 s"):
-        dap.simulate(problems.chain(2), t_end=50.0, dt=25.0, step=25.0, integrator="radau")
 
 
 @pytest.mark.slow

@@ -9,8 +9,6 @@ from support.integrands import (
 )
 
 from dap3d_core.integrators import TABLEAUS
-from dap3d_core.integrators.runge_kutta.tableau import ABSCISSA, combinations
-from dap3d_core.integrators.stepping.vector_ops import GROUP, GROUPS, TERMS
 
 
 @pytest.mark.parametrize("name", ALL)
@@ -37,17 +35,3 @@ def test_coefficients_are_those_of_scipy():
     assert np.allclose(method.a[6, :6], RK45.B, rtol=1e-15)
     assert np.allclose(method.e[0], -RK45.E, rtol=1e-15)
     assert np.allclose(method.d[0], RK45.P[:, 3], rtol=1e-14)
-
-
-@pytest.mark.parametrize("name", ALL)
-def test_packed_coefficients_are_the_coefficients(name):
-    """The table of the compiled core, unpacked, is a, e and d."""
-    method = TABLEAUS[name]
-    wanted = np.vstack([method.a, *method.e, *method.d])
-    table = combinations(method)
-    assert np.array_equal(table[: len(method.c), ABSCISSA], method.c)
-    found = np.zeros_like(wanted)
-    for i, row in enumerate(table):
-        groups = row[TERMS:].reshape(-1, 2, GROUP)[: int(row[GROUPS])]
-        np.add.at(found[i], groups[:, 1].astype(int).ravel(), groups[:, 0].ravel())
-    assert np.array_equal(found, wanted)

@@ -30,7 +30,7 @@ def test_rounding_excuses_no_more_than_a_millionth(error, passes):
     for i, size in enumerate((2.0, 2.0, 1e-3, 1e-3)):
         x = np.zeros(5)
         x[i] = error * size
-        largest = scaled_largest(x, y, y, 4, RTOL, work.tolerance, 1.0)
+        largest = scaled_largest(np.zeros(5), x, y, y, 4, RTOL, work.tolerance, 1.0)
         assert bool(largest <= 1.0) is passes, (i, largest)
 
 

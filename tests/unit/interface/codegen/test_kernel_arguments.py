@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.internals import LoopArrays, call_loop, loop_list, specs_of
 
 from dap3d_core.interface import (
     Body,
@@ -18,10 +19,8 @@ from dap3d_core.interface import (
     vector,
 )
 from dap3d_core.interface.codegen.compile_loops import write
-from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels import add
 from dap3d_core.kernels.runtime import loop_support
-from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_modules import build
 
 ZERO = (0.0, 0.0, 0.0)
@@ -43,9 +42,7 @@ class Named(Force):
 
 def test_a_vector_may_be_called_v_i():
     """It takes the place of the velocity of that name; the velocity of a point stays one.
-
-    All of it by numpy: v_P = v + w x A s, the vector A a and its rate w x A a.
-    """
+    All of it by numpy: v_P = v + w x A s, the vector A a and its rate w x A a."""
     type_info = examine(Named)
     assert not type_info.names["v_i"].velocity
     assert type_info.names["v_i_dot"].velocity

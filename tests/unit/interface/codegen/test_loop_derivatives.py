@@ -8,9 +8,7 @@ import dap3d_core as dap
 
 def test_springs_by_tables():
     """Each of several springs has the slope of its own spline at its own elongation.
-
-    Along its line a spring has the stiffness f'(x), across it f(x) / l.
-    """
+    Along its line a spring has the stiffness f'(x), across it f(x) / l."""
     x, y = np.linspace(-0.5, 0.5, 7), np.array([-9.0, -5.0, -2.0, 0.0, 3.0, 4.0, 8.0])
     curve, elongations = CubicSpline(x, y, bc_type="natural"), (-0.31, 0.07, 0.44)
     scene = dap.Scene(name="splines")

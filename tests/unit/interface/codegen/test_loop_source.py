@@ -1,18 +1,17 @@
 """Every name that a kernel may ask for holds what it says, computed by the written loops.
-
 Types made for these tests return the named quantities as forces and moments, eighteen numbers from
 three bodies; numpy computes them anew from the state. Tolerance: two rotations and some sums, 1e-13
-of numbers of order one.
-"""
+of numbers of order one."""
 
 import numpy as np
 import pytest
+from support.internals import call_kinds, split
 from support.motions import Motion
 from support.own_types import registry_of
 
 import dap3d_core as dap
 from dap3d_core.assembly.arrays import ENERGY, VALUE, WRENCH
-from dap3d_core.assembly.evaluate import call_kinds, place_bodies
+from dap3d_core.assembly.evaluate import place_bodies
 from dap3d_core.interface import (
     Body,
     Force,
@@ -32,7 +31,6 @@ from dap3d_core.interface import (
     vector2,
 )
 from dap3d_core.kernels import row
-from dap3d_core.model.state_layout import split
 
 ZERO = (0.0, 0.0, 0.0)
 CLOSE = {"rtol": 1e-13, "atol": 1e-13}

@@ -6,12 +6,12 @@ import warnings
 
 import numpy as np
 import pytest
+from support.internals import call_kinds
 from support.own_types import registry_of
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.assembly.arrays import ANGLE
-from dap3d_core.assembly.evaluate import call_kinds
 from dap3d_core.interface import (
     REQUIRED,
     Body,
@@ -481,9 +481,7 @@ class AcrossAlone(TwoLaws, across=True, along=False):
 
 def test_one_of_two_functions_may_be_left_out():
     """Each variant gets the functions that are given; one that calls another is refused in words.
-
-    x = 3 and z = 4: across = 1 + 2 x = 7, along = 5 z^2 = 80.
-    """
+    x = 3 and z = 4: across = 1 + 2 x = 7, along = 5 z^2 = 80."""
     laws = {"line": (1.0, 2.0, 0.0), "square": (0.0, 0.0, 5.0)}
     for given, wanted in (({"along": "square"}, (0.0, 40.0)),
                           ({"along": "square", "across": "line"}, (3.5, 40.0))):  # fmt: skip

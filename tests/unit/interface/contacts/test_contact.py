@@ -26,15 +26,6 @@ from dap3d_core.kernels import (
 from dap3d_core.testing.kit import checks_for
 
 
-@pytest.mark.every(7)
-@pytest.mark.parametrize("keyword", dap.load_registry().keywords("contact"))
-def test_rows_of_the_standard_types_are_exact_derivatives(keyword):
-    """Rate of the gap and normal velocity, J, gamma of a moving point, friction, compiled code."""
-    failed = [str(outcome) for check in checks_for(dap.load_registry().get("contact", keyword))
-              if not (outcome := check.run()).ok]  # fmt: skip
-    assert not failed
-
-
 class Pipe(Contact):
     keyword = "pipe"
     P_i: Point = point()

@@ -1,9 +1,7 @@
 """Formulas derived from C, C_dot, energy or value are those that are written by hand.
-
 Both are evaluated at random states off the constraints. They differ by rounding alone, 1e-11 of the
 largest term: a few hundred operations, and differences of angles near 1. Where there is none by
-hand, rates along random motions stand for it (see tests/contract for the tolerance).
-"""
+hand, rates along random motions stand for it (see tests/contract for the tolerance)."""
 
 import inspect
 import math
@@ -24,14 +22,15 @@ from support.derived_types import (
     Winding,
     from_C_alone,
 )
+from support.internals import Evaluator, split
 from support.motions import Motion, derivative
 from support.own_types import registry_of
 from support.plain import in_another_process
 from support.process import REPOSITORY, run
+from support.rotations import rotation
 from support.scenes import scene_for
 
 import dap3d_core as dap
-from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface import (
     Function,
     Joint,
@@ -45,8 +44,6 @@ from dap3d_core.interface import (
 )
 from dap3d_core.kernels import acos, asin, dot, exp, floor, log
 from dap3d_core.model import build_model
-from dap3d_core.model.rotations import rotation
-from dap3d_core.model.state_layout import split
 from dap3d_core.scene import check
 from dap3d_core.testing import check_type
 
@@ -157,17 +154,6 @@ def test_a_wrench_is_derived_from_the_energy(type_):
     assert power == pytest.approx(-rate[0], rel=1e-8)
 
 
-def test_a_function_by_its_value_alone_has_its_derivatives():
-    """Of a sin(w x) / sqrt(1 + x^2), against the derivatives of its Taylor series' factors."""
-    value = examine(Wave).kernels["value"]
-    x, a, w, h = 0.4, 1.3, 2.1, 1e-3
-    for order in (1, 2, 3):
-        lower = [value(x + k * h, a, w)[order - 1] for k in (-3, -2, -1, 1, 2, 3)]
-        slope = np.array([-1, 9, -45, 45, -9, 1]) @ lower / (60.0 * h)
-        assert value(x, a, w)[order] == pytest.approx(slope, rel=1e-10)
-    assert value(x, a, w)[0] == pytest.approx(a * np.sin(w * x) / np.sqrt(1.0 + x * x), rel=1e-15)
-
-
 class Words(Function):
     """A function of time in all words that sympy has under names of its own."""
 
@@ -177,17 +163,24 @@ class Words(Function):
         return exp(-t) * log(t + 2.0) + asin(t / 3.0) * acos(t / 4.0) + t * floor(5.0 * t)
 
 
-def test_derived_kernels_take_all_words_and_t_is_the_argument():
+@pytest.mark.parametrize(
+    ("type_", "x", "constants", "exact"),
+    [
+        (Wave, 0.4, (1.3, 2.1), lambda x, a, w: a * np.sin(w * x) / np.sqrt(1.0 + x * x)),
+        (Words, 0.41, (), lambda t: (math.exp(-t) * math.log(t + 2.0)
+                                     + math.asin(t / 3.0) * math.acos(t / 4.0)
+                                     + t * math.floor(5.0 * t))),
+    ],
+    ids=["wave", "all words"],
+)  # fmt: skip
+def test_a_function_by_its_value_alone_has_its_derivatives(type_, x, constants, exact):
     """By central differences of order 6: steps of 1e-3, in which 5 t is not a whole number."""
-    value = examine(Words).kernels["value"]
-    t, h = 0.41, 1e-3
-    exact = (math.exp(-t) * math.log(t + 2.0) + math.asin(t / 3.0) * math.acos(t / 4.0)
-             + t * math.floor(5.0 * t))  # fmt: skip
-    assert value(t)[0] == pytest.approx(exact, rel=1e-15)
+    value, h = examine(type_).kernels["value"], 1e-3
+    assert value(x, *constants)[0] == pytest.approx(exact(x, *constants), rel=1e-15)
     for order in (1, 2, 3):
-        lower = [value(t + k * h)[order - 1] for k in (-3, -2, -1, 1, 2, 3)]
+        lower = [value(x + k * h, *constants)[order - 1] for k in (-3, -2, -1, 1, 2, 3)]
         slope = np.array([-1, 9, -45, 45, -9, 1]) @ lower / (60.0 * h)
-        assert value(t)[order] == pytest.approx(slope, rel=1e-10)
+        assert value(x, *constants)[order] == pytest.approx(slope, rel=1e-10)
 
 
 # ------------------------------------------------------------------ what cannot be derived

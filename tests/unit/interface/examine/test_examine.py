@@ -115,10 +115,8 @@ def prepare(constants):
         (function(value=lambda x: (x, 1.0, 0.0)), ["Mine.value", "(f, f', f'', f''')", "(3,)"]),
         # what comes out
         (joint(C=lambda r_i: r_i[7]), ["Mine.C failed", "IndexError", "out of range"]),
-        (
-            force(wrench=lambda r_i: broken(r_i)),
-            ["Mine.wrench failed", "RuntimeError: it is broken"],
-        ),
+        (force(wrench=lambda r_i: broken(r_i)),
+         ["Mine.wrench failed", "RuntimeError: it is broken"]),
         (joint(C=lambda t: math.nan), ["Mine.C returned nan", "finite number"]),
         (joint(gamma=lambda t: t / 1e-320), ["Mine.gamma returned inf", "finite number"]),
         (joint(C=lambda t: None), ["Mine.C returned None", "finite number"]),
@@ -150,14 +148,10 @@ def prepare(constants):
         (joint(holonomic=(True, False)), ["holonomic", "one truth value for each of its 1 rows"]),
         (joint(fields={"k": (float, number())}), ["acts on no body", "P_i: Point = point()"]),
         (joint(fields={"P": (Point, point())}), ["acts on no body"]),
-        (
-            joint(fields={"d": (Vector2, vector2()), "e": (Vector2, vector2())}),
-            ["more than one vector2", "ends P_i and P_j", "sub(r_Q_j, r_Q_i)"],
-        ),
-        (
-            joint(fields={"a_i": (Vector, vector(across="b_j"))}),
-            ["a_i is across b_j, which is no vector field"],
-        ),
+        (joint(fields={"d": (Vector2, vector2()), "e": (Vector2, vector2())}),
+         ["more than one vector2", "ends P_i and P_j", "sub(r_Q_j, r_Q_i)"]),
+        (joint(fields={"a_i": (Vector, vector(across="b_j"))}),
+         ["a_i is across b_j, which is no vector field"]),
         # prepare
         (joint(prepare=prepare(None)), ["Mine.prepare should return a dict", "None"]),
         (joint(prepare=prepare([1.0])), ["Mine.prepare should return a dict", "[1.0]"]),
@@ -176,7 +170,7 @@ def prepare(constants):
         (joint(prepare=lambda self, bodies: self.Q_i), ["Mine.prepare failed: AttributeError"]),
     ],
     ids=lambda v: " ".join(v)[:40] if isinstance(v, list) else "",
-)
+)  # fmt: skip
 def test_what_is_wrong_with_a_type_is_said(type_, words):
     """A PluginError names file, class, function, what is wrong and what to do."""
     said = refusal(type_)
@@ -274,14 +268,11 @@ def test_velocity_level_kernels_may_name_velocities():
         (joint(C=lambda r_i: (r_i[0],)), "C", ("out[0]",)),
         (joint(C=lambda r_i: ((r_i[0],),)), "C", ("out[0][0]",)),
         (joint(), "J", tuple(f"out[{b}][{c}]" for b in range(2) for c in range(6))),
-        (
-            joint(J=lambda: (((1.0,) * 6,), ((2.0,) * 6,))),
-            "J",
-            tuple(f"out[{b}][0][{c}]" for b in range(2) for c in range(6)),
-        ),
+        (joint(J=lambda: (((1.0,) * 6,), ((2.0,) * 6,))), "J",
+         tuple(f"out[{b}][0][{c}]" for b in range(2) for c in range(6))),
         (function(), "value", ("out[0]", "out[1]", "out[2]", "out[3]")),
     ],
-)
+)  # fmt: skip
 def test_brackets_around_one_thing_may_be_left_out(type_, kernel, paths):
     """A joint of one row returns a number, a tuple of one, or a block with or without its bracket;
     each number is found where it stands."""

@@ -1,7 +1,5 @@
 """Whole runs: plain Python and optimised code have the same bits.
-
-Each function of them, also made quickly and without FMA: test_core.py, test_trace.py.
-"""
+Each function of them, also made quickly and without FMA: test_core.py, test_trace.py."""
 
 import json
 

@@ -1,16 +1,15 @@
 """Each compiled function of the core: plain Python and machine code give the same bits.
-
-Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py).
-"""
+Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py)."""
 
 import json
 
 import pytest
+from support.internals import FLOAT, INT
 from support.plain import jit_is_on
 from support.problems import short_runs
 from support.process import REPOSITORY, run
 
-from dap3d_core.kernels.compiler.types import FLOAT, INT, Known, Struct
+from dap3d_core.kernels.compiler.types import Known, Struct
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -91,7 +90,8 @@ NOT_CALLED = {
         "formulations.standard": "settle_rows",
         "integrators.adams.step": "reject",
         "integrators.stepping.vector_ops": "scaled_beyond",
-        "integrators.stepping.step_control": "error_beyond_rounding",
+        "integrators.runge_kutta.error": "error_beyond_rounding",
+        "integrators.runge_kutta.sums": "combine_by_table",
         "integrators.stepping.singular_poses": "predict_measures is_approaching "
         "least_time_to_singularity",
         "integrators.radau.step": "reject_iteration stage_is_across blame",
@@ -123,11 +123,43 @@ NOT_CALLED = {
         "bend flat_directions part_best touch_convex",
         "assembly.collisions.manifold": "turn outline clip tangents spread inside crossing "
         "at_plane_along put_points points_within",
-        "assembly.collisions.broad_phase": "meet place_of grid_pairs",
-        "assembly.collisions.find": "touch",
-        "integrators.moreau.dense": "solve_dense",
-        "integrators.moreau.gauss_seidel": "sweep_bodies sweep_contacts change_of",
-        "integrators.moreau.integration": "state_at goes_on take_state",
+        "assembly.collisions.broad_phase": (
+            "find_pairs add_pair meet ranked place_of fill_cells grid_pairs"
+        ),
+        "assembly.collisions.placed_shapes": "place_shapes",
+        "assembly.collisions.find": "has_formula touch find_touches",
+        "integrators.moreau.dense": (
+            "solve_dense solve_square solve_blocks invert multiply take take_from"
+        ),
+        "integrators.moreau.gauss_seidel": (
+            "sweep_bodies sweep_contacts change_of refine_held keep take_kept put_crossed "
+            "put_answer put_felt"
+        ),
+        "integrators.moreau.contact_set": (
+            "find_contacts place_poses axes_of turn_tensor put_touch put_frame evaluate_rows "
+            "put_declared"
+        ),
+        "integrators.moreau.free_motion": "move_freely normalise size_of largest_rate",
+        "integrators.moreau.groups": (
+            "root_of find_groups choose lay_out connect join bit_count order_bodies degree_of "
+            "eliminate block_at"
+        ),
+        "integrators.moreau.impulses": (
+            "slot_of recall remember mode_of keep_for_reports complete_row log_contacts"
+        ),
+        "integrators.moreau.newton": (
+            "put_projected put_slopes put_missed put_velocities clear add_pull times_inverse "
+            "add_inverse velocity_of speed_of left_at residual_of newton exchange put_rest "
+            "size_of solve_round try_pass assemble put_turned add_contact"
+        ),
+        "integrators.moreau.problem": "prepare_problem solve judge sweep finish refine_groups",
+        "integrators.moreau.restitution": (
+            "limit_bounces any_gains put_work part_without_gain mix"
+        ),
+        "integrators.moreau.step": (
+            "advance goes_on state_at meet take_velocities put_margins length_of deepest_of "
+            "put_bias put_hits work_done move part finish way_of closing_of put_means"
+        ),
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",
         "formulations.jumps.rounds": "kick has_crossed stop",
@@ -147,9 +179,7 @@ NOT_CALLED = {
 
 def repeated(runs, few, more="", every=()):
     """Of the calls of runs at levels, of these and more at others: number, those that differ.
-
-    And the functions that were not called.
-    """
+    And the functions that were not called."""
     lines = [
         f"recorder.record(dap.simulate, {model!r}, **{settings!r})" for model, settings in runs
     ]
@@ -173,9 +203,7 @@ def test_calls_of_a_short_run_have_the_bits_of_plain_python():
 @pytest.mark.slow
 def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python(found):
     """Optimised for this processor; functions not called are listed.
-
-    Without FMA: `make no-fma`. Unoptimised: a short run, above.
-    """
+    Without FMA: `make no-fma`. Unoptimised: a short run, above."""
     _, (count, different), missing = found
     assert count > 4000
     assert different == []
@@ -185,9 +213,7 @@ def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python(found):
 @pytest.mark.slow
 def test_calls_have_the_same_bits_where_their_numbers_carry_derivatives(found):
     """Functions of all formulations and integrators; complex numbers of radau as well.
-
-    Where a switch crosses, Newton steps for derivatives leave other numbers in rows of scratch.
-    """
+    Where a switch crosses, Newton steps for derivatives leave other numbers in rows of scratch."""
     (count, different), *_ = found
     assert count > 2000
     crossing = "dap3d_core.integrators.stepping.event_location."

@@ -1,7 +1,5 @@
 """Differentiated functions of the subset: values have the bits of the function, slopes are exact.
-
-Slopes are compared with complex steps where the function is analytic, else with differences.
-"""
+Slopes are compared with complex steps where the function is analytic, else with differences."""
 
 import cmath
 import math
@@ -13,15 +11,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.at_all_levels import function_of, made_of, programs, same_bits
+from support.internals import INTEGERS, MATRIX, Arrays, CompileError, Program, compiled, pointer
+from support.plain import jit_is_on
 from support.structs import Inner, Numbers
 
 from dap3d_core.kernels import scalar_math
 from dap3d_core.kernels.compiler.derivatives import differentiate
-from dap3d_core.kernels.compiler.functions import Program
-from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.kernels.compiler.units import type_of
-from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, Arrays, pointer
-from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 from dap3d_core.kernels.runtime.lanes import DifferentiatedArrays, differentiated
 from dap3d_core.kernels.scalar_math import is_differentiated, with_slopes
 
@@ -100,9 +96,7 @@ def arrays(rng):
 
 def differentiated_run(function, one, directions):
     """The results (48,) and their slopes (48, d) along directions of x, (3, d), and of the table.
-
-    Those of the table are of x as well, row by row.
-    """
+    Those of the table are of x as well, row by row."""
     wide = DifferentiatedArrays(one, 1 + directions.shape[1])
     wide.slopes(one.x)[:] = directions
     wide.slopes(one.inner.table)[:] = np.repeat(directions, 2, axis=0)

@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from support.internals import CompileError, compiled, pointer
+from support.plain import jit_is_on
 from support.structs import Inner, Numbers
 
 from dap3d_core.kernels.compiler import lanes
-from dap3d_core.kernels.compiler.types import CompileError
-from dap3d_core.kernels.runtime.array_struct import pointer
-from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 from dap3d_core.kernels.runtime.lanes import WideArrays, wide_function
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")

@@ -93,9 +93,6 @@ def test_members_in_order():
     ]
 
 
-# ------------------------------------------------------------------ scalars
-
-
 @attrs.define(eq=False, kw_only=True, slots=False)
 class Clock(Arrays):
     types = {"integer": INTEGERS}  # noqa: RUF012

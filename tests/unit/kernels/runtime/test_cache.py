@@ -1,7 +1,5 @@
 """Compiled code is kept under a digest of all it was made from: never stale, never made twice.
-
-That a second run of a model compiles nothing: tests/e2e/test_run.py.
-"""
+That a second run of a model compiles nothing: tests/e2e/test_run.py."""
 
 import shutil
 import time

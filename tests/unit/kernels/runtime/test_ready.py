@@ -4,13 +4,12 @@ import sys
 
 import numpy as np
 import pytest
+from support.internals import FLOAT, Array, Entry, Program, Signature
 from support.plain import jit_is_on
 from support.process import REPOSITORY
 
 from dap3d_core.kernels.compiler import objects, units
-from dap3d_core.kernels.compiler.functions import Program
-from dap3d_core.kernels.compiler.types import FLOAT, Array, Signature
-from dap3d_core.kernels.compiler.units import Entry, Unit
+from dap3d_core.kernels.compiler.units import Unit
 from dap3d_core.kernels.runtime import ready
 from dap3d_core.kernels.scalar_math import atan2, sin, sqrt
 
@@ -102,13 +101,13 @@ def test_a_file_that_is_cut_off_is_not_used(pack, size):
         assert value()[1]
 
 
-def test_what_a_file_does_not_hold_is_made_here(pack, packs):
+def test_what_a_file_does_not_hold_and_code_of_another_processor_is_made_here(
+    pack, packs, monkeypatch
+):
+    with monkeypatch.context() as named:
+        named.setenv("DAP3D_CPU", "x86-64")
+        assert value()[1]
     pack.write_bytes(ready.packed({"curve-2": (["None"], b"")}))
-    assert value()[1]
-
-
-def test_another_processor_that_was_named_has_code_of_its_own(pack, monkeypatch):
-    monkeypatch.setenv("DAP3D_CPU", "x86-64")
     assert value()[1]
 
 

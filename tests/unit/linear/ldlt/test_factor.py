@@ -18,10 +18,8 @@ def test_solution_is_that_of_the_dense_saddle_point_matrix(name):
 @all_graphs
 def test_rows_eliminated_so_far_are_independent_on_the_bodies_eliminated_so_far(name):
     """What the static order promises at each of its places, and what makes every pivot exist.
-
     Singular values of the prefix and of the same rows on all bodies: where these are independent
-    (above 1e-3), those do not vanish (1e-9 is far above rounding).
-    """
+    (above 1e-3), those do not vanish (1e-9 is far above rounding)."""
     case = full_case(name)
     ordering = case.plan.ordering
     bodies, rows = set(ordering.early), []
@@ -75,9 +73,6 @@ def test_scaled_blocks_are_those_of_the_scaled_jacobian():
     a, out = rng.normal(size=6 * case.n), np.zeros(case.plan.row_size)
     add_product(case.plan.blocks, case.D, np.concatenate([np.zeros(6), a]), out)
     assert out[case.places] == pytest.approx(case.dense @ (scaling @ a), abs=1e-12)
-
-
-# ------------------------------------------------------------------ small pivots
 
 
 def weak_case():

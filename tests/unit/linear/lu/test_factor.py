@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from support.graphs import chain, star
+from support.internals import compiled
 
-from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.linear.lu.factor import factor_lu, solve_lu
 from dap3d_core.linear.lu.plan import make_lu_plan
 from dap3d_core.linear.ordering.elimination_order import order_nodes

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.graphs import GRAPHS, RANDOM, Case, chain, check_solution, star
+from support.internals import make_plan
 from support.nets import fourbars, ladder, plate_net, rod_net
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.linear.ldlt import plan
-from dap3d_core.linear.ldlt.plan import make_plan
 from dap3d_core.linear.ordering import elimination_order, supernodes
 from dap3d_core.linear.ordering.elimination_order import dissect, order_nodes
 from dap3d_core.linear.rank import rank
@@ -23,9 +23,6 @@ EPS = np.finfo(float).eps
 def arguments(graph):
     n, joints = graph
     return n, [slots for slots, _ in joints], [rows for _, rows in joints]
-
-
-# ------------------------------------------------------------------ fill and work
 
 
 @pytest.mark.parametrize("net", [rod_net, plate_net])
@@ -99,9 +96,6 @@ def test_trees_are_not_dissected(graph, monkeypatch):
     assert order_nodes(*arguments(graph)).panels == ()
 
 
-# ------------------------------------------------------------------ panels
-
-
 @pytest.fixture(params=[0.3, 0.9] if jit_is_on() else [0.3])
 def panels_everywhere(request, monkeypatch):
     """Dissection down to four nodes and panels, whatever the size, many zeros in them."""
@@ -173,9 +167,7 @@ def test_each_row_of_the_matrix_is_in_one_node():
 
 def test_the_fill_that_is_reported_is_that_of_the_matrix():
     """Blocks of the Cholesky factor of a random matrix of this pattern, less those of the matrix.
-
-    Fill of a pattern is that of numbers without cancellation; hubs are not among these.
-    """
+    Fill of a pattern is that of numbers without cancellation; hubs are not among these."""
     case = Case(plate_net(7), np.random.default_rng(2))
     made = case.plan
     nodes = made.ordering.nodes
@@ -219,9 +211,6 @@ def test_small_pivots_of_panels_are_counted_or_dropped(panels_everywhere):
     wanted = np.linalg.solve(D @ D.T, np.delete(gamma, weak))
     scale = 1e3 * EPS * np.linalg.cond(D) ** 2 * np.max(np.abs(wanted))
     assert np.delete(multipliers, weak) == pytest.approx(wanted, abs=scale)
-
-
-# ------------------------------------------------------------------ once for all steps
 
 
 def test_the_program_is_found_once_for_all_runs_and_steps(monkeypatch):

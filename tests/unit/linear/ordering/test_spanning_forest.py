@@ -90,9 +90,7 @@ def test_a_four_bar_is_cut_at_the_joint_of_fewest_rows():
 
 def test_a_ladder_is_cut_near_ground():
     """Cranks on ground, couplers between them: every row is carried over three bodies, not all.
-
-    Work grows with the number of loops, as neighbours alone meet.
-    """
+    Work grows with the number of loops, as neighbours alone meet."""
 
     def ladder(loops):
         """Cranks 1 to loops + 1, couplers behind them."""

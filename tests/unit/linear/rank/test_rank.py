@@ -67,10 +67,8 @@ def projector(found):
 def test_both_ranks_agree(name, sparse):
     """By the blocks the same rank is found as by singular values, the same combinations and the
     same sets of rows that depend on each other.
-
     Combinations are as good as rounding over the smallest singular value that is not zero, squared
-    at worst before refinement: 1e-16 / 1e-4^2.
-    """
+    at worst before refinement: 1e-16 / 1e-4^2."""
     for seed in range(2):
         rng = np.random.default_rng(seed)
         case = Case(REDUNDANT[name](rng), rng)

@@ -9,15 +9,16 @@ from tests.unit.native.test_export import differences, exported
 import dap3d_core as dap
 
 
-@pytest.mark.parametrize("integrator", ["dop853", "rk4", "adams", "radau"])
-def test_a_ball_bounces_with_the_bits_of_simulate(tmp_path, integrator):
-    step = 1e-2 if integrator == "rk4" else None
-    assert differences(bouncing(), tmp_path, 2.0, integrator=integrator, step=step)
-
-
-@pytest.mark.parametrize("method", ["standard", "lsq"])
-def test_so_does_a_bar_on_a_hinge(tmp_path, method):
-    assert differences(swinging(), tmp_path, 2.0, method=method)
+@pytest.mark.parametrize(
+    ("make", "settings"),
+    [
+        *((bouncing, {"integrator": name}) for name in ("dop853", "adams", "radau")),
+        (bouncing, {"integrator": "rk4", "step": 1e-2}),
+        *((swinging, {"method": method}) for method in ("standard", "lsq")),
+    ],
+)
+def test_jumps_have_the_bits_of_simulate(tmp_path, make, settings):
+    assert differences(make(), tmp_path, 2.0, **settings)
 
 
 def test_what_touches_at_the_start_jumps_there_and_once(tmp_path):

@@ -69,8 +69,11 @@ def changed_files(good, path, count):
             yield written(path, changed)
 
 
-def test_a_byte_changed_anywhere_is_refused(good, tmp_path, no_library):
-    for bad in changed_files(good, tmp_path / "bad.nc", 150):
+def test_a_byte_changed_anywhere_and_more_at_the_end_are_refused(good, tmp_path, no_library):
+    data = good.read_bytes()
+    longer = (written(tmp_path / "long.nc", data + more)
+              for more in (b"\0", b"x" * 1000, data[-SIZE:]))  # fmt: skip
+    for bad in (*changed_files(good, tmp_path / "bad.nc", 150), *longer):
         with pytest.raises(ResultError, match=REFUSED):
             open_result(bad)
 
@@ -83,13 +86,6 @@ def test_a_file_cut_off_anywhere_says_so(good, tmp_path, no_library):
         words = f"it is cut off, or damaged: {size} of {len(data)} bytes are there"
         with pytest.raises(ResultError, match=words):
             open_result(written(tmp_path / "cut.nc", data[:size]))
-
-
-def test_more_bytes_at_the_end_are_refused(good, tmp_path, no_library):
-    data = good.read_bytes()
-    for more in (b"\0", b"x" * 1000, data[-SIZE:]):
-        with pytest.raises(ResultError, match=REFUSED):
-            open_result(written(tmp_path / "long.nc", data + more))
 
 
 def test_what_describes_a_growing_file_is_sealed(part, tmp_path, no_library):

@@ -158,19 +158,25 @@ def test_rows_that_did_not_reach_the_file_whole_are_left_out(tmp_path):
     assert len(found.t) == len(found.u) == len(found.Lam) == 20
 
 
-def test_a_writer_that_cannot_begin_leaves_nothing(tmp_path, monkeypatch):
-    result, _, _ = circling()
+@pytest.mark.parametrize("step", ["define", "write_rows"])
+def test_a_write_that_fails_leaves_nothing_and_the_old_file(tmp_path, monkeypatch, step):
+    path, (result, _, _) = tmp_path / "run.nc", circling()
 
-    def fail(*_):
+    def fail(*_, **__):
         raise RuntimeError("NetCDF: HDF error")
 
-    monkeypatch.setattr("dap3d_core.result.file.write.define", fail)
-    with pytest.raises(ResultError, match="is the disk full"):
-        grown(tmp_path / "run.nc", result)
+    with monkeypatch.context() as failing:
+        failing.setattr(f"dap3d_core.result.file.write.{step}", fail)
+        with pytest.raises(ResultError, match="is the disk full"):
+            result.save(path)
     assert os.listdir(tmp_path) == []
-
-
-# ---------------------------------------------------------------------------- writing safely
+    result.save(path)
+    before = path.read_bytes()
+    monkeypatch.setattr(f"dap3d_core.result.file.write.{step}", fail)
+    with pytest.raises(ResultError, match="is the disk full"):
+        result.save(path, force=True)
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["run.nc"]
 
 
 def test_an_existing_file_is_kept_unless_forced(tmp_path):
@@ -211,22 +217,6 @@ def test_a_folder_without_permission(tmp_path):
             result.save(tmp_path / "run.nc")
     finally:
         tmp_path.chmod(0o700)
-
-
-def test_a_write_that_fails_leaves_the_old_file(tmp_path, monkeypatch):
-    path = tmp_path / "run.nc"
-    result, _, _ = circling()
-    result.save(path)
-    before = path.read_bytes()
-
-    def fail(*_):
-        raise RuntimeError("NetCDF: HDF error")
-
-    monkeypatch.setattr("dap3d_core.result.file.write.write_rows", fail)
-    with pytest.raises(ResultError, match=r"run\.nc: .*is the disk full"):
-        result.save(path, force=True)
-    assert path.read_bytes() == before
-    assert os.listdir(tmp_path) == ["run.nc"]
 
 
 @pytest.mark.skipif(not hasattr(signal, "SIGXFSZ"), reason="no limits of file size here")

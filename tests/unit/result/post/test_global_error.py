@@ -24,9 +24,7 @@ def estimated():
 
 def test_it_is_the_difference_to_a_run_ten_times_tighter():
     """Up to the second run's own error, a tenth of the first's, which its first step changes.
-
-    Over some dozens of steps; in a handful, as of the other tests here, the first one decides.
-    """
+    Over some dozens of steps; in a handful, as of the other tests here, the first one decides."""
     options = SHORT | dict(t_end=5.0, dt=0.5)
     estimated = dap.simulate(problems.pendulum(), estimate_error=True, **options)
     finer = dap.simulate(problems.pendulum(), **(options | dict(rtol=1e-6, atol=1e-8)))
@@ -139,14 +137,15 @@ def test_a_time_of_tenfold_growth():
     assert found.meaningless_from == pytest.approx(6.1)
 
 
-@pytest.mark.parametrize("power", [1.0, 2.0, 8.0])
-def test_powers_of_time_are_no_exponentials(power):
-    assert growing(lambda t: 1e-9 * t**power).tenfold is None
-
-
-def test_little_growth_is_none():
-    """Two decades in all, of which nobody can say how they went on."""
-    assert growing(lambda t: 1e-9 * 10.0 ** (0.2 * t)).tenfold is None
+@pytest.mark.parametrize(
+    "law",
+    [
+        *(lambda t, power=power: 1e-9 * t**power for power in (1.0, 2.0, 8.0)),
+        lambda t: 1e-9 * 10.0 ** (0.2 * t),  # two decades in all: nobody can say how they go on
+    ],
+)
+def test_powers_of_time_and_little_growth_are_no_exponentials(law):
+    assert growing(law).tenfold is None
 
 
 def test_the_tightest_tolerance_has_no_estimate_and_says_so():

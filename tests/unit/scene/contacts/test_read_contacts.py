@@ -34,43 +34,31 @@ def test_a_stop_is_a_contact_where_it_has_no_stiffness():
     assert [contact.name for contact in found.contacts] == ["rigid"]
 
 
-@pytest.mark.parametrize(
-    ("limits", "words"),
-    [
-        ({"lower": 1.0, "upper": 0.5}, "joints.axle.upper = 0.5: is not above lower = 1"),
-        ({"e": 0.5}, "joints.axle.e = 0.5: is of limits"),
-        ({"lower": "low"}, 'joints.axle.lower = "low": should be a number'),
-    ],
-)
-def test_limits_that_are_none(limits, words):
-    with pytest.raises(dap.SceneError, match=words):
-        read(hinge(**limits))
-
-
-def test_names_of_limits_are_those_of_contacts():
-    scene = hinge(lower=0.0)
-    scene.add_contact("ball_plane", "axle_lower", P_i="wheel.O")
-    with pytest.raises(dap.SceneError, match="is the name of the lower limit of joint axle"):
-        read(scene)
-
-
-def test_fields_of_the_spring_need_its_stiffness():
-    scene = hinge()
-    scene.add_force("rot_stop", "stop", joint="axle", theta_stop=-1.0, zeta=0.5)
-    with pytest.raises(dap.SceneError, match=r"forces\.stop\.zeta = 0.5.*rigid without k\s+give k"):
-        read(scene)
-
-
-def test_a_rigid_stop_has_a_name_of_its_own():
-    scene = hinge()
-    scene.add_force("rot_stop", "axle", joint="axle", theta_stop=-1.0)
-    with pytest.raises(dap.SceneError, match=r"its name is one of \[joints\] as well"):
-        read(scene)
-
-
-def test_a_joint_without_a_coordinate_takes_no_limits():
-    scene = hinge()
+def of_a_ball(scene):
     scene.joints["axle"].type = "sph"
     scene.joints["axle"].fields = {"P_i": "wheel.O", "P_j": "ground.O", "lower": 1.0}
-    with pytest.raises(dap.SceneError, match=r"joints\.axle\.lower"):
+
+
+def stop(name, **fields):
+    return lambda scene: scene.add_force("rot_stop", name, joint="axle", theta_stop=-1.0, **fields)
+
+
+@pytest.mark.parametrize(
+    ("limits", "change", "words"),
+    [
+        ({"lower": 1.0, "upper": 0.5}, None, "joints.axle.upper = 0.5: is not above lower = 1"),
+        ({"e": 0.5}, None, "joints.axle.e = 0.5: is of limits"),
+        ({"lower": "low"}, None, 'joints.axle.lower = "low": should be a number'),
+        ({"lower": 0.0}, lambda scene: scene.add_contact("ball_plane", "axle_lower", P_i="wheel.O"),
+         "is the name of the lower limit of joint axle"),
+        ({}, stop("stop", zeta=0.5), r"forces\.stop\.zeta = 0.5.*rigid without k\s+give k"),
+        ({}, stop("axle"), r"its name is one of \[joints\] as well"),
+        ({}, of_a_ball, r"joints\.axle\.lower"),  # a joint without a coordinate
+    ],
+)  # fmt: skip
+def test_what_is_no_limit_is_refused(limits, change, words):
+    scene = hinge(**limits)
+    if change:
+        change(scene)
+    with pytest.raises(dap.SceneError, match=words):
         read(scene)

@@ -87,9 +87,11 @@ def test_add_output_refuses_a_name_twice():
         scene.add_output("", "t")
 
 
-def test_outputs_come_behind_those_that_they_name():
+def test_outputs_come_behind_those_that_they_name_and_name_what_there_is():
     found = outputs_of({"c": "a + b.x", "b": "a * stone.r", "a": "t"}, {})
     assert list(found) == ["a", "b", "c"]
+    with pytest.raises(dap.SceneError, match="twise"):
+        dap.compile(falling_by(fallen="stone.r.z / twise"))
 
 
 def falling_by(g=9.81, **outputs):
@@ -117,9 +119,3 @@ def test_outputs_read_parameters(tmp_path):
     scene.add_output("by_output", "g / stone.r.z")
     values = dap.simulate(scene, t_end=1.0, dt=0.5).quantity("by_output").values
     assert values[-1] == pytest.approx(1.0 - 28.0, abs=1e-6)
-
-
-def test_an_unknown_parameter_of_an_output_is_refused():
-    """As every name that no result has."""
-    with pytest.raises(dap.SceneError, match="twise"):
-        dap.compile(falling_by(fallen="stone.r.z / twise"))

@@ -175,10 +175,10 @@ def test_the_layout_is_that_of_a_scene_file():
     )
 
 
-def test_a_folder_gets_a_scene_file(tmp_path):
-    scene = dap.Scene(name="x")
-    assert scene.save(tmp_path) == tmp_path / "scene.toml"
-    assert dap.load(tmp_path) == scene
+def test_a_folder_gets_a_scene_file_and_another_replaces_it_whole(tmp_path):
+    for scene in (dap.Scene(name="x", description="longer"), dap.Scene(name="y")):
+        assert scene.save(tmp_path) == tmp_path / "scene.toml"
+        assert dap.load(tmp_path) == scene
 
 
 def test_what_a_file_cannot_hold_is_refused_and_nothing_is_written(tmp_path):
@@ -207,10 +207,3 @@ def test_a_file_that_cannot_be_written_is_an_error(tmp_path, where):
     (tmp_path / "file").write_text("")
     with pytest.raises(dap.SceneError, match="cannot be written"):
         dap.Scene().save(str(tmp_path / where))
-
-
-def test_saving_over_a_file_replaces_it_whole(tmp_path):
-    file = tmp_path / "scene.toml"
-    file.write_text("old")
-    dap.Scene(name="new").save(file)
-    assert dap.load(file).name == "new"

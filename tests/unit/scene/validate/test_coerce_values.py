@@ -18,13 +18,10 @@ from dap3d_core.scene import check
         ("Jp = [0.5, 0.5, 0.1]\n", "", ["bodies.crank.Jp", "kg m^2"]),
         ("rtol = 1e-8", "atol = 0", ["atol"]),
         ("[forces.g]", '[forces.g2]\ntype = "weight"\n[forces.g]', ["forces.g is the same"]),
-        (
-            "[forces.g]",
-            '[joints.J5]\ntype = "sph-sph"\nd = "d1"\nlength = 7.0\n[forces.g]',
-            ["joints.J5", "differs only in its numbers", "joints.J4"],
-        ),
+        ("[forces.g]", '[joints.J5]\ntype = "sph-sph"\nd = "d1"\nlength = 7.0\n[forces.g]',
+         ["joints.J5", "differs only in its numbers", "joints.J4"]),
     ],
-)
+)  # fmt: skip
 def test_what_is_changed_or_assumed_is_noted(scene_of, registry, old, new, words):
     assert old in BASE
     notes = check(scene_of(BASE.replace(old, new)), registry).notes
@@ -93,15 +90,11 @@ def test_the_triangle_inequality_has_room_for_rounding(registry):
 
 TURNED = [
     ({"rpy": (0.3, -0.7, 2.0)}, Rotation.from_euler("xyz", (0.3, -0.7, 2.0))),
-    (
-        {"rpy": ("30 deg", 0.1, "-1.5e1deg")},
-        Rotation.from_euler("xyz", (30, 5.729577951, -15), True),
-    ),
-    (
-        {"axis_angle": (1, 2, 2, "90 deg")},
-        Rotation.from_rotvec(np.array([1, 2, 2]) / 3 * np.pi / 2),
-    ),
-]
+    ({"rpy": ("30 deg", 0.1, "-1.5e1deg")},
+     Rotation.from_euler("xyz", (30, 5.729577951, -15), True)),
+    ({"axis_angle": (1, 2, 2, "90 deg")},
+     Rotation.from_rotvec(np.array([1, 2, 2]) / 3 * np.pi / 2)),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("given", "wanted"), TURNED)

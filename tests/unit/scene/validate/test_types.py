@@ -125,28 +125,16 @@ OWN_MISTAKES = [
     ('[forces.p]\ntype = "push"\nbody_i = "a"\nlevel = "hihg"\n', "forces.p.level", "'high'?"),
     ('[forces.p]\ntype = "push"\nbody_i = "a"\nM = [1, 2, 3]\n', "forces.p.M", "row 1"),
     ('[forces.p]\ntype = "push"\nbody_i = "a"\nM = [[1, 2], [3, 4]]\n', "forces.p.M", "3x3"),
-    (
-        '[joints.j]\ntype = "between"\nP_i = "a.O"\nP_j = "b.O"\nP_k = "b.O"\n',
-        "joints.j.P_k",
-        "body j and body k are both b",
-    ),
-    (
-        '[joints.j]\ntype = "between"\nP_i = "a.O"\nP_j = "b.O"\nP_k = "a.O"\n',
-        "joints.j.P_k",
-        "body i and body k are both a",
-    ),
-    (
-        '[joints.j]\ntype = "between"\nP_i = "ground.O"\nP_j = "ground.O"\nP_k = "a.O"\n',
-        "joints.j.P_j",
-        "body i and body j are both ground",
-    ),
+    ('[joints.j]\ntype = "between"\nP_i = "a.O"\nP_j = "b.O"\nP_k = "b.O"\n', "joints.j.P_k",
+     "body j and body k are both b"),
+    ('[joints.j]\ntype = "between"\nP_i = "a.O"\nP_j = "b.O"\nP_k = "a.O"\n', "joints.j.P_k",
+     "body i and body k are both a"),
+    ('[joints.j]\ntype = "between"\nP_i = "ground.O"\nP_j = "ground.O"\nP_k = "a.O"\n',
+     "joints.j.P_j", "body i and body j are both ground"),
     ('[joints.j]\ntype = "rail"\n', "joints.j", "which body is i? Give body_i or P_i"),
-    (
-        '[joints.j]\ntype = "rail"\nbody_i = "a"\nP_i = "b.O"\n',
-        "joints.j.P_i",
-        "P_i is on b, but body_i on a",
-    ),
-]
+    ('[joints.j]\ntype = "rail"\nbody_i = "a"\nP_i = "b.O"\n', "joints.j.P_i",
+     "P_i is on b, but body_i on a"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -156,9 +156,14 @@ def test_what_is_no_table_is_reported(scene_of, registry, text, key, words):
     assert words in found[key]
 
 
-def test_a_missing_schema_is_version_1(scene_of, registry):
-    checked = check(scene_of(BASE.replace("schema = 1\n", "")), registry)
-    assert checked.notes == []
+def test_crlf_files_are_read_and_lines_counted_and_a_missing_schema_is_version_1(
+    tmp_path, scene_of, registry
+):
+    assert check(scene_of(BASE.replace("schema = 1\n", "")), registry).notes == []
+    text = BASE.replace("dt = 0.05", "dt = -1").replace("\n", "\r\n")
+    (tmp_path / "scene.toml").write_bytes(text.encode())
+    (mistake,) = mistakes_of(dap.load(tmp_path), registry)
+    assert (mistake.key, mistake.line) == ("simulation.dt", text.split("\r\n").index("dt = -1") + 1)
 
 
 def test_an_inline_table_and_dotted_keys_have_lines(scene_of, registry):
@@ -171,13 +176,6 @@ def test_an_inline_table_and_dotted_keys_have_lines(scene_of, registry):
     """)
     found = {m.key: m.line for m in mistakes_of(scene_of(text), registry)}
     assert found == {"bodies.b.rr": 3, "points.P 1.body": 4}
-
-
-def test_crlf_files_are_read_and_lines_counted(tmp_path, registry):
-    text = BASE.replace("dt = 0.05", "dt = -1").replace("\n", "\r\n")
-    (tmp_path / "scene.toml").write_bytes(text.encode())
-    (mistake,) = mistakes_of(dap.load(tmp_path), registry)
-    assert (mistake.key, mistake.line) == ("simulation.dt", text.split("\r\n").index("dt = -1") + 1)
 
 
 def test_a_scene_that_was_changed_after_loading_reports_the_new_value(scene_of, registry):

@@ -150,10 +150,17 @@ def test_two_controllers_cannot_set_one_input():
         )  # fmt: skip
 
 
-def test_a_scene_without_inputs_takes_no_controller():
-    """With what to do."""
+def test_controllers_that_cannot_be_are_refused():
+    """With what to do; a second run is none, for a controller may remember the first."""
     with pytest.raises(dap.SimulationError, match=r"no inputs .*declare \[inputs.NAME\]"):
         run(feedback, "pen1")
+    with pytest.raises(dap.SceneError, match=r"estimate_error.*with controllers"):
+        run(feedback, estimate_error=True)
+    one = dap.Controller(every=0.1, update=feedback)
+    for given, words in ((one, r"write \[controller\]"),
+                         ([feedback], r"a list of dap\.Controller, not ")):  # fmt: skip
+        with pytest.raises(TypeError, match=words):
+            dap.simulate(pushed_block(), t_end=1.0, controllers=given)
 
 
 def test_slow_controllers_are_noted():
@@ -165,12 +172,6 @@ def test_slow_controllers_are_noted():
     notes = run(feedback, every=2.0).notes
     assert any("and the run ends at 1 s: at t = 0 alone" in note for note in notes)
     assert not any("feedback" in note for note in run(feedback, every=0.1).notes)
-
-
-def test_no_error_estimate_by_a_second_run():
-    """A controller may remember the first."""
-    with pytest.raises(dap.SceneError, match=r"estimate_error.*with controllers"):
-        run(feedback, estimate_error=True)
 
 
 def test_events_are_located_between_samples():
@@ -272,12 +273,3 @@ def test_reports_within_a_step_wait_for_room(monkeypatch):
     found = run(feedback, every=0.25, dt=0.02)
     for name in ("t", "u", "v_dot", "inputs"):
         assert np.array_equal(getattr(wanted, name), getattr(found, name)), name
-
-
-def test_lists_of_controllers_are_checked():
-    """A single one, or something else, is a clear error; so is a controller that cannot be."""
-    one = dap.Controller(every=0.1, update=feedback)
-    with pytest.raises(TypeError, match=r"write \[controller\]"):
-        dap.simulate(pushed_block(), t_end=1.0, controllers=one)
-    with pytest.raises(TypeError, match=r"a list of dap\.Controller, not "):
-        dap.simulate(pushed_block(), t_end=1.0, controllers=[feedback])

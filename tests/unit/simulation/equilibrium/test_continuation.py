@@ -55,9 +55,7 @@ def toggle():
 
 def toggle_load(angle):
     """The load along z on the knee that holds the rods at an angle, by virtual work.
-
-    The spring pushes by 200 (2.8 - 4 + 2 cos) N against the slider at 2 cos; the knee is at sin.
-    """
+    The spring pushes by 200 (2.8 - 4 + 2 cos) N against the slider at 2 cos; the knee is at sin."""
     return -2.0 * np.tan(angle) * 200.0 * (2.0 * np.cos(angle) - 1.2)
 
 

@@ -72,20 +72,12 @@ def test_a_contact_of_several_points_cannot_be_moved_until_it_touches():
     [
         ("linearisation", lambda s: dap.linearize(touching(s))),
         ("kinematics", lambda s: dap.kinematics(s, t_end=1.0)),
-        ("method joint", lambda s: dap.simulate(s, method="joint")),
         ("method standard", lambda s: dap.simulate(s, method="standard")),
     ],
 )
 def test_what_does_not_know_contacts_says_so(what, call):
     with pytest.raises(dap.SimulationError, match=f"{what}.*contacts"):
         call(bouncing())
-
-
-def test_inverse_dynamics_refuses_contacts():
-    scene = bouncing()
-    result = dap.simulate(scene)
-    with pytest.raises(dap.SimulationError, match=r"inverse dynamics.*contacts"):
-        dap.inverse(scene, result, actuators=["g"])
 
 
 def test_elements_with_jumps_of_their_own_are_refused_beside_contacts():

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.internals import split
 from support.mechanisms import (
     bent_chain,
     door,
@@ -15,7 +16,6 @@ from support.own_types import registry_of
 import dap3d_core as dap
 from dap3d_core.interface import Function, Joint, Vector2, number, vector2
 from dap3d_core.kernels import cross, dot, neg, row, scale, sqrt, where
-from dap3d_core.model.state_layout import split
 from dap3d_core.result import Note
 from dap3d_core.simulation.initial import assemble, least_change
 from dap3d_core.simulation.initial.assemble import correct_initial, violation
@@ -221,7 +221,6 @@ def test_the_metric_shares_a_gap_by_mass(rows, metric, share, request):
 def test_the_metric_of_masses_weighs_rotations_by_inertia(rows, request):
     """A bar of mass m, inertia J about z, held at an arm L: of a small gap g across it the centre
     takes g (1/m) / (1/m + L^2/J), the rotation g (L/J) / (1/m + L^2/J); to the second order of g.
-
     The bar is turned about y, so that its inertia about its own x is the one that counts."""
     if rows == "many":
         request.getfixturevalue("many_rows")
@@ -405,28 +404,22 @@ REDUNDANT = [
 ]
 
 
+@pytest.mark.parametrize("count", ["few", "many"])
 @pytest.mark.parametrize(
     ("scene", "rows", "redundant", "dof", "joints"), REDUNDANT, ids=lambda s: getattr(s, "name", "")
 )
-def test_redundancy_is_counted_and_the_joints_named(scene, rows, redundant, dof, joints):
-    """Exact counts at the state as given: rows, rank, degrees of freedom, joints that share one."""
+def test_redundancy_is_counted_and_the_joints_named(
+    scene, rows, redundant, dof, joints, count, request
+):
+    """Exact counts at the state as given: rows, rank, degrees of freedom, joints that share one.
+    By parts, where there are many rows, the same."""
+    if count == "many":
+        request.getfixturevalue("many_rows")
     found = dap.compile(scene).redundancy()
     assert (found.rank.rows, found.rank.redundant, found.rank.dof) == (rows, redundant, dof)
     assert found.joints == joints
-    if redundant:
-        assert f"{redundant} of {rows} constraint rows are redundant" in found.describe()
-    else:
-        assert "all independent" in found.describe()
-
-
-@pytest.mark.parametrize(
-    ("scene", "rows", "redundant", "dof", "joints"), REDUNDANT, ids=lambda s: getattr(s, "name", "")
-)
-def test_many_rows_count_the_same(scene, rows, redundant, dof, joints, many_rows):
-    """By parts: the same counts and joints."""
-    found = dap.compile(scene).redundancy()
-    assert (found.rank.rows, found.rank.redundant, found.rank.dof) == (rows, redundant, dof)
-    assert found.joints == joints
+    words = f"{redundant} of {rows} constraint rows are redundant" if redundant else "independent"
+    assert words in found.describe()
 
 
 @pytest.mark.parametrize("shift", [0.0, 0.02])

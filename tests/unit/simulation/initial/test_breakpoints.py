@@ -44,9 +44,7 @@ BUMP = [0, 1, 2, 3, 3.9, 3.99, 3.999, 4, 4.0005, 4.001, 4.002, 4.01, 4.1, 5, 6, 
 def test_a_quick_change_in_a_long_rest_is_not_missed(integrator, function):
     """A turn within a millisecond of ten seconds: the driver is of the velocity level alone, so
     the angle at the end is that of the function only if steps have seen it.
-
-    Tolerance: rtol of the largest rates, some 2e3 rad/s, for half a second.
-    """
+    Tolerance: rtol of the largest rates, some 2e3 rad/s, for half a second."""
     compiled = dap.compile(turntable(**function))
     result = dap.simulate(compiled, t_end=10.0, dt=1.0, integrator=integrator,
                           rtol=1e-8, atol=1e-8)  # fmt: skip
@@ -99,9 +97,7 @@ def test_a_change_within_roundings_of_the_run_is_noted():
 @pytest.mark.parametrize("rtol", [1e-6, pytest.param(1e-9, marks=long_in_plain_python)])
 def test_what_happens_within_a_microsecond_leaves_no_rate_behind(integrator, rtol):
     """The driver's acceleration jumps by 6e12 rad/s^2; at its end the body stands still again.
-
-    The last instant before it lets go is a rounding of time early: a rate of 5e-3 rad/s.
-    """
+    The last instant before it lets go is a rounding of time early: a rate of 5e-3 rad/s."""
     scene = turntable(type="step", x_start=5.0123, x_end=5.012301)
     result = dap.simulate(
         scene, t_end=10.0, integrator=integrator, rtol=rtol, atol=rtol / 100.0, estimate_error=True

@@ -40,10 +40,8 @@ def transfer(lin, s):
 
 def test_transfer_functions():
     """From force and moment to positions, velocities, accelerations, reactions.
-
     By minimal coordinates: q = (M s^2 + C s + K)^-1 Q, and the force of the hinge on the bob along
-    x is its mass times its acceleration, x_ddot - l phi_ddot.
-    """
+    x is its mass times its acceleration, x_ddot - l phi_ddot."""
     outputs = ("cart.r.x", "bob.w.y", "pin.v.x", "bob.rdd.x", "hinge.force.x", "cart.p.e0")
     lin = dap.linearize(cart(), inputs=("push.f.x", "motor.n.y"), outputs=outputs)
     for s in (0.3 + 1.1j, 2.0j):
@@ -55,10 +53,8 @@ def test_transfer_functions():
 
 def test_parameters_as_inputs():
     """Any number of a force is an input: a stiffness, a component, all of a force.
-
     With the spring stretched by 0.1 m, F = k (l - l0): dF/dk = 0.1, dF/dl0 = -k; a factor on the
-    spring is F itself.
-    """
+    spring is F itself."""
     scene = cart()
     scene.forces["spring"].fields["l0"] = 0.9
     names = ("spring.k", "spring.l0", "spring", "push.f.x")
@@ -219,11 +215,9 @@ def test_friction_is_a_damper_at_rest():
 
 def test_friction_follows_the_load():
     """Where the load changes with the motion, friction's derivative by the multipliers counts.
-
     A mass on a rail is pressed by a spring across it, hung ahead of the mass by d: the load is
     N = k (l - l0) h / l, its slope by x is exact by hand. With speed v far above v_tol friction is
-    -mu N: the linear equation is m x'' = Fx' x - mu N' x.
-    """
+    -mu N: the linear equation is m x'' = Fx' x - mu N' x."""
     m, k, l0, mu, d, h, speed = 1.0, 50.0, 0.5, 0.2, 0.6, 0.8, 1.0
     scene = dap.Scene(name="pressed")
     scene.add_body("b", mass=m, Jp=np.eye(3), r_dot=[speed, 0, 0])
@@ -257,10 +251,8 @@ def test_picture_of_the_eigenvalues():
 @pytest.mark.parametrize(("level", "sense"), [("drive-tran", 1.0), ("rel-tran", -1.0)])
 def test_driver_as_input(level, sense):
     """A cart that a driver moves: its acceleration swings the pendulum, and the driver's force.
-
     (J + m l^2) phi'' + m g l phi = m l x'' about y. The driver moves the cart, x'' = a, and pushes
-    it with (M + m) x'' - m l phi''; rel-tran has the sign of the manual, x'' = -a.
-    """
+    it with (M + m) x'' - m l phi''; rel-tran has the sign of the manual, x'' = -a."""
     scene = cart()
     for name in ("spring", "push"):
         del scene.forces[name]

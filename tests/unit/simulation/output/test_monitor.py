@@ -12,9 +12,7 @@ import dap3d_core as dap
 @pytest.mark.parametrize("options", [{}, {"integrator": "rk4", "step": 0.002}])
 def test_the_last_word_is_that_of_the_result(options):
     """Steps and drift at the end are those of statistics and ledger.
-
-    A tenth is allowed for the drift: it is measured by the largest energy at the end of a chunk.
-    """
+    A tenth is allowed for the drift: it is measured by the largest energy at the end of a chunk."""
     seen = []
     result = dap.simulate("pen1", t_end=1.0, dt=1.0, watch=seen.append, **options)
     last = seen[-1]

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.internals import correct_initial
 from support.mechanisms import (
     bent_chain,
     bricard,
@@ -15,7 +16,6 @@ from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.linear.rank import rank
-from dap3d_core.simulation.initial.assemble import correct_initial
 from dap3d_core.simulation.redundancy import redundancy
 from dap3d_core.simulation.redundancy.other_poses import redundancy_elsewhere
 
@@ -41,9 +41,6 @@ def elsewhere_of(scene):
     u = correct_initial(compiled.evaluator, compiled.model.u0).u
     found = compiled.redundancy(u)
     return found, redundancy_elsewhere(compiled.evaluator, u, found)
-
-
-# ------------------------------------------------------------------ who shares what
 
 
 def test_separate_loops_are_separate_groups():
@@ -118,9 +115,6 @@ def test_many_four_bars_are_counted_beyond_a_thousand_rows():
     assert (found.rank.rows, found.rank.redundant, found.rank.dof) == (1205, 240, 1)
 
 
-# ------------------------------------------------------------------ everywhere or here alone
-
-
 @pytest.mark.parametrize(
     ("scene", "rows", "found_rank", "dof"),
     [
@@ -180,7 +174,6 @@ def test_what_cannot_be_moved_cannot_be_told():
 
 def test_the_count_does_not_depend_on_how_well_the_start_was_closed():
     """Newton stops with up to 1e-10 open, and tilts the axes by as much: they still are parallel.
-
     Without allowing for it one in ten of these starts would have all of its rows independent."""
     compiled = dap.compile(planar_four_bar())
     rng = np.random.default_rng(0)
@@ -194,9 +187,6 @@ def test_the_count_does_not_depend_on_how_well_the_start_was_closed():
         left_open.append(found.residual[0])
         assert compiled.redundancy(found.u).rank.redundant == 3
     assert max(left_open) > 1e-12  # some of them are far above rounding
-
-
-# ------------------------------------------------------------------ whether they agree
 
 
 def test_drivers_that_contradict_each_other_are_named():
@@ -242,9 +232,6 @@ def test_joints_that_are_merely_open_contradict_nothing(scene):
     start = correct_initial(compiled.evaluator, compiled.model.u0)
     assert compiled.redundancy().contradictions == ()
     assert compiled.redundancy(start.u).contradictions == ()
-
-
-# ------------------------------------------------------------------ what stays unique
 
 
 def test_reactions_in_the_plane_of_a_four_bar_are_unique():

@@ -9,9 +9,8 @@ from support.plain import long_in_plain_python
 import dap3d_core as dap
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
 from dap3d_core.study.batch import driver
-from dap3d_core.study.batch.parameter_map import ParameterMap, poses_of
-from dap3d_core.study.batch.prepare_dependence import dependence_of
-from dap3d_core.study.batch.rebuild import ModelRebuilder
+from dap3d_core.study.batch.batch import ModelRebuilder
+from dap3d_core.study.batch.parameter_map import ParameterMap, dependence_of, poses_of
 
 DONE, STOPPED, FAILED = PointStatus.DONE, PointStatus.STOPPED, PointStatus.FAILED
 
@@ -151,9 +150,7 @@ def test_a_point_does_not_depend_on_those_before_it():
 @pytest.mark.parametrize("name", ["points.A.sPp.y", "bodies.bob.r_dot.x", "bodies.bob.r.z"])
 def test_starts_are_corrected_as_those_of_single_runs(name):
     """Compiled Newton passes on the block factors, against numpy's least squares: rounding.
-
-    One radian of swing multiplies it by some ten; 1e-13 leaves another ten.
-    """
+    One radian of swing multiplies it by some ten; 1e-13 leaves another ten."""
     of = ensemble(pendulum(), [name], ["bob.r:series", "bob.w"], dt=0.1, t_end=0.5)
     points = np.array([[0.3], [0.9], [1.1]])
     batch = of.run(points)
@@ -178,17 +175,30 @@ def test_a_driver_without_position_level_is_left_out_of_the_correction_of_positi
         np.testing.assert_allclose(found, single[output.name], rtol=0.0, atol=1e-11)
 
 
+SERIES = ["bob.r:series", "bob.w"]
+
+
 @long_in_plain_python
-def test_drives_begin_with_the_value_at_the_start_of_their_own_point():
-    """A drive counts from its function's value at the start, which moves no start here."""
-    of = ensemble("wiper", ["functions.turning.coeff.x"], ["rod_end.lambda:max"],
-                  t_end=0.05, dt=0.05)  # fmt: skip
-    points = np.array([[0.0], [0.06], [-0.03]])
+@pytest.mark.parametrize(
+    ("make", "name", "outputs", "points", "settings", "error"),
+    [
+        # a drive counts from its function's value at the start, which moves no start here
+        (lambda: "wiper", "functions.turning.coeff.x", ["rod_end.lambda:max"], [0.0, 0.06, -0.03],
+         {"t_end": 0.05, "dt": 0.05}, dict(rtol=1e-9, atol=1e-9)),
+        # rates of joints are those of body velocities, corrected in compiled code: rounding
+        (pendulum, "bodies.bob.r_dot.x", SERIES, [0.3, 0.9, 1.1], {"method": "joint"},
+         dict(rtol=0.0, atol=1e-13 * 10.0)),
+    ],
+    ids=["drive", "joint"],
+)  # fmt: skip
+def test_points_start_as_single_runs(make, name, outputs, points, settings, error):
+    of, points = ensemble(make(), [name], outputs, **settings), np.array(points)[:, None]
     batch = of.run(points)
     assert path_of(of) == "copied"
-    assert batch.notes == [""] * 3
-    for name, single in singly(of, points).items():
-        np.testing.assert_allclose(batch.values[name], single, rtol=1e-9, atol=1e-9)
+    assert batch.status.tolist() == [DONE] * 3
+    assert batch.notes == [""] * 3 or name.startswith("bodies")
+    for output, single in singly(of, points).items():
+        np.testing.assert_allclose(batch.values[output], single, **error)
 
 
 def test_failing_points_are_noted_and_the_others_run():
@@ -214,27 +224,21 @@ def test_points_that_stop_early_keep_what_was_computed():
 
 
 @pytest.mark.parametrize(
-    ("points", "status"), [([[1.0], [0.5]], [DONE, DONE]), ([[0.0]], [FAILED])]
+    ("z", "points", "path", "status"),
+    [
+        (1.0, [[1.0], [0.5]], "copied", [DONE, DONE]),
+        (1.0, [[0.0]], "copied", [FAILED]),
+        (0.0, [[0.0], [2.0]], "alone", [FAILED, DONE]),  # as given it lies on the end of its spring
+    ],
 )
-def test_a_direction_that_a_point_leaves_undefined_is_refused(points, status):
+def test_a_direction_that_a_point_leaves_undefined_is_refused(z, points, path, status):
     scene = stone()
-    scene.bodies["stone"].r = (0.0, 0.0, 1.0)
+    scene.bodies["stone"].r = (0.0, 0.0, z)
     of = ensemble(scene, ["bodies.stone.r.z"], ["stone.r.z"], t_end=0.01, dt=0.01)
     batch = of.run(points)
-    assert path_of(of) == "copied"
+    assert path_of(of) == path
     assert batch.status.tolist() == status
-    if status == [FAILED]:
-        assert "coincide at the start" in batch.notes[0]
-
-
-def test_a_scene_that_cannot_start_as_given_has_points_that_can():
-    """The stone as given lies on the end of its spring."""
-    scene = stone()
-    scene.bodies["stone"].r = (0.0, 0.0, 0.0)
-    of = ensemble(scene, ["bodies.stone.r.z"], ["stone.r.z"], t_end=0.01, dt=0.01)
-    batch = of.run([[0.0], [2.0]])
-    assert path_of(of) == "alone"
-    assert batch.status.tolist() == [FAILED, DONE]
+    assert ("coincide at the start" in batch.notes[0]) is (status[0] == FAILED)
 
 
 def test_numbers_that_are_copied_need_no_check_and_no_model(monkeypatch):
@@ -337,18 +341,6 @@ def test_points_in_joint_coordinates_are_single_runs_bit_for_bit(case):
     again = of.run(points[::-1])  # whichever points were run before
     for name, values in alone.items():
         assert np.array_equal(again.values[name][::-1], values)
-
-
-@long_in_plain_python
-def test_velocities_in_joint_coordinates_start_as_those_of_single_runs():
-    """Rates of joints are those of body velocities, corrected in compiled code: rounding."""
-    of = ensemble(pendulum(), ["bodies.bob.r_dot.x"], ["bob.r:series", "bob.w"], method="joint")
-    points = np.array([[0.3], [0.9], [1.1]])
-    batch = of.run(points)
-    assert path_of(of) == "copied"
-    assert batch.status.tolist() == [DONE] * 3
-    for output, single in singly(of, points).items():
-        np.testing.assert_allclose(batch.values[output], single, rtol=0.0, atol=1e-13 * 10.0)
 
 
 def test_points_whose_bodies_start_elsewhere_are_left_open():

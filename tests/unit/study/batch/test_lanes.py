@@ -47,9 +47,7 @@ def at_once(monkeypatch):
 
 def branched():
     """A tree of all standard joints with one degree of freedom or more, and a free body.
-
-    A spring, and a force and a spring's length that follow functions of time.
-    """
+    A spring, and a force and a spring's length that follow functions of time."""
     scene = trees.random_tree(5, seed=3, free=0.3)
     scene.add_function("harmonic", "waves", amplitude=0.2, frequency=3.0, phase=0.5, offset=1.0)
     scene.add_force("ptp", "spring", P_i="b4.O", P_j="ground.O", k=20.0, c=0.5, l0=1.0)
@@ -236,9 +234,7 @@ def test_notes_say_how_points_are_run():
 
 def test_turns_are_counted_in_steps_near_singular_poses():
     """A crank turns by 1.6 rad a step through poses in line, to which each run steps by itself.
-
-    Of two such steps whose turns were not counted, the second one would be cut.
-    """
+    Of two such steps whose turns were not counted, the second one would be cut."""
     scene, speed = mechanisms.planar_four_bar(), -40.0
     for name, joint in (("J2", scene.joints.pop("J2")), ("J4", scene.joints.pop("J4"))):
         scene.add_joint("sph", name, P_i=joint.fields["P_i"], P_j=joint.fields["P_j"])

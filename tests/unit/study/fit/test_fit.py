@@ -88,9 +88,7 @@ def test_exact_data_give_the_numbers_back():
 @pytest.mark.slow
 def test_intervals_hold_the_truth_as_often_as_they_say():
     """30 data sets of 12 numbers: 95 % is 28.5, and 25 or more but once in 300 times.
-
-    With so few numbers Student's t matters: normal quantiles would give 92.5 %.
-    """
+    With so few numbers Student's t matters: normal quantiles would give 92.5 %."""
     t = np.linspace(0.2, 3.0, 12)
     scene, inside = oscillator(c=C), {"forces.spring.k": 0, "forces.spring.c": 0}
     for seed in range(30):

@@ -162,9 +162,7 @@ def test_a_stop_of_an_angle(method):
 )
 def test_a_start_that_a_parameter_takes_off_the_constraints(how):
     """Its derivatives are brought onto them as its values would be, whether it is corrected or not.
-
-    The model's start is on the constraints, where projections find nothing to do.
-    """
+    The model's start is on the constraints, where projections find nothing to do."""
     by, settings = ["points.P3.sPp.y"], SHORT | {"rtol": 1e-10, "atol": 1e-12}
     corrected = dap.sensitivities("pen2", by, correct=True, **settings).of("cylinder.r.z")
     s = dap.sensitivities("pen2", by, correct=False, **how, **settings)

@@ -1,8 +1,6 @@
 """An error planted in each kind of formula is found, and the words name row and remedy.
-
 Each type here is a standard type with one formula spoiled, or a small type that breaks one rule.
-The set of checks that fail is asserted whole: what is right stays right.
-"""
+The set of checks that fail is asserted whole: what is right stays right."""
 
 import inspect
 import math

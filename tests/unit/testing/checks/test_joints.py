@@ -109,6 +109,7 @@ def short(s):
 @pytest.mark.parametrize(
     ("members", "words"),
     [
+        ({"unknowns": (), "C": Spherical.C, "G": short}, "defines G, but no unknowns"),
         ({"C": early}, "a quantity of the velocity level"),
         ({"C": without_s}, "C does not name s"),
         ({"G": short}, "3 rows of the derivatives of C by its 1 unknowns"),
@@ -119,18 +120,12 @@ def short(s):
         ({"unknowns": ("two words",)}, "no name that a kernel can take"),
         ({"s_0": number(None), "__annotations__": {"s_0": float}}, "belongs to the unknown s"),
     ],
-    ids=["level", "unnamed", "G", "friction", "field", "many", "periodic", "name", "start"],
+    ids=["none", "level", "unnamed", "G", "friction", "field", "many", "periodic", "name", "start"],
 )
 def test_a_type_with_impossible_unknowns_is_refused(members, words):
     """With the class, the unknown, and what to do."""
     type_ = type("Own", (OnCurve,), {"__module__": __name__, **members})
     with pytest.raises(dap.PluginError, match=words):
-        examine(type_)
-
-
-def test_a_gradient_without_unknowns_is_refused():
-    type_ = type("Own", (Spherical,), {"__module__": __name__, "G": short})
-    with pytest.raises(dap.PluginError, match="defines G, but no unknowns"):
         examine(type_)
 
 

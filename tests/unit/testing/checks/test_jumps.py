@@ -1,8 +1,6 @@
 """An error planted in each formula of a jump is found, by the check that is for it.
-
 Each type is a stop with one formula spoiled, or breaks one rule of a type. The set of checks that
-fail is asserted whole: what is right stays right.
-"""
+fail is asserted whole: what is right stays right."""
 
 import random
 

@@ -57,6 +57,34 @@ INSTALLED = {
     "point-on-plane": [ONE_ROW],
     "point-on-surface": [ONE_ROW],
 }
+
+
+class Undefined(Joint):
+    """Its rows are not numbers where C would be zero."""
+
+    keyword, rows = "undefined", 3
+    P_i: Point = point()
+    P_j: Point = point()
+
+    def C(r_P_i, r_P_j):
+        return tuple(x / (x * x) for x in sub(r_P_i, r_P_j))
+
+
+class Either(Between):
+    """A ball on a plane, or in a socket: a field says which."""
+
+    keyword, rows = "either", 3
+    held: str = choice(("plane", "socket"))
+
+    def prepare(self, bodies):
+        return super().prepare(bodies) | {"socket": float(self.held == "socket")}
+
+    def C(r_P_i, r_P_j, a_i, a_j, n_j, m_j, socket):
+        d = sub(r_P_i, r_P_j)
+        plane = (dot(a_j, d), dot(a_i, n_j), dot(a_i, m_j))
+        return tuple(socket * x + (1.0 - socket) * y for x, y in zip(d, plane, strict=True))
+
+
 OWN = {
     PinInSlot: (
         "1 translation along a_j, constant in body j, and 1 rotation about a_i, constant in body i"
@@ -70,6 +98,8 @@ OWN = {
     RepeatedRow: "refused: its rows depend on each other where C = 0",
     Upright: "refused: its rows depend on where ground is",
     Rising: ON_TIME,
+    Undefined: "refused: no pose with C = 0 was found from the one given",
+    Either: "refused: its motion is another for other values of its fields",
 }
 
 
@@ -96,39 +126,3 @@ def test_motion_of_types_of_authors(type_):
 def test_the_report_has_the_motion_of_a_joint_alone():
     assert "motion: 2 translations along n_j and m_j" in str(check_type(Planar, poses=1))
     assert check_type(Weight, poses=1).motions == ()
-
-
-class Undefined(Joint):
-    """Its rows are not numbers where C would be zero."""
-
-    keyword, rows = "undefined", 3
-    P_i: Point = point()
-    P_j: Point = point()
-
-    def C(r_P_i, r_P_j):
-        return tuple(x / (x * x) for x in sub(r_P_i, r_P_j))
-
-
-def test_a_joint_that_cannot_be_closed_is_refused_and_reported():
-    (motion,) = type_motions(examine(Undefined))
-    assert motion.words == "refused: no pose with C = 0 was found from the one given"
-
-
-class Either(Between):
-    """A ball on a plane, or in a socket: a field says which."""
-
-    keyword, rows = "either", 3
-    held: str = choice(("plane", "socket"))
-
-    def prepare(self, bodies):
-        return super().prepare(bodies) | {"socket": float(self.held == "socket")}
-
-    def C(r_P_i, r_P_j, a_i, a_j, n_j, m_j, socket):
-        d = sub(r_P_i, r_P_j)
-        plane = (dot(a_j, d), dot(a_i, n_j), dot(a_i, m_j))
-        return tuple(socket * x + (1.0 - socket) * y for x, y in zip(d, plane, strict=True))
-
-
-def test_a_type_of_several_motions_is_refused():
-    (motion,) = type_motions(examine(Either))
-    assert motion.words == "refused: its motion is another for other values of its fields"

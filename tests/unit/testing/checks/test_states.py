@@ -1,7 +1,5 @@
 """An error planted in what has to do with states is found; the words name row and remedy.
-
-As in test_checks.py the set of checks that fail is asserted whole.
-"""
+As in test_checks.py the set of checks that fail is asserted whole."""
 
 import math
 import random

@@ -1,0 +1,330 @@
+"""What a step works on: bodies, the contacts near, rows of joints, and scratch of the solution."""
+
+from typing import Any, ClassVar
+
+import attrs
+import numpy as np
+
+from dap3d_core.assembly.collisions.placed_shapes import (
+    POSE,
+    PlacedShapes,
+    placed_shapes,
+    with_room,
+)
+from dap3d_core.formulations.contacts.contact_rows import ContactTable
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
+
+#: Contacts that there is room for at first, besides those declared.
+ROOM = 16
+#: Columns of a row of contacts that shapes push with: t, i, j, mode, gap, point, normal, force.
+MET = 14
+#: Reported rows of such contacts that there is room for at first.
+LOG_ROOM = 64
+#: Pairs of shapes a shape, and points a pair, that exported models have room for; entries of their
+#: matrices a body; contacts that joints hold.
+MOST_PAIRS, MOST_POINTS, MOST_ENTRIES, MOST_HELD = 32, 8, 16, 100
+#: Arrays of which a row belongs to a contact.
+OF_CONTACTS = ("bodies", "key", "group", "chosen", "J", "moved", "own", "own_held", "gap", "mu",
+               "e", "bias", "r", "left", "collides", "closing", "x", "u", "z", "B", "push", "kept",
+               "met", "x_bounce")  # fmt: skip
+
+
+def _integer() -> Scalar[int]:
+    return Scalar("integer")
+
+
+def _real() -> Scalar[float]:
+    return Scalar("real")
+
+
+@attrs.define(eq=False, kw_only=True, slots=False)
+class StepArrays(Arrays):
+    """n bodies and ground, c contacts at most, d of them declared, k rows of joints.
+
+    A step reads nothing of it that it did not write, but for what the last one leaves for reports.
+    """
+
+    types: ClassVar[dict[str, Any]] = {
+        **dict.fromkeys(
+            ("integer", "key", "group", "chosen", "collides", "declared_gap", "declared_mode",
+             "row_start", "row_body", "row_place", "used", "place", "parent", "queue", "order",
+             "entry_start", "entries", "bits", "slots"),
+            INTEGERS,
+        ),
+        **dict.fromkeys(("bodies", "declared_bodies", "declared_place"), INTEGER_MATRIX),
+        **dict.fromkeys(
+            ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "trial",
+             "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z", "B",
+             "push",
+             "kept", "met", "D", "declared_x", "log", "values", "vectors", "crossed", "answer",
+             "felt", "bounce", "v_bounce", "x_bounce"),
+            MATRIX,
+        ),
+        "shapes": PlacedShapes.type_of(),
+    }  # fmt: skip
+
+    # of the step
+    contact_count = _integer()
+    touch_count = _integer()  # the first ones, of shapes
+    stage = _integer()  # of a step that waits for room: 0, or FREE or MOVED (step.py)
+    is_solved = _integer()  # 1: there were contacts in the last step
+    met_count = _integer()
+    log_count = _integer()
+    # of a solution
+    chosen_count = _integer()
+    used_count = _integer()
+    matrix_size = _integer()  # numbers of K that are needed
+    width = _integer()  # numbers from row to row of K: all unknowns, or 6 where it has blocks
+    entry_count = _integer()  # blocks of K below the diagonal
+    bit_size = _integer()  # words of bits
+    held_count = _integer()  # contacts that scratch of held ones is needed for
+    is_exported = _integer()  # 1: Python makes no room, and takes no log
+    # constants
+    dense_size = _integer()  # unknowns up to which K is a square
+    first_v_dot = _integer()  # places in reported rows
+    first_lam = _integer()
+    first_state = _integer()
+    t1 = _real()  # s, end of the step, and its length
+    h = _real()
+    residual = _real()
+    length = _real()  # of the scene, m
+
+    shapes: PlacedShapes
+    integer: Integers
+    real: Floats
+    # of bodies, with ground first
+    poses: Floats  # (n + 1, POSE) where contacts are sought
+    margin: Floats  # m
+    shape_reach: Floats  # m, how far shapes reach from the mass centre
+    mass: Floats
+    mass_inverse: Floats  # zero of ground
+    Jp: Floats  # (n + 1, 9), and its inverse; in global axes
+    Jp_inverse: Floats
+    spin: Floats
+    spin_inverse: Floats
+    before: Floats  # (n + 1, 6) velocities at the start, without contacts, with them; scratch
+    free: Floats
+    v: Floats
+    trial: Floats
+    rest: Floats
+    trial_rest: Floats
+    end: Floats  # at the end of the step
+    hit: Floats  # the part of the step at which a body is hit; and 1 where it flies else
+    flies: Floats
+    bounce: Floats  # (n + 1, 5) of each group (restitution.py)
+    v_bounce: Floats  # (n + 1, 6), (c, 3), (k,) what bounces lead to
+    x_bounce: Floats
+    used: Integers  # bodies of a group of contacts, in the order of K; the place of each, or -1
+    place: Integers
+    parent: Integers  # scratch of groups and of the order of bodies
+    queue: Integers
+    order: Integers
+    bits: Integers
+    entry_start: Integers  # (n + 2,) first of the blocks of K below the diagonal of each column
+    entries: Integers  # their rows
+    # of contacts
+    bodies: Integers  # (c, 2) i and j, ground 0
+    key: Integers  # a number that a contact keeps
+    group: Integers  # the least body of those that contacts connect
+    chosen: Integers  # contacts of a group
+    collides: Integers  # what it does; the part of the step at which it closes
+    closing: Floats
+    J: Floats  # (c, 36) rows of the velocity of body i less that of j: normal, tangents
+    moved: Floats  # the same times M^-1
+    own: Floats  # (c, 9) J M^-1 J^T of each
+    own_held: Floats  # the same with what joints answer
+    gap: Floats
+    mu: Floats
+    e: Floats
+    bias: Floats  # m/s, added to normal velocities
+    r: Floats  # masses that rows feel, kg
+    left: Floats  # residuals
+    x: Floats  # (c, 3) impulses, N s; what is projected, its slopes, impulses tried, others kept
+    z: Floats
+    B: Floats
+    push: Floats
+    kept: Floats
+    u: Floats  # velocities
+    met: Floats  # (c, MET) contacts that shapes push with
+    # of declared contacts
+    declared_bodies: Integers  # (d, 2)
+    declared_place: Integers  # (d, 6) place in D of the system: row normal of i and j, ...; or -1
+    declared_gap: Integers  # in the residual of the system
+    declared_mode: Integers  # first state
+    declared_mu: Floats
+    declared_e: Floats
+    declared_x: Floats  # (d, 3) impulses of the last step
+    # of rows of joints
+    row_start: Integers  # (k + 1,) first entry of each
+    row_body: Integers  # body of each entry, and where its six numbers are in D of the system
+    row_place: Integers
+    D: Floats  # (entries, 6)
+    s: Floats  # masses that they feel
+    y: Floats  # impulses; tried, kept, and of the last step
+    pull: Floats
+    y_kept: Floats
+    y_bounce: Floats
+    joint_y: Floats
+    # scratch
+    slopes: Floats  # (2, y) flat: dy/dt
+    changed: Floats
+    slots: Integers  # table of the contacts remembered
+    K: Floats
+    change: Floats
+    turned: Floats  # (36,)
+    log: Floats  # (room, MET) contacts at instants reported
+    values: Floats  # (k, k), (k, k), (k, 3 c), (3 c, 3 c) of contacts that joints hold, once needed
+    vectors: Floats
+    crossed: Floats
+    answer: Floats
+    felt: Floats
+
+
+def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: int) -> StepArrays:
+    """The arrays of a model.
+
+    Args:
+        evaluator: of the model.
+        size: numbers of its integrated state.
+        remembered: impulses that are kept from step to step.
+        dense_size: unknowns up to which matrices are squares.
+    """
+    model = evaluator.model
+    n, k = model.body_count, model.joint_row_count
+    layout, own = model.row_layout, _joint_rows(evaluator)
+    bodies: dict[str, Any] = {
+        **{name: np.zeros((n + 1, 9)) for name in ("Jp", "Jp_inverse", "spin", "spin_inverse")},
+        **{name: np.zeros((n + 1, 6)) for name in (
+            "before", "free", "v", "trial", "rest", "trial_rest", "end", "v_bounce")},
+        "bounce": np.zeros((n + 1, 5)),
+        **{name: np.zeros(n + 1) for name in (
+            "margin", "shape_reach", "mass", "mass_inverse", "hit", "flies")},
+        **{name: np.zeros(n + 1, dtype=np.int64) for name in (
+            "used", "place", "parent", "queue", "order")},
+        "entry_start": np.zeros(n + 2, dtype=np.int64),
+        **{name: np.zeros(0, dtype=np.int64) for name in ("bits", "entries")},
+    }  # fmt: skip
+    bodies["mass"][1:], bodies["mass_inverse"][1:] = model.mass, 1.0 / model.mass
+    bodies["Jp"][1:] = model.Jp.reshape(-1, 9)
+    bodies["Jp_inverse"][1:] = np.linalg.inv(model.Jp).reshape(-1, 9)
+    if model.collisions is not None:
+        far = np.linalg.norm(model.collisions.at, axis=1) + model.collisions.reach
+        np.maximum.at(bodies["shape_reach"], model.collisions.body, far)
+        bodies["shape_reach"][0] = 0.0
+    scratch: dict[str, Any] = {
+        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "y_bounce", "joint_y")},
+        **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
+    }
+    arrays = StepArrays(
+        shapes=placed_shapes(model.collisions),
+        integer=np.zeros(len(StepArrays.indices("integer")), dtype=np.int64),
+        real=np.zeros(len(StepArrays.indices("real"))),
+        poses=np.zeros((n + 1, POSE)),
+        **bodies,
+        **own,
+        **_declared(evaluator),
+        **_of_contacts(ROOM + model.contact_count),
+        **scratch,
+        slopes=np.zeros(2 * size),
+        changed=np.zeros(size),
+        slots=np.zeros(2 * remembered + 1, dtype=np.int64),
+        K=np.zeros(min(6 * n, dense_size) ** 2),
+        change=np.zeros(6 * n),
+        turned=np.zeros(36),
+        log=np.zeros((LOG_ROOM, MET)),
+    )
+    arrays.dense_size, arrays.length = dense_size, model.length
+    arrays.first_v_dot, arrays.first_lam = layout["v_dot"].start, layout["Lam"].start
+    arrays.first_state = layout["states"].start
+    return arrays
+
+
+def _of_contacts(room: int) -> dict[str, Any]:
+    """Arrays of so many contacts."""
+    widths = {"bodies": 2, "J": 36, "moved": 36, "own": 9, "own_held": 9, "B": 9, "met": MET,
+              **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
+    whole = ("bodies", "key", "group", "chosen", "collides")
+    return {
+        name: np.zeros((room, widths[name]) if name in widths else room,
+                       dtype=np.int64 if name in whole else float)
+        for name in OF_CONTACTS
+    }  # fmt: skip
+
+
+def _joint_rows(evaluator: Evaluator) -> dict[str, Any]:
+    """Entries of the rows of joints, row by row."""
+    own, (row, column, place) = evaluator.model.joint_row_count, evaluator.pattern
+    row, body, place = row[::6], column[::6] // 6 + 1, place[::6]
+    order = np.flatnonzero(row < own)
+    order = order[np.argsort(row[order], kind="stable")]
+    start = np.searchsorted(row[order], np.arange(own + 1))
+    return {
+        "row_start": start.astype(np.int64),
+        "row_body": np.ascontiguousarray(body[order]),
+        "row_place": np.ascontiguousarray(place[order]),
+        "D": np.zeros((len(order), 6)),
+    }
+
+
+def _declared(evaluator: Evaluator) -> dict[str, Any]:
+    """The declared contacts."""
+    model = evaluator.model
+    d, own = model.contact_count, model.joint_row_count
+    table = ContactTable(evaluator) if d else None
+    given = model.joint_slots[len(model.joint_slots) - d :]
+    bodies = np.array([(s[0], s[1] if len(s) > 1 else 0) for s in given]).reshape(d, 2)
+    places = np.full((d, 6), -1)
+    row, column, place = evaluator.pattern
+    for at, b, first in zip(row[::6] - own, column[::6] // 6 + 1, place[::6], strict=True):
+        if at >= 0:
+            contact, part = divmod(int(at), 3)
+            for side in np.flatnonzero(bodies[contact] == b):
+                places[contact, 2 * part + side] = first
+    return {
+        "declared_bodies": bodies.astype(np.int64),
+        "declared_place": places,
+        "declared_gap": np.ascontiguousarray(evaluator.system.row[own::3][:d]),
+        "declared_mode": np.zeros(0, dtype=np.int64) if table is None else table.mode,
+        "declared_mu": np.zeros(0) if table is None else table.mu,
+        "declared_e": np.zeros(0) if table is None else table.e,
+        "declared_x": np.zeros((d, 3)),
+    }
+
+
+def all_room(s: StepArrays) -> StepArrays:
+    """The same arrays with room for all that exported models may need, and no log."""
+    m, n = len(s.shapes.kind), len(s.mass) - 1
+    s.shapes.pair_count = min(m * (m - 1) // 2, MOST_PAIRS * m)
+    s.shapes.point_count = MOST_POINTS * s.shapes.pair_count
+    s.bit_size = n * (n // 32 + 1)
+    s.entry_count = min(n * (n - 1) // 2, MOST_ENTRIES * n)
+    s.matrix_size = 36 * (n + 2 * s.entry_count)
+    s.held_count = min(s.shapes.point_count + len(s.declared_gap), MOST_HELD) if len(s.y) else 0
+    found = grown(s)
+    found.shapes.pair_count = found.shapes.point_count = 0
+    found.entry_count = found.held_count = 0
+    found.is_exported = 1
+    return found
+
+
+def grown(s: StepArrays) -> StepArrays:
+    """The same arrays with the room that a step has asked for."""
+    new: dict[str, Any] = {"shapes": with_room(s.shapes)}
+    room = max(s.contact_count, s.shapes.point_count + len(s.declared_gap))
+    if room > len(s.key):
+        new |= _of_contacts(room + room // 4)
+        new["met"][: s.met_count] = s.met[: s.met_count]
+    if 2 * s.met_count > len(s.log):
+        new["log"] = np.zeros((4 * s.met_count, MET))
+    if s.matrix_size > len(s.K):
+        new["K"] = np.zeros(s.matrix_size)
+    for name, size in (("entries", s.entry_count), ("bits", s.bit_size)):
+        if size > len(getattr(s, name)):
+            new[name] = np.zeros(size + size // 4, dtype=np.int64)
+    if s.held_count > len(s.felt) // 3:
+        k, m = len(s.y), 3 * s.held_count
+        new |= {"values": np.zeros((k, k)), "vectors": np.zeros((k, k))}
+        new |= {"crossed": np.zeros((k, m)), "answer": np.zeros((k, m)), "felt": np.zeros((m, m))}
+    return attrs.evolve(s, **new)

@@ -1,0 +1,110 @@
+"""Bounces with friction that give back no more energy than they take.
+
+Newton's law with friction may gain energy (Kane, Levinson, Dynamics: theory and applications, 1985,
+sec. 5.8). Where it would, impulses are a mean of these and of those without a bounce: cones are
+convex, and without a bounce nothing is gained.
+"""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+
+from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.integrators.moreau.groups import find_groups, root_of
+from dap3d_core.integrators.moreau.newton import velocity_of
+from dap3d_core.integrators.moreau.problem import solve
+from dap3d_core.integrators.stepping.vector_ops import copy
+from dap3d_core.kernels.runtime.cache import compiled
+
+#: What a contact that collides does.
+STOPS, BOUNCES = 1, 2
+#: Columns of ``bounce``: work of the impulses of a group with the bounce, half of it, and without;
+#: the sum of the magnitudes of its parts; how much of the bounce is kept.
+WITH, HALF, WITHOUT, EXCHANGED, KEPT = range(5)
+#: Work that is rounding, as a part of what is exchanged.
+GAIN_ROUNDING = 1e-12
+
+
+@compiled
+def limit_bounces(s: StepArrays, tolerance: float) -> bool:
+    """Weaken the bounces of groups that would gain energy; False without room."""
+    rubs = False
+    for c in range(s.contact_count):
+        rubs |= s.collides[c] == BOUNCES and s.mu[c] > 0.0
+    if not rubs or not any_gains(s):
+        return True
+    for b in range(s.v.shape[0]):
+        copy(s.v_bounce[b], s.v[b])
+    for c in range(s.contact_count):
+        copy(s.x_bounce[c], s.x[c])
+        s.bias[c] = 0.0 if s.collides[c] == BOUNCES else s.bias[c]
+    copy(s.y_bounce, s.y)
+    if not solve(s, tolerance):
+        return False
+    put_work(s, WITHOUT, 0.0)
+    put_work(s, HALF, 0.5)
+    for g in range(s.bounce.shape[0]):
+        s.bounce[g, KEPT] = part_without_gain(
+            s.bounce[g, WITHOUT], s.bounce[g, HALF], s.bounce[g, WITH], s.bounce[g, EXCHANGED]
+        )
+    find_groups(s)
+    mix(s)
+    return True
+
+
+@compiled
+def any_gains(s: StepArrays) -> bool:
+    """True if a group gains energy by its impact."""
+    put_work(s, WITH, 0.0)
+    found = False
+    for g in range(s.bounce.shape[0]):
+        found |= s.bounce[g, WITH] > GAIN_ROUNDING * s.bounce[g, EXCHANGED]
+    return found
+
+
+@compiled
+def put_work(s: StepArrays, column: int, part: float) -> None:
+    """Put the work of the impulses of each group, J, with such a part of the bounce kept."""
+    for g in range(s.bounce.shape[0]):
+        s.bounce[g, column] = s.bounce[g, EXCHANGED] = 0.0
+    for b in range(s.v.shape[0]):
+        first = s.hit[b] if s.hit[b] <= 1.0 else 0.5
+        for k in range(6):
+            fall = s.flies[b] * (s.free[b, k] - s.before[b, k])
+            end = s.v[b, k] + part * (s.v_bounce[b, k] - s.v[b, k])
+            s.trial[b, k] = 0.5 * (s.before[b, k] + end + (2.0 * first - 1.0) * fall)
+    for c in range(s.contact_count):
+        u0, u1, u2 = velocity_of(s, c, s.trial)
+        x, other = s.x[c], s.x_bounce[c]
+        normal = (x[0] + part * (other[0] - x[0])) * u0
+        rubbed = (x[1] + part * (other[1] - x[1])) * u1 + (x[2] + part * (other[2] - x[2])) * u2
+        s.bounce[s.group[c], column] += normal + rubbed
+        s.bounce[s.group[c], EXCHANGED] += abs(normal) + abs(rubbed)
+
+
+@compiled
+def part_without_gain(without: float, half: float, whole: float, exchanged: float) -> float:
+    """The largest part of a bounce whose work is zero; the work is quadratic in it."""
+    if not whole > GAIN_ROUNDING * exchanged:
+        return 1.0
+    a, b = 2.0 * (whole + without) - 4.0 * half, 4.0 * half - whole - 3.0 * without
+    root = math.sqrt(max(b * b - 4.0 * a * without, 0.0))
+    below = b + root if b > 0.0 else root - b
+    found = -2.0 * without / below if b > 0.0 else below / (2.0 * a)
+    return min(1.0, max(0.0, found))
+
+
+@compiled
+def mix(s: StepArrays) -> None:
+    """Make impulses and velocities those of the parts that are kept."""
+    for c in range(s.contact_count):
+        part = s.bounce[s.group[c], KEPT]
+        for k in range(3):
+            s.x[c, k] += part * (s.x_bounce[c, k] - s.x[c, k])
+    for b in range(s.v.shape[0]):
+        part = s.bounce[root_of(s.parent, b) if s.y.size == 0 else 0, KEPT]
+        for k in range(6):
+            s.v[b, k] += part * (s.v_bounce[b, k] - s.v[b, k])
+    for k in range(s.y.size):
+        s.y[k] += s.bounce[0, KEPT] * (s.y_bounce[k] - s.y[k])

@@ -1,0 +1,349 @@
+"""One step: motion without contacts, impulses, moves; compiled, it stops where room is missing."""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+from typing import Any
+
+from dap3d_core.assembly.arrays import System
+from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
+from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.integrators.moreau.contact_set import axes_of, evaluate_rows, find_contacts
+from dap3d_core.integrators.moreau.free_motion import move_freely
+from dap3d_core.integrators.moreau.groups import find_groups, root_of
+from dap3d_core.integrators.moreau.impulses import (
+    complete_row,
+    keep_for_reports,
+    log_contacts,
+    recall,
+    remember,
+)
+from dap3d_core.integrators.moreau.newton import speed_of, velocity_of
+from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
+from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
+from dap3d_core.integrators.stepping.integration_state import (
+    NO_ROOM,
+    NOT_FINITE,
+    OTHER,
+    RUNNING,
+    TRIAL,
+    Y,
+)
+from dap3d_core.integrators.stepping.output import may_step, project_state
+from dap3d_core.integrators.stepping.step_control import count_turns, end_of_step
+from dap3d_core.integrators.stepping.vector_ops import all_finite, copy
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.cache import compiled
+
+#: Gaps, m of a scene of ordinary size, below which overlaps are left; passes that remove them.
+OVERLAP, PASSES = 1e-12, 8
+#: A contact collides where it approaches by more than this times h times the acceleration.
+COLLIDES = 4.0
+#: A part of the step where bodies are not hit.
+NOT_HIT = 2.0
+#: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
+MARGIN, LEAST_MARGIN = 1.2, 1e-6
+#: Stages of a step that waits for room: the trial state is that without contacts; it is that where
+#: bodies have moved to, but may overlap.
+FREE, MOVED = 1, 2
+
+
+@compiled
+def advance(
+    work: Any, s: StepArrays, functions: Any, system: System, loops: Any, budget: int
+) -> None:
+    """Integrate until more than ``budget`` calls of rhs are spent, or the rows are full.
+
+    Or room is missing: ``stage`` says so.
+    """
+    limit = work.rhs_count + budget
+    while s.stage != 0 or goes_on(work, s, functions, system, loops, limit):
+        if s.stage == 0:
+            s.t1 = min(end_of_step(work), work.step_limit)
+            s.h = s.t1 - work.t
+            move_freely(work, s, functions[0], system, loops)
+            s.stage = FREE
+            if not all_finite(work.state[TRIAL]):
+                work.t_stop, work.status, s.stage = s.t1, NOT_FINITE, 0
+                return
+        if s.stage == FREE:
+            if not meet(work, s, system, loops):
+                break
+            s.stage = MOVED
+        if s.is_solved != 0 and not part(work, s, system, loops):
+            break
+        s.stage = 0
+        finish(work, s, functions, system, loops)
+    if s.stage != 0 and s.is_exported != 0:
+        work.t_stop, work.status, s.stage = s.t1, NO_ROOM, 0
+
+
+@compiled
+def goes_on(
+    work: Any, s: StepArrays, functions: Any, system: System, loops: Any, limit: int
+) -> bool:
+    """Report what is reached; True if a step is to be taken now."""
+    if s.log_count + 2 * s.met_count > s.log.shape[0] and s.is_exported == 0:
+        return False
+    first = work.row_count
+    again = may_step(work, state_at, limit, functions[1], functions[2], system, loops)
+    for q in range(first, work.row_count):
+        complete_row(work, s, work.rows[q])
+        if s.is_exported == 0:
+            log_contacts(work, s, work.rows[q, 0])
+    return again
+
+
+@compiled
+def state_at(work: Any, t: float, y: Floats) -> None:
+    """The state reached: steps end where something is reported."""
+    copy(y, work.state[Y])
+
+
+@compiled
+def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
+    """Let contacts push, and move the bodies, as the trial state; False without room."""
+    y, trial, n = work.state[Y], work.state[TRIAL], s.mass.size - 1
+    take_velocities(y, n, s.before)
+    take_velocities(trial, n, s.free)
+    put_margins(s)
+    if not find_contacts(work.t, y, 1e300, s, system, loops):
+        return False
+    if work.step_count == 0:
+        work.overlap_at_start = deepest_of(s)
+    else:  # what the projection of the last step has left
+        work.deepest = max(work.deepest, deepest_of(s))
+    s.is_solved = s.met_count = 0
+    if s.contact_count == 0:
+        for b in range(n + 1):
+            copy(s.end[b], s.free[b])
+        return True
+    if s.declared_gap.size == 0 and s.y.size > 0:
+        evaluate_rows(work.t, y, s, system, loops)
+    prepare_problem(s)
+    any_collides = put_bias(s)
+    recall(work, s)
+    if not solve(s, work.rtol):
+        return False
+    put_hits(s, any_collides)
+    if any_collides and not limit_bounces(s, work.rtol):
+        return False
+    s.is_solved = 1
+    work.largest_residual = max(work.largest_residual, s.residual)
+    for b in range(n + 1):
+        copy(s.end[b], s.v[b])
+    remember(work, s)
+    keep_for_reports(s)
+    trial[trial.size - 1] += work_done(work, s)
+    for b in range(1, n + 1):
+        c, d = coordinate_offset(b), s.trial[b]
+        if s.hit[b] <= 1.0:  # from where it was
+            for k in range(7):
+                trial[c + k] = y[c + k]
+        for k in range(6):
+            d[k] = way_of(s, b, k)
+        move(trial, c, d[0], d[1], d[2], d[3], d[4], d[5])
+    return True
+
+
+@compiled
+def way_of(s: StepArrays, b: int, k: int) -> float:
+    """How far a body goes by impulses; one that is hit, at all."""
+    before, free, end, first = s.before[b, k], s.free[b, k], s.end[b, k], s.hit[b]
+    if first > 1.0:
+        return 0.5 * s.h * (end - free)
+    fall, last = s.flies[b] * (free - before), 1.0 - first
+    return s.h * (first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall))
+
+
+@compiled
+def take_velocities(y: Floats, n: int, v: Floats) -> None:
+    """Put the velocities of an integrated state, in global axes."""
+    for b in range(1, n + 1):
+        f, p = velocity_offset(b, n), y[coordinate_offset(b) :]
+        for k in range(3):
+            v[b, k] = y[f + k]
+            a, c, d = axes_of(p, k)
+            v[b, 3 + k] = a * y[f + 3] + c * y[f + 4] + d * y[f + 5]
+
+
+@compiled
+def put_margins(s: StepArrays) -> None:
+    """How near bodies have to be, m, to touch within the step."""
+    least = LEAST_MARGIN * s.length
+    s.margin[0] = 0.0
+    for b in range(1, s.margin.size):
+        speed = max(length_of(s.before[b], 0), length_of(s.free[b], 0))
+        spin = max(length_of(s.before[b], 3), length_of(s.free[b], 3))
+        s.margin[b] = MARGIN * s.h * (speed + spin * s.shape_reach[b]) + least
+
+
+@compiled
+def length_of(v: Floats, k: int) -> float:
+    """Length of three numbers from k on."""
+    return math.sqrt(v[k] * v[k] + v[k + 1] * v[k + 1] + v[k + 2] * v[k + 2])
+
+
+@compiled
+def deepest_of(s: StepArrays) -> float:
+    """The largest overlap of the contacts found, m."""
+    least = 0.0
+    for c in range(s.contact_count):
+        least = min(least, s.gap[c])
+    return -least
+
+
+@compiled
+def put_bias(s: StepArrays) -> bool:
+    """What is added to normal velocities; True if bodies collide."""
+    fall, found = 0.0, False
+    for b in range(s.free.shape[0]):
+        for k in range(6):
+            fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
+    for c in range(s.contact_count):
+        approach, _, _ = velocity_of(s, c, s.before)
+        normal, _, _ = velocity_of(s, c, s.free)
+        s.collides[c], s.bias[c] = 0, max(s.gap[c], 0.0) / s.h
+        if approach < -COLLIDES * fall and s.gap[c] + s.h * min(approach, normal) < 0.0:
+            s.collides[c], found = STOPS, True
+            s.closing[c] = closing_of(max(s.gap[c], 0.0), s.h * approach, s.h * (normal - approach))
+            last = 1.0 - s.closing[c]
+            back = last * (normal - approach) - s.e[c] * (normal - last * (normal - approach))
+            if s.e[c] > 0.0 and back > 0.0:
+                s.collides[c], s.bias[c] = BOUNCES, -back
+    return found
+
+
+@compiled
+def closing_of(gap: float, way: float, more: float) -> float:
+    """The part x of a step in which a gap closes: gap + x (way + x more / 2) = 0."""
+    inner = way * way - 2.0 * gap * more
+    return min(1.0, 2.0 * gap / (math.sqrt(max(inner, 0.0)) - way))
+
+
+@compiled
+def put_hits(s: StepArrays, any_collides: bool) -> None:
+    """When bodies are hit, as parts of the step, and whether their group flies else.
+
+    All of a group at once: where all that collides bounces at the first instant, else at the start.
+    """
+    for b in range(s.hit.size):
+        s.hit[b], s.flies[b] = NOT_HIT, 1.0
+    if not any_collides:
+        return
+    find_groups(s)
+    for c in range(s.contact_count):
+        g = s.group[c]
+        if s.collides[c] == BOUNCES:
+            s.hit[g] = min(s.hit[g], s.closing[c])
+        elif s.collides[c] == STOPS or s.x[c, 0] > 0.0:
+            s.flies[g] = 0.0
+            s.hit[g] = 0.0 if s.collides[c] == STOPS else s.hit[g]
+    for b in range(s.hit.size):
+        g = root_of(s.parent, b) if s.y.size == 0 else 0
+        s.hit[b], s.flies[b] = s.hit[g], s.flies[g]
+
+
+@compiled
+def work_done(work: Any, s: StepArrays) -> float:
+    """Work of the impulses behind free motion, J; that of friction is added to the sum."""
+    total, rubbed = 0.0, 0.0
+    put_means(s, s.before)
+    for c in range(s.contact_count):
+        _, u1, u2 = velocity_of(s, c, s.trial)
+        rubbed += s.x[c, 1] * u1 + s.x[c, 2] * u2
+    work.friction_work += rubbed
+    put_means(s, s.free)
+    for c in range(s.contact_count):
+        u0, u1, u2 = velocity_of(s, c, s.trial)
+        total += s.x[c, 0] * u0 + s.x[c, 1] * u1 + s.x[c, 2] * u2
+    for k in range(s.y.size):
+        total += s.y[k] * speed_of(s, k, s.trial)
+    return total
+
+
+@compiled
+def put_means(s: StepArrays, v: Floats) -> None:
+    """Put the means of velocities v and those of the end into ``trial``."""
+    for b in range(v.shape[0]):
+        for k in range(6):
+            s.trial[b, k] = 0.5 * (v[b, k] + s.end[b, k])
+
+
+@compiled
+def move(y: Floats, c: int, dx: float, dy: float, dz: float, a: float, b: float, d: float) -> None:
+    """Move and turn the body at c by (dx, dy, dz), m, and (a, b, d), rad, in global axes."""
+    y[c], y[c + 1], y[c + 2] = y[c] + dx, y[c + 1] + dy, y[c + 2] + dz
+    half = 0.5 * math.sqrt(a * a + b * b + d * d)
+    part = 0.5 * (math.sin(half) / half if half > 0.0 else 1.0)
+    a, b, d, f = part * a, part * b, part * d, math.cos(half)
+    e0, e1, e2, e3 = y[c + 3], y[c + 4], y[c + 5], y[c + 6]
+    p0 = f * e0 - (a * e1 + b * e2 + d * e3)
+    p1 = f * e1 + a * e0 + (b * e3 - d * e2)
+    p2 = f * e2 + b * e0 + (d * e1 - a * e3)
+    p3 = f * e3 + d * e0 + (a * e2 - b * e1)
+    size = math.sqrt(p0 * p0 + p1 * p1 + p2 * p2 + p3 * p3)
+    y[c + 3], y[c + 4], y[c + 5], y[c + 6] = p0 / size, p1 / size, p2 / size, p3 / size
+
+
+@compiled
+def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
+    """Move bodies that overlap apart, by the least change in the metric of their masses.
+
+    False without room.
+    """
+    trial, deepest, margin = work.state[TRIAL], 0.0, 0.5 * LEAST_MARGIN * s.length
+    for b in range(s.margin.size):
+        s.margin[b] = margin
+    for _ in range(PASSES):
+        if not find_contacts(s.t1, trial, 2.0 * margin, s, system, loops):
+            return False
+        deepest = deepest_of(s)
+        if deepest <= OVERLAP * s.length:
+            break
+        if s.declared_gap.size == 0 and s.y.size > 0:
+            evaluate_rows(s.t1, trial, s, system, loops)
+        prepare_problem(s)
+        for b in range(s.free.shape[0]):
+            for k in range(6):
+                s.free[b, k] = 0.0
+        for c in range(s.contact_count):
+            s.bias[c], s.mu[c] = s.gap[c], 0.0
+            s.x[c, 0] = s.x[c, 1] = s.x[c, 2] = 0.0
+        if not solve(s, NEAR):
+            return False
+        for b in range(1, s.v.shape[0]):
+            v = s.v[b]
+            move(trial, coordinate_offset(b), v[0], v[1], v[2], v[3], v[4], v[5])
+    work.deepest = max(work.deepest, deepest)
+    return True
+
+
+@compiled
+def finish(work: Any, s: StepArrays, functions: Any, system: System, loops: Any) -> None:
+    """Make the trial state that of the end of the step."""
+    y, trial, n = work.state[Y], work.state[TRIAL], s.mass.size - 1
+    for b in range(1, n + 1 if s.is_solved != 0 else 1):
+        f, end = velocity_offset(b, n), s.end[b]
+        a, c, d = axes_of(trial[coordinate_offset(b) :], 0)
+        e, g, h = axes_of(trial[coordinate_offset(b) :], 1)
+        i, k, m = axes_of(trial[coordinate_offset(b) :], 2)
+        trial[f], trial[f + 1], trial[f + 2] = end[0], end[1], end[2]
+        trial[f + 3] = a * end[3] + e * end[4] + i * end[5]
+        trial[f + 4] = c * end[3] + g * end[4] + k * end[5]
+        trial[f + 5] = d * end[3] + h * end[4] + m * end[5]
+    copy(work.state[OTHER], y)
+    copy(y, trial)
+    work.t_dense, work.h_dense, work.t = work.t, s.h, s.t1
+    work.step_count += 1
+    work.segment_step += 1
+    failure = RUNNING
+    if not all_finite(y):
+        failure = NOT_FINITE
+    elif s.y.size > 0:
+        failure = project_state(work, work.t, y, functions[1], system, loops)
+    if failure != RUNNING:
+        work.t_stop, work.status = s.t1, failure
+    elif work.calls_accepted != 0:
+        count_turns(work, functions[3], system, loops)

@@ -1,1 +1,0 @@
-"""Signals of a scene: functions that combine others, and inputs."""

@@ -1,0 +1,90 @@
+"""Models in MuJoCo with limits, equalities and contacts as hard as it has them."""
+
+import mujoco
+import numpy as np
+
+from support.bare_mujoco import compiled
+from support.mujoco_models import Oracle
+
+#: What has a softness.
+SOLREF = ("geom_solref", "jnt_solref", "eq_solref", "pair_solref", "tendon_solref_lim")
+SOLIMP = ("geom_solimp", "jnt_solimp", "eq_solimp", "pair_solimp", "tendon_solimp_lim")
+#: Impedances from which accelerations are extrapolated to rigid ones; MuJoCo has none above.
+IMPEDANCES = (0.9998, 0.9999)
+
+
+class HardOracle(Oracle):
+    """A model of an MJCF file, without dry friction of joints, fluids, and friction of spin.
+
+    Its cone is elliptic, and it slips by no regularisation (noslip).
+    """
+
+    def __init__(self, path):
+        self.mujoco, self.unnamed, self.known = mujoco, [], set()
+        self.model = m = compiled(path)
+        m.opt.cone, m.opt.solver = mujoco.mjtCone.mjCONE_ELLIPTIC, mujoco.mjtSolver.mjSOL_NEWTON
+        m.opt.timestep, m.opt.tolerance, m.opt.noslip_tolerance = 5e-4, 0.0, 0.0
+        m.opt.density = m.opt.viscosity = 0.0
+        m.opt.wind[:] = m.dof_frictionloss[:] = 0.0
+        m.geom_margin[:] = m.geom_gap[:] = m.jnt_margin[:] = 0.0
+        m.geom_condim[:] = np.minimum(m.geom_condim, 3)
+        self.data = mujoco.MjData(m)
+
+    def keys(self):
+        """Numbers and names of the keyframes that have one."""
+        names = ((k, self.name("mjOBJ_KEY", k)) for k in range(self.model.nkey))
+        return ((k, name) for k, name in names if name)
+
+    def settle(self, time, key):
+        """Move for a time from a keyframe, or from the pose of the file; then at rest there.
+
+        Accelerations are those of bodies that overlap no further, and are not pushed apart.
+        """
+        m, d = self.model, self.data
+        if key is not None:
+            mujoco.mj_resetDataKeyframe(m, d, key)
+        self._soften((0.004, 1.0), IMPEDANCES[1])
+        m.opt.iterations, m.opt.noslip_iterations = 50, 0
+        for _ in range(round(time / m.opt.timestep)):
+            mujoco.mj_step(m, d)
+        m.opt.iterations, m.opt.noslip_iterations = 500, 200
+        d.qvel[:], found = 0.0, []
+        for impedance in IMPEDANCES:
+            self._soften((-1e-9, -1e-9), impedance)
+            mujoco.mj_forward(m, d)
+            found.append(d.qacc.copy())
+        d.qacc[:] = 2.0 * found[1] - found[0]
+
+    def _soften(self, solref, impedance):
+        for name in SOLREF:
+            getattr(self.model, name)[:] = solref
+        for name in SOLIMP:
+            getattr(self.model, name)[:] = (impedance, impedance, 0.001, 0.5, 2.0)
+
+    def use(self, model):
+        """Take the names of joints, for those that have none in the file."""
+        moving = [n for n, j in model.joints.items() if j.kind != "fixed" and not j.closes]
+        self.unnamed = moving if len(moving) == self.model.njnt else []
+        self.known = set(model.joints)
+
+    def positions(self):
+        """Coordinates of the joints that both have, by name, within limits that yield a little."""
+        m, found = self.model, {}
+        for j in range(m.njnt):
+            at, size = m.jnt_qposadr[j], {0: 7, 1: 4}.get(int(m.jnt_type[j]), 1)
+            name = self.name("mjOBJ_JOINT", j) or (self.unnamed[j] if self.unnamed else None)
+            q = self.data.qpos[at : at + size]
+            if size == 1 and m.jnt_limited[j]:
+                q = np.clip(q, *m.jnt_range[j])
+            if name in self.known:
+                found[name] = tuple(q.tolist())
+        return found
+
+    def accelerations(self):
+        """Name, mass centre, its acceleration and angular acceleration of each link that moves."""
+        parts = self.model.body_weldid
+        for b in range(1, self.model.nbody):
+            group = [k for k in range(1, self.model.nbody) if parts[k] == b]
+            if group and self.model.body_mass[group].sum():
+                com = self.group(b)[1]
+                yield self.name("mjOBJ_BODY", b), (com, self.acceleration(b, com))
