@@ -9,6 +9,7 @@ def registry_of(*types):
     """The installed types and these, as if a package brought them."""
     sources = {key: list(found) for key, found in dap.load_registry().sources.items()}
     for type_ in types:
-        key = (type_.kind, type_.keyword)
+        kind = "contact" if getattr(type_, "is_contact", False) else type_.kind
+        key = (kind, type_.keyword)
         sources.setdefault(key, []).append(Source(*key, type_.__module__, type=type_))
     return Registry(sources)

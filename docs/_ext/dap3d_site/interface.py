@@ -42,7 +42,7 @@ WORDS = {
         "hypot",
     ),
     "Parts of numbers": ("abs", "sign", "floor", "mod", "minimum", "maximum"),
-    "Branches, tables, lists": ("where", "lookup", "item", "by_body"),
+    "Branches, tables, lists": ("where", "lookup", "item", "root", "by_body"),
     "For `prepare`": ("normals",),
 }
 

@@ -3,6 +3,7 @@
 A plugin imports only these functions; the compiler and its runtime serve the core.
 """
 
+from dap3d_core.kernels.eliminate_unknowns import root
 from dap3d_core.kernels.rotations import (
     conjugate,
     euler_parameters,
@@ -83,6 +84,7 @@ __all__ = [
     "norm2",
     "normals",
     "quaternion_product",
+    "root",
     "rotate",
     "rotation_matrix",
     "rotation_vector",

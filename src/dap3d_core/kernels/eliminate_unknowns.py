@@ -11,6 +11,8 @@ from dap3d_core.kernels.scalar_math import sqrt, where
 
 #: Newton passes from what the last accepted step predicts: 1e-2 becomes 1e-16 in three.
 PASSES = 4
+#: The same from a start that a kernel guesses.
+PASSES_OF_ROOT = 6
 #: A last pass that changes the unknowns by more, of their size and one, has not found them.
 LEFT = 1e-7
 
@@ -83,3 +85,26 @@ def settled(s, C, G):
         change, size = change + abs(b), size + abs(a)
     doubt = 0.0 * where(change > LEFT * (1.0 + size), math.inf, 0.0)
     return tuple(a + doubt for a in s)
+
+
+def root(start, C, G):
+    """The unknowns at which C(*s) = 0, and the sum of changes of the last Newton pass.
+
+    For a kernel that finds a point of a curve or a surface: ``start`` a tuple near it, ``C`` a
+    function that returns as many numbers, ``G`` one that returns the rows of their derivatives. The
+    rates of the unknowns follow from those of C where they are wanted (implicit function theorem).
+    """
+    s = _plain(start)
+    for _ in range(PASSES_OF_ROOT):
+        s = tuple(a - b for a, b in zip(s, least_change(_plain(G(*s)), _plain(C(*s))), strict=True))
+    last = C(*s)
+    constant = next((c.constant for c in last if hasattr(c, "constant")), lambda x: x)
+    slopes = tuple(tuple(map(constant, row)) for row in _plain(G(*s)))
+    changes, left = least_change(slopes, last), 0.0
+    for b in _plain(changes):
+        left = left + where(b < 0.0, -b, b)
+    return tuple(constant(a) - b for a, b in zip(s, changes, strict=True)), constant(left)
+
+
+def _plain(x):
+    return tuple(map(_plain, x)) if isinstance(x, tuple) else getattr(x, "plain", x)

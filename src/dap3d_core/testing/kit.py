@@ -12,7 +12,7 @@ from dap3d_core.interface.codegen.reactions import joints_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.testing.checks import branches, forces, functions, joints, purity, states
+from dap3d_core.testing.checks import branches, contacts, forces, functions, joints, purity, states
 from dap3d_core.testing.checks.findings import (
     FAILED,
     LEFT_OUT,
@@ -186,6 +186,8 @@ def _of_joint(subject: SampledType) -> list[Check]:
     ]
     if "G" in subject.type_info.kernels:
         checks.insert(0, Check("G", subject, "", joints.gradient_of_unknowns))
+    if subject.type.is_contact and subject.type.grip is not None:
+        checks.append(Check("grip", subject, "", contacts.grip))
     checks += _of_jumps(subject)
     if "friction" in subject.type_info.kernels:
         checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))

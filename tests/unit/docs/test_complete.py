@@ -182,12 +182,17 @@ def test_the_names_of_each_field_are_those_of_the_sources():
 def test_the_names_besides_those_of_fields_are_those_of_the_sources():
     """Of time, of a function's argument, of friction, of what prepare returns; of its bodies."""
     from dap3d_core.interface.body_pose import BodyPose
-    from dap3d_core.interface.codegen.kernel_arguments import VELOCITY_KERNELS, friction_names
+    from dap3d_core.interface.codegen.kernel_arguments import (
+        SLIP,
+        VELOCITY_KERNELS,
+        friction_names,
+    )
 
     page = (DOCS / "reference" / "names.md").read_text()
     besides = rows_of(page, "where | names")
     jumps = [[{"crossing"}], [{"Jv"}]]
-    assert list(besides.values()) == [[{"t"}], [{"x"}], [set(friction_names(3))], *jumps]
+    rubs = [[set(friction_names(3))], [set(SLIP)]]
+    assert list(besides.values()) == [[{"t"}], [{"x"}], *rubs, *jumps]
     for line, levels in rows_of(page, "returned | position level | velocity level").items():
         (constant,) = re.findall(r"`(\"\w+\": .*)`", line)
         found = names_of(constants=eval(f"{{{constant}}}"))

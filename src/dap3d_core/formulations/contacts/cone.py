@@ -36,6 +36,7 @@ def solve_cone(
     start: Any = None,
     tries: int = TRIES,
     gapless: Any = None,
+    ratio: Any = None,
 ) -> tuple[Floats, float]:
     """The solution x (3 m,), and the residual of the equations over its size.
 
@@ -46,7 +47,14 @@ def solve_cone(
         start: (3 m,) where to begin.
         tries: at most; fewer where it is to be known whether there is a solution nearby.
         gapless: (m,) 1 of friction in three directions, else 0.
+        ratio: (m,) of coefficients along t2 to mu, that along t1, where friction is in an ellipse.
     """
+    if ratio is not None and np.any(ratio != 1.0):  # stretched to a circle
+        stretch = np.column_stack([np.ones((len(ratio), 2)), ratio]).ravel()
+        start = None if start is None else start / np.where(stretch > 0.0, stretch, 1.0)
+        stretched = stretch[:, None] * A * stretch
+        x, left = solve_cone(stretched, stretch * b, mu, more, start, tries, gapless)
+        return stretch * x, left
     count = len(b) // 3
     mu, more = np.asarray(mu, dtype=float), np.zeros(count) if more is None else more
     free = np.zeros(count) if gapless is None else gapless

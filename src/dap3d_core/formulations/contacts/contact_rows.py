@@ -1,6 +1,6 @@
 """The contacts of a model at one state: gaps, rows, forces, as arrays of Python."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property, reduce
 from typing import Any
 
@@ -18,6 +18,8 @@ from dap3d_core.model.state_layout import split
 GAP, NORMAL = 0, 1
 FRICTION, SLIP, PLACE = slice(2, 5), slice(5, 8), slice(8, 11)
 REACH, FORCE, WIDTH = 11, slice(12, 15), 15
+#: Those of a law of friction of its own, behind them: coefficients that slide, and that stick.
+SLIDING, STICKING, LAW_WIDTH = slice(0, 2), slice(2, 4), 4
 #: Velocities that are set are met to this part of their size.
 HELD = 1e-9
 
@@ -32,7 +34,8 @@ class ContactTable:
 
     Attributes:
         names: of each point of contact.
-        mu, mu_s, e: (m,) coefficients of friction and restitution.
+        mu, mu_s, e: (m,) coefficients of friction, along the first tangent, and restitution.
+        ratio, ratio_s: (m,) the same along the second tangent, as parts of them: 1 but in ellipses.
         newton: (m,) True where the law of impact is Newton's.
         turns: (m,) 1 of those whose gap or slip is an angle, 0 of others.
         movable: (m,) True of those that a scene may have moved until they touch.
@@ -56,6 +59,7 @@ class ContactTable:
         self.newton = np.array([law == "newton" for law in model.contact_laws], dtype=bool)
         self.numbers = {name: np.zeros(self.count) for name in ("mu", "mu_s", "e")}
         self.movable = np.array(["#" not in name for name in self.names], dtype=bool)
+        self.ratio, self.ratio_s = np.ones((2, self.count))
         self.mode = np.zeros(self.count, dtype=np.int64)
         self.switches: Integers = np.zeros((self.count, 2), dtype=np.int64)
         self._loops = []
@@ -76,7 +80,8 @@ class ContactTable:
             q = next(q for q, (kind, g) in enumerate(evaluator.loop_groups)
                      if g is group and kind == "switch")  # fmt: skip
             loop = loop_list([compiled_loop(group.type_info, "tension")])
-            self._loops.append((loop, evaluator.system.groups[q], which))
+            width = WIDTH + LAW_WIDTH * (type_.grip is not None)
+            self._loops.append((loop, evaluator.system.groups[q], which, width))
         self.gapless = (self.alone & self.holds[:, 0]).astype(float)
         self.way: Integers = self.mode[:, None] + np.arange(1, 4)
         self.near: Integers = self.mode[:, None] + np.arange(4, 7)
@@ -96,17 +101,58 @@ class ContactTable:
 
         The states of elements are those of the evaluator. Lam: (rows,) in the order of the model.
         """
+        found = np.zeros((self.count, WIDTH))
+        for which, values in self._values(t, u, Lam, self._loops):
+            found[which] = values[:, :WIDTH]
+        return found
+
+    @IGNORE_FLOAT_ERRORS
+    def find_grips(self, t: float, u: Floats) -> None:
+        """Coefficients of contacts whose law of friction is their own, at a state u (13 n,)."""
+        laws = [loop for loop in self._loops if loop[-1] > WIDTH]
+        if not laws:
+            return
+        evaluator, states = self.evaluator, self.evaluator.states
+        evaluator.states = states.copy()
+        evaluator.states[self.way] = 0.0  # slip of today alone has a part
+        for which, values in self._values(t, u, None, laws):
+            for place, mu, ratio in (
+                (SLIDING, self.mu, self.ratio), (STICKING, self.mu_s, self.ratio_s)
+            ):  # fmt: skip
+                first, second = values[:, WIDTH:][:, place].T
+                mu[which] = first
+                ratio[which] = np.where(
+                    first > 0.0, second / np.where(first > 0.0, first, 1.0), 1.0
+                )
+        evaluator.states = states
+
+    def _values(
+        self, t: float, u: Floats, Lam: Floats | None, loops: Sequence[Any]
+    ) -> Iterator[tuple[Integers, Floats]]:
+        """Contacts, by their numbers, with what some loops return."""
         evaluator, s = self.evaluator, self.evaluator.system
         evaluator.place(t, u)
         minus_lambda = np.zeros_like(s.multipliers)
         if Lam is not None:
             minus_lambda[s.row] = -Lam
         arrays = LoopArrays(body=s.body, F=s.F, idx=s.idx, par=s.par, states=s.states)
-        found = np.zeros((self.count, WIDTH))
-        for loop, group, which in self._loops:
-            out = np.zeros(len(which) * WIDTH)
+        for loop, group, which, width in loops:
+            out = np.zeros(len(which) * width)
             call_loop(loop, 0, float(t), arrays, group, out, np.zeros(1), minus_lambda)
-            found[which] = out.reshape(-1, WIDTH)
+            yield which, out.reshape(-1, width)
+
+    def against(self, c: int, way: Floats) -> Floats:
+        """(2,) what friction of a sliding contact acts against, in parts of mu: a unit vector."""
+        if self.ratio[c] == 1.0:
+            return way
+        across = np.array([way[0], self.ratio[c] * way[1]])
+        found: Floats = across * [1.0, self.ratio[c]] / max(float(np.hypot(*across)), 1e-300)
+        return found
+
+    def slip_against(self, c: int, force: Floats) -> Floats:
+        """(2,) the direction in which a contact begins to slip against friction at its limit."""
+        along = -force if self.ratio_s[c] == 1.0 else -force / [1.0, self.ratio_s[c] ** 2]
+        found: Floats = along / length_of(along)
         return found
 
 

@@ -119,12 +119,13 @@ def _impulses(table: ContactTable, rows: ContactRows, contacts: list[int], e: Fl
     of, newton, gapless = e[contacts], table.newton[contacts], table.gapless[contacts]
     b = u.copy()
     b[::3] += np.where(newton, of, 0.0) * np.minimum(u[::3], 0.0)
-    first, _ = solve_cone(A, b, mu, gapless=gapless)
+    ratio = table.ratio[contacts]
+    first, _ = solve_cone(A, b, mu, gapless=gapless, ratio=ratio)
     more = np.where(newton, 0.0, of) * first[::3]  # friction of joints alone has none
     if not more.any():
         return first
     given = np.kron(more, [1.0, 0.0, 0.0])
-    second, _ = solve_cone(A, u + A @ (first + given), mu, more, gapless=gapless)
+    second, _ = solve_cone(A, u + A @ (first + given), mu, more, gapless=gapless, ratio=ratio)
     return first + second + given
 
 

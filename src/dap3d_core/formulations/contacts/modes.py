@@ -192,7 +192,8 @@ def _matrix(
     A, ways = full.copy(), _ways(table, rows, closed, sliding, limit)
     for k, c in enumerate(closed):
         if c in ways and not table.gapless[c]:
-            A[:, 3 * k] -= table.mu[c] * full[:, 3 * k + 1 : 3 * k + 3] @ ways[c]
+            across = full[:, 3 * k + 1 : 3 * k + 3]
+            A[:, 3 * k] -= table.mu[c] * across @ table.against(c, ways[c])
             if A[3 * k, 3 * k] <= 0.0 and not table.alone[c]:
                 raise JamError(table.names[c])
     return A, ways
@@ -211,14 +212,16 @@ def _solve(
             b += load[k] * A[:, 3 * k]
     mu = LOOSE * table.mu[closed] if loose else part * table.mu_s[closed]
     mu[[c in ways for c in closed]] = 0.0
-    x, left = solve_cone(A, b, mu, load, gapless=table.gapless[closed], **more)
+    gapless, ratio = table.gapless[closed], table.ratio_s[closed]
+    x, left = solve_cone(A, b, mu, load, gapless=gapless, ratio=ratio, **more)
     if left > 1e-6 and not more:
         raise JamError(table.names[closed[0]])
     a = A @ x + b
     for k, c in enumerate(closed):
         if c in ways:
             pressing = load[k] if table.gapless[c] else x[3 * k] + load[k]
-            x[3 * k : 3 * k + 3][table.across(c)] = -table.mu[c] * pressing * ways[c]
+            against = table.against(c, ways[c])
+            x[3 * k : 3 * k + 3][table.across(c)] = -table.mu[c] * pressing * against
     return x, a
 
 
@@ -252,7 +255,7 @@ def _put(
             mode, way = 1.0, np.zeros_like(rate[across])
         elif length_of(rate[across]) > ZERO * max(big, _stops(table, rows, c)):
             has_force = table.mu[c] > 0.0 and np.any(force[across])
-            along = -force[across] if has_force else rate[across]
+            along = table.slip_against(c, force[across]) if has_force else rate[across]
             mode, way = 1.0, along / length_of(along)
         else:
             mode, way = 2.0, np.zeros_like(rate[across])

@@ -21,6 +21,8 @@ VELOCITY_KERNELS = (
 )  # fmt: skip
 #: Numbers of a force ``friction`` for the kernel ``friction`` of its joint.
 FRICTION_NUMBERS = ("mu", "v_tol", "radius")
+#: Kernels of contacts that return vectors.
+VECTORS = ("at", "normal", "along", "grain")
 #: Suffixes of a function's value and derivatives.
 DERIVATIVES = ("", "_dot", "_ddot", "_dddot")
 #: The same of a function of two arguments: its partial derivatives.
@@ -67,6 +69,10 @@ class KernelArgument:
     rate_name: str = ""
     motion: str = ""
     derivable: bool = True
+
+
+#: A further name of the kernel ``grip`` of a contact.
+SLIP = {"speed": KernelArgument("speed", (), False, "", doc="of slip, m/s")}
 
 
 def namespace(type_: type[TypeBase], layout: InstanceLayout) -> dict[str, KernelArgument]:

@@ -75,6 +75,8 @@ def bind_functions(
         given.append(one)
     kernels = {n: _with_functions(k, given) for n, k in type_info.kernels.items()}
     outputs, knotted = dict(type_info.outputs), [one for one in given if one.knot_count]
+    if getattr(type_info.type, "is_contact", False):  # arguments are sought: most are of no state
+        knotted = []
     calling = (k for n in CALLING if (k := type_info.kernels.get(n)) and _called(k, knotted))
     if kernel := next(calling, None):
         distances = _distances(kernel, type_info, knotted)
@@ -146,8 +148,10 @@ class _Given:
         known = {n: f"note__(x__, {n})" if noted and self.knot_count else n for n in arguments}
         wanted = parameters(self.function.kernels["value"])
         passed = ", ".join(known.get(n) or self.name(n) for n in wanted)
-        value = f"{self.name('value')}({passed})[{self.calls[call]}]"
-        return f"lambda {', '.join(arguments)}: {value}"
+        value = f"{self.name('value')}({passed})"
+        if not noted:
+            value = f"once__(values__, {self.prefix!r}, ({', '.join(arguments)},), lambda: {value})"
+        return f"lambda {', '.join(arguments)}: {value}[{self.calls[call]}]"
 
 
 def _called(kernel: Callable[..., Any], given: Iterable[_Given]) -> dict[str, _Given]:
@@ -166,6 +170,8 @@ def _with_functions(
     expressions = {n: one.expression(n, noted=noted) for n, one in called.items()}
     numbers: list[str] = []
     names: dict[str, Any] = {"note__": note} if noted else {}
+    if not noted:
+        names["once__"], body = once, f"values__ = {{{{}}}}\n{body}"
     for one in called.values():
         value = one.function.kernels["value"]
         numbers += map(one.name, one.own(parameters(value)))
@@ -203,6 +209,16 @@ def bound_kernel(
     bound.__code__ = bound.__code__.replace(co_qualname=kernel.__qualname__, co_firstlineno=line)
     bound.kernels = (kernel, *names.values())  # wherever they were defined: in a notebook, say
     return bound
+
+
+def once(
+    values: dict[Any, Any], f: str, arguments: tuple[Any, ...], call: Callable[[], Any]
+) -> Any:
+    """What a function f returns for these arguments, called at first: f and f_dot are one call."""
+    key = (f, *map(id, arguments))
+    if key not in values:
+        values[key] = arguments, call()  # kept, so that no other object takes their place
+    return values[key][1]
 
 
 def note(arguments: list[Any], x: Any) -> Any:

@@ -1,6 +1,8 @@
 """The base class of contact types."""
 
 from collections.abc import Callable, Mapping
+from inspect import signature
+from itertools import pairwise
 from typing import Any, ClassVar
 
 from dap3d_core.interface.fields import FieldSpec, choice, field_of, number, slot_of
@@ -9,7 +11,7 @@ from dap3d_core.interface.types import Joint, TypeBase
 #: What authors define.
 DECLARED = ("gap", "normal")
 #: What they may define besides.
-OPTIONAL = ("at", "reach", "along")
+OPTIONAL = ("at", "reach", "along", "grip", "grain")
 #: Fields that a material gives.
 MATERIAL = ("mu", "mu_s", "e", "law")
 #: Values of ``law``.
@@ -42,6 +44,12 @@ class Contact(Joint):
     Without ``at`` the gap is an angle, m being rad, and the normal the axis of a moment on body i,
     which alone acts: the rate of the gap is the angular velocity of body i less that of body j
     along it.
+
+    A law of friction other than mu and mu_s is ``grip``: the coefficient at a ``speed`` of slip,
+    m/s, which it may name besides what the others may; continuous, also a little below zero. What
+    sticks holds up to that of no speed. Two coefficients are along ``grain``, a vector of the
+    position level, and across it: friction is within the ellipse of both. It has fields mu and mu_s
+    if it names them.
 
     Dry friction of a size of its own, as of seals, has no gap and no normal, but ``along``: the
     unit vector that body i slides along at the point ``at``, or without that turns about.
@@ -86,6 +94,7 @@ class Contact(Joint):
     holds: ClassVar[tuple[bool, bool, bool]] = (True, True, True)
     at: ClassVar[Any] = None
     along: ClassVar[Any] = None
+    grip: ClassVar[Any] = None
     normal: ClassVar[Any] = None
 
     def __init_subclass__(cls, of: type[TypeBase] | None = None, **conditions: Any) -> None:
@@ -153,6 +162,9 @@ def _add_material(class_: type) -> None:
         fields |= {} if alone else {"e": e}
         if class_.load and class_.at is None:  # type: ignore[attr-defined]
             fields["radius"] = hidden(1.0)
+    if class_.grip is not None:  # type: ignore[attr-defined]
+        unread = {"mu", "mu_s"} - set(signature(class_.grip).parameters)  # type: ignore[attr-defined]
+        fields |= {name: hidden(0.0) for name in unread}
     fields |= {name: hidden(value) for name, value in HIDDEN.items()}
     _add_fields(class_, fields)
 
@@ -210,24 +222,8 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     names_of = [n for n in (*DECLARED, *OPTIONAL) if getattr(class_, n, None) is not None]
     declared = {name: getattr(class_, name) for name in names_of}
     specs = _specs(class_)
-    kinds = {name: spec.kind for name, spec in specs.items()}
     has_j = any(slot_of(name) == "j" or spec.kind == "vector2" for name, spec in specs.items())
-    calls, wanted = {}, {}
-    for short, name in {"gap": "gap", "c": "at", "n": "normal", "e": "along"}.items():
-        if name not in declared:
-            continue
-        names = parameters(declared[name])
-        changes = [_rate_name(n, kinds) for n in names]
-        calls[short] = f"{name}__({', '.join(names)})"
-        calls[f"{short}_dot"] = f"rate_of__({name}__, ({_list(names)}), ({_list(changes)}))"
-        wanted[short] = list(names)
-        found = [c.removeprefix("turned__(").split(",")[0] for c in changes]
-        wanted[f"{short}_dot"] = [*names, *(c for c in found if c not in ("None", "1.0"))]
-    if "reach" in declared:
-        wanted["reach"] = list(parameters(declared["reach"]))
-        calls["reach"] = f"reach__({', '.join(wanted['reach'])})"
-    else:
-        calls["reach"] = "1.0"
+    calls, wanted = _expressions(declared, specs)
     if not has_j:
         calls |= dict.fromkeys(("r_j", "v_j", "w_j"), "(0.0, 0.0, 0.0)")
     kernels = {f"{name}__": kernel for name, kernel in declared.items()}
@@ -253,8 +249,63 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
         "friction": bound(rows.friction if has_j else rows.friction_of_one),
         "switch": bound(rows.switch),
         "rate": rows.rate,
-        "tension": bound(rows.output),
+        "tension": bound(rows.output_with_law if "grip" in declared else rows.output),
     }
+
+
+def _expressions(
+    declared: Mapping[str, Callable[..., Any]], specs: Mapping[str, FieldSpec]
+) -> tuple[dict[str, str], dict[str, list[str]]]:
+    """Expressions for parameters of kernels, by what authors declare, and the names in each."""
+    from dap3d_core.interface.codegen.kernel_arguments import parameters
+
+    kinds, slopes = {name: spec.kind for name, spec in specs.items()}, _slopes(specs)
+    calls, wanted = dict[str, str](), dict[str, list[str]]()
+    shorts = {"gap": "gap", "c": "at", "n": "normal", "e": "along", "grain": "grain"}
+    for short, name in shorts.items():
+        if name not in declared:
+            continue
+        names = parameters(declared[name])
+        changes = [slopes.get(n) or _rate_name(n, kinds) for n in names]
+        calls[short] = f"{name}__({', '.join(names)})"
+        calls[f"{short}_dot"] = f"rate_of__({name}__, ({_list(names)}), ({_list(changes)}))"
+        wanted[short] = list(names)
+        found = [c.removeprefix("turned__(").strip("(,)").split(", ") for c in changes]
+        of_rates = [n for c in found for n in c if n not in ("None", "1.0", "") and n not in names]
+        wanted[f"{short}_dot"] = [*names, *of_rates]
+    if "reach" in declared:
+        wanted["reach"] = list(parameters(declared["reach"]))
+        calls["reach"] = f"reach__({', '.join(wanted['reach'])})"
+    else:
+        calls["reach"] = "1.0"
+    if "grain" not in declared:
+        calls |= {"grain": "None", "grain_dot": "None"}
+    if "grip" in declared:
+        given = parameters(declared["grip"])
+        wanted["grip"] = wanted["hold"] = [name for name in given if name != "speed"]
+        calls["grip"] = f"lambda speed: grip__({', '.join(given)})"
+        calls["hold"] = f"grip__({', '.join('0.0' if n == 'speed' else n for n in given)})"
+    else:
+        wanted |= {"grip": ["mu"], "hold": ["mu_s"]}
+        calls |= {"grip": "lambda speed: mu", "hold": "mu_s"}
+    return calls, wanted
+
+
+def _slopes(specs: Mapping[str, FieldSpec]) -> dict[str, str]:
+    """Names of functions that kernels call -> their partial derivatives, by name."""
+    found: dict[str, str] = {}
+    for name, spec in specs.items():
+        if spec.kind != "function" or not spec.argument:
+            continue
+        f = "f" if name == "function" else name
+        if spec.arguments == 1:
+            orders = [f"{f}{suffix}" for suffix in ("", "_dot", "_ddot", "_dddot")]
+            found |= {a: f"({b},)" for a, b in pairwise(orders)} | {orders[-1]: "()"}
+        else:
+            found |= {f: f"({f}_x, {f}_y)", f"{f}_x": f"({f}_xx, {f}_xy)"}
+            found |= {f"{f}_y": f"({f}_xy, {f}_yy)"}
+            found |= {f"{f}_{which}": "()" for which in ("xx", "xy", "yy")}
+    return found
 
 
 def _list(words: Any) -> str:

@@ -8,10 +8,25 @@ has its rate. Branches are those of the values.
 # Kernels take numbers of any kind: floats, and symbols of a trace.
 # mypy: disable-error-code="no-untyped-def, no-untyped-call"
 
+import math
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.kernels import acos, asin, atan, cos, exp, log, matmul, sin, skew, sqrt, tan, where
+from dap3d_core.kernels import (
+    acos,
+    asin,
+    atan,
+    atan2,
+    cos,
+    exp,
+    log,
+    matmul,
+    sin,
+    skew,
+    sqrt,
+    tan,
+    where,
+)
 
 
 class _RateFunctions:
@@ -45,6 +60,11 @@ class _RateFunctions:
     def atan(self, x):
         """The angle of a tangent."""
         return Rate(atan(x.value), x.rate / (1.0 + x.value * x.value))
+
+    def atan2(self, y, x):
+        """The angle of a point (x, y)."""
+        (v, g), (w, h) = _parts(y), _parts(x)
+        return Rate(atan2(v, w), (w * g - v * h) / (v * v + w * w))
 
     def asin(self, x):
         """The angle of a sine."""
@@ -89,6 +109,16 @@ class Rate:
 
     def __init__(self, value, rate):
         self.value, self.rate = value, rate
+
+    @property
+    def plain(self):
+        """The number without its rate."""
+        return self.value
+
+    @staticmethod
+    def constant(value):
+        """A number that does not change."""
+        return Rate(value, 0.0)
 
     def __add__(self, other):
         v, g = _parts(other)
@@ -148,10 +178,23 @@ def turned(w, A):
 
 
 def _paired(value: Any, rate: Any) -> Any:
+    if callable(value):
+        return _function_of_rates(value, rate)
     if isinstance(value, tuple):
         rates = (None,) * len(value) if rate is None else rate
         return tuple(_paired(v, g) for v, g in zip(value, rates, strict=True))
     return Rate(value, 0.0 if rate is None else rate)
+
+
+def _function_of_rates(f: Callable[..., Any], slopes: Any) -> Callable[..., Any]:
+    """A function of the scene, for numbers with rates; slopes: its partial derivatives."""
+
+    def function(*x: Any) -> Any:
+        at, changes = zip(*map(_parts, x), strict=True)
+        terms = [slope(*at) * g for slope, g in zip(slopes, changes, strict=True)] if slopes else []
+        return Rate(f(*at), sum(terms[1:], terms[0]) if terms else math.nan)
+
+    return function
 
 
 def _rates(value: Any) -> Any:

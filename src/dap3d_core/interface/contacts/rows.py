@@ -15,6 +15,8 @@ from dap3d_core.kernels import add, cross, dot, neg, row, scale, sqrt, sub, wher
 OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0
 #: Speed, m/s, below which friction points against the direction in which sliding began.
 STILL = 1e-8
+#: The same of friction in an ellipse, which turns slip all the way to its end.
+STILL_IN_ELLIPSE = 1e-10
 #: Gap, m, of what does not touch as its surfaces end before.
 APART = 1.0
 _ZERO = (0.0, 0.0, 0.0)
@@ -45,16 +47,20 @@ def axis(n):
     return where(first, (1.0, 0.0, 0.0), where(y <= z, (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
 
 
-def tangents(n):
-    """Two unit vectors across a normal."""
-    a = cross(n, axis(n))
+def tangents(n, grain=None):
+    """Two unit vectors across a normal, the first along a grain; None: any two."""
+    a = cross(n, axis(n)) if grain is None else across(grain, n)
     first = scale(1.0 / sqrt(dot(a, a)), a)
     return first, cross(n, first)
 
 
-def tangent_rates(n, n_dot):
+def tangent_rates(n, n_dot, grain=None, grain_dot=None):
     """Rates of ``tangents``."""
-    a, a_dot = cross(n, axis(n)), cross(n_dot, axis(n))
+    if grain is None:
+        a, a_dot = cross(n, axis(n)), cross(n_dot, axis(n))
+    else:
+        a, turn = across(grain, n), dot(grain_dot, n) + dot(grain, n_dot)
+        a_dot = sub(sub(grain_dot, scale(turn, n)), scale(dot(grain, n), n_dot))
     size = sqrt(dot(a, a))
     first = scale(1.0 / size, a)
     first_dot = scale(1.0 / size, sub(a_dot, scale(dot(first, a_dot), first)))
@@ -66,9 +72,9 @@ def position(gap, mode):
     return where(closed(mode), gap, 0.0)
 
 
-def blocks(c, n, r_i, r_j, mode):
+def blocks(c, n, grain, r_i, r_j, mode):
     """J of both bodies."""
-    first, second = tangents(n)
+    first, second = tangents(n, grain)
     directions = (
         where(closed(mode), n, _ZERO),
         where(held(mode), first, _ZERO),
@@ -81,9 +87,9 @@ def blocks(c, n, r_i, r_j, mode):
     )
 
 
-def block(c, n, r_i, mode):
+def block(c, n, grain, r_i, mode):
     """J of a contact of one body with ground."""
-    return blocks(c, n, r_i, _ZERO, mode)[0]
+    return blocks(c, n, grain, r_i, _ZERO, mode)[0]
 
 
 def slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j):
@@ -92,12 +98,12 @@ def slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j):
     return sub(of_i, add(v_j, cross(w_j, sub(c, r_j))))
 
 
-def gamma(c, c_dot, n, n_dot, r_i, v_i, w_i, r_j, v_j, w_j, mode):
+def gamma(c, c_dot, n, n_dot, grain, grain_dot, r_i, v_i, w_i, r_j, v_j, w_j, mode):
     """-J_dot v, for a point of contact and a normal that move."""
     slip = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
     bent = sub(cross(w_i, sub(c_dot, v_i)), cross(w_j, sub(c_dot, v_j)))
-    first, second = tangents(n)
-    first_dot, second_dot = tangent_rates(n, n_dot)
+    first, second = tangents(n, grain)
+    first_dot, second_dot = tangent_rates(n, n_dot, grain, grain_dot)
     pairs = (n, n_dot), (first, first_dot), (second, second_dot)
     values = tuple(-dot(e_dot, slip) - dot(e, bent) for e, e_dot in pairs)
     return (
@@ -112,34 +118,59 @@ def across(vector, n):
     return sub(vector, scale(dot(vector, n), n))
 
 
-def direction(slip, n, way):
+def direction(slip, n, way, still=STILL):
     """Unit vector of sliding; through zero it goes on as it was, so that no step sees a jump.
 
-    Of slow slip that in which sliding began has a part, of (STILL / |u|)^3 soon: slip that turns
+    Of slow slip that in which sliding began has a part, of (still / |u|)^3 soon: slip that turns
     while it is next to nothing would ask for steps as short as that.
     """
     u, w = across(slip, n), across(way, n)
     square, length = dot(u, u), sqrt(dot(w, w))
     w = scale(1.0 / where(length > 0.0, length, 1.0), w)
     back = where(dot(u, w) < 0.0, dot(u, w), 0.0)
-    u = add(u, scale(STILL**3 / (STILL * STILL + square) - 2.0 * back, w))
+    u = add(u, scale(still**3 / (still * still + square) - 2.0 * back, w))
     size = sqrt(dot(u, u))
     return scale(1.0 / where(size > 0.0, size, 1.0), u)
 
 
-def forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):
+def sliding(u, n, grain, grip, way):
+    """Direction of a slip u, and the coefficients there.
+
+    The speed is that in this direction: less than zero beyond the end of a slip.
+    """
+    d = direction(u, n, way, STILL if grain is None else STILL_IN_ELLIPSE)
+    return d, grip(dot(across(u, n), d))
+
+
+def resistance(normal, d, frame, mu):
+    """Sliding friction against a direction d, of two coefficients within an ellipse."""
+    if not isinstance(mu, tuple):
+        return scale(-mu * normal, d)
+    parts = [k * k * dot(d, e) for k, e in zip(mu, frame, strict=True)]
+    square = parts[0] * dot(d, frame[0]) + parts[1] * dot(d, frame[1])
+    size = sqrt(where(square > 0.0, square, 1.0))
+    return scale(-normal / size, add(scale(parts[0], frame[0]), scale(parts[1], frame[1])))
+
+
+def forces(c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, near):
     """Normal force, friction on body i (3), both with what ``near`` gives."""
-    first, second = tangents(n)
+    first, second = frame = tangents(n, grain)
     normal = where(closed(mode), lam[0] + dot(near, n), 0.0)
-    slides = scale(-mu * normal, direction(slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j), n, way))
+    u = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
+    d, mu = sliding(u, n, grain, grip, way)
+    if isinstance(mu, tuple) and (grain is None or len(mu) != 2):
+        raise ValueError(
+            "grip should return one coefficient, or those along a vector grain and across it"
+        )
+    slides = resistance(normal, d, frame, mu)
     sticks = add(add(scale(lam[1], first), scale(lam[2], second)), across(near, n))
     friction = where(held(mode), sticks, where(closed(mode), slides, _ZERO))
     return normal, friction
 
 
-def friction(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):
+def friction(c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, near):
     """What acts besides the rows: sliding friction, and ``near``."""
-    _, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
+    _, tangential = forces(c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, near)
     slides = where(held(mode), across(near, n), tangential)
     force = add(where(closed(mode), scale(dot(near, n), n), _ZERO),
                 where(closed(mode), slides, _ZERO))  # fmt: skip
@@ -149,17 +180,25 @@ def friction(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):
     )
 
 
-def friction_of_one(c, n, r_i, v_i, w_i, lam, mu, mode, way, near):
+def friction_of_one(c, n, grain, r_i, v_i, w_i, lam, grip, mode, way, near):
     """The same of a contact of one body with ground."""
-    return friction(c, n, r_i, v_i, w_i, _ZERO, _ZERO, _ZERO, lam, mu, mode, way, near)[0]
+    other = _ZERO, _ZERO, _ZERO
+    return friction(c, n, grain, r_i, v_i, w_i, *other, lam, grip, mode, way, near)[0]
 
 
-def switch(gap, reach, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mu_s, mode, way, near):
+def switch(gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near):
     """What ends a mode where it is negative: gap; force, reach; slip, rest of a cone."""
-    normal, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
+    normal, tangential = forces(
+        c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, near
+    )
     slip = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
+    mu, mu_s, held_by = pair(grip(0.0))[0], pair(hold)[0], tangential
+    if isinstance(hold, tuple):  # an ellipse, stretched to a circle
+        first, second = tangents(n, grain)
+        part = hold[0] / where(hold[1] > 0.0, hold[1], 1.0)
+        held_by = (dot(tangential, first), part * dot(tangential, second), 0.0)
     slides = where(mu > 0.0, dot(slip, across(way, n)), 1.0)
-    sticks = where(mu_s > 0.0, mu_s * normal - sqrt(dot(tangential, tangential)), 1.0)
+    sticks = where(mu_s > 0.0, mu_s * normal - sqrt(dot(held_by, held_by)), 1.0)
     return (
         where(
             closed(mode),
@@ -175,11 +214,30 @@ def rate(mode, way, near):
     return 0.0, _ZERO, _ZERO
 
 
-def output(gap, reach, c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near):
+def output(gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, near):
     """Of results: gap, normal force, friction on body i (3), slip (3), point of contact (3), reach,
     force on body i (3).
     """
-    normal, tangential = forces(c, n, r_i, v_i, w_i, r_j, v_j, w_j, lam, mu, mode, way, near)
+    normal, tangential = forces(
+        c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, near
+    )
     slip = across(slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j), n)
     force = add(scale(normal, n), tangential)
     return (gap, normal, *tangential, *slip, *c, reach, *force)
+
+
+def pair(mu):
+    """Coefficients along two tangents."""
+    return mu if isinstance(mu, tuple) else (mu, mu)
+
+
+def output_with_law(
+    gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hold, mode, way, near
+):
+    """The same, and coefficients along both tangents where it slides so, and where it sticks."""
+    u = slip_of(c, r_i, v_i, w_i, r_j, v_j, w_j)
+    _, mu = sliding(u, n, grain, grip, way)
+    known = output(
+        gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, mode, way, near
+    )
+    return (*known, *pair(mu), *pair(hold))

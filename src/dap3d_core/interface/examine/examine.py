@@ -26,7 +26,9 @@ from dap3d_core.interface.codegen.instance_layout import (
 )
 from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, jump_names, row_count
 from dap3d_core.interface.codegen.kernel_arguments import (
+    SLIP,
     VALUES,
+    VECTORS,
     VELOCITY_KERNELS,
     KernelArgument,
     friction_names,
@@ -128,7 +130,7 @@ def _further_names(
         return friction_names(type_.rows)
     if kernel in JUMP_KINDS:
         return jump_names(type_.kind, kernel, outputs, slots)
-    return reaction_names(type_) if kernel in READING else {}
+    return reaction_names(type_) if kernel in READING else SLIP if kernel == "grip" else {}
 
 
 def _declares_states(type_: type[TypeBase], *, is_abstract: bool) -> bool:
@@ -461,10 +463,7 @@ def _check_jumps(type_: type[TypeBase], outputs: Mapping[str, Sequence[str]], sl
 def _expected(
     type_: type[TypeBase], kernel: str, value: Any, rows: int = 0
 ) -> tuple[tuple[int, ...], str]:
-    """The shape that a kernel should return, and its description for messages.
-
-    rows: of J, where ``impulse`` of a force gives the change of J v.
-    """
+    """The shape that a kernel should return, and words for it; rows: of J, for ``impulse``."""
     slots = len(body_slots(type_))
     if kernel == "impulse":
         if rows and type_.kind == "force":
@@ -473,7 +472,7 @@ def _expected(
     if kernel == "J" and type_.kind == "force":
         count = max(1, size(checked_shape(value)) // (6 * slots))
         return (slots, count, 6), f"a block of rows x 6 for each of {slots} bodies"
-    if kernel in ("switch", "tension"):
+    if kernel in ("switch", "tension", "grip"):
         shape = (len(value),) if isinstance(value, tuple) and value else ()
         return shape, "one number, or a tuple of numbers"
     if kernel in ("wrench", "friction"):
@@ -482,7 +481,7 @@ def _expected(
         shape, words = VALUES[type_.arguments]
         return shape if isinstance(value, (tuple, list)) else (), words
     if not issubclass(type_, Joint) or kernel in type_.declared:  # of contacts
-        return ((3,), "3 numbers") if kernel in ("at", "normal", "along") else ((), "one number")
+        return ((3,), "3 numbers") if kernel in VECTORS else ((), "one number")
     if kernel == "G":
         n, k = len(type_.position_rows()), len(unknown_names(type_))
         return (n, k), f"{n} rows of the derivatives of C by its {k} unknowns"

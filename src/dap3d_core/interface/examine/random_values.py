@@ -5,7 +5,11 @@ import random
 from typing import Any
 
 from dap3d_core.interface.body_pose import BodyPose, pose
-from dap3d_core.interface.codegen.kernel_arguments import SEVERAL, KernelArgument
+from dap3d_core.interface.codegen.kernel_arguments import (
+    PARTIALS,
+    SEVERAL,
+    KernelArgument,
+)
 from dap3d_core.interface.fields import FieldSpec
 
 
@@ -43,12 +47,21 @@ def random_quantity(quantity: KernelArgument, rng: random.Random) -> Any:
     if quantity.derivative == SEVERAL:
         return tuple(_random_line(rng) for _ in range(3))
     if quantity.derivative >= 0:
-        a, b = rng.uniform(0.5, 1.5), rng.uniform(0.5, 1.5)
-        return (lambda x, y: a + b * (x + y)) if quantity.arguments > 1 else lambda x: a + b * x
+        return _known_function(quantity)
     if quantity.columns:
         rows = [(float(k), *numbers(rng, quantity.columns - 1)) for k in range(3)]
         return [x for row in rows for x in row], 0, len(rows), (0.0,) * quantity.columns
     return random_value(quantity.shape, rng)
+
+
+def _known_function(quantity: KernelArgument) -> Any:
+    """A function, or the derivative of it that is wanted: kernels may solve equations of both."""
+    size, order = 1.0 + 0.05 * (ord(quantity.name[0]) % 7), quantity.derivative
+    if quantity.arguments == 1:
+        return lambda x: size * 0.25**order * math.exp(0.25 * x)
+    which = PARTIALS[order]
+    size *= 0.25 ** which.count("x") * 0.2 ** which.count("y")
+    return lambda x, y: size * math.exp(0.25 * x + 0.2 * y)
 
 
 def _random_line(rng: random.Random) -> Any:

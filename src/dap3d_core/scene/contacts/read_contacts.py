@@ -19,6 +19,9 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.types import Types
 from dap3d_core.scene.validate.validated_scene import Instance
 
+#: Stands for fields of a type that is not known.
+_ANY = FieldSpec("number", None)
+
 
 def read_contacts(
     report: Collector, geometry: Geometry, types: Types, functions: Sequence[Instance],
@@ -31,12 +34,12 @@ def read_contacts(
     for name in elements.keys() & report.scene.joints.keys():
         what = "is the name of a joint as well; results know both by their names"
         report.add(("contacts", name), MISSING, what, remedy="rename one of them")
-    elements = {name: _with_material(report, e) for name, e in elements.items()}
+    elements = {name: _with_material(report, types, e) for name, e in elements.items()}
     found = []
     for one in read_elements(report, geometry, "contacts", types, functions, elements):
         count: int = one.type_info.type.points  # type: ignore[attr-defined]
         smooth = one.type_info.type.is_smooth  # type: ignore[attr-defined]
-        given = one.values | (SMOOTH if smooth else {}) | HIDDEN
+        given = {"mu": 0.0, "mu_s": 0.0} | one.values | (SMOOTH if smooth else {}) | HIDDEN
         if given["touch"] and count > 1:
             what = f"cannot be: a {one.type_info.type.keyword} may touch at {count} points"
             remedy = "place its bodies so that they touch, or add a contact of the point that does"
@@ -141,7 +144,7 @@ def _examined(grip: Any) -> TypeInfo:
     return examine(grip)
 
 
-def _with_material(report: Collector, element: Element) -> Element:
+def _with_material(report: Collector, types: Types, element: Element) -> Element:
     """A contact with the fields that its material gives, and it does not."""
     fields: dict[str, Any] = dict(element.fields)
     if "material" not in fields:
@@ -152,6 +155,8 @@ def _with_material(report: Collector, element: Element) -> Element:
         what, near, remedy = missing_words(report, "material", name, materials)
         report.add(("contacts", element.name, "material"), name, what, near, remedy)
         return attrs.evolve(element, fields=fields)
-    given = {field: getattr(material, field) for field in MATERIAL}
+    known = types.known("contact", element.type)
+    own = specs_of(known.type) if known else {}  # of another law of friction perhaps without mu
+    given = {field: getattr(material, field) for field in MATERIAL if own.get(field, _ANY).given}
     given = {field: value for field, value in given.items() if value is not None}
     return attrs.evolve(element, fields=given | fields)

@@ -271,8 +271,7 @@ class ContactJumps(Jumps):
             touching: gap, m, below which contacts touch.
         """
         evaluator, table, t = self._evaluator, self.table, integration.t
-        u = self._state_of(integration)
-        before = evaluator.states[table.mode].copy()
+        u, before = self._state_of(integration), evaluator.states[table.mode].copy()
         outputs = self._outputs(t, u)
         rows = ContactRows(table, t, u)
         # of those that hold what ends is the force, or the reach of their surfaces
@@ -288,6 +287,7 @@ class ContactJumps(Jumps):
         sliding, leaving, stopped = self._what_ended(rows, outputs, before, ended)
         closed = self._movable(rows, closed)
         impact = collide(table, rows, closed, evaluator.model.length)
+        table.find_grips(t, rows.with_velocities(rows.v))
         try:
             modes = find_modes(table, rows, closed, sliding, leaving)
         except JamError as error:
@@ -333,6 +333,7 @@ class ContactJumps(Jumps):
     def _outputs(self, t: float, u: Floats) -> Floats:
         evaluator = self._evaluator
         report = evaluator.report(t, u)
+        self.table.find_grips(t, u)
         return self.table.outputs(t, u, report[evaluator.model.report_layout["Lam"]])
 
     def _what_ended(
@@ -349,7 +350,7 @@ class ContactJumps(Jumps):
                 force = rows.frames[c, self.table.across(c)] @ outputs[c, FRICTION]
                 size = length_of(force)
                 if size > 0.0:
-                    sliding[c] = -force / size
+                    sliding[c] = self.table.slip_against(c, force)
             elif (
                 length_of(rows.slip[c, self.table.across(c)])
                 < STOPPED * self._evaluator.model.length
@@ -367,6 +368,7 @@ class ContactJumps(Jumps):
         decided, table, evaluator = self.decided, self.table, self._evaluator
         assert decided is not None
         u = self._state_of(integration)
+        table.find_grips(integration.t, u)
         rows, states = ContactRows(table, integration.t, u), evaluator.states.copy()
         for c in decided.stopped:
             self._stop(rows, c)

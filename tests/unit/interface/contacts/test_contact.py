@@ -8,7 +8,21 @@ import dap3d_core as dap
 from dap3d_contacts.box_box import BoxBox, part_of
 from dap3d_core.interface import Contact, PluginError, Point, examine, number, point
 from dap3d_core.interface.contacts.rates import rate_of
-from dap3d_core.kernels import acos, asin, atan, cos, exp, log, scale, sin, sqrt, tan, where
+from dap3d_core.kernels import (
+    acos,
+    asin,
+    atan,
+    atan2,
+    cos,
+    exp,
+    log,
+    root,
+    scale,
+    sin,
+    sqrt,
+    tan,
+    where,
+)
 from dap3d_core.testing.kit import checks_for
 
 
@@ -77,6 +91,28 @@ def test_rates_of_functions(function, slope):
     x, rate = 0.3, 2.0
     assert rate_of(function, (x,), (rate,)) == pytest.approx(rate * slope(x), rel=1e-14)
     assert rate_of(function, (x,), (None,)) == 0.0
+
+
+def test_rates_of_an_angle_and_of_functions_of_the_scene():
+    x, y, x_dot, y_dot = 0.3, -0.7, 2.0, 0.5
+    rate = (x * y_dot - y * x_dot) / (x * x + y * y)
+    assert rate_of(atan2, (y, x), (y_dot, x_dot)) == pytest.approx(rate, rel=1e-14)
+    values = (lambda a, b: a * a * b), x, y
+    slopes = (lambda a, b: 2.0 * a * b), (lambda a, b: a * a)
+    rates = slopes, x_dot, y_dot
+    found = rate_of(lambda f, a, b: f(a, b), values, rates)
+    assert found == pytest.approx(2.0 * x * y * x_dot + x * x * y_dot, rel=1e-14)
+
+
+def test_rates_of_what_is_sought_follow_from_its_equation():
+    """s^3 + s = x: s_dot = x_dot / (3 s^2 + 1)."""
+
+    def sought(x):
+        return root((x,), lambda s: (s**3 + s - x,), lambda s: ((3.0 * s * s + 1.0,),))[0]
+
+    (s,), (s_dot,) = sought(0.9), rate_of(sought, (0.9,), (2.0,))
+    assert s**3 + s == pytest.approx(0.9, rel=1e-15)
+    assert s_dot == pytest.approx(2.0 / (3.0 * s * s + 1.0), rel=1e-14)
 
 
 @pytest.mark.every(4)
