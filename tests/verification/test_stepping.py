@@ -250,6 +250,35 @@ def test_joints_hold_while_shapes_touch():
     assert np.abs(smooth.reaction("J")["i"].force[-1]).max() < 1e-3
 
 
+def leg(**limits):
+    """A trunk on a link of a thousandth of its foot, which lands beside its centre."""
+    scene = dap.Scene(name="leg")
+    for name, mass, z in (("trunk", 8.0, 0.51), ("link", 1e-3, 0.11), ("foot", 1.0, 0.07)):
+        Jp = [2e-3 * mass] * 3
+        scene.add_body(name, mass=mass, Jp=Jp, r=[0.0, 0.0, z], r_dot=[0.0, 0.0, -2.0])
+    at = [0.1, 0.03, -0.03]
+    scene.add_shape("sphere", body="foot", radius=0.03, at=at, collides=True)
+    for i, j, axis, length in (("link", "trunk", "x", 0.4), ("foot", "link", "y", 0.04)):
+        scene.add_point(f"of_{i}", j, [0.0, 0.0, -length])
+        scene.add_joint("rev", f"at_{i}", P_i=f"{i}.O", P_j=f"of_{i}", a_i=f"{i}.{axis}",
+                        a_j=f"{j}.{axis}", **limits)  # fmt: skip
+    return collide(scene, mu=1.0)
+
+
+def test_limits_that_are_far_away_change_nothing():
+    """Beside them the joints' rows are solved by another method, to the residual of a step.
+
+    Impulses have 1e-6 of the largest one then (1 N s by 1 kg); a projection adds nothing to that.
+    """
+    settings = {"t_end": 0.05, "dt": 0.01, "contact_step": 1e-3}
+    free, limited = (
+        dap.simulate(leg(**limits), **settings) for limits in ({}, {"lower": -3.0, "upper": 3.0})
+    )
+    assert np.abs(free.w[-1]).max() > 1.0  # it has landed, and turns
+    assert (free.method, limited.method) == ("standard", "lsq")
+    assert limited.u == pytest.approx(free.u, rel=0, abs=1e-6)
+
+
 def test_stiff_dampers_do_not_explode():
     """A damper of 1e4 N s/m stops 1 kg within 0.1 ms, a tenth of a step, after v m / c."""
     scene, c = dap.Scene(name="damped"), 1e4

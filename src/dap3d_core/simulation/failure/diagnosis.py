@@ -103,6 +103,7 @@ def _without_direction(evaluator: Evaluator, t: float, y: Floats) -> str:
     rows = evaluator.rows(t, evaluator.hold(y))
     size = np.bincount(rows.row, np.abs(rows.value), minlength=rows.shape[0])
     zero = np.flatnonzero(size == 0.0)
+    zero = zero[zero < evaluator.model.joint_row_count]  # those of an open contact are zero
     if not len(zero):
         return ""
     return f"the gradient of a row of joint {evaluator.model.row_owner(int(zero[0]))} is zero"
