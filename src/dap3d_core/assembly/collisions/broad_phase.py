@@ -6,6 +6,8 @@ from dap3d_core.kernels.runtime.cache import compiled
 
 #: Part of the shapes that fit into a cell.
 FIT = 0.95
+#: The last cell along an axis, which all farther ones share.
+LAST = 1e9
 
 
 @compiled
@@ -108,7 +110,8 @@ def fill_cells(s: PlacedShapes) -> tuple[int, int]:
         for k in range(small):
             least = min(least, s.centre[s.small[k], c])
         for k in range(small):
-            s.cells[k, c] = 1 + int((s.centre[s.small[k], c] - least) / (2.0 * fit))
+            cell = (s.centre[s.small[k], c] - least) / (2.0 * fit)
+            s.cells[k, c] = 1 + int(min(cell, LAST))
     for k in range(2 * small + 1):
         s.head[k] = -1
     for a in range(small):

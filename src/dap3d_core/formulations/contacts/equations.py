@@ -40,6 +40,7 @@ from dap3d_core.assembly.evaluate import (
     state_rates,
     zero,
 )
+from dap3d_core.assembly.state_update import size_of_positions, size_of_velocities
 from dap3d_core.formulations.common import constraints
 from dap3d_core.formulations.common.constraints import (
     factorise,
@@ -431,8 +432,8 @@ def project(t: float, y: Floats, out: Floats, system: System, loops: Any) -> Non
     not get there: it goes on with the compliance of lsq.py, as no multipliers are read here.
     """
     project_onto(t, y, out, system, loops, constraints, PART, True, True)
-    most_c = REACHED * system.settings[TOLERANCE_C] * constraints.size_of_positions(y, system)
-    most_v = REACHED * system.settings[TOLERANCE_V] * constraints.size_of_velocities(y, system)
+    most_c = REACHED * system.settings[TOLERANCE_C] * size_of_positions(y, system)
+    most_v = REACHED * system.settings[TOLERANCE_V] * size_of_velocities(y, system)
     if out[1] == 1.0 or out[2] > most_c or out[3] > most_v:
         out[0] = 0.0
         project_onto(t, y, out, system, loops, constraints, constraints.PART, True, False)

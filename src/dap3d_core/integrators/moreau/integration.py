@@ -19,6 +19,7 @@ import numpy as np
 
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.moreau.arrays import all_room, grown
+from dap3d_core.integrators.moreau.free_motion import MOST_PARTS, PART
 from dap3d_core.integrators.moreau.problem import arrays_of
 from dap3d_core.integrators.moreau.step import advance
 from dap3d_core.integrators.stepping.integration import Integration
@@ -135,6 +136,18 @@ class MoreauIntegration(Integration):
             raise ValueError("contacts: they are of other shapes")
         self._contact_rows = [found]
         return found
+
+    @property
+    def too_fast(self) -> str:
+        """As of ``Integration``."""
+        rate, h = float(self.work.rate), float(self._arrays.h)
+        if not h * rate > PART * MOST_PARTS:
+            return ""
+        return (
+            f"forces change motion at {rate:.2g} 1/s there, and a step of {h:g} s follows "
+            f"{PART * MOST_PARTS / h:.2g} 1/s; let a joint do what so stiff a spring or damper "
+            "does, give a shorter contact_step, or make it less stiff"
+        )
 
     @property
     def dy_dt(self) -> Floats | None:

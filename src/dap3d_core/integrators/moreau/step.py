@@ -297,6 +297,8 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     for b in range(s.margin.size):
         s.margin[b] = margin
     for _ in range(PASSES):
+        if not all_finite(trial):  # ``finish`` says so
+            break
         if not find_contacts(s.t1, trial, 2.0 * margin, s, system, loops):
             return False
         deepest = deepest_of(s)

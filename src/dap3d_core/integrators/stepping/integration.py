@@ -339,6 +339,11 @@ class Integration(Restorable):
         return float(self.work.t_stop)
 
     @property
+    def too_fast(self) -> str:
+        """In words, what its steps cannot follow, which makes numbers overflow; "" for nothing."""
+        return ""
+
+    @property
     def dy_dt(self) -> Floats | None:
         """(n,) dy/dt at ``t``, a copy; None where it is not known."""
         if self.work.first_stage_valid == 0:

@@ -183,7 +183,8 @@ def _fault_of(evaluator: Evaluator, q: int, k: int, kind: str, group: Group, t: 
     if kind == "rate":
         joint_outs[kind] = (s.multipliers,) * 3
     if kind == "switch":
-        joint_outs[kind] = np.zeros(len(group.type_info.outputs[kind])), np.zeros(1), np.zeros(1)
+        found = np.zeros(len(group.type_info.outputs[kind]))
+        joint_outs[kind] = found, np.zeros(1), s.multipliers
     outs = joint_outs.get(kind, (s.force, s.force, s.force))
     i0, p0, _ = s.groups[q]
     i1, p1 = i0 + k * stride(group.type_info), p0 + k * group.type_info.layout.par_width

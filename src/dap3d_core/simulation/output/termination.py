@@ -68,7 +68,7 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
         return f"{message}. {describe_stall(evaluator, integration)}"
     culprit = jammed_forces(evaluator, t, y) or find_offender(evaluator, t, y, t_stop)
     if not culprit and integration.status is Status.NOT_FINITE:
-        culprit = fastest_body(evaluator, y)
+        culprit = integration.too_fast or fastest_body(evaluator, y)
     return f"{message}: {culprit}" if culprit else message
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from support.plain import jit_is_on
 from support.process import run
-from verification.test_stepping import ball, slope, tower
+from verification.test_stepping import ball, collide, slope, tower
 
 import dap3d_core as dap
 from dap3d_core.assembly.collisions import placed_shapes
@@ -70,3 +70,36 @@ def test_blocks_have_the_results_of_squares(monkeypatch):
     blocks = dap.simulate(make(), **settings)
     monkeypatch.setattr(problem, "SMALL", 120)
     assert dap.simulate(make(), **settings).u == pytest.approx(blocks.u, abs=1e-11)
+
+
+def thrown(r_dot, c=0.0):
+    """Two balls on the floor and a third on them, with a damper to a wall; an arm with limits."""
+    scene = dap.Scene(name="thrown")
+    for k in range(3):
+        z, v = 0.1 + 0.19 * k, r_dot if k == 2 else [0.0, 0.0, 0.0]
+        scene.add_body(f"b{k}", mass=1.0, Jp=[0.01] * 3, r=[0.0, 0.0, z], r_dot=v)
+        scene.add_shape("sphere", body=f"b{k}", radius=0.1, collides=True)
+    scene.add_point("wall", "ground", [10.0, 0.0, 0.48])
+    scene.add_force("ptp", "damper", P_i="b2.O", P_j="wall", c=c)
+    scene.add_body("arm", mass=1.0, Jp=[0.01] * 3, r=[10.0, 0.0, 0.48])
+    scene.add_joint("rev", "axle", P_i="arm.O", P_j="wall", a_i="arm.x", a_j="ground.x",
+                    lower=-1.0, upper=1.0)  # fmt: skip
+    return collide(scene, mu=0.3)
+
+
+@pytest.mark.parametrize(("v", "c", "words"), [
+    ([1.0, 0.0, 0.0], 1e11, r"forces change motion at [\d.e+]+ 1/s there.*shorter contact_step"),
+    ([1.0, 0.0, -1e78], 0.0, "body b2 runs away"),
+])  # fmt: skip
+def test_numbers_that_overflow_end_a_run_in_words(v, c, words):
+    """By compiled kernels and plain ones; the result until then is kept."""
+    with pytest.raises(dap.SimulationError, match=words) as stopped:
+        dap.simulate(thrown(v, c), t_end=2e-3, dt=1e-3, contact_step=1e-3)
+    assert np.isfinite(stopped.value.result.u).all()
+    assert stopped.value.result.t[0] == 0.0
+
+
+def test_shapes_may_be_far_beyond_the_integers_of_cells():
+    """A distance of 1e57 m; tolerance: rounding of two steps in 1000 parts at most."""
+    result = dap.simulate(thrown([1e60, 0.0, 0.0]), t_end=2e-3, dt=1e-3, contact_step=1e-3)
+    assert result.r[-1, 2, 0] == pytest.approx(2e57, rel=4.4e-13)
