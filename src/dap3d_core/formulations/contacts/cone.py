@@ -38,7 +38,7 @@ def solve_cone(
     gapless: Any = None,
     ratio: Any = None,
 ) -> tuple[Floats, float]:
-    """The solution x (3 m,), and the residual of the equations over its size.
+    """The solution x (3 m,), and the residual of the equations over its size, inf of none.
 
     Args:
         A, b: (3 m, 3 m), (3 m,) of u = A x + b.
@@ -69,7 +69,7 @@ def solve_cone(
         x, left = _newton(A, b, mu, x, r, more, free)
         if left <= SOLVED * scale:
             break
-    return x, left / scale
+    return x, left / scale if np.isfinite(left) else np.inf  # where there is none it may grow
 
 
 @compiled

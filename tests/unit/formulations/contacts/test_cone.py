@@ -35,3 +35,11 @@ def test_a_block_slides_by_what_friction_leaves():
     assert x == pytest.approx([weight, -mu * weight, 0.0], rel=1e-14)
     x, _ = solve_cone(np.eye(3) / mass, b, [0.6])
     assert x == pytest.approx([weight, -pull, 0.0], rel=1e-14)
+
+
+def test_contacts_that_jam_each_other_have_no_solution():
+    """Neither both forces (-161, -67), nor one alone (the other would accelerate by -52, -15)."""
+    A = np.kron([[0.06037, -0.29260], [-0.26205, 0.48465]], np.diag([1.0, 0.0, 0.0]))
+    A += np.kron(np.eye(2), np.diag([0.0, 1.0, 1.0]))
+    _, left = solve_cone(A, np.array([-9.81, 0.0, 0.0] * 2), [0.0, 0.0])
+    assert left > 1e-6
