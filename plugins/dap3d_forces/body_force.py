@@ -19,7 +19,7 @@ interface_version = 1
 
 
 class BodyForce(Force):
-    """A force at P_i of body i, constant in its axes (manual: ``fp``; spec 6).
+    """A force at P_i of body i, constant in its axes (manual: ``fp``).
 
     Without P_i it acts at the mass centre. force = A_i fp, moment = s_i x A_i fp. A function of
     time or an input is a factor of fp.

@@ -10,7 +10,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 class BodyMoment(Force):
-    """A moment A_i np on body i, constant in its axes (manual: ``np``; spec 6).
+    """A moment A_i np on body i, constant in its axes (manual: ``np``).
 
     A function of time or an input is a factor of np.
     """

@@ -6,7 +6,7 @@ interface_version = 1
 
 
 class Friction(Force):
-    """Coulomb friction in a joint whose type says how it rubs (spec 6.1).
+    """Coulomb friction in a joint whose type says how it rubs.
 
     Where it slides it is mu |N|, against the sliding velocity v; at rest it sticks, exactly, by up
     to mu_s |N|, as contacts do (docs/concepts/contact.md). N is the load that the joint's

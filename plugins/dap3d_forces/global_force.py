@@ -7,7 +7,7 @@ interface_version = 1
 
 
 class GlobalForce(Force):
-    """A force f at P_i of body i, constant in ground axes (manual: ``f``; spec 6).
+    """A force f at P_i of body i, constant in ground axes (manual: ``f``).
 
     Without P_i it acts at the mass centre. force = f, moment = s_i x f, energy = -f . r_Pi. A
     function of time or an input is a factor of f; there is no energy then.

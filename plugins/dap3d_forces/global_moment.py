@@ -9,7 +9,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 class GlobalMoment(Force):
-    """A moment n on body i, constant in ground axes (manual: ``n``; spec 6).
+    """A moment n on body i, constant in ground axes (manual: ``n``).
 
     A function of time or an input is a factor of n.
     """

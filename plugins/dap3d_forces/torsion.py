@@ -25,7 +25,7 @@ class Torsion(Force):
     """Spring, damper and actuator, in parallel, about an axis u common to two bodies.
 
     A positive n_a increases the angle that a ``rev`` or ``cyl`` about u of the same bodies i and j
-    reports; it decreases theta, which has the sign of the manual (``rot_sda``; spec 6): theta is
+    reports; it decreases theta, which has the sign of the manual (``rot_sda``): theta is
     the angle of body j relative to body i about u, from v_i to v_j, both projected on the plane
     normal to u; theta_dot = u . (w_j - w_i):
 

@@ -6,7 +6,7 @@ interface_version = 1
 
 
 class Polynomial(Function):
-    """f = c1 + c2 x + c3 x^2, for every x (manual: type ``a``; spec 7)."""
+    """f = c1 + c2 x + c3 x^2, for every x (manual: type ``a``)."""
 
     keyword, smooth = "a", True
     synonyms = ("polynomial", "linear", "constant")

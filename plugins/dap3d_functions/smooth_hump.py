@@ -11,7 +11,7 @@ MOST_BEYOND = 1e3
 
 
 class SmoothHump(Function):
-    """From f_start through the extreme f_max at x_max to f_end (manual: type ``c``; spec 7).
+    """From f_start through the extreme f_max at x_max to f_end (manual: type ``c``).
 
     With D = x_end - x_start and u = (x - x_start) / D:
 

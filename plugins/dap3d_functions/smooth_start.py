@@ -7,7 +7,7 @@ interface_version = 1
 
 
 class SmoothStart(Function):
-    """From rest at f_start into the slope fp_end, which is kept (manual: type ``d``; spec 7).
+    """From rest at f_start into the slope fp_end, which is kept (manual: type ``d``).
 
     With D = x_end - x_start, u = (x - x_start) / D and v = fp_end:
 

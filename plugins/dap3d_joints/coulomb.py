@@ -1,4 +1,4 @@
-"""Coulomb friction that fades at low speed: mu |N| S(v / v_tol), S = tanh (spec 6.1)."""
+"""Coulomb friction that fades at low speed: mu |N| S(v / v_tol), S = tanh."""
 
 from dap3d_core.kernels import scale, sqrt, tanh, where
 

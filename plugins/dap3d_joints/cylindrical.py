@@ -12,7 +12,7 @@ ZERO = (0.0, 0.0, 0.0)
 class Cylindrical(Joint):
     """Axis a_i stays on the line of a_j; one rotation and one translation are left free.
 
-    Manual: ``cyl``, formulation II; spec 3.2, 3.3, 4.4. d runs from a point of the axis on body i
+    Manual: ``cyl``, formulation II. d runs from a point of the axis on body i
     to one on body j; n_j and m_j complete a_j to a triad on body j. Rows 1 and 2, for b = n_j, m_j,
     keep the axes parallel; rows 3 and 4 keep d along the axis:
 
@@ -22,7 +22,7 @@ class Cylindrical(Joint):
         gamma = (a_i_dot x b + a_i x b_dot).(w_j - w_i)
         gamma = (w_i x s_i_dot).b + (w_j x d + s_j_dot - 2 d_dot).b_dot
 
-    Friction, on a rod of the radius given, with N = lambda_3 n_j + lambda_4 m_j (spec 6.1): a force
+    Friction, on a rod of the radius given, with N = lambda_3 n_j + lambda_4 m_j: a force
     mu |N| S(v / v_tol) along a_j at P_i, against the speed v of P_i along a_j as seen from body j,
     and a moment mu radius |N| S(radius w / v_tol) about a_j, against w = a_j . (w_i - w_j).
     """

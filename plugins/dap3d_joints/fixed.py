@@ -14,7 +14,7 @@ class Fixed(Joint):
     """Body i keeps the position r0 and the orientation p0 of the scene; nothing is left free.
 
     Manual: ``fix``, there at velocity level alone, so that the correction of the initial positions
-    moves the body; spec 4.10. With q = p o conj(p0) = (q0, e), q0 >= 0, rows 1 to 3 and 4 to 6:
+    moves the body. With q = p o conj(p0) = (q0, e), q0 >= 0, rows 1 to 3 and 4 to 6:
 
         C     = r - r0         C     = 2 e
         J_i   = [I, 0]         J_i   = [0, q0 I - e~]

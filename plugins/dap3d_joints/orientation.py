@@ -1,4 +1,4 @@
-"""The relative orientation of two bodies as an error quaternion, and its rate (spec 3.4)."""
+"""The relative orientation of two bodies as an error quaternion, and its rate."""
 
 from dap3d_core.kernels import add, conjugate, cross, dot, quaternion_product, scale, sub, where
 

@@ -24,7 +24,7 @@ class RelativeTranslation(Joint):
     Sign of the manual: a growing f, or a positive input, decreases the length that a ``tran`` or
     ``cyl`` of the same bodies i and j reports; ``drive-tran`` increases it.
 
-    Manual: ``rel-tran``, whose Jacobian stands in the wrong slots; spec 4.8. One row, of the
+    Manual: ``rel-tran``, whose Jacobian stands in the wrong slots. One row, of the
     velocity level alone; without a function it locks the relative translation. An input may give
     the velocity in place of f_dot: it is held, and velocities jump where it is set.
 

@@ -34,7 +34,7 @@ class Revolute(Joint):
 
     The manual writes a_j for a_i in rows 4 and 5, the same on the constraint manifold only; these
     are exact everywhere. Friction, on a pin of the radius given: a moment about a_j,
-    mu radius |lambda_1..3| S(radius w / v_tol) against w = a_j . (w_i - w_j) (spec 6.1); without
+    mu radius |lambda_1..3| S(radius w / v_tol) against w = a_j . (w_i - w_j); without
     v_tol it sticks.
     """
 

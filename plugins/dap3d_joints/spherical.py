@@ -10,7 +10,7 @@ ZERO = (0.0, 0.0, 0.0)
 
 
 class Spherical(Joint):
-    """Point P_i stays on point P_j; the three rotations are left free (manual: ``sph``; spec 3.1).
+    """Point P_i stays on point P_j; the three rotations are left free (manual: ``sph``).
 
     Rows 1 to 3, with s the arms from the mass centres to the points:
 
@@ -19,7 +19,7 @@ class Spherical(Joint):
         gamma = w_i x (w_i x s_i) - w_j x (w_j x s_j)
 
     Friction, on a ball of the radius given: a moment mu radius |lambda| S(radius |w| / v_tol)
-    against the relative angular velocity w = w_i - w_j (spec 6.1).
+    against the relative angular velocity w = w_i - w_j.
     """
 
     keyword, rows = "sph", 3

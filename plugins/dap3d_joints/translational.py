@@ -26,7 +26,7 @@ NO_TURN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 class Translational(Joint):
     """A_i^T A_j stays A_c, and d along a_j; one translation is left free.
 
-    Manual: ``tran``, formulation II; spec 3.3, 3.4, 4.5. With the error quaternion
+    Manual: ``tran``, formulation II. With the error quaternion
     q = p_j o conj(p_c) o conj(p_i) = (q0, e), rows 1 to 3:
 
         C     = 2 e
@@ -40,7 +40,7 @@ class Translational(Joint):
         gamma = (w_i x s_i_dot) . b + (w_j x d + s_j_dot - 2 d_dot) . b_dot
 
     On the constraints these are the manual's; it prints J = [0, -I], [0, I] and gamma = 0 for rows
-    1 to 3. Friction, with N = lambda_4 n_j + lambda_5 m_j (spec 6.1): a force mu |N| S(v / v_tol)
+    1 to 3. Friction, with N = lambda_4 n_j + lambda_5 m_j: a force mu |N| S(v / v_tol)
     along a_j at P_i, against the speed v of P_i along a_j as seen from body j; without v_tol it
     sticks.
     """

@@ -11,7 +11,7 @@ ZERO = (0.0, 0.0, 0.0)
 class Universal(Joint):
     """Point P_i stays on P_j and arm a_i perpendicular to arm n_j; two rotations are left free.
 
-    The manual names it and does not implement it; spec 3.1, 3.2, 4.6. Rows 1 to 3 are those of the
+    The manual names it and does not implement it. Rows 1 to 3 are those of the
     spherical joint; row 4:
 
         C     = a_i . n_j

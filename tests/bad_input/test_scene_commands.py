@@ -51,7 +51,7 @@ def test_what_types_refuse_is_told_for_all_elements(run, tmp_path, command):
         driven('type = "b"\nx_start = 2.0'),
         add='[joints.again]\ntype = "rel-rot"\nbody_i = "rod"\na_j = "ground.x"\nfunction = "n"\n'
         '[functions.n]\ntype = "spline"\nx = [0.0, 0.0]\ny = [1.0, 2.0]\n'
-        '[forces.rub]\ntype = "friction"\njoint = "hinge"\n',
+        '[forces.rub]\ntype = "friction"\njoint = "hinge"\nv_tol = 1e-3\n',
     )
     code, out, err = run(text, command, "scene.toml")
     assert (code, out) == (2, "")

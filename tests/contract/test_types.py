@@ -1,4 +1,4 @@
-"""The contract of every registered type (spec 2): each check of the kit is a test.
+"""The contract of every registered type: each check of the kit is a test.
 The standard types pass through the door that is there for everyone (``dap3d_core.testing``). The
 tests run over the registry: a new type is covered without a new test, and so are its variants.
 That the checks find errors is the subject of tests/unit/testing/checks."""

@@ -27,7 +27,7 @@ def test_check_counts_and_runs_nothing(dap3d):
 
 @pytest.mark.slow
 def test_check_tells_redundant_joints(dap3d, scene_file):
-    """A door on two hinges: ten rows, five independent (spec 8)."""
+    """A door on two hinges: ten rows, five independent."""
     hinge = 'type = "rev"\nP_i = "{p}"\nP_j = "ground.O"\na_i = "stone.z"\na_j = "ground.z"\n'
     upper = '[points.up]\nbody = "ground"\nsPp = [0.0, 0.0, 1.0]\n'
     points = upper + '[points.U]\nbody = "stone"\nsPp = [0.0, 0.0, 1.0]\n'

@@ -129,7 +129,7 @@ def test_a_scene_without_joints_has_no_rows_and_its_springs_have_quantities(dap3
     picked = ("spring1.length", "spring1.tension", "spring2.i.moment_body.x")
     assert dap3d("post", "bodies2.nc", "-o", "s.csv", *picked).returncode == 0
     column = table_of(dap3d.folder / "s.csv")
-    assert column["spring1.length [m]"][0] == 1.5  # unstretched at the start (spec 12)
+    assert column["spring1.length [m]"][0] == 1.5  # unstretched at the start
     assert column["spring1.tension [N]"][0] == 0.0
 
 

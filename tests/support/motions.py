@@ -51,7 +51,7 @@ class Motion:
 
 
 def G(p):
-    """The 3x4 matrix with omega = 2 G p_dot (spec 1)."""
+    """The 3x4 matrix with omega = 2 G p_dot."""
     e0, e1, e2, e3 = p
     return np.array([[-e1, e0, -e3, e2], [-e2, e3, e0, -e1], [-e3, -e2, e1, e0]])
 

@@ -69,7 +69,7 @@ def circling(nt=21, outputs=None, **more):
     w = np.broadcast_to([0.0, 0.0, RATE], (nt, 1, 3))
     u = join((PIVOT + ARM * out)[:, None], about_z(RATE * t), (RATE * ARM * ahead)[:, None], w)
     v_dot = np.hstack([-(RATE**2) * ARM * out, np.zeros((nt, 3))])
-    Lam = MASS * RATE**2 * ARM * out  # 'sph' exerts -lambda on body i (spec 2)
+    Lam = MASS * RATE**2 * ARM * out  # 'sph' exerts -lambda on body i
     rows = rows_of(model, t, u, v_dot, Lam)
     return result_of(scene, rows, model, **more), out, ahead
 

@@ -1,4 +1,4 @@
-"""The disk on the ground (spec 5) against closed forms.
+"""The disk on the ground against closed forms.
 Tolerances: rtol 1e-11 over a second or two leaves some 1e-9 of the largest coordinate."""
 
 import numpy as np

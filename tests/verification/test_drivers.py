@@ -97,7 +97,7 @@ def slide(length):
 
 @pytest.mark.parametrize(("length", "start"), [(None, 1.0), (1.6, 1.2)])
 def test_a_bead_is_pushed_along_a_turning_arm(length, start):
-    """drive-tran: arm_x . (r_bead - r_arm) = length + f, also where the arm turns (spec 4.8).
+    """drive-tran: arm_x . (r_bead - r_arm) = length + f, also where the arm turns.
     Left out, the length makes C = 0 at the start. With rho the distance from the axle, the guide
     gives the Coriolis force 2 m Omega rho', and the driver m (rho'' - Omega^2 rho)."""
     result = dap.simulate(slide(length), t_end=1.0, dt=0.1, **TIGHT)

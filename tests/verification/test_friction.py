@@ -29,7 +29,7 @@ def incline(mu, v_tol=1e-3):
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.5])
 def test_a_block_slides_down_an_incline(method, mu):
-    """a = g (sin - mu cos), 3.205858158 m/s^2 for mu 0.2 (spec 6.1), once tanh(v / v_tol) = 1."""
+    """a = g (sin - mu cos), 3.205858158 m/s^2 for mu 0.2, once tanh(v / v_tol) = 1."""
     result = dap.simulate(incline(mu), t_end=1.0, dt=0.5, method=method)
     wanted = G * (np.sin(SLOPE) - mu * np.cos(SLOPE))
     assert np.linalg.norm(result.rdd[-1, 0]) == pytest.approx(wanted, rel=1e-9)
@@ -136,7 +136,7 @@ each = pytest.mark.parametrize("law", LAWS)
 
 
 def test_the_joints_that_rub():
-    """Those of spec 6.1; the disk where it slips."""
+    """Of the joints that have one; the disk where it slips."""
     assert {name.split()[0] for name in LAWS} == {"sph", "rev", "cyl", "tran", "disk"}
     assert sum(name.startswith("disk") for name in LAWS) == 3
 

@@ -88,7 +88,7 @@ def test_a_step_is_the_cubic():
 
 
 def test_a_hump_that_leaves_its_range_says_so():
-    """spec 7: u_m = 0.4 undershoots by 1.9 %, 0.3 by 130 %; between 0.43 and 0.57 nothing is said.
+    """u_m = 0.4 undershoots by 1.9 %, 0.3 by 130 %; between 0.43 and 0.57 nothing is said.
     The example of the manual dips to 0.78856 on its way from 1 to 0.8, which is within its
     range."""
 

@@ -1,4 +1,4 @@
-"""Arrays of the post-processor (spec 10) from real runs, against derivatives and closed forms."""
+"""Arrays of the post-processor from real runs, against derivatives and closed forms."""
 
 import numpy as np
 import pytest
@@ -35,7 +35,7 @@ def near(found, expected):
 
 
 def test_shapes(result):
-    """As spec 10 lists them: time first, then bodies, points or rows, then components."""
+    """Time first, then bodies, points or rows, then components."""
     nt, nB = len(result.t), result.summary.body_count
     nP, m = len(result.summary.point_names), result.summary.row_count
     for name in ("r", "rd", "w", "wp", "rdd", "wd", "wpd"):
@@ -57,7 +57,7 @@ def test_translation(result):
 
 
 def test_rotation(result):
-    """omega = 2 G p_dot, omega' = 2 L p_dot = A^T omega (spec 1)."""
+    """omega = 2 G p_dot, omega' = 2 L p_dot = A^T omega."""
     e0, e = result.p[3:-3, :, :1], result.p[3:-3, :, 1:]
     p_dot = rate(result.p)
     d0, d = p_dot[..., :1], p_dot[..., 1:]
@@ -88,12 +88,12 @@ def test_jacobian_is_that_of_the_motion(result):
     motion = np.einsum("trc,tc->tr", result.Jac, v)
     expected = np.zeros(result.summary.row_count)
     if result.record.title == "fourbar3":
-        expected[-1] = 2 * np.pi  # spec 4.7: a_j . (omega_j - omega_i) = f_dot
+        expected[-1] = 2 * np.pi  # a_j . (omega_j - omega_i) = f_dot
     np.testing.assert_allclose(motion, np.broadcast_to(expected, motion.shape), atol=1e-10)
 
 
 def test_multipliers_fulfil_the_equations_of_motion(result):
-    """M v_dot = g + D^T lambda for every body, forces from the scene's own numbers (spec 9)."""
+    """M v_dot = g + D^T lambda for every body, forces from the scene's own numbers."""
     summary = result.summary
     wp, wpd, A = result.wp, result.wpd, rotation(result.p)
     force = summary.mass[:, None] * result.rdd

@@ -99,7 +99,7 @@ def values(keyword, fields, x):
 
 
 def test_functions_meet_their_ends():
-    """b, c, d: values, slopes, curvatures at the ends and beyond as the manual states (spec 7)."""
+    """b, c, d: values, slopes, curvatures at the ends and beyond as the manual states."""
     b = {"x_start": 0.5, "x_end": 2.0, "f_start": 1.0, "f_end": -1.0}
     assert values("b", b, 0.4)[:3] == pytest.approx([1.0, 0.0, 0.0], abs=0.0)
     assert values("b", b, 1.25)[:3] == pytest.approx([0.0, -2.0 * 1.875 / 1.5, 0.0], abs=1e-14)
@@ -107,7 +107,7 @@ def test_functions_meet_their_ends():
     c = {"x_start": 0.0, "x_end": 0.8, "f_start": 0.0, "f_end": 0.8, "x_max": 0.4, "f_max": 1.0}
     assert values("c", c, 0.4)[:2] == pytest.approx([1.0, 0.0], abs=1e-12)
     assert values("c", c, 0.8)[:3] == pytest.approx([0.8, 0.0, 0.0], abs=1e-11)
-    assert values("c", c, 0.6742)[0] == pytest.approx(0.78856, abs=1e-5)  # the dip of spec 7
+    assert values("c", c, 0.6742)[0] == pytest.approx(0.78856, abs=1e-5)  # its dip
     hump = {**c, "f_end": 0.0}
     u = 0.3
     assert values("c", hump, 0.8 * u)[0] == pytest.approx(64.0 * (u * (1.0 - u)) ** 3, abs=1e-12)

@@ -25,7 +25,7 @@ from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS, A, P
 from dap3d_core.linear.ldlt.plan import Plan
 from dap3d_core.model import Group, Model
 
-#: Usual alpha, Omega (1/s), mu of the penalty formulation (spec 9).
+#: Usual alpha, Omega (1/s), mu of the penalty formulation.
 PENALTY = (1e7, 10.0, 1.0)
 
 

@@ -1,6 +1,6 @@
 """Penalty formulation: constraints as stiff, damped springs on the accelerations.
 
-Manual: analysis_p; spec 9. With gamma' = gamma - 2 mu Omega (D v - nu) - Omega^2 C,
+Manual: analysis_p. With gamma' = gamma - 2 mu Omega (D v - nu) - Omega^2 C,
 
     (M + alpha D^T D) v_dot = g + alpha D^T gamma'        lambda = -alpha (D v_dot - gamma')
 

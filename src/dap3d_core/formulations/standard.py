@@ -1,6 +1,6 @@
 """Standard formulation: accelerations and multipliers from the saddle-point equations.
 
-Manual: analysis_s; spec 9.
+Manual: analysis_s.
 
     [M  D^T] (v_dot  )   (g    )
     [D   0 ] (-lambda) = (gamma)

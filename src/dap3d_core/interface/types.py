@@ -96,7 +96,7 @@ class TypeBase:
 class Joint(TypeBase):
     """A kinematic constraint or driver: ``rows`` equations between one, two or more bodies.
 
-    Subclasses define, each a pure function of named quantities (spec 2):
+    Subclasses define, each a pure function of named quantities:
 
     * ``C``      position level, one number a row that ``holonomic`` keeps;
     * ``J``      dC/dq, one block of rows x 6 (tuples of rows) a body slot, in their order;

@@ -3,7 +3,8 @@
 A plugin imports only these functions; the compiler and its runtime serve the core.
 """
 
-from dap3d_core.kernels.eliminate_unknowns import root
+from typing import TYPE_CHECKING, Any
+
 from dap3d_core.kernels.rotations import (
     conjugate,
     euler_parameters,
@@ -54,6 +55,9 @@ from dap3d_core.kernels.vectors import (
     sub,
 )
 
+if TYPE_CHECKING:
+    from dap3d_core.kernels.eliminate_unknowns import root
+
 __all__ = [
     "abs",
     "acos",
@@ -101,3 +105,12 @@ __all__ = [
     "transpose",
     "where",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    """``root``, which few kernels need, with its module."""
+    if name != "root":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from dap3d_core.kernels import eliminate_unknowns
+
+    return eliminate_unknowns.root

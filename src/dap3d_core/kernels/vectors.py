@@ -92,7 +92,7 @@ def added(a, b):
 
 
 def normals(a):
-    """Two unit vectors n, m that complete an axis a to a triad: a x n = m, n x m = a (spec 3).
+    """Two unit vectors n, m that complete an axis a to a triad: a x n = m, n x m = a.
 
     n is the coordinate axis least aligned with a, made normal to it. For ``prepare``, not for a
     kernel.

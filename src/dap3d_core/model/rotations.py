@@ -1,4 +1,4 @@
-"""Euler parameters and frames for whole arrays at once (spec 1)."""
+"""Euler parameters and frames for whole arrays at once."""
 
 from typing import Any, TypeVar
 

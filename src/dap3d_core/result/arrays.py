@@ -73,7 +73,7 @@ class Arrays:
 
     Attributes:
         t: (nt,) s.
-        u: (nt, 13 n) states, angular velocities in global axes (spec 1).
+        u: (nt, 13 n) states, angular velocities in global axes.
         v_dot: (nt, 6 n) accelerations r_ddot, omega_dot of each body, global axes.
         Lam: (nt, m) Lagrange multipliers.
         work: (nt,) J, done on the system by forces and drivers.

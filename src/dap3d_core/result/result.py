@@ -74,7 +74,7 @@ class Result(ResultDisplay, ResultContacts):
     """Result of a run: n bodies, m constraint rows, nP points at nt instants.
 
     Stored are t, u, v_dot, Lam, work and the potential energy; the other arrays of the manual's
-    post-processor (spec 10) are computed on first use. Stored arrays are read-only. SI units;
+    post-processor are computed on first use. Stored arrays are read-only. SI units;
     global axes except for names that end in p (body axes). Animation points are the last points.
 
     Attributes:
@@ -284,7 +284,7 @@ class Result(ResultDisplay, ResultContacts):
 
     @checked
     def reaction(self, joint: str) -> Mapping[str, Reaction]:
-        """Reaction of a joint on each of its bodies, ground included: D^T lambda (spec 2).
+        """Reaction of a joint on each of its bodies, ground included: D^T lambda.
 
         What a joint brings besides, such as the pressure angle of a ``gear``, is part of it; the
         friction of a force element is not.
@@ -379,7 +379,7 @@ class Result(ResultDisplay, ResultContacts):
 
     @checked
     def force(self, name: str) -> ForceOutput:
-        """Output of a force element, evaluated at the reported states (spec 6).
+        """Output of a force element, evaluated at the reported states.
 
         Args:
             name: of an element that acts on given bodies (not ``weight``).

@@ -70,9 +70,15 @@ class Run(RunState):
     shared_laws: "tuple[SharedLaw, ...]" = ()
 
     def save_every(self, seconds: float, *, force: bool) -> None:
-        """Write checkpoints next to the output; arguments and errors as of ``CheckpointWriter``."""
+        """Write checkpoints next to the output; arguments and errors as of ``CheckpointWriter``.
+
+        A scene whose joints may break has none: one that was asked for is refused, one for an
+        interruption alone is left out.
+        """
         from dap3d_core.simulation.checkpoint.save import CheckpointWriter
 
+        if self.evaluator.model.breaks and seconds == np.inf:
+            return
         refuse_breaks(self.evaluator.model, "a checkpoint")
         self.checkpoint_writer = CheckpointWriter(self, seconds, force=force)
 

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from dap3d_core.cli.console.console import stderr
 from dap3d_core.cli.framework import completion, options
 from dap3d_core.cli.framework.command import command
 
@@ -134,6 +133,7 @@ def _ask(
 
 
 def _ask_model() -> tuple[str, "Scene"]:
+    from dap3d_core.cli.console.console import stderr
     from dap3d_core.scene import SceneError, load, shipped_models
 
     console = stderr()

@@ -37,7 +37,7 @@ def turned(w: Any, A: Any) -> Any:
 
 
 def euler_rate(w: Any, p: Any) -> Any:
-    """Rate of Euler parameters for a global angular velocity (spec 1)."""
+    """Rate of Euler parameters for a global angular velocity."""
     e0, e = p[0], (p[1], p[2], p[3])
     half = sympy.Rational(1, 2)
     turning = add(tuple(e0 * x for x in w), cross(w, e))

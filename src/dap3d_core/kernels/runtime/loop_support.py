@@ -57,7 +57,7 @@ def matrix_in(array, k):
 
 
 def angle_about(u, v, k):
-    """The angle from u to v about the unit vector k, in (-pi, pi]; spec 6."""
+    """The angle from u to v about the unit vector k, in (-pi, pi]."""
     return atan2(dot(k, cross(u, v)), dot(u, v) - dot(u, k) * dot(v, k))
 
 

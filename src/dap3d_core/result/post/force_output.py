@@ -1,4 +1,4 @@
-"""Force elements evaluated at reported states (spec 6)."""
+"""Force elements evaluated at reported states."""
 
 from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""Motion of points and energy of bodies from a stored state (spec 1, 9, 10)."""
+"""Motion of points and energy of bodies from a stored state."""
 
 import attrs
 import numpy as np

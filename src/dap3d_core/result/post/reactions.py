@@ -1,4 +1,4 @@
-"""Reactions of joints and the Jacobian, evaluated at reported states (spec 2, 10)."""
+"""Reactions of joints and the Jacobian, evaluated at reported states."""
 
 from collections.abc import Collection, Iterator
 from typing import TYPE_CHECKING, Any
@@ -71,7 +71,7 @@ def rows_at(
 
 
 def jacobians(evaluator: "Evaluator", t: Floats, u: Floats, inputs: Floats) -> Any:
-    """The constraint Jacobian D of C(q, t) at each reported instant, D v = nu (spec 2).
+    """The constraint Jacobian D of C(q, t) at each reported instant, D v = nu.
 
     Args:
         evaluator: evaluates the model.
@@ -102,7 +102,7 @@ def reactions(
     states: Floats | None = None,
     inputs: Floats | None = None,
 ) -> dict[int, dict[str, Reaction]]:
-    """Reactions of joints on each of their bodies: D_slot^T lambda (spec 2).
+    """Reactions of joints on each of their bodies: D_slot^T lambda.
 
     Args:
         evaluator: evaluates the model.

@@ -220,7 +220,7 @@ def _points(level: int) -> MotionFunction:
     )
 
 
-#: Arrays of the manual's post-processor (spec 10).
+#: Arrays of the manual's post-processor.
 MOTION = (
     MotionArray("r", "r", "position", "position of the mass centre", "m", _state(0), "rd"),
     MotionArray("p", "p", "Euler parameters", "Euler parameters, body to global", "1", _state(1),

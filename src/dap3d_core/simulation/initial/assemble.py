@@ -1,4 +1,4 @@
-"""Initial conditions brought onto the constraints, at position and at velocity level (spec 8).
+"""Initial conditions brought onto the constraints, at position and at velocity level.
 
 The change is the least one: of all that fulfil the linear equations D x = residual the one whose
 sum of squares is the smallest, of displacements in m (in units of ``Model.length`` where the scene

@@ -1,4 +1,4 @@
-"""Redundant constraints: how many, where, and what they leave undetermined (spec 8)."""
+"""Redundant constraints: how many, where, and what they leave undetermined."""
 
 from collections.abc import Sequence
 from typing import Any

@@ -218,7 +218,7 @@ def quaternion_product(a: Floats, b: Floats) -> Floats:
 
 
 def rotation(p: Floats) -> Floats:
-    """(n, 3, 3) rotation matrices of rows of unit Euler parameters (spec 1)."""
+    """(n, 3, 3) rotation matrices of rows of unit Euler parameters."""
     return ((p[:, :, None] * p[:, None, :]).reshape(-1, 16) @ _ROTATION).reshape(-1, 3, 3)
 
 

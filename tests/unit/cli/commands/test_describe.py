@@ -64,7 +64,7 @@ def test_every_type_is_described(kind, keyword):
 
 
 def test_the_freedoms_that_joints_leave():
-    """6 less the rows, for each variant (spec 4 and 5)."""
+    """6 less the rows, for each variant."""
     left = {"sph": 3, "rev": 1, "sph-sph": 5, "cyl": 2, "tran": 1, "univ": 2, "fix": 0, "rP": 5}
     left |= {"rel-rot": 5, "rel-tran": 5, "drive-rot": 5, "drive-tran": 5, "disk": 3}
     joints = [keyword for kind, keyword in TYPES if kind == "joint"]

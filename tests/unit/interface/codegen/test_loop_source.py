@@ -217,7 +217,7 @@ class Truth:
 
 
 def attitude(p):
-    """A = G L^T of Euler parameters (spec 1)."""
+    """A = G L^T of Euler parameters."""
     e0, e = p[0], p[1:]
     tilde = np.array([[0, -e[2], e[1]], [e[2], 0, -e[0]], [-e[1], e[0], 0]])
     G = np.column_stack([-e, tilde + e0 * np.eye(3)])

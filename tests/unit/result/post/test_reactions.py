@@ -64,7 +64,7 @@ def test_reactions_of_all_joints_are_those_of_each():
 def test_action_and_reaction(keyword, ground):
     """Any multipliers: forces of a joint cancel, moments about a common point too (Newton 3).
     On the constraints, where both bodies meet. Rows of the velocity level alone have to balance in
-    force only: ``rel-tran`` is the manual's literal equation (spec 4.8)."""
+    force only: ``rel-tran`` is the manual's literal equation."""
     type_info = REGISTRY.get("joint", keyword)
     scene = scene_for(type_info, np.random.default_rng(7), ground=ground)
     model = model_of(scene)
@@ -112,7 +112,7 @@ def sprung():
 
 
 def test_a_spring_and_damper_element():
-    """Length, rate, tension and potential of ptp from the circle that its end runs on (spec 6)."""
+    """Length, rate, tension and potential of ptp from the circle that its end runs on."""
     result, out, ahead = sprung()
     end, speed = PIVOT + (ARM + 0.1) * out, RATE * (ARM + 0.1) * ahead
     d = np.array([1.0, 0.5, -0.2]) - end
@@ -135,7 +135,7 @@ def test_a_spring_and_damper_element():
 
 
 def test_turns_are_counted_again_from_the_start():
-    """A wheel that turns four times against a torsion spring: k times the whole angle (spec 6)."""
+    """A wheel that turns four times against a torsion spring: k times the whole angle."""
     scene = dap.Scene(name="wound")
     scene.add_body("wheel", mass=1.0, Jp=[1, 1, 1])
     scene.add_force("rot_sda", "coil", v_i="wheel.x", v_j="ground.x", axis="ground.z", k=2.0,

@@ -210,6 +210,13 @@ def test_a_checkpoint_is_refused(compiled, tmp_path):
         dap.simulate(compiled, t_end=1.0, output=tmp_path / "out.nc", checkpoint=1.0)
 
 
+def test_one_for_an_interruption_alone_is_left_out(compiled, tmp_path):
+    """As runs of the command line ask for."""
+    out = tmp_path / "out.nc"
+    dap.simulate(compiled, t_end=0.1, output=out, checkpoint=np.inf)
+    assert [path.name for path in tmp_path.iterdir()] == [out.name]
+
+
 def test_only_joints_that_may_break_are_released(compiled):
     event = dap.Event("t", above=0.1, action=lambda state: state.release("hinge"))
     with pytest.raises(ValueError, match="'hinge' is no joint that may be released: there are rod"):

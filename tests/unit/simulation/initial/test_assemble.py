@@ -1,4 +1,4 @@
-"""How a run starts: positions and velocities corrected, constraints independent (spec 8)."""
+"""How a run starts: positions and velocities corrected, constraints independent."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def turn_of(u, v, n):
 
 
 def test_rough_four_bar_converges_quadratically(monkeypatch):
-    """max |C| before each pass is 1.2e-3, 1.6e-6, 1.3e-12 (spec 8, 14), to the digits printed."""
+    """max |C| before each pass is 1.2e-3, 1.6e-6, 1.3e-12, to the digits printed."""
     residuals = []
     for tolerance in (1.0, 1e-4, 1e-10):
         monkeypatch.setattr(assemble, "TOLERANCE", tolerance)
@@ -73,7 +73,7 @@ def test_the_first_pass_is_the_least_change(monkeypatch):
 
 
 def test_a_velocity_row_holds_nothing():
-    """The crank of the rough four-bar leaves the vertical by 0.08 degrees (spec 8): its driver does
+    """The crank of the rough four-bar leaves the vertical by 0.08 degrees: its driver does
     not take part in the correction of positions."""
     evaluator, found = corrected(rough_four_bar())
     assert np.degrees(turn_of(evaluator.model.u0, found.u, 3)[0]) == pytest.approx(0.08, abs=0.005)
@@ -286,7 +286,7 @@ def test_corrected_velocities_are_the_least_change():
 
 
 def test_corrected_velocities_of_the_four_bar_are_those_of_the_specification():
-    """Minimum-norm velocities from rest: 11 digits of an independent simulator (spec 14)."""
+    """Minimum-norm velocities from rest: 11 digits of an independent simulator."""
     _, found = corrected(dap.load("fourbar3"))
     _, _, v, w = split(found.u)
     assert v[0] == pytest.approx([0, 2 * np.pi, 0], abs=1e-10)

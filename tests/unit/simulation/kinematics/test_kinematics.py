@@ -106,7 +106,7 @@ def test_rows_of_the_velocity_level_are_integrated_to_rounding():
     """fourbar2 has a rate driver: after a turn both bodies are back."""
     result = dap.kinematics("fourbar2", t_end=1.0, dt=0.5)
     assert np.max(np.abs(result.r[-1] - result.r[0])) < 1e-11
-    assert np.max(np.abs(result.r[1, 1] - [2.33416577, 1.66583423, 1.16333155])) < 1e-8  # spec 14
+    assert np.max(np.abs(result.r[1, 1] - [2.33416577, 1.66583423, 1.16333155])) < 1e-8
     assert max(result.arrays.position_residual) < 1e-13
 
 

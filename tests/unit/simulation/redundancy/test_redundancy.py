@@ -1,4 +1,4 @@
-"""Redundant constraints: who shares what, where, whether they agree, what stays unique (spec 8)."""
+"""Redundant constraints: who shares what, where, whether they agree, what stays unique."""
 
 import numpy as np
 import pytest
