@@ -195,6 +195,34 @@ def test_a_ball_bounces_obliquely_by_poissons_law():
     assert result.ledger["energy"].value < TOLERANCE
 
 
+@pytest.mark.parametrize("method", ["lsq", "joint"])
+@pytest.mark.parametrize(("e", "mu"), [(0.0, 0.0), (0.5, 0.0), (0.5, 0.1)])
+def test_the_work_of_an_impact_has_that_of_what_drives_the_plate(e, mu, method):
+    """The motor takes the ball's impulse P: it does P v, the contact loses what a fixed one does.
+
+    P = m (1 + e) v_n along the normal and -mu of that across it, while the ball slides.
+    """
+    v, at, m, r = 2.0, np.array([0.3, 0.0, 0.4]), 2.0, 0.1
+    scene = ball(height=0.2, v=v, e=e, mu=mu, P_j="plate.O", a_j="plate.z")
+    scene.add_body("plate", mass=3.0, Jp=[1.0] * 3, r_dot=at)
+    scene.add_vector("up", "ground", [0.6, 0.0, 0.8])
+    scene.add_function("a", "rises", coeff=[0.0, 0.5, 0.0])
+    along = {"P_i": "plate.O", "P_j": "ground.O", "a_j": "up"}
+    scene.add_joint("tran", "rail", **along)
+    scene.add_joint("drive-tran", "motor", **along, function="rises")
+    result = dap.simulate(scene, t_end=0.25, dt=0.05, method=method, **TIGHT)
+    impact = next(e for e in result.events if e.kind == "impact")
+    normal = np.sqrt(at[2] ** 2 + 2.0 * G * 0.2)
+    P = m * (1.0 + e) * normal
+    change = (np.array(impact.u_after) - np.array(impact.u))[14:17]
+    assert change == pytest.approx([-mu * P / m, 0.0, P / m], abs=TOLERANCE)
+    slip = v - at[0] - 0.5 * mu * P * (1.0 / m + r**2 / (0.4 * m * r**2))
+    lost = 0.5 * m * (1.0 - e**2) * normal**2 + mu * P * slip
+    by_motor = P * at[2] - mu * P * at[0]
+    assert impact.work == pytest.approx(by_motor - lost, abs=TOLERANCE)
+    assert result.ledger["energy"].value < TOLERANCE
+
+
 @pytest.mark.slow  # its corners solve their friction in a hundred passes each
 def test_a_block_slips_where_its_load_passes_what_holds_and_is_then_slowed_by_less():
     """Load c t: it slips at mu_s m g / c, with acceleration (c t - mu m g) / m from then on."""

@@ -31,7 +31,7 @@ class EventRecord:
         u: (13 n) the state, of events and before jumps; None for switches.
         changes: force -> field -> new value of changed parameters.
         u_after: (13 n) the state after a jump of velocities; None for all else.
-        work: of the impulses of a jump, J.
+        work: of the impulses of a jump, with those of drivers, J.
         states: element -> state -> value of states of elements that a jump has changed.
     """
 

@@ -8,6 +8,8 @@ which ends at rounding (Alart and Curnier, Comp. Meth. Appl. Mech. Eng. 92, 1991
     x_N = max(0, x_N - r u_N),    x_T = proj(mu (x_N + more); x_T - r u_T)
 
 Friction without a normal may act in all three directions: x = proj(mu more; x - r u).
+Where contacts share what they carry Newton may stall. Then the proximal point method comes nearer
+(Rockafellar, SIAM J. Control Optim. 14, 1976): A + D and b - D x, x of the problem before.
 Dense, for as many contacts as touch in one place.
 """
 
@@ -25,6 +27,8 @@ FIRST = 5
 PASSES, CUTS, RESIDUAL_ROUNDING = 50, 12, 1e-15
 #: Of the scale of the solution: a problem counts as solved.
 SOLVED = 1e-12
+#: Parts of mobilities that are added to them; sweeps of a step, and how many steps with each.
+ADDED, CLOSER, STEPS = (1e-4, 1e-5, 1e-6), 1000, 40
 TINY = 1e-300
 
 
@@ -38,14 +42,15 @@ def solve_cone(
     gapless: Any = None,
     ratio: Any = None,
 ) -> tuple[Floats, float]:
-    """The solution x (3 m,), and the residual of the equations over its size.
+    """The solution x (3 m,), and the residual of the equations over its size, inf of none.
 
     Args:
         A, b: (3 m, 3 m), (3 m,) of u = A x + b.
         mu: (m,) coefficients of friction.
         more: (m,) normal impulses of an earlier phase, which widen the discs.
         start: (3 m,) where to begin.
-        tries: at most; fewer where it is to be known whether there is a solution nearby.
+        tries: at most; fewer where it is to be known whether there is a solution nearby, and then
+            nothing else is tried.
         gapless: (m,) 1 of friction in three directions, else 0.
         ratio: (m,) of coefficients along t2 to mu, that along t1, where friction is in an ellipse.
     """
@@ -69,7 +74,17 @@ def solve_cone(
         x, left = _newton(A, b, mu, x, r, more, free)
         if left <= SOLVED * scale:
             break
-    return x, left / scale
+    y = np.zeros_like(x)
+    for part in np.repeat(ADDED, STEPS) if tries == TRIES else ():
+        if left <= SOLVED * scale or not np.all(np.isfinite(y)):
+            break
+        own = part * np.diag(A)
+        firm, moved = A + np.diag(own), b - own * y
+        sweep(firm, moved, mu, y, r, more, free, CLOSER)
+        y, _ = _newton(firm, moved, mu, y, r, more, free)
+        new, rest = _newton(A, b, mu, y, r, more, free)
+        x, left = (x, left) if rest >= left else (new, rest)
+    return x, left / scale if np.isfinite(left) else np.inf  # where there is none it may grow
 
 
 @compiled
@@ -177,7 +192,8 @@ def _newton(
     residual_of(A, b, mu, x, r, more, free, F, none)
     best = float(np.abs(F).max())
     for _ in range(PASSES):
-        if best <= RESIDUAL_ROUNDING * (float(np.abs(x).max()) + least + TINY):
+        rounding = RESIDUAL_ROUNDING * (float(np.abs(x).max()) + least + TINY)
+        if best <= rounding or not np.isfinite(best):
             break
         residual_of(A, b, mu, x, r, more, free, F, S)
         step = np.linalg.lstsq(S, -F, rcond=1e-13)[0]

@@ -164,6 +164,9 @@ class ContactRows:
         G: (3 m, 6 n) rows, normal first.
         frames: (m, 3, 3) normal and tangents.
         P: (6 n, 6 n) changes of velocity by impulses, with the joints held.
+        driven: (m, 3) velocity at each contact, in its frame, of the motion that drivers prescribe:
+            of those that the joints allow the one of least energy. Impulses do their work, with
+            that of the drivers, along what is left of the slip.
         load: (m,) of friction alone, by which mu is multiplied: of friction of a constant size 1,
             of that of a joint what was put there last (modes.py); else 0.
     """
@@ -190,13 +193,15 @@ class ContactRows:
             self.M[i, i], self.inverse[i, i] = np.eye(3) * model.mass[b], np.eye(3) / model.mass[b]
             self.M[k, k] = A[b] @ model.Jp[b] @ A[b].T
             self.inverse[k, k] = A[b] @ np.linalg.inv(model.Jp[b]) @ A[b].T
-        self.P = self.inverse
+        self.P, self.driven = self.inverse, np.zeros((table.count, 3))
         self.load = table.alone.astype(float)
         self._reaction = np.zeros((own, 3 * table.count))
         if own:
             held = self.inverse @ self.D.T
             mobility = self.D @ held
-            self.P = self.inverse - held @ np.linalg.pinv(mobility, rcond=1e-12) @ held.T
+            answer = held @ np.linalg.pinv(mobility, rcond=1e-12)
+            self.P = self.inverse - answer @ held.T
+            self.driven = (self.G @ (answer @ self._nu)).reshape(-1, 3)
             if table.loads:  # of rows that depend on each other the least, as equations.py has them
                 s = 1.0 / np.sqrt(np.maximum(np.diag(mobility), 1e-300))
                 least = np.linalg.pinv(s[:, None] * mobility * s, rcond=1e-12)

@@ -33,7 +33,7 @@ class Impact:
 
     Attributes:
         impulses: (m, 3) in the frames of the contacts.
-        work: (m,) J, of the impulses of each contact.
+        work: (m,) J, of the impulses of each contact and of drivers that these make work.
         exchanged: J, sum of the magnitudes of its parts.
         rest: contact -> s from now on until its bounces end.
         rounds: the contacts of each, and the coefficients of restitution of all.
@@ -53,9 +53,10 @@ def repeat(table: ContactTable, rows: ContactRows, impact: Impact) -> Impact:
     work = 0.0
     for taking, e in impact.rounds:
         x = _impulses(table, rows, taking, np.where(e > 0.0, table.e, 0.0))
-        before = rows.slip[taking]
+        before = rows.slip[taking] - rows.driven[taking]
         rows.kick(_spread(x, taking, table.count))
-        work += float(np.sum(x.reshape(-1, 3) * 0.5 * (before + rows.slip[taking])))
+        after = rows.slip[taking] - rows.driven[taking]
+        work += float(np.sum(x.reshape(-1, 3) * 0.5 * (before + after)))
     _hold_low(rows, impact.low, [])
     return attrs.evolve(impact, work=np.array([work]))
 
@@ -82,9 +83,9 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
             e[list(short)] = 0.0
             continue
         rounds.append((taking, of.copy()))
-        parts = x.reshape(-1, 3) * 0.5 * slip[taking]
+        parts = x.reshape(-1, 3) * 0.5 * (slip - rows.driven)[taking]
         rows.kick(_spread(x, taking, table.count))
-        after = x.reshape(-1, 3) * 0.5 * rows.slip[taking]
+        after = x.reshape(-1, 3) * 0.5 * (rows.slip - rows.driven)[taking]
         work[taking] += np.sum(parts + after, axis=1)
         exchanged += float(np.sum(np.abs(parts)) + np.sum(np.abs(after)))
         impulses[taking] += x.reshape(-1, 3)

@@ -215,7 +215,7 @@ def _solve(
     gapless, ratio = table.gapless[closed], table.ratio_s[closed]
     x, left = solve_cone(A, b, mu, load, gapless=gapless, ratio=ratio, **more)
     if left > 1e-6 and not more:
-        raise JamError(table.names[closed[0]])
+        raise JamError(" with ".join(table.names[c] for c in closed))
     a = A @ x + b
     for k, c in enumerate(closed):
         if c in ways:

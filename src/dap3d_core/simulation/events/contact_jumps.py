@@ -355,8 +355,8 @@ class ContactJumps(Jumps):
                 length_of(rows.slip[c, self.table.across(c)])
                 < STOPPED * self._evaluator.model.length
             ):
-                self._stop(rows, c)
                 stopped.append(c)
+        self._stop(rows, stopped, before)
         return sliding, leaving, stopped
 
     @IGNORE_FLOAT_ERRORS
@@ -370,8 +370,7 @@ class ContactJumps(Jumps):
         u = self._state_of(integration)
         table.find_grips(integration.t, u)
         rows, states = ContactRows(table, integration.t, u), evaluator.states.copy()
-        for c in decided.stopped:
-            self._stop(rows, c)
+        self._stop(rows, decided.stopped, states[table.mode])
         impact = repeat(table, rows, decided.impact)
         rows.change(rows.lifted(rows.closing, decided.held, []))
         modes = decided.modes
@@ -387,20 +386,24 @@ class ContactJumps(Jumps):
         moved = np.zeros(len(rows.v))
         self._go_on(integration, u, rows, moved, states, float(np.sum(impact.work)))
 
-    def _stop(self, rows: ContactRows, c: int) -> None:
-        """Stop the slip of a contact, rounding of zero, without a change of its normal velocity.
+    def _stop(self, rows: ContactRows, contacts: list[int], mode: Floats) -> None:
+        """Stop slips, rounding of zero, without a change of what contacts hold in their modes.
 
         At a dead centre it passes through zero while the mechanism moves on.
         """
-        which = rows.rows_of([c])
-        free = np.einsum("ri,ij,rj->r", rows.G[which], rows.inverse, rows.G[which])
-        if np.diag(rows.W)[which].max() < DEAD * free.max():
-            return
-        A, u = rows.W[np.ix_(which, which)], rows.slip[c].copy()
-        u[: self.table.across(c).start] = 0.0
-        x = np.zeros(len(rows.G))
-        x[which] = np.linalg.lstsq(A, -u, rcond=1e-12)[0]
-        rows.kick(x)
+        u, holds = np.zeros_like(rows.slip), np.zeros_like(rows.slip, dtype=bool)
+        holds[mode == 1.0, 0] = holds[mode == 2.0] = True
+        for c in contacts:
+            which = rows.rows_of([c])
+            free = np.einsum("ri,ij,rj->r", rows.G[which], rows.inverse, rows.G[which])
+            if np.diag(rows.W)[which].max() >= DEAD * free.max():
+                across = self.table.across(c)
+                u[c, across], holds[c] = rows.slip[c, across], True
+        if u.any():
+            held, x = np.flatnonzero(holds), np.zeros(len(rows.G))
+            A = rows.W[np.ix_(held, held)]
+            x[held] = np.linalg.lstsq(A, -u.ravel()[held], rcond=1e-12)[0]
+            rows.kick(x)
 
     def _go_on(
         self, integration: Integration, u: Floats, rows: ContactRows, moved: Floats, states: Floats,

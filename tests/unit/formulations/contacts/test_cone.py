@@ -35,3 +35,24 @@ def test_a_block_slides_by_what_friction_leaves():
     assert x == pytest.approx([weight, -mu * weight, 0.0], rel=1e-14)
     x, _ = solve_cone(np.eye(3) / mass, b, [0.6])
     assert x == pytest.approx([weight, -pull, 0.0], rel=1e-14)
+
+
+def test_contacts_that_jam_each_other_have_no_solution():
+    """Neither both forces (-161, -67), nor one alone (the other would accelerate by -52, -15)."""
+    A = np.kron([[0.06037, -0.29260], [-0.26205, 0.48465]], np.diag([1.0, 0.0, 0.0]))
+    A += np.kron(np.eye(2), np.diag([0.0, 1.0, 1.0]))
+    _, left = solve_cone(A, np.array([-9.81, 0.0, 0.0] * 2), [0.0, 0.0])
+    assert left > 1e-6
+
+
+@pytest.mark.parametrize("seed", [17, 125, 152, 752, 1335, 1675])
+def test_four_feet_that_share_a_load_are_solved_where_newton_alone_stalls(seed):
+    """A trunk of 10 kg on hinged legs, in rates as of landing; a residual of zero is the law."""
+    rng, G, scale = np.random.default_rng(seed), np.zeros((12, 10)), [10, 10, 10, 0.1, 0.3, 0.35]
+    for c, p in enumerate([x, y, -0.4] for x in (-0.3, 0.3) for y in (-0.15, 0.15)):
+        axes, a = np.eye(3)[[2, 0, 1]], 0.1 * rng.normal()
+        G[3 * c : 3 * c + 3, :6] = np.hstack([axes, np.cross(p, axes)]) / np.sqrt(scale)
+        G[3 * c : 3 * c + 3, 6 + c] = 2.0 * np.sin(a), 2.0 * np.cos(a), 0.0
+    rates = rng.normal(size=10) * ([1.0] * 6 + [5.0] * 4)
+    rates[2] -= 9.81 * np.sqrt(10.0)
+    assert solve_cone(G @ G.T, G @ rates, np.full(4, 0.6))[1] < 1e-12
