@@ -171,8 +171,8 @@ NOT_CALLED = {
             "largest_given project report rhs watch contact_of fill_load has_loads solve_loads"
         ),
         "formulations.joint_loops.contacts": (
-            "accelerate add_contact_forces add_scaled force_of_one normal_forces project report rhs "
-            "watch"
+            "accelerate add_contact_forces add_scaled force_of_one normal_forces project report "
+            "rhs watch"
         ),
         # of runs with derivatives: study/sensitivities compares their values with those without
         "integrators.stepping.integration": "project_here",
