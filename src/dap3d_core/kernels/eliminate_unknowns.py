@@ -88,7 +88,7 @@ def settled(s, C, G):
 
 
 def root(start, C, G):
-    """The unknowns at which C(*s) = 0, and the sum of changes of the last Newton pass.
+    """The unknowns at which ``C(*s)`` is zero, and the sum of changes of the last Newton pass.
 
     For a kernel that finds a point of a curve or a surface: ``start`` a tuple near it, ``C`` a
     function that returns as many numbers, ``G`` one that returns the rows of their derivatives. The
