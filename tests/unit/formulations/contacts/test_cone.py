@@ -41,7 +41,8 @@ def test_contacts_that_jam_each_other_have_no_solution():
     """Neither both forces (-161, -67), nor one alone (the other would accelerate by -52, -15)."""
     A = np.kron([[0.06037, -0.29260], [-0.26205, 0.48465]], np.diag([1.0, 0.0, 0.0]))
     A += np.kron(np.eye(2), np.diag([0.0, 1.0, 1.0]))
-    _, left = solve_cone(A, np.array([-9.81, 0.0, 0.0] * 2), [0.0, 0.0])
+    with np.errstate(all="ignore"):  # forces grow without end
+        _, left = solve_cone(A, np.array([-9.81, 0.0, 0.0] * 2), [0.0, 0.0])
     assert left > 1e-6
 
 
