@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 
 from dap3d_core.formulations.contacts.cone import solve_cone
 
@@ -46,6 +47,7 @@ def test_contacts_that_jam_each_other_have_no_solution():
     assert left > 1e-6
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("seed", [17, 125, 152, 752, 1335, 1675])
 def test_four_feet_that_share_a_load_are_solved_where_newton_alone_stalls(seed):
     """A trunk of 10 kg on hinged legs, in rates as of landing; a residual of zero is the law."""

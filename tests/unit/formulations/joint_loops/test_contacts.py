@@ -7,6 +7,7 @@ unique, and least multipliers with those of other joints are another choice.
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 
@@ -108,6 +109,7 @@ def legged():
     return scene
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("scene", [box(), legged()], ids=["box", "legged"])
 def test_what_slides_and_shares_is_the_same_in_coordinates_of_bodies(scene):
     result, other = both(scene)

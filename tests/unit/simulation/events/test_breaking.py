@@ -7,6 +7,7 @@ room for the slowest integrator.
 import numpy as np
 import pytest
 from scipy.special import ellipk, ellipkinc
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.result import open_result
@@ -96,6 +97,7 @@ def clutch(events, **settings):
     return dap.simulate(scene, events=events, t_end=4.0, dt=0.5, **settings, **TIGHT)
 
 
+@long_in_plain_python
 @pytest.mark.parametrize("integrator", ["dop853", "radau"])
 def test_a_clutch_that_is_engaged_again_takes_energy(integrator):
     """From the start on the first wheel is braked alone, until it is a turn behind."""

@@ -7,6 +7,7 @@ are good to 1e-8 or so.
 
 import numpy as np
 import pytest
+from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 
@@ -31,6 +32,7 @@ def box(**motion):
     return scene
 
 
+@long_in_plain_python
 @pytest.mark.parametrize(
     "scene", [ball(), box(r_dot=(1.5, 0.3, 0), w=(0, 0, 2.0))], ids=["rolls", "slides"]
 )
