@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import Computed, Result
-from dap3d_core.result.note import warnings_of
+from dap3d_core.result.metadata import warnings_of
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
 from dap3d_core.study.outputs import Reduction

@@ -6,12 +6,13 @@ series have ``time`` as their last dimension. Derivatives, ``d NAME``, have ``pa
 """
 
 import json
+import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
@@ -32,9 +33,6 @@ from dap3d_core.study.design import Design
 from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.study import Batch, PointStatus, derivative_name
 
-if TYPE_CHECKING:
-    import xarray
-
 Read = TypeVar("Read")
 
 #: Version of the format, raised when an older reader would misread it.
@@ -52,6 +50,10 @@ ABOUT_STATUS = {
     "flag_meanings": " ".join(status.name.lower() for status in PointStatus),
 }
 ABOUT_NOTE = {"long_name": "what there is to say of the point", "units": "1"}
+
+
+#: Variables of up to so many bytes are read whole: single values from a file take far longer.
+READ_WHOLE = 2**30
 
 
 @attrs.frozen(eq=False)
@@ -401,3 +403,30 @@ def _ends(values: Any) -> tuple[Any, Any]:
     if not values.size:
         return "", ""
     return f"{np.min(values):.6g}", f"{np.max(values):.6g}"
+
+
+def at_places(data: "xarray.Dataset", places: Mapping[str, Integers]) -> "xarray.Dataset":
+    """A data set at some indices along its dimensions."""
+
+    def subset(array: "xarray.DataArray") -> "xarray.DataArray":
+        index = {axis: k for axis, k in places.items() if axis in array.dims}
+        return (array.compute() if array.nbytes <= READ_WHOLE else array).isel(index)
+
+    return data.map(subset, keep_attrs=True)
+
+
+def evenly(shape: Sequence[int], most: int) -> list[Integers]:
+    """Indices along each axis with at most ``most`` combinations (1 or more), (k,) rising.
+
+    No axis keeps more indices than the longest that is shortened; the first and the last index of
+    an axis are among them where it keeps two or more.
+    """
+    low, high = 1, max(shape, default=1)
+    while low < high:
+        cap = (low + high + 1) // 2
+        fits = math.prod(min(length, cap) for length in shape) <= most
+        low, high = (cap, high) if fits else (low, cap - 1)
+    return [
+        np.unique(np.linspace(0, length - 1, min(length, low)).round().astype(np.int64))
+        for length in shape
+    ]
