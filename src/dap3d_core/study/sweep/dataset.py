@@ -23,7 +23,7 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.result import ResultError, current_versions
 from dap3d_core.result.arrays import LARGE
 from dap3d_core.result.file.checksum import check_checksums, check_signature
-from dap3d_core.result.file.library import NETCDF, unreadable
+from dap3d_core.result.file.library import opened, reading, unreadable
 from dap3d_core.result.file.schema import SWEEP, about
 from dap3d_core.result.file.validate import check_claims
 from dap3d_core.result.metadata import to_json
@@ -256,20 +256,19 @@ def _opened(file: Path) -> "xarray.Dataset":
     import xarray
 
     check_checksums(file)
-    with NETCDF:
-        _check(file)
-        try:
-            found = xarray.open_dataset(
-                file, engine="netcdf4", decode_times=False, decode_timedelta=False
-            )
-            varied = [one["name"] for one in json.loads(found.attrs["varied"])]
-            found = found.set_coords([name for name in varied if name in found])
-            found = found.drop_encoding()  # how a file holds it is no property of the data
-            if found.nbytes <= LARGE:
-                with found:
-                    found.load()
-        except Exception as error:  # whatever a damaged file makes of it
-            raise unreadable(file, error) from error
+    with reading(file):
+        with opened(file) as dataset:
+            check_format(file, dataset)
+            check_claims(file, dataset)
+        found = xarray.open_dataset(
+            file, engine="netcdf4", decode_times=False, decode_timedelta=False
+        )
+        varied = [one["name"] for one in json.loads(found.attrs["varied"])]
+        found = found.set_coords([name for name in varied if name in found])
+        found = found.drop_encoding()  # how a file holds it is no property of the data
+        if found.nbytes <= LARGE:
+            with found:
+                found.load()
     sweep = _with_names(Sweep(found.data_vars, found.coords, found.attrs))
     sweep.set_close(found.close)
     return sweep
@@ -293,28 +292,9 @@ def is_sweep(path: str | os.PathLike[str]) -> bool:
 
 
 def _attributes_of(file: Path) -> list[str]:
-    import netCDF4
-
     check_checksums(file)
-    try:
-        with NETCDF, netCDF4.Dataset(os.path.abspath(file), "r") as dataset:
-            return list(dataset.ncattrs())
-    except Exception as error:  # whatever a damaged file makes of it
-        raise unreadable(file, error) from error
-
-
-def _check(file: Path) -> None:
-    """Refuse a file that is no sweep, or claims more than it can hold."""
-    import netCDF4
-
-    try:
-        with netCDF4.Dataset(os.path.abspath(file), "r") as dataset:
-            check_format(file, dataset)
-            check_claims(file, dataset)
-    except ResultError:
-        raise
-    except Exception as error:  # whatever a damaged file makes of it
-        raise unreadable(file, error) from error
+    with reading(file), opened(file) as dataset:
+        return list(dataset.ncattrs())
 
 
 def check_format(file: Path, dataset: Any) -> None:
