@@ -33,9 +33,9 @@ def keep_unoptimised(folder):
     compile_unit = units.Unit._compile
 
     def compile_once(unit, write, ready_name):
-        if unit.is_optimised or unit.path is None or unit.path.parent != cache_folder():
+        if unit.path is None or unit.path.parent != cache_folder():
             return compile_unit(unit, write, ready_name)
-        path = folder / unit.path.name
+        path, unit.is_optimised = folder / unit.path.name, False
         kept = objects.read_object(path)
         if kept is None:
             kept = compile_unit(unit, write, ready_name)
