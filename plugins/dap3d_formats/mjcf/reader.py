@@ -20,6 +20,7 @@ from dap3d_core.interface.formats import (
     Limits,
     Link,
     XmlElement,
+    balanced_inertia,
     quaternion,
     total_inertia,
 )
@@ -206,8 +207,8 @@ class MjcfReader:
         if moment > moments[0]:
             moments = np.maximum(moments, moment)
             J = axes @ np.diag(moments) @ axes.T
-        if self.document.flag("balanceinertia", False) and moments[0] + moments[1] < moments[2]:
-            J = float(np.mean(moments)) * np.eye(3)
+        if self.document.flag("balanceinertia", False):
+            J = balanced_inertia(J)
         return Inertial(max(inertial.mass, mass), inertial.com, J)
 
     def _join(
@@ -298,6 +299,8 @@ class MjcfReader:
             raise FormatError("both numbers of springdamper are above 0", element.place)
         keys = ("actuatorfrcrange", "actuatorfrclimited")
         self.force_ranges[joint.name] = self.document.bounds(element, *keys)
+        if joint.kind == "free":  # has no limits, whatever its class says
+            return
         low, high = self.document.bounds(element, "range", "limited")
         if (low, high) != UNBOUNDED and not self.document.disables("limit", "constraint"):
             limited = element.get("limited", "auto")

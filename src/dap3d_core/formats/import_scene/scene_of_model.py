@@ -67,7 +67,7 @@ class ImportOptions:
     Attributes:
         free_base: links without a joint to a parent are free, where the format leaves it open.
         keep_fixed: fixed joints between moving links stay joints.
-        balance_inertia: principal moments that no body has are replaced by their mean.
+        balance_inertia: their mean replaces principal moments that no body has, not the nearest.
         limits: of joints: one of LIMITS.
         positions, rates: of joints where the scene starts, by name, as the file counts them.
         contacts: shapes meet each other.
