@@ -46,6 +46,7 @@ class MjcfReader:
         springdampers: joint -> time constant and damping ratio that give its spring and damper.
         force_ranges: joint -> bounds of the force of its actuators.
         mocap: names of bodies that a user would move.
+        ground: the link of the geoms of the world.
     """
 
     document: Document
@@ -57,6 +58,7 @@ class MjcfReader:
     springdampers: dict[str, tuple[float, ...]] = attrs.Factory(dict)
     force_ranges: dict[str, tuple[float, float]] = attrs.Factory(dict)
     mocap: list[str] = attrs.Factory(list)
+    ground: str = ""
 
     def __attrs_post_init__(self) -> None:
         root = self.document.root
@@ -81,18 +83,8 @@ class MjcfReader:
             self._contents(world, WORLD, Frame(), "main")
         if not model.links:
             raise FormatError("holds no <body>", document.root.place)
-        ground = ""
         for world in document.root.all("worldbody"):
-            ground = self._world_shapes(world)
-        for contact in document.root.all("contact"):
-            for pair in contact.all("exclude"):
-                ends = pair.require("body1"), pair.require("body2")
-                for name in ends:
-                    if name not in (*model.links, WORLD) and document.source.contacts:
-                        raise FormatError(f"there is no body {name}", pair.place)
-                if ground in model.links or WORLD not in ends:
-                    one, other = (ground if name == WORLD else name for name in ends)
-                    model.excluded.append((one, other))
+            self.ground = self._world_shapes(world)
 
     def _world_shapes(self, world: XmlElement) -> str:
         """The geoms of the world, as a link that is fixed to it; its name."""

@@ -174,12 +174,13 @@ def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
 
 
 def _coefficients(model: Articulation, one: Contact, other: Contact) -> dict[str, float]:
-    """Friction and restitution of a pair: of the one that has priority, if one has."""
+    """Friction and restitution of a pair: its own, or of the one that has priority, if one has."""
+    own = model.friction.get(frozenset((one.surface, other.surface)))
     if one.priority != other.priority:
         one = other = max(one, other, key=lambda contact: contact.priority)
     mu = 0.0 if one.smooth and other.smooth else model.coefficient_of_pair(one.mu, other.mu)
     e = model.coefficient_of_pair(one.e, other.e)
-    return {"mu": mu} | ({"e": e} if e else {})
+    return {"mu": mu if own is None else own} | ({"e": e} if e else {})
 
 
 def _beyond_rows(model: Articulation) -> Iterator[tuple[str, str]]:
