@@ -198,7 +198,7 @@ def count(path, root):
     """
     try:
         moves = path.suffix == ".sdf" or read_by_mujoco(path).nv
-    except ValueError as error:
+    except (ValueError, ET.ParseError) as error:
         raise PeerError(" ".join(str(error).split())) from None
     if not moves:
         raise PeerError("nothing moves")

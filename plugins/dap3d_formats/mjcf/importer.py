@@ -30,6 +30,7 @@ class MjcfImporter(Importer):
         read_contacts(reader)
         keyframe = Keyframe.of(document, reader.model)
         reader.scale_masses()
+        reader.add_armatures()
         inertia = reader.inertia()
         reader.scale_springs(inertia)
         read_tendons(reader)

@@ -304,6 +304,22 @@ class MjcfReader:
         if not any((joint.damping[0], joint.stiffness[0])):
             joint.limits = joint.limits or (Limits(-inf, inf),)
 
+    def add_armatures(self) -> None:
+        """Put the armature of free joints into links of their own.
+
+        It is mass and inertia at the frame of a body, without weight.
+        """
+        free = [joint for joint in self.model.joints.values() if joint.kind == "free"]
+        for joint in (one for one in free if one.armature[0]):
+            size, joint.armature = joint.armature[0], (0.0,)
+            name = self._free_link(f"{joint.child}_armature")
+            own = Inertial(size, inertia=size * np.eye(3))
+            self.model.links[name] = Link(name, own, place=joint.place, gravcomp=1.0)
+            fixed = self._free(f"{name}_fixed")
+            self.model.joints[fixed] = Joint(fixed, "fixed", joint.child, name, place=joint.place)
+            text = "armature of a free joint is mass and inertia of its body, without weight"
+            self.document.source.remarks.translate(joint.place, text)
+
     def inertia(self) -> JointInertia:
         """Inertias of the joints at zero coordinates, by which the compiler scales springs."""
         links, joints = dict(self.model.links), self.model.joints.values()

@@ -244,12 +244,11 @@ def _mesh(
     if shape.mesh.suffix.lower() not in MESHES:
         _leave_out(builder, shape, f"a mesh other than {', '.join(MESHES)}")
         return []
-    uniform = len(set(shape.scale)) == 1 and shape.scale[0] > 0.0
-    if not uniform:
-        _leave_out(builder, shape, "a mesh with different or negative factors along its axes")
+    if 0.0 in shape.scale:
+        _leave_out(builder, shape, "a mesh with a factor of 0")
         return []
     name = meshes.name(shape.mesh, (1.0, 1.0, 1.0))
     builder.scene.files[name] = shape.mesh
-    factor = shape.scale[0]
+    factor = shape.scale[0] if len(set(shape.scale)) == 1 and shape.scale[0] > 0.0 else shape.scale
     fields = {"file": name, "at": float_tuple(frame.r), "p": quaternion(frame.A)}
     return [("mesh", fields | ({} if factor == 1.0 else {"scale": factor}))]
