@@ -6,8 +6,7 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import System
-from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
+from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
 from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import FAR, axes_of, evaluate_rows, find_contacts
 from dap3d_core.integrators.moreau.free_motion import move_freely
