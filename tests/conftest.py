@@ -30,10 +30,13 @@ def keep_unoptimised(folder):
     from dap3d_core.kernels.compiler import background, objects, units
     from dap3d_core.kernels.runtime.cache import cache_folder
 
-    compile_unit = units.Unit._compile
+    compile_unit, optimised = units.Unit._compile, objects.optimised
+
+    def is_users(path):
+        return path is not None and path.parent == cache_folder()
 
     def compile_once(unit, write, ready_name):
-        if unit.path is None or unit.path.parent != cache_folder():
+        if not is_users(unit.path):
             return compile_unit(unit, write, ready_name)
         path, unit.is_optimised = folder / unit.path.name, False
         kept = objects.read_object(path)
@@ -43,7 +46,12 @@ def keep_unoptimised(folder):
             objects.write_object(path, *kept)
         return kept
 
-    units.Unit._compile = compile_once
+    def compile_program(text, results, path):
+        if is_users(path):
+            return objects.compile_ir(text, objects.UNOPTIMISED)
+        return optimised(text, results, path)
+
+    units.Unit._compile, objects.optimised = compile_once, compile_program
     background.optimiser.add = lambda unit: None
 
 
