@@ -256,6 +256,7 @@ def test_the_example_compiles_without_a_warning_and_runs(tmp_path):
     assert last == [0.5, *run.values(["cone.r.x", "energy.total"])]
 
 
+@pytest.mark.slow
 def test_the_example_in_rust_gives_the_same(tmp_path):
     if shutil.which("rustc") is None:
         pytest.skip("there is no rustc")
