@@ -235,6 +235,7 @@ def test_a_controller_that_reads_for_the_first_time(method):
     np.testing.assert_allclose(angles, decaying(t), atol=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("methods", [("standard", "standard"), ("standard", "joint"),
                                      ("joint", "standard"), ("joint", "joint")])  # fmt: skip
 def test_a_run_from_a_result_goes_on_with_its_turns(methods, tmp_path):

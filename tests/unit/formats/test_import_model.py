@@ -242,6 +242,7 @@ def test_geoms_meet_as_in_the_file(tmp_path):
     assert "1e-06 of the mass that it carries" in first.text
 
 
+@pytest.mark.slow
 def test_limits_beside_contacts_are_rigid(tmp_path):
     """An arm falls on its limit and stays there; its friction fades, for stepping.
 

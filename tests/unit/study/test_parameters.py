@@ -165,6 +165,7 @@ def test_names_go_on_part_by_part(checked):
     assert names_under(checked, "bodies.none.") == names_under(checked, "none.") == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 def test_numbers_of_what_sticks_and_of_limits():
     """Friction that sticks and limits are contacts, and have their numbers as other elements."""
