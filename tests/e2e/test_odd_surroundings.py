@@ -110,8 +110,7 @@ def test_a_full_disk_is_named_and_what_was_computed_is_kept(scene_file):
 
 @posix
 @pytest.mark.parametrize(
-    "words",
-    ["info f.nc", "resume f.nc", "run f.nc", "resume /dev/null", "info /dev/zero"],
+    "words", ["info f.nc", "resume f.nc", "run f.nc", "resume /dev/null", "info /dev/zero"]
 )
 def test_a_pipe_or_a_device_is_not_waited_for(dap3d, refuse, words):
     os.mkfifo(dap3d.folder / "f.nc")

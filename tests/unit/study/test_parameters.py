@@ -7,12 +7,7 @@ from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.scene import check
-from dap3d_core.study import (
-    all_parameters,
-    names_under,
-    parameters_named,
-    with_values,
-)
+from dap3d_core.study import all_parameters, names_under, parameters_named, with_values
 
 #: Components by letters and by places, of fields that the scene gives or leaves to their types.
 HERE = {
