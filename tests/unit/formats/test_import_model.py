@@ -270,6 +270,7 @@ def test_pairs_of_geoms_meet_beside_those_of_bits(tmp_path):
     assert not report.left_out
 
 
+@pytest.mark.slow
 def test_limits_beside_contacts_are_rigid(tmp_path):
     """An arm falls on its limit and stays there; its friction sticks.
 
