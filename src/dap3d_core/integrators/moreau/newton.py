@@ -19,7 +19,7 @@ import math
 import numpy as np
 
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
-from dap3d_core.integrators.moreau.contact_set import DECLARED
+from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
 from dap3d_core.integrators.moreau.dense import solve_blocks, solve_square
 from dap3d_core.integrators.moreau.groups import block_at
 from dap3d_core.kernels.array_types import Floats
@@ -188,18 +188,6 @@ def add_inverse(s: StepArrays, b: int, x: Floats, out: Floats) -> None:
 
 
 @compiled
-def velocity_of(s: StepArrays, c: int, v: Floats) -> tuple[float, float, float]:
-    """Normal and tangential velocities of contact c of velocities of bodies."""
-    a, b, J = v[s.bodies[c, 0]], v[s.bodies[c, 1]], s.J[c]
-    u0, u1, u2 = 0.0, 0.0, 0.0
-    for k in range(6):
-        u0 += J[k] * a[k] + J[6 + k] * b[k]
-        u1 += J[12 + k] * a[k] + J[18 + k] * b[k]
-        u2 += J[24 + k] * a[k] + J[30 + k] * b[k]
-    return u0, u1, u2
-
-
-@compiled
 def speed_of(s: StepArrays, k: int, v: Floats) -> float:
     """D v of row k of joints."""
     found = 0.0
@@ -222,7 +210,7 @@ def left_at(s: StepArrays, c: int, v: Floats) -> float:
 
 @compiled
 def impulse_of(s: StepArrays, c: int) -> float:
-    """The size of an impulse, or of what friction of a joint may have: residuals are parts of it."""
+    """The size of an impulse, or of the most that friction of a joint has."""
     x = s.x[c]
     return max(abs(x[0]), abs(x[1]), abs(x[2]), rim_of(s, c, s.y))
 
@@ -311,17 +299,19 @@ def put_rest(s: StepArrays, v: Floats, weight: float, R: Floats) -> float:
             second[k] -= J[6 + k] * p + J[18 + k] * y + J[30 + k] * w
     merit = 0.0
     for q in range(s.used_count):
-        merit += size_of(R[s.used[q]], s.mass_inverse[s.used[q]], s.spin_inverse[s.used[q]])
+        merit += product_of(
+            R[s.used[q]], R[s.used[q]], s.mass_inverse[s.used[q]], s.spin_inverse[s.used[q]]
+        )
     return merit
 
 
 @compiled
-def size_of(x: Floats, m: float, spin: Floats) -> float:
-    """X . M x of six numbers, by the mass and the moments of inertia of a body."""
+def product_of(x: Floats, y: Floats, m: float, spin: Floats) -> float:
+    """X . M y of six numbers each, by the mass and the moments of inertia of a body."""
     total = 0.0
     for k in range(3):
-        turned = spin[3 * k] * x[3] + spin[3 * k + 1] * x[4] + spin[3 * k + 2] * x[5]
-        total += m * x[k] * x[k] + x[3 + k] * turned
+        turned = spin[3 * k] * y[3] + spin[3 * k + 1] * y[4] + spin[3 * k + 2] * y[5]
+        total += m * x[k] * y[k] + x[3 + k] * turned
     return total
 
 
@@ -335,7 +325,7 @@ def solve_round(s: StepArrays, weight: float, tolerance: float) -> None:
         b = s.used[q]
         for k in range(6):  # friction of joints may be little beside the momentum of its bodies
             s.change[k] = s.free[b, k] - rubs * s.v[b, k]
-        size += size_of(s.change, s.mass[b], s.spin[b])
+        size += product_of(s.change, s.change, s.mass[b], s.spin[b])
     merit = put_rest(s, s.v, weight, s.rest)
     for _ in range(PASSES):
         if merit <= tolerance * tolerance * size:

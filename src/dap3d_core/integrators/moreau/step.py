@@ -7,8 +7,15 @@ import math
 from typing import Any
 
 from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
-from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
-from dap3d_core.integrators.moreau.contact_set import FAR, axes_of, evaluate_rows, find_contacts
+from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
+from dap3d_core.integrators.moreau.contact_set import (
+    FARTHEST_GAP,
+    axes_of,
+    evaluate_rows,
+    find_contacts,
+    find_grips,
+    velocity_of,
+)
 from dap3d_core.integrators.moreau.free_motion import move_freely
 from dap3d_core.integrators.moreau.groups import find_groups, root_of
 from dap3d_core.integrators.moreau.impulses import (
@@ -19,7 +26,7 @@ from dap3d_core.integrators.moreau.impulses import (
     recall,
     remember,
 )
-from dap3d_core.integrators.moreau.newton import speed_of, velocity_of
+from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
 from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
 from dap3d_core.integrators.stepping.integration_state import (
@@ -110,7 +117,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     take_velocities(y, n, s.before)
     take_velocities(trial, n, s.free)
     put_margins(s)
-    if not find_contacts(work.t, y, FAR, s, system, loops):
+    if not find_contacts(work.t, y, FARTHEST_GAP, s, system, loops):
         return False
     if work.step_count == 0:
         work.overlap_at_start = deepest_of(s)
@@ -123,10 +130,12 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         return True
     if s.declared_gap.size == 0 and s.y.size > 0:
         evaluate_rows(work.t, y, s, system, loops)
-    prepare_problem(s)
     any_collides = put_bias(s)
+    if s.declared_law.size > 0:
+        find_grips(work.t, s, system, loops)
     recall(work, s)
     while True:
+        prepare_problem(s)
         if not solve(s, work.rtol):
             return False
         if not let_slip(s):
@@ -140,7 +149,6 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         copy(s.end[b], s.v[b])
     remember(work, s)
     keep_for_reports(s)
-    trial[trial.size - 1] += work_done(work, s)
     for b in range(1, n + 1):
         c, d = coordinate_offset(b), s.trial[b]
         if s.hit[b] <= 1.0 or rests(s, b):  # from where it was
@@ -149,6 +157,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         for k in range(6):
             d[k] = way_of(s, b, k)
         move(trial, c, d[0], d[1], d[2], d[3], d[4], d[5])
+    trial[trial.size - 1] += work_done(work, s)
     return True
 
 
@@ -271,28 +280,39 @@ def put_hits(s: StepArrays, any_collides: bool) -> None:
 
 @compiled
 def work_done(work: Any, s: StepArrays) -> float:
-    """Work of the impulses behind free motion, J; that of friction is added to the sum."""
-    total, rubbed = 0.0, 0.0
-    put_means(s, s.before)
-    for c in range(s.contact_count):
-        _, u1, u2 = velocity_of(s, c, s.trial)
-        rubbed += s.x[c, 1] * u1 + s.x[c, 2] * u2
-    work.friction_work += rubbed
-    put_means(s, s.free)
+    """Work of the impulses behind free motion, J; those of contacts are added to the sums.
+
+    An impulse acts at the mean of the velocities before and behind it; what moved bodies without
+    contacts does work along the way that impulses add, ``trial``.
+    """
+    total, given = 0.0, 0.0
+    for b in range(1, s.trial.shape[0]):
+        for k in range(6):
+            way = s.trial[b, k]
+            if s.hit[b] <= 1.0 or rests(s, b):
+                way -= 0.5 * s.h * (s.before[b, k] + s.free[b, k])
+            s.change[k], s.turned[k] = s.free[b, k] - s.before[b, k], way / s.h
+        total += product_of(s.change, s.turned, s.mass[b], s.spin[b])
+        if s.flies[b] == 0.0:
+            work.work_open += product_of(s.change, s.change, s.mass[b], s.spin[b])
+    for b in range(s.trial.shape[0]):
+        first = s.hit[b] if s.hit[b] <= 1.0 else 0.5
+        for k in range(6):
+            fall = (2.0 * first - 1.0) * (s.free[b, k] - s.before[b, k])
+            s.trial[b, k] = 0.5 * (s.before[b, k] + s.end[b, k] + fall)
     for c in range(s.contact_count):
         u0, u1, u2 = velocity_of(s, c, s.trial)
-        total += s.x[c, 0] * u0 + s.x[c, 1] * u1 + s.x[c, 2] * u2
+        pushed, rubbed = s.x[c, 0] * u0, s.x[c, 1] * u1 + s.x[c, 2] * u2
+        if s.kind[c] == WHOLE:
+            pushed, rubbed = 0.0, rubbed + pushed
+        given += pushed + rubbed
+        work.friction_work += rubbed
+    work.contact_work += given
+    work.work_given += max(given, 0.0)
+    total += given
     for k in range(s.y.size):
         total += s.y[k] * speed_of(s, k, s.trial)
     return total
-
-
-@compiled
-def put_means(s: StepArrays, v: Floats) -> None:
-    """Put the means of velocities v and those of the end into ``trial``."""
-    for b in range(v.shape[0]):
-        for k in range(6):
-            s.trial[b, k] = 0.5 * (v[b, k] + s.end[b, k])
 
 
 @compiled
