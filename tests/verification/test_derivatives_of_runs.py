@@ -132,6 +132,22 @@ def test_a_free_symmetric_top():
         close(found[..., j], expected)
 
 
+@pytest.mark.parametrize("method", ["standard", "joint"])
+def test_large_reactions_beside_a_top(method):
+    """What holds a heavy body says nothing of a top that turns beside it."""
+
+    def turning(mass):
+        scene = dap.Scene(name="beside")
+        scene.add_body("top", mass=1.0, Jp=(2.0, 2.0, 3.0), r=(0.0, 0.0, 3.0), w=(0.5, 0.0, 4.0))
+        scene.add_body("block", mass=mass, Jp=(2.0, 2.0, 3.0))
+        scene.add_joint("sph", "hold", P_i="block.O", P_j="ground.O")
+        scene.add_force("weight", "gravity")
+        settings = {"t_end": 3.0, "dt": 0.5, "method": method, **TIGHT}
+        return dap.sensitivities(scene, ["bodies.top.w.z"], **settings).of("top.w")[..., 0]
+
+    close(turning(1e6), turning(1.0), 1e-11)
+
+
 def test_a_bouncing_ball():
     """Height, and the instant of the bounce, by e, g, height and speed at the start."""
     scene = bouncing()

@@ -89,7 +89,7 @@ MJCF: Table = {
     "inertial": taken() | _FRAME | taken("mass diaginertia fullinertia"),
     "joint": taken()
     | taken("name class type pos axis range limited ref springref stiffness damping armature")
-    | translated("frictionloss", "it sticks; with contacts it fades at low rates")
+    | translated("frictionloss", "it sticks; with method joint it fades at low rates")
     | translated("springdamper", "stiffness and damping, by the mass matrix where the model starts")
     | moves("springyield", "springs do not yield")
     | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)

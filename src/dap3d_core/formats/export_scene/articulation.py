@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.formats.export_scene.actuators import add_actuators
 from dap3d_core.formats.export_scene.elements import (
     ALIGNED,
     ModelBuilder,
     SceneElements,
     SceneJoint,
+    add_actuators,
     leave_out,
 )
 from dap3d_core.interface.formats.articulation import (

@@ -442,14 +442,14 @@ class _JointCoordinate:
         return turning if self.turns else body.mass
 
     def add_friction(self) -> None:
-        """Add dry friction, which sticks, or fades at low rates where contacts are not events."""
+        """Add dry friction, which sticks, or fades at low rates where runs take no contacts."""
         friction, builder, ends = self._value("friction"), self.builder, self.ends
         if friction < 0.0:
             text = "friction below 0, which would drive"
             builder.remarks.leave_out(self.joint.place, text, motion=True)
         if friction <= 0.0:
             return
-        fading = None if builder.takes_contacts and not builder.stepped else FADING
+        fading = None if builder.takes_contacts else FADING
         if fading:
             unit = "rad/s" if self.turns else "m/s"
             text = f"dry friction of a joint fades below {fading:g} {unit}: it creeps, and does not"

@@ -15,6 +15,7 @@ from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.integrators.stepping.integration_state import BEFORE, INSTANT
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import Arrays
+from dap3d_core.model.state_layout import STATE
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError
 from dap3d_core.simulation.initial.assemble import correct_initial
@@ -209,12 +210,18 @@ def change_along(state: Floats, slopes: Floats) -> float:
     return CHANGE * max(size, 1e-3) / speed if speed > 0.0 and math.isfinite(speed) else 0.0
 
 
+def motion_of(body_count: int) -> slice:
+    """Columns of poses and velocities in rows; reactions, which may be large, are behind them."""
+    return slice(1, 1 + STATE * body_count)
+
+
 def total_derivative(
     function: Callable[[Run, Floats], Floats],
     beside: Sequence[Neighbours],
     base: Run,
     x: Floats,
     slopes: Floats,
+    motion: slice,
 ) -> Floats:
     """Derivatives (..., p) of what Python computes of a run and of numbers x.
 
@@ -222,12 +229,13 @@ def total_derivative(
         function: of a run and numbers.
         beside: neighbours of the run by each parameter; base: the run itself.
         x: the numbers; slopes: (..., p) their derivatives.
+        motion: those of them (of the last axis) of which it may be a curved function.
     """
     found = []
     for j, neighbours in enumerate(beside):
         along = slopes[..., j]
         total = neighbours.derivative(lambda run: function(run, x))
-        if step := change_along(x, along):
+        if step := change_along(x[..., motion], along[..., motion]):
             total = total + differences(lambda e: function(base, x + e * along), step)  # noqa: B023
         found.append(total)
     return np.stack(found, axis=-1)

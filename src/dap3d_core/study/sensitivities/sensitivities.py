@@ -33,6 +33,7 @@ from dap3d_core.study.sensitivities.neighbours import (
     RunBeside,
     arrays_of,
     floats_of,
+    motion_of,
     neighbours_of,
     run_beside,
     total_derivative,
@@ -109,7 +110,10 @@ class Sensitivities:
             result = Result.of_run(evaluator.model, whole, record, lambda: evaluator)
             return np.asarray(function(result), dtype=float)
 
-        return total_derivative(of_rows, self._neighbours, self._base, self._rows, self._slopes)
+        motion = motion_of(self._base.evaluator.model.body_count)
+        return total_derivative(
+            of_rows, self._neighbours, self._base, self._rows, self._slopes, motion
+        )
 
     @property
     def event_times(self) -> Floats:
@@ -376,7 +380,8 @@ class DifferentiatedRun(Run):
         slopes = self._slopes_of(work.rows)[: count * work.rows.shape[1]]
         slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
         if count and not self.evaluator.coordinates.are_of_bodies:
-            slopes = self._derivative(lambda run, rows: run.evaluator.body_rows(rows), raw, slopes)
+            motion = slice(1, work.state.shape[1])  # without the work done, which may be large
+            slopes = self._derivative(_body_rows, raw, slopes, motion)
         if count:
             self.slopes.append(slopes)
             self.reported.append(self.evaluator.body_rows(raw))
@@ -386,9 +391,13 @@ class DifferentiatedRun(Run):
         return type(integration).rows(integration)
 
     def _derivative(
-        self, function: Callable[[Run, Floats], Floats], x: Floats, slopes: Floats
+        self,
+        function: Callable[[Run, Floats], Floats],
+        x: Floats,
+        slopes: Floats,
+        motion: slice,
     ) -> Floats:
-        return total_derivative(function, self.neighbours, self.base, x, slopes)
+        return total_derivative(function, self.neighbours, self.base, x, slopes, motion)
 
     def _jumping(self, change: Callable[..., None]) -> Callable[[Integration], None]:
         """A jump of velocities, whose derivatives are those of the law that Python solves."""
@@ -423,7 +432,8 @@ class DifferentiatedRun(Run):
                 return own.state[Y].copy()
 
             change(of, integration)
-            slopes = self._derivative(after, given, np.vstack([of_state, of_time]))
+            motion = slice(0, -2)  # without the work done and time
+            slopes = self._derivative(after, given, np.vstack([of_state, of_time]), motion)
             self.instants[float(work.t)] = of_time
             self._differentiation.take()
             self._slopes_of(work.state)[: work.state.shape[1]] = slopes
@@ -437,6 +447,10 @@ class DifferentiatedRun(Run):
                 if other is run and run is not self.base:
                     return offset, j
         return 0.0, 0
+
+
+def _body_rows(run: Run, rows: Floats) -> Floats:
+    return run.evaluator.body_rows(rows)
 
 
 def _finite(x: Floats) -> Floats:

@@ -18,8 +18,7 @@ from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.shapes import SHAPES, Shape, height_field, mesh_file, read_shapes
 from dap3d_core.view.scene3d.colors import color
-from dap3d_core.view.scene3d.primitives import Located, Mark, floats_of, turned_to
-from dap3d_core.view.scene3d.solids import Triangles, solid
+from dap3d_core.view.scene3d.primitives import Located, Mark, Triangles, floats_of, solid, turned_to
 
 #: Meshes of more triangles are not put into a page.
 MOST_TRIANGLES = 300_000

@@ -125,13 +125,13 @@ def test_free_fall_is_linear_least_squares(sigma):
     values, covariance, rest = linear_fit(t, z, sigma)
     assert list(fit.values) == list(FALL)
     assert list(fit.values.values()) == pytest.approx(values, rel=1e-7)
-    # derivatives by differences of runs with a tolerance of 1e-8: some 1e-6
-    assert fit.covariance == pytest.approx(covariance, rel=1e-5)
+    # exact derivatives of runs whose error is none: parabolas
+    assert fit.covariance == pytest.approx(covariance, rel=1e-7)
     deviation = np.sqrt(np.diag(covariance))
-    assert fit.correlation == pytest.approx(covariance / np.outer(deviation, deviation), abs=1e-5)
+    assert fit.correlation == pytest.approx(covariance / np.outer(deviation, deviation), abs=1e-7)
     quantile = student.ppf(0.975, 18) if sigma is None else norm.ppf(0.975)
     for (low, high), value, s in zip(fit.interval.values(), values, deviation, strict=True):
-        assert (low, high) == pytest.approx((value - quantile * s, value + quantile * s), rel=1e-5)
+        assert (low, high) == pytest.approx((value - quantile * s, value + quantile * s), rel=1e-7)
     assert fit.cost == pytest.approx(rest @ rest / 2.0, rel=1e-7)
     if sigma is None:
         assert fit.chi_square is None
