@@ -168,13 +168,13 @@ NOT_CALLED = {
         "formulations.jumps.held_joints": "place_alone solve_free",
         "formulations.contacts.cone": "residual_of shorten sweep",
         "formulations.contacts.equations": (
-            "accelerate add_columns add_friction column force_of friction_of_one has_settled "
-            "inverse invert is_given is_sliding mode_of row_of "
+            "accelerate add_columns add_friction column force_of force_of_one has_settled "
+            "inverse invert invert_responses is_given is_sliding mode_of pressing row_of "
             "largest_given project report rhs watch contact_of fill_load has_loads solve_loads"
         ),
         "formulations.joint_loops.contacts": (
-            "accelerate add_contact_forces add_scaled force_of_one normal_forces project report "
-            "rhs watch"
+            "accelerate add_contact_forces add_scaled find_columns find_multipliers project report "
+            "rhs solve_all store_kept watch"
         ),
         # of runs with derivatives: study/sensitivities compares their values with those without
         "integrators.stepping.integration": "project_here",
