@@ -16,14 +16,9 @@ from dap3d_core.result import Computed, Result
 from dap3d_core.result.note import warnings_of
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
+from dap3d_core.study.differences import OFFSETS, change_along, motion_of, weights_of
 from dap3d_core.study.outputs import Reduction
 from dap3d_core.study.parameters import SceneParameter, parameters_named, with_values
-from dap3d_core.study.sensitivities.neighbours import (
-    OFFSETS,
-    change_along,
-    motion_of,
-    weights_of,
-)
 from dap3d_core.study.study import Batch, PointStatus, Study, derivative_name
 
 if TYPE_CHECKING:
