@@ -117,15 +117,16 @@ class Ensemble:
     ) -> dict[str, tuple[Floats, Floats]] | None:
         """Output -> (nt,) its series at a point (p,) and (nt, p) its derivatives, of one run.
 
-        size: (p,) of the parameters. None where an output is computed from more than rows, or the
-        point cannot be run in compiled code from its start to its end.
+        size: (p,) of the parameters. None where the run fails, or has no derivatives.
         """
         runner, of = self._runner(), self.reduction
-        if not self.is_differentiable or runner is None or not all(of.of_rows.values()):
+        if not self.is_differentiable:
             return None
+        if runner is None or not all(of.of_rows.values()):
+            return self._series_of_run(point)
         found = runner.run_with_slopes(point, size)
         if found is None:
-            return None
+            return self._series_of_run(point)
         rows, slopes = found
         motion, p = motion_of(self.compiled.model.body_count), len(point)
         ways = [change_along(rows[:, motion], slopes[:, motion, j]) or 1.0 for j in range(p)]
@@ -141,6 +142,16 @@ class Ensemble:
             )
             for name, values in series.items()
         }
+
+    def _series_of_run(self, point: Floats) -> dict[str, tuple[Floats, Floats]] | None:
+        """As ``series_with_slopes``, of a run with a model of its own."""
+        from dap3d_core.study.sensitivities.sensitivities import sensitivities
+
+        try:
+            found = sensitivities(self._model(self.study.scene, point.tolist()), self.study.names)
+        except (SceneError, SimulationError):
+            return None
+        return {o.name: (o.value(found.result), found.of(str(o.of))) for o in self.outputs}
 
     @cached_property
     def is_differentiable(self) -> bool:
