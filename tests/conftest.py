@@ -18,13 +18,33 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection(session):
-    """Quick tests have ended before optimised code is there: none is made beside them, as for
-    threads of BLAS, and none is asked for, which is hundreds of files fifty times a second."""
     gc.disable()  # nothing that is imported or collected is garbage
-    if "not slow" in session.config.option.markexpr:
-        from dap3d_core.kernels.compiler import background
+    if session.config.option.markexpr != "long":
+        keep_unoptimised(session.config.rootpath / "build" / "unoptimised")
 
-        background.optimiser.add = lambda unit: None
+
+def keep_unoptimised(folder):
+    """Let code stay unoptimised, which has the same bits, and keep it: most tests have ended before
+    optimised code is there, which takes longer to make than all of them. Where the user's cache has
+    some, it is used. The optimised code of each function is tested in unit/kernels/compiler."""
+    from dap3d_core.kernels.compiler import background, objects, units
+    from dap3d_core.kernels.runtime.cache import cache_folder
+
+    compile_unit = units.Unit._compile
+
+    def compile_once(unit, write, ready_name):
+        if unit.path is None or unit.path.parent != cache_folder():
+            return compile_unit(unit, write, ready_name)
+        path, unit.is_optimised = folder / unit.path.name, False
+        kept = objects.read_object(path)
+        if kept is None:
+            kept = compile_unit(unit, write, ready_name)
+            folder.mkdir(parents=True, exist_ok=True)
+            objects.write_object(path, *kept)
+        return kept
+
+    units.Unit._compile = compile_once
+    background.optimiser.add = lambda unit: None
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -162,7 +162,7 @@ class CompiledModel:
 
             check_outputs(self.scene, self.scene_text, self.evaluator)
         if self.model.active:
-            from dap3d_core.simulation.output.active_joints import check_active
+            from dap3d_core.simulation.output.check_outputs import check_active
 
             check_active(self.scene, self.scene_text, self.evaluator)
 
@@ -338,7 +338,7 @@ class CompiledModel:
         """As ``start``, with an evaluator."""
         active: AbstractContextManager[object] = nullcontext()
         if self.model.active:
-            from dap3d_core.simulation.output.active_joints import only_active
+            from dap3d_core.simulation.output.check_outputs import only_active
 
             u = self.model.u0 if state is None else state.u
             active = only_active(self.scene_text, evaluator, u)

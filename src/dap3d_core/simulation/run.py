@@ -17,7 +17,7 @@ from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import Computed, Result, ResultError, information
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.errors import RedundantError, SimulationError, refuse_breaks
-from dap3d_core.simulation.failure.refused_steps import refusal_notes
+from dap3d_core.simulation.failure.stall import refusal_notes
 from dap3d_core.simulation.handover import (
     crossing_notes,
     hand_over,

@@ -82,8 +82,8 @@ def response(
         frequencies = _frequencies(lin, first, last, number)
         found = lin.frequency_response(frequencies)
     if target is not None:
-        from dap3d_core.plot.bode import BodePicture
         from dap3d_core.plot.figure_file import save_figure
+        from dap3d_core.plot.modes_over import BodePicture
         from dap3d_core.plot.style import WIDTH
 
         picture = BodePicture(frequencies, found, inputs, outputs)

@@ -25,9 +25,11 @@ LOG_ROOM = 64
 #: Pairs of shapes a shape, and points a pair, that exported models have room for; entries of their
 #: matrices a body; contacts that joints hold.
 MOST_PAIRS, MOST_POINTS, MOST_ENTRIES, MOST_HELD = 32, 8, 16, 100
+#: Kinds of contacts: with a cone; friction of a joint along rows 1 and 2, or along all three.
+CONE, ALONE, WHOLE = range(3)
 #: Arrays of which a row belongs to a contact.
-OF_CONTACTS = ("bodies", "key", "group", "chosen", "J", "moved", "own", "own_held", "gap", "mu",
-               "e", "bias", "r", "left", "collides", "closing", "x", "u", "z", "B", "push", "kept",
+OF_CONTACTS = ("bodies", "key", "kind", "group", "chosen", "J", "moved", "own", "own_held", "gap", "mu",
+               "rim", "e", "bias", "r", "left", "collides", "closing", "x", "u", "z", "B", "push", "kept",
                "met", "x_bounce")  # fmt: skip
 
 
@@ -48,7 +50,8 @@ class StepArrays(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(
-            ("integer", "key", "group", "chosen", "collides", "declared_gap", "declared_mode",
+            ("integer", "key", "kind", "group", "chosen", "collides", "declared_gap",
+             "declared_mode", "declared_kind", "declared_turns", "load_row", "load_count", "load_pushes", "held",
              "row_start", "row_body", "row_place", "used", "place", "parent", "queue", "order",
              "entry_start", "entries", "bits", "slots"),
             INTEGERS,
@@ -127,6 +130,7 @@ class StepArrays(Arrays):
     # of contacts
     bodies: Integers  # (c, 2) i and j, ground 0
     key: Integers  # a number that a contact keeps
+    kind: Integers  # CONE, ALONE or WHOLE
     group: Integers  # the least body of those that contacts connect
     chosen: Integers  # contacts of a group
     collides: Integers  # what it does; the part of the step at which it closes
@@ -136,7 +140,8 @@ class StepArrays(Arrays):
     own: Floats  # (c, 9) J M^-1 J^T of each
     own_held: Floats  # the same with what joints answer
     gap: Floats
-    mu: Floats
+    mu: Floats  # of the cone
+    rim: Floats  # friction besides, N s
     e: Floats
     bias: Floats  # m/s, added to normal velocities
     r: Floats  # masses that rows feel, kg
@@ -153,20 +158,29 @@ class StepArrays(Arrays):
     declared_place: Integers  # (d, 6) place in D of the system: row normal of i and j, ...; or -1
     declared_gap: Integers  # in the residual of the system
     declared_mode: Integers  # first state
-    declared_mu: Floats
+    declared_kind: Integers
+    declared_turns: Integers  # 1 of moments
+    declared_mu: Floats  # where it slides, where it sticks
+    declared_mu_s: Floats
     declared_e: Floats
-    declared_x: Floats  # (d, 3) impulses of the last step
+    held: Integers  # 1 where it has stuck until this step
+    grip: Floats  # coefficient that counts now
+    load_row: Integers  # of friction of a joint: its load's first row, their number, whether it
+    load_count: Integers  # pushes alone; none where friction is of a size of its own
+    load_pushes: Integers
+    declared_x: Floats  # (d, 7) impulses of the last step, modes, directions of slip
     # of rows of joints
     row_start: Integers  # (k + 1,) first entry of each
     row_body: Integers  # body of each entry, and where its six numbers are in D of the system
     row_place: Integers
     D: Floats  # (entries, 6)
     s: Floats  # masses that they feel
-    y: Floats  # impulses; tried, kept, and of the last step
+    y: Floats  # impulses; tried, kept, and of the last step; those of motion without contacts
     pull: Floats
     y_kept: Floats
     y_bounce: Floats
     joint_y: Floats
+    y_free: Floats
     # scratch
     slopes: Floats  # (2, y) flat: dy/dt
     changed: Floats
@@ -214,7 +228,8 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         np.maximum.at(bodies["shape_reach"], model.collisions.body, far)
         bodies["shape_reach"][0] = 0.0
     scratch: dict[str, Any] = {
-        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "y_bounce", "joint_y")},
+        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "y_bounce", "joint_y",
+                                    "y_free")},
         **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
     }
     arrays = StepArrays(
@@ -245,7 +260,7 @@ def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
     widths = {"bodies": 2, "J": 36, "moved": 36, "own": 9, "own_held": 9, "B": 9, "met": MET,
               **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
-    whole = ("bodies", "key", "group", "chosen", "collides")
+    whole = ("bodies", "key", "kind", "group", "chosen", "collides")
     return {
         name: np.zeros((room, widths[name]) if name in widths else room,
                        dtype=np.int64 if name in whole else float)
@@ -282,15 +297,26 @@ def _declared(evaluator: Evaluator) -> dict[str, Any]:
             contact, part = divmod(int(at), 3)
             for side in np.flatnonzero(bodies[contact] == b):
                 places[contact, 2 * part + side] = first
-    return {
+    found = {
         "declared_bodies": bodies.astype(np.int64),
         "declared_place": places,
         "declared_gap": np.ascontiguousarray(evaluator.system.row[own::3][:d]),
-        "declared_mode": np.zeros(0, dtype=np.int64) if table is None else table.mode,
-        "declared_mu": np.zeros(0) if table is None else table.mu,
-        "declared_e": np.zeros(0) if table is None else table.e,
-        "declared_x": np.zeros((d, 3)),
-    }
+        **{name: np.zeros(d, dtype=np.int64) for name in (
+            "declared_mode", "declared_kind", "declared_turns", "held", "load_row", "load_count",
+            "load_pushes")},
+        **{name: np.zeros(d) for name in (
+            "declared_mu", "declared_mu_s", "declared_e", "grip")},
+        "declared_x": np.zeros((d, 7)),
+    }  # fmt: skip
+    if table is not None:
+        found |= {"declared_mode": table.mode, "declared_mu": table.mu, "declared_e": table.e}
+        found |= {"declared_mu_s": table.mu_s, "declared_turns": table.turns.astype(np.int64)}
+        found["declared_kind"] = np.where(table.alone, np.where(table.holds[:, 0], WHOLE, ALONE),
+                                          CONE)  # fmt: skip
+        for c, (rows, pushes) in table.loads.items():
+            found["load_row"][c], found["load_count"][c] = rows[0], len(rows)
+            found["load_pushes"][c] = pushes
+    return found
 
 
 def all_room(s: StepArrays) -> StepArrays:

@@ -9,12 +9,14 @@ from typing import Any
 from dap3d_core.assembly.arrays import ACCELERATION, POSITION, System
 from dap3d_core.assembly.collisions.find import find_touches
 from dap3d_core.assembly.evaluate import call_kinds, place
-from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Of keys of declared contacts, which are beyond those of shapes.
 DECLARED = 2**52
+#: Beyond every gap, m.
+FAR = 1e300
 #: Points of a pair of shapes that keys tell apart.
 POINTS = 256
 #: Mode of a contact that sticks, and states after it: way and what is nearest, three of each.
@@ -27,7 +29,8 @@ def find_contacts(
 ) -> bool:
     """Find the contacts at an integrated state y; False without room.
 
-    Shapes are nearer than the margins of bodies, declared contacts than ``most``.
+    Shapes are nearer than the margins of bodies, declared contacts than ``most``; friction of
+    joints is among them where that is FAR.
     """
     place_poses(y, s)
     s.contact_count = s.touch_count = 0
@@ -44,7 +47,11 @@ def find_contacts(
         evaluate_rows(t, y, s, system, loops)
         s.contact_count = s.touch_count
         for k in range(s.declared_gap.size):
-            if system.residual[s.declared_gap[k]] < most:
+            if s.declared_kind[k] != CONE:
+                near = most >= FAR
+            else:
+                near = system.residual[s.declared_gap[k]] < most
+            if near:
                 put_declared(k, s, system)
     return True
 
@@ -95,7 +102,7 @@ def put_touch(c: int, s: StepArrays) -> None:
     a, b = shapes.body[i], shapes.body[j]
     s.bodies[c, 0], s.bodies[c, 1] = a, b
     s.key[c] = (i * shapes.kind.size + j) * POINTS + which[2]
-    s.gap[c] = found[6]
+    s.gap[c], s.kind[c] = found[6], CONE
     first, second = shapes.material[i], shapes.material[j]
     s.mu[c], s.e[c] = shapes.mu[first, second], shapes.e[first, second]
     put_frame(found[3], found[4], found[5], J)
@@ -152,8 +159,10 @@ def put_declared(k: int, s: StepArrays, system: System) -> None:
     c = s.contact_count
     s.contact_count = c + 1
     s.bodies[c, 0], s.bodies[c, 1] = s.declared_bodies[k, 0], s.declared_bodies[k, 1]
-    s.key[c], s.gap[c] = DECLARED + k, system.residual[s.declared_gap[k]]
-    s.mu[c], s.e[c] = s.declared_mu[k], s.declared_e[k]
+    s.key[c], s.gap[c], s.kind[c] = DECLARED + k, 0.0, s.declared_kind[k]
+    s.mu[c], s.e[c] = 0.0, s.declared_e[k]
+    if s.kind[c] == CONE:
+        s.gap[c], s.mu[c] = system.residual[s.declared_gap[k]], s.declared_mu[k]
     for side in range(6):
         first = s.declared_place[k, side]
         for i in range(6):

@@ -52,7 +52,7 @@ class MoreauState(IntegrationState):
     deepest = _measure()  # largest overlap at the end of a step, m
     overlap_at_start = _measure()  # that of before the first step, m, which moves bodies apart
 
-    memory: Floats  # (room, 4) key of a contact, or -1, and its impulse, N s, global axes
+    memory: Floats  # (room, 5) key of a contact, or -1, its impulse, N s, and its mode
     measures: Floats  # scalars
 
 
@@ -78,7 +78,7 @@ class MoreauIntegration(Integration):
         """As ``Integration.own_arrays``."""
         model = self._evaluator.model
         shapes = 0 if model.collisions is None else np.count_nonzero(model.collisions.body)
-        memory = np.full((KEPT * shapes + model.contact_count, 4), -1.0)
+        memory = np.full((KEPT * shapes + model.contact_count, 5), -1.0)
         return {"memory": memory, "measures": np.zeros(len(MoreauState.indices("measures")))}
 
     @property

@@ -6,15 +6,15 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import System
-from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
-from dap3d_core.integrators.moreau.arrays import StepArrays
-from dap3d_core.integrators.moreau.contact_set import axes_of, evaluate_rows, find_contacts
+from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
+from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
+from dap3d_core.integrators.moreau.contact_set import FAR, axes_of, evaluate_rows, find_contacts
 from dap3d_core.integrators.moreau.free_motion import move_freely
 from dap3d_core.integrators.moreau.groups import find_groups, root_of
 from dap3d_core.integrators.moreau.impulses import (
     complete_row,
     keep_for_reports,
+    let_slip,
     log_contacts,
     recall,
     remember,
@@ -42,6 +42,8 @@ OVERLAP, PASSES = 1e-12, 8
 COLLIDES = 4.0
 #: A part of the step where bodies are not hit.
 NOT_HIT = 2.0
+#: Velocities of rest, as parts of what they would become without contacts.
+STILL = 1e-8
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
@@ -108,7 +110,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     take_velocities(y, n, s.before)
     take_velocities(trial, n, s.free)
     put_margins(s)
-    if not find_contacts(work.t, y, 1e300, s, system, loops):
+    if not find_contacts(work.t, y, FAR, s, system, loops):
         return False
     if work.step_count == 0:
         work.overlap_at_start = deepest_of(s)
@@ -124,8 +126,11 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     prepare_problem(s)
     any_collides = put_bias(s)
     recall(work, s)
-    if not solve(s, work.rtol):
-        return False
+    while True:
+        if not solve(s, work.rtol):
+            return False
+        if not let_slip(s):
+            break
     put_hits(s, any_collides)
     if any_collides and not limit_bounces(s, work.rtol):
         return False
@@ -138,7 +143,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     trial[trial.size - 1] += work_done(work, s)
     for b in range(1, n + 1):
         c, d = coordinate_offset(b), s.trial[b]
-        if s.hit[b] <= 1.0:  # from where it was
+        if s.hit[b] <= 1.0 or rests(s, b):  # from where it was
             for k in range(7):
                 trial[c + k] = y[c + k]
         for k in range(6):
@@ -151,10 +156,27 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 def way_of(s: StepArrays, b: int, k: int) -> float:
     """How far a body goes by impulses; one that is hit, at all."""
     before, free, end, first = s.before[b, k], s.free[b, k], s.end[b, k], s.hit[b]
+    if first > 1.0 and rests(s, b):
+        return 0.5 * s.h * (before + end)
     if first > 1.0:
         return 0.5 * s.h * (end - free)
     fall, last = s.flies[b] * (free - before), 1.0 - first
     return s.h * (first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall))
+
+
+@compiled
+def rests(s: StepArrays, b: int) -> bool:
+    """True of a body at rest that something would turn: turned and turned back it would creep.
+
+    By (h w)^3 / 12 in each step, by which Euler parameters that are made of unit length are off.
+    """
+    turn, v, w = 0.0, 0.0, 0.0
+    for k in range(3):
+        turn += (s.free[b, 3 + k] - s.before[b, 3 + k]) ** 2
+        v = max(v, abs(s.before[b, k]), abs(s.end[b, k]))
+        w = max(w, abs(s.before[b, 3 + k]), abs(s.end[b, 3 + k]))
+    turn = STILL * math.sqrt(turn)
+    return turn > 0.0 and w <= turn and v <= turn * s.length
 
 
 @compiled
@@ -202,9 +224,11 @@ def put_bias(s: StepArrays) -> bool:
         for k in range(6):
             fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
     for c in range(s.contact_count):
+        s.collides[c], s.bias[c] = 0, max(s.gap[c], 0.0) / s.h
+        if s.kind[c] != CONE:
+            continue
         approach, _, _ = velocity_of(s, c, s.before)
         normal, _, _ = velocity_of(s, c, s.free)
-        s.collides[c], s.bias[c] = 0, max(s.gap[c], 0.0) / s.h
         if approach < -COLLIDES * fall and s.gap[c] + s.h * min(approach, normal) < 0.0:
             s.collides[c], found = STOPS, True
             s.closing[c] = closing_of(max(s.gap[c], 0.0), s.h * approach, s.h * (normal - approach))

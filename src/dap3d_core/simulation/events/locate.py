@@ -187,7 +187,7 @@ class EventLocator:
         """End the joints that are not active where a run starts: None for the scene's start."""
         model, compiled = self.compiled.model, self.compiled
         if self.released is not None and model.active:
-            from dap3d_core.simulation.output.active_joints import inactive_joints
+            from dap3d_core.simulation.output.check_outputs import inactive_joints
 
             u = model.u0 if start is None else start.u
             self.released.release(inactive_joints(compiled.scene_text, compiled.evaluator, u))

@@ -15,7 +15,7 @@ from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.result.note import warnings_of
 from dap3d_core.scene import SceneError, ValidatedScene, check
 from dap3d_core.simulation import AssemblyError, CompiledModel
-from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
+from dap3d_core.simulation.failure.monitors import UnilateralMonitor
 from dap3d_core.simulation.initial.assemble import (
     SMALL_CORRECTION,
     Initial,
@@ -42,7 +42,7 @@ from dap3d_core.study.sensitivities.sensitivities import directions_of
 from dap3d_core.study.study import Batch, PointStatus
 
 if TYPE_CHECKING:
-    from dap3d_core.study.batch.joint_space_batch import TreePoints
+    from dap3d_core.study.batch.compiled_batch import TreePoints
 
 
 def batch_runner(reduction: Reduction, times: Floats) -> "BatchRunner | None":
@@ -109,7 +109,7 @@ class BatchRunner:
         batch, compiled = self.compiled_batch, self._compiled
         if batch.evaluator.coordinates.are_of_bodies:
             return batch
-        from dap3d_core.study.batch.joint_space_batch import TreePoints
+        from dap3d_core.study.batch.compiled_batch import TreePoints
 
         def of_bodies() -> CompiledBatch:
             return CompiledBatch(

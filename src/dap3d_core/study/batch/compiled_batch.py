@@ -1,7 +1,7 @@
 """Sets up the compiled loop over points (driver.py) and calls it."""
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dap3d_core.assembly.arrays import STEPS, System, step_functions
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.joint.coordinates import TreeCoordinates
 from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
@@ -18,10 +19,13 @@ from dap3d_core.integrators.stepping.integration_state import Status
 from dap3d_core.kernels.runtime.cache import jit_is_on, table_of
 from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, procedure_signature
 from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.scene import Simulation
-from dap3d_core.simulation.initial.assemble import model_size
+from dap3d_core.simulation.initial.assemble import SMALL_CORRECTION, distance, model_size
+from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.simulation.settings import fits, integration_options
 from dap3d_core.study.batch import driver, initial_state
+from dap3d_core.study.batch.initial_state import STARTING
 
 if TYPE_CHECKING:
     from dap3d_core.study.batch.lanes import LaneBatch
@@ -35,6 +39,8 @@ CALL = 200_000
 UNIT_METRIC = np.array([1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
 _DRIVE = procedure_signature(RungeKuttaState.type_of(), STEPS, System.type_of(), LOOP_LIST, INTEGER)
+
+MakeBatch = Callable[[], "CompiledBatch"]
 
 
 class BatchRows(NamedTuple):
@@ -279,7 +285,7 @@ def varied_at(system: System, places: Integers) -> dict[str, Integers]:
 def begin_functions(formulation: Formulation) -> Any:
     """Compiled functions that store the references of a start, and correct it."""
     if formulation.has_own_coordinates:
-        from dap3d_core.study.batch.tree_start import begin_tree, state_of_bodies
+        from dap3d_core.study.batch.initial_state import begin_tree, state_of_bodies
 
         return step_functions(begin_tree, begin_tree, state_of_bodies)  # none corrects a start
     if not formulation.needs_joints:
@@ -293,3 +299,38 @@ def begin_functions(formulation: Formulation) -> Any:
 def _drives() -> Any:
     """The integrator, by its address: compiled code that calls it has no copy of it."""
     return table_of(_DRIVE, (advance,))
+
+
+class TreePoints:
+    """Runs points whose poses at the start are those of the scene. Not for two threads at once."""
+
+    def __init__(self, batch: CompiledBatch, start: InitialState, make_other: MakeBatch) -> None:
+        """Args: what runs the points; start of the scene; makes what corrects velocities."""
+        self._batch, self._u, self._make_other = batch, start.u, make_other
+
+    @cached_property
+    def _other(self) -> CompiledBatch:
+        return self._make_other()
+
+    def run(self, table: Floats, places: Integers, y0: Floats, start: int) -> BatchRows:
+        """As ``CompiledBatch.run``; states (k, 13 n + 1), also those returned, are of bodies.
+
+        Points whose correction moves bodies from where they start in the scene are not done.
+        """
+        coordinates = self._batch.evaluator.coordinates
+        assert isinstance(coordinates, TreeCoordinates)
+        first = coordinates.start(self._u)
+        if start == driver.UNCORRECTED:
+            rows = self._batch.run(table, places, np.repeat(first[None], len(table), axis=0))
+            return rows._replace(given=y0, y0=y0)
+        known = places < self._other.number_count
+        corrected = self._other.run(table[:, known], places[known], y0, driver.CORRECT_ONLY)
+        y = coordinates.starts(self._u, u_from_y(corrected.y0))
+        rows = self._batch.run(table, places, y)
+        rows.diagnostics[:, :STARTING] = corrected.diagnostics[:, :STARTING]
+        moved, turned = distance(
+            u_from_y(corrected.y0), self._u, self._batch.evaluator.model.body_count
+        )
+        stays = np.maximum(moved / self._batch.size, turned) <= SMALL_CORRECTION
+        done = rows.done & corrected.done & stays
+        return BatchRows(done, rows.rows, y0, corrected.y0, rows.diagnostics)

@@ -16,11 +16,12 @@ from dap3d_core.assembly.arrays import (
     LENGTH,
     SCRATCH,
     UNSETTLED,
+    VALUE,
     Floats,
     System,
+    velocity_offset,
 )
 from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
-from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.assembly.state_update import apply_displacement, apply_velocity_change
 from dap3d_core.assembly.turns import begin_turns
 from dap3d_core.formulations.common.constraints import (
@@ -32,6 +33,8 @@ from dap3d_core.formulations.common.constraints import (
     residuals,
     velocity_residuals,
 )
+from dap3d_core.formulations.joint.equations import body_state
+from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.pivots import REDUNDANT
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import A, W
@@ -264,3 +267,17 @@ def begin_regularised(t: float, y: Floats, out: Floats, system: System, loops: A
     place(t, y, system, loops)
     store_reference_pivots(t, system, loops, PART)
     store_start(t, y, system, loops)
+
+
+@compiled
+def begin_tree(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Begin a run; ``out`` is not used."""
+    place_tree(y, system)
+    call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
+    count_from_here(t, y, system, loops)
+
+
+@compiled
+def state_of_bodies(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """The state y in coordinates of bodies into ``out``."""
+    body_state(y, out, system)

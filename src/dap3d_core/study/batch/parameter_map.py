@@ -17,11 +17,10 @@ from dap3d_core.assembly.metric import METRIC_CONSTANTS, METRIC_WIDTH
 from dap3d_core.assembly.turns import IS_POINT
 from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.element_states import INITIAL, TOLERANCE
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.types import Function, TypeBase, acts_on_all, turns_of
+from dap3d_core.interface.types import BodyPose, Function, TypeBase, acts_on_all, pose, turns_of
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
 from dap3d_core.model.groups import Floats, Integers
