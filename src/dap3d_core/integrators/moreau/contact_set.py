@@ -10,6 +10,7 @@ from dap3d_core.assembly.arrays import ACCELERATION, POSITION, System
 from dap3d_core.assembly.collisions.find import find_touches
 from dap3d_core.assembly.evaluate import call_kinds, place
 from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.interface.contacts.rows import STEPPED
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -17,8 +18,8 @@ from dap3d_core.kernels.runtime.cache import compiled
 DECLARED = 2**52
 #: Points of a pair of shapes that keys tell apart.
 POINTS = 256
-#: Mode of a contact that sticks, and states after it: way and what is nearest, three of each.
-STUCK, NEAREST = 2.0, 4
+#: Of the states of a contact after its mode and way, what is nearest.
+NEAREST = 4
 
 
 @compiled
@@ -132,7 +133,7 @@ def evaluate_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any
     place(t, y, system, loops)
     for k in range(s.declared_mode.size):
         first = s.declared_mode[k]
-        system.states[first] = STUCK
+        system.states[first] = STEPPED
         for i in range(3):
             system.states[first + NEAREST + i] = 0.0
     if s.declared_gap.size > 0:

@@ -33,6 +33,7 @@ from dap3d_core.integrators.stepping.integration_state import (
 from dap3d_core.integrators.stepping.output import may_step, project_state
 from dap3d_core.integrators.stepping.step_control import count_turns, end_of_step
 from dap3d_core.integrators.stepping.vector_ops import all_finite, copy
+from dap3d_core.interface.contacts.rows import FAR_APART
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -108,7 +109,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     take_velocities(y, n, s.before)
     take_velocities(trial, n, s.free)
     put_margins(s)
-    if not find_contacts(work.t, y, 1e300, s, system, loops):
+    if not find_contacts(work.t, y, FAR_APART, s, system, loops):
         return False
     if work.step_count == 0:
         work.overlap_at_start = deepest_of(s)
