@@ -85,6 +85,7 @@ def watched(folder, jobs):
     return json.loads(told.splitlines()[-1])
 
 
+@pytest.mark.slow
 def test_nothing_of_a_scene_a_result_or_a_matlab_folder_is_run(folder):
     jobs = [
         ["check", "."],

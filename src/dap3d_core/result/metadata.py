@@ -282,6 +282,11 @@ class RunMetadata:
         return float(rtol), atol if isinstance(atol, dict) else dict.fromkeys("rpvw", atol or 0.0)
 
     @property
+    def stepping(self) -> dict[str, float]:
+        """What contacts that are stepped did (simulation/run_state.py); empty for others."""
+        return dict(self.settings.get("stepping", {}))
+
+    @property
     def length(self) -> float:
         """The length, m, that tolerances speak of (Model.length)."""
         return float(self.settings.get("length", 1.0))

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
                  help="Free the base, where the format leaves open whether it is fixed."),
     click.option("--keep-fixed", is_flag=True, help="Keep fixed joints; do not merge their links."),
     click.option("--balance-inertia", is_flag=True,
-                 help="Replace principal moments that no body has by their mean."),
+                 help="Replace moments of inertia that no body has by their mean."),
     click.option("--no-shapes", is_flag=True, help="Leave shapes out; their files are not read."),
     click.option("--strict", is_flag=True, help="Refuse a model if something would be left out."),
     click.option("--allow-code", is_flag=True,

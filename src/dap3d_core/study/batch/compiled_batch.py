@@ -104,7 +104,7 @@ class CompiledBatch:
         self._make, self.integration = make, make()
         work, unit = self.integration.work, UNIT_METRIC.copy()
         unit[0] = evaluator.model.length
-        starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size)
+        starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size + len(y0))
         starting[initial_state.SIZE] = self.size
         without_position = np.flatnonzero(~evaluator.model.position_row)
         starting[initial_state.STARTING + evaluator.system.row[without_position]] = 1.0
@@ -183,6 +183,27 @@ class CompiledBatch:
         """Numbers that may differ from point to point."""
         return len(numbers_of(self.evaluator))
 
+    def points(
+        self, table: Floats, places: Integers, y0: Floats, start: int = driver.UNCORRECTED
+    ) -> driver.Points:
+        """Points to run; arguments as of ``run``."""
+        count, nt = len(table), len(self.integration.work.rows)
+        own = not self.evaluator.coordinates.are_of_bodies
+        return driver.Points(
+            at=np.array([0, 0, start, own], dtype=np.int64),
+            places=np.ascontiguousarray(places, dtype=np.int64),
+            table=np.array(table, dtype=float, order="C"),
+            y0=np.array(y0, dtype=float),
+            rows=np.empty((count * nt, self.evaluator.model.row_layout["inputs"].start)),
+            diagnostics=np.zeros((count, driver.COLUMNS)),
+            **self.constants,
+        )
+
+    def arguments(self, points: driver.Points) -> tuple[Any, ...]:
+        """Arguments of ``driver.run_points``."""
+        of, tables = self.evaluator, (self.evaluator.functions, _drives(), self._begin)
+        return points, self.integration.work, *tables, of.system, of.loops, CALL
+
     def run(
         self, table: Floats, places: Integers, y0: Floats, start: int = driver.UNCORRECTED
     ) -> BatchRows:
@@ -195,20 +216,9 @@ class CompiledBatch:
             start: UNCORRECTED, CORRECT, or CORRECT_ONLY (driver.py).
         """
         work, count = self.integration.work, len(table)
-        nt, width = len(work.rows), self.evaluator.model.row_layout["inputs"].start
-        own = not self.evaluator.coordinates.are_of_bodies
-        diagnostics = np.zeros((count, driver.COLUMNS))
-        points = driver.Points(
-            at=np.array([0, 0, start, own], dtype=np.int64),
-            places=np.ascontiguousarray(places, dtype=np.int64),
-            table=np.ascontiguousarray(table, dtype=float),
-            y0=np.array(y0, dtype=float),
-            rows=np.empty((count * nt, width)),
-            diagnostics=diagnostics,
-            **self.constants,
-        )
-        problem = (self.evaluator.functions, _drives(), self._begin)
-        system, loops = self.evaluator.system, self.evaluator.loops
+        points = self.points(table, places, y0, start)
+        diagnostics = points.diagnostics
+        arguments = self.arguments(points)
         programs = self._programs_for(points)
 
         def run(call: Callable[[], Any], *, needs_programs: bool = False) -> None:
@@ -232,23 +242,32 @@ class CompiledBatch:
             if not isinstance(lanes, str) and lanes.is_ready:
                 run(lambda: lanes.run(points, CALL), needs_programs=reads_rates(self.evaluator))
         while True:
-            run(lambda: driver.run_points(points, work, *problem, system, loops, CALL))
+            run(lambda: driver.run_points(*arguments))
             if points.at[driver.POINT] == count:
                 break
         if count:
             self.last_start = points.y0[-1]
             self._calls += float(np.sum(diagnostics[:, driver.CALLS]))
             self._point_calls = float(np.mean(diagnostics[:, driver.CALLS]))
-        rows = points.rows.reshape(count, nt, width)
+        return self.rows_of(points, y0)
+
+    def rows_of(self, points: driver.Points, given: Floats) -> BatchRows:
+        """Rows of points that were run; given: the states that were given."""
+        rows, diagnostics = points.rows, points.diagnostics
+        rows = rows.reshape(len(diagnostics), len(self.integration.work.rows), rows.shape[1])
         done = diagnostics[:, driver.ENDED] == Status.FINISHED
-        return BatchRows(done, rows, y0, points.y0, diagnostics)
+        return BatchRows(done, rows, given, points.y0, diagnostics)
+
+
+def arrays_of_numbers(evaluator: Evaluator) -> list[Floats]:
+    """Arrays of a model's numbers: par, body, metric and, where there is a tree, its constants."""
+    s = evaluator.system
+    return [s.par, s.body, s.metric, *([] if s.tree is None else [s.tree.constants])]
 
 
 def numbers_of(evaluator: Evaluator) -> Floats:
-    """Numbers of a model: par, body, metric and, where there is a tree, its constants."""
-    s = evaluator.system
-    tree = () if s.tree is None else (s.tree.constants,)
-    return np.concatenate([s.par, s.body.ravel(), s.metric.ravel(), *tree])
+    """The numbers of a model, all of them."""
+    return np.concatenate([array.ravel() for array in arrays_of_numbers(evaluator)])
 
 
 def varied_at(system: System, places: Integers) -> dict[str, Integers]:

@@ -38,6 +38,7 @@ from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.pivots import REDUNDANT
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import A, W
+from dap3d_core.kernels.scalar_math import is_differentiated, with_slopes
 from dap3d_core.linear.ldlt.factor import SINGULAR_PIVOT_RATIO, assemble, factor, weigh_rows
 from dap3d_core.linear.rank.rank import PIVOT_TOLERANCE
 from dap3d_core.simulation.initial.assemble import (
@@ -50,7 +51,8 @@ from dap3d_core.simulation.initial.assemble import (
 
 # Entries of ``out`` of these functions: a length of the model (given); largest residuals of
 # position and velocity before and after; Newton passes; the least pivot as a fraction of its row;
-# 1 where positions did not close. From STARTING on (given): 1 for rows without a position level.
+# 1 where positions did not close. From STARTING on (given): 1 for rows without a position level;
+# then room for a state, which differentiated code takes.
 SIZE, C_BEFORE, V_BEFORE, C_AFTER, V_AFTER, PASSES, LEAST_PIVOT, OPEN, STARTING = range(9)
 
 
@@ -159,22 +161,60 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         before = worst
         if passes == MOST_PASSES or not worst < 1e100:
             return
-        linearise(t, system, loops)
-        factor_positions(system, out[STARTING:])
-        correct(system)
-        limit_displacement(system, MOST_SHIFT * size / length)
-        apply_displacement(y, system)
-        place_with_spin(y, system)
+        correct_positions(t, y, out, system, loops)
         out[PASSES] += 1.0
+    if is_differentiated() and worst < 1e100:  # derivatives of a start that values leave as it is
+        kept = out[STARTING + system.multipliers.shape[0] :]
+        keep(kept, y)
+        correct_positions(t, y, out, system, loops)
+        put_back(y, kept)
+        place(t, y, system, loops)
     out[C_AFTER] = worst
     linearise(t, system, loops)
     factorise(system, None)
     out[LEAST_PIVOT] = least_pivot_fraction(system)
     if velocity_residuals(system) > 0.0:
-        correct(system)
-        apply_velocity_change(y, system.metric, system.change)
+        correct_velocities(y, system)
+        place_bodies(y, system.body, system.metric)
+    elif is_differentiated():
+        kept = out[STARTING + system.multipliers.shape[0] :]
+        keep(kept, y)
+        correct_velocities(y, system)
+        put_back(y, kept)
         place_bodies(y, system.body, system.metric)
     out[V_AFTER] = velocity_residuals(system)
+
+
+@compiled
+def correct_positions(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """One pass of Newton's iteration for the positions of a start."""
+    linearise(t, system, loops)
+    factor_positions(system, out[STARTING:])
+    correct(system)
+    limit_displacement(system, MOST_SHIFT * out[SIZE] / system.settings[LENGTH])
+    apply_displacement(y, system)
+    place_with_spin(y, system)
+
+
+@compiled_into
+def correct_velocities(y: Floats, system: System) -> None:
+    """Correct the velocities of a start by ``residual``."""
+    correct(system)
+    apply_velocity_change(y, system.metric, system.change)
+
+
+@compiled_into
+def keep(kept: Floats, y: Floats) -> None:
+    """Keep a state."""
+    for k in range(y.shape[0]):
+        kept[k] = y[k]
+
+
+@compiled_into
+def put_back(y: Floats, kept: Floats) -> None:
+    """Put a state back, with the derivatives of the one it has become."""
+    for k in range(y.shape[0]):
+        y[k] = with_slopes(kept[k], y[k])
 
 
 @compiled_into
