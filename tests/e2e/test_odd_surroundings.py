@@ -143,6 +143,7 @@ def test_a_file_of_the_system_without_a_size_is_empty(refuse):
     assert "empty" in refuse("info", "/proc/self/status")
 
 
+@pytest.mark.slow
 @posix
 def test_a_link_of_the_system_stays_and_its_pipe_is_refused(scene_file):
     """As root, ``-o /dev/stdout --force`` replaced the system's link by a result."""

@@ -141,6 +141,7 @@ def test_numbers_that_a_run_does_not_change_are_those_of_its_scene(tmp_path, mon
     assert same_bits(dap.resume(found), whole)
 
 
+@pytest.mark.slow
 def test_every_run_of_the_fuzz_target_is_resumed_as_it_is(tmp_path):
     """The files that are changed are good ones: unchanged they go on."""
     for run in RUNS:

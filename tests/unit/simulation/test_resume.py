@@ -320,6 +320,7 @@ def test_a_checkpoint_that_was_cut_off_is_refused(copied):
         refused(copied, "it is cut off or damaged")
 
 
+@pytest.mark.slow
 def test_a_damaged_checkpoint_is_refused_or_does_no_harm(copied, left):
     """One byte after another: what is not noticed is none that the run goes on from."""
     whole = np.frombuffer(copied.read_bytes(), dtype=np.uint8)

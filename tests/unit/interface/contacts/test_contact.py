@@ -43,6 +43,7 @@ class Pipe(Contact):
         return scale(-1.0 / size, (0.0, r_P_i[1], r_P_i[2]))
 
 
+@pytest.mark.slow
 def test_a_type_of_ones_own_on_one_body():
     failed = [str(outcome) for check in checks_for(Pipe) if not (outcome := check.run()).ok]
     assert not failed
