@@ -2,10 +2,9 @@
 
 import numpy as np
 import pytest
-from support.internals import BODY_WIDTH, compiled
+from support.internals import BODY_WIDTH, JP, compiled
 
 from dap3d_core.assembly.metric import gyroscopic_moment
-from dap3d_core.kernels.runtime.loop_support import JP
 
 
 @compiled

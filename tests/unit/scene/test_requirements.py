@@ -6,8 +6,7 @@ import pytest
 from unit.scene.base import BASE, mistakes_of, scene_of
 
 import dap3d_core as dap
-from dap3d_core.scene import check
-from dap3d_core.scene.files.read_toml import parse
+from dap3d_core.scene import check, parse
 
 SPRING = '[forces.spring]\ntype = "ptp"'
 

@@ -23,7 +23,7 @@ from dap3d_core.kernels import (
     tan,
     where,
 )
-from dap3d_core.testing.kit import checks_for
+from dap3d_core.testing import checks_for
 
 
 class Pipe(Contact):

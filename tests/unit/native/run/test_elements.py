@@ -5,8 +5,7 @@ import pytest
 from tests.unit.native.test_export import SPRING, _written, exported
 
 import dap3d_core as dap
-from dap3d_core.result import ResultError
-from dap3d_core.result.errors import UnknownNameError
+from dap3d_core.result import ResultError, UnknownNameError
 
 PARTS = ("force", "moment", "force_body", "moment_body", "moment_at_point")
 

@@ -9,7 +9,7 @@ from support.plain import long_in_plain_python
 from support.trees import mixed_chain
 
 import dap3d_core as dap
-from dap3d_core.result.quantities.lookup import find
+from dap3d_core.result import find
 
 
 @pytest.fixture(scope="module")
