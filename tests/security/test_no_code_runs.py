@@ -167,7 +167,7 @@ ALLOWED = {
     ("testing/packages.py", "subprocess"): "pytest, on the tests of packages, when it is asked for",
     ("plot/film/animation.py", "subprocess"): "ffmpeg, without a shell",
     ("native/build.py", "subprocess"): "a C compiler, on C that is written here, without a shell",
-    ("simulation/checkpoint/file.py", "allow_pickle"): "switched off",
+    ("simulation/checkpoint/save.py", "allow_pickle"): "switched off",
     (
         "study/workers/dask_cluster.py",
         "cloudpickle",

@@ -6,7 +6,6 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.pivots import near_singular_rows, store_reference_pivots
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration import Refusals, off_constraints
-from dap3d_core.interface.body_pose import pose
 from dap3d_core.interface.examine.sized_types import sample_classes
 from dap3d_core.interface.fields import sized_fields, slot_of, specs_of
 from dap3d_core.interface.formats import (
@@ -19,6 +18,7 @@ from dap3d_core.interface.formats import (
     parse_xml,
     total_inertia,
 )
+from dap3d_core.interface.types import SYMBOLS, pose
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.trace import Symbol, TraceError, trace
 from dap3d_core.kernels.compiler.types import (
@@ -66,9 +66,9 @@ from dap3d_core.scene.expressions.expression import (
     ExpressionError,
     parse_expression,
 )
-from dap3d_core.scene.files.line_numbers import lines_of
 from dap3d_core.scene.files.read_toml import LARGEST_FILE, scene_of
-from dap3d_core.simulation.checkpoint.file import (
+from dap3d_core.scene.validate.mistake_collector import Collector, lines_of
+from dap3d_core.simulation.checkpoint.save import (
     FORMAT,
     Checkpoint,
     path_of,
@@ -79,8 +79,8 @@ from dap3d_core.simulation.initial.assemble import correct_initial
 
 __all__ = [
     "BODY_WIDTH", "COLUMNS", "COMPLEX", "DTYPES", "FLOAT", "FORMAT", "INT", "INTEGERS", "JP",
-    "LARGEST_FILE", "LOOP", "MASS", "MATRIX", "NOTHING", "OPERATORS", "VECTOR", "WORDS",
-    "Array", "Arrays", "Checkpoint", "CompileError", "Compiled", "Entry", "Evaluator",
+    "LARGEST_FILE", "LOOP", "MASS", "MATRIX", "NOTHING", "OPERATORS", "SYMBOLS", "VECTOR", "WORDS",
+    "Array", "Arrays", "Checkpoint", "Collector", "CompileError", "Compiled", "Entry", "Evaluator",
     "ExpressionError", "FormatError", "Frame", "Functions", "Inertial", "Known", "Loop",
     "LoopArrays", "Pose", "Program", "RadauState", "Refusals", "Refused", "Remarks", "Signature",
     "Struct", "Symbol", "Table", "Terminated", "TraceError", "Tuple", "Unit", "address_of",
@@ -89,7 +89,7 @@ __all__ = [
     "inertia_of_solid", "inverse", "jit_is_on", "join", "lines_of", "loop_list", "make_plan",
     "matrices", "near_singular_rows", "off_constraints", "parse_expression", "parse_xml", "path_of",
     "place_bodies", "pointer", "pose", "read_checkpoint", "relative", "rotation_vector",
-    "sample_classes", "scene_of", "selected", "sized_fields", "slot_of", "source_of",
-    "specs_of", "split", "store_reference_pivots", "total_inertia", "trace", "type_of",
-    "u_from_y", "unit_names", "unwound", "write_checkpoint", "write_csv", "y_from_u",
+    "sample_classes", "scene_of", "selected", "sized_fields", "slot_of", "source_of", "specs_of",
+    "split", "store_reference_pivots", "total_inertia", "trace", "type_of", "u_from_y",
+    "unit_names", "unwound", "write_checkpoint", "write_csv", "y_from_u",
 ]  # fmt: skip

@@ -28,7 +28,7 @@ print(system.states.size, system.rates.size, compiled.model.state_count, system.
 """
 #: What a scene has to have for each of these modules, and for the kinds of loops behind them.
 NEEDED = {
-    "scene.add_requirement('dap3d')": ({"packaging", "dap3d_core.scene.requirements"}, ()),
+    "scene.add_requirement('dap3d')": ({"packaging", "dap3d_core.scene.validate.validate"}, ()),
     "scene.add_force('maxwell', 'late', P_i='upper.O', P_j='ground.O', k=1.0, c=1.0)": (
         {"dap3d_core.model.element_states", "dap3d_core.interface.examine.check_states"}, ()),
     "scene.add_contact('ball_plane', P_i='upper.O', P_j='ground.O', a_j='ground.z')": (
@@ -44,7 +44,7 @@ NOWHERE = ("matplotlib", "netCDF4", "xarray", "rich", "dap3d_core.formulations.j
            "dap3d_functions.grid", "dap3d_core.simulation.control", "scipy.optimize",
            "dap3d_core.simulation.stepwise", "dap3d_core.integrators.stepping.hold",
            "dap3d_core.model.reaction_groups", "dap3d_core.interface.codegen.unknowns",
-           "dap3d_core.kernels.eliminate_unknowns", "dap3d_core.scene.signals",
+           "dap3d_core.kernels.eliminate_unknowns", "dap3d_core.scene.validate.validate",
            "dap3d_core.interface.codegen.terms")  # fmt: skip
 
 
@@ -133,7 +133,7 @@ def test_a_stepped_run_loads_what_sets_its_inputs():
              "dap3d_core.integrators.stepping.hold"}  # fmt: skip
     found = imported("import dap3d_core as dap\ndap.start('pen1').step(0.01)")
     assert names <= found
-    assert not found & {"dap3d_core.scene.signals", "dap3d_core.interface.codegen.terms"}
+    assert not found & {"dap3d_core.scene.validate.validate", "dap3d_core.interface.codegen.terms"}
 
 
 @pytest.mark.slow

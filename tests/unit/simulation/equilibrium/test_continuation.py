@@ -6,7 +6,7 @@ from support.plain import long_in_plain_python
 from unit.simulation.equilibrium.test_states_at_rest import hanging
 
 import dap3d_core as dap
-from dap3d_core.simulation.equilibrium.trust_region import held_solution
+from dap3d_core.simulation.equilibrium.search import held_solution
 
 
 def stopped():

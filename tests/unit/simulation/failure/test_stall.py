@@ -5,7 +5,7 @@ from support import problems
 from support.internals import Refusals
 
 import dap3d_core as dap
-from dap3d_core.simulation.failure.refused_steps import describe_refusals, refusal_notes
+from dap3d_core.simulation.failure.stall import describe_refusals, refusal_notes
 
 
 class Run:
