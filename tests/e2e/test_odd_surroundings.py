@@ -36,7 +36,7 @@ def test_a_result_is_saved_though_its_words_are_lost(scene_file, option):
     folder = scene_file().parent
     found = in_shell(f"$DAP3D run fall.toml --t-end 0.1 {option} > /dev/full", folder)
     assert found.returncode == 0
-    assert found.stderr == (
+    assert found.stderr.endswith(  # where it compiles for the first time, stderr has said so
         "cannot write to the standard output: No space left on device; the files of the command "
         "are saved\n"
     )
