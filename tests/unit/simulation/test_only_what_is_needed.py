@@ -45,7 +45,7 @@ NOWHERE = ("matplotlib", "netCDF4", "xarray", "rich", "dap3d_core.formulations.j
            "dap3d_core.simulation.stepwise", "dap3d_core.integrators.stepping.hold",
            "dap3d_core.model.reaction_groups", "dap3d_core.interface.codegen.unknowns",
            "dap3d_core.kernels.eliminate_unknowns", "dap3d_core.scene.validate.validate",
-           "dap3d_core.interface.codegen.terms")  # fmt: skip
+           "dap3d_core.interface.codegen.specialise")  # fmt: skip
 
 
 @cache
@@ -133,7 +133,10 @@ def test_a_stepped_run_loads_what_sets_its_inputs():
              "dap3d_core.integrators.stepping.hold"}  # fmt: skip
     found = imported("import dap3d_core as dap\ndap.start('pen1').step(0.01)")
     assert names <= found
-    assert not found & {"dap3d_core.scene.validate.validate", "dap3d_core.interface.codegen.terms"}
+    assert not found & {
+        "dap3d_core.scene.validate.validate",
+        "dap3d_core.interface.codegen.specialise",
+    }
 
 
 @pytest.mark.slow
