@@ -76,7 +76,7 @@ def differences(scene, folder, t_end, count=20, **settings):
     return np.array_equal(np.array(rows), expected)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("model", "t_end", "settings"),
     [

@@ -121,6 +121,7 @@ def test_what_a_scene_names_is_there(with_jumps):
     assert not any("state_derivatives" in m or "states_at_rest" in m for m in found)
 
 
+@pytest.mark.slow
 def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     _, _, found = told("pen1", method="joint")
     assert "dap3d_core.formulations.joint" in found
@@ -156,6 +157,7 @@ def test_lanes_are_imported_by_long_studies():
     assert names <= imported(script)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("file", "needed"),
     [("arm.urdf", "urdf"), ("parallelogram.sdf", "sdf"), ("parallelogram.xml", "mjcf")],

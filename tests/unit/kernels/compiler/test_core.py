@@ -4,12 +4,10 @@ Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py
 import json
 
 import pytest
-from support.internals import FLOAT, INT
+from support.internals import FLOAT, INT, Known, Struct
 from support.plain import jit_is_on
 from support.problems import short_runs
 from support.process import REPOSITORY, run
-
-from dap3d_core.kernels.compiler.types import Known, Struct
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
