@@ -147,7 +147,7 @@ NOT_CALLED = {
             "log_contacts"
         ),
         "integrators.moreau.newton": (
-            "put_projected put_slopes put_missed rim_of bound_of impulse_of add_load "
+            "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of add_load "
             "put_velocities clear add_pull times_inverse add_inverse speed_of left_at residual_of "
             "newton exchange put_rest product_of solve_round try_pass assemble put_turned "
             "add_contact"
