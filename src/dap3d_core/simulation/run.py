@@ -58,8 +58,6 @@ SECOND_RUN_FACTOR = 0.8
 #: A residual above this part of the largest impulse is a warning, and an overlap above this part of
 #: the length of the scene.
 UNSOLVED = 1e-3
-#: Overlaps at the start above this part of the length of the scene are told.
-LEAST_OVERLAP = 1e-8
 
 
 class Run(RunState):
@@ -385,8 +383,5 @@ def stepping_notes(integrations: Sequence[Integration], length: float) -> list[s
         notes = [f"{words}: where bodies rest is not to be trusted; give a shorter contact_step"]
     elif deepest > UNSOLVED * length:
         notes = [f"{words}: joints or drivers hold them where they cannot move apart"]
-    if (overlap := states[0].overlap_at_start) > LEAST_OVERLAP * length:
-        notes.append(
-            f"bodies overlapped by {overlap:.2g} m at the start, and were moved apart: move them"
-        )
-    return notes
+    first = next(one for one in integrations if one.name == STEPPING.name)
+    return [*notes, words] if (words := first.overlapping) else notes
