@@ -14,7 +14,7 @@ import numpy as np
 
 import dap3d_core as dap
 from dap3d_core.scene import check, parse
-from dap3d_core.scene.files.line_numbers import lines_of
+from dap3d_core.scene.validate.mistake_collector import lines_of
 from fuzz.scenes import events_of
 
 #: A case that computes for longer hangs, s; kernels that are not cached are compiled in it, too.

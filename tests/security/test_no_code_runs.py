@@ -85,6 +85,7 @@ def watched(folder, jobs):
     return json.loads(told.splitlines()[-1])
 
 
+@pytest.mark.slow
 def test_nothing_of_a_scene_a_result_or_a_matlab_folder_is_run(folder):
     jobs = [
         ["check", "."],
@@ -166,7 +167,7 @@ ALLOWED = {
     ("testing/packages.py", "subprocess"): "pytest, on the tests of packages, when it is asked for",
     ("plot/film/animation.py", "subprocess"): "ffmpeg, without a shell",
     ("native/build.py", "subprocess"): "a C compiler, on C that is written here, without a shell",
-    ("simulation/checkpoint/file.py", "allow_pickle"): "switched off",
+    ("simulation/checkpoint/save.py", "allow_pickle"): "switched off",
     (
         "study/workers/dask_cluster.py",
         "cloudpickle",

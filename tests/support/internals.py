@@ -4,9 +4,9 @@ from dap3d_core.assembly.evaluate import call_kinds
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.pivots import store_reference_pivots
 from dap3d_core.integrators.stepping.integration import off_constraints
-from dap3d_core.interface.body_pose import pose
 from dap3d_core.interface.examine.sized_types import sample_classes
 from dap3d_core.interface.fields import specs_of
+from dap3d_core.interface.types import pose
 from dap3d_core.kernels.compiler.functions import Program
 from dap3d_core.kernels.compiler.types import FLOAT, INT, Array, CompileError, Signature
 from dap3d_core.kernels.compiler.units import Entry
@@ -18,7 +18,7 @@ from dap3d_core.linear.ldlt.plan import make_plan
 from dap3d_core.model.rigid_motion import Pose, compose, relative
 from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
 from dap3d_core.result.quantities.csv_table import columns_of, write_csv
-from dap3d_core.simulation.checkpoint.file import Checkpoint, read_checkpoint, write_checkpoint
+from dap3d_core.simulation.checkpoint.save import Checkpoint, read_checkpoint, write_checkpoint
 from dap3d_core.simulation.initial.assemble import correct_initial
 
 __all__ = [

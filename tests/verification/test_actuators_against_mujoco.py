@@ -154,3 +154,23 @@ def test_a_tendon_at_its_limit_holds(tmp_path, engine):
     found = np.hstack([result.rd[-1] - result.rd[0], result.w[-1] - result.w[0]])[k] / 1e-6
     assert abs(expected[2]) > 1.0
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-5)
+
+
+FREE = """<mujoco><worldbody><body name="a"><joint name="fly" type="free" damping="0.7"
+  armature="0.3"/><geom type="box" size="0.1 0.2 0.15" pos="0.2 0.1 0"/></body></worldbody></mujoco>
+"""
+
+
+def test_damping_and_armature_of_a_free_joint(tmp_path):
+    """A damper against the motion of its frame; mass and inertia there, without weight."""
+    path, rng = tmp_path / "a.xml", np.random.default_rng(2)
+    path.write_text(FREE)
+    oracle = Oracle(path)
+    for _ in range(3):
+        positions, rates = oracle.randomise(rng)
+        scene, report = dap.import_model(path, positions=positions, rates=rates)
+        result = dap.simulate(scene, t_end=0.0)
+        found = np.concatenate([result.rdd[0, 0], result.wd[0, 0]])
+        expected = oracle.acceleration(1, result.r[0, 0])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+        assert not report.left_out

@@ -38,6 +38,7 @@ def test_flight_and_bounce_by_restitution_and_height():
     assert found.final("ball.r.z") == pytest.approx([v1 * left, by_height], rel=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_ball_that_slides_then_rolls_by_friction():
     """It rolls from 2 v / (7 mu g) on: x' = v t1' - ..., by hand."""
     v, mu, t_end = 3.0, 0.3, 2.0
@@ -49,6 +50,7 @@ def test_a_ball_that_slides_then_rolls_by_friction():
     assert found.final("ball.rd.x") == pytest.approx([0.0], abs=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_differences_where_a_ball_bounces_with_friction():
     """Impacts within their cones, whose impulses are found by iteration."""
     scene = ball(height=0.5, v=2.0, e=0.5, mu=0.1)

@@ -13,8 +13,9 @@ from dap3d_core.kernels.array_types import Floats as Floats
 from dap3d_core.kernels.array_types import Integers as Integers
 from dap3d_core.kernels.compiler.types import Table
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX
-from dap3d_core.kernels.runtime.cache import table_of
+from dap3d_core.kernels.runtime.cache import compiled_into, table_of
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, step_signature
+from dap3d_core.model.state_layout import COORDINATES, STATE, VELOCITIES
 
 #: The order of the group loops in the list: all loops of one kind stand together.
 KINDS = (
@@ -114,3 +115,21 @@ STEPS = Table(STEP)
 def step_functions(*functions: Any) -> Any:
     """A formulation's functions (t, y, out, system, loops) as an integrator takes them."""
     return table_of(STEP, functions)
+
+
+@compiled_into
+def coordinate_offset(b: int) -> int:
+    """Index of the first coordinate of body b."""
+    return COORDINATES * (b - 1)
+
+
+@compiled_into
+def velocity_offset(b: int, n: int) -> int:
+    """Index of the first velocity of body b of n."""
+    return COORDINATES * n + VELOCITIES * (b - 1)
+
+
+@compiled_into
+def states_offset(n: int) -> int:
+    """Index of the first state of an element, in coordinates of n bodies; the work is last."""
+    return STATE * n

@@ -48,7 +48,7 @@ from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pat
 from dap3d_core.formulations.coordinates import Coordinates
 from dap3d_core.formulations.switches import Switch, switches_of
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
-from dap3d_core.interface.element_unknowns import START
+from dap3d_core.interface.element_states import START
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import to_body

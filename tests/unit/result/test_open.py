@@ -67,8 +67,7 @@ def test_round_trip_is_bit_for_bit(tmp_path, name):
     assert found.record == result.record
     for constant in attrs.fields(type(result.summary)):
         np.testing.assert_array_equal(
-            getattr(found.summary, constant.name),
-            getattr(result.summary, constant.name),
+            getattr(found.summary, constant.name), getattr(result.summary, constant.name)
         )
     for array in ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd", "rP", "rPd", "rPdd"):
         np.testing.assert_array_equal(getattr(found, array), getattr(result, array))

@@ -28,7 +28,7 @@ print(system.states.size, system.rates.size, compiled.model.state_count, system.
 """
 #: What a scene has to have for each of these modules, and for the kinds of loops behind them.
 NEEDED = {
-    "scene.add_requirement('dap3d')": ({"packaging", "dap3d_core.scene.requirements"}, ()),
+    "scene.add_requirement('dap3d')": ({"packaging", "dap3d_core.scene.validate.validate"}, ()),
     "scene.add_force('maxwell', 'late', P_i='upper.O', P_j='ground.O', k=1.0, c=1.0)": (
         {"dap3d_core.model.element_states", "dap3d_core.interface.examine.check_states"}, ()),
     "scene.add_contact('ball_plane', P_i='upper.O', P_j='ground.O', a_j='ground.z')": (
@@ -44,7 +44,7 @@ NOWHERE = ("matplotlib", "netCDF4", "xarray", "rich", "dap3d_core.formulations.j
            "dap3d_functions.grid", "dap3d_core.simulation.control", "scipy.optimize",
            "dap3d_core.simulation.stepwise", "dap3d_core.integrators.stepping.hold",
            "dap3d_core.model.reaction_groups", "dap3d_core.interface.codegen.unknowns",
-           "dap3d_core.kernels.eliminate_unknowns", "dap3d_core.scene.signals",
+           "dap3d_core.kernels.eliminate_unknowns", "dap3d_core.scene.validate.validate",
            "dap3d_core.interface.codegen.terms")  # fmt: skip
 
 
@@ -72,6 +72,7 @@ LEFT_ALONE = {
 }  # fmt: skip
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("script", "others"), LEFT_ALONE.items(), ids=range(len(LEFT_ALONE)))
 def test_a_script_leaves_alone_what_it_does_not_need(script, others):
     """The package, its registry, scenes, results, a run, a page."""
@@ -85,6 +86,7 @@ def told(model, added="", method="auto"):
     return set(loops.split()), sizes, set(modules.split())
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("model", "own", "others"),
     [
@@ -106,6 +108,7 @@ def test_a_scene_has_only_what_it_needs(model, own, others):
         assert "dap3d_core.formulations.standard" not in found
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("with_jumps", [False, True])
 def test_what_a_scene_names_is_there(with_jumps):
     """Each of what the scenes above do without; contacts and other jumps exclude one another."""
@@ -129,7 +132,7 @@ def test_a_stepped_run_loads_what_sets_its_inputs():
              "dap3d_core.integrators.stepping.hold"}  # fmt: skip
     found = imported("import dap3d_core as dap\ndap.start('pen1').step(0.01)")
     assert names <= found
-    assert not found & {"dap3d_core.scene.signals", "dap3d_core.interface.codegen.terms"}
+    assert not found & {"dap3d_core.scene.validate.validate", "dap3d_core.interface.codegen.terms"}
 
 
 @pytest.mark.slow
@@ -182,6 +185,7 @@ def test_a_force_without_a_factor_has_the_loop_of_one_that_knows_of_none(keyword
     assert "F[" not in "\n".join(write(type_info, "wrench").lines)
 
 
+@pytest.mark.slow
 def test_a_run_needs_no_analysis_and_no_other_start(tmp_path):
     """``dap3d run`` imports no other analysis, nothing that these need, no starts from results."""
     found = imported(

@@ -17,7 +17,7 @@ from support.state_types import stated
 
 import dap3d_core as dap
 from dap3d_core.simulation import CheckpointError
-from dap3d_core.simulation.checkpoint.file import (
+from dap3d_core.simulation.checkpoint.save import (
     FORMAT,
     Checkpoint,
     path_of,

@@ -174,12 +174,13 @@ def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
 
 
 def _coefficients(model: Articulation, one: Contact, other: Contact) -> dict[str, float]:
-    """Friction and restitution of a pair: of the one that has priority, if one has."""
+    """Friction and restitution of a pair: its own, or of the one that has priority, if one has."""
+    own = model.friction.get(frozenset((one.surface, other.surface)))
     if one.priority != other.priority:
         one = other = max(one, other, key=lambda contact: contact.priority)
     mu = 0.0 if one.smooth and other.smooth else model.coefficient_of_pair(one.mu, other.mu)
     e = model.coefficient_of_pair(one.e, other.e)
-    return {"mu": mu} | ({"e": e} if e else {})
+    return {"mu": mu if own is None else own} | ({"e": e} if e else {})
 
 
 def _beyond_rows(model: Articulation) -> Iterator[tuple[str, str]]:
@@ -243,12 +244,11 @@ def _mesh(
     if shape.mesh.suffix.lower() not in MESHES:
         _leave_out(builder, shape, f"a mesh other than {', '.join(MESHES)}")
         return []
-    uniform = len(set(shape.scale)) == 1 and shape.scale[0] > 0.0
-    if not uniform:
-        _leave_out(builder, shape, "a mesh with different or negative factors along its axes")
+    if 0.0 in shape.scale:
+        _leave_out(builder, shape, "a mesh with a factor of 0")
         return []
     name = meshes.name(shape.mesh, (1.0, 1.0, 1.0))
     builder.scene.files[name] = shape.mesh
-    factor = shape.scale[0]
+    factor = shape.scale[0] if len(set(shape.scale)) == 1 and shape.scale[0] > 0.0 else shape.scale
     fields = {"file": name, "at": float_tuple(frame.r), "p": quaternion(frame.A)}
     return [("mesh", fields | ({} if factor == 1.0 else {"scale": factor}))]

@@ -48,11 +48,14 @@ class MoreauState(IntegrationState):
 
     rate = _measure()  # largest one of the forces without contacts, 1/s
     largest_residual = _measure()  # of all steps, a part of the largest impulse of each
-    friction_work = _measure()  # of all steps so far, J, not positive
+    contact_work = _measure()  # of all steps so far, J
+    friction_work = _measure()  # the part of friction
+    work_open = _measure()  # what moving by velocities behind impacts may change of energies, J
+    work_given = _measure()  # that of steps in which it is positive, J
     deepest = _measure()  # largest overlap at the end of a step, m
     overlap_at_start = _measure()  # that of before the first step, m, which moves bodies apart
 
-    memory: Floats  # (room, 4) key of a contact, or -1, and its impulse, N s, global axes
+    memory: Floats  # (room, 5) key of a contact, or -1, its impulse, N s, and its mode
     measures: Floats  # scalars
 
 
@@ -78,7 +81,7 @@ class MoreauIntegration(Integration):
         """As ``Integration.own_arrays``."""
         model = self._evaluator.model
         shapes = 0 if model.collisions is None else np.count_nonzero(model.collisions.body)
-        memory = np.full((KEPT * shapes + model.contact_count, 4), -1.0)
+        memory = np.full((KEPT * shapes + model.contact_count, 5), -1.0)
         return {"memory": memory, "measures": np.zeros(len(MoreauState.indices("measures")))}
 
     @property

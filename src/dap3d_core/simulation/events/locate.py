@@ -16,8 +16,8 @@ from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.formulations import RHS
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.validate import are_events, is_number
+from dap3d_core.result.metadata import EventRecord
 from dap3d_core.result.post.smooth_parts import cubic
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_events
@@ -187,7 +187,7 @@ class EventLocator:
         """End the joints that are not active where a run starts: None for the scene's start."""
         model, compiled = self.compiled.model, self.compiled
         if self.released is not None and model.active:
-            from dap3d_core.simulation.output.active_joints import inactive_joints
+            from dap3d_core.simulation.output.check_outputs import inactive_joints
 
             u = model.u0 if start is None else start.u
             self.released.release(inactive_joints(compiled.scene_text, compiled.evaluator, u))

@@ -21,7 +21,7 @@ from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError, refuse_collisions
-from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
+from dap3d_core.simulation.failure.monitors import UnilateralMonitor
 from dap3d_core.simulation.kinematics.actuators import Actuator, DriverActuator, actuators_of
 from dap3d_core.simulation.kinematics.balance import Balance
 from dap3d_core.simulation.kinematics.closed_contacts import ContactForces

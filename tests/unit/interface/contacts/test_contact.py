@@ -115,7 +115,7 @@ def test_rates_of_what_is_sought_follow_from_its_equation():
     assert s_dot == pytest.approx(2.0 / (3.0 * s * s + 1.0), rel=1e-14)
 
 
-@pytest.mark.every(4)
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [8, 16, 21, 51])
 def test_corners_and_edges_of_boxes_are_exact_derivatives(part):
     class Part(BoxBox):

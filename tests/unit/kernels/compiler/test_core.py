@@ -132,12 +132,12 @@ NOT_CALLED = {
             "solve_dense solve_square solve_blocks invert multiply take take_from"
         ),
         "integrators.moreau.gauss_seidel": (
-            "sweep_bodies sweep_contacts change_of refine_held keep take_kept put_crossed "
+            "sweep_bodies sweep_contacts size_of change_of refine_held copy_impulses put_crossed "
             "put_answer put_felt"
         ),
         "integrators.moreau.contact_set": (
             "find_contacts place_poses axes_of turn_tensor put_touch put_frame evaluate_rows "
-            "put_declared"
+            "put_declared velocity_of find_grips friction_at"
         ),
         "integrators.moreau.free_motion": "move_freely normalise size_of largest_rate",
         "integrators.moreau.groups": (
@@ -145,12 +145,14 @@ NOT_CALLED = {
             "eliminate block_at"
         ),
         "integrators.moreau.impulses": (
-            "slot_of recall remember mode_of keep_for_reports complete_row log_contacts"
+            "slot_of recall put_grip let_slip remember mode_of keep_for_reports complete_row "
+            "log_contacts"
         ),
         "integrators.moreau.newton": (
-            "put_projected put_slopes put_missed put_velocities clear add_pull times_inverse "
-            "add_inverse velocity_of speed_of left_at residual_of newton exchange put_rest "
-            "size_of solve_round try_pass assemble put_turned add_contact"
+            "put_projected put_slopes put_missed rim_of bound_of impulse_of add_load "
+            "put_velocities clear add_pull times_inverse add_inverse speed_of left_at residual_of "
+            "newton exchange put_rest product_of solve_round try_pass assemble put_turned "
+            "add_contact"
         ),
         "integrators.moreau.problem": "prepare_problem solve judge sweep finish refine_groups",
         "integrators.moreau.restitution": (
@@ -158,7 +160,7 @@ NOT_CALLED = {
         ),
         "integrators.moreau.step": (
             "advance goes_on state_at meet take_velocities put_margins length_of deepest_of "
-            "put_bias put_hits work_done move part finish way_of closing_of put_means"
+            "put_bias put_hits work_done move part finish way_of closing_of rests"
         ),
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",

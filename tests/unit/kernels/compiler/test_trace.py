@@ -72,11 +72,17 @@ TYPES = [(kind, keyword) for kind in ("joint", "force", "function")
          for keyword in REGISTRY.keywords(kind)]  # fmt: skip
 
 
+#: Of each type what is optimised; of every third one the other levels, which know no types.
+CASES = [(*one, "O3") for one in TYPES] + [
+    pytest.param(*one, level, marks=pytest.mark.slow)
+    for one in TYPES[::3]
+    for level in targets()
+    if level != "O3"
+]
+
+
 @pytest.mark.every(4)
-@pytest.mark.parametrize(
-    "level", [pytest.param(n, marks=[pytest.mark.slow] if n != "O3" else []) for n in targets()]
-)
-@pytest.mark.parametrize(("kind", "keyword"), TYPES)
+@pytest.mark.parametrize(("kind", "keyword", "level"), CASES)
 def test_traced_loops_have_the_bits_of_plain_python(kind, keyword, level):
     for type_info, loop in loops_of(REGISTRY.get(kind, keyword)):
 

@@ -9,6 +9,7 @@ from tests.unit.native.test_export import differences, exported
 import dap3d_core as dap
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("make", "settings"),
     [

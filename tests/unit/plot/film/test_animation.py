@@ -9,16 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from PIL import Image
-from support.results import (
-    ARM,
-    PIVOT,
-    RATE,
-    circling,
-    circling_scene,
-    model_of,
-    result_of,
-    rows_of,
-)
+from support.results import ARM, PIVOT, RATE, circling, circling_scene, model_of, result_of, rows_of
 
 import dap3d_core as dap
 from dap3d_core.plot.film.animation import frame_times, usual_speed

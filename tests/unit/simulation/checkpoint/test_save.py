@@ -14,7 +14,7 @@ from support.results import same_bits
 
 import dap3d_core as dap
 from dap3d_core.integrators.radau.state import RadauState
-from dap3d_core.simulation.checkpoint.file import read_checkpoint
+from dap3d_core.simulation.checkpoint.save import read_checkpoint
 
 RUN = import_module("dap3d_core.simulation.run")
 

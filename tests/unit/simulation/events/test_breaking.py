@@ -212,6 +212,7 @@ def test_a_checkpoint_is_refused(compiled, tmp_path):
         dap.simulate(compiled, t_end=1.0, output=tmp_path / "out.nc", checkpoint=1.0)
 
 
+@pytest.mark.slow
 def test_one_for_an_interruption_alone_is_left_out(compiled, tmp_path):
     """As runs of the command line ask for."""
     out = tmp_path / "out.nc"

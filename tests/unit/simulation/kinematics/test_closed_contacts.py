@@ -172,6 +172,7 @@ def test_a_contact_that_would_have_to_pull_is_named():
     assert "by 19.6 N" in note
 
 
+@pytest.mark.slow
 def test_feet_that_cannot_hold_are_refused():
     scene, motion = table((1.5, 0.0))
     with pytest.raises(dap.SimulationError, match="none within their cones was found"):

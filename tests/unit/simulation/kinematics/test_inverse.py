@@ -80,6 +80,7 @@ def test_actuation_is_stored(scene, motion, tmp_path):
                           result.force("torque").on["i"].moment)  # fmt: skip
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_positions_as_data_are_differentiated_by_splines(scene, motion, tmp_path):
     """Of two columns, one more than freedoms, from a CSV file; the error is of order dt^4."""

@@ -169,7 +169,7 @@ CASES = {
 }
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(7)
 @pytest.mark.parametrize("case", CASES)
 def test_points_of_all_kinds_have_the_bits_of_points_alone(case):
     make, vary, output = CASES[case]
@@ -198,6 +198,7 @@ def with_friction(scene):
     scene.add_force("friction", "rubbing", joint="hinge", mu=0.1, radius=0.05, v_tol=0.1)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("change", [with_table, with_bend, with_turns])
 def test_trees_with_more_have_the_bits_of_points_alone(change):
     """What decides by a number is a guard; where it fails, rates are evaluated alone."""
@@ -232,6 +233,7 @@ def test_notes_say_how_points_are_run():
     assert of.notes == (f"points are run in {lanes_of(of).count} lanes of a vector",)
 
 
+@pytest.mark.slow
 def test_turns_are_counted_in_steps_near_singular_poses():
     """A crank turns by 1.6 rad a step through poses in line, to which each run steps by itself.
     Of two such steps whose turns were not counted, the second one would be cut."""

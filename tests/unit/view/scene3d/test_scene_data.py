@@ -15,11 +15,10 @@ from dap3d_core.interface.types import SYMBOLS
 from dap3d_core.kernels import dot, sub
 from dap3d_core.model import build_model
 from dap3d_core.scene import check
-from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import CYCLE, chains_of, colors
 from dap3d_core.view.scene3d.elements import elements_of, joints_of
 from dap3d_core.view.scene3d.primitives import turned_to
-from dap3d_core.view.scene3d.sampled_motion import Extent, Motion, instants_to_show
+from dap3d_core.view.scene3d.sampled_motion import Extent, Motion, instants_to_show, stage
 from dap3d_core.view.scene3d.scene_data import (
     DRAWINGS,
     MODEST,
