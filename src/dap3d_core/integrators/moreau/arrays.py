@@ -228,8 +228,10 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         np.maximum.at(bodies["shape_reach"], model.collisions.body, far)
         bodies["shape_reach"][0] = 0.0
     scratch: dict[str, Any] = {
-        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "y_bounce", "joint_y",
-                                    "y_free")},
+        **{
+            name: np.zeros(k)
+            for name in ("s", "y", "pull", "y_kept", "y_bounce", "joint_y", "y_free")
+        },
         **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
     }
     arrays = StepArrays(

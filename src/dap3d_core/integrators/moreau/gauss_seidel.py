@@ -87,9 +87,7 @@ def sweep_contacts(
         for c in range(mu.size):
             if own[c, 0] == 0.0:
                 continue
-            d0, d1, d2 = change_of(
-                own[c], kind[c], mu[c], rim[c], x[c], u[c, 0], u[c, 1], u[c, 2]
-            )
+            d0, d1, d2 = change_of(own[c], kind[c], mu[c], rim[c], x[c], u[c, 0], u[c, 1], u[c, 2])
             p, q, r = felt[3 * c], felt[3 * c + 1], felt[3 * c + 2]
             for k in range(mu.size):
                 for s in range(3):
