@@ -76,7 +76,7 @@ def differences(scene, folder, t_end, count=20, **settings):
     return np.array_equal(np.array(rows), expected)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("model", "t_end", "settings"),
     [
@@ -93,6 +93,7 @@ def test_a_run_has_the_bits_of_simulate(tmp_path, model, t_end, settings):
     assert differences(dap.load(model), tmp_path, t_end, **settings)
 
 
+@pytest.mark.slow
 def test_so_have_runs_in_joint_coordinates(tmp_path):
     scene = dap.load("pen2")
     made, library = exported(scene, tmp_path, method="joint", outputs=states_of(scene))
@@ -105,6 +106,7 @@ def test_so_have_runs_in_joint_coordinates(tmp_path):
         np.testing.assert_allclose(run.values(made.outputs), expected, rtol=0, atol=2e-15)
 
 
+@pytest.mark.slow
 def test_auto_continues_with_radau_where_a_scene_is_stiff(tmp_path):
     scene = _written(SPRING, tmp_path)
     scene.forces["spring"].fields |= {"c": 2e5}
@@ -256,6 +258,7 @@ def test_the_example_compiles_without_a_warning_and_runs(tmp_path):
     assert last == [0.5, *run.values(["cone.r.x", "energy.total"])]
 
 
+@pytest.mark.slow
 def test_the_example_in_rust_gives_the_same(tmp_path):
     if shutil.which("rustc") is None:
         pytest.skip("there is no rustc")
@@ -321,6 +324,7 @@ def declared_ball():
     return scene
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("make", "more", "settings"), [
     (falling_ball, ["ball.rdd"], {}),
     (declared_ball, ["ball.rdd"], {"contact": "stepping", "contact_step": 2e-3}),
