@@ -104,6 +104,7 @@ NOT_CALLED = {
         "formulations.joint.lanes": "rhs",
         "integrators.runge_kutta.lanes": "plan_step after_step put_stage put_argument judge_step "
         "take_projection end_step argument_of begin_stage",
+        "study.batch.initial_state": "keep put_back",  # of differentiated code
         "study.batch.lanes": "set_lane load next_step run_lanes exchange_kept take_stages "
         "take_rates watch_stages",
         # of scenes with contacts, which have closed forms: verification/test_contacts.py
