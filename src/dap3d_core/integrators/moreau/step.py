@@ -121,6 +121,9 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         return False
     if work.step_count == 0:
         work.overlap_at_start = deepest_of(s)
+        for c in range(s.touch_count):
+            if -s.gap[c] == work.overlap_at_start:
+                work.overlap_key = 1.0 * s.key[c]
     else:  # what the projection of the last step has left
         work.deepest = max(work.deepest, deepest_of(s))
     s.is_solved = s.met_count = 0
