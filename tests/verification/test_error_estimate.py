@@ -68,8 +68,8 @@ def norms(u):
 
 
 def pairs():
-    """Every scene with every setting, outside releases with every second one, by turns; steps of rk4
-    are beyond what the stiff A05 bears."""
+    """Every scene with every setting, outside releases with every second one by turns; steps of
+    rk4 are beyond what the stiff A05 bears."""
     return [
         pytest.param(n, s, marks=[pytest.mark.long] if (i + j) % 2 else [])
         for i, n in enumerate(CASES)
