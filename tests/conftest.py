@@ -3,7 +3,7 @@
 import gc
 import os
 import signal
-from collections import Counter
+from collections import defaultdict
 
 import pytest
 from support.process import UNOPTIMISED
@@ -58,17 +58,23 @@ def keep_unoptimised():
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items):
-    """Of the cases of a verification the quick tests take the first, of `every(n)` each n-th."""
-    counts = Counter()
+    """Of the cases of a verification the quick tests take the first, of `every(n)` each n-th, of
+    any other test that has more than five each third."""
+    cases = defaultdict(list)
     for item in items:
-        mark = item.get_closest_marker("every")
-        is_swept = mark or "/verification/" in item.path.as_posix()
-        if not is_swept or item.get_closest_marker("slow"):
-            continue
-        test = item.nodeid.partition("[")[0]
-        count, counts[test] = counts[test], counts[test] + 1
-        if count % mark.args[0] if mark else count:
-            item.add_marker("slow")
+        if not item.get_closest_marker("slow"):
+            cases[item.nodeid.partition("[")[0]].append(item)
+    for found in cases.values():
+        mark = found[0].get_closest_marker("every")
+        if mark:
+            n = mark.args[0]
+        elif "/verification/" in found[0].path.as_posix():
+            n = len(found)
+        else:
+            n = 3 if len(found) > 5 else 1
+        for k, item in enumerate(found):
+            if k % n:
+                item.add_marker("slow")
 
 
 def pytest_collection_finish():

@@ -14,6 +14,7 @@ import pytest
 from support.pages import follow, steps
 from support.process import REPOSITORY, environment
 
+import dap3d_core as dap
 from dap3d_core.cli import main
 
 #: Pages with tests of their own, here and in test_import_matlab.py.
@@ -221,3 +222,15 @@ def test_the_commands_on_the_pages_of_the_models_are_there():
             assert done.returncode == 0, f"{page}: {words}"
             for option in (w for w in words if w.startswith("--")):
                 assert option in done.stdout, f"{page}: {words}"
+
+
+@pytest.mark.slow
+def test_what_the_pages_of_the_models_plot_is_there():
+    """The quantities of each ``dap3d plot``, in a result of the model."""
+    for scene in REPOSITORY.glob("models/**/scene.toml"):
+        page = scene.with_name("README.md").read_text()
+        asked = [words for words in commands(page, "dap3d") if words[0] == "plot"]
+        plotted = {q for _, file, *words in asked if "-sweep" not in file for q in words}
+        result = dap.simulate(scene.parent, t_end=1e-3, dt=1e-3, allow_code=True)
+        for quantity in plotted - {"--x"}:
+            result.quantity(quantity)

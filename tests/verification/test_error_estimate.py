@@ -68,8 +68,14 @@ def norms(u):
 
 
 def pairs():
-    """Every scene with every setting; steps of rk4 are beyond what the stiff A05 bears."""
-    return [(n, s) for n in CASES for s in SETTINGS if (n, s) != ("A05", "rk4")]
+    """Every scene with every setting, outside releases with every second one by turns; steps of
+    rk4 are beyond what the stiff A05 bears."""
+    return [
+        pytest.param(n, s, marks=[pytest.mark.long] if (i + j) % 2 else [])
+        for i, n in enumerate(CASES)
+        for j, s in enumerate(SETTINGS)
+        if (n, s) != ("A05", "rk4")
+    ]
 
 
 @pytest.mark.slow
