@@ -17,7 +17,6 @@ from dap3d_core.result import EventRecord, RunMetadata, RunStatistics, informati
 from dap3d_core.result.contact_table import ContactTable, no_contacts
 from dap3d_core.scene import MISSING, Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.errors import refuse_breaks
 from dap3d_core.simulation.events.event import Event, check_every
 from dap3d_core.simulation.events.locate import EventLocator
 from dap3d_core.simulation.initial.tolerances import atol_notes, resolved_atol
@@ -283,10 +282,7 @@ def jumps_of(evaluator: Evaluator, settings: Simulation) -> "Jumps | None":
 
     Raises:
         SceneError: elements change velocities by laws that steps of contacts do not know.
-        SimulationError: joints may break, which these steps do not know either.
     """
-    if integrator_named(settings.integrator).steps_contacts:
-        refuse_breaks(evaluator.model, "time stepping")
     jumping = [switch for switch in evaluator.switches if switch.jumps]
     if not jumping:
         return None

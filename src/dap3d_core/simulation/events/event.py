@@ -190,9 +190,19 @@ class Instant:
         u: (13 n,) the state, read-only, in the order of ``Result.u``.
     """
 
-    def __init__(self, compiled: CompiledModel, t: float, y: Floats, numbers: "Numbers") -> None:
-        """Args: the model, time, the integrated state, numbers that may be changed."""
+    def __init__(
+        self,
+        compiled: CompiledModel,
+        t: float,
+        y: Floats,
+        numbers: "Numbers",
+        complete: Callable[[Floats], None],
+    ) -> None:
+        """Args: the model, time, the integrated state, numbers that may be changed; what completes
+        rows of reports, as of ``Integration``.
+        """
         self._compiled, self._y, self._numbers = compiled, y, numbers
+        self._complete = complete
         self.t = t
         self._body_state = compiled.evaluator.body_state(y)
         u = u_from_y(self._body_state[None], compiled.model.state_count)[0]
@@ -326,6 +336,7 @@ class Instant:
             evaluator.functions[REPORT](
                 self.t, y, row[-evaluator.report_size :], evaluator.system, evaluator.loops
             )
+        self._complete(row)
         row = evaluator.with_inputs(row[None])
         record = RunMetadata(scene_text=self._compiled.scene_text)
         return Result.of_run(evaluator.model, row, record, lambda: evaluator)

@@ -14,10 +14,10 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.formulations import RHS
-from dap3d_core.integrators import Integration, Status
+from dap3d_core.integrators import STEPPING, Integration, Status
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result.event_record import EventRecord
-from dap3d_core.result.file.validate import are_events, is_number
+from dap3d_core.result.file.validate import are_events, are_texts, is_number
 from dap3d_core.result.post.smooth_parts import cubic
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_events
@@ -95,7 +95,29 @@ class EventLocator:
             "sides": self._sides,
             "samplers": [sampler.state() for sampler in self._samplers],
             "inputs": self.compiled.evaluator.inputs.tolist(),
+            **self._joints_state(),
         }
+
+    def _joints_state(self) -> dict[str, Any]:
+        """Which joints hold no more, and why, as plain data."""
+        if self.released is None:
+            return {}
+        pivots = self.compiled.evaluator.system.smallest.tolist()
+        released = sorted(self.released.names)
+        return {"joints": {"released": released, "pivots": pivots, **self._of_joints.state()}}
+
+    def _restore_joints(self, found: Any) -> None:
+        assert self.released is not None
+        system, known = self.compiled.evaluator.system, self.compiled.model.breaks
+        names: Any = found.get("released") if isinstance(found, dict) else None
+        if not are_texts(names) or not set(names) <= set(known):
+            raise ValueError("the joints that have ended should be some of those that may")
+        if not _are_numbers(found.get("pivots"), (len(system.smallest),)):
+            raise ValueError("what is known of pivots is damaged")
+        self._of_joints.restore(found, set(known))
+        self.released.put_back()
+        self.released.release(names)
+        system.smallest[:] = found["pivots"]
 
     def restore(self, found: Mapping[str, Any]) -> None:
         """Go on from what ``state`` gave.
@@ -121,6 +143,8 @@ class EventLocator:
         if not _are_numbers(inputs, (len(self.compiled.model.input_names),)):
             raise ValueError("the inputs that events have set should be a number for each")
         self.compiled.evaluator.set_inputs(inputs)
+        if self.released is not None:
+            self._restore_joints(found.get("joints"))
         if any(one.changes for one in self.occurrences):
             self.numbers.given = self.compiled.evaluator.system.par.copy()
 
@@ -176,7 +200,7 @@ class EventLocator:
         if begins and 0.0 in sides:
             soon = SOON * integration.work.times[-1]
             y = integration.y + soon * self._slope(integration)
-            later = Instant(self.compiled, integration.t + soon, y, self.numbers)
+            later = self._instant(integration, integration.t + soon, y)
             events = self.events[len(self.of_script) :]
             sides = [side or float(np.sign(event.value(later)))
                      for side, event in zip(sides, events, strict=True)]  # fmt: skip
@@ -231,8 +255,12 @@ class EventLocator:
         system = self.compiled.evaluator.system
         return [*integration.state_arrays(), *(getattr(system, name) for name in CHECKPOINTED)]
 
-    def _instant(self, integration: Integration) -> Instant:
-        return Instant(self.compiled, integration.t, integration.y, self.numbers)
+    def _instant(
+        self, integration: Integration, t: float | None = None, y: Floats | None = None
+    ) -> Instant:
+        """A state, by default the present one, with what else is known of the last step."""
+        t, y = integration.t if t is None else t, integration.y if y is None else y
+        return Instant(self.compiled, t, y, self.numbers, integration.complete)
 
     def _all(self, instant: Instant) -> list[float]:
         return [event.value(instant) for event in self.events]
@@ -262,7 +290,12 @@ class EventLocator:
         y: Floats,
         slope: Floats,
     ) -> list[Iterator[tuple[float, float]]]:
-        """For each event instants within the step from t, and its values there, in order."""
+        """For each event instants within the step from t, and its values there, in order.
+
+        Of steps of contacts the end alone: what they do has no course within.
+        """
+        if integration.name == STEPPING.name:
+            return [iter([(here.t, event.value(here))]) for event in self.events]
         last, h, y_end = self._slope(integration), here.t - t, integration.y
         expected = y + 0.5 * h * (slope + last)
         end = self.compiled.evaluator.coordinates.continued(expected, y_end)
@@ -273,7 +306,7 @@ class EventLocator:
                 between = integration.state_within(time)
                 if between is None:  # a method without dense output, as accurate as a cubic
                     between = cubic((time - t) / h, h, (y, end), (slope, last))
-                known[time] = Instant(self.compiled, time, between, self.numbers)
+                known[time] = self._instant(integration, time, between)
             return known[time]
 
         def value(event: Event, time: float) -> float:
