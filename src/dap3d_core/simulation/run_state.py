@@ -119,7 +119,7 @@ class RunState:
         self.until = np.inf
         self.options: dict[str, Any] = {}
         watches = bool(events or compiled.model.breaks)
-        self.event_locator = EventLocator(compiled, events) if watches else None
+        self.event_locator = EventLocator(compiled, events, self.evaluator) if watches else None
         self.jumps = jumps_of(self.evaluator, self.settings)
         if self.event_locator is not None:
             check_every(self.event_locator.events, self.t_end)

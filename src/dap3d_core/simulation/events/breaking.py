@@ -64,6 +64,11 @@ class JointEvents:
         self._broken: set[str] = set()
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
 
+    def forget(self) -> None:
+        """No joint has broken."""
+        self._broken.clear()
+        self._latest.clear()
+
     def state(self) -> dict[str, Any]:
         """Joints that have broken, and the latest changes, as plain data."""
         return {"broken": sorted(self._broken), "latest": [list(one) for one in self._latest]}

@@ -14,6 +14,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.formulations import RHS
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import STEPPING, Integration, Status
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result.event_record import EventRecord
@@ -67,8 +68,10 @@ class EventLocator:
 
     horizon = np.inf
 
-    def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
-        self.compiled = compiled
+    def __init__(
+        self, compiled: CompiledModel, events: Sequence[Event], evaluator: Evaluator
+    ) -> None:
+        self.compiled, self.evaluator = compiled, evaluator
         self.of_script = checked_events(events, compiled.model.body_names)
         self.events = self.of_script
         self.released: ReleasedJoints | None = None
@@ -77,8 +80,8 @@ class EventLocator:
 
             self._of_joints = JointEvents(compiled.model)
             self.events += self._of_joints.events
-            self.released = ReleasedJoints(compiled.evaluator)
-        self.numbers = Numbers(compiled)
+            self.released = ReleasedJoints(evaluator)
+        self.numbers = Numbers(compiled, evaluator)
         self.jumps: Jumps | None = None
         self.take_rows: Callable[[], None] = lambda: None
         self.occurrences: list[EventRecord] = []
@@ -94,7 +97,7 @@ class EventLocator:
             "values": self._values,
             "sides": self._sides,
             "samplers": [sampler.state() for sampler in self._samplers],
-            "inputs": self.compiled.evaluator.inputs.tolist(),
+            "inputs": self.evaluator.inputs.tolist(),
             **self._joints_state(),
         }
 
@@ -102,13 +105,13 @@ class EventLocator:
         """Which joints hold no more, and why, as plain data."""
         if self.released is None:
             return {}
-        pivots = self.compiled.evaluator.system.smallest.tolist()
+        pivots = self.evaluator.system.smallest.tolist()
         released = sorted(self.released.names)
         return {"joints": {"released": released, "pivots": pivots, **self._of_joints.state()}}
 
     def _restore_joints(self, found: Any) -> None:
         assert self.released is not None
-        system, known = self.compiled.evaluator.system, self.compiled.model.breaks
+        system, known = self.evaluator.system, self.compiled.model.breaks
         names: Any = found.get("released") if isinstance(found, dict) else None
         if not are_texts(names) or not set(names) <= set(known):
             raise ValueError("the joints that have ended should be some of those that may")
@@ -142,11 +145,11 @@ class EventLocator:
         inputs: Any = found.get("inputs")
         if not _are_numbers(inputs, (len(self.compiled.model.input_names),)):
             raise ValueError("the inputs that events have set should be a number for each")
-        self.compiled.evaluator.set_inputs(inputs)
+        self.evaluator.set_inputs(inputs)
         if self.released is not None:
             self._restore_joints(found.get("joints"))
         if any(one.changes for one in self.occurrences):
-            self.numbers.given = self.compiled.evaluator.system.par.copy()
+            self.numbers.given = self.evaluator.system.par.copy()
 
     @property
     def changed_forces(self) -> set[str]:
@@ -214,7 +217,16 @@ class EventLocator:
             from dap3d_core.simulation.output.active_joints import inactive_joints
 
             u = model.u0 if start is None else start.u
-            self.released.release(inactive_joints(compiled.scene_text, compiled.evaluator, u))
+            self.released.release(inactive_joints(compiled.scene_text, self.evaluator, u))
+
+    def forget(self) -> None:
+        """Begin as at the start of a run, all joints holding; nothing was found."""
+        self.put_back()
+        self.occurrences.clear()
+        self._values, self._sides = [], []
+        self._samplers = [Sampler(event.every) for event in self.events]
+        if self.released is not None:
+            self._of_joints.forget()
 
     def put_back(self) -> None:
         """Make numbers and joints those of the scene again."""
@@ -252,7 +264,7 @@ class EventLocator:
 
     def _arrays(self, integration: Integration) -> list[Any]:
         """All that a step changes."""
-        system = self.compiled.evaluator.system
+        system = self.evaluator.system
         return [*integration.state_arrays(), *(getattr(system, name) for name in CHECKPOINTED)]
 
     def _instant(
@@ -274,7 +286,7 @@ class EventLocator:
         slope = integration.dy_dt
         if slope is not None:
             return slope
-        evaluator, found = self.compiled.evaluator, np.zeros_like(integration.y)
+        evaluator, found = self.evaluator, np.zeros_like(integration.y)
         with np.errstate(all="ignore"):  # as compiled code does
             evaluator.functions[RHS](
                 integration.t, integration.y, found, evaluator.system, evaluator.loops
@@ -298,7 +310,7 @@ class EventLocator:
             return [iter([(here.t, event.value(here))]) for event in self.events]
         last, h, y_end = self._slope(integration), here.t - t, integration.y
         expected = y + 0.5 * h * (slope + last)
-        end = self.compiled.evaluator.coordinates.continued(expected, y_end)
+        end = self.evaluator.coordinates.continued(expected, y_end)
         known: dict[float, Instant] = {here.t: here}
 
         def instant(time: float) -> Instant:
@@ -450,9 +462,9 @@ class EventLocator:
     def _set_inputs(self, inputs: Mapping[int, float]) -> None:
         """Set inputs from here on; what was reported so far has those before."""
         self.take_rows()
-        values = self.compiled.evaluator.inputs
+        values = self.evaluator.inputs
         values[list(inputs)] = list(inputs.values())
-        self.compiled.evaluator.set_inputs(values)
+        self.evaluator.set_inputs(values)
 
     @property
     def _jumps(self) -> "Jumps":
@@ -460,7 +472,7 @@ class EventLocator:
         if self.jumps is None:
             from dap3d_core.simulation.events.jumps import Jumps
 
-            self.jumps = Jumps(self.compiled.evaluator)
+            self.jumps = Jumps(self.evaluator)
         return self.jumps
 
 

@@ -196,7 +196,6 @@ def test_friction_of_a_joint_that_may_break_is_refused():
     [
         (dap.linearize, "linearisation does not take joints that may break"),
         (dap.equilibrium, "equilibrium does not take joints that may break"),
-        (dap.start, "a run step by step does not"),
         (lambda c: dap.sensitivities(c, "bodies.bob.mass", t_end=1.0), "with derivatives does not"),
         (lambda c: dap.simulate(c, t_end=1.0, method="standard"), "use lsq or auto"),
     ],
@@ -231,6 +230,23 @@ def test_a_checkpoint_has_the_joints_that_have_ended(scene, settings, stops, tmp
         result = dap.resume(stopped.value.checkpoint)
         assert (result.u == whole.u).all()
         assert [(e.kind, e.t) for e in result.events] == [(e.kind, e.t) for e in whole.events]
+
+
+@pytest.mark.parametrize("settings", [{}, {"integrator": "moreau", "step": 5e-3}])
+def test_joints_end_in_a_run_step_by_step(compiled, settings):
+    """As in a run as a whole, again after a reset, and reported with their forces before."""
+    given = {**TIGHT, **settings} if not settings else settings
+    whole = dap.simulate(compiled, t_end=0.6, dt=0.1, **given)
+    run = dap.start(compiled, **given)
+    for _ in range(2):
+        run.reset()
+        while run.t < 0.55:
+            run.step(0.1)
+        result = run.result()
+        assert result.u == pytest.approx(whole.u, abs=1e-9 if not settings else 1e-4)
+        held = np.linalg.norm(result.reaction("rod")["i"].force, axis=1) > 0.0
+        assert list(held) == list(result.t < BREAK)
+        assert [event.name for event in result.events] == ["rod"]
 
 
 def test_only_joints_that_may_break_are_released(compiled):
