@@ -235,7 +235,7 @@ def test_a_checkpoint_has_the_joints_that_have_ended(scene, settings, stops, tmp
 @pytest.mark.parametrize("settings", [{}, {"integrator": "moreau", "step": 5e-3}])
 def test_joints_end_in_a_run_step_by_step(compiled, settings):
     """As in a run as a whole, again after a reset, and reported with their forces before."""
-    given = {**TIGHT, **settings} if not settings else settings
+    given = settings or TIGHT
     whole = dap.simulate(compiled, t_end=0.6, dt=0.1, **given)
     run = dap.start(compiled, **given)
     for _ in range(2):
