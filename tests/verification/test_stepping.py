@@ -146,6 +146,31 @@ def test_forces_and_modes_of_declared_contacts_are_those_of_the_step():
     assert rolls == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_declared_pair_of_boxes_touches_on_their_faces_alone():
+    """One slides on a longer one to rest, v^2 / (2 mu g) on, with edges and corners far beyond."""
+    scene, mu, v = dap.Scene(name="plank"), 0.3, 0.8
+    scene.add_body("box", mass=2.0, Jp=[0.02] * 3, r=[0.0, 0.0, 0.25], r_dot=[v, 0.0, 0.0])
+    scene.add_force("weight", "gravity")
+    ends = {"P_i": "box.O", "size_i": [0.4] * 3, "P_j": "ground.O", "size_j": [20.0, 2.0, 0.1]}
+    scene.add_contact("box_box", "plank", **ends, mu=mu)
+    result = dap.simulate(scene, t_end=0.4, dt=0.1, contact="stepping", contact_step=2e-3)
+    stops = [v**2 / (2.0 * mu * G), 0.0, 0.25]
+    assert result.r[-1, 0] == pytest.approx(stops, abs=1e-6)  # h^2 and its place in a step
+    assert not any("overlap" in note and "start" in note for note in result.notes)
+
+
+def test_a_declared_column_that_spins_stands_on_its_rim_alone():
+    """The moment of friction is mu m g R: it stops at t = R w / (2 mu g), after w t / 2."""
+    scene, mu, w, R = dap.Scene(name="column"), 0.5, 5.0, 0.2
+    scene.add_body("column", mass=3.0, Jp=[0.1, 0.1, 0.06], r=[0.0, 0.0, 0.25], w=[0.0, 0.0, w])
+    scene.add_force("weight", "gravity")
+    shape = {"P_i": "column.O", "a_i": "column.z", "radius": R, "length": 0.5}
+    scene.add_contact("cylinder_plane", "floor", **shape, mu=mu)
+    result = dap.simulate(scene, t_end=0.2, dt=0.1, contact="stepping", contact_step=2e-3)
+    turned = 2.0 * np.arctan2(result.p[-1, 0, 3], result.p[-1, 0, 0])
+    assert turned == pytest.approx(R * w**2 / (4.0 * mu * G), rel=1e-4)  # h^2 of 0.1 s
+
+
 def test_a_pair_without_loss_keeps_its_energy():
     scene = dap.Scene(name="pair")
     scene.add_material("surface", e=1.0)
@@ -317,7 +342,7 @@ def test_guided_fingers_lift_a_box():
 def test_an_overlap_at_the_start_is_told():
     told = dap.simulate(ball(-0.02, mu=0.3), t_end=0.01, contact_step=1e-3).notes
     (note,) = (note for note in told if "at the start" in note)
-    assert "overlapped by 0.02 m" in note
+    assert "overlapped by 0.02 m at the start, most of all shapes " in note
     assert note.severity == "warning"
 
 

@@ -18,21 +18,19 @@ from dap3d_core.formulations.contacts.equations import (
     STATE,
 )
 from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
+from dap3d_core.interface.contacts.rows import FAR_APART, SLIDES, STEPPED
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Of keys of declared contacts, which are beyond those of shapes.
 DECLARED = 2**52
-#: Beyond every gap, m.
-FARTHEST_GAP = 1e300
 #: Points of a pair of shapes that keys tell apart.
 POINTS = 256
 #: The least ratio of an ellipse of friction.
 THIN = 1e-9
-#: Modes of a contact that slides, and sticks, and states after it: way and what is nearest, three
-#: of each.
-SLIDES, STUCK, NEAREST = 1.0, 2.0, 4
+#: Of the states of a contact after its mode and way, what is nearest.
+NEAREST = 4
 
 
 @compiled
@@ -42,7 +40,7 @@ def find_contacts(
     """Find the contacts at an integrated state y; False without room.
 
     Shapes are nearer than the margins of bodies, declared contacts than ``most``; friction of
-    joints is among them where that is FARTHEST_GAP.
+    joints is among them where that is FAR_APART.
     """
     place_poses(y, s)
     s.contact_count = s.touch_count = 0
@@ -60,7 +58,7 @@ def find_contacts(
         s.contact_count = s.touch_count
         for k in range(s.declared_gap.size):
             if s.declared_kind[k] != CONE:
-                near = most >= FARTHEST_GAP
+                near = most >= FAR_APART
             else:
                 near = system.residual[s.declared_gap[k]] < most
             if near:
@@ -151,7 +149,7 @@ def evaluate_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any
     place(t, y, system, loops)
     for k in range(s.declared_mode.size):
         first = s.declared_mode[k]
-        system.states[first] = STUCK
+        system.states[first] = STEPPED
         for i in range(3):
             system.states[first + NEAREST + i] = 0.0
     if s.declared_gap.size > 0:

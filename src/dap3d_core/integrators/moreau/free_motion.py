@@ -6,8 +6,7 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import System
-from dap3d_core.assembly.offsets import coordinate_offset
+from dap3d_core.assembly.arrays import System, coordinate_offset
 from dap3d_core.integrators.moreau.arrays import StepArrays
 from dap3d_core.integrators.stepping.integration_state import TRIAL, Function, Y
 from dap3d_core.integrators.stepping.vector_ops import copy

@@ -6,11 +6,9 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import System
-from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
+from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import (
-    FARTHEST_GAP,
     axes_of,
     evaluate_rows,
     find_contacts,
@@ -41,6 +39,7 @@ from dap3d_core.integrators.stepping.integration_state import (
 from dap3d_core.integrators.stepping.output import may_step, project_state
 from dap3d_core.integrators.stepping.step_control import count_turns, end_of_step
 from dap3d_core.integrators.stepping.vector_ops import all_finite, copy
+from dap3d_core.interface.contacts.rows import FAR_APART
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -118,10 +117,13 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     take_velocities(y, n, s.before)
     take_velocities(trial, n, s.free)
     put_margins(s)
-    if not find_contacts(work.t, y, FARTHEST_GAP, s, system, loops):
+    if not find_contacts(work.t, y, FAR_APART, s, system, loops):
         return False
     if work.step_count == 0:
         work.overlap_at_start = deepest_of(s)
+        for c in range(s.touch_count):
+            if -s.gap[c] == work.overlap_at_start:
+                work.overlap_key = 1.0 * s.key[c]
     else:  # what the projection of the last step has left
         work.deepest = max(work.deepest, deepest_of(s))
     s.is_solved = s.met_count = 0

@@ -8,13 +8,12 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.parameter_change import Change, changed
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.registry.suggestions import nearest, some
-from dap3d_core.result import Result, RunMetadata
+from dap3d_core.result import Result
 from dap3d_core.simulation.compiled_model import CompiledModel
 
 Kind = TypeVar("Kind")
@@ -331,16 +330,10 @@ class Instant:
 
     @cached_property
     def _result(self) -> Result:
-        evaluator, y = self._numbers.evaluator, self._y
-        row = np.concatenate([[self.t], self._body_state, np.zeros(evaluator.report_size)])
-        with np.errstate(all="ignore"):  # as compiled code does
-            evaluator.functions[REPORT](
-                self.t, y, row[-evaluator.report_size :], evaluator.system, evaluator.loops
-            )
-        self._complete(row)
-        row = evaluator.with_inputs(row[None])
-        record = RunMetadata(scene_text=self._compiled.scene_text)
-        return Result.of_run(evaluator.model, row, record, lambda: evaluator)
+        from dap3d_core.simulation.output.check_outputs import instant_of
+
+        text, evaluator = self._compiled.scene_text, self._numbers.evaluator
+        return instant_of(text, evaluator, self.t, self._y, self._complete)
 
 
 class Numbers:

@@ -52,6 +52,7 @@ def digests():
     return [digest(name) for name in CASES]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 def test_compiled_steps_have_the_bits_of_plain_python():
     assert run(SCRIPT, DAP3D_PLAIN=1).split() == digests()
