@@ -87,3 +87,30 @@ def test_steps_extrapolate_to_events(make):
     )
     assert np.abs(first).max() < 2.0 * 2e-3
     assert np.abs((8.0 * third - 6.0 * second + first) / 3.0).max() < 1e-6
+
+
+@pytest.mark.parametrize("shapes", [False, True])
+@pytest.mark.parametrize(
+    ("ends", "t"), [({"active": "t < 0.25"}, 0.25), ({"breaks_at": 25.0}, 0.2)]
+)
+def test_what_hangs_on_a_joint_that_ends_falls_onto_the_floor(ends, t, shapes):
+    """It carries m g + 26.9 t N; it has come to rest to the square of a step."""
+    scene, fall = dap.Scene(name="hung"), 0.5
+    scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=(0.0, 0.0, 0.1 + fall))
+    scene.add_joint("rev", "hook", P_i="ball.O", P_j="on", a_i="ball.x", a_j="ground.x", **ends)
+    scene.add_point("on", "ground", (0.0, 0.0, 0.1 + fall))
+    scene.add_force("weight", "gravity")
+    scene.add_function("a", "grows", coeff=[0.0, (2.0 * G - 25.0) / 0.2, 0.0])
+    scene.add_force("motor", "pull", P_i="ball.O", P_j="ground.O", a_j="ground.z",
+                    coordinate="length", force="grows")  # fmt: skip
+    if shapes:
+        scene.add_shape("sphere", body="ball", radius=0.1, collides=True)
+        scene.add_shape("plane", body="ground", collides=True)
+        scene.add_collisions()
+    else:
+        scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
+    result = dap.simulate(scene, t_end=0.8, dt=0.4, **STEPS)
+    (event,) = result.events
+    assert (event.kind, event.name) == ("break", "hook")
+    assert event.t == pytest.approx(t, abs=1e-9)
+    assert result.r[-1, 0, 2] == pytest.approx(0.1, abs=STEPS["contact_step"] ** 2)

@@ -76,11 +76,6 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
 def _method_of_breaks(model: Model, requested: str) -> tuple[str, str]:
     """As ``choose_method``, of a model with joints that may be released."""
     some_joint = next(iter(model.breaks))
-    if model.collisions is not None:
-        raise SimulationError(
-            f"joint {some_joint} may break or holds at times, which shapes that collide do not "
-            "take yet: leave breaks_at and active out, or declare the contacts"
-        )
     if requested in ("auto", "lsq"):
         return "lsq", "joints may break or hold at times"
     raise SimulationError(

@@ -17,7 +17,7 @@ from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import Computed, Result, ResultError, information
 from dap3d_core.result.post.ledger import UNSOLVED
 from dap3d_core.scene import Mistake, SceneError, Simulation
-from dap3d_core.simulation.errors import RedundantError, SimulationError, refuse_breaks
+from dap3d_core.simulation.errors import RedundantError, SimulationError
 from dap3d_core.simulation.failure.stall import refusal_notes
 from dap3d_core.simulation.handover import (
     crossing_notes,
@@ -66,16 +66,9 @@ class Run(RunState):
     shared_laws: "tuple[SharedLaw, ...]" = ()
 
     def save_every(self, seconds: float, *, force: bool) -> None:
-        """Write checkpoints next to the output; arguments and errors as of ``CheckpointWriter``.
-
-        A scene whose joints may break has none: one that was asked for is refused, one for an
-        interruption alone is left out.
-        """
+        """Write checkpoints next to the output; arguments and errors as of ``CheckpointWriter``."""
         from dap3d_core.simulation.checkpoint.save import CheckpointWriter
 
-        if self.evaluator.model.breaks and seconds == np.inf:
-            return
-        refuse_breaks(self.evaluator.model, "a checkpoint")
         self.checkpoint_writer = CheckpointWriter(self, seconds, force=force)
 
     def execute(self, restore: Callable[[RunState], None] | None = None) -> Result:

@@ -17,7 +17,6 @@ from dap3d_core.result import EventRecord, RunMetadata, RunStatistics, informati
 from dap3d_core.result.contact_table import ContactTable, no_contacts
 from dap3d_core.scene import MISSING, Mistake, SceneError, Simulation
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.errors import refuse_breaks
 from dap3d_core.simulation.events.event import Event, check_every
 from dap3d_core.simulation.events.locate import EventLocator
 from dap3d_core.simulation.initial.tolerances import atol_notes, resolved_atol
@@ -119,7 +118,7 @@ class RunState:
         self.until = np.inf
         self.options: dict[str, Any] = {}
         watches = bool(events or compiled.model.breaks)
-        self.event_locator = EventLocator(compiled, events) if watches else None
+        self.event_locator = EventLocator(compiled, events, self.evaluator) if watches else None
         self.jumps = jumps_of(self.evaluator, self.settings)
         if self.event_locator is not None:
             check_every(self.event_locator.events, self.t_end)
@@ -282,10 +281,7 @@ def jumps_of(evaluator: Evaluator, settings: Simulation) -> "Jumps | None":
 
     Raises:
         SceneError: elements change velocities by laws that steps of contacts do not know.
-        SimulationError: joints may break, which these steps do not know either.
     """
-    if integrator_named(settings.integrator).steps_contacts:
-        refuse_breaks(evaluator.model, "time stepping")
     jumping = [switch for switch in evaluator.switches if switch.jumps]
     if not jumping:
         return None

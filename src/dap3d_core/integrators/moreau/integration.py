@@ -21,6 +21,7 @@ from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.moreau.arrays import all_room, grown
 from dap3d_core.integrators.moreau.contact_set import POINTS
 from dap3d_core.integrators.moreau.free_motion import MOST_PARTS, PART
+from dap3d_core.integrators.moreau.impulses import complete_row
 from dap3d_core.integrators.moreau.problem import arrays_of
 from dap3d_core.integrators.moreau.step import advance
 from dap3d_core.integrators.stepping.integration import Integration
@@ -119,6 +120,10 @@ class MoreauIntegration(Integration):
         part = (t - work.t_dense) / work.h_dense
         found: Floats = (1.0 - part) * work.state[OTHER] + part * work.state[Y]
         return found
+
+    def complete(self, row: Floats) -> None:
+        """As ``Integration.complete``: accelerations and forces are means of the last step."""
+        self.call(complete_row, self.work, self._arrays, row)
 
     @property
     def contact_rows(self) -> Floats:  # type: ignore[override]

@@ -294,6 +294,9 @@ class Integration(Restorable):
             state_at(self.work, t, y)
         return y
 
+    def complete(self, row: Floats) -> None:
+        """Add to a row t, y, report of now what else is known of it: here nothing."""
+
     def end(self) -> None:
         """End the run here: the next ``advance`` reports this state, and stops."""
         self.work.end_status = Status.ENDED

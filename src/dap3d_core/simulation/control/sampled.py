@@ -141,7 +141,7 @@ class SampledControl:
             if hold.t >= self._next and not hold.is_open:
                 self._sample(hold, locator)
             end = self._next
-            reached = _with_events(hold, locator, end) if locator else hold.to(end, budget)
+            reached = with_events(hold, locator, end) if locator else hold.to(end, budget)
             if not reached or time.perf_counter() > deadline:
                 return
 
@@ -279,7 +279,7 @@ def _lists(found: Mapping[str, Any], **lengths: int) -> list[list[Any]]:
     return [list(value) for value in values if isinstance(value, list)]
 
 
-def _with_events(hold: Hold, locator: EventLocator, end: float) -> bool:
+def with_events(hold: Hold, locator: EventLocator, end: float) -> bool:
     """As ``Hold.to``, with events looked for after each step."""
     hold.begin()
     locator.horizon = end

@@ -1,12 +1,14 @@
 """Events of joints that break or hold at times: what is watched of them, and what follows."""
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
 
 from dap3d_core.model import Model
+from dap3d_core.result.file.validate import are_texts, is_number
 from dap3d_core.scene.expressions.expression import Expression
 from dap3d_core.scene.expressions.outputs import margin
 from dap3d_core.simulation.errors import SimulationError
@@ -61,6 +63,32 @@ class JointEvents:
         ))  # fmt: skip
         self._broken: set[str] = set()
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
+
+    def forget(self) -> None:
+        """No joint has broken."""
+        self._broken.clear()
+        self._latest.clear()
+
+    def state(self) -> dict[str, Any]:
+        """Joints that have broken, and the latest changes, as plain data."""
+        return {"broken": sorted(self._broken), "latest": [list(one) for one in self._latest]}
+
+    def restore(self, found: Mapping[str, Any], known: set[str]) -> None:
+        """Go on from what ``state`` gave; joints are among those known.
+
+        Raises:
+            ValueError: it is not of that form.
+        """
+        broken: Any = found.get("broken")
+        latest: Any = found.get("latest")
+        if not are_texts(broken) or not set(broken) <= known or not isinstance(latest, list):
+            raise ValueError("what is known of joints that ended is damaged")
+        if not all(isinstance(one, list) and len(one) == 2 and is_number(one[0])
+                   and isinstance(one[1], str) for one in latest):  # fmt: skip
+            raise ValueError("what is known of joints that ended lately is damaged")
+        self._broken = set(broken)
+        self._latest.clear()
+        self._latest.extend((float(t), names) for t, names in latest)
 
     def due(self, sides: Sequence[float], released: set[str]) -> tuple[list[str], list[str]]:
         """Joints that end and that hold again, where events are on these sides of their levels.

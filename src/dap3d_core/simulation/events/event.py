@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
+from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.parameter_change import Change, changed
 from dap3d_core.model.state_layout import u_from_y
@@ -189,11 +190,21 @@ class Instant:
         u: (13 n,) the state, read-only, in the order of ``Result.u``.
     """
 
-    def __init__(self, compiled: CompiledModel, t: float, y: Floats, numbers: "Numbers") -> None:
-        """Args: the model, time, the integrated state, numbers that may be changed."""
+    def __init__(
+        self,
+        compiled: CompiledModel,
+        t: float,
+        y: Floats,
+        numbers: "Numbers",
+        complete: Callable[[Floats], None],
+    ) -> None:
+        """Args: the model, time, the integrated state, numbers that may be changed; what completes
+        rows of reports, as of ``Integration``.
+        """
         self._compiled, self._y, self._numbers = compiled, y, numbers
+        self._complete = complete
         self.t = t
-        self._body_state = compiled.evaluator.body_state(y)
+        self._body_state = numbers.evaluator.body_state(y)
         u = u_from_y(self._body_state[None], compiled.model.state_count)[0]
         u.flags.writeable = False
         self.u: Floats = u
@@ -321,19 +332,20 @@ class Instant:
     def _result(self) -> Result:
         from dap3d_core.simulation.output.check_outputs import instant_of
 
-        compiled = self._compiled
-        return instant_of(compiled.scene_text, compiled.evaluator, self.t, self._y)
+        text, evaluator = self._compiled.scene_text, self._numbers.evaluator
+        return instant_of(text, evaluator, self.t, self._y, self._complete)
 
 
 class Numbers:
     """The numbers of the forces of a compiled model; what was changed can be put back.
 
     Attributes:
+        evaluator: that has them.
         given: those of the scene, once they were changed; else None.
     """
 
-    def __init__(self, compiled: CompiledModel) -> None:
-        self._compiled = compiled
+    def __init__(self, compiled: CompiledModel, evaluator: Evaluator) -> None:
+        self._compiled, self.evaluator = compiled, evaluator
         self.given: Floats | None = None
 
     def set(self, force: str, fields: dict[str, Any]) -> None:
@@ -345,7 +357,7 @@ class Numbers:
             near = nearest(force, known)
             hint = f"did you mean {near!r}?" if near else f"there are {some(known, 20)}"
             raise ValueError(f"there is no force, body or input {force!r}; {hint}")
-        model, par = self._compiled.model, self._compiled.evaluator.system.par
+        model, par = self._compiled.model, self.evaluator.system.par
         change = changed(self._compiled.checked, model, names.index(force), fields)
         if self.given is None:
             self.given = par.copy()
@@ -356,7 +368,7 @@ class Numbers:
     def changeable(self, forces: Collection[str]) -> NDArray[np.bool_]:
         """Mask of the numbers in ``par`` that ``set`` may have changed, given names of forces."""
         model = self._compiled.model
-        found = np.zeros(len(self._compiled.evaluator.system.par), dtype=bool)
+        found = np.zeros(len(self.evaluator.system.par), dtype=bool)
         numbers = [k for k, name in enumerate(model.force_names) if name in forces]
         for group in (*model.forces, *model.friction):
             changes = np.zeros(group.numbers.shape, dtype=bool)
@@ -371,23 +383,23 @@ class Numbers:
     def put_back(self) -> None:
         """Make the numbers those of the scene again."""
         if self.given is not None:
-            self._compiled.evaluator.system.par[:] = self.given
+            self.evaluator.system.par[:] = self.given
             self.given = None
 
     def _first(self, group: Any) -> int:
-        evaluator = self._compiled.evaluator
+        evaluator = self.evaluator
         q = next(k for k, (_, g) in enumerate(evaluator.loop_groups) if g is group)
         return int(evaluator.system.groups[q, 1])
 
     def _rows(self, change: Change) -> Floats:
         count, width = change.group.numbers.shape
         first = self._first(change.group)
-        table = self._compiled.evaluator.system.par[first : first + count * width]
+        table = self.evaluator.system.par[first : first + count * width]
         found: Floats = table.reshape(count, width)[change.places]
         return found
 
     def _write(self, change: Change, rows: Floats) -> None:
         count, width = change.group.numbers.shape
         first = self._first(change.group)
-        table = self._compiled.evaluator.system.par[first : first + count * width]
+        table = self.evaluator.system.par[first : first + count * width]
         table.reshape(count, width)[change.places] = rows

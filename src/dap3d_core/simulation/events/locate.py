@@ -13,9 +13,10 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import CHECKPOINTED
-from dap3d_core.integrators import Integration, Status
+from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.integrators import STEPPING, Integration, Status
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.result.file.validate import are_events, is_number
+from dap3d_core.result.file.validate import are_events, are_texts, is_number
 from dap3d_core.result.metadata import EventRecord
 from dap3d_core.result.post.smooth_parts import cubic
 from dap3d_core.simulation.compiled_model import CompiledModel
@@ -66,8 +67,10 @@ class EventLocator:
 
     horizon = np.inf
 
-    def __init__(self, compiled: CompiledModel, events: Sequence[Event]) -> None:
-        self.compiled = compiled
+    def __init__(
+        self, compiled: CompiledModel, events: Sequence[Event], evaluator: Evaluator
+    ) -> None:
+        self.compiled, self.evaluator = compiled, evaluator
         self.of_script = checked_events(events, compiled.model.body_names)
         self.events = self.of_script
         self.released: ReleasedJoints | None = None
@@ -76,8 +79,8 @@ class EventLocator:
 
             self._of_joints = JointEvents(compiled.model)
             self.events += self._of_joints.events
-            self.released = ReleasedJoints(compiled.evaluator)
-        self.numbers = Numbers(compiled)
+            self.released = ReleasedJoints(evaluator)
+        self.numbers = Numbers(compiled, evaluator)
         self.jumps: Jumps | None = None
         self.take_rows: Callable[[], None] = lambda: None
         self.occurrences: list[EventRecord] = []
@@ -93,8 +96,30 @@ class EventLocator:
             "values": self._values,
             "sides": self._sides,
             "samplers": [sampler.state() for sampler in self._samplers],
-            "inputs": self.compiled.evaluator.inputs.tolist(),
+            "inputs": self.evaluator.inputs.tolist(),
+            **self._joints_state(),
         }
+
+    def _joints_state(self) -> dict[str, Any]:
+        """Which joints hold no more, and why, as plain data."""
+        if self.released is None:
+            return {}
+        pivots = self.evaluator.system.smallest.tolist()
+        released = sorted(self.released.names)
+        return {"joints": {"released": released, "pivots": pivots, **self._of_joints.state()}}
+
+    def _restore_joints(self, found: Any) -> None:
+        assert self.released is not None
+        system, known = self.evaluator.system, self.compiled.model.breaks
+        names: Any = found.get("released") if isinstance(found, dict) else None
+        if not are_texts(names) or not set(names) <= set(known):
+            raise ValueError("the joints that have ended should be some of those that may")
+        if not _are_numbers(found.get("pivots"), (len(system.smallest),)):
+            raise ValueError("what is known of pivots is damaged")
+        self._of_joints.restore(found, set(known))
+        self.released.put_back()
+        self.released.release(names)
+        system.smallest[:] = found["pivots"]
 
     def restore(self, found: Mapping[str, Any]) -> None:
         """Go on from what ``state`` gave.
@@ -119,9 +144,11 @@ class EventLocator:
         inputs: Any = found.get("inputs")
         if not _are_numbers(inputs, (len(self.compiled.model.input_names),)):
             raise ValueError("the inputs that events have set should be a number for each")
-        self.compiled.evaluator.set_inputs(inputs)
+        self.evaluator.set_inputs(inputs)
+        if self.released is not None:
+            self._restore_joints(found.get("joints"))
         if any(one.changes for one in self.occurrences):
-            self.numbers.given = self.compiled.evaluator.system.par.copy()
+            self.numbers.given = self.evaluator.system.par.copy()
 
     @property
     def changed_forces(self) -> set[str]:
@@ -175,7 +202,7 @@ class EventLocator:
         if begins and 0.0 in sides:
             soon = SOON * integration.work.times[-1]
             y = integration.y + soon * self._slope(integration)
-            later = Instant(self.compiled, integration.t + soon, y, self.numbers)
+            later = self._instant(integration, integration.t + soon, y)
             events = self.events[len(self.of_script) :]
             sides = [side or float(np.sign(event.value(later)))
                      for side, event in zip(sides, events, strict=True)]  # fmt: skip
@@ -189,7 +216,16 @@ class EventLocator:
             from dap3d_core.simulation.output.check_outputs import inactive_joints
 
             u = model.u0 if start is None else start.u
-            self.released.release(inactive_joints(compiled.scene_text, compiled.evaluator, u))
+            self.released.release(inactive_joints(compiled.scene_text, self.evaluator, u))
+
+    def forget(self) -> None:
+        """Begin as at the start of a run, all joints holding; nothing was found."""
+        self.put_back()
+        self.occurrences.clear()
+        self._values, self._sides = [], []
+        self._samplers = [Sampler(event.every) for event in self.events]
+        if self.released is not None:
+            self._of_joints.forget()
 
     def put_back(self) -> None:
         """Make numbers and joints those of the scene again."""
@@ -227,11 +263,15 @@ class EventLocator:
 
     def _arrays(self, integration: Integration) -> list[Any]:
         """All that a step changes."""
-        system = self.compiled.evaluator.system
+        system = self.evaluator.system
         return [*integration.state_arrays(), *(getattr(system, name) for name in CHECKPOINTED)]
 
-    def _instant(self, integration: Integration) -> Instant:
-        return Instant(self.compiled, integration.t, integration.y, self.numbers)
+    def _instant(
+        self, integration: Integration, t: float | None = None, y: Floats | None = None
+    ) -> Instant:
+        """A state, by default the present one, with what else is known of the last step."""
+        t, y = integration.t if t is None else t, integration.y if y is None else y
+        return Instant(self.compiled, t, y, self.numbers, integration.complete)
 
     def _all(self, instant: Instant) -> list[float]:
         return [event.value(instant) for event in self.events]
@@ -245,7 +285,7 @@ class EventLocator:
         slope = integration.dy_dt
         if slope is not None:
             return slope
-        return self.compiled.evaluator.slope(integration.t, integration.y)
+        return self.evaluator.slope(integration.t, integration.y)
 
     def _within(
         self,
@@ -256,10 +296,15 @@ class EventLocator:
         y: Floats,
         slope: Floats,
     ) -> list[Iterator[tuple[float, float]]]:
-        """For each event instants within the step from t, and its values there, in order."""
+        """For each event instants within the step from t, and its values there, in order.
+
+        Of steps of contacts the end alone: what they do has no course within.
+        """
+        if integration.name == STEPPING.name:
+            return [iter([(here.t, event.value(here))]) for event in self.events]
         last, h, y_end = self._slope(integration), here.t - t, integration.y
         expected = y + 0.5 * h * (slope + last)
-        end = self.compiled.evaluator.coordinates.continued(expected, y_end)
+        end = self.evaluator.coordinates.continued(expected, y_end)
         known: dict[float, Instant] = {here.t: here}
 
         def instant(time: float) -> Instant:
@@ -267,7 +312,7 @@ class EventLocator:
                 between = integration.state_within(time)
                 if between is None:  # a method without dense output, as accurate as a cubic
                     between = cubic((time - t) / h, h, (y, end), (slope, last))
-                known[time] = Instant(self.compiled, time, between, self.numbers)
+                known[time] = self._instant(integration, time, between)
             return known[time]
 
         def value(event: Event, time: float) -> float:
@@ -411,9 +456,9 @@ class EventLocator:
     def _set_inputs(self, inputs: Mapping[int, float]) -> None:
         """Set inputs from here on; what was reported so far has those before."""
         self.take_rows()
-        values = self.compiled.evaluator.inputs
+        values = self.evaluator.inputs
         values[list(inputs)] = list(inputs.values())
-        self.compiled.evaluator.set_inputs(values)
+        self.evaluator.set_inputs(values)
 
     @property
     def _jumps(self) -> "Jumps":
@@ -421,7 +466,7 @@ class EventLocator:
         if self.jumps is None:
             from dap3d_core.simulation.events.jumps import Jumps
 
-            self.jumps = Jumps(self.compiled.evaluator)
+            self.jumps = Jumps(self.evaluator)
         return self.jumps
 
 

@@ -4,7 +4,7 @@ Their rows stay among those of the others, and are zero: nothing writes them, th
 zero, and method lsq gives what weighs nothing a pivot of its own.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 
 import numpy as np
 from numpy.typing import NDArray
@@ -122,6 +122,12 @@ class ReleasedJoints:
             values[system.row[rows]] = 0.0
         system.turns[own, BODY_I] = system.turns[own, BODY_J] = 0
         system.turns[own, ROTATION] = ONLY
+
+    def let_end(self, joints: Set[str]) -> None:
+        """Let these and no others hold no more, for evaluations."""
+        if joints != self.names:
+            self.put_back()
+            self.release(joints)
 
     def put_back(self) -> None:
         """Let all joints hold again."""

@@ -1,6 +1,6 @@
 """Check of the outputs of a scene against the quantities that its results have."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
@@ -42,10 +42,21 @@ def check_outputs(scene: Scene, scene_text: str, evaluator: Evaluator) -> None:
         raise SceneError(located(scene, mistakes))
 
 
-def instant_of(scene_text: str, evaluator: Evaluator, t: float, y: Floats) -> Result:
-    """A result of one instant, at time t and the integrated state y."""
+def instant_of(
+    scene_text: str,
+    evaluator: Evaluator,
+    t: float,
+    y: Floats,
+    complete: Callable[[Floats], None] | None = None,
+) -> Result:
+    """A result of one instant, at time t and the integrated state y.
+
+    complete: what completes rows of reports, as that of ``Integration``.
+    """
     reported = evaluator.reported(t, y)
     row = np.concatenate([[t], evaluator.body_state(y), reported])
+    if complete is not None:
+        complete(row)
     record = RunMetadata(scene_text=scene_text)
     rows = evaluator.with_inputs(row[None])
     return Result.of_run(evaluator.model, rows, record, lambda: evaluator)

@@ -23,11 +23,13 @@ from dap3d_core.scene import Scene
 from dap3d_core.settings import StepSettings
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.control.held_inputs import HeldInputs
-from dap3d_core.simulation.control.sampled import ALIKE, jump
+from dap3d_core.simulation.control.sampled import ALIKE, jump, with_events
 from dap3d_core.simulation.control.state_view import StateView
-from dap3d_core.simulation.errors import SimulationError, refuse_breaks
+from dap3d_core.simulation.errors import SimulationError
+from dap3d_core.simulation.events.locate import EventLocator
 from dap3d_core.simulation.handover import hand_over
 from dap3d_core.simulation.initial.given_state import state_of
+from dap3d_core.simulation.initial.released_joints import ReleasedJoints
 from dap3d_core.simulation.output.termination import why_stopped
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks, jumps_of
@@ -61,8 +63,13 @@ class SteppedRun:
         self._lock = threading.RLock()
         self.compiled, self._run = run.compiled, run
         evaluator = self._evaluator = run.evaluator = run.compiled.new_evaluator()
+        if run.event_locator is not None:
+            run.event_locator = EventLocator(run.compiled, (), evaluator)
+        self._locator = run.event_locator
         run.initialise()
         run.jumps = jumps_of(evaluator, run.settings)
+        if self._locator is not None:
+            self._locator.jumps = run.jumps
         if run.jumps is not None:
             run.jumps.begin(run.present)
         self.state = StateView(run.compiled, evaluator)
@@ -71,7 +78,10 @@ class SteppedRun:
         self._failure = ""
         self._is_recorded, self._t_end = record, run.t_end
         integration = self._integration = run.present
-        self._log = StateLog(evaluator, integration.work.state[Y], self._inputs)
+        self._log = StateLog(
+            evaluator, integration.work.state[Y], self._inputs,
+            None if self._locator is None else self._locator.released,
+        )  # fmt: skip
         self._attach()
         system = evaluator.system
         arrays = [*integration.state_arrays(), *(getattr(system, name) for name in CHECKPOINTED)]
@@ -114,11 +124,13 @@ class SteppedRun:
                 end = self._t_end
             if inputs and self._inputs.set(inputs):
                 jump(self._evaluator, hold, drives=self._inputs.drives)
+                if self._locator is not None:
+                    self._locator.begin_anew(hold.integration)
             if self._is_recorded:
                 self._log.add(t)
             if self._run.jumps is not None:
                 self._run.jumps.span = min(USUAL_STEPS * dt, self._t_end)
-            if not hold.to(end) or self._run.until < math.inf:
+            if not self._reach(end) or self._run.until < math.inf:
                 self._go_on(end)
             self.state.changed()
             return end
@@ -142,6 +154,9 @@ class SteppedRun:
                 array[...] = first
             self._inputs.replace(evaluator.model.input_values.tolist())
             self._failure, self._log.count = "", 0
+            if self._locator is not None:
+                self._locator.forget()
+                self._locator.release_inactive(None)
             self._hold.forget()
             if self._hold.integration is not self._integration:
                 self._attach()
@@ -183,6 +198,12 @@ class SteppedRun:
         self._log.attach(self._run.present.work.state[Y])
         self.state.attach(self._run.present)
 
+    def _reach(self, end: float, budget: int | None = None) -> bool:
+        """As ``Hold.to``; joints may end meanwhile."""
+        if self._locator is None:
+            return self._hold.to(end, budget)
+        return with_events(self._hold, self._locator, end)
+
     def _go_on(self, end: float) -> None:
         """Reach the end of a step that one compiled call has not reached."""
         run = self._run
@@ -192,7 +213,7 @@ class SteppedRun:
             if run.jumps is not None and present.status is Status.JUMPED:
                 self._jump(run.jumps)
             elif present.status is Status.RUNNING and present.t < min(end, run.until):
-                self._hold.to(min(end, run.until), 0 if run.until < math.inf else None)
+                self._reach(min(end, run.until), 0 if run.until < math.inf else None)
             elif present.t >= end and present.status in (Status.RUNNING, Status.FINISHED):
                 return
             elif hand_over(run):
@@ -257,7 +278,6 @@ def start(
         SimulationError (RedundantError, AssemblyError): the run cannot begin.
     """
     compiled = compiled_for(scene, allow_code, announce, **settings)
-    refuse_breaks(compiled.model, "a run step by step")
     end = HORIZON if t_end is None else t_end
     simulation = settings_of(compiled, t_end=end, dt=end, **settings)
     with compiled.borrow_evaluator():
@@ -273,9 +293,14 @@ class StateLog:
         count: rows so far.
     """
 
-    def __init__(self, evaluator: Evaluator, y: Floats, inputs: HeldInputs) -> None:
-        """Args: the evaluator of the run, its integrated state, the inputs that act on it."""
-        self._evaluator = evaluator
+    def __init__(
+        self, evaluator: Evaluator, y: Floats, inputs: HeldInputs, released: ReleasedJoints | None
+    ) -> None:
+        """Args: the evaluator of the run, its integrated state, the inputs that act on it, and the
+        joints that have ended; None where none may.
+        """
+        self._evaluator, self._joints = evaluator, released
+        self._ended: list[frozenset[str]] = []
         numbers = np.arange(len(evaluator.system.par))
         turns = [numbers[place] for place in evaluator.turn_places()]
         self._turns = np.concatenate(turns) if turns else numbers[:0]
@@ -303,6 +328,8 @@ class StateLog:
             flat[y_end:end] = self._inputs
         if len(self._turns):
             self._rows[self.count, self._end :] = self._evaluator.system.par[self._turns]
+        if self._joints is not None:
+            self._ended[self.count :] = [frozenset(self._joints.names)]
         self.count += 1
 
     def _make_room(self, rows: int) -> None:
@@ -320,7 +347,9 @@ class StateLog:
         par, places = evaluator.system.par, self._turns
         before, rows = par[places], np.zeros((len(log), y_end + evaluator.report_size))
         with evaluator.held_inputs():
-            for row, noted in zip(rows, log, strict=True):
+            for k, (row, noted) in enumerate(zip(rows, log, strict=True)):
+                if self._joints is not None:
+                    self._joints.let_end(self._ended[k])
                 row[:y_end] = noted[:y_end]
                 evaluator.set_inputs(noted[y_end:end])
                 par[places] = noted[end:]
@@ -329,4 +358,6 @@ class StateLog:
                     evaluator.loops,
                 )  # fmt: skip
         par[places] = before
+        if self._joints is not None:
+            self._joints.let_end(self._ended[-1])
         return evaluator.with_inputs(evaluator.body_rows(rows), log[:, y_end:end])

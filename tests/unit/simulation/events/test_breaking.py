@@ -198,10 +198,8 @@ def test_friction_of_a_joint_that_may_break_is_refused():
     [
         (dap.linearize, "linearisation does not take joints that may break"),
         (dap.equilibrium, "equilibrium does not take joints that may break"),
-        (dap.start, "a run step by step does not"),
         (lambda c: dap.sensitivities(c, "bodies.bob.mass", t_end=1.0), "with derivatives does not"),
         (lambda c: dap.simulate(c, t_end=1.0, method="standard"), "use lsq or auto"),
-        (lambda c: dap.simulate(c, t_end=1.0, integrator="moreau", step=0.1), "time stepping does"),
     ],
 )
 def test_what_does_not_know_that_joints_break_says_so(compiled, use, words):
@@ -209,17 +207,48 @@ def test_what_does_not_know_that_joints_break_says_so(compiled, use, words):
         use(compiled)
 
 
-def test_a_checkpoint_is_refused(compiled, tmp_path):
-    with pytest.raises(dap.SimulationError, match="a checkpoint does not take joints"):
-        dap.simulate(compiled, t_end=1.0, output=tmp_path / "out.nc", checkpoint=1.0)
+@pytest.mark.parametrize(
+    ("scene", "settings", "stops"),
+    [
+        (pendulum(LIMIT), {}, (0.3, 0.5)),
+        (pendulum(LIMIT), {"integrator": "moreau", "step": 5e-3}, (0.5,)),
+        (pendulum(None, active="t < 0.3"), {}, (0.2, 0.4)),
+    ],
+)
+def test_a_checkpoint_has_the_joints_that_have_ended(scene, settings, stops, tmp_path):
+    """Stopped before and after one ends, a run goes on with the bits of one that was not."""
+    given = {"t_end": 0.6, "dt": 0.05, **settings}
+    whole = dap.simulate(scene, **given)
+    assert whole.events
+
+    def stop(progress):
+        if progress.t >= until:
+            raise KeyboardInterrupt
+
+    for until in stops:
+        out = tmp_path / f"{until}.nc"
+        with pytest.raises(KeyboardInterrupt) as stopped:
+            dap.simulate(scene, output=out, checkpoint=1e-9, watch=stop, **given)
+        result = dap.resume(stopped.value.checkpoint)
+        assert (result.u == whole.u).all()
+        assert [(e.kind, e.t) for e in result.events] == [(e.kind, e.t) for e in whole.events]
 
 
-@pytest.mark.slow
-def test_one_for_an_interruption_alone_is_left_out(compiled, tmp_path):
-    """As runs of the command line ask for."""
-    out = tmp_path / "out.nc"
-    dap.simulate(compiled, t_end=0.1, output=out, checkpoint=np.inf)
-    assert [path.name for path in tmp_path.iterdir()] == [out.name]
+@pytest.mark.parametrize("settings", [{}, {"integrator": "moreau", "step": 5e-3}])
+def test_joints_end_in_a_run_step_by_step(compiled, settings):
+    """As in a run as a whole, again after a reset, and reported with their forces before."""
+    given = settings or TIGHT
+    whole = dap.simulate(compiled, t_end=0.6, dt=0.1, **given)
+    run = dap.start(compiled, **given)
+    for _ in range(2):
+        run.reset()
+        while run.t < 0.55:
+            run.step(0.1)
+        result = run.result()
+        assert result.u == pytest.approx(whole.u, abs=1e-9 if not settings else 1e-4)
+        held = np.linalg.norm(result.reaction("rod")["i"].force, axis=1) > 0.0
+        assert list(held) == list(result.t < BREAK)
+        assert [event.name for event in result.events] == ["rod"]
 
 
 def test_only_joints_that_may_break_are_released(compiled):
