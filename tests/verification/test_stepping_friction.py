@@ -24,6 +24,7 @@ def test_a_loaded_hinge_does_not_creep():
     assert abs(result.quantity("pin.angle").values[-1]) < 1e-14
     rub = result.contact("rub")
     assert list(rub.mode[1:]) == [2, 2]
+    assert result.ledger["contact work"].ok
     assert rub.normal_force[1:] == pytest.approx(0.02 * 5.0 * G / 0.02, rel=1e-12)
 
 

@@ -40,10 +40,9 @@ from dap3d_core.simulation.explain import (
     takes_joint_coordinates,
 )
 from dap3d_core.simulation.failure.diagnosis import find_offender
-from dap3d_core.simulation.failure.narrow_forces import notes_on_laws
+from dap3d_core.simulation.failure.narrow_forces import notes_on_drivers, notes_on_laws
 from dap3d_core.simulation.initial.breakpoints import Breakpoints
 from dap3d_core.simulation.initial.conservative import is_conservative
-from dap3d_core.simulation.initial.driver_notes import notes_on_drivers
 from dap3d_core.simulation.initial.given_state import state_of, time_of
 from dap3d_core.simulation.initial.undefined_directions import undefined_directions
 from dap3d_core.simulation.initial_state import InitialState, find_start

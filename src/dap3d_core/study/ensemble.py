@@ -13,17 +13,12 @@ from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import Computed, Result
-from dap3d_core.result.note import warnings_of
+from dap3d_core.result.metadata import warnings_of
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
+from dap3d_core.study.differences import OFFSETS, change_along, motion_of, weights_of
 from dap3d_core.study.outputs import Reduction
 from dap3d_core.study.parameters import SceneParameter, parameters_named, with_values
-from dap3d_core.study.sensitivities.neighbours import (
-    OFFSETS,
-    change_along,
-    motion_of,
-    weights_of,
-)
 from dap3d_core.study.study import Batch, PointStatus, Study, derivative_name
 
 if TYPE_CHECKING:
@@ -122,15 +117,16 @@ class Ensemble:
     ) -> dict[str, tuple[Floats, Floats]] | None:
         """Output -> (nt,) its series at a point (p,) and (nt, p) its derivatives, of one run.
 
-        size: (p,) of the parameters. None where an output is computed from more than rows, or the
-        point cannot be run in compiled code from its start to its end.
+        size: (p,) of the parameters. None where the run fails, or has no derivatives.
         """
         runner, of = self._runner(), self.reduction
-        if not self.is_differentiable or runner is None or not all(of.of_rows.values()):
+        if not self.is_differentiable:
             return None
+        if runner is None or not all(of.of_rows.values()):
+            return self._series_of_run(point)
         found = runner.run_with_slopes(point, size)
         if found is None:
-            return None
+            return self._series_of_run(point)
         rows, slopes = found
         motion, p = motion_of(self.compiled.model.body_count), len(point)
         ways = [change_along(rows[:, motion], slopes[:, motion, j]) or 1.0 for j in range(p)]
@@ -146,6 +142,16 @@ class Ensemble:
             )
             for name, values in series.items()
         }
+
+    def _series_of_run(self, point: Floats) -> dict[str, tuple[Floats, Floats]] | None:
+        """As ``series_with_slopes``, of a run with a model of its own."""
+        from dap3d_core.study.sensitivities.sensitivities import sensitivities
+
+        try:
+            found = sensitivities(self._model(self.study.scene, point.tolist()), self.study.names)
+        except (SceneError, SimulationError):
+            return None
+        return {o.name: (o.value(found.result), found.of(str(o.of))) for o in self.outputs}
 
     @cached_property
     def is_differentiable(self) -> bool:

@@ -29,15 +29,14 @@ def test_a_long_run_whose_method_was_left_open_says_that_joint_is_quicker(
 
 
 def ran(residual):
-    work = SimpleNamespace(largest_residual=residual, deepest=1e-12, friction_work=-2.0)
+    work = SimpleNamespace(largest_residual=residual, deepest=1e-12)
     return SimpleNamespace(name="moreau", work=work, overlapping="")
 
 
-@pytest.mark.parametrize(("residual", "severity"), [(1e-4, "information"), (1e-2, "warning")])
-def test_what_is_not_solved_is_a_warning(residual, severity):
-    (note,) = stepping_notes([ran(residual)], 1.0)
-    assert (getattr(note, "severity", "warning"), "2 J" in note) == (severity, True)
-    assert ("shorter contact_step" in note) == (severity == "warning")
+def test_what_is_not_solved_is_a_warning():
+    (note,) = stepping_notes([ran(1e-2)], 1.0)
+    assert "shorter contact_step" in note
+    assert not stepping_notes([ran(1e-4)], 1.0)
 
 
 def test_what_is_driven_into_another_is_a_warning():
@@ -50,6 +49,7 @@ def test_what_is_driven_into_another_is_a_warning():
     scene.add_shape("plane", body="ground", collides=True)
     result = dap.simulate(scene, t_end=0.02, dt=0.02, contact_step=5e-3)
     assert result.r[-1, 0, 2] == pytest.approx(0.48, abs=1e-6)
+    assert result.ledger["overlap"].ok is False
     (note,) = (note for note in result.notes if "overlap by" in note)
     assert "drivers hold them" in note
     assert getattr(note, "severity", "warning") == "warning"

@@ -88,7 +88,7 @@ def import_model(
     with its line.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.formats.import_model import ImportReport
 
     scene, report = dap.import_model(
@@ -107,10 +107,8 @@ def import_model(
         return write_folder(scene, report, folder / "scene.toml", force=force, stub=stub,
                             as_json=as_json)  # fmt: skip
     target = _save(scene, report, folder, Path(file), force=force)
-    if as_json:
-        print_json({"scene": target} | _as_data(report))
-    else:
-        _show(stdout(), scene, report, target)
+    data = {"scene": target} | _as_data(report)
+    show_data(data, lambda console: _show(console, scene, report, target), as_json=as_json)
     return DONE
 
 

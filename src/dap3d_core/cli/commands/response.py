@@ -66,7 +66,7 @@ def response(
     """
     import dap3d_core as dap
     from dap3d_core.cli.commands.modes import state_of
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.result import UnknownNameError
 
     if target is not None:
@@ -89,12 +89,7 @@ def response(
         picture = BodePicture(frequencies, found, inputs, outputs)
         save_figure(picture.draw, Path(target), (WIDTH, picture.height), 200.0, force=force)
     data = _data(scene.name, lin, frequencies, found)
-    if as_json:
-        print_json(data)
-    else:
-        _show(stdout(), data)
-        if target is not None:
-            stdout().say(f"{target} written", whole=True)
+    show_data(data, lambda console: _show(console, data), target, as_json=as_json)
     return DONE
 
 

@@ -11,12 +11,12 @@ import math
 
 from dap3d_core.formulations.jumps.multipliers import diagonalise
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
+from dap3d_core.integrators.moreau.contact_set import velocity_of
 from dap3d_core.integrators.moreau.newton import (
     TINY,
     newton,
     rim_of,
     times_inverse,
-    velocity_of,
 )
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
@@ -87,9 +87,7 @@ def sweep_contacts(
         for c in range(mu.size):
             if own[c, 0] == 0.0:
                 continue
-            d0, d1, d2 = change_of(
-                own[c], kind[c], mu[c], rim[c], x[c], u[c, 0], u[c, 1], u[c, 2]
-            )
+            d0, d1, d2 = change_of(own[c], kind[c], mu[c], rim[c], x[c], u[c, 0], u[c, 1], u[c, 2])
             p, q, r = felt[3 * c], felt[3 * c + 1], felt[3 * c + 2]
             for k in range(mu.size):
                 for s in range(3):
@@ -151,7 +149,7 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
         felt = own[0] if s.kind[c] == CONE else own[0] + own[4] + own[8]
         own[0] = 0.0 if felt * s.r[c] < HELD else max(own[0], TINY)
     best = s.residual
-    keep(s)
+    copy_impulses(s.x, s.y, s.kept, s.y_kept, m)
     for _ in range(ROUNDS):
         for c in range(m):
             u = s.u[c]
@@ -162,7 +160,7 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
                     for k in range(3):
                         u[r] += s.felt[3 * c + r, 3 * q + k] * s.x[q, k]
         for c in range(m):
-            s.rim[c] = rim_of(s, c, s.y)
+            s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.y)
         sweep_contacts(s.felt, s.own_held, s.u, s.kind, s.mu[:m], s.rim, s.x, SWEEPS, aim)
         for k in range(s.y.size):
             s.y[k] = 0.0
@@ -172,9 +170,9 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
         s.residual = newton(s, aim)
         if s.residual < best:
             best = s.residual
-            keep(s)
+            copy_impulses(s.x, s.y, s.kept, s.y_kept, m)
         else:
-            take_kept(s)
+            copy_impulses(s.kept, s.y_kept, s.x, s.y, m)
             s.residual = best
         if best <= tolerance:
             break
@@ -182,23 +180,13 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
 
 
 @compiled
-def keep(s: StepArrays) -> None:
-    """Keep the impulses."""
-    for c in range(s.contact_count):
+def copy_impulses(x: Floats, y: Floats, to_x: Floats, to_y: Floats, count: int) -> None:
+    """Copy the impulses of so many contacts, and of joints."""
+    for c in range(count):
         for k in range(3):
-            s.kept[c, k] = s.x[c, k]
-    for k in range(s.y.size):
-        s.y_kept[k] = s.y[k]
-
-
-@compiled
-def take_kept(s: StepArrays) -> None:
-    """Take those kept."""
-    for c in range(s.contact_count):
-        for k in range(3):
-            s.x[c, k] = s.kept[c, k]
-    for k in range(s.y.size):
-        s.y[k] = s.y_kept[k]
+            to_x[c, k] = x[c, k]
+    for k in range(y.size):
+        to_y[k] = y[k]
 
 
 @compiled

@@ -7,8 +7,8 @@ import math
 from typing import Any
 
 from dap3d_core.integrators.moreau.arrays import CONE, MET, WHOLE, StepArrays
-from dap3d_core.integrators.moreau.contact_set import DECLARED
-from dap3d_core.integrators.moreau.newton import bound_of, velocity_of
+from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
+from dap3d_core.integrators.moreau.newton import bound_of
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -66,6 +66,12 @@ def put_grip(s: StepArrays, c: int, holds: bool) -> None:
     s.held[k] = 1 if holds else 0
     s.grip[k] = s.declared_mu_s[k] if holds else s.declared_mu[k]
     s.mu[c] = s.grip[k] if s.kind[c] == CONE else 0.0
+    ratio, J = s.declared_ratio_s[k] if holds else s.declared_ratio[k], s.J[c]
+    if ratio != s.ratio[k]:  # an ellipse is a disc that is stretched
+        for i in range(24, 36):
+            J[i] *= ratio / s.ratio[k]
+        s.x[c, 2] *= s.ratio[k] / ratio
+        s.ratio[k] = ratio
 
 
 @compiled
@@ -85,9 +91,9 @@ def remember(work: Any, s: StepArrays) -> None:
     """Keep the impulses of contacts that push, and of friction of joints."""
     memory, count = work.memory, 0
     for c in range(s.contact_count):
-        mode = mode_of(s, c)
-        if mode > OPEN and count < memory.shape[0]:
-            memory[count, 0], memory[count, 4] = s.key[c], mode
+        if (s.x[c, 0] > 0.0 or s.kind[c] != CONE) and count < memory.shape[0]:
+            memory[count, 0] = s.key[c]
+            memory[count, 4] = SLIDES if c < s.touch_count else mode_of(s, c)
             for k in range(3):
                 total = 0.0
                 for r in range(3):
@@ -120,7 +126,7 @@ def keep_for_reports(s: StepArrays) -> None:
         d, x, J = s.key[c] - DECLARED, s.x[c], s.J[c]
         kept, sign = s.declared_x[d], -1.0 if s.bodies[c, 0] > 0 else 1.0
         axis = J[3 * s.declared_turns[d] + (0 if sign < 0.0 else 6) :]
-        kept[0], kept[1], kept[2], kept[3] = x[0], x[1], x[2], mode_of(s, c)
+        kept[0], kept[1], kept[2], kept[3] = x[0], x[1], s.ratio[d] * x[2], mode_of(s, c)
         for k in range(3):
             kept[4 + k] = 0.0
             for r in range(3 if s.kind[c] != CONE and kept[3] == SLIDES else 0):

@@ -51,7 +51,10 @@ class MoreauState(IntegrationState):
 
     rate = _measure()  # largest one of the forces without contacts, 1/s
     largest_residual = _measure()  # of all steps, a part of the largest impulse of each
-    friction_work = _measure()  # of all steps so far, J, not positive
+    contact_work = _measure()  # of all steps so far, J
+    friction_work = _measure()  # the part of friction
+    work_open = _measure()  # what moving by velocities behind impacts may change of energies, J
+    work_given = _measure()  # that of steps in which it is positive, J
     deepest = _measure()  # largest overlap at the end of a step, m
     overlap_at_start = _measure()  # that of before the first step, m, which moves bodies apart
     overlap_key = _measure()  # of that contact

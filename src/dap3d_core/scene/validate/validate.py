@@ -14,7 +14,7 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
 
 if TYPE_CHECKING:
-    from dap3d_core.scene.contacts.tables import CollisionShapes
+    from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
     from dap3d_core.scene.validate.bodies import Bodies
     from dap3d_core.scene.validate.geometry import Geometry
     from dap3d_core.scene.validate.shapes import Shape
@@ -204,7 +204,7 @@ def _check_shapes_and_outputs(
         read_outputs(report)
     if report.scene.collisions is None and not any(s.values.get("collides") for s in shapes):
         return None
-    from dap3d_core.scene.contacts.read_contacts import read_collisions
+    from dap3d_core.scene.contacts.read_collisions import read_collisions
 
     return read_collisions(report, shapes, bodies.body_index, joints)
 

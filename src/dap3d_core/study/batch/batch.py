@@ -12,7 +12,7 @@ from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.result.note import warnings_of
+from dap3d_core.result.metadata import warnings_of
 from dap3d_core.scene import SceneError, ValidatedScene, check
 from dap3d_core.simulation import AssemblyError, CompiledModel
 from dap3d_core.simulation.failure.monitors import UnilateralMonitor
@@ -29,20 +29,20 @@ from dap3d_core.simulation.initial_state import InitialState, find_start, start_
 from dap3d_core.study.batch import driver, initial_state
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch, numbers_of
 from dap3d_core.study.batch.parameter_map import Booleans, NotCopiedError, ParameterMap
-from dap3d_core.study.batch.slopes import DifferentiatedBatch, Starts, starts_with_slopes
+from dap3d_core.study.batch.slopes import (
+    COPIES,
+    MODELS,
+    DifferentiatedBatch,
+    Starts,
+    starts_with_slopes,
+)
 from dap3d_core.study.outputs import Reduction
 from dap3d_core.study.parameters import SceneParameter, with_values
-from dap3d_core.study.sensitivities.neighbours import OFFSETS, STEPS
 from dap3d_core.study.sensitivities.sensitivities import directions_of
 from dap3d_core.study.study import Batch, PointStatus
 
 if TYPE_CHECKING:
     from dap3d_core.study.batch.compiled_batch import TreePoints
-
-#: Steps and offsets of differences: of numbers that are copied, and of models that are made anew,
-#: to second order, whose error is some 1e-8.
-OF_COPIES = STEPS[0], OFFSETS[:1]
-OF_MODELS = 1e-4, ((-1, 1), (0, 1, 2), (0, -1, -2))
 
 
 def batch_runner(reduction: Reduction, times: Floats) -> "BatchRunner | None":
@@ -151,10 +151,13 @@ class BatchRunner:
         self.compiled_batch.evaluator.coordinates.start(self._start.u)
 
     def _mapped_starts(
-        self, parameter_map: ParameterMap, values: Floats
+        self, parameter_map: ParameterMap, values: Floats, *, is_checked: bool = True
     ) -> tuple[Starts, Booleans]:
-        """Starts of points (k, p) by the parameter map; those that the scene's check accepts."""
-        table, valid = parameter_map.table(values)
+        """Starts of points (k, p) by the parameter map; those that the scene's check accepts.
+
+        is_checked: as of ``ParameterMap.table``.
+        """
+        table, valid = parameter_map.table(values, is_checked=is_checked)
         model, moves_start = self._compiled.model, parameter_map.moves_start
         if moves_start:
             y0 = parameter_map.states(values, model.u0)
@@ -167,7 +170,7 @@ class BatchRunner:
 
     def _copied_starts(self, parameter_map: ParameterMap, values: Floats) -> Starts:
         """Starts of points (k, p) in coordinates of the formulation."""
-        start, _ = self._mapped_starts(parameter_map, values)
+        start, _ = self._mapped_starts(parameter_map, values, is_checked=False)
         coordinates = self.compiled_batch.evaluator.coordinates
         if coordinates.are_of_bodies:
             return start
@@ -191,14 +194,14 @@ class BatchRunner:
         """
         by_map, batch = self.parameter_map, self.compiled_batch
         if by_map is None:
-            found = starts_with_slopes(self._rebuilt_starts, x, size, *OF_MODELS)
+            found = starts_with_slopes(self._rebuilt_starts, x, size, *MODELS)
         else:
             if by_map.moves_start and not batch.evaluator.coordinates.are_of_bodies:
                 return None
             self._refer_to_start()
             if not by_map.table(x[None])[1][0]:
                 return None
-            found = starts_with_slopes(partial(self._copied_starts, by_map), x, size, *OF_COPIES)
+            found = starts_with_slopes(partial(self._copied_starts, by_map), x, size, *COPIES)
         if found is None:
             return None
         if self._differentiated is None:

@@ -259,11 +259,15 @@ class CompiledBatch:
         return BatchRows(done, rows, given, points.y0, diagnostics)
 
 
-def numbers_of(evaluator: Evaluator) -> Floats:
-    """Numbers of a model: par, body, metric and, where there is a tree, its constants."""
+def arrays_of_numbers(evaluator: Evaluator) -> list[Floats]:
+    """Arrays of a model's numbers: par, body, metric and, where there is a tree, its constants."""
     s = evaluator.system
-    tree = () if s.tree is None else (s.tree.constants,)
-    return np.concatenate([s.par, s.body.ravel(), s.metric.ravel(), *tree])
+    return [s.par, s.body, s.metric, *([] if s.tree is None else [s.tree.constants])]
+
+
+def numbers_of(evaluator: Evaluator) -> Floats:
+    """The numbers of a model, all of them."""
+    return np.concatenate([array.ravel() for array in arrays_of_numbers(evaluator)])
 
 
 def varied_at(system: System, places: Integers) -> dict[str, Integers]:

@@ -52,7 +52,7 @@ from dap3d_core.simulation.initial.assemble import (
 # Entries of ``out`` of these functions: a length of the model (given); largest residuals of
 # position and velocity before and after; Newton passes; the least pivot as a fraction of its row;
 # 1 where positions did not close. From STARTING on (given): 1 for rows without a position level;
-# then room for a state.
+# then room for a state, which differentiated code takes.
 SIZE, C_BEFORE, V_BEFORE, C_AFTER, V_AFTER, PASSES, LEAST_PIVOT, OPEN, STARTING = range(9)
 
 
@@ -173,14 +173,14 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
     linearise(t, system, loops)
     factorise(system, None)
     out[LEAST_PIVOT] = least_pivot_fraction(system)
-    worst = velocity_residuals(system)
-    if worst > 0.0 or is_differentiated():
+    if velocity_residuals(system) > 0.0:
+        correct_velocities(y, system)
+        place_bodies(y, system.body, system.metric)
+    elif is_differentiated():
         kept = out[STARTING + system.multipliers.shape[0] :]
         keep(kept, y)
-        correct(system)
-        apply_velocity_change(y, system.metric, system.change)
-        if worst == 0.0:
-            put_back(y, kept)
+        correct_velocities(y, system)
+        put_back(y, kept)
         place_bodies(y, system.body, system.metric)
     out[V_AFTER] = velocity_residuals(system)
 
@@ -194,6 +194,13 @@ def correct_positions(t: float, y: Floats, out: Floats, system: System, loops: A
     limit_displacement(system, MOST_SHIFT * out[SIZE] / system.settings[LENGTH])
     apply_displacement(y, system)
     place_with_spin(y, system)
+
+
+@compiled_into
+def correct_velocities(y: Floats, system: System) -> None:
+    """Correct the velocities of a start by ``residual``."""
+    correct(system)
+    apply_velocity_change(y, system.metric, system.change)
 
 
 @compiled_into

@@ -131,8 +131,10 @@ class ParameterMap:
             ]
         ).astype(np.int64)
 
-    def table(self, values: Floats) -> tuple[Floats, Booleans]:
+    def table(self, values: Floats, *, is_checked: bool = True) -> tuple[Floats, Booleans]:
         """Numbers for ``places`` of points whose varied parameters are ``values`` (k, d).
+
+        is_checked: masses and inertias that are not valid are those of the scene.
 
         Returns:
             (k, w) numbers; (k,) False where the scene's check refuses a point, and its numbers are
@@ -146,6 +148,10 @@ class ParameterMap:
         if len(self._bodies):
             mass, Jp, fine = self._inertias(values)
             valid &= fine
+            if is_checked:
+                mass[~fine], Jp[~fine] = (
+                    of[self._bodies] for of in (self._checked.mass, self._checked.Jp)
+                )
             metric = np.zeros((1 + mass.size, METRIC_WIDTH))
             set_metric(metric, mass.ravel(), Jp.reshape(-1, 3, 3))
             body = np.concatenate([mass[..., None], Jp.reshape(*mass.shape, 9)], axis=-1)
@@ -345,7 +351,6 @@ class ParameterMap:
         least, middle, most = np.linalg.eigvalsh(np.where(np.abs(Jp) <= LARGEST, Jp, 0.0)).T
         sound = (least > ZERO_INERTIA * most) & (most >= SMALLEST_INERTIA)
         valid &= np.all(sound & (most <= least + middle), axis=0)
-        mass[~valid], Jp[~valid] = checked.mass[self._bodies], checked.Jp[self._bodies]
         return mass, Jp, valid
 
 

@@ -15,7 +15,7 @@ from dap3d_core.kernels.runtime.lanes import Differentiation
 from dap3d_core.model.groups import Integers
 from dap3d_core.study.batch import driver
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
-from dap3d_core.study.sensitivities.neighbours import weighted, weights_of
+from dap3d_core.study.differences import power_of_two, weighted, weights_of
 
 
 class Starts(NamedTuple):
@@ -27,6 +27,10 @@ class Starts(NamedTuple):
     start: int
 
 
+#: Steps and offsets of differences: of numbers that are copied, and of models that are made anew,
+#: to second order, whose error is some 1e-8.
+COPIES = 2.0**-6, (tuple(k for k in range(-5, 6) if k),)
+MODELS = 1e-4, ((-1, 1), (0, 1, 2), (0, -1, -2))
 #: Starts of points (k, p); None where one of them cannot be run.
 MakeStarts = Callable[[Floats], Starts | None]
 
@@ -51,7 +55,7 @@ def starts_with_slopes(
     of_numbers = np.zeros((base.table.shape[1], len(x)))
     of_state = np.zeros((base.y0.shape[1], len(x)))
     for j, length in enumerate(size):
-        h = 2.0 ** np.floor(np.log2(step * length))  # so that copies have the derivative 1
+        h = power_of_two(step * length)
         for some in offsets:
             points = np.repeat(x[None], len(some), axis=0)
             points[:, j] += h * np.array(some)

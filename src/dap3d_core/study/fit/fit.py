@@ -71,8 +71,8 @@ def fit(
     """Find the values of parameters of a scene with which its run explains measured data best.
 
     The sum of the squares of (measured - predicted) / sigma is minimised within the bounds, by a
-    trust region. A run gives predictions and their exact derivatives; where an output is computed
-    from more than reported rows, or nothing is compiled, they are central differences of a batch.
+    trust region. A run gives predictions and their exact derivatives; where it has none, as where
+    nothing is compiled, they are central differences, all runs of which are one batch.
 
     Args:
         scene: a Scene, or what ``load`` takes.
@@ -228,6 +228,7 @@ class _Search:
         self.iterations = 0
         self._known: dict[bytes, Floats] = {}
         self._exact: dict[bytes, Floats] = {}
+        self._is_exact = True
         self._slopes: Floats | None = None
         self._largest = 0.0
 
@@ -250,9 +251,13 @@ class _Search:
         """(m,) predictions at a point; NaN where its run fails."""
         key = x.tobytes()
         if key not in self._known:
-            found = self.predict.with_slopes(x, self.differences.lengths(x))
+            found = None
+            if self._is_exact:
+                found = self.predict.with_slopes(x, self.differences.lengths(x))
             if found is None:
                 self._known[key] = self.predict(x[None])[0]
+                # a run that succeeds without derivatives will have none elsewhere
+                self._is_exact &= not np.isfinite(self._known[key]).all()
             else:
                 self._known[key], self._exact[key] = found
         return self._known[key]

@@ -130,6 +130,7 @@ def rows_of(run, budget):
     return np.concatenate(taken)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_chunks_change_no_bit():
     """Everything that decides what comes next lies in arrays."""

@@ -4,12 +4,10 @@ Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py
 import json
 
 import pytest
-from support.internals import FLOAT, INT
+from support.internals import FLOAT, INT, Known, Struct
 from support.plain import jit_is_on
 from support.problems import short_runs
 from support.process import REPOSITORY, run
-
-from dap3d_core.kernels.compiler.types import Known, Struct
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -132,12 +130,12 @@ NOT_CALLED = {
             "solve_dense solve_square solve_blocks invert multiply take take_from"
         ),
         "integrators.moreau.gauss_seidel": (
-            "sweep_bodies sweep_contacts size_of change_of refine_held keep take_kept put_crossed "
+            "sweep_bodies sweep_contacts size_of change_of refine_held copy_impulses put_crossed "
             "put_answer put_felt"
         ),
         "integrators.moreau.contact_set": (
             "find_contacts place_poses axes_of turn_tensor put_touch put_frame evaluate_rows "
-            "put_declared"
+            "put_declared velocity_of find_grips friction_at"
         ),
         "integrators.moreau.free_motion": "move_freely normalise size_of largest_rate",
         "integrators.moreau.groups": (
@@ -149,9 +147,10 @@ NOT_CALLED = {
             "log_contacts"
         ),
         "integrators.moreau.newton": (
-            "put_projected put_slopes put_missed rim_of bound_of impulse_of add_load put_velocities clear add_pull times_inverse "
-            "add_inverse velocity_of speed_of left_at residual_of newton exchange put_rest "
-            "size_of solve_round try_pass assemble put_turned add_contact"
+            "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of add_load "
+            "put_velocities clear add_pull times_inverse add_inverse speed_of left_at residual_of "
+            "newton exchange put_rest product_of solve_round try_pass assemble put_turned "
+            "add_contact"
         ),
         "integrators.moreau.problem": "prepare_problem solve judge sweep finish refine_groups",
         "integrators.moreau.restitution": (
@@ -159,8 +158,7 @@ NOT_CALLED = {
         ),
         "integrators.moreau.step": (
             "advance goes_on state_at meet take_velocities put_margins length_of deepest_of "
-            "put_bias put_hits work_done move part finish way_of closing_of put_means "
-            "rests"
+            "put_bias put_hits work_done move part finish way_of closing_of rests"
         ),
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",
@@ -168,13 +166,13 @@ NOT_CALLED = {
         "formulations.jumps.held_joints": "place_alone solve_free",
         "formulations.contacts.cone": "residual_of shorten sweep",
         "formulations.contacts.equations": (
-            "accelerate add_columns add_friction column force_of friction_of_one has_settled "
-            "inverse invert is_given is_sliding mode_of row_of "
+            "accelerate add_columns add_friction column force_of force_of_one has_settled "
+            "inverse invert invert_responses is_given is_sliding mode_of pressing row_of "
             "largest_given project report rhs watch contact_of fill_load has_loads solve_loads"
         ),
         "formulations.joint_loops.contacts": (
-            "accelerate add_contact_forces add_scaled force_of_one normal_forces project report "
-            "rhs watch"
+            "accelerate add_contact_forces add_scaled find_columns find_multipliers project report "
+            "rhs solve_all store_kept watch"
         ),
         # of runs with derivatives: study/sensitivities compares their values with those without
         "integrators.stepping.integration": "project_here",

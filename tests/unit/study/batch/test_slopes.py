@@ -6,9 +6,7 @@ import pytest
 from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.study.ensemble import Ensemble
-from dap3d_core.study.outputs import outputs_of
-from dap3d_core.study.study import Study
+from dap3d_core.study import Ensemble, Study, outputs_of
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 SETTINGS = {"t_end": 0.2, "dt": 0.05, "rtol": 1e-11, "atol": 1e-13}
@@ -18,7 +16,7 @@ def ensemble_of(scene, names, quantities, **settings):
     scene = scene.copy()
     scene.simulation = attrs.evolve(scene.simulation, **SETTINGS, **settings)
     outputs = outputs_of({name: f"{name}:series" for name in quantities})
-    return Ensemble(Study(scene, dict.fromkeys(names), outputs, allow_code=False))
+    return Ensemble(Study(scene, tuple(names), outputs, allow_code=False))
 
 
 def pendulum():
@@ -65,6 +63,16 @@ def test_one_run_has_the_values_of_the_batch_and_derivatives(scene, names, setti
         assert np.any(expected)
 
 
-def test_none_where_an_output_is_computed_from_more_than_rows():
+def test_outputs_that_are_computed_from_more_than_rows_have_derivatives():
     ensemble = ensemble_of(dap.load("pen2"), ["bodies.rod.mass"], ["energy.kinetic"])
-    assert ensemble.series_with_slopes(np.array([4.0]), np.ones(1)) is None
+    x = np.array([parameter.value for parameter in ensemble.parameters])
+    values, slopes = ensemble.series_with_slopes(x, np.ones(1))["energy.kinetic"]
+    ends = [ensemble.run(x + h).values["energy.kinetic"][0] for h in (1e-3, -1e-3)]
+    # the difference errs by h^2
+    np.testing.assert_allclose(slopes[:, 0], (ends[0] - ends[1]) / 2e-3, rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(values, 0.5 * np.add(*ends), rtol=1e-6, atol=1e-9)
+
+
+def test_none_where_a_point_cannot_be_run():
+    ensemble = ensemble_of(dap.load("pen2"), ["bodies.rod.mass"], ["rod.r.z"])
+    assert ensemble.series_with_slopes(np.array([-1.0]), np.ones(1)) is None

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import xarray
+from support.bouncing import bouncing
 from support.plain import jit_is_on
 
 import dap3d_core as dap
@@ -233,6 +234,19 @@ def test_points_that_fail_shorten_the_way():
     assert fit.values["bodies.stone.mass"] == pytest.approx(1.5, rel=1e-7)
     assert [number for number, _ in seen] == list(range(1, fit.iterations + 1))
     assert (np.diff([cost for _, cost in seen]) <= 0.0).all()
+
+
+@compiled
+def test_a_ball_that_bounces():
+    """Restitution and height from where it is, in closed form: derivatives through the bounce."""
+    t, e, z0, g = np.linspace(0.1, 0.8, 8), 0.7, 1.2, 9.81
+    first = np.sqrt(2.0 * z0 / g)
+    after = e * g * first * (t - first) - 0.5 * g * (t - first) ** 2
+    data = {"t": t, "ball.r.z": np.where(t < first, z0 - 0.5 * g * t * t, after)}
+    given = {"forces.floor.e": 0.8, "bodies.ball.r.z": 1.25}
+    fit = dap.fit(bouncing(), given, data, outputs=["ball.r.z"], dt=0.1)
+    assert list(fit.values.values()) == pytest.approx([e, z0], rel=1e-7)
+    assert fit.runs < 15
 
 
 def test_a_start_that_fails_is_an_error():
