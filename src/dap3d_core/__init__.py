@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
-    "Controller": ("simulation.control.controller", "Controller"),
+    "Controller": ("simulation.control.sampled", "Controller"),
     "Equilibrium": ("simulation.equilibrium.equilibrium", "Equilibrium"),
     "EquilibriumPath": ("study.equilibrium_path", "EquilibriumPath"),
     "Event": ("simulation", "Event"),
