@@ -219,15 +219,20 @@ CONTACTS = """
 <body name="b" pos="2 0 0.1"><freejoint/><geom size="0.1" condim="1" contype="2"/>
 <body name="c" pos="0 0 1"><joint type="hinge"/><joint type="hinge" axis="0 1 0"/>
 <geom type="capsule" size="0.1 0.2" conaffinity="0" contype="0"/>
-<geom type="ellipsoid" size="0.1 0.2 0.3" density="0"/></body></body></worldbody>
-<contact><exclude body1="a" body2="b"/></contact>"""
+<geom type="ellipsoid" size="0.1 0.2 0.3" density="0"/></body>
+<body name="head" pos="0 0 0.2"><geom size="0.1"/></body></body></worldbody>
+<contact><exclude body1="a" body2="b"/><exclude body1="a" body2="head"/></contact>"""
 
 
 def test_geoms_meet_as_in_the_file(tmp_path):
-    """The larger friction of a pair holds, as in MuJoCo; geoms of joints in a row do not meet."""
+    """The larger friction of a pair holds, as in MuJoCo; geoms of joints in a row do not meet.
+
+    Nor do those with what is fixed to the ends of the row, the head.
+    """
     scene, report = imported(tmp_path, CONTACTS, contacts=True)
     meeting = {n: s.fields for n, s in scene.shapes.items() if s.fields.get("collides")}
-    assert list(meeting) == ["world_shapes_plane", "a_box", "b_sphere", "c_ellipsoid"]
+    names = ["world_shapes_plane", "a_box", "b_sphere", "head_sphere", "c_ellipsoid"]
+    assert list(meeting) == names
     assert meeting["b_sphere"]["group"] == 2
     assert scene.shapes["c_cylinder"].fields["length"] == 0.4  # drawn alone
     assert {("a", "b"), ("b", "c")} <= set(scene.collisions.exclude)

@@ -95,3 +95,31 @@ def test_a_package_above_or_beside_the_file_is_found_within_the_root(tmp_path, i
     else:
         with pytest.raises(dap.SceneError, match="the package arms is not known"):
             dap.import_model(folder / "m.urdf", root=folder)
+
+
+def test_meshes_that_are_nowhere_are_remarked_and_those_elsewhere_refused(tmp_path):
+    """Paths of another machine, and out of the folder."""
+    (tmp_path / "m").mkdir()
+    path = tmp_path / "m" / "m.urdf"
+    path.write_text(TWO.format("/home/of/another/a.obj", "../../gone/b.obj"))
+    scene, report = dap.import_model(path)
+    gone = [one.text for one in report.left_out if "there is no file" in one.text]
+    assert (len(gone), scene.files) == (2, {})
+    (tmp_path / "b.obj").write_text(CUBE)
+    path.write_text(TWO.format("../b.obj", "../b.obj"))
+    with pytest.raises(dap.SceneError, match="lies outside of the folder"):
+        dap.import_model(path)
+
+
+WORLD = """<sdf version="1.6"><model name="gripper"><pose>0 0 2 3.141592653589793 0 0</pose>
+<link name="world"/><link name="base"><pose>0 0 0.5 0 0 0</pose></link>
+<joint name="lift" type="prismatic"><parent>world</parent><child>base</child>
+<axis><xyz>0 0 1</xyz></axis></joint></model></sdf>"""
+
+
+def test_an_empty_link_of_sdf_named_world_is_the_world(tmp_path):
+    (tmp_path / "a.sdf").write_text(WORLD)
+    scene, report = dap.import_model(tmp_path / "a.sdf")
+    np.testing.assert_allclose(scene.bodies["base"].r, (0.0, 0.0, 1.5), atol=1e-15)
+    assert scene.joints["lift"].fields["P_j"].partition(".")[0] != "base"
+    assert any("named world is the world itself" in one.text for one in report.translated)
