@@ -1,4 +1,4 @@
-"""Checks of contacts: a law of friction of their own."""
+"""Checks of contacts: their normal, and a law of friction of their own."""
 
 import attrs
 import numpy as np
@@ -15,6 +15,16 @@ _JUMPS = (
     "grip jumps where slip begins: it gives {x.is_:.6g} at next to no speed and {x.should:.6g} at "
     "none"
 )
+_LONG = "the normal is {x.is_:.6g} long; of another length than 1 forces, slip and gaps differ"
+
+
+def normal(subject: SampledType) -> CheckOutcome:
+    """The normal, or the axis of a moment, is a unit vector: J has it where the gap is."""
+    c = Comparison("normal", subject, "normal", "the normal is a unit vector")
+    part = slice(0, 3) if subject.type.at is not None else slice(3, 6)
+    for sample in subject.samples:
+        c.compare(sample, np.linalg.norm(sample.value("J")[0, :1, part], axis=1), 1.0, _LONG)
+    return c.outcome()
 
 
 def grip(subject: SampledType) -> CheckOutcome:
