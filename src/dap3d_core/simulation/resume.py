@@ -29,7 +29,7 @@ from dap3d_core.simulation.checkpoint.save import (
     results_of,
 )
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.control.controller import Controller
+from dap3d_core.simulation.control.sampled import Controller
 from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.handover import switch_integrator

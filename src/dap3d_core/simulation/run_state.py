@@ -29,8 +29,7 @@ from dap3d_core.simulation.output.termination import occurrences
 from dap3d_core.simulation.settings import report_times, settings_notes
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation.control.controller import Controller
-    from dap3d_core.simulation.control.sampled import SampledControl
+    from dap3d_core.simulation.control.sampled import Controller, SampledControl
     from dap3d_core.simulation.events.jumps import Jumps
     from dap3d_core.simulation.initial.start_state import StartState
 

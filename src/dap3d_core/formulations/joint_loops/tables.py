@@ -7,8 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.assembly.tree_arrays import KeptRowArrays
+from dap3d_core.assembly.arrays import Floats, Integers, KeptRowArrays
 from dap3d_core.formulations import RHS
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator

@@ -36,8 +36,8 @@ PROJECTED = 1e-10
 SOLVED = 1e-9
 #: Roundings in the reactions of a solution, as a part of them: its backward error.
 BACKWARD = 10.0 * float(np.finfo(float).eps)
-#: A residual of stepped contacts, as a part of the largest impulse, and an overlap, as a part of the
-#: length of the scene.
+#: A residual of stepped contacts, as a part of the largest impulse, and an overlap, as a part of
+#: the length of the scene.
 UNSOLVED = 1e-3
 #: Scales are not zero.
 SMALLEST = float(np.finfo(float).tiny)

@@ -13,7 +13,6 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import CHECKPOINTED
-from dap3d_core.formulations import RHS
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result.file.validate import are_events, is_number
@@ -246,12 +245,7 @@ class EventLocator:
         slope = integration.dy_dt
         if slope is not None:
             return slope
-        evaluator, found = self.compiled.evaluator, np.zeros_like(integration.y)
-        with np.errstate(all="ignore"):  # as compiled code does
-            evaluator.functions[RHS](
-                integration.t, integration.y, found, evaluator.system, evaluator.loops
-            )
-        return found
+        return self.compiled.evaluator.slope(integration.t, integration.y)
 
     def _within(
         self,

@@ -42,6 +42,15 @@ def check_outputs(scene: Scene, scene_text: str, evaluator: Evaluator) -> None:
         raise SceneError(located(scene, mistakes))
 
 
+def instant_of(scene_text: str, evaluator: Evaluator, t: float, y: Floats) -> Result:
+    """A result of one instant, at time t and the integrated state y."""
+    reported = evaluator.reported(t, y)
+    row = np.concatenate([[t], evaluator.body_state(y), reported])
+    record = RunMetadata(scene_text=scene_text)
+    rows = evaluator.with_inputs(row[None])
+    return Result.of_run(evaluator.model, rows, record, lambda: evaluator)
+
+
 def probe_of(scene_text: str, evaluator: Evaluator, u: Floats | None = None) -> Result:
     """A result of one instant, without accelerations and multipliers: u (13 n,), or the start."""
     y = evaluator.integrated(evaluator.model.u0 if u is None else u)

@@ -4,12 +4,10 @@ Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py
 import json
 
 import pytest
-from support.internals import FLOAT, INT
+from support.internals import FLOAT, INT, Known, Struct
 from support.plain import jit_is_on
 from support.problems import short_runs
 from support.process import REPOSITORY, run
-
-from dap3d_core.kernels.compiler.types import Known, Struct
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -63,13 +61,13 @@ recorder.record(points, pendulum, {"bodies.bob.mass": (1.0, 3.0)}, "bob.w", meth
 in_joint_coordinates = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.w"], method="joint")
 recorder.record(in_joint_coordinates.run, [[1.0], [3.0]])
 recorder.record(dap.simulate, "pen1", t_end=0.1, dt=0.1, rtol=1e-13, atol=1e-15)
-from dap3d_core.linear.ordering import elimination_order, supernodes
+from dap3d_core.linear.ordering import elimination_order, ordering
 from support.graphs import Case, check_solution
 from support.nets import plate_net
-usual = elimination_order.WIDE, elimination_order.LEAF, supernodes.ZEROS
-elimination_order.WIDE, elimination_order.LEAF, supernodes.ZEROS = 0, 4, 0.3
+usual = elimination_order.WIDE, elimination_order.LEAF, ordering.ZEROS
+elimination_order.WIDE, elimination_order.LEAF, ordering.ZEROS = 0, 4, 0.3
 recorder.record(lambda: check_solution(Case(plate_net(8), np.random.default_rng(1))))
-elimination_order.WIDE, elimination_order.LEAF, supernodes.ZEROS = usual
+elimination_order.WIDE, elimination_order.LEAF, ordering.ZEROS = usual
 from support.state_types import REGISTRY, stated, steered
 recorder.record(dap.simulate, dap.compile(steered(), registry=REGISTRY), t_end=0.1, dt=0.1,
                 integrator="radau")
@@ -90,8 +88,7 @@ NOT_CALLED = {
         "formulations.standard": "settle_rows",
         "integrators.adams.step": "reject",
         "integrators.stepping.vector_ops": "scaled_beyond",
-        "integrators.runge_kutta.error": "error_beyond_rounding",
-        "integrators.runge_kutta.sums": "combine_by_table",
+        "integrators.runge_kutta.sums": "combine_by_table error_beyond_rounding",
         "integrators.stepping.singular_poses": "predict_measures is_approaching "
         "least_time_to_singularity",
         "integrators.radau.step": "reject_iteration stage_is_across blame",
@@ -112,8 +109,6 @@ NOT_CALLED = {
         # of scenes with contacts, which have closed forms: verification/test_contacts.py
         # of shapes that collide: unit/assembly/collisions, verification/test_stepping.py
         "assembly.collisions.records": "add",
-        "assembly.collisions.rods": "balls along sphere_capsule capsules _pair",
-        "assembly.collisions.planes": "above at_plane _rims",
         "assembly.collisions.solids": "clamp local put ball_box sphere_cylinder capsule_box slope "
         "_lowest",
         "assembly.collisions.boxes": "dot_axis apart boxes _edges _face _facing _clip",
@@ -123,11 +118,11 @@ NOT_CALLED = {
         "bend flat_directions part_best touch_convex",
         "assembly.collisions.manifold": "turn outline clip tangents spread inside crossing "
         "at_plane_along put_points points_within",
-        "assembly.collisions.broad_phase": (
-            "find_pairs add_pair meet ranked place_of fill_cells grid_pairs"
-        ),
         "assembly.collisions.placed_shapes": "place_shapes",
-        "assembly.collisions.find": "has_formula touch find_touches",
+        "assembly.collisions.find": (
+            "has_formula touch find_touches find_pairs add_pair meet ranked place_of fill_cells "
+            "grid_pairs above at_plane _rims balls along sphere_capsule capsules _pair"
+        ),
         "integrators.moreau.dense": (
             "solve_dense solve_square solve_blocks invert multiply take take_from"
         ),
@@ -149,7 +144,7 @@ NOT_CALLED = {
             "log_contacts"
         ),
         "integrators.moreau.newton": (
-            "put_projected put_slopes put_missed rim_of bound_of impulse_of add_load "
+            "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of add_load "
             "put_velocities clear add_pull times_inverse add_inverse speed_of left_at residual_of "
             "newton exchange put_rest product_of solve_round try_pass assemble put_turned "
             "add_contact"
