@@ -75,6 +75,22 @@ def of_polar(place, side, f, f_dot, f_ddot):
     return nearest(place, start, -side, lambda s: polar(s, f, f_dot, f_ddot))
 
 
+def kernels_of(curve):
+    """Gap, point of contact and normal at a curve; curve: ``of_height`` or ``of_polar``."""
+
+    def gap(r_P_i, r_P_j, A_j, radius, sense, f, f_dot, f_ddot):
+        return curve(seen_from(r_P_i, r_P_j, A_j), sense, f, f_dot, f_ddot)[0] - radius
+
+    def at(r_P_i, r_P_j, A_j, sense, f, f_dot, f_ddot):
+        found = curve(seen_from(r_P_i, r_P_j, A_j), sense, f, f_dot, f_ddot)[2]
+        return add(r_P_j, rotate(A_j, found))
+
+    def normal(r_P_i, r_P_j, A_j, sense, f, f_dot, f_ddot):
+        return rotate(A_j, curve(seen_from(r_P_i, r_P_j, A_j), sense, f, f_dot, f_ddot)[1])
+
+    return gap, at, normal
+
+
 class PointCurve(Contact):
     """The point P_i, or a roller of ``radius`` about it, at a curve in the x-y plane of body j.
 
@@ -98,33 +114,13 @@ class PointCurve(Contact):
         """The sign of the normal."""
         return {**super().prepare(bodies), "sense": 1.0 if self.side == "above" else -1.0}
 
-    def gap(r_P_i, r_P_j, A_j, radius, sense, f, f_dot, f_ddot):
-        place = seen_from(r_P_i, r_P_j, A_j)
-        return of_height(place, sense, f, f_dot, f_ddot)[0] - radius
-
-    def at(r_P_i, r_P_j, A_j, sense, f, f_dot, f_ddot):
-        found = of_height(seen_from(r_P_i, r_P_j, A_j), sense, f, f_dot, f_ddot)[2]
-        return add(r_P_j, rotate(A_j, found))
-
-    def normal(r_P_i, r_P_j, A_j, sense, f, f_dot, f_ddot):
-        place = seen_from(r_P_i, r_P_j, A_j)
-        return rotate(A_j, of_height(place, sense, f, f_dot, f_ddot)[1])
+    gap, at, normal = kernels_of(of_height)
 
 
 class PointCam(PointCurve, polar=True):
     """The curve is polar."""
 
-    def gap(r_P_i, r_P_j, A_j, radius, sense, f, f_dot, f_ddot):
-        place = seen_from(r_P_i, r_P_j, A_j)
-        return of_polar(place, sense, f, f_dot, f_ddot)[0] - radius
-
-    def at(r_P_i, r_P_j, A_j, sense, f, f_dot, f_ddot):
-        found = of_polar(seen_from(r_P_i, r_P_j, A_j), sense, f, f_dot, f_ddot)[2]
-        return add(r_P_j, rotate(A_j, found))
-
-    def normal(r_P_i, r_P_j, A_j, sense, f, f_dot, f_ddot):
-        place = seen_from(r_P_i, r_P_j, A_j)
-        return rotate(A_j, of_polar(place, sense, f, f_dot, f_ddot)[1])
+    gap, at, normal = kernels_of(of_polar)
 
 
 @hookimpl

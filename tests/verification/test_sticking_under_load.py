@@ -406,6 +406,17 @@ def test_joint_coordinates_give_the_same(scene, t_end):
         assert one.friction == pytest.approx(two.friction, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.slow
+def test_modes_of_many_hinges_end_at_rounding():
+    """What twenty hinges hold is found to 1e-9 of it, which is no jam; it stays in their cones."""
+    result = dap.simulate(chain(20), t_end=0.015, dt=0.005)
+    assert len(result.events) > 10
+    for name in result.contact_names:
+        rub = result.contact(name)
+        limit = 0.2 * 0.01 * rub.normal_force
+        assert np.all(np.linalg.norm(rub.friction, axis=-1) <= limit * (1.0 + 1e-6) + 1e-9)
+
+
 def test_a_joint_without_load_has_no_friction():
     """It neither slows what moves nor stops the run where load and friction are both zero."""
     scene = dap.Scene(name="free")

@@ -186,6 +186,8 @@ def _of_joint(subject: SampledType) -> list[Check]:
     ]
     if "G" in subject.type_info.kernels:
         checks.insert(0, Check("G", subject, "", joints.gradient_of_unknowns))
+    if subject.type.is_contact and not subject.type.is_friction_alone():
+        checks.append(Check("normal", subject, "", elements.normal))
     if subject.type.is_contact and subject.type.grip is not None:
         checks.append(Check("grip", subject, "", elements.grip))
     checks += _of_jumps(subject)

@@ -1,4 +1,4 @@
-"""Checks of functions, of states of elements, and of grips of contacts."""
+"""Checks of functions, of states of elements, and of normals and grips of contacts."""
 
 import random
 
@@ -37,6 +37,7 @@ _WRONG_OF_TWO = (
     "be {x.should:.6g}, the derivative of {g} by {by} ({way})"
 )
 
+_LONG = "the normal is {x.is_:.6g} long; of another length than 1 forces, slip and gaps differ"
 #: Part of its speed at which slip is next to nothing, and tolerance of coefficients there.
 SLOW, CONTINUOUS = 1e-9, 1e-6
 _DRIVES = "grip gives {x.is_:.3g}: a negative coefficient of friction would drive"
@@ -140,6 +141,15 @@ def _partial_derivatives(subject: SampledType) -> CheckOutcome:
                         c.compare(here, value[k : k + 1], rate.value[of : of + 1], _WRONG_OF_TWO,
                                   words=words, tolerance=rate.tolerance, bound=bound, scale=scale,
                                   rows=[k])  # fmt: skip
+    return c.outcome()
+
+
+def normal(subject: SampledType) -> CheckOutcome:
+    """The normal, or the axis of a moment, is a unit vector: J has it where the gap is."""
+    c = Comparison("normal", subject, "normal", "the normal is a unit vector")
+    part = slice(0, 3) if subject.type.at is not None else slice(3, 6)
+    for sample in subject.samples:
+        c.compare(sample, np.linalg.norm(sample.value("J")[0, :1, part], axis=1), 1.0, _LONG)
     return c.outcome()
 
 
