@@ -10,7 +10,7 @@ that is computed.
 Code may say what differentiation by instructions does not know (``with_slopes``,
 ``is_differentiated``, ``values_alone`` of intrinsics.py): these are lines with a remark.
 
-Sums of products of slopes may be fused (``contract``), as what gives lane 0 may not.
+Slopes, too, are neither contracted nor reassociated: their bits depend on no optimisation.
 
 The text is that of this compiler (writer.py, functions.py, trace.py), one instruction a line.
 Source: A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 3.
@@ -161,8 +161,8 @@ class _Differentiator(VectorWriter):
             self._out.append(f"  {self._name} = fmul {self.vector} {a}, {b}")
             return
         one = self._wide("fmul", self._splat(a), b)
-        other = self._wide("fmul contract", a, self._splat(b))
-        self._out.append(self._join(one, self._wide("fadd contract", one, other)))
+        other = self._wide("fmul", a, self._splat(b))
+        self._out.append(self._join(one, self._wide("fadd", one, other)))
 
     def _quotient(self, a: str, b: str) -> None:
         """(a / b)' = (a' - (a / b) b') / b."""
@@ -176,8 +176,8 @@ class _Differentiator(VectorWriter):
             self._number("fdiv", _ONE, divisor),
         )
         first = self._new(f"insertelement {self.vector} undef, double {value}, i32 0")
-        part = self._wide("fmul contract", self._splat(first), b)
-        rest = self._wide("fsub contract", self._word(a), part)
+        part = self._wide("fmul", self._splat(first), b)
+        rest = self._wide("fsub", self._word(a), part)
         first = self._new(f"insertelement {self.vector} undef, double {over}, i32 0")
         self._finish(value, self._wide("fmul", rest, self._splat(first)))
 
