@@ -113,7 +113,7 @@ class SteppedRun:
             if abs(end - self._t_end) <= ALIKE * dt:
                 end = self._t_end
             if inputs and self._inputs.set(inputs):
-                jump(self._evaluator, hold, drives=self._inputs.drives)
+                jump(self._evaluator, hold, self._run.jumps, drives=self._inputs.drives)
             if self._is_recorded:
                 self._log.add(t)
             if self._run.jumps is not None:
