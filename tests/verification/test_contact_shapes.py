@@ -197,6 +197,7 @@ def test_a_box_tips_over_the_edge_of_another_where_its_centre_is_beyond():
     assert 2.0 * result.p[1:, 1, 2] == pytest.approx(angle, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_box_slides_on_another_that_sticks():
     scene, mu, F = stack(mu=0.2), 0.2, 3.0
     scene.add_force("f", "push", body_i="b1", f=[F, 0.0, 0.0])

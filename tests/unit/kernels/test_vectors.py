@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.internals import LoopArrays, call_loop, loop_list
+from support.internals import Loop, LoopArrays, build, call_loop, loop_list
 from support.plain import jit_is_on
 
 from dap3d_core import kernels
@@ -55,7 +55,6 @@ from dap3d_core.kernels import (
     transpose,
     where,
 )
-from dap3d_core.kernels.runtime.loop_modules import Loop, build
 
 number = st.floats(-1e3, 1e3, allow_subnormal=False)
 vec = st.tuples(number, number, number)
