@@ -128,3 +128,46 @@ def test_inputs_vary_in_sweeps():
     data = dap.sweep(scene, {"bodies.block.mass": masses}, outputs=outputs, t_end=1.0)
     assert data["block.r.x"].values == pytest.approx(0.25 / masses, abs=1e-14)
     assert data["push"].values.tolist() == [0.5] * 30
+
+
+def set_at(scene, t, t_end, values, by_steps):
+    """Times and velocities of the last body of a run whose inputs are set once, and its events."""
+    if by_steps:
+        run = dap.start(scene)
+        run.step(t)
+        run.step(t_end - t, inputs=values)
+        result = run.result()
+    else:
+        update = dap.Controller(every=t, update=lambda now, _: values if now > 0.5 * t else {})
+        result = dap.simulate(scene, t_end=t_end, dt=t_end, controllers=[update])
+    return result.rd[-1, -1], [event.kind for event in result.events]
+
+
+@pytest.mark.parametrize("by_steps", [False, True])
+def test_contacts_go_on_by_what_inputs_make_of_them(by_steps):
+    """A pull above the weight lifts a ball, and a lift that goes down faster leaves it behind."""
+    g, m = 9.81, 2.0
+    pulled = dap.Scene(name="pulled")
+    pulled.add_body("ball", mass=m, Jp=[0.02] * 3, r=[0.0, 0.0, 0.1])
+    pulled.add_force("weight", "gravity", gravity=g)
+    pulled.add_input("pull")
+    pulled.add_force("f", "rope", body_i="ball", f=[0.5, 0.0, 1.0], input="pull")
+    pulled.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, mu=0.3, e=0.2)
+    v, kinds = set_at(pulled, 0.2, 0.5, {"pull": 30.0}, by_steps)
+    assert v == pytest.approx([15.0 / m * 0.3, 0.0, (30.0 / m - g) * 0.3], abs=1e-7)
+    assert kinds == ["touch", "lift"]
+
+    scene, before = dap.Scene(name="lift"), 0.5
+    for name, z in (("lift", 0.0), ("ball", 0.1)):
+        start = {"r": [0.0, 0.0, z], "r_dot": [0.0, 0.0, before]}
+        scene.add_body(name, mass=m, Jp=[0.02] * 3, **start)
+    scene.add_force("weight", "gravity", gravity=g)
+    scene.add_input("speed", value=before)
+    along = {"P_i": "lift.O", "P_j": "ground.O", "a_j": "ground.z"}
+    scene.add_joint("tran", "rail", **along)
+    scene.add_joint("drive-tran", "winch", **along, input="speed")
+    floor = {"P_j": "lift.O", "a_j": "lift.z"}
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, **floor, e=0.5)
+    v, kinds = set_at(scene, 0.5, 0.6, {"speed": -2.0}, by_steps)
+    assert v[2] == pytest.approx(before - g * 0.1, abs=1e-9)
+    assert kinds[-1] == "lift"

@@ -146,6 +146,23 @@ def test_forces_and_modes_of_declared_contacts_are_those_of_the_step():
     assert rolls == pytest.approx(0.0, abs=1e-9)
 
 
+def test_a_small_box_that_tumbles_bounces_as_a_large_one():
+    """Lengths and gravity are times the size, moments times its square: times stay."""
+    found, size = [], 1e-3
+    for L in (1.0, size):
+        scene = dap.Scene(name="box")
+        J = [2.0 * L**2 * k for k in (0.02, 0.03, 0.025)]
+        start = {"r": [0.0, 0.0, 0.5 * L], "rpy": [0.3, 0.2, 0.1], "w": [1.0, 2.0, 3.0]}
+        scene.add_body("box", mass=2.0, Jp=J, r_dot=[L, 0.0, 0.0], **start)
+        scene.add_shape("box", body="box", size=[0.4 * L, 0.3 * L, 0.2 * L], collides=True)
+        collide(scene, mu=0.4, e=0.4).forces["gravity"].fields["gravity"] = G * L
+        found.append(dap.simulate(scene, t_end=0.4, dt=0.1, contact_step=1e-3))
+    large, small = found
+    assert small.r / size == pytest.approx(large.r, abs=1e-11)
+    assert small.w == pytest.approx(large.w, abs=1e-9)
+    assert small.ledger["energy"].ok
+
+
 def test_a_declared_pair_of_boxes_touches_on_their_faces_alone():
     """One slides on a longer one to rest, v^2 / (2 mu g) on, with edges and corners far beyond."""
     scene, mu, v = dap.Scene(name="plank"), 0.3, 0.8

@@ -144,6 +144,7 @@ class RunState:
             remedy = "compare with a run of smaller rtol and atol"
             raise SceneError([Mistake("estimate_error", True, what, remedy=remedy)])
         self.control = SampledControl(self.compiled, self.evaluator, controllers, self.t_end)
+        self.control.jumps = self.jumps
         self.notes += self.control.notes(self.settings.dt or self.t_end / 100.0)
 
     @property

@@ -232,7 +232,7 @@ def put_bias(s: StepArrays) -> bool:
     """What is added to normal velocities; True if bodies collide."""
     fall, found = 0.0, False
     for b in range(s.free.shape[0]):
-        for k in range(6):
+        for k in range(3):
             fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
     for c in range(s.contact_count):
         s.collides[c], s.bias[c] = 0, max(s.gap[c], 0.0) / s.h
@@ -240,7 +240,8 @@ def put_bias(s: StepArrays) -> bool:
             continue
         approach, _, _ = velocity_of(s, c, s.before)
         normal, _, _ = velocity_of(s, c, s.free)
-        if approach < -COLLIDES * fall and s.gap[c] + s.h * min(approach, normal) < 0.0:
+        change = max(fall, abs(normal - approach))  # by turning, too
+        if approach < -COLLIDES * change and s.gap[c] + s.h * min(approach, normal) < 0.0:
             s.collides[c], found = STOPS, True
             s.closing[c] = closing_of(max(s.gap[c], 0.0), s.h * approach, s.h * (normal - approach))
             last = 1.0 - s.closing[c]

@@ -3,7 +3,7 @@
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import attrs
 import numpy as np
@@ -23,6 +23,9 @@ from dap3d_core.simulation.control.state_view import StateView
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.event import several
 from dap3d_core.simulation.events.locate import EventLocator
+
+if TYPE_CHECKING:
+    from dap3d_core.simulation.events.jumps import Jumps
 
 #: Seconds of holds after which a run looks about: progress, checkpoints, Ctrl-C.
 CHUNK_SECONDS = 0.1
@@ -102,6 +105,7 @@ class SampledControl:
         #: When inputs have changed since rows were taken last, and to what.
         self._history: list[tuple[float, list[float]]] = []
         self._next = 0.0
+        self.jumps: Jumps | None = None  # of the run, if it has any
 
     @property
     def titles(self) -> list[str]:
@@ -186,7 +190,7 @@ class SampledControl:
         if changes or not self._history:
             self._history.append((now, list(self._inputs.values)))
         if changes:
-            jump(self._evaluator, hold, drives=self._inputs.drives)
+            jump(self._evaluator, hold, self.jumps, drives=self._inputs.drives)
             if locator is not None:
                 locator.begin_anew(hold.integration)
 
@@ -290,15 +294,20 @@ def with_events(hold: Hold, locator: EventLocator, end: float) -> bool:
     return True
 
 
-def jump(evaluator: Evaluator, hold: Hold, *, drives: bool) -> None:
+def jump(evaluator: Evaluator, hold: Hold, jumps: "Jumps | None", *, drives: bool) -> None:
     """Go on behind a change of inputs.
 
     Where a driver reads one, velocities jump with it, by impulses that its joints transmit: the
-    least change in the metric of the masses. What they do is work of the drivers.
+    least change in the metric of the masses. What they do is work of the drivers. What touches
+    lifts, slips or sticks by the forces that act then.
     """
     hold.jump()
-    if drives:
+    if drives and jumps is not None and evaluator.model.contact_count:
+        jumps.set_state(hold.integration, {}, {}, "what sets an input")  # contacts do not pull
+    elif drives:
         _jump_of_velocities(evaluator, hold.integration)
+    elif jumps is not None:
+        jumps.settle(hold.integration)
 
 
 @IGNORE_FLOAT_ERRORS  # costs more than the rest of a sample: only where it is needed

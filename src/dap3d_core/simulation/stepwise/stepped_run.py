@@ -123,7 +123,7 @@ class SteppedRun:
             if abs(end - self._t_end) <= ALIKE * dt:
                 end = self._t_end
             if inputs and self._inputs.set(inputs):
-                jump(self._evaluator, hold, drives=self._inputs.drives)
+                jump(self._evaluator, hold, self._run.jumps, drives=self._inputs.drives)
                 if self._locator is not None:
                     self._locator.begin_anew(hold.integration)
             if self._is_recorded:
