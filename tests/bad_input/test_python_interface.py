@@ -400,6 +400,7 @@ def test_threads_may_run_one_compiled_model(compiled, fresh):
         sys.setswitchinterval(before)
 
 
+@pytest.mark.slow
 def test_an_event_in_one_thread_changes_no_run_in_another(compiled, fresh):
     """The numbers of a force are changed in half of the runs."""
 

@@ -36,7 +36,7 @@ def test_a_result_is_saved_though_its_words_are_lost(scene_file, option):
     folder = scene_file().parent
     found = in_shell(f"$DAP3D run fall.toml --t-end 0.1 {option} > /dev/full", folder)
     assert found.returncode == 0
-    assert found.stderr == (
+    assert found.stderr.endswith(  # where it compiles for the first time, stderr has said so
         "cannot write to the standard output: No space left on device; the files of the command "
         "are saved\n"
     )
@@ -143,6 +143,7 @@ def test_a_file_of_the_system_without_a_size_is_empty(refuse):
     assert "empty" in refuse("info", "/proc/self/status")
 
 
+@pytest.mark.slow
 @posix
 def test_a_link_of_the_system_stays_and_its_pipe_is_refused(scene_file):
     """As root, ``-o /dev/stdout --force`` replaced the system's link by a result."""

@@ -204,6 +204,7 @@ def test_dangerous_words_of_python_stand_in_known_places_alone():
     assert found == set(ALLOWED)
 
 
+@pytest.mark.slow
 def test_a_folder_of_ours_is_never_searched_for_modules(folder):
     """``dap3d`` in a folder with a numpy.py takes the installed one."""
     command = str(Path(sys.executable).with_name("dap3d"))

@@ -11,9 +11,9 @@ UNOPTIMISED = REPOSITORY / "build" / "unoptimised"
 
 
 def environment(cache=UNOPTIMISED, **variables):
-    """The environment of a child process, with its own cache of compiled code."""
+    """The environment of a child process, with a cache of compiled code, for the same processor."""
     ours = ("DAP3D_", "COVERAGE_")
-    env = {k: v for k, v in os.environ.items() if not k.startswith(ours)}
+    env = {k: v for k, v in os.environ.items() if not k.startswith(ours) or k == "DAP3D_CPU"}
     return env | {"DAP3D_CACHE_DIR": str(cache)} | {k: str(v) for k, v in variables.items()}
 
 

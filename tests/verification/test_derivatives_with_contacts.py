@@ -10,6 +10,7 @@ import dap3d_core as dap
 TOLERANCE = 1e-8
 
 
+@pytest.mark.slow
 def test_slide_distance_by_friction_and_speed():
     """A point mass stops at v^2 / (2 mu g), at the time v / (mu g)."""
     v, mu = 3.0, 0.3

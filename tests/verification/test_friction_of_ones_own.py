@@ -8,7 +8,7 @@ from support.own_types import registry_of
 import dap3d_core as dap
 from dap3d_core.interface import Contact, PluginError, Point, Vector, examine, number, point, vector
 from dap3d_core.kernels import dot, exp, sub, where
-from dap3d_core.testing.kit import checks_for
+from dap3d_core.testing import checks_for
 
 G, MASS = 9.81, 2.0
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}

@@ -342,7 +342,7 @@ def test_guided_fingers_lift_a_box():
 def test_an_overlap_at_the_start_is_told():
     told = dap.simulate(ball(-0.02, mu=0.3), t_end=0.01, contact_step=1e-3).notes
     (note,) = (note for note in told if "at the start" in note)
-    assert "overlapped by 0.02 m" in note
+    assert "overlapped by 0.02 m at the start, most of all shapes " in note
     assert note.severity == "warning"
 
 

@@ -143,7 +143,7 @@ MJCF: Table = {
         "forces and limits of tendons",
     ),
     "fixed/joint": taken() | taken("joint coef"),
-    "spatial": translated("", "between two sites a spring, a damper and rigid stops")
+    "spatial": translated("", "over sites a spring and a damper, between two also rigid stops")
     | taken("name class limited range stiffness damping springlength")
     | noted("group width material rgba user", _DRAWING)
     | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)

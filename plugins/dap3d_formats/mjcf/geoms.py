@@ -109,8 +109,15 @@ class Geoms:
         path = self.document.source.locate(self._file(asset), asset.place)
         if path is None:
             return None
-        pose = frame @ self.document.frame(geom) @ _reference(asset).inverse()
-        scale = asset.numbers("scale", 3, (1.0, 1.0, 1.0))
+        inner, scale = _reference(asset).inverse(), asset.numbers("scale", 3, (1.0, 1.0, 1.0))
+        if len(set(scale)) > 1 and not np.array_equal(inner.A, np.eye(3)):
+            meets = common["contact"] is not None
+            text = "refquat of <mesh> with a scale of unlike factors: not drawn"
+            text += " and meets no others" if meets else ""
+            self.document.source.remarks.leave_out(geom.place, text, motion=meets)
+            return None
+        inner = Frame(np.array(scale) * inner.r, inner.A)
+        pose = frame @ self.document.frame(geom) @ inner
         return Geometry("mesh", mesh=path, scale=scale, pose=pose, **common)
 
     def inertial(self, geom: XmlElement, frame: Frame) -> Inertial | None:
@@ -197,9 +204,9 @@ class Geoms:
             what = f"the inertia of mesh {asset.get('name')} is not computed here"
             raise FormatError(what, geom.place, "give its body an <inertial>")
         vertices, triangles = self._read(asset) if "file" in given else _inline(asset)
-        vertices = vertices * np.array(asset.numbers("scale", 3, (1.0, 1.0, 1.0)))
         reference = _reference(asset).inverse()
         vertices = vertices @ reference.A.T + reference.r
+        vertices = vertices * np.array(asset.numbers("scale", 3, (1.0, 1.0, 1.0)))
         try:
             return inertia_of_mesh(vertices, triangles, all_positive=rule == "legacy")
         except ValueError as error:
@@ -254,7 +261,7 @@ def _hull(vertices: Any, asset: XmlElement) -> Any:
 
 
 def _reference(asset: XmlElement) -> Frame:
-    """The frame of a mesh in its file."""
+    """The frame of a mesh in its file, before it is scaled."""
     q = asset.numbers("refquat", 4, (1.0, 0.0, 0.0, 0.0))
     return Frame(asset.numbers("refpos", 3, (0.0, 0.0, 0.0)), from_quaternion(q))
 

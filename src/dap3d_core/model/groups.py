@@ -266,7 +266,7 @@ class Grouping:
         numbers, tables = self._numbers(type_info, functions, members)
         if not functions[0].terms:
             return type_info, numbers, tables
-        from dap3d_core.interface.codegen.specialise import bind_terms
+        from dap3d_core.interface.codegen.terms import bind_terms
 
         terms = []
         for column in zip(*(function.terms for function in functions), strict=True):

@@ -27,7 +27,7 @@ from dap3d_core.model.state_layout import (
     state_layout,
 )
 from dap3d_core.scene import Instance, ValidatedScene
-from dap3d_core.scene.contacts.tables import CollisionShapes
+from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
 
 if TYPE_CHECKING:
     from dap3d_core.model.element_states import ElementState

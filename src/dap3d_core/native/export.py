@@ -4,20 +4,16 @@ import os
 import re
 import shutil
 import tempfile
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
 import attrs
-import numpy as np
 
 from dap3d_core.formats.export_model import ExportReport
 from dap3d_core.formats.export_model import export_model as export_text
-from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
-from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.formats import ResultExporter
-from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
 from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_header, variables_of
@@ -25,27 +21,20 @@ from dap3d_core.native.fmu import write_fmu
 from dap3d_core.native.library import Exported
 from dap3d_core.native.run.directions import Directions
 from dap3d_core.native.run.outputs import Outputs, outputs_of
+from dap3d_core.native.run.parameters import places_of
 from dap3d_core.native.run.prepared import PreparedRun, refusal
 from dap3d_core.registry import Registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.extensions import extensions
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import Scene, SceneError, load
-from dap3d_core.study.batch import initial_state
-from dap3d_core.study.parameters import SceneParameter, parameters_named, with_values
+from dap3d_core.study.parameters import SceneParameter, parameters_named
 
 #: Formats, with the suffix of their files; "c" is a folder.
 NATIVE_FORMATS = {"c": "", "fmu": ".fmu"}
 SOURCE = Path(__file__).parent / "source"
 #: Files of it with words of the model.
 WRITTEN = ("example.c", "example.rs", "example.m", "CMakeLists.txt", "README.md")
-
-#: Factors on a parameter by which its places in the memory are found, and summands where it is 0.
-TRIALS = (1.001, 0.9975)
-#: What follows from other numbers at the start of a run.
-DERIVED = frozenset(("metric", "smallest", "F", "start"))
-#: Two corrections of a start agree to this part of the length of the scene.
-ALIKE = 1e-9
 
 
 @attrs.frozen
@@ -341,144 +330,3 @@ def _require_format(kind: str, given: Iterable[str]) -> None:
     hint = f"; did you mean {near!r}?" if near else ""
     listed = ", ".join(formats)
     raise PluginError(f"there is no format {kind!r} of models{hint} (there are: {listed})")
-
-
-@attrs.frozen
-class Places:
-    """Where a parameter is in the memory.
-
-    Attributes:
-        words: each with its sign.
-        is_fixed: it is set before a run begins alone.
-        moves_start: bodies then start elsewhere, or with other velocities.
-    """
-
-    words: dict[int, float]
-    is_fixed: bool
-    moves_start: bool
-
-
-def places_of(
-    prepared: PreparedRun, parameter: SceneParameter, options: dict[str, Any], outputs: Outputs
-) -> Places:
-    """Where a parameter of a scene is in the memory of its run, which has these outputs.
-
-    Raises:
-        SceneError: more depends on it than compiled code finds at the start.
-    """
-    name, value = parameter.name, parameter.value
-    if value is None:
-        raise refusal(f"parameter {name} has no number in the scene", "give it one")
-    trials = [value * factor if value else factor for factor in TRIALS]
-    scene = prepared.compiled.scene
-    try:
-        others = [PreparedRun(with_values(scene, [parameter], [x]), **options) for x in trials]
-    except SceneError as error:
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: a value near its own is "
-            f"refused: {error.mistakes[0].what}",
-            "export a model for each value",
-        ) from error
-    if any(one.stops != prepared.stops for one in others):
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: it moves a break point of a "
-            "function, where steps end",
-            "export a model for each value",
-        )
-    if any(outputs_of(one, outputs.names).text != outputs.text for one in others):
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: outputs depend on it that read "
-            "it as it is in the scene, such as places of points",
-            "leave these outputs out, or export a model for each value",
-        )
-    words, moved = _changed_words(prepared, others, value, trials)
-    if words is None:
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: numbers depend on it that are "
-            "found in Python before a run, or none does",
-            "export a model for each value, or name a number that is used as it is",
-        )
-    moves_start = "start" in moved
-    if moves_start and not all(map(_is_assembled_alike, others)):
-        raise refusal(
-            f"parameter {name} cannot be set in an exported model: the start depends on it, and "
-            "compiled code does not correct it as Python does",
-            "export a model for each value",
-        )
-    return Places(words, bool(moved), moves_start)
-
-
-def _changed_words(
-    prepared: PreparedRun, others: Sequence[PreparedRun], value: float, trials: Sequence[float]
-) -> tuple[dict[int, float] | None, set[str]]:
-    """Words that are the parameter, each with its sign, and what follows from it; None: more does.
-
-    Args:
-        prepared: of the scene as it is.
-        others: the same with other values, ``trials``, of the parameter.
-        value: of the parameter in the scene.
-    """
-    found: dict[int, float] = {}
-    derived: set[str] = set()
-    rows = zip(_numbers(prepared), *map(_numbers, others), strict=True)
-    for (name, array, places), *changed in rows:
-        mine = array.reshape(-1)[places]
-        theirs = [a.reshape(-1)[p] for _, a, p in changed]
-        if any(len(one) != len(mine) for one in theirs):
-            return None, derived
-        moved = np.zeros(len(mine), dtype=bool)
-        for one in theirs:
-            moved |= (one != mine) & ~((one != one) & (mine != mine))
-        if name in DERIVED:
-            derived |= {name} if moved.any() else set()
-            continue
-        for k in np.flatnonzero(moved).tolist():
-            sign = next((s for s in (1.0, -1.0) if mine[k] == s * value), 0.0)
-            if not sign or array.dtype != np.float64:
-                return None, derived
-            if any(a[k] != sign * x for a, x in zip(theirs, trials, strict=True)):
-                return None, derived
-            found[prepared.image.at(array) + int(places[k])] = sign
-    can_derive = prepared.start is not None or not derived
-    return (found or None) if can_derive else None, derived
-
-
-def _numbers(prepared: PreparedRun) -> Iterator[tuple[str, Any, Any]]:
-    """Names, arrays and flat indices of what nothing changes in the course of a run."""
-    from dap3d_core.formulations.programs.symbolic_arrays import constants
-
-    evaluator = prepared.evaluator
-    arrays = dict(evaluator.system.walk())
-    for name, places in constants(evaluator):
-        yield name, arrays[name], places
-    if prepared.start is not None:
-        given = prepared.start.arrays.given
-        yield "given", given, np.arange(given.size)
-    y = prepared.run.present.work.state[at.Y]
-    yield ("start" if prepared.start is not None else "y"), y, np.arange(y.size)
-    for k, one in enumerate(prepared.advances):
-        work = one.integration.work
-        for name in ("real", "integer", "switches", "tolerance"):
-            array = getattr(work, name)
-            yield f"{k}.{name}", array, np.arange(array.size)
-        if one.completes is not None:  # masses, shapes, materials
-            for name, array in one.arguments[1].walk():
-                yield f"{k}.{name}", array, np.arange(array.size)
-
-
-@IGNORE_FLOAT_ERRORS
-def _is_assembled_alike(other: PreparedRun) -> bool:
-    """True if compiled code brings the given start onto the constraints where Python does."""
-    evaluator, start, y = other.evaluator, other.start, other.run.present.y
-    assert start is not None
-    found, system = start.given_state(evaluator), evaluator.system
-    if start.assembles:
-        arrays, kept = start.arrays, system.metric.copy()
-        system.metric[1:, :7] = arrays.unit
-        out: Floats = arrays.starting.copy()
-        start.functions[1](0.0, found, out, system, evaluator.loops)
-        system.metric[:] = kept
-        if out[initial_state.OPEN] or not out[initial_state.LEAST_PIVOT] > start.least_pivot:
-            return False
-    size = max(1.0, float(np.abs(y).max(initial=0.0)))
-    return bool(np.abs(found - y).max(initial=0.0) <= ALIKE * size)

@@ -56,8 +56,6 @@ BUFFER_NUMBERS = 1_000_000
 MUCH_WORK = 3_000_000
 #: A second run, for the error, leaves a singular pose by a first step of this part.
 SECOND_RUN_FACTOR = 0.8
-#: Overlaps at the start above this part of the length of the scene are told.
-LEAST_OVERLAP = 1e-8
 
 
 class Run(RunState):
@@ -384,8 +382,5 @@ def stepping_notes(integrations: Sequence[Integration], length: float) -> list[s
             f"bodies overlap by {deepest:.2g} m: joints or drivers hold them where they cannot "
             "move apart"
         )
-    if (overlap := states[0].overlap_at_start) > LEAST_OVERLAP * length:
-        notes.append(
-            f"bodies overlapped by {overlap:.2g} m at the start, and were moved apart: move them"
-        )
-    return notes
+    first = next(one for one in integrations if one.name == STEPPING.name)
+    return [*notes, words] if (words := first.overlapping) else notes

@@ -489,3 +489,15 @@ def test_links_stay_apart_from_a_base_that_does_not_move(tmp_path, self_collide)
         if len(bodies) == 2 and bodies not in apart and group & meets_2 | group_2 & meets:
             meeting.add((a, b))
     assert meeting == MEET[self_collide]
+
+
+def test_a_mesh_of_mjcf_is_moved_and_turned_before_it_is_scaled(tmp_path):
+    """A tetrahedron: its centroid (1, 1, 1) / 4 less refpos, turned back by a quarter, scaled."""
+    path = tmp_path / "mesh.xml"
+    path.write_text("""<mujoco><asset><mesh name="m" vertex="0 0 0 1 0 0 0 1 0 0 0 1"
+      refpos="0.05 0.15 0.25" refquat="1 0 0 1" scale="2 3 4"/></asset><worldbody>
+      <body><freejoint/><geom type="mesh" mesh="m" density="1"/></body></worldbody></mujoco>""")
+    scene, _ = dap.import_model(path)
+    (body,) = scene.bodies.values()
+    assert body.mass == pytest.approx(2.0 * 3.0 * 4.0 / 6.0, rel=1e-12)
+    np.testing.assert_allclose(body.r, [2.0 * 0.1, 3.0 * -0.2, 0.0], atol=1e-12)

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import xarray
 from support import problems
-from support.internals import Evaluator
+from support.internals import Evaluator, scene_of
 from support.plain import long_in_plain_python
 from support.process import run
 from support.results import (
@@ -34,7 +34,6 @@ from dap3d_core.result import ResultError, RunMetadata, RunStatistics, open_resu
 from dap3d_core.result import arrays as arrays_module
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.open import LazyArrays
-from dap3d_core.scene.files.read_toml import scene_of
 
 ABOUT = dict(
     status="interrupted",

@@ -28,7 +28,7 @@ print(system.states.size, system.rates.size, compiled.model.state_count, system.
 """
 #: What a scene has to have for each of these modules, and for the kinds of loops behind them.
 NEEDED = {
-    "scene.add_requirement('dap3d')": ({"packaging", "dap3d_core.scene.validate.validate"}, ()),
+    "scene.add_requirement('dap3d')": ({"packaging", "dap3d_core.scene.requirements"}, ()),
     "scene.add_force('maxwell', 'late', P_i='upper.O', P_j='ground.O', k=1.0, c=1.0)": (
         {"dap3d_core.model.element_states", "dap3d_core.interface.examine.check_states"}, ()),
     "scene.add_contact('ball_plane', P_i='upper.O', P_j='ground.O', a_j='ground.z')": (
@@ -44,8 +44,8 @@ NOWHERE = ("matplotlib", "netCDF4", "xarray", "rich", "dap3d_core.formulations.j
            "dap3d_functions.grid", "dap3d_core.simulation.control", "scipy.optimize",
            "dap3d_core.simulation.stepwise", "dap3d_core.integrators.stepping.hold",
            "dap3d_core.model.reaction_groups", "dap3d_core.interface.codegen.unknowns",
-           "dap3d_core.kernels.eliminate_unknowns", "dap3d_core.scene.validate.validate",
-           "dap3d_core.interface.codegen.specialise")  # fmt: skip
+           "dap3d_core.kernels.eliminate_unknowns", "dap3d_core.scene.signals",
+           "dap3d_core.interface.codegen.terms")  # fmt: skip
 
 
 @cache
@@ -121,6 +121,7 @@ def test_what_a_scene_names_is_there(with_jumps):
     assert not any("state_derivatives" in m or "states_at_rest" in m for m in found)
 
 
+@pytest.mark.slow
 def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     _, _, found = told("pen1", method="joint")
     assert "dap3d_core.formulations.joint" in found
@@ -132,10 +133,7 @@ def test_a_stepped_run_loads_what_sets_its_inputs():
              "dap3d_core.integrators.stepping.hold"}  # fmt: skip
     found = imported("import dap3d_core as dap\ndap.start('pen1').step(0.01)")
     assert names <= found
-    assert not found & {
-        "dap3d_core.scene.validate.validate",
-        "dap3d_core.interface.codegen.specialise",
-    }
+    assert not found & {"dap3d_core.scene.signals", "dap3d_core.interface.codegen.terms"}
 
 
 @pytest.mark.slow
@@ -159,6 +157,7 @@ def test_lanes_are_imported_by_long_studies():
     assert names <= imported(script)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("file", "needed"),
     [("arm.urdf", "urdf"), ("parallelogram.sdf", "sdf"), ("parallelogram.xml", "mjcf")],

@@ -163,6 +163,7 @@ def test_turns_are_counted():
     assert found.stable.all()
 
 
+@pytest.mark.slow
 def test_column_buckles():
     """P L = k, where another path crosses: the straight column goes on, without stability."""
     found = dap.equilibrium_path(column(), "parameters.P", "0:120:4")

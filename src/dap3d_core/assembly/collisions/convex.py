@@ -14,7 +14,7 @@ from dap3d_core.assembly.collisions.manifold import E1, E2, POLYGON, put_points,
 from dap3d_core.assembly.collisions.supports import FLAT, curvature, radius_of, support
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.scene.contacts.tables import BOX, CAPSULE, CYLINDER, HULL, PLANE
+from dap3d_core.scene.contacts.collision_shapes import BOX, CAPSULE, CYLINDER, HULL, PLANE
 
 #: Rows of scratch behind those of ``nearest``: directions tried and found, start, points, a step,
 #: edges of i and j.

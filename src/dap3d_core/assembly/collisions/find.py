@@ -18,7 +18,7 @@ from dap3d_core.assembly.collisions.records import GAP, NORMAL, POINT, add
 from dap3d_core.assembly.collisions.solids import ball_box, capsule_box, sphere_cylinder
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.scene.contacts.tables import (
+from dap3d_core.scene.contacts.collision_shapes import (
     BOX,
     CAPSULE,
     CYLINDER,

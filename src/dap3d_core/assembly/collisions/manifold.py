@@ -7,7 +7,7 @@ from dap3d_core.assembly.collisions.records import GAP, add
 from dap3d_core.assembly.collisions.supports import CORNERS, near_support, radius_of
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.scene.contacts.tables import PLANE
+from dap3d_core.scene.contacts.collision_shapes import PLANE
 
 #: Rows of scratch: polygons of i and j, their points while one is clipped; tangents.
 POLYGON, OTHER, CLIPPED, E1, E2 = 40, 56, 72, 104, 105

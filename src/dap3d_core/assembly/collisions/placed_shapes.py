@@ -12,7 +12,7 @@ from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.model.rotations import rotation
-from dap3d_core.scene.contacts.tables import PLANE, CollisionShapes
+from dap3d_core.scene.contacts.collision_shapes import PLANE, CollisionShapes
 
 #: Pairs of shapes, and points of contact, that there is room for at first.
 ROOM = 64

@@ -8,7 +8,7 @@ import math
 from dap3d_core.assembly.collisions.boxes import dot_axis
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.scene.contacts.tables import (
+from dap3d_core.scene.contacts.collision_shapes import (
     BOX,
     CAPSULE,
     CYLINDER,

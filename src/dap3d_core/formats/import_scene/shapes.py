@@ -149,15 +149,21 @@ def bodies_apart(builder: SceneBuilder, model: Articulation) -> dict[tuple[str, 
 
 def _joined(model: Articulation) -> Iterator[tuple[str, str]]:
     """Pairs of links that a joint holds together, through links that are fixed to one of them."""
+    held = _held_together(model)
+    for joint in model.joints.values():
+        if joint.kind not in ("fixed", "free") and WORLD not in (joint.parent, joint.child):
+            yield from product(held[joint.parent], held[joint.child])
+
+
+def _held_together(model: Articulation) -> dict[str, set[str]]:
+    """The links that are fixed to each link, directly or through others, itself included."""
     held: dict[str, set[str]] = {name: {name} for name in model.links}
     for joint in model.joints.values():
         if joint.kind == "fixed" and WORLD not in (joint.parent, joint.child):
             together = held[joint.parent] | held[joint.child]
             for name in together:
                 held[name] = together
-    for joint in model.joints.values():
-        if joint.kind not in ("fixed", "free") and WORLD not in (joint.parent, joint.child):
-            yield from product(held[joint.parent], held[joint.child])
+    return held
 
 
 def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
@@ -184,7 +190,11 @@ def _coefficients(model: Articulation, one: Contact, other: Contact) -> dict[str
 
 
 def _beyond_rows(model: Articulation) -> Iterator[tuple[str, str]]:
-    """Links that joints in a row, with links between them that have nothing, hold together."""
+    """Links that joints in a row, with links between them that have nothing, hold together.
+
+    And what is fixed to them.
+    """
+    held = _held_together(model)
     above = {joint.child: joint.parent for joint in model.joints.values() if not joint.closes}
     for name, link in model.links.items():
         parent = above.get(name, WORLD) if link.geometries else WORLD
@@ -193,7 +203,7 @@ def _beyond_rows(model: Articulation) -> Iterator[tuple[str, str]]:
                 break
             parent = above.get(parent, WORLD)
             if parent != WORLD:
-                yield name, parent
+                yield from product(held[name], held[parent])
 
 
 def _shapes(

@@ -160,7 +160,7 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
                     for k in range(3):
                         u[r] += s.felt[3 * c + r, 3 * q + k] * s.x[q, k]
         for c in range(m):
-            s.rim[c] = rim_of(s, c, s.y)
+            s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.y)
         sweep_contacts(s.felt, s.own_held, s.u, s.kind, s.mu[:m], s.rim, s.x, SWEEPS, aim)
         for k in range(s.y.size):
             s.y[k] = 0.0

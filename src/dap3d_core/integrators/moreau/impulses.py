@@ -91,9 +91,9 @@ def remember(work: Any, s: StepArrays) -> None:
     """Keep the impulses of contacts that push, and of friction of joints."""
     memory, count = work.memory, 0
     for c in range(s.contact_count):
-        mode = mode_of(s, c)
-        if mode > OPEN and count < memory.shape[0]:
-            memory[count, 0], memory[count, 4] = s.key[c], mode
+        if (s.x[c, 0] > 0.0 or s.kind[c] != CONE) and count < memory.shape[0]:
+            memory[count, 0] = s.key[c]
+            memory[count, 4] = SLIDES if c < s.touch_count else mode_of(s, c)
             for k in range(3):
                 total = 0.0
                 for r in range(3):

@@ -40,29 +40,40 @@ SMALL = 60
 @compiled
 def put_projected(z: Floats, bound: float, kind: int, out: Floats) -> None:
     """Put the impulse next to z that Coulomb's law allows, of friction up to a bound."""
-    whole = z[0] * z[0] if kind == WHOLE else 0.0
-    size = max(math.sqrt(whole + (z[1] * z[1] + z[2] * z[2])), TINY)
+    size = max(math.sqrt(z[1] * z[1] + z[2] * z[2]), TINY)
+    out[0] = max(0.0, z[0])
+    if kind != CONE:
+        size = slip_size(z, kind)
+        out[0] = min(1.0, bound / size) * z[0] if kind == WHOLE else 0.0
     part = min(1.0, bound / size)
-    out[0] = max(0.0, z[0]) if kind == CONE else part * z[0] if kind == WHOLE else 0.0
     out[1], out[2] = part * z[1], part * z[2]
+
+
+@compiled
+def slip_size(z: Floats, kind: int) -> float:
+    """Length of what friction of a joint acts along."""
+    whole = z[0] * z[0] if kind == WHOLE else 0.0
+    return max(math.sqrt(whole + (z[1] * z[1] + z[2] * z[2])), TINY)
 
 
 @compiled
 def put_slopes(z: Floats, mu: float, bound: float, kind: int, B: Floats) -> None:
     """Put the derivatives of ``projected``, (9,) by rows; mu: of the bound, of what pushes."""
-    whole = z[0] * z[0] if kind == WHOLE else 0.0
-    size = max(math.sqrt(whole + (z[1] * z[1] + z[2] * z[2])), TINY)
+    size = max(math.sqrt(z[1] * z[1] + z[2] * z[2]), TINY)
+    pushes = 1.0 if z[0] > 0.0 else 0.0
+    if kind != CONE:
+        size, pushes = slip_size(z, kind), 0.0
     part, d, e = min(1.0, bound / size), z[1] / size, z[2] / size
-    slides, pushes = 1.0 if bound < size else 0.0, 1.0 if kind == CONE and z[0] > 0.0 else 0.0
+    slides = 1.0 if bound < size else 0.0
     B[0], B[1], B[2] = pushes, 0.0, 0.0
     B[3], B[6] = slides * pushes * mu * d, slides * pushes * mu * e
     B[4], B[8] = part * (1.0 - slides * d * d), part * (1.0 - slides * e * e)
     B[5] = B[7] = -part * slides * d * e
     if kind == WHOLE:
         c = z[0] / size
-        B[0], B[1] = part * (1.0 - slides * c * c), -part * slides * c * d
+        B[0] = part * (1.0 - slides * c * c)
+        B[1] = B[3] = -part * slides * c * d
         B[2] = B[6] = -part * slides * c * e
-        B[3] = B[1]
 
 
 @compiled
@@ -72,21 +83,23 @@ def put_missed(x: Floats, u: Floats, bound: float, kind: int, r: float, out: Flo
     r: mass that the rows feel, kg, which makes an impulse of a velocity.
     """
     z0, z1, z2 = x[0] - r * u[0], x[1] - r * u[1], x[2] - r * u[2]
-    whole = z0 * z0 if kind == WHOLE else 0.0
-    size = math.sqrt(whole + (z1 * z1 + z2 * z2))
+    size = math.sqrt(z1 * z1 + z2 * z2)
+    if kind == WHOLE:
+        size = math.sqrt(z0 * z0 + size * size)
     part = bound / max(size, TINY) if size > bound else 1.0
-    z0 = max(0.0, z0) if kind == CONE else z0 * part if kind == WHOLE else 0.0
+    if kind == CONE:
+        z0 = max(0.0, z0)
+    else:
+        z0 = z0 * part if kind == WHOLE else 0.0
     out[0], out[1], out[2] = x[0] - z0, x[1] - z1 * part, x[2] - z2 * part
 
 
 @compiled
 def rim_of(s: StepArrays, c: int, y: Floats) -> float:
-    """Friction that contact c may have besides that of its cone, N s: that of joints.
+    """Friction that contact c, of a joint, may have, N s.
 
     y: impulses of joints, N s, besides those of free motion.
     """
-    if s.kind[c] == CONE:
-        return 0.0
     k = s.key[c] - DECLARED
     first, total = s.load_row[k], 0.0
     if s.load_count[k] == 0:
@@ -100,7 +113,7 @@ def rim_of(s: StepArrays, c: int, y: Floats) -> float:
 @compiled
 def bound_of(s: StepArrays, c: int, push: float, y: Floats) -> float:
     """The most friction of contact c, N s, where it pushes with ``push`` and joints with y."""
-    return s.mu[c] * max(push, 0.0) + rim_of(s, c, y)
+    return s.mu[c] * max(push, 0.0) if s.kind[c] == CONE else rim_of(s, c, y)
 
 
 def project(z: Floats, mu: Floats) -> Floats:
@@ -212,7 +225,8 @@ def left_at(s: StepArrays, c: int, v: Floats) -> float:
 def impulse_of(s: StepArrays, c: int) -> float:
     """The size of an impulse, or of the most that friction of a joint has."""
     x = s.x[c]
-    return max(abs(x[0]), abs(x[1]), abs(x[2]), rim_of(s, c, s.y))
+    found = max(abs(x[0]), abs(x[1]), abs(x[2]))
+    return found if s.kind[c] == CONE else max(found, rim_of(s, c, s.y))
 
 
 @compiled
@@ -291,7 +305,8 @@ def put_rest(s: StepArrays, v: Floats, weight: float, R: Floats) -> float:
         part, z, J = weight * s.r[c], s.z[c], s.J[c]
         z[0] = s.x[c, 0] - part * (u0 + s.bias[c])
         z[1], z[2] = s.x[c, 1] - part * u1, s.x[c, 2] - part * u2
-        put_projected(z, bound_of(s, c, z[0], s.pull), s.kind[c], s.push[c])
+        s.rim[c] = bound_of(s, c, z[0], s.pull)
+        put_projected(z, s.rim[c], s.kind[c], s.push[c])
         p, y, w = s.push[c, 0], s.push[c, 1], s.push[c, 2]
         first, second = R[s.bodies[c, 0]], R[s.bodies[c, 1]]
         for k in range(6):
@@ -318,14 +333,17 @@ def product_of(x: Floats, y: Floats, m: float, spin: Floats) -> float:
 @compiled
 def solve_round(s: StepArrays, weight: float, tolerance: float) -> None:
     """Bring v to where it solves the equations of a round; impulses there in push and pull."""
-    size, rubs = TINY, 0.0
+    size, rubs = TINY, False
     for q in range(s.chosen_count):
-        rubs = rubs if s.kind[s.chosen[q]] == CONE else 1.0
+        rubs |= s.kind[s.chosen[q]] != CONE
     for q in range(s.used_count):
         b = s.used[q]
-        for k in range(6):  # friction of joints may be little beside the momentum of its bodies
-            s.change[k] = s.free[b, k] - rubs * s.v[b, k]
-        size += product_of(s.change, s.change, s.mass[b], s.spin[b])
+        x = s.free[b]
+        if rubs:  # friction of joints may be little beside the momentum of its bodies
+            x = s.change
+            for k in range(6):
+                x[k] = s.free[b, k] - s.v[b, k]
+        size += product_of(x, x, s.mass[b], s.spin[b])
     merit = put_rest(s, s.v, weight, s.rest)
     for _ in range(PASSES):
         if merit <= tolerance * tolerance * size:
@@ -348,8 +366,7 @@ def try_pass(s: StepArrays, weight: float, merit: float, feels: float) -> float:
     """
     for q in range(s.chosen_count):
         c = s.chosen[q]
-        z, bound = s.z[c], bound_of(s, c, s.z[c, 0], s.pull)
-        put_slopes(z, feels * s.mu[c], bound, s.kind[c], s.B[c])
+        put_slopes(s.z[c], feels * s.mu[c], s.rim[c], s.kind[c], s.B[c])
     assemble(s, weight, feels)
     for q in range(s.used_count):
         for k in range(6):

@@ -4,7 +4,7 @@
 # mypy: disable-error-code="no-any-return"
 
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.integrators.moreau.arrays import StepArrays, step_arrays
+from dap3d_core.integrators.moreau.arrays import CONE, StepArrays, step_arrays
 from dap3d_core.integrators.moreau.gauss_seidel import refine_held, sweep_bodies
 from dap3d_core.integrators.moreau.groups import choose, find_groups, lay_out
 from dap3d_core.integrators.moreau.newton import (
@@ -111,7 +111,7 @@ def sweep(s: StepArrays, sweeps: int, tolerance: float, relax: float) -> None:
     m = s.contact_count
     put_velocities(s, s.v)
     for c in range(m):
-        s.rim[c] = rim_of(s, c, s.y)
+        s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.y)
     sweep_bodies(s.bodies, s.J, s.moved, s.own, s.bias, s.kind, s.mu[:m], s.rim, s.x, s.v, sweeps,
                  0.1 * tolerance, relax)  # fmt: skip
 

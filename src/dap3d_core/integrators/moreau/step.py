@@ -47,8 +47,8 @@ from dap3d_core.kernels.runtime.cache import compiled
 OVERLAP, PASSES = 1e-12, 8
 #: A contact collides where it approaches by more than this times h times the acceleration.
 COLLIDES = 4.0
-#: A part of the step where bodies are not hit.
-NOT_HIT = 2.0
+#: Parts of the step where bodies are not hit, and those of them that rest.
+NOT_HIT, RESTS = 2.0, 1.5
 #: Velocities of rest, as parts of what they would become without contacts.
 STILL = 1e-8
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
@@ -121,6 +121,9 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         return False
     if work.step_count == 0:
         work.overlap_at_start = deepest_of(s)
+        for c in range(s.touch_count):
+            if -s.gap[c] == work.overlap_at_start:
+                work.overlap_key = 1.0 * s.key[c]
     else:  # what the projection of the last step has left
         work.deepest = max(work.deepest, deepest_of(s))
     s.is_solved = s.met_count = 0
@@ -151,7 +154,9 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     keep_for_reports(s)
     for b in range(1, n + 1):
         c, d = coordinate_offset(b), s.trial[b]
-        if s.hit[b] <= 1.0 or rests(s, b):  # from where it was
+        if s.hit[b] > 1.0 and rests(s, b):
+            s.hit[b] = RESTS
+        if s.hit[b] < NOT_HIT:  # from where it was
             for k in range(7):
                 trial[c + k] = y[c + k]
         for k in range(6):
@@ -163,12 +168,10 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
 
 @compiled
 def way_of(s: StepArrays, b: int, k: int) -> float:
-    """How far a body goes by impulses; one that is hit, at all."""
+    """How far a body goes by impulses; one that is hit, or rests, at all."""
     before, free, end, first = s.before[b, k], s.free[b, k], s.end[b, k], s.hit[b]
-    if first > 1.0 and rests(s, b):
-        return 0.5 * s.h * (before + end)
     if first > 1.0:
-        return 0.5 * s.h * (end - free)
+        return 0.5 * s.h * (end - free if first == NOT_HIT else before + end)
     fall, last = s.flies[b] * (free - before), 1.0 - first
     return s.h * (first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall))
 
@@ -181,11 +184,10 @@ def rests(s: StepArrays, b: int) -> bool:
     """
     turn, v, w = 0.0, 0.0, 0.0
     for k in range(3):
-        turn += (s.free[b, 3 + k] - s.before[b, 3 + k]) ** 2
+        turn = max(turn, abs(s.free[b, 3 + k] - s.before[b, 3 + k]))
         v = max(v, abs(s.before[b, k]), abs(s.end[b, k]))
         w = max(w, abs(s.before[b, 3 + k]), abs(s.end[b, 3 + k]))
-    turn = STILL * math.sqrt(turn)
-    return turn > 0.0 and w <= turn and v <= turn * s.length
+    return turn > 0.0 and w <= STILL * turn and v <= STILL * turn * s.length
 
 
 @compiled
@@ -289,7 +291,7 @@ def work_done(work: Any, s: StepArrays) -> float:
     for b in range(1, s.trial.shape[0]):
         for k in range(6):
             way = s.trial[b, k]
-            if s.hit[b] <= 1.0 or rests(s, b):
+            if s.hit[b] < NOT_HIT:
                 way -= 0.5 * s.h * (s.before[b, k] + s.free[b, k])
             s.change[k], s.turned[k] = s.free[b, k] - s.before[b, k], way / s.h
         total += product_of(s.change, s.turned, s.mass[b], s.spin[b])

@@ -4,7 +4,7 @@ A kernel that calls ``f(x)``, or ``f(x, y)``, is compiled once for each type of 
 given the function's own kernel for ``f``; the numbers of the function follow those of the element.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping
 from random import Random
 from typing import Any
 
@@ -13,7 +13,6 @@ import attrs
 from dap3d_core.interface.codegen.instance_layout import InstanceLayout
 from dap3d_core.interface.codegen.kernel_arguments import (
     FRICTION_NUMBERS,
-    SEVERAL,
     KernelArgument,
     argument_names,
     derivative_names,
@@ -280,37 +279,3 @@ def bind_friction(type_info: TypeInfo) -> TypeInfo:
         names[name] = quantity if name not in type_info.layout.numbers else names[name]
     layout = attrs.evolve(layout, numbers=numbers, par_width=width)
     return attrs.evolve(type_info, layout=layout, names=names, kernels={"friction": kernel})
-
-
-def bind_terms(type_info: TypeInfo, terms: Sequence[TypeInfo]) -> TypeInfo:
-    """A function type that combines functions, with those known.
-
-    Args:
-        type_info: the type, with one field of several functions.
-        terms: the types of these functions; their numbers follow its own, in this order.
-    """
-    layout = type_info.layout
-    width = layout.par_width + sum(term.layout.par_width for term in terms)
-    bound = attrs.evolve(
-        type_info,
-        layout=attrs.evolve(layout, par_width=width),
-        kernels={"value": _kernel(type_info, terms)},
-        given=f"({', '.join(term.type.keyword + term.given for term in terms)})",
-        terms=tuple(terms),
-    )
-    return attrs.evolve(bound, names=names_behind(bound, bound.layout))
-
-
-def _kernel(type_info: TypeInfo, terms: Sequence[TypeInfo]) -> Callable[..., Any]:
-    """The kernel ``value`` of a combination, of the argument and the numbers of all terms."""
-    kernel = type_info.kernels["value"]
-    functions, numbers = [], []
-    for k, term in enumerate(terms):
-        of_term = parameters(term.kernels["value"])
-        numbers += [f"g{k}__{n}" for n in of_term if n != "x"]
-        passed = ", ".join("x" if n == "x" else f"g{k}__{n}" for n in of_term)
-        functions.append(f"lambda x: g{k}__value({passed})")
-    several = f"({', '.join(functions)},)"
-    given = {n: several for n in parameters(kernel) if type_info.names[n].derivative == SEVERAL}
-    names = {f"g{k}__value": term.kernels["value"] for k, term in enumerate(terms)}
-    return bound_kernel(kernel, given, numbers, names)

@@ -263,11 +263,11 @@ class Actuator:
 
 @attrs.frozen(eq=False)
 class Tendon:
-    """A straight line between points of two links, with a spring, a damper and limits.
+    """A line from point to point of links, with a spring, a damper and limits of its length.
 
     Attributes:
         name: its name in the file.
-        ends: two links, and the points in their axes, (3,) each.
+        points: links, and the points in their axes, (3,) each.
         stiffness, damping: N/m, N s/m.
         rest: the length without force, m.
         limits: of its length, m.
@@ -275,7 +275,7 @@ class Tendon:
     """
 
     name: str
-    ends: tuple[tuple[str, Floats], tuple[str, Floats]]
+    points: tuple[tuple[str, Floats], ...]
     stiffness: float = 0.0
     damping: float = 0.0
     rest: float = 0.0

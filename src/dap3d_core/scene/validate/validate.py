@@ -1,46 +1,24 @@
 """Check of a whole scene: all mistakes are reported at once, with file and line."""
 
-import shlex
-from collections.abc import Iterable, Sequence
-from graphlib import CycleError, TopologicalSorter
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 import attrs
-from packaging.specifiers import InvalidSpecifier, SpecifierSet
-from packaging.utils import InvalidName, canonicalize_name
-from packaging.version import InvalidVersion
 
-from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.types import acts_on_all
-from dap3d_core.registry import Registry, load_registry
-from dap3d_core.scene.errors import MISSING, Key, dotted
-from dap3d_core.scene.expressions.outputs import fault_of_quantity
+from dap3d_core.registry import Registry
+from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.scene import Scene
 from dap3d_core.scene.tables import LIMITS, NAMED, RELEASES, fault_of_name
-from dap3d_core.scene.validate.coerce_values import Fault, number_of, text_of
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.validated_scene import (
-    Instance,
-    ValidatedScene,
-    arguments_of,
-    combines,
-)
+from dap3d_core.scene.validate.validated_scene import Instance, ValidatedScene, combines
 
 if TYPE_CHECKING:
-    from dap3d_core.scene.contacts.tables import CollisionShapes
+    from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
     from dap3d_core.scene.validate.bodies import Bodies
     from dap3d_core.scene.validate.geometry import Geometry
     from dap3d_core.scene.validate.shapes import Shape
     from dap3d_core.scene.validate.types import Types
-
-#: Any version.
-ANY = "*"
-
-#: Most functions in one combination, each counted as often as it occurs: all become one kernel.
-MOST_TERMS = 200
-#: First words of the quantities that every result has (result/quantities/catalogue.py).
-SYSTEM_NAMES = ("t", "energy", "work", "constraint")
 
 
 def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> ValidatedScene:
@@ -123,9 +101,13 @@ def _read_signals(
 
     inputs = {}
     if report.scene.inputs:
+        from dap3d_core.scene.signals import read_inputs
+
         inputs = read_inputs(report)
     functions = read_elements(report, geometry, "functions", types)
     if any(combines(function.type_info) for function in functions):
+        from dap3d_core.scene.signals import combine_functions
+
         functions = combine_functions(report, functions)
     return inputs, functions
 
@@ -202,6 +184,7 @@ def _check_requires(report: Collector) -> str:
     """Check the distributions that the scene requires; the command that installs what lacks."""
     if not report.scene.requires:
         return ""
+    from dap3d_core.scene.requirements import read_requirements
 
     return read_requirements(report)
 
@@ -221,7 +204,7 @@ def _check_shapes_and_outputs(
         read_outputs(report)
     if report.scene.collisions is None and not any(s.values.get("collides") for s in shapes):
         return None
-    from dap3d_core.scene.contacts.read_contacts import read_collisions
+    from dap3d_core.scene.contacts.read_collisions import read_collisions
 
     return read_collisions(report, shapes, bodies.body_index, joints)
 
@@ -247,6 +230,8 @@ def _note_unused_signals(
             key = dotted(("functions", name))
             report.note(f"{key}: no joint and no force uses it", "functions left unused")
     if report.scene.inputs:
+        from dap3d_core.scene.signals import note_unread_inputs
+
         note_unread_inputs(report, elements)
 
 
@@ -268,139 +253,3 @@ def _report_twins(report: Collector, **tables: Iterable[Instance]) -> None:
         elif table == "joints" or same:
             words = "is the same as" if same else "differs only in its numbers from"
             report.note(f"{table}.{instance.name} {words} {table}.{twin.name}")
-
-
-def read_requirements(report: Collector) -> str:
-    """Check that each distribution is installed, in a version of its range.
-
-    A distribution that lacks, or has another version, is a mistake with the command that installs
-    it. Ranges are those of packaging (PEP 440), such as ``">=0.2, <1"``.
-
-    Returns:
-        The command that installs all that lack; "" if none does.
-    """
-    missing = []
-    for name, given in report.scene.requires.items():
-        key = ("requires", str(name))
-        if not _is_name(name):
-            what = "not the name of a distribution; it has letters, digits, and - _ . between them"
-            report.add(key, given, what)
-            continue
-        versions = report.read(key, given, _range_of)
-        if not isinstance(versions, Fault) and not _is_installed(report, key, name, versions):
-            missing.append(_pip(f"{name}{versions}"))
-    return f"pip install {' '.join(missing)}" if missing else ""
-
-
-def _is_installed(report: Collector, key: Key, name: str, versions: SpecifierSet) -> bool:
-    """True for a distribution of a version in a range; otherwise a mistake is reported."""
-    given, remedy = report.scene.requires[name], f"pip install {_pip(f'{name}{versions}')}"
-    try:
-        installed = version(name)
-    except PackageNotFoundError:
-        brought = {s.distribution for each in load_registry().sources.values() for s in each}
-        what = f"the distribution {name}, which the scene requires, is not installed"
-        report.add(key, given, what, report.nearest(name, brought), remedy)
-        return False
-    try:
-        is_suitable = versions.contains(installed, prereleases=True)
-    except InvalidVersion:
-        is_suitable = not versions
-    if not is_suitable:
-        what = f"{name} {installed} is installed, which is not of this range"
-        report.add(key, given, what, remedy=remedy)
-    return is_suitable
-
-
-def _range_of(value: Any) -> Any:
-    """The range of versions, or the fault."""
-    text = text_of(value)
-    if isinstance(text, Fault):
-        return text
-    try:
-        return SpecifierSet("" if text.strip() == ANY else text)
-    except InvalidSpecifier:
-        return Fault('should be a range of versions, such as ">=0.2, <1", or "*" for any')
-
-
-def _is_name(name: Any) -> bool:
-    try:
-        canonicalize_name(name, validate=True)
-    except (InvalidName, TypeError):
-        return False
-    return True
-
-
-def _pip(words: str) -> str:
-    """A requirement in a command of a shell."""
-    quoted = shlex.quote(words)
-    return f'"{words}"' if quoted != words else words
-
-
-def combine_functions(report: Collector, functions: list[Instance]) -> list[Instance]:
-    """The functions with those that they combine; mistakes are reported.
-
-    Args:
-        report: takes mistakes: a function that names itself, one of two arguments, or too many
-            terms.
-        functions: without mistakes of their own, in file order.
-    """
-    known = {function.name: function for function in functions}
-    arguments = arguments_of(functions)
-    for function in functions:
-        if of_two := [name for name in _terms(function) if arguments.get(name, 1) > 1]:
-            what = f"combines functions of one argument; {of_two[0]} takes two"
-            report.add(("functions", function.name), list(_terms(function)), what)
-            return functions
-    uses = {name: _terms(function) for name, function in known.items()}
-    try:
-        order = list(TopologicalSorter(uses).static_order())
-    except CycleError as error:
-        cycle = error.args[1][::-1]  # each names the next
-        what = f"functions combine one another in a circle: {' -> '.join(cycle)}"
-        report.add(("functions", cycle[0]), list(uses[cycle[0]]), what)
-        return functions
-    sizes: dict[str, int] = {}
-    for name in order:
-        if name not in known or not set(uses[name]) <= sizes.keys():
-            continue  # one of them has a mistake, which is reported
-        sizes[name] = sum(sizes[term] for term in uses[name]) or 1
-        if sizes[name] > MOST_TERMS:
-            what = f"combines {sizes[name]} functions, counted as often as they occur"
-            report.add(("functions", name), list(uses[name]), what, "", f"at most {MOST_TERMS}")
-            return functions
-        known[name] = attrs.evolve(known[name], terms=tuple(known[term] for term in uses[name]))
-    return list(known.values())
-
-
-def _terms(function: Instance) -> tuple[str, ...]:
-    """Names of the functions that a function combines, in the order of its fields."""
-    specs = specs_of(function.type_info.type)
-    return tuple(
-        name for field, spec in specs.items() if spec.kind == "functions"
-        for name in function.values[field]
-    )  # fmt: skip
-
-
-def read_inputs(report: Collector) -> dict[str, float]:
-    """The values of the inputs at the start of a run, by name; mistakes are reported."""
-    inputs = {}
-    for name, entry in report.scene.inputs.items():
-        fault = fault_of_quantity(report.scene, name, but="inputs")
-        if not fault and name in SYSTEM_NAMES:
-            fault = "every result has a quantity of this name"
-        if fault:
-            report.add(("inputs", str(name)), name, f"not a name for an input: {fault}")
-        inputs[name] = report.read(("inputs", str(name), "value"), entry.value, number_of)
-    return inputs
-
-
-def note_unread_inputs(report: Collector, elements: Sequence[Instance]) -> None:
-    """Note inputs that no joint and no force reads."""
-    behind = 1 + len(report.scene.functions)
-    read = {index - behind for e in elements for index in e.functions}
-    named = {name for e in elements if e.active for name in e.active.names}
-    for index, name in enumerate(report.scene.inputs):
-        if index not in read and name not in named:
-            key = dotted(("inputs", name))
-            report.note(f"{key}: no joint and no force reads it", "inputs left unread")

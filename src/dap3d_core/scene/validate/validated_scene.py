@@ -12,7 +12,7 @@ from dap3d_core.scene.scene import Scene
 
 if TYPE_CHECKING:
     from dap3d_core.kernels.array_types import Floats, Integers
-    from dap3d_core.scene.contacts.tables import CollisionShapes
+    from dap3d_core.scene.contacts.collision_shapes import CollisionShapes
     from dap3d_core.scene.expressions.expression import Expression
 
 

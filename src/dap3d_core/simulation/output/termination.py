@@ -56,6 +56,8 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
             f"{head}: a step of {step:g} s, as given, cannot be taken there; give a shorter step, "
             "or none, and rtol chooses the steps"
         )
+    if words := integration.overlapping:
+        return f"{message}: {words}"
     words = describe_refusals(evaluator, integration)
     if integration.status is Status.STEP_FLOOR and words:
         message = f"{message} (refused so far: {words})"

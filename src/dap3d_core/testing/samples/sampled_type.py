@@ -11,7 +11,8 @@ import numpy as np
 
 from dap3d_core.interface import Function, number
 from dap3d_core.interface.codegen.reactions import with_sample_reactions
-from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions, bind_terms
+from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions
+from dap3d_core.interface.codegen.terms import bind_terms
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.contacts.rows import STICKS
 from dap3d_core.interface.element_states import unknown_names

@@ -5,7 +5,7 @@ import pytest
 
 from dap3d_core.assembly.collisions.find import ShapeFinder
 from dap3d_core.model.rotations import rotation
-from dap3d_core.scene.contacts.tables import (
+from dap3d_core.scene.contacts.collision_shapes import (
     BOX,
     CAPSULE,
     CYLINDER,

@@ -23,7 +23,7 @@ from dap3d_core.kernels import (
     tan,
     where,
 )
-from dap3d_core.testing.kit import checks_for
+from dap3d_core.testing import checks_for
 
 
 class Pipe(Contact):
@@ -43,6 +43,7 @@ class Pipe(Contact):
         return scale(-1.0 / size, (0.0, r_P_i[1], r_P_i[2]))
 
 
+@pytest.mark.slow
 def test_a_type_of_ones_own_on_one_body():
     failed = [str(outcome) for check in checks_for(Pipe) if not (outcome := check.run()).ok]
     assert not failed

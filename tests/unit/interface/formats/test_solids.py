@@ -2,14 +2,8 @@
 
 import numpy as np
 import pytest
+from support.internals import Frame, Inertial, inertia_of_mesh, inertia_of_solid, total_inertia
 
-from dap3d_core.interface.formats import (
-    Frame,
-    Inertial,
-    inertia_of_mesh,
-    inertia_of_solid,
-    total_inertia,
-)
 from dap3d_core.interface.formats.solids import inertia_moved, nearest_inertia
 
 CORNERS = np.array([(x, y, z) for x in (0.0, 2.0) for y in (0.0, 3.0) for z in (0.0, 5.0)])

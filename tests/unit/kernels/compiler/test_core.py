@@ -4,12 +4,10 @@ Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py
 import json
 
 import pytest
-from support.internals import FLOAT, INT
+from support.internals import FLOAT, INT, Known, Struct
 from support.plain import jit_is_on
 from support.problems import short_runs
 from support.process import REPOSITORY, run
-
-from dap3d_core.kernels.compiler.types import Known, Struct
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -146,7 +144,7 @@ NOT_CALLED = {
             "log_contacts"
         ),
         "integrators.moreau.newton": (
-            "put_projected put_slopes put_missed rim_of bound_of impulse_of add_load "
+            "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of add_load "
             "put_velocities clear add_pull times_inverse add_inverse speed_of left_at residual_of "
             "newton exchange put_rest product_of solve_round try_pass assemble put_turned "
             "add_contact"

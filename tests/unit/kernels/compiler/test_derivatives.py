@@ -11,13 +11,21 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.at_all_levels import function_of, made_of, programs, same_bits
-from support.internals import INTEGERS, MATRIX, Arrays, CompileError, Program, compiled, pointer
+from support.internals import (
+    INTEGERS,
+    MATRIX,
+    Arrays,
+    CompileError,
+    Program,
+    compiled,
+    pointer,
+    type_of,
+)
 from support.plain import jit_is_on
 from support.structs import Inner, Numbers
 
 from dap3d_core.kernels import scalar_math
 from dap3d_core.kernels.compiler.derivatives import differentiate
-from dap3d_core.kernels.compiler.units import type_of
 from dap3d_core.kernels.runtime.lanes import DifferentiatedArrays, differentiated
 from dap3d_core.kernels.scalar_math import is_differentiated, values_alone, with_slopes
 

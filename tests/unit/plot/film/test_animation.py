@@ -17,7 +17,7 @@ from dap3d_core.plot.film.frame import Stage
 from dap3d_core.plot.film.projection import camera_of, visible_rectangle, with_margin
 from dap3d_core.plot.film.stick_figure import SHADES, pose_at, shapes_of, sticks_of
 from dap3d_core.result import ResultError
-from dap3d_core.scene.tables import AnimationPoint
+from dap3d_core.scene import AnimationPoint
 from dap3d_core.view.scene3d.shapes import GROUND_COLOR
 
 

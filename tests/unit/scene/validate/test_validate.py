@@ -10,9 +10,8 @@ from unit.scene.mistakes import ALL
 
 import dap3d_core as dap
 from dap3d_core.result.quantities.catalogue import SYSTEM
-from dap3d_core.scene import MISSING, check
-from dap3d_core.scene.files.read_toml import parse
-from dap3d_core.scene.validate.validate import MOST_TERMS, SYSTEM_NAMES
+from dap3d_core.scene import MISSING, check, parse
+from dap3d_core.scene.signals import MOST_TERMS, SYSTEM_NAMES
 
 SPRING = '[forces.spring]\ntype = "ptp"'
 

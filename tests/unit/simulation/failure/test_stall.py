@@ -2,9 +2,9 @@
 
 import pytest
 from support import problems
+from support.internals import Refusals
 
 import dap3d_core as dap
-from dap3d_core.integrators.stepping.integration import Refusals
 from dap3d_core.simulation.failure.stall import describe_refusals, refusal_notes
 
 

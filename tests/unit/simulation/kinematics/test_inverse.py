@@ -9,7 +9,7 @@ from support.plain import long_in_plain_python
 from support.trees import mixed_chain
 
 import dap3d_core as dap
-from dap3d_core.result.quantities.lookup import find
+from dap3d_core.result import find
 
 
 @pytest.fixture(scope="module")
@@ -111,6 +111,7 @@ def test_angles_of_joints_are_data_over_many_turns(scene):
     assert np.max(np.abs(result.r - turning.r)) < 1e-12
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_data_that_contradict_the_joints_are_met_halfway(scene, motion):
     """The crank's place is too far out by 1 mm: the note says by how much it is missed."""

@@ -6,9 +6,7 @@ import pytest
 from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.study.ensemble import Ensemble
-from dap3d_core.study.outputs import outputs_of
-from dap3d_core.study.study import Study
+from dap3d_core.study import Ensemble, Study, outputs_of
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 SETTINGS = {"t_end": 0.2, "dt": 0.05, "rtol": 1e-11, "atol": 1e-13}
