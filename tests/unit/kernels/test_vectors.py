@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.internals import LoopArrays, call_loop, loop_list
+from support.internals import Loop, LoopArrays, build, call_loop, loop_list
 from support.plain import jit_is_on
 
 from dap3d_core import kernels
