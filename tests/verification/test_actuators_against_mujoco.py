@@ -100,7 +100,8 @@ TENDON = """<mujoco><default><tendon stiffness="40"/></default><worldbody>
   <site name="hook" pos="0.2 0 2"/><body name="a" pos="0 0 1"><freejoint name="fly"/>
   <geom type="box" size="0.1 0.2 0.15" pos="0.05 0 0"/><site name="eye" pos="0.1 0.1 0.1"/></body>
   <body name="b" pos="1 0 1"><joint name="b" axis="0 1 0"/>
-  <geom name="ball" size="0.1" pos="0.3 0 0"/><site name="end" pos="0.4 0 0.1"/></body></worldbody><tendon>
+  <geom name="ball" size="0.1" pos="0.3 0 0"/><site name="end" pos="0.4 0 0.1"/></body></worldbody>
+  <tendon>
   <spatial damping="2"><site site="hook"/><site site="eye"/></spatial>
   <spatial stiffness="15" springlength="0.3"><site site="end"/><site site="eye"/></spatial>
   <spatial name="bent" stiffness="9" damping="3"><site site="hook"/><site site="end"/>

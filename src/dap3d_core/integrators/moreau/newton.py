@@ -87,10 +87,7 @@ def put_missed(x: Floats, u: Floats, bound: float, kind: int, r: float, out: Flo
     if kind == WHOLE:
         size = math.sqrt(z0 * z0 + size * size)
     part = bound / max(size, TINY) if size > bound else 1.0
-    if kind == CONE:
-        z0 = max(0.0, z0)
-    else:
-        z0 = z0 * part if kind == WHOLE else 0.0
+    z0 = max(0.0, z0) if kind == CONE else z0 * part if kind == WHOLE else 0.0
     out[0], out[1], out[2] = x[0] - z0, x[1] - z1 * part, x[2] - z2 * part
 
 
