@@ -53,7 +53,7 @@ FILES = {
     "added.py": "plugin_integrators.py",
     "closed_joints.py": "a part of classify.py",
     "elimination.py": "eliminate_unknowns.py",
-    "tree_points.py": "joint_space_batch.py",
+    "tree_points.py": "compiled_batch.py",
 }
 #: Words of docstrings and messages -> what to write.
 WORDS = {

@@ -7,7 +7,7 @@ less error per length is a sign of that: then the change is measured, and what o
 times that is not counted. Where it is far below the tolerances nothing changes.
 
 It is measured as the method propagates it (docs/decisions/0071): an implicit one damps the
-rounding of a stiff direction (radau/rounding.py), and an explicit one takes no step in which
+rounding of a stiff direction (radau/error.py), and an explicit one takes no step in which
 changes grow. A step may never be off by more than 1e-6 of the largest component of a kind for that.
 """
 

@@ -1,4 +1,4 @@
-"""Panels: nodes of many rows, which loops in nets leave behind (ordering/supernodes.py).
+"""Panels: nodes of many rows, which loops in nets leave behind (ordering/ordering.py).
 
 Written for throughput: inner loops hold four by four sums in registers, so that each number loaded
 serves four products. Factors are stored as those of small nodes (factor.py), but while a panel is

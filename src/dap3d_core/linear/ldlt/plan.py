@@ -1,7 +1,7 @@
 """The static elimination program of a model: the place of each block, the products that are formed.
 
 K is stored by nodes: below the square block of a node's own rows those of the rows that it updates,
-all of them with as many numbers as the node has rows. A panel (ordering/supernodes.py) is one node
+all of them with as many numbers as the node has rows. A panel (ordering/ordering.py) is one node
 of many rows; what is assembled into it, and what small nodes subtract from it, is in blocks of
 its own until the panel's turn comes, so that small nodes know nothing of panels.
 """
