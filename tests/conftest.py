@@ -6,6 +6,7 @@ import signal
 from collections import Counter
 
 import pytest
+from support.process import UNOPTIMISED
 
 # Tests fill all cores by themselves, and their matrices are small: threads of BLAS would only wait,
 # each at the cost of a core. Set before numpy is imported.
@@ -18,13 +19,41 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection(session):
-    """Quick tests have ended before optimised code is there: none is made beside them, as for
-    threads of BLAS, and none is asked for, which is hundreds of files fifty times a second."""
     gc.disable()  # nothing that is imported or collected is garbage
-    if "not slow" in session.config.option.markexpr:
-        from dap3d_core.kernels.compiler import background
+    if session.config.option.markexpr != "long":
+        keep_unoptimised()
 
-        background.optimiser.add = lambda unit: None
+
+def keep_unoptimised():
+    """Let code stay unoptimised, which has the same bits, and keep it: most tests have ended before
+    optimised code is there, which takes longer to make than all of them. Where the user's cache has
+    some, it is used. The optimised code of each function is tested in unit/kernels/compiler."""
+    from dap3d_core.kernels.compiler import background, objects, units
+    from dap3d_core.kernels.runtime.cache import cache_folder
+
+    compile_unit, optimised, users = units.Unit._compile, objects.optimised, cache_folder()
+
+    def is_users(path):
+        return path is not None and path.parent == users
+
+    def compile_once(unit, write, ready_name):
+        if not is_users(unit.path):
+            return compile_unit(unit, write, ready_name)
+        path, unit.is_optimised = UNOPTIMISED / unit.path.name, False
+        kept = objects.read_object(path)
+        if kept is None:
+            kept = compile_unit(unit, write, ready_name)
+            UNOPTIMISED.mkdir(0o700, parents=True, exist_ok=True)
+            objects.write_object(path, *kept)
+        return kept
+
+    def compile_program(text, results, path):
+        if is_users(path):
+            return objects.compile_ir(text, objects.UNOPTIMISED)
+        return optimised(text, results, path)
+
+    units.Unit._compile, objects.optimised = compile_once, compile_program
+    background.optimiser.add = lambda unit: None
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -1,10 +1,12 @@
 """Height of the tip of a chain of 8 revolutes after 1 s, and its gradient by the last 7 masses.
 
-``build/peers-venv/bin/python benchmarks/peers/gradients.py``, with casadi in it and gcc at hand.
+``build/peers-venv/bin/python benchmarks/peers/gradients.py``, with casadi and heyoka in it, and gcc
+at hand.
 
 CasADi gets the articulated bodies of generated.py, derives the variational equations, and writes C;
 dop853 in C takes equal steps. Pinocchio has derivatives of ``aba`` and the regressor of masses, for
-dop853 in Python; MuJoCo central differences of 14 runs of RK4. dap3d gets the scene, and runs the
+dop853 in Python; MuJoCo central differences of 14 runs of RK4; heyoka the program of CasADi, whose
+variational equations it integrates by Taylor series. dap3d gets the scene, and runs the
 differentiated program that ``sensitivities`` runs. Integration alone is timed: CPU time, least of
 many rounds in turn, to an error of value (m) and gradient (m/kg), against CasADi's at 400 steps.
 """
@@ -23,6 +25,9 @@ from scipy.integrate import DOP853
 COUNT, MASSES, ROUNDS, ALL = 8, 7, 15, 10**15
 STEPS = (4, 6, 8, 12, 16, 24, 32, 48)
 TOLERANCES = [10.0**-k for k in range(2, 14)]
+#: heyoka's, for each of which it compiles half a minute. Terms by which it would choose its first
+#: step vanish at this start, from rest: it gets one that is shorter than the others, s.
+FEW_TOLERANCES, FIRST_STEP = [1e-5, 1e-7, 1e-9, 1e-11], 0.02
 #: Equal steps of dop853 with 12 stages; y and its rates have N numbers.
 LOOP = """
 #include <stddef.h>
@@ -171,6 +176,54 @@ def mujoco(mechanism):
     return start
 
 
+def heyoka(mechanism):
+    """What starts a trial, by a tolerance."""
+    import casadi as ca
+    import heyoka as hy
+
+    x, m, rates = equations(mechanism)
+    program = ca.Function("rates", [x, m], [rates], {"cse": True})
+    states = hy.make_vars(*(f"x{k}" for k in range(2 * COUNT)))
+    given = [states, [hy.par[k] for k in range(MASSES)]]
+    forms = {
+        ca.OP_ADD: lambda a, b: a + b, ca.OP_SUB: lambda a, b: a - b, ca.OP_SQ: lambda a: a * a,
+        ca.OP_MUL: lambda a, b: a * b, ca.OP_DIV: lambda a, b: a / b, ca.OP_NEG: lambda a: -a,
+        ca.OP_SIN: hy.sin, ca.OP_COS: hy.cos,
+    }  # fmt: skip
+    work, of_states = {}, [None] * len(states)
+    for k in range(program.n_instructions()):
+        operation = program.instruction_id(k)
+        to, sources = program.instruction_output(k), program.instruction_input(k)
+        if operation == ca.OP_INPUT:
+            work[to[0]] = given[sources[0]][sources[1]]
+        elif operation == ca.OP_CONST:
+            work[to[0]] = hy.expression(program.instruction_constant(k))
+        elif operation == ca.OP_OUTPUT:
+            of_states[to[1]] = work[sources[0]]
+        else:
+            work[to[0]] = forms[operation](*(work[j] for j in sources))
+    pairs = list(zip(states, of_states, strict=True))
+    system = hy.var_ode_sys(pairs, args=given[1], order=1)
+
+    def start(tolerance):
+        pars = [1.0] * MASSES
+        of = hy.taylor_adaptive(
+            system, [0.0] * len(states), tol=tolerance, pars=pars, compact_mode=True
+        )
+        first = of.state.copy()
+
+        def run():
+            of.time, of.state[:] = 0.0, first
+            before = time.thread_time()
+            of.step(max_delta_t=FIRST_STEP)
+            of.propagate_until(mechanism.t_end)
+            return time.thread_time() - before
+
+        return run, lambda: of_state(of.state)
+
+    return start
+
+
 def dap3d(mechanism, **fixed):
     """What starts a trial, by a tolerance or, with ``fixed``, by a number of steps."""
     import dap3d_core as dap
@@ -233,6 +286,7 @@ def trials(mechanism):
     """(program, method, parameters, what starts a trial)."""
     yield "dap3d", "joint, dop853", TOLERANCES, optimised(dap3d(mechanism))
     yield "dap3d", "joint, dop853 fixed", STEPS, optimised(dap3d(mechanism, fixed=True))
+    yield "heyoka", "taylor, variational", FEW_TOLERANCES, heyoka(mechanism)
     yield "Pinocchio", "dop853 fixed, Python", STEPS, pinocchio(mechanism)
     yield "MuJoCo", "RK4, differences", [25 * 2**k for k in range(8)], mujoco(mechanism)
 

@@ -9,8 +9,11 @@ from dap3d_core.kernels import add, cross, dot, scale, sqrt, sub, where
 
 interface_version = 1
 #: Points of what lies flat; sine of the tilt below which they touch, and half of it, below which a
-#: rim has no lowest point and does not.
-FLAT, UPRIGHT = 8, 1e-9
+#: rim does not, so that what falls flat is met by points whose gap has no kink there. Below half of
+#: that a rim has no lowest point. No step that locates an event may pass over all of it.
+FLAT, UPRIGHT = 8, 1e-7
+#: Sine of the tilt below which points across the rim are seen as well.
+NEARLY_UPRIGHT = 0.05
 
 
 def tilt(a_i, a_j):
@@ -24,13 +27,23 @@ def upright(a_i, a_j):
     return UPRIGHT - tilt(a_i, a_j)[1] / UPRIGHT
 
 
+def across_rim(gap, radius, a_i, a_j):
+    """Not negative of a point of the cap that is high, or as deep as if the cap had tipped over.
+
+    In the gaps of these a passage of the level of the plane is seen; a rim never rolls over them.
+    """
+    sine = sqrt(tilt(a_i, a_j)[1])
+    away = where(gap < 0.0, -gap, gap) - 0.5 * radius * sine
+    return where(sine < NEARLY_UPRIGHT, away, -1.0)
+
+
 def lowest(r_P_i, a_i, spoke_i, a_j, radius, length, end):
     """A point of part ``end``: -1, 1 the lowest of a rim, else one of the cap that is lower.
 
     Of a cylinder that stands upright the lowest of a rim is the centre of its cap: out of reach.
     """
     across, square = tilt(a_i, a_j)
-    tilts = square > 0.25 * UPRIGHT * UPRIGHT
+    tilts = square > (0.25 * UPRIGHT) ** 2
     rim = scale(where(tilts, -radius / sqrt(where(tilts, square, 1.0)), 0.0), across)
     of_rim = is_rim(end)
     way = where(of_rim, end, where(dot(a_j, a_i) > 0.0, -1.0, 1.0))
@@ -74,9 +87,11 @@ class DiskPlane(Contact):
     def normal(a_j):
         return a_j
 
-    def reach(a_i, a_j, end):
+    def reach(r_P_i, a_i, spoke_i, r_P_j, a_j, radius, length, end):
         flat = upright(a_i, a_j)
-        return where(is_rim(end), 0.75 * UPRIGHT - flat, flat)
+        point = lowest(r_P_i, a_i, spoke_i, a_j, radius, length, end)
+        of_cap = where(flat < 0.0, across_rim(dot(a_j, sub(point, r_P_j)), radius, a_i, a_j), flat)
+        return where(is_rim(end), 0.75 * UPRIGHT - flat, of_cap)
 
     def prepare(self, bodies):
         """The rim of the first parts, the spoke of the others, in axes of the body."""

@@ -18,9 +18,8 @@ from dap3d_core.model.groups import Floats, Integers
 from dap3d_core.model.rotations import euler_rates
 from dap3d_core.result import ResultError
 from dap3d_core.result.file.atomic_write import cannot
-from dap3d_core.view.scene3d.primitives import turned_to
+from dap3d_core.view.scene3d.primitives import Triangles, turned_to
 from dap3d_core.view.scene3d.shapes import Line, Part
-from dap3d_core.view.scene3d.solids import Triangles
 from dap3d_results.moving_solids import MovingScene, Stretched, rgb
 
 Progress = Callable[[int, int], None]

@@ -8,13 +8,11 @@ import numpy as np
 from dap3d_core.model.groups import Floats
 from dap3d_core.model.rotations import to_global
 from dap3d_core.result import Result
-from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.elements import elements_of
-from dap3d_core.view.scene3d.primitives import Span, turned_to
-from dap3d_core.view.scene3d.sampled_motion import Motion
+from dap3d_core.view.scene3d.primitives import Span, Triangles, solid, spring, turned_to
+from dap3d_core.view.scene3d.sampled_motion import Motion, stage
 from dap3d_core.view.scene3d.scene_data import notes_of, scene_geometry, scene_of
 from dap3d_core.view.scene3d.shapes import Line, Part, parts_of
-from dap3d_core.view.scene3d.solids import Triangles, solid, spring
 
 #: Colour where none can be read, each part from 0 to 255.
 GREY = (154, 163, 173)

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     )
     from dap3d_core.simulation import compile_scene as compile
     from dap3d_core.simulation import open_result as open
-    from dap3d_core.simulation.control.controller import Controller
+    from dap3d_core.simulation.control.sampled import Controller
     from dap3d_core.simulation.equilibrium.equilibrium import Equilibrium, equilibrium
     from dap3d_core.simulation.kinematics.inverse import inverse
     from dap3d_core.simulation.kinematics.kinematics import kinematics
@@ -53,7 +53,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "AssemblyError": ("simulation", "AssemblyError"),
-    "Controller": ("simulation.control.controller", "Controller"),
+    "Controller": ("simulation.control.sampled", "Controller"),
     "Equilibrium": ("simulation.equilibrium.equilibrium", "Equilibrium"),
     "EquilibriumPath": ("study.equilibrium_path", "EquilibriumPath"),
     "Event": ("simulation", "Event"),

@@ -13,7 +13,7 @@ import pytest
 
 import dap3d_core as dap
 from dap3d_core.registry.arguments import SETTINGS, checked
-from dap3d_core.scene.tables import Simulation
+from dap3d_core.scene import Simulation
 
 
 def public(name):

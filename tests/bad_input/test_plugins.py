@@ -276,10 +276,7 @@ def test_two_types_of_a_models_file_with_one_keyword_are_refused(model):
 
 
 #: Classes of a model's own file that have the keyword of an installed force.
-SHADOWS = {
-    "plain": "keyword = 'fp'",
-    "found by running it": "keyword = ''.join(('f', 'p'))",
-}
+SHADOWS = {"plain": "keyword = 'fp'", "found by running it": "keyword = ''.join(('f', 'p'))"}
 
 
 @pytest.mark.parametrize("keyword", SHADOWS.values(), ids=SHADOWS)

@@ -305,6 +305,7 @@ def test_what_a_callback_raises_comes_out_and_leaves_no_trace(
     assert_same_run(dap.simulate(compiled, t_end=0.5, dt=0.1), fresh)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     "integrator", ["dop853", "dopri5", pytest.param("radau", marks=pytest.mark.slow)]
 )
@@ -399,6 +400,7 @@ def test_threads_may_run_one_compiled_model(compiled, fresh):
         sys.setswitchinterval(before)
 
 
+@pytest.mark.slow
 def test_an_event_in_one_thread_changes_no_run_in_another(compiled, fresh):
     """The numbers of a force are changed in half of the runs."""
 

@@ -1,5 +1,5 @@
 """The command line as a user has it, in a folder of its own.
-The user's cache of compiled code is used, but where a test is about it."""
+Compiled code is that of all tests, but where a test is about it."""
 
 import os
 import subprocess
@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from support.falling import SCENE
+from support.process import UNOPTIMISED
 
 COMMAND = [str(Path(sys.executable).with_name("dap3d"))]
 
@@ -24,7 +25,7 @@ def environment(**variables):
         "DAP3D_BLOCK",
     )
     kept = {k: v for k, v in os.environ.items() if not k.startswith(dropped)}
-    return kept | {k: str(v) for k, v in variables.items()}
+    return kept | {"DAP3D_CACHE_DIR": str(UNOPTIMISED)} | {k: str(v) for k, v in variables.items()}
 
 
 class CommandLine:

@@ -88,6 +88,7 @@ def test_a_window_that_cannot_be_opened_is_told(refuse, dap3d, runs, monkeypatch
     assert "cannot open a window" in refuse("plot", "pen1.nc", "cone.r.z", "--show")
 
 
+@pytest.mark.slow
 def test_no_colour_when_asked(dap3d):
     _, shown = in_terminal(dap3d, 80, "models", "--no-color")
     assert "\x1b[3" not in shown

@@ -23,7 +23,7 @@ from importlib import import_module
 from pathlib import Path
 
 import dap3d_core as dap
-from dap3d_core.simulation.checkpoint.file import read_checkpoint
+from dap3d_core.simulation.checkpoint.save import read_checkpoint
 
 runs = import_module("dap3d_core.simulation.run")
 runs.CHUNK_SECONDS, runs.FIRST_CHUNK = 1e-3, 100

@@ -11,10 +11,10 @@ import warnings
 from pathlib import Path
 
 import numpy as np
+from support.internals import lines_of
 
 import dap3d_core as dap
 from dap3d_core.scene import check, parse
-from dap3d_core.scene.files.line_numbers import lines_of
 from fuzz.scenes import events_of
 
 #: A case that computes for longer hangs, s; kernels that are not cached are compiled in it, too.

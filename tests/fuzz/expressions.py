@@ -2,8 +2,8 @@
 
 import numpy as np
 from hypothesis import strategies as st
+from support.internals import WORDS, ExpressionError, parse_expression
 
-from dap3d_core.scene.expressions.expression import WORDS, ExpressionError, parse_expression
 from fuzz.acceptable import strict
 
 HANG = 10

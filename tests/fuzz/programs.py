@@ -1,13 +1,7 @@
 """Programs of the core's subset, drawn at random: their bits are the same however they are run."""
 
 import numpy as np
-from support.at_all_levels import (
-    EDGES,
-    compiled_at_all_levels,
-    function_of,
-    programs,
-    same_bits,
-)
+from support.at_all_levels import EDGES, compiled_at_all_levels, function_of, programs, same_bits
 from support.internals import FLOAT, INT, Array
 
 from dap3d_core.kernels import atan2, exp, sin

@@ -15,8 +15,7 @@ from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.result import ResultError, UnknownNameError
-from dap3d_core.result.quantities.lookup import names_of
+from dap3d_core.result import ResultError, UnknownNameError, names_of
 from dap3d_core.scene import parse
 from fuzz.acceptable import strict
 

@@ -154,10 +154,7 @@ JOINTS = {
         {"P_i": "P1", "P_j": "P2", "a_i": "V1", "a_j": "V2"},
     ),
     "sph-sph": ("V2index = 1; J.el = 2.5", {"d": "d1", "length": 2.5}),
-    "cyl": (
-        "iVindex_a = 3; J.jVindex_a = 1; J.V2index = 1",
-        {"a_i": "V3", "a_j": "V1", "d": "d1"},
-    ),
+    "cyl": ("iVindex_a = 3; J.jVindex_a = 1; J.V2index = 1", {"a_i": "V3", "a_j": "V1", "d": "d1"}),
     "tran": (
         "jVindex_a = 1; J.V2index = 1; J.Ac = [0 -1 0 1 0 0 0 0 1]",
         {"a_j": "V1", "d": "d1", "A_c": ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))},
@@ -221,10 +218,7 @@ FORCES = {
         {"v_i": "V3", "v_j": "V1", "axis": "V1", "k": 2.0, "c": 3.0, "theta_0": np.pi / 8}
         | {"n_a": 5.0},
     ),
-    "weight": (
-        "gravity = 1.6; S.wgt = [0; -1; 0]",
-        {"gravity": 1.6, "wgt": (0.0, -1.0, 0.0)},
-    ),
+    "weight": ("gravity = 1.6; S.wgt = [0; -1; 0]", {"gravity": 1.6, "wgt": (0.0, -1.0, 0.0)}),
     "fp": ("iBindex = 2; S.fp = [1; 2; 3]", {"body_i": "body2", "fp": (1.0, 2.0, 3.0)}),
     "np": ("iBindex = 2; S.np = [1; 2; 3]", {"body_i": "body2", "np": (1.0, 2.0, 3.0)}),
     "f": ("iPindex = 3; S.f = [1; 2; 3]", {"P_i": "P3", "f": (1.0, 2.0, 3.0)}),

@@ -14,8 +14,8 @@ EXPECTED = {
     for name, folder in dap.shipped_models().items()
     if (folder / "expected.toml").exists()
 }
-#: Of forty loops, and of hundreds of steps with contacts.
-LONG = {"A02-40", "domino_row", "marble_run"}
+#: Of forty loops, stiff, and of hundreds of steps with contacts.
+LONG = {"A02-40", "A05", "domino_row", "marble_run"}
 COUNTS = ("rows", "rank", "dof")
 
 

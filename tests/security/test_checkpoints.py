@@ -9,13 +9,12 @@ import pytest
 from fuzz.numbers import PATIENCE, RUNS, check_change, folder, make
 from fuzz.results import in_child
 from support.ended import EndedError, ended_at, leave, shorten_chunks
-from support.internals import Checkpoint, read_checkpoint, write_checkpoint
+from support.internals import Checkpoint, RadauState, read_checkpoint, write_checkpoint
 from support.results import same_bits
 
 import dap3d_core as dap
 from dap3d_core.cli import main
 from dap3d_core.integrators.adams.formulas import AdamsState
-from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.stepping.integration_state import IntegrationState
 from dap3d_core.simulation import CheckpointError, CompiledModel
 
@@ -141,6 +140,7 @@ def test_numbers_that_a_run_does_not_change_are_those_of_its_scene(tmp_path, mon
     assert same_bits(dap.resume(found), whole)
 
 
+@pytest.mark.slow
 def test_every_run_of_the_fuzz_target_is_resumed_as_it_is(tmp_path):
     """The files that are changed are good ones: unchanged they go on."""
     for run in RUNS:

@@ -29,6 +29,7 @@ def folder(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes as POSIX has them")
 def test_a_matplotlibrc_is_not_opened(folder):
     """Whatever it holds, also what would stop the import: whoever opens this pipe waits."""

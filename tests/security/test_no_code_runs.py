@@ -85,6 +85,7 @@ def watched(folder, jobs):
     return json.loads(told.splitlines()[-1])
 
 
+@pytest.mark.slow
 def test_nothing_of_a_scene_a_result_or_a_matlab_folder_is_run(folder):
     jobs = [
         ["check", "."],
@@ -166,7 +167,7 @@ ALLOWED = {
     ("testing/packages.py", "subprocess"): "pytest, on the tests of packages, when it is asked for",
     ("plot/film/animation.py", "subprocess"): "ffmpeg, without a shell",
     ("native/build.py", "subprocess"): "a C compiler, on C that is written here, without a shell",
-    ("simulation/checkpoint/file.py", "allow_pickle"): "switched off",
+    ("simulation/checkpoint/save.py", "allow_pickle"): "switched off",
     (
         "study/workers/dask_cluster.py",
         "cloudpickle",
@@ -203,6 +204,7 @@ def test_dangerous_words_of_python_stand_in_known_places_alone():
     assert found == set(ALLOWED)
 
 
+@pytest.mark.slow
 def test_a_folder_of_ours_is_never_searched_for_modules(folder):
     """``dap3d`` in a folder with a numpy.py takes the installed one."""
     command = str(Path(sys.executable).with_name("dap3d"))

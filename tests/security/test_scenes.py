@@ -4,10 +4,10 @@ Nests, long keys and long numbers: tests/unit/scene/files/test_read_toml.py."""
 import os
 
 import pytest
+from support.internals import LARGEST_FILE
 
 import dap3d_core as dap
 from dap3d_core.scene import check
-from dap3d_core.scene.files.read_toml import LARGEST_FILE
 
 BODY = "[bodies.b]\nmass = 1.0\nJp = [1.0, 1.0, 1.0]\n"
 

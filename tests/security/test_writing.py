@@ -5,13 +5,13 @@ import os
 import stat
 
 import pytest
+from support.internals import distrust
 from support.matlab import SMALL
 from support.matlab import write as write_matlab
 from support.process import run
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.kernels.runtime.cache import distrust
 from dap3d_core.result import ResultError, check_target
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="links and owners as POSIX has them")

@@ -11,6 +11,8 @@ SOLREF = ("geom_solref", "jnt_solref", "eq_solref", "pair_solref", "tendon_solre
 SOLIMP = ("geom_solimp", "jnt_solimp", "eq_solimp", "pair_solimp", "tendon_solimp_lim")
 #: Impedances from which accelerations are extrapolated to rigid ones; MuJoCo has none above.
 IMPEDANCES = (0.9998, 0.9999)
+#: Distance from its limit at which a joint is held by it, rad and m.
+AT_LIMIT = 1e-9
 
 
 class HardOracle(Oracle):
@@ -50,11 +52,21 @@ class HardOracle(Oracle):
             mujoco.mj_step(m, d)
         m.opt.iterations, m.opt.noslip_iterations = 500, 200
         d.qvel[:], found = 0.0, []
+        self._keep_to_limits()
         for impedance in IMPEDANCES:
             self._soften((-1e-9, -1e-9), impedance)
             mujoco.mj_forward(m, d)
             found.append(d.qacc.copy())
         d.qacc[:] = 2.0 * found[1] - found[0]
+
+    def _keep_to_limits(self):
+        """Put joints that have yielded back at their limits, which hold them from there on."""
+        m = self.model
+        for j in np.flatnonzero(m.jnt_limited):
+            if m.jnt_type[j] > 1:
+                at = m.jnt_qposadr[j]
+                self.data.qpos[at] = np.clip(self.data.qpos[at], *m.jnt_range[j])
+        m.jnt_margin[:] = AT_LIMIT
 
     def _soften(self, solref, impedance):
         for name in SOLREF:
@@ -69,14 +81,12 @@ class HardOracle(Oracle):
         self.known = set(model.joints)
 
     def positions(self):
-        """Coordinates of the joints that both have, by name, within limits that yield a little."""
+        """Coordinates of the joints that both have, by name."""
         m, found = self.model, {}
         for j in range(m.njnt):
             at, size = m.jnt_qposadr[j], {0: 7, 1: 4}.get(int(m.jnt_type[j]), 1)
             name = self.name("mjOBJ_JOINT", j) or (self.unnamed[j] if self.unnamed else None)
             q = self.data.qpos[at : at + size]
-            if size == 1 and m.jnt_limited[j]:
-                q = np.clip(q, *m.jnt_range[j])
             if name in self.known:
                 found[name] = tuple(q.tolist())
         return found

@@ -7,8 +7,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import System, step_functions
 from dap3d_core.integrators import TABLEAUS, RungeKutta, Status
-from dap3d_core.kernels.compiler.types import DTYPES
-from support.internals import Array, compiled, loop_list
+from support.internals import DTYPES, Array, compiled, loop_list
 
 # The system is an empty one of the core, whose integrators are compiled for it already; its
 # ``force`` counts the calls of rhs, project and report.

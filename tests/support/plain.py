@@ -2,7 +2,7 @@
 
 import pytest
 
-from dap3d_core.kernels.runtime.cache import jit_is_on
+from support.internals import jit_is_on
 
 #: A long run, a hundred times as long in plain Python; shorter tests run the same lines.
 long_in_plain_python = pytest.mark.skipif(

@@ -1,21 +1,23 @@
-"""Python scripts run in fresh processes, with a cache folder of their own."""
+"""Python scripts run in fresh processes, with a cache folder of their own or that of the tests."""
 
 import os
 import subprocess
 import sys
 from pathlib import Path
 
+REPOSITORY = Path(__file__).parents[2]
+#: Where tests keep code (tests/conftest.py).
+UNOPTIMISED = REPOSITORY / "build" / "unoptimised"
 
-def environment(cache=None, **variables):
-    """The environment of a child process, with its own cache of compiled code."""
+
+def environment(cache=UNOPTIMISED, **variables):
+    """The environment of a child process, with a cache of compiled code, for the same processor."""
     ours = ("DAP3D_", "COVERAGE_")
-    env = {k: v for k, v in os.environ.items() if not k.startswith(ours)}
-    if cache is not None:
-        env["DAP3D_CACHE_DIR"] = str(cache)
-    return env | {k: str(v) for k, v in variables.items()}
+    env = {k: v for k, v in os.environ.items() if not k.startswith(ours) or k == "DAP3D_CPU"}
+    return env | {"DAP3D_CACHE_DIR": str(cache)} | {k: str(v) for k, v in variables.items()}
 
 
-def start(script, cache=None, *, cwd=None, **variables):
+def start(script, cache=UNOPTIMISED, *, cwd=None, **variables):
     """Start a script and return the process."""
     return subprocess.Popen(
         [sys.executable, "-c", script],
@@ -27,12 +29,9 @@ def start(script, cache=None, *, cwd=None, **variables):
     )
 
 
-def run(script, cache=None, *, cwd=None, timeout=300, **variables):
+def run(script, cache=UNOPTIMISED, *, cwd=None, timeout=300, **variables):
     """Run a script to its end and return what it printed; its failure is the test's."""
     process = start(script, cache, cwd=cwd, **variables)
     out, err = process.communicate(timeout=timeout)
     assert process.returncode == 0, err
     return out.strip()
-
-
-REPOSITORY = Path(__file__).parents[2]

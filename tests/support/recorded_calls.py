@@ -14,26 +14,33 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.compiler.derivatives import differentiate
-from dap3d_core.kernels.compiler.trace import trace
-from dap3d_core.kernels.compiler.types import COMPLEX, DTYPES, NOTHING, Known, Table, Tuple
-from dap3d_core.kernels.compiler.units import Functions, address_of, type_of
 from dap3d_core.kernels.runtime import cache
-from dap3d_core.kernels.runtime.cache import Compiled
-from dap3d_core.kernels.runtime.function_lists import LOOP
 from dap3d_core.kernels.runtime.lanes import Differentiation
-from dap3d_core.kernels.runtime.loop_modules import array_members
 from dap3d_core.kernels.runtime.source_digest import COMPILED_LAYERS
 from support.at_all_levels import all_made_of, function_of, same_bits, targets
 from support.internals import (
+    COMPLEX,
+    DTYPES,
     FLOAT,
     INT,
+    LOOP,
+    NOTHING,
     Array,
     Arrays,
+    Compiled,
     CompileError,
     Entry,
+    Functions,
+    Known,
     Program,
     Signature,
+    Table,
+    Tuple,
+    address_of,
+    array_members,
     pointer,
+    trace,
+    type_of,
 )
 
 #: The calls of a function that are recorded in each scene, from 1: early ones and some later ones.

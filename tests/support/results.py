@@ -5,9 +5,8 @@ import numpy as np
 import dap3d_core as dap
 from dap3d_core.model import build_model
 from dap3d_core.result import ResultWriter, RunMetadata
-from dap3d_core.result.arrays import COLUMNS
 from dap3d_core.scene import check
-from support.internals import Evaluator, join, y_from_u
+from support.internals import COLUMNS, Evaluator, join, y_from_u
 
 CONTROLLED = dict(rtol=1e-8, atol=1e-10, step=None, project=True, correct=True, conservative=True)
 

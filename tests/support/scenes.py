@@ -3,9 +3,8 @@
 import numpy as np
 
 import dap3d_core as dap
-from dap3d_core.interface.fields import slot_of
 from dap3d_core.testing.samples.sampled_type import own_values
-from support.internals import specs_of
+from support.internals import slot_of, specs_of
 from support.rotations import rotation
 
 

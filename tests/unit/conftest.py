@@ -1,5 +1,5 @@
 """Shared by unit tests: distributions to install; fewer examples with kernels as plain Python.
-`make test` tries properties on all examples."""
+`make test` tries properties on all examples, and tests with all their parameters."""
 
 import sys
 import textwrap
@@ -11,6 +11,19 @@ from support.plain import jit_is_on
 if not jit_is_on():
     settings.register_profile("plain Python", max_examples=20)
     settings.load_profile("plain Python")
+
+
+def pytest_collection_modifyitems(config, items):
+    """Plain Python runs a test with its first parameters: each compiled function has the bits of
+    plain Python (kernels/compiler/test_core.py). To measure coverage it runs with all."""
+    if jit_is_on() or config.pluginmanager.hasplugin("_cov"):
+        return
+    first = {}
+    for item in items:
+        first.setdefault(item.nodeid.partition("[")[0], item)
+    kept = set(first.values())
+    config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+    items[:] = first.values()
 
 
 @pytest.fixture

@@ -99,25 +99,27 @@ def test_activation_follows_its_control(tmp_path):
 TENDON = """<mujoco><default><tendon stiffness="40"/></default><worldbody>
   <site name="hook" pos="0.2 0 2"/><body name="a" pos="0 0 1"><freejoint name="fly"/>
   <geom type="box" size="0.1 0.2 0.15" pos="0.05 0 0"/><site name="eye" pos="0.1 0.1 0.1"/></body>
-  <body name="b" pos="1 0 1"><joint name="b" axis="0 1 0"/><geom size="0.1" pos="0.3 0 0"/>
-  <site name="end" pos="0.4 0 0.1"/></body></worldbody><tendon>
+  <body name="b" pos="1 0 1"><joint name="b" axis="0 1 0"/>
+  <geom name="ball" size="0.1" pos="0.3 0 0"/><site name="end" pos="0.4 0 0.1"/></body></worldbody><tendon>
   <spatial damping="2"><site site="hook"/><site site="eye"/></spatial>
   <spatial stiffness="15" springlength="0.3"><site site="end"/><site site="eye"/></spatial>
-  <spatial name="bent" stiffness="1"><site site="hook"/><site site="end"/><site site="eye"/>
+  <spatial name="bent" stiffness="9" damping="3"><site site="hook"/><site site="end"/>
+  <site site="eye"/></spatial>
+  <spatial name="wrapped" stiffness="1"><site site="hook"/><geom geom="ball"/><site site="eye"/>
   </spatial></tendon></mujoco>"""
 
 
-def test_tendons_between_two_sites_are_springs_and_dampers(tmp_path):
-    """Of their class, at rest as the file draws them or at a length; those that bend are said."""
+def test_tendons_over_sites_are_springs_and_dampers(tmp_path):
+    """Of their class, at rest as the file draws them or at a length; those that wrap are said."""
     path, rng = tmp_path / "a.xml", np.random.default_rng(6)
     path.write_text(TENDON)
     oracle = Oracle(path)
-    oracle.model.tendon_stiffness[2] = 0.0
+    oracle.model.tendon_stiffness[3] = oracle.model.tendon_damping[3] = 0.0
     for _ in range(3):
         positions, rates = oracle.randomise(rng)
         scene, report = dap.import_model(path, positions=positions, rates=rates)
-        assert [one.text for one in report.left_out] == [
-            "forces and limits of spatial tendons but between two sites"
+        assert [one.text for one in report.left_out if one.motion] == [
+            "forces and limits of spatial tendons with geoms or pulleys, or two springlengths"
         ]
         result = dap.simulate(scene, t_end=0.0)
         for b, name in enumerate("ab", 1):
@@ -154,3 +156,23 @@ def test_a_tendon_at_its_limit_holds(tmp_path, engine):
     found = np.hstack([result.rd[-1] - result.rd[0], result.w[-1] - result.w[0]])[k] / 1e-6
     assert abs(expected[2]) > 1.0
     np.testing.assert_allclose(found, expected, rtol=0, atol=2e-5)
+
+
+FREE = """<mujoco><worldbody><body name="a"><joint name="fly" type="free" damping="0.7"
+  armature="0.3"/><geom type="box" size="0.1 0.2 0.15" pos="0.2 0.1 0"/></body></worldbody></mujoco>
+"""
+
+
+def test_damping_and_armature_of_a_free_joint(tmp_path):
+    """A damper against the motion of its frame; mass and inertia there, without weight."""
+    path, rng = tmp_path / "a.xml", np.random.default_rng(2)
+    path.write_text(FREE)
+    oracle = Oracle(path)
+    for _ in range(3):
+        positions, rates = oracle.randomise(rng)
+        scene, report = dap.import_model(path, positions=positions, rates=rates)
+        result = dap.simulate(scene, t_end=0.0)
+        found = np.concatenate([result.rdd[0, 0], result.wd[0, 0]])
+        expected = oracle.acceleration(1, result.r[0, 0])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
+        assert not report.left_out

@@ -72,6 +72,28 @@ def test_a_ball_bounces_to_rest_at_the_end_of_the_series(integrator):
     assert result.ledger["energy"].value < TOLERANCE
 
 
+@pytest.mark.parametrize(("e", "g", "radius"), [(0.5, 1.0, 3.0), (0.1, 0.05, 0.2)])
+def test_bounces_below_the_rounding_of_a_step_are_not_missed(e, g, radius):
+    """Steps of adams that an impact has cut grow from lengths in which no digit of the gap changes.
+
+    A ball that falls by h: its series ends at sqrt(2 h / g) (1 + e) / (1 - e), after impacts whose
+    work is e^2 of that before.
+    """
+    h, scene = 1e-3, dap.Scene(name="slow ball")
+    scene.add_body("ball", mass=1.0, Jp=[0.1] * 3, r=[0.0, 0.0, radius + h])
+    scene.add_force("weight", "gravity", gravity=g)
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=radius, e=e)
+    ends = np.sqrt(2.0 * h / g) * (1.0 + e) / (1.0 - e)
+    result = dap.simulate(scene, t_end=2.0 * ends, dt=ends, integrator="adams")
+    (rest,) = (event for event in result.events if event.kind == "rest")
+    assert rest.t == pytest.approx(ends, abs=1e-7)
+    work = np.array([event.work for event in result.events if event.kind == "impact"])
+    work = work[work < -1e-10]  # where m g times the rounding of the radius, 4e-16 J, is little
+    assert len(work) > 2
+    assert work[1:] / work[:-1] == pytest.approx(e**2, rel=1e-4)
+    assert result.r[-1, 0, 2] == pytest.approx(radius, abs=1e-12)
+
+
 @pytest.mark.parametrize("integrator", INTEGRATORS)
 def test_a_ball_slides_then_rolls_with_five_sevenths_of_its_speed(integrator):
     v, mu = 3.0, 0.3

@@ -78,6 +78,7 @@ def centre(x, k, radius):
     return x - radius * 2.0 * k * x / size, k * x * x + radius / size
 
 
+@pytest.mark.slow
 def test_a_ball_rolls_through_a_bowl():
     """Let go at rest it is at the bottom after the integral of its path over its speed.
 
@@ -192,6 +193,7 @@ def cam(function, rate, start, radius=0.0, **fields):
     return scene
 
 
+@pytest.mark.slow
 def test_a_follower_lifts_off_its_cam():
     """y = c + h sin(w t) while it is carried: it lifts where h w^2 sin(w t) = g, and falls back."""
     c, h, w = 0.3, 0.05, 16.0
@@ -210,6 +212,7 @@ def test_a_follower_lifts_off_its_cam():
     assert not any(e.kind == "lift" for e in run(slow, 0.5).events)
 
 
+@pytest.mark.slow
 def test_a_roller_follows_an_eccentric():
     """The centres are a + R apart: y = e sin(w t) + sqrt((a + R)^2 - (e cos(w t))^2)."""
     a, e, w, radius = 0.2, 0.05, 3.0, 0.06

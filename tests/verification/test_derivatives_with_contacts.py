@@ -10,6 +10,7 @@ import dap3d_core as dap
 TOLERANCE = 1e-8
 
 
+@pytest.mark.slow
 def test_slide_distance_by_friction_and_speed():
     """A point mass stops at v^2 / (2 mu g), at the time v / (mu g)."""
     v, mu = 3.0, 0.3
@@ -38,6 +39,7 @@ def test_flight_and_bounce_by_restitution_and_height():
     assert found.final("ball.r.z") == pytest.approx([v1 * left, by_height], rel=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_a_ball_that_slides_then_rolls_by_friction():
     """It rolls from 2 v / (7 mu g) on: x' = v t1' - ..., by hand."""
     v, mu, t_end = 3.0, 0.3, 2.0
@@ -49,6 +51,7 @@ def test_a_ball_that_slides_then_rolls_by_friction():
     assert found.final("ball.rd.x") == pytest.approx([0.0], abs=TOLERANCE)
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_differences_where_a_ball_bounces_with_friction():
     """Impacts within their cones, whose impulses are found by iteration."""
     scene = ball(height=0.5, v=2.0, e=0.5, mu=0.1)

@@ -297,12 +297,7 @@ def tool_velocity(t):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("integrator", "settings"),
-    [
-        ("dop853", {}),
-        ("radau", {}),
-        ("rk4", {"step": 2e-4}),
-    ],
+    ("integrator", "settings"), [("dop853", {}), ("radau", {}), ("rk4", {"step": 2e-4})]
 )
 def test_an_arm_whose_tool_vibrates_at_500_hz(integrator, settings):
     """All changes of sign are found: of a velocity of the tool, and of a clock, at long steps too.

@@ -8,7 +8,7 @@ from support.own_types import registry_of
 import dap3d_core as dap
 from dap3d_core.interface import Contact, PluginError, Point, Vector, examine, number, point, vector
 from dap3d_core.kernels import dot, exp, sub, where
-from dap3d_core.testing.kit import checks_for
+from dap3d_core.testing import checks_for
 
 G, MASS = 9.81, 2.0
 TIGHT = {"rtol": 1e-12, "atol": 1e-14}
@@ -211,9 +211,15 @@ def test_an_impact_with_friction_in_an_ellipse():
     assert result.events[0].work == pytest.approx(work, abs=1e-12)
 
 
-def test_time_stepping_refuses_the_laws():
-    with pytest.raises(dap.SceneError, match=r"contacts\.floor.*law of friction of its type"):
-        run(block("test-runner", **ELLIPSE), 0.5, contact="stepping", contact_step=1e-3)
+@pytest.mark.parametrize(("keyword", "law"), [("test-runner", ELLIPSE), ("test-stribeck", LAW)])
+def test_steps_extrapolate_to_events(keyword, law):
+    """Slip that turns, or slows: errors of order h, whose limit by h, h/2, h/4 is 1e-6 away."""
+    scene = block(keyword, (1.5, 2.0, 0.0), **law)
+    steps = [{}] + [{"contact": "stepping", "contact_step": h, "rtol": 1e-6}
+                    for h in (2e-3, 1e-3, 5e-4)]  # fmt: skip
+    exact, first, second, third = (run(scene, 0.3, **settings).u[-1] for settings in steps)
+    assert 0.0 < np.abs(first - exact).max() < 2e-3
+    assert np.abs((8.0 * third - 6.0 * second + first) / 3.0 - exact).max() < 1e-6
 
 
 def test_a_law_that_jumps_or_drives_is_found():

@@ -10,11 +10,10 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support import mechanisms, redundant
-from support.internals import store_reference_pivots
+from support.internals import near_singular_rows, store_reference_pivots
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.formulations.pivots import near_singular_rows
 
 sys.path.append(str(REPOSITORY / "benchmarks"))
 

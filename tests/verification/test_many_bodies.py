@@ -151,6 +151,7 @@ def test_its_formulas_are_right(scene):
         assert report.ok, report
 
 
+@pytest.mark.slow
 def test_reactions_name_every_body(scene):
     """Internal forces: those on the five bodies cancel."""
     result = dap.simulate(scene, t_end=0.1, dt=0.1, allow_code=True)

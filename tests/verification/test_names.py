@@ -8,10 +8,10 @@ import unicodedata
 
 import numpy as np
 import pytest
+from support.internals import ExpressionError, parse_expression
 
 import dap3d_core as dap
 from dap3d_core.cli import main
-from dap3d_core.scene.expressions.expression import ExpressionError, parse_expression
 
 #: Different characters that the form NFKC makes one.
 ALIKE = {

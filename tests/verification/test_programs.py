@@ -15,10 +15,7 @@ from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.formulations.programs import change_over, scene_program
 from dap3d_core.kernels.compiler import objects
 
-pytestmark = [
-    pytest.mark.slow,
-    pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled"),
-]
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")]
 #: Scenes with contacts have other loops of steps.
 MODELS = sorted(
     [

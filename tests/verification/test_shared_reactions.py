@@ -156,6 +156,7 @@ def spread(result):
     return [float(x) for x in re.findall(r"took (\S+) J.*between (\S+) and (\S+) J", note)[0]]
 
 
+@pytest.mark.slow
 def test_the_note_has_the_spread_of_the_outcome():
     """It holds what the same motion would lose by two shares that numpy finds.
     Hinges that keep the axes parallel stiffly carry little by forces, soft ones all of it."""

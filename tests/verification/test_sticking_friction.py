@@ -132,10 +132,3 @@ def test_what_sticks_holds_no_less_than_what_slides():
     scene.add_force("rot_friction", "rub", joint="axle", n_c=0.4, n_s=0.3)
     with pytest.raises(dap.SceneError, match=r"forces\.rub: n_s = 0\.3 is less than n_c = 0\.4"):
         dap.simulate(scene, t_end=0.1)
-
-
-def test_steps_of_contacts_refuse_friction_that_sticks():
-    scene = hinge()
-    scene.add_force("rot_friction", "rub", joint="axle", n_c=0.4)
-    with pytest.raises(dap.SceneError, match=r"forces\.rub: sticks.*\s+give it a w_tol"):
-        dap.simulate(scene, t_end=0.1, contact="stepping")

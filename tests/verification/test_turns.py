@@ -31,6 +31,7 @@ def check(result, tolerance=1e-4):
     np.testing.assert_allclose(spring.on["i"].moment[:, 2], -STIFFNESS * wound, atol=tolerance)
 
 
+@pytest.mark.slow
 def test_a_spring_between_two_reports_winds_up(tmp_path):
     """Also from a file, and from the arrays that a data set has."""
     result = dap.simulate(winding())

@@ -7,17 +7,11 @@ import netCDF4
 import numpy as np
 import pytest
 from support.command_line import output_of
+from support.internals import OPERATORS, WORDS
 
 import dap3d_core as dap
 from dap3d_core.scene import parse
-from dap3d_core.scene.expressions.expression import OPERATORS, WORDS
-from dap3d_core.scene.expressions.units import (
-    COMPARISONS,
-    PURE,
-    text_of,
-    unit_of,
-    unit_of_call,
-)
+from dap3d_core.scene.expressions.units import COMPARISONS, PURE, text_of, unit_of, unit_of_call
 
 ANGLES = ("asin", "acos", "atan", "atan2")
 

@@ -147,7 +147,7 @@ def _settled_tendon(reader: MjcfReader, tendon: XmlElement) -> XmlElement:
 
 
 def read_tendons(reader: MjcfReader) -> None:
-    """Read spatial tendons between two sites; others that act are left out, remarked.
+    """Read spatial tendons over sites; others that act are left out, remarked.
 
     Raises:
         FormatError: one names a site that is not there.
@@ -161,16 +161,19 @@ def read_tendons(reader: MjcfReader) -> None:
         if not (stiffness or damping or (low, high) != UNBOUNDED):
             continue
         rest = tendon.numbers("springlength", None, (-1.0,))
-        if [part.name for part in tendon] != ["site", "site"] or len(set(rest)) > 1:
-            text = "forces and limits of spatial tendons but between two sites"
+        if {part.name for part in tendon} != {"site"} or len(set(rest)) > 1:
+            text = (
+                "forces and limits of spatial tendons with geoms or pulleys, or two springlengths"
+            )
             reader.document.source.remarks.leave_out(tendon.place, text, motion=True)
             continue
-        (one, at), (other, there) = (reader.site(site, "site") for site in tendon)
-        apart = (_pose(reader, one) @ at).r - (_pose(reader, other) @ there).r
-        length = float(np.linalg.norm(apart)) if rest[0] < 0.0 else rest[0]
+        sites = [reader.site(site, "site") for site in tendon]
+        places = np.array([(_pose(reader, link) @ at).r for link, at in sites])
+        drawn = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
         reader.model.tendons.append(Tendon(
-            tendon.get("name") or f"tendon{k}", ((one, at.r), (other, there.r)), stiffness,
-            damping, length, Limits(low, high), tendon.place,
+            tendon.get("name") or f"tendon{k}", tuple((link, at.r) for link, at in sites),
+            stiffness, damping, drawn if rest[0] < 0.0 else rest[0], Limits(low, high),
+            tendon.place,
         ))  # fmt: skip
 
 

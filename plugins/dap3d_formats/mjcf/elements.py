@@ -89,7 +89,7 @@ MJCF: Table = {
     "inertial": taken() | _FRAME | taken("mass diaginertia fullinertia"),
     "joint": taken()
     | taken("name class type pos axis range limited ref springref stiffness damping armature")
-    | translated("frictionloss", "it sticks; with contacts it fades at low rates")
+    | translated("frictionloss", "it sticks; with method joint it fades at low rates")
     | translated("springdamper", "stiffness and damping, by the mass matrix where the model starts")
     | moves("springyield", "springs do not yield")
     | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
@@ -135,14 +135,15 @@ MJCF: Table = {
         "solreflimit solimplimit solreffriction solimpfriction", "of tendons",
     ) | taken("class limited range stiffness damping springlength group width material rgba user"),
     "fixed": translated("", "where an equality or an actuator takes it") | taken("name class")
+    | noted("group width material rgba user", _DRAWING)
     | moves(
-        "group limited actuatorfrclimited range actuatorfrcrange solreflimit solimplimit "
-        "solreffriction solimpfriction frictionloss margin springlength width material rgba "
-        "stiffness damping armature user springyield",
+        "limited actuatorfrclimited range actuatorfrcrange solreflimit solimplimit "
+        "solreffriction solimpfriction frictionloss margin springlength stiffness damping "
+        "armature springyield",
         "forces and limits of tendons",
     ),
     "fixed/joint": taken() | taken("joint coef"),
-    "spatial": translated("", "between two sites a spring, a damper and rigid stops")
+    "spatial": translated("", "over sites a spring and a damper, between two also rigid stops")
     | taken("name class limited range stiffness damping springlength")
     | noted("group width material rgba user", _DRAWING)
     | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
@@ -175,5 +176,6 @@ CONTACTS: Table = {
     | moves("solmix solref solimp margin gap", "contacts are rigid"),
     "contact": taken(),
     "exclude": taken() | taken("name body1 body2"),
-    "pair": moves("", "pairs of geoms of their own"),
+    "pair": taken() | taken("name class geom1 geom2 condim friction")
+    | moves("solref solimp solreffriction margin gap", "contacts are rigid"),
 }  # fmt: skip

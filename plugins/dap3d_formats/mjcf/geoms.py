@@ -38,16 +38,19 @@ class Geoms:
         document: the document.
         assets: meshes by name.
         colors: materials by name.
+        paired: names of the geoms of pairs, which meet also without bits.
     """
 
     document: Document
     assets: dict[str, XmlElement] = attrs.Factory(dict)
     colors: dict[str, str] = attrs.Factory(dict)
+    paired: set[str] = attrs.Factory(set)
 
     @classmethod
     def of(cls, document: Document) -> "Geoms":
         """The reader, with the assets of the document."""
-        geoms = cls(document)
+        pairs = [pair for one in document.root.all("contact") for pair in one.all("pair")]
+        geoms = cls(document, paired={p.get(k) or "" for p in pairs for k in ("geom1", "geom2")})
         for asset in document.root.all("asset"):
             for mesh in asset.all("mesh"):
                 name = mesh.get("name") or Path(mesh.get("file") or "").stem
@@ -70,7 +73,7 @@ class Geoms:
         color = color or self.colors.get(geom.get("material") or "", "")
         hidden = geom.number("group", 0.0) >= HIDDEN
         common: dict[str, Any] = {"color": color, "collision": hidden, "place": geom.place}
-        common["contact"] = self._contact(geom)
+        common |= {"contact": self._contact(geom), "name": geom.get("name") or ""}
         if kind == "mesh":
             return self._mesh_shape(geom, frame, common)
         if kind == "plane" and common["contact"] is not None:
@@ -86,13 +89,15 @@ class Geoms:
     def _contact(self, geom: XmlElement) -> Contact | None:
         """How a geom meets others; None where contacts are not asked for, or it meets none."""
         bits = [int(geom.number(name, 1.0)) % 2**32 for name in ("contype", "conaffinity")]
-        if not self.document.source.contacts or not any(bits):
+        name = geom.get("name") or ""
+        surface = name if name in self.paired else ""
+        if not self.document.source.contacts or not (any(bits) or surface):
             return None
         if self.document.disables("contact", "constraint"):
             return None
         friction = geom.numbers("friction", None, (1.0,))
         smooth, priority = geom.number("condim", 3.0) < 3.0, int(geom.number("priority", 0.0))
-        return Contact(friction[0], smooth, bits[0], bits[1], priority)
+        return Contact(friction[0], smooth, bits[0], bits[1], priority, surface=surface)
 
     def _mesh_shape(self, geom: XmlElement, frame: Frame, common: Any) -> Geometry | None:
         asset = self._asset(geom)
@@ -104,8 +109,15 @@ class Geoms:
         path = self.document.source.locate(self._file(asset), asset.place)
         if path is None:
             return None
-        pose = frame @ self.document.frame(geom) @ _reference(asset).inverse()
-        scale = asset.numbers("scale", 3, (1.0, 1.0, 1.0))
+        inner, scale = _reference(asset).inverse(), asset.numbers("scale", 3, (1.0, 1.0, 1.0))
+        if len(set(scale)) > 1 and not np.array_equal(inner.A, np.eye(3)):
+            meets = common["contact"] is not None
+            text = "refquat of <mesh> with a scale of unlike factors: not drawn"
+            text += " and meets no others" if meets else ""
+            self.document.source.remarks.leave_out(geom.place, text, motion=meets)
+            return None
+        inner = Frame(np.array(scale) * inner.r, inner.A)
+        pose = frame @ self.document.frame(geom) @ inner
         return Geometry("mesh", mesh=path, scale=scale, pose=pose, **common)
 
     def inertial(self, geom: XmlElement, frame: Frame) -> Inertial | None:
@@ -192,9 +204,9 @@ class Geoms:
             what = f"the inertia of mesh {asset.get('name')} is not computed here"
             raise FormatError(what, geom.place, "give its body an <inertial>")
         vertices, triangles = self._read(asset) if "file" in given else _inline(asset)
-        vertices = vertices * np.array(asset.numbers("scale", 3, (1.0, 1.0, 1.0)))
         reference = _reference(asset).inverse()
         vertices = vertices @ reference.A.T + reference.r
+        vertices = vertices * np.array(asset.numbers("scale", 3, (1.0, 1.0, 1.0)))
         try:
             return inertia_of_mesh(vertices, triangles, all_positive=rule == "legacy")
         except ValueError as error:
@@ -249,7 +261,7 @@ def _hull(vertices: Any, asset: XmlElement) -> Any:
 
 
 def _reference(asset: XmlElement) -> Frame:
-    """The frame of a mesh in its file."""
+    """The frame of a mesh in its file, before it is scaled."""
     q = asset.numbers("refquat", 4, (1.0, 0.0, 0.0, 0.0))
     return Frame(asset.numbers("refpos", 3, (0.0, 0.0, 0.0)), from_quaternion(q))
 

@@ -14,6 +14,7 @@ class MjcfImporter(Importer):
         from dap3d_formats.element_table import note_elements
         from dap3d_formats.mjcf.actuators import read_actuators
         from dap3d_formats.mjcf.constraints import read_equalities, read_tendons
+        from dap3d_formats.mjcf.contacts import read_contacts
         from dap3d_formats.mjcf.document import Document
         from dap3d_formats.mjcf.elements import CONTACTS, MJCF
         from dap3d_formats.mjcf.keyframes import Keyframe
@@ -26,8 +27,10 @@ class MjcfImporter(Importer):
         expand_replicas(document)
         reader = MjcfReader(document)
         reader.read_bodies()
+        read_contacts(reader)
         keyframe = Keyframe.of(document, reader.model)
         reader.scale_masses()
+        reader.add_armatures()
         inertia = reader.inertia()
         reader.scale_springs(inertia)
         read_tendons(reader)

@@ -20,6 +20,7 @@ from dap3d_core.interface.formats import (
     Limits,
     Link,
     XmlElement,
+    balanced_inertia,
     quaternion,
     total_inertia,
 )
@@ -45,6 +46,7 @@ class MjcfReader:
         springdampers: joint -> time constant and damping ratio that give its spring and damper.
         force_ranges: joint -> bounds of the force of its actuators.
         mocap: names of bodies that a user would move.
+        ground: the link of the geoms of the world.
     """
 
     document: Document
@@ -56,6 +58,7 @@ class MjcfReader:
     springdampers: dict[str, tuple[float, ...]] = attrs.Factory(dict)
     force_ranges: dict[str, tuple[float, float]] = attrs.Factory(dict)
     mocap: list[str] = attrs.Factory(list)
+    ground: str = ""
 
     def __attrs_post_init__(self) -> None:
         root = self.document.root
@@ -80,18 +83,8 @@ class MjcfReader:
             self._contents(world, WORLD, Frame(), "main")
         if not model.links:
             raise FormatError("holds no <body>", document.root.place)
-        ground = ""
         for world in document.root.all("worldbody"):
-            ground = self._world_shapes(world)
-        for contact in document.root.all("contact"):
-            for pair in contact.all("exclude"):
-                ends = pair.require("body1"), pair.require("body2")
-                for name in ends:
-                    if name not in (*model.links, WORLD) and document.source.contacts:
-                        raise FormatError(f"there is no body {name}", pair.place)
-                if ground in model.links or WORLD not in ends:
-                    one, other = (ground if name == WORLD else name for name in ends)
-                    model.excluded.append((one, other))
+            self.ground = self._world_shapes(world)
 
     def _world_shapes(self, world: XmlElement) -> str:
         """The geoms of the world, as a link that is fixed to it; its name."""
@@ -206,8 +199,8 @@ class MjcfReader:
         if moment > moments[0]:
             moments = np.maximum(moments, moment)
             J = axes @ np.diag(moments) @ axes.T
-        if self.document.flag("balanceinertia", False) and moments[0] + moments[1] < moments[2]:
-            J = float(np.mean(moments)) * np.eye(3)
+        if self.document.flag("balanceinertia", False):
+            J = balanced_inertia(J)
         return Inertial(max(inertial.mass, mass), inertial.com, J)
 
     def _join(
@@ -298,6 +291,8 @@ class MjcfReader:
             raise FormatError("both numbers of springdamper are above 0", element.place)
         keys = ("actuatorfrcrange", "actuatorfrclimited")
         self.force_ranges[joint.name] = self.document.bounds(element, *keys)
+        if joint.kind == "free":  # has no limits, whatever its class says
+            return
         low, high = self.document.bounds(element, "range", "limited")
         if (low, high) != UNBOUNDED and not self.document.disables("limit", "constraint"):
             limited = element.get("limited", "auto")
@@ -308,6 +303,22 @@ class MjcfReader:
                                                joint.name, element.place),)  # fmt: skip
         if not any((joint.damping[0], joint.stiffness[0])):
             joint.limits = joint.limits or (Limits(-inf, inf),)
+
+    def add_armatures(self) -> None:
+        """Put the armature of free joints into links of their own.
+
+        It is mass and inertia at the frame of a body, without weight.
+        """
+        free = [joint for joint in self.model.joints.values() if joint.kind == "free"]
+        for joint in (one for one in free if one.armature[0]):
+            size, joint.armature = joint.armature[0], (0.0,)
+            name = self._free_link(f"{joint.child}_armature")
+            own = Inertial(size, inertia=size * np.eye(3))
+            self.model.links[name] = Link(name, own, place=joint.place, gravcomp=1.0)
+            fixed = self._free(f"{name}_fixed")
+            self.model.joints[fixed] = Joint(fixed, "fixed", joint.child, name, place=joint.place)
+            text = "armature of a free joint is mass and inertia of its body, without weight"
+            self.document.source.remarks.translate(joint.place, text)
 
     def inertia(self) -> JointInertia:
         """Inertias of the joints at zero coordinates, by which the compiler scales springs."""

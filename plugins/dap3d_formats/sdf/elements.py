@@ -64,7 +64,7 @@ SDF: Table = {
     "dissipation": moves("", "stops are critically damped"),
     "dynamics": taken(), "damping": taken(), "spring_reference": taken(),
     "spring_stiffness": taken(),
-    "friction": translated("", "it sticks; with contacts it fades at low rates"),
+    "friction": translated("", "it sticks; with method joint it fades at low rates"),
     "mimic": translated("", "a joint follow of the same rates, and the start by ratio and offset")
     | taken("joint axis"),
     "multiplier": taken(), "offset": taken(), "reference": taken(),

@@ -27,6 +27,8 @@ from dap3d_formats.sdf.frames import FrameGraph
 
 #: Speed below which nothing bounces from which on nothing ever does, m/s: the default is 1e5.
 FAST = 1e3
+#: What a link may hold.
+CONTENTS = ("inertial", "visual", "collision")
 
 
 class SdfReader:
@@ -157,6 +159,10 @@ class SdfReader:
         name = scoped(scope, element.require("name"))
         if name in self.model.links:
             raise FormatError(f"there are two links {name}", element.place)
+        if name == WORLD and not any(element.all(tag) for tag in CONTENTS):
+            text = "an empty link named world is the world itself"
+            self.remarks.translate(element.place, text, motion=True)
+            return
         pose, relative = self.pose(element)
         self.frames.add(name, scoped(scope, relative or "__model__"), pose, element.place)
         link = Link(name, place=element.place)

@@ -32,7 +32,7 @@ URDF: Table = {
     "child": taken() | taken("link"),
     "axis": taken() | taken("xyz"),
     "dynamics": taken() | taken("damping")
-    | translated("friction", "it sticks; with contacts it fades at low rates"),
+    | translated("friction", "it sticks; with method joint it fades at low rates"),
     "limit": translated("", "stops, with --limits soft, hard or off") | taken("lower upper")
     | noted("effort velocity", "limits of forces and speeds are those of a controller"),
     "mimic": translated("", "a joint follow of the same rates, and the start by ratio and offset")

@@ -17,6 +17,7 @@ from dap3d_core.interface.formats import (
     Link,
     Source,
     XmlElement,
+    balanced_inertia,
     rpy,
 )
 from dap3d_formats.axes import across, unit
@@ -37,6 +38,8 @@ class UrdfReader:
         self.source, self.root, self.remarks = source, root, source.remarks
         self.model = Articulation(root.get("name") or source.path.stem, place=root.place)
         self.colors: dict[str, str] = {}
+        compilers = [one for holder in root.all("mujoco") for one in holder.all("compiler")]
+        self.balances = any(one.get("balanceinertia") == "true" for one in compilers)
 
     def read(self) -> Articulation:
         note_elements(self.root, URDF, self.remarks)
@@ -93,6 +96,8 @@ class UrdfReader:
         )
         frame = self._origin(element)
         matrix = frame.A @ [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]] @ frame.A.T
+        if self.balances:
+            matrix = balanced_inertia(matrix)
         return Inertial(mass.number("value"), frame.r, matrix)
 
     def _origin(self, element: XmlElement) -> Frame:

@@ -11,7 +11,7 @@ import attrs
 
 from dap3d_core.scene import MISSING, Mistake, SceneError
 from dap3d_core.scene.errors import file_error
-from dap3d_core.scene.files.text_file import read_text, unreadable
+from dap3d_core.scene.files.read_toml import read_text, unreadable
 
 if TYPE_CHECKING:
     from tree_sitter import Node

@@ -8,13 +8,13 @@ from typing import Any, ClassVar
 
 import attrs
 
-from dap3d_core.assembly.tree_arrays import TreeArrays
 from dap3d_core.kernels.array_types import Floats as Floats
 from dap3d_core.kernels.array_types import Integers as Integers
 from dap3d_core.kernels.compiler.types import Table
-from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX
-from dap3d_core.kernels.runtime.cache import table_of
+from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays
+from dap3d_core.kernels.runtime.cache import compiled_into, table_of
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, step_signature
+from dap3d_core.model.state_layout import COORDINATES, STATE, VELOCITIES
 
 #: The order of the group loops in the list: all loops of one kind stand together.
 KINDS = (
@@ -39,6 +39,62 @@ ENDS, BEGINS, UNSEEN, JUMPS = 1, 0, -1, 2
     TOLERANCE_C, TOLERANCE_V, SCRATCH, UNSETTLED, ALPHA, OMEGA, MU, SINGULAR, LENGTH, EVEN,
     DOUBTFUL, JAMS, SETTINGS
 ) = range(13)  # fmt: skip
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class KeptRowArrays(Arrays):
+    """Arrays of rows that are kept on a tree; columns as in formulations/joint_loops/layout.py.
+
+    A kept row is a load on the bodies of its joint, which is carried to ground node by node; m rows
+    are kept.
+    """
+
+    types: ClassVar[dict[str, Any]] = {
+        "call_counts": INTEGERS,
+        **dict.fromkeys(("calls", "cuts", "ends", "ways", "pairs", "profile"), INTEGER_MATRIX),
+    }
+
+    calls: Integers  # (calls, 4) loop, i0, p0, count: of accelerations, then of positions
+    call_counts: Integers  # (2,) calls of each of the two
+    cuts: Integers  # (joints, CUT_WIDTH)
+    ends: Integers  # (ends, END_WIDTH) bodies of the joints
+    ways: Integers  # (steps, STEP_WIDTH) nodes that a joint's loads pass, children before parents
+    pairs: Integers  # (pairs, PAIR_WIDTH) joints whose loads meet at a node
+    profile: Integers  # (m, 2) first row that a row couples with; place of the row in ``matrix``
+    D: Floats  # as ``System.D``, along global axes; of the kept rows alone
+    loads: Floats  # what loads do along the freedoms of the nodes that they pass
+    carried: Floats  # (6 rows steps,) scratch: loads of one joint on their way
+    matrix: Floats  # G M^-1 G^T of the kept rows, lower triangle within its profile; its factors
+    compliance: Floats  # (m,) E, which regularises rows that may depend on each other
+    right: Floats  # (m,) right-hand side
+    solution: Floats  # (m,) scratch
+    multipliers: Floats  # (m,) lambda
+    smallest: Floats  # (m,) a pivot not above this is near a singular pose
+    settings: (
+        Floats  # (1,) part of a row's square that is its compliance; 0.0: rows are independent
+    )
+
+
+@attrs.frozen(eq=False, kw_only=True, slots=False)
+class TreeArrays(Arrays):
+    """Arrays of a tree; their columns are those of formulations/joint/node_layout.py."""
+
+    types: ClassVar[dict[str, Any]] = {
+        **dict.fromkeys(("nodes", "joints"), INTEGER_MATRIX),
+        **dict.fromkeys(("places", "half_angles"), MATRIX),
+        "kept": KeptRowArrays.type_of(),
+    }
+
+    nodes: Integers  # (nodes, TREE_WIDTH), ground first
+    joints: Integers  # (joints, JOINT_WIDTH), children before parents
+    places: Floats  # (n+1+massless, BODY_WIDTH): ``System.body``, then massless nodes
+    constants: Floats  # (nodes * CONSTANT_WIDTH,)
+    work: Floats  # (nodes * WORK_WIDTH,)
+    half_angles: Floats  # (2, revolutes) sine and cosine of q/2
+    scratch: Floats  # (48,) of one joint
+    force: Floats  # (6 (n+1),) applied forces with friction
+    slope: Floats  # (state,) rates that nobody reads
+    kept: Any = None  # KeptRowArrays, where rows are kept on the tree
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)
@@ -114,3 +170,21 @@ STEPS = Table(STEP)
 def step_functions(*functions: Any) -> Any:
     """A formulation's functions (t, y, out, system, loops) as an integrator takes them."""
     return table_of(STEP, functions)
+
+
+@compiled_into
+def coordinate_offset(b: int) -> int:
+    """Index of the first coordinate of body b."""
+    return COORDINATES * (b - 1)
+
+
+@compiled_into
+def velocity_offset(b: int, n: int) -> int:
+    """Index of the first velocity of body b of n."""
+    return COORDINATES * n + VELOCITIES * (b - 1)
+
+
+@compiled_into
+def states_offset(n: int) -> int:
+    """Index of the first state of an element, in coordinates of n bodies; the work is last."""
+    return STATE * n

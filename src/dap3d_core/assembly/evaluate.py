@@ -7,10 +7,22 @@ end: the states of elements that have some (docs/decisions/0054), and the work d
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import RATE, VALUE, WRENCH, Floats, System
-from dap3d_core.assembly.metric import gyroscopic_moment, scaled, scaled_moment, unscaled
-from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
-from dap3d_core.assembly.orientation import orient_by_state
+from dap3d_core.assembly.arrays import (
+    RATE,
+    VALUE,
+    WRENCH,
+    Floats,
+    System,
+    coordinate_offset,
+    velocity_offset,
+)
+from dap3d_core.assembly.metric import (
+    gyroscopic_moment,
+    orient_by_state,
+    scaled,
+    scaled_moment,
+    unscaled,
+)
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import where

@@ -4,8 +4,13 @@ s is the body's row of ``System.body``, k its row of ``System.metric``; U = L^-T
 upper triangular, A the rotation matrix. All functions are put into their callers.
 """
 
+from typing import Any
+
+import numpy as np
+
 from dap3d_core.assembly.arrays import Floats
 from dap3d_core.kernels.runtime.cache import compiled_into
+from dap3d_core.kernels.runtime.loop_support import A, P
 
 #: Columns of the metric, and those that hold constants of a body: 1/sqrt(m), then U by rows.
 METRIC_WIDTH, METRIC_CONSTANTS = 19, 7
@@ -53,3 +58,33 @@ def scaled(k: Floats, x: float, y: float, z: float) -> tuple[float, float, float
 def scaled_moment(k: Floats, x: float, y: float, z: float) -> tuple[float, float, float]:
     """U^T (x, y, z): scaled moment from the one in body axes."""
     return k[1] * x, k[2] * x + k[4] * y, k[3] * x + k[5] * y + k[6] * z
+
+
+@compiled_into
+def orient_by_state(b: Floats, o: int, e: Any) -> None:
+    """The same of the state, of any length; A waits for no square root."""
+    square = square_of(e)
+    put_rotation(b, o + A, e, 2.0 / square)
+    h = 1.0 / np.sqrt(square)
+    b[o + P], b[o + P + 1], b[o + P + 2], b[o + P + 3] = e[0] * h, e[1] * h, e[2] * h, e[3] * h
+
+
+@compiled_into
+def square_of(e: Any) -> float:
+    """E . e of four numbers."""
+    return (e[0] * e[0] + e[1] * e[1]) + (e[2] * e[2] + e[3] * e[3])
+
+
+@compiled_into
+def put_rotation(b: Floats, k: int, e: Any, h: float) -> None:
+    """Store the rotation matrix of Euler parameters at k; h: 2/(e . e)."""
+    e0, e1, e2, e3 = e
+    b[k] = 1.0 - h * (e2 * e2 + e3 * e3)
+    b[k + 1] = h * (e1 * e2 - e0 * e3)
+    b[k + 2] = h * (e1 * e3 + e0 * e2)
+    b[k + 3] = h * (e1 * e2 + e0 * e3)
+    b[k + 4] = 1.0 - h * (e1 * e1 + e3 * e3)
+    b[k + 5] = h * (e2 * e3 - e0 * e1)
+    b[k + 6] = h * (e1 * e3 - e0 * e2)
+    b[k + 7] = h * (e2 * e3 + e0 * e1)
+    b[k + 8] = 1.0 - h * (e1 * e1 + e2 * e2)

@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import LENGTH, Floats, System
+from dap3d_core.assembly.arrays import LENGTH, Floats, System, coordinate_offset, velocity_offset
 from dap3d_core.assembly.metric import unscaled
-from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.cache import compiled
 from dap3d_core.kernels.scalar_math import where
 

@@ -13,9 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.arrays import Floats, System, coordinate_offset, velocity_offset
 from dap3d_core.assembly.metric import in_body_axes
-from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import TURN, P, R, V, W
 from dap3d_core.kernels.scalar_math import atan2

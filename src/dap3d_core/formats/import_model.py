@@ -100,7 +100,7 @@ def import_model(
         root: the folder that files which the model names must lie in; by default that of the file.
         free_base: links without a joint to a parent are free, where the format leaves it open.
         keep_fixed: fixed joints between moving links stay joints.
-        balance_inertia: principal moments that no body has are replaced by their mean.
+        balance_inertia: their mean replaces principal moments that no body has, not the nearest.
         limits: of joints: "soft", critically damped springs; "hard", where a rate ends; "off".
         contacts: shapes that meet others in the file do, by time stepping; else none does.
         shapes: links have their shapes; without, files of meshes are not looked for.

@@ -10,7 +10,7 @@ import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
 from dap3d_core.assembly.evaluate import place_bodies
-from dap3d_core.formulations import ACCEPTED, FUNCTIONS, REPORT, RHS, WATCH
+from dap3d_core.formulations import ACCEPTED, FUNCTIONS, WATCH
 from dap3d_core.kernels.runtime.cache import prepared
 from dap3d_core.model.rotations import euler_rates, to_body, to_global
 from dap3d_core.model.state_layout import COORDINATES, VELOCITIES, split
@@ -113,11 +113,8 @@ class Coordinates(ABC):
 
     def report(self, t: float, u: Floats) -> Floats:
         """What the function ``report`` gives at a state u (13 n,)."""
-        evaluator = self.evaluator
-        out = np.zeros(evaluator.report_size)
         with self.at(u) as y:
-            evaluator.functions[REPORT](t, y, out, evaluator.system, evaluator.loops)
-        return out
+            return self.evaluator.reported(t, y)
 
     def inertia_places(self, bodies: Integers) -> Integers:
         """Indices in numbers of its own of what masses and inertias of bodies, from 1, make."""
@@ -220,9 +217,7 @@ class BodyCoordinates(Coordinates):
         """As of ``Coordinates``."""
         evaluator = self.evaluator
         y = evaluator.integrated(u)
-        out = np.zeros_like(y)
-        evaluator.functions[RHS](t, y, out, evaluator.system, evaluator.loops)
-        u_dot: Floats = evaluator.bodies_of(out)
+        u_dot: Floats = evaluator.bodies_of(evaluator.slope(t, y))
         w_dot = split(u_dot)[3]
         p = split(evaluator.bodies_of(y))[1]
         w_dot[:] = to_global(p, w_dot)  # omega_dot = A omega'_dot, no extra term

@@ -48,7 +48,7 @@ from dap3d_core.formulations.constraint_rows import ConstraintRows, jacobian_pat
 from dap3d_core.formulations.coordinates import Coordinates
 from dap3d_core.formulations.switches import Switch, switches_of
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH
-from dap3d_core.interface.element_unknowns import START
+from dap3d_core.interface.element_states import START
 from dap3d_core.linear.ldlt.plan import Plan, make_plan
 from dap3d_core.model import Model
 from dap3d_core.model.rotations import to_body
@@ -356,19 +356,37 @@ class Evaluator:
         return self.coordinates.u_dot(float(t), np.asarray(u, dtype=float))
 
     @IGNORE_FLOAT_ERRORS
+    def slope(self, t: float, y: Floats) -> Floats:
+        """dy/dt at time t and the integrated state y."""
+        out = np.zeros_like(y)
+        self.functions[RHS](float(t), y, out, self.system, self.loops)
+        return out
+
+    @IGNORE_FLOAT_ERRORS
+    def switch_values(self, t: float, y: Floats) -> Floats:
+        """(switches,) values of the switches at time t and the integrated state y."""
+        out = np.zeros(len(self.switches))
+        self.functions[WATCH](float(t), y, out, self.system, self.loops)
+        return out
+
+    @IGNORE_FLOAT_ERRORS
+    def reported(self, t: float, y: Floats) -> Floats:
+        """What is reported at time t and the integrated state y, without inputs."""
+        out = np.zeros(self.report_size)
+        self.functions[REPORT](float(t), y, out, self.system, self.loops)
+        return out
+
     def state_rates(self, t: float, u: ArrayLike) -> Floats:
         """(states,) derivatives of the states of elements at time t, a state u and ``states``."""
         with self.coordinates.at(np.asarray(u, dtype=float)) as y:
-            out = np.zeros_like(y)
-            self.functions[RHS](float(t), y, out, self.system, self.loops)
+            out = self.slope(t, y)
         return out[len(out) - 1 - len(self.states) : -1].copy()
 
     @IGNORE_FLOAT_ERRORS
     def rates(self, t: float, u: ArrayLike, v_dot: Floats) -> Floats:
         """dy/dt with given accelerations (6 n,): r_ddot, omega_dot of each body."""
         y = self.integrated(u)
-        out = np.zeros_like(y)
-        self.functions[RHS](float(t), y, out, self.system, self.loops)
+        out = self.slope(t, y)
         u_dot = self.bodies_of(out)
         velocities_of(u_dot)[:] = v_dot
         w_dot = split(u_dot)[3]

@@ -23,6 +23,11 @@ _OF_RESULTS = (
 #: Names that no state may have: of quantities of results, and of kernel arguments of every type.
 RESERVED = frozenset((*_OF_RESULTS, "t", "f", "f_dot", "f_ddot", "lam", "mu", "v_tol", "radius"))
 
+#: Suffixes of the fields of an unknown.
+START, LEAST, GREATEST = "_0", "_min", "_max"
+#: The bounds of an unknown without bounds.
+UNBOUNDED = 1e100
+
 
 def state_lengths(type_: type) -> dict[str, int]:
     """Length of each state of a type, 1 of a number; what is no name or length is kept as it is."""
@@ -80,3 +85,32 @@ def _initial(name: str, length: int | str) -> Any:
         return number(0.0, doc=words)
     zeros = (0.0,) * length
     return vec3(zeros, doc=words) if length == 3 else numbers(length, zeros, doc=words)
+
+
+def unknown_names(type_: type) -> tuple[Any, ...]:
+    """The unknowns that a type declares; what is no name is kept as it is."""
+    declared: Any = getattr(type_, "unknowns", ())
+    return (declared,) if isinstance(declared, str) else tuple(declared)
+
+
+def add_unknown_fields(class_: type) -> None:
+    """Give a class that declares unknowns the fields of their starts and bounds."""
+    if "unknowns" not in vars(class_):
+        return
+    own: dict[str, Any] = dict(vars(class_).get("__annotations__", {}))
+    inherited: list[Mapping[str, Any]] = [
+        vars(base).get("__annotations__", {}) for base in class_.__mro__[1:]
+    ]
+    for name in unknown_names(class_):
+        if not (isinstance(name, str) and name.isidentifier()):
+            continue
+        for suffix, default, doc in (
+            (START, 0.0, f"value near which {name} is sought at the start"),
+            (LEAST, -UNBOUNDED, f"least value of {name}"),
+            (GREATEST, UNBOUNDED, f"greatest value of {name}"),
+        ):
+            field = f"{name}{suffix}"
+            if field not in own and not any(field in names for names in inherited):
+                setattr(class_, field, number(default, doc=doc))
+                own[field] = float
+    class_.__annotations__ = own

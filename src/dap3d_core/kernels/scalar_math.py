@@ -149,3 +149,11 @@ def with_slopes(x: float, source: float) -> float:
 def is_differentiated() -> bool:
     """True where code is differentiated: iterations then make one pass more, for derivatives."""
     return False
+
+
+@intrinsic("values_alone")
+def values_alone() -> bool:
+    """First statement of functions that are differentiated as if nothing depended on parameters:
+    of norms, which decide and are no part of the motion.
+    """
+    return False

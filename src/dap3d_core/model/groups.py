@@ -7,14 +7,13 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.interface.body_pose import BodyPose
 from dap3d_core.interface.codegen.instance_layout import shape_of, size
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions, uncalled
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.types import TypeBase, acts_on_all, turns_of
+from dap3d_core.interface.types import BodyPose, TypeBase, acts_on_all, turns_of
 from dap3d_core.kernels.array_types import Floats as Floats
 from dap3d_core.kernels.array_types import Integers as Integers
 from dap3d_core.model.knots import knots_of

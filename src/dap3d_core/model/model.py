@@ -12,8 +12,8 @@ import attrs
 import numpy as np
 from numpy.typing import ArrayLike
 
-from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.codegen.reactions import joint_fields
+from dap3d_core.interface.types import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.joint_angles import JointAngles, joint_angle_name
 from dap3d_core.model.rotations import read_only, to_global

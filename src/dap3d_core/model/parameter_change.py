@@ -6,8 +6,8 @@ from typing import Any, NamedTuple
 import attrs
 import numpy as np
 
-from dap3d_core.interface.body_pose import pose
 from dap3d_core.interface.fields import FieldSpec, specs_of
+from dap3d_core.interface.types import pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers
 from dap3d_core.model.model import Model
 from dap3d_core.registry.suggestions import nearest

@@ -375,6 +375,12 @@ def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
         "METRIC_WIDTH": METRIC_WIDTH,
         "ELEMENT_STATES": len(prepared.evaluator.model.initial_states),
     }
+    first = prepared.advances[0]
+    numbers["STEPS_CONTACTS"] = int(first.completes is not None)
+    if first.completes is not None:
+        steps = first.arguments[1]
+        for name in ("mass", "mass_inverse", "Jp", "Jp_inverse"):
+            numbers[name.upper()] = place(getattr(steps, name))
     lines = _defined(numbers)
     lines += _table("static const int heavy[]", map(str, sorted(owned) or [0]))
     moving = [str(k) for k, v in enumerate(variables) if v.kind == "fixed" and v.first]

@@ -17,8 +17,8 @@ from dap3d_core.interface.formats import ResultExporter
 from dap3d_core.kernels.compiler.types import CompileError
 from dap3d_core.native.build import PLATFORMS, Platform, platforms_named
 from dap3d_core.native.c_source import PARAMETERS, Variable, data_of, variables_header, variables_of
-from dap3d_core.native.exported import Exported
 from dap3d_core.native.fmu import write_fmu
+from dap3d_core.native.library import Exported
 from dap3d_core.native.run.directions import Directions
 from dap3d_core.native.run.outputs import Outputs, outputs_of
 from dap3d_core.native.run.parameters import places_of

@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 from dap3d_core.native.build import Platform
 from dap3d_core.native.c_source import Variable, c_text
-from dap3d_core.native.exported import Exported
+from dap3d_core.native.library import Exported
 from dap3d_core.result.metadata import current_versions
 from dap3d_core.scene.expressions.units import Number, Unit, constant, unit_of
 

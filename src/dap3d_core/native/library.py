@@ -8,11 +8,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.native.build import PLATFORMS, own_platform
-from dap3d_core.native.c_source import KINDS
+from dap3d_core.native.build import PLATFORMS, Platform, build_objects, link, own_platform
+from dap3d_core.native.c_source import KINDS, Variable, units_of
+from dap3d_core.native.run.directions import Directions
+from dap3d_core.native.run.outputs import SYMBOL, Outputs
+from dap3d_core.native.run.prepared import PreparedRun
 from dap3d_core.registry.arguments import checked
 from dap3d_core.simulation import SimulationError
 
@@ -196,3 +200,34 @@ def load_native(folder: str | os.PathLike[str]) -> NativeLibrary:
     if not found:
         raise FileNotFoundError(f"{place} has no library for {name}")
     return NativeLibrary(found[0])
+
+
+@attrs.frozen
+class Exported:
+    """A model on its way into files.
+
+    Attributes:
+        prepared, variables: of the model.
+        name: for files.
+        outputs: with the function that computes them.
+        directions: directional derivatives; None where a function has none.
+    """
+
+    prepared: PreparedRun
+    variables: list[Variable]
+    name: str
+    outputs: Outputs
+    directions: Directions | None
+
+    def link(self, source: Path, target: Platform, library: Path, archive: Path | None) -> int:
+        """Make libraries of a C file, which has data.h beside it; bytes of the shared one."""
+        objects = source.parent / target.name
+        objects.mkdir(exist_ok=True)
+        texts = [(self.outputs.text, SYMBOL)]
+        if self.directions is not None:
+            texts.append((self.directions.text, self.directions.symbol))
+        units = units_of(self.prepared, self.directions)
+        files = build_objects(units, texts, target, objects)
+        library.parent.mkdir(parents=True, exist_ok=True)
+        link(source, files, target, library, archive)
+        return library.stat().st_size

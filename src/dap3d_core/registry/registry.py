@@ -10,8 +10,13 @@ from dap3d_core.interface import PluginError
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.hooks import EXTENSIONS, GROUPS
 from dap3d_core.registry.arguments import checked
-from dap3d_core.registry.declared_types import not_yet_installed
-from dap3d_core.registry.discovery import BLOCK_VARIABLE, Source, discover, normal_name
+from dap3d_core.registry.discovery import (
+    BLOCK_VARIABLE,
+    Source,
+    discover,
+    normal_name,
+    not_yet_installed,
+)
 from dap3d_core.registry.guard import OverdueError, noun_of
 from dap3d_core.registry.loading import compile_kernels, load, load_file
 from dap3d_core.registry.suggestions import nearest

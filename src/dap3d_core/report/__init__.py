@@ -4,13 +4,11 @@ import sys
 from types import ModuleType
 from typing import Any
 
-from dap3d_core.report.measurement import Failed, MeasuredRun
-from dap3d_core.report.recommend import Recommendation
+from dap3d_core.report.measurement import Failed, MeasuredRun, RejectedSetting
 from dap3d_core.report.reference import Reference
-from dap3d_core.report.report import Report
+from dap3d_core.report.report import Recommendation, Report
 from dap3d_core.report.runner import report
 from dap3d_core.report.settings_ladder import Setting
-from dap3d_core.report.timing import RejectedSetting
 
 __all__ = [
     "Failed",

@@ -13,11 +13,22 @@ import attrs
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.integrators import INTEGRATORS
 from dap3d_core.registry.arguments import checked
-from dap3d_core.report.error_norms import PARTED, final_position_error, trajectory_error
-from dap3d_core.report.measurement import Failed, MeasuredRun, measures_of
-from dap3d_core.report.recommend import front
-from dap3d_core.report.reference import Reference, find_reference
-from dap3d_core.report.report import Report
+from dap3d_core.report.measurement import (
+    Announce,
+    Bench,
+    Failed,
+    MeasuredRun,
+    Progress,
+    measures_of,
+)
+from dap3d_core.report.reference import (
+    PARTED,
+    Reference,
+    final_position_error,
+    find_reference,
+    trajectory_error,
+)
+from dap3d_core.report.report import Report, front
 from dap3d_core.report.settings_ladder import (
     ADAPTIVE,
     MEASURED,
@@ -29,7 +40,6 @@ from dap3d_core.report.settings_ladder import (
     ladder,
     ladder_of_steps,
 )
-from dap3d_core.report.timing import Announce, Bench, Progress
 from dap3d_core.result import Computed, Result
 from dap3d_core.scene import Mistake, Scene, SceneError, check_simulation, load
 from dap3d_core.simulation import report_times
@@ -70,7 +80,7 @@ def report(
 
     Args:
         scene: a Scene, or what ``load`` takes; as it is, but for its step, method and integrator.
-        target_error: the error e (error_norms.py) that ``Report.recommended`` takes by default.
+        target_error: the error e (reference.py) that ``Report.recommended`` takes by default.
         methods, integrators: the ones to measure; by default all.
         tolerances: ladder of rtol (atol = rtol / 100); by default 1e-3, 1e-4 ... 1e-12.
         steps: ladder of fixed steps, s; by default from the mean step of a coarse run down.

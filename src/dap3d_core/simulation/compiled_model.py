@@ -40,10 +40,9 @@ from dap3d_core.simulation.explain import (
     takes_joint_coordinates,
 )
 from dap3d_core.simulation.failure.diagnosis import find_offender
-from dap3d_core.simulation.failure.narrow_forces import notes_on_laws
+from dap3d_core.simulation.failure.narrow_forces import notes_on_drivers, notes_on_laws
 from dap3d_core.simulation.initial.breakpoints import Breakpoints
 from dap3d_core.simulation.initial.conservative import is_conservative
-from dap3d_core.simulation.initial.driver_notes import notes_on_drivers
 from dap3d_core.simulation.initial.given_state import state_of, time_of
 from dap3d_core.simulation.initial.undefined_directions import undefined_directions
 from dap3d_core.simulation.initial_state import InitialState, find_start
@@ -162,7 +161,7 @@ class CompiledModel:
 
             check_outputs(self.scene, self.scene_text, self.evaluator)
         if self.model.active:
-            from dap3d_core.simulation.output.active_joints import check_active
+            from dap3d_core.simulation.output.check_outputs import check_active
 
             check_active(self.scene, self.scene_text, self.evaluator)
 
@@ -338,7 +337,7 @@ class CompiledModel:
         """As ``start``, with an evaluator."""
         active: AbstractContextManager[object] = nullcontext()
         if self.model.active:
-            from dap3d_core.simulation.output.active_joints import only_active
+            from dap3d_core.simulation.output.check_outputs import only_active
 
             u = self.model.u0 if state is None else state.u
             active = only_active(self.scene_text, evaluator, u)

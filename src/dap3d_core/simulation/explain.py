@@ -51,12 +51,11 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
     if model.contact_count:
         if requested in ("auto", "lsq"):
             return "lsq", "the scene has contacts"
-        takes_joint = not (model.breaks or model.loaded_contacts)
-        if requested == "joint" and takes_joint:
+        if requested == "joint" and not model.breaks:
             return "joint", "asked for"
         raise SimulationError(
             f"method {requested} does not fit: the scene has contacts, whose rows hold and let go; "
-            f"use {'lsq, joint' if takes_joint else 'lsq'} or auto"
+            f"use {'lsq' if model.breaks else 'lsq, joint'} or auto"
         )
     if model.breaks:
         return _method_of_breaks(model, requested)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dap3d_core.formulations import PROJECT, RHS
+from dap3d_core.formulations import PROJECT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, Integration, Status
 from dap3d_core.integrators.stepping import integration_state as at
@@ -130,8 +130,7 @@ def lengths_at(evaluator: Evaluator, t: float, y: Floats, span: float) -> Floats
         t, y: state of the motion, on the constraints.
         span: length of the run, s.
     """
-    slope, h = np.zeros_like(y), APART * span
-    evaluator.functions[RHS](t, y, slope, evaluator.system, evaluator.loops)
+    slope, h = evaluator.slope(t, y), APART * span
     now, before, earlier = (_lengths(evaluator, t - k * h, y - k * h * slope) for k in range(3))
     rate, bend = (now - before) / h, (now - 2.0 * before + earlier) / h**2
     return np.array([now, mean_rate(now, rate, bend)])

@@ -20,10 +20,16 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.result import Result, current_versions, information
 from dap3d_core.result.file.validate import are_texts
 from dap3d_core.scene import SceneError, Simulation, check_simulation, load, parse
-from dap3d_core.simulation.checkpoint.file import Checkpoint, path_of, read_checkpoint
-from dap3d_core.simulation.checkpoint.save import parts_of, remove_parts, results_of
+from dap3d_core.simulation.checkpoint.save import (
+    Checkpoint,
+    parts_of,
+    path_of,
+    read_checkpoint,
+    remove_parts,
+    results_of,
+)
 from dap3d_core.simulation.compiled_model import CompiledModel
-from dap3d_core.simulation.control.controller import Controller
+from dap3d_core.simulation.control.sampled import Controller
 from dap3d_core.simulation.errors import CheckpointError
 from dap3d_core.simulation.events.event import Event
 from dap3d_core.simulation.handover import switch_integrator

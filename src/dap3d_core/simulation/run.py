@@ -15,9 +15,10 @@ from dap3d_core.integrators.stepping.singular_poses import begin_singular
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.result import Computed, Result, ResultError, information
+from dap3d_core.result.post.ledger import UNSOLVED
 from dap3d_core.scene import Mistake, SceneError, Simulation
 from dap3d_core.simulation.errors import RedundantError, SimulationError, refuse_breaks
-from dap3d_core.simulation.failure.refused_steps import refusal_notes
+from dap3d_core.simulation.failure.stall import refusal_notes
 from dap3d_core.simulation.handover import (
     crossing_notes,
     hand_over,
@@ -55,11 +56,6 @@ BUFFER_NUMBERS = 1_000_000
 MUCH_WORK = 3_000_000
 #: A second run, for the error, leaves a singular pose by a first step of this part.
 SECOND_RUN_FACTOR = 0.8
-#: A residual above this part of the largest impulse is a warning, and an overlap above this part of
-#: the length of the scene.
-UNSOLVED = 1e-3
-#: Overlaps at the start above this part of the length of the scene are told.
-LEAST_OVERLAP = 1e-8
 
 
 class Run(RunState):
@@ -367,7 +363,7 @@ class Run(RunState):
 
 
 def stepping_notes(integrations: Sequence[Integration], length: float) -> list[str]:
-    """Residual, overlap and work of friction of a run by time stepping; none of other runs.
+    """What contacts of a run by time stepping do that they should not; the ledger has their sizes.
 
     length: of the scene, m.
     """
@@ -375,18 +371,16 @@ def stepping_notes(integrations: Sequence[Integration], length: float) -> list[s
     if not states:
         return []
     residual, deepest = max(w.largest_residual for w in states), max(w.deepest for w in states)
-    taken = abs(sum(w.friction_work for w in states))
-    words = (
-        f"contacts were solved to {residual:.2g} of the largest impulse of a step, bodies overlap "
-        f"by {deepest:.2g} m at most; friction took {taken:.6g} J"
-    )
-    notes: list[str] = [information(words)]
+    notes: list[str] = []
     if residual > UNSOLVED:
-        notes = [f"{words}: where bodies rest is not to be trusted; give a shorter contact_step"]
-    elif deepest > UNSOLVED * length:
-        notes = [f"{words}: joints or drivers hold them where they cannot move apart"]
-    if (overlap := states[0].overlap_at_start) > LEAST_OVERLAP * length:
         notes.append(
-            f"bodies overlapped by {overlap:.2g} m at the start, and were moved apart: move them"
+            f"contacts were solved to {residual:.2g} of the largest impulse of a step: where "
+            "bodies rest is not to be trusted; give a shorter contact_step"
         )
-    return notes
+    elif deepest > UNSOLVED * length:
+        notes.append(
+            f"bodies overlap by {deepest:.2g} m: joints or drivers hold them where they cannot "
+            "move apart"
+        )
+    first = next(one for one in integrations if one.name == STEPPING.name)
+    return [*notes, words] if (words := first.overlapping) else notes

@@ -11,7 +11,7 @@ import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.programs.change_over import ChangeOver
-from dap3d_core.integrators import Integration, StepCounts
+from dap3d_core.integrators import STEPPING, Integration, StepCounts
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.result import EventRecord, RunMetadata, RunStatistics, information
 from dap3d_core.result.contact_table import ContactTable, no_contacts
@@ -29,8 +29,7 @@ from dap3d_core.simulation.output.termination import occurrences
 from dap3d_core.simulation.settings import report_times, settings_notes
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation.control.controller import Controller
-    from dap3d_core.simulation.control.sampled import SampledControl
+    from dap3d_core.simulation.control.sampled import Controller, SampledControl
     from dap3d_core.simulation.events.jumps import Jumps
     from dap3d_core.simulation.initial.start_state import StartState
 
@@ -233,17 +232,34 @@ class RunState:
                 "extent": self.evaluator.model.extent,
                 "most_work": max((run.largest_work for run in self.integrations), default=0.0),
                 **self._rate_noise(),
+                **self._stepping(),
                 "step": self.settings.step,
                 "project": bool(self.settings.project),
                 "correct": bool(self.settings.correct),
                 "rank": self.rank,
-                "conservative": self.compiled.is_conservative and not changes,
+                "conservative": self._is_conservative(changes),
                 "correct_metric": str(self.settings.correct_metric),
                 "start": self.settings.start if self.start is None else GIVEN_START,
                 "method": self.compiled.requested_method,
                 **({} if self.control is None else {"controllers": self.control.titles}),
             },
         )
+
+    def _is_conservative(self, changes: bool) -> bool:
+        """True if potentials account for all work but that of contacts which are stepped."""
+        others = self.evaluator.model.contact_count and not self._stepping()
+        return self.compiled.is_conservative and not changes and not others
+
+    def _stepping(self) -> dict[str, dict[str, float]]:
+        """What contacts did, and what was left unsolved of them, where they are stepped."""
+        states = [one.work for one in self.integrations if one.name == STEPPING.name]
+        if not states:
+            return {}
+        most = ("largest_residual", "deepest")
+        sums = ("contact_work", "friction_work", "work_given", "work_open")
+        found = {name: max(float(getattr(work, name)) for work in states) for name in most}
+        found |= {name: sum(float(getattr(work, name)) for work in states) for name in sums}
+        return {"stepping": found}
 
     def _rate_noise(self) -> dict[str, dict[str, float]]:
         """Largest rounding of accelerations, m/s^2 and rad/s^2, where it limits the accuracy.

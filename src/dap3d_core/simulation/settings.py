@@ -15,7 +15,7 @@ from dap3d_core.integrators import EXPLICIT, STEPPING, Integrator
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
-from dap3d_core.result.note import information
+from dap3d_core.result.metadata import information
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
 from dap3d_core.scene.validate.settings import notes_of
 from dap3d_core.settings import METHODS, SETTINGS
@@ -46,11 +46,10 @@ def _with_contact_engine(compiled: CompiledModel, settings: Simulation) -> Simul
     """The settings with the integrator that steps contacts, where that is chosen.
 
     Raises:
-        SceneError: events are to follow shapes that collide, or steps friction that sticks.
+        SceneError: events are to follow shapes that collide.
     """
     model = compiled.model
     if integrator_named(settings.integrator).steps_contacts:
-        _refuse_sticking(model)
         return settings
     if model.collisions is not None and settings.contact == "events":
         what = "shapes that collide are followed by stepping, and not by events"
@@ -58,37 +57,7 @@ def _with_contact_engine(compiled: CompiledModel, settings: Simulation) -> Simul
         raise SceneError([Mistake("contact", "events", what, remedy=remedy)])
     if not contact_engine_reason(model, settings.contact):
         return settings
-    _refuse_sticking(model)
     return attrs.evolve(settings, integrator=STEPPING.name, step=settings.contact_step)
-
-
-def _refuse_sticking(model: Model) -> None:
-    """SceneError: friction of joints sticks, or a law is a type's own: steps do not know these."""
-    name = _sticking(model)
-    if name.partition("#")[0] in {n.partition("#")[0] for n in _of_laws(model)}:
-        what = "has a law of friction of its type, which events follow, and time stepping does not"
-        remedy = "take contact = 'events', or a type of contact without grip"
-        raise SceneError([Mistake(f"contacts.{name}", MISSING, what, remedy=remedy)])
-    if name:
-        what = "sticks, which events follow, and time stepping of contacts does not"
-        remedy = "give it a w_tol, or v_tol, below which it fades"
-        raise SceneError([Mistake(f"forces.{name}", MISSING, what, remedy=remedy)])
-
-
-def _sticking(model: Model) -> str:
-    """A friction of joints that sticks, or a contact of its own law; "" where there is none."""
-    if laws := _of_laws(model):
-        return laws[0]
-    for group in model.contacts:
-        if group.type_info.type.along is not None:  # type: ignore[attr-defined]
-            return model.joint_names[int(group.members[0])]
-    return ""
-
-
-def _of_laws(model: Model) -> list[str]:
-    """Contacts whose law of friction is that of their type."""
-    groups = [group for group in model.contacts if getattr(group.type_info.type, "grip", None)]
-    return [model.joint_names[int(member)] for group in groups for member in group.members]
 
 
 def contact_engine_reason(model: Model, contact: str) -> str:
@@ -100,7 +69,7 @@ def contact_engine_reason(model: Model, contact: str) -> str:
         return f"{count} shape{'s' * (count != 1)} may meet anywhere"
     points = Counter(name.partition("#")[0] for name in model.contact_names)
     closed = sum(min(count, MOST_CLOSED) for count in points.values())
-    if contact == "auto" and closed > MOST_BY_EVENTS and not _sticking(model):
+    if contact == "auto" and closed > MOST_BY_EVENTS:
         return f"{closed} points may touch at once, more than {MOST_BY_EVENTS}"
     return ""
 

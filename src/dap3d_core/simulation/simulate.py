@@ -21,7 +21,7 @@ from dap3d_core.simulation.settings import (
 )
 
 if TYPE_CHECKING:
-    from dap3d_core.simulation.control.controller import Controller
+    from dap3d_core.simulation.control.sampled import Controller
     from dap3d_core.simulation.initial.start_state import Start, StartState
 
 

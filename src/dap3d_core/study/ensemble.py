@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import attrs
@@ -9,11 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dap3d_core.integrators.plugin_integrators import integrator_named
+from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import Computed, Result
-from dap3d_core.result.note import warnings_of
+from dap3d_core.result.metadata import warnings_of
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
+from dap3d_core.study.differences import OFFSETS, change_along, motion_of, weights_of
 from dap3d_core.study.outputs import Reduction
 from dap3d_core.study.parameters import SceneParameter, parameters_named, with_values
 from dap3d_core.study.study import Batch, PointStatus, Study, derivative_name
@@ -108,6 +111,54 @@ class Ensemble:
         for k in np.flatnonzero(batch.status == PointStatus.OPEN):
             self._run_one(int(k), values[k], batch)
         return batch
+
+    def series_with_slopes(
+        self, point: Floats, size: Floats
+    ) -> dict[str, tuple[Floats, Floats]] | None:
+        """Output -> (nt,) its series at a point (p,) and (nt, p) its derivatives, of one run.
+
+        size: (p,) of the parameters. None where the run fails, or has no derivatives.
+        """
+        runner, of = self._runner(), self.reduction
+        if not self.is_differentiable:
+            return None
+        if runner is None or not all(of.of_rows.values()):
+            return self._series_of_run(point)
+        found = runner.run_with_slopes(point, size)
+        if found is None:
+            return self._series_of_run(point)
+        rows, slopes = found
+        motion, p = motion_of(self.compiled.model.body_count), len(point)
+        ways = [change_along(rows[:, motion], slopes[:, motion, j]) or 1.0 for j in range(p)]
+        along = np.moveaxis(slopes * ways, -1, 0)
+        changed = [rows + k * along for k in OFFSETS[0]]
+        series = of.reduce(np.concatenate([rows[None], *changed]), self.times)
+        weights = weights_of(OFFSETS[0])
+        return {
+            name: (
+                values[0],
+                np.tensordot(weights, (values[1:] - values[0]).reshape(len(weights), p, -1), 1).T
+                / ways,
+            )
+            for name, values in series.items()
+        }
+
+    def _series_of_run(self, point: Floats) -> dict[str, tuple[Floats, Floats]] | None:
+        """As ``series_with_slopes``, of a run with a model of its own."""
+        from dap3d_core.study.sensitivities.sensitivities import sensitivities
+
+        try:
+            found = sensitivities(self._model(self.study.scene, point.tolist()), self.study.names)
+        except (SceneError, SimulationError):
+            return None
+        return {o.name: (o.value(found.result), found.of(str(o.of))) for o in self.outputs}
+
+    @cached_property
+    def is_differentiable(self) -> bool:
+        """True if code is compiled and has derivatives by all parameters."""
+        from dap3d_core.study.sensitivities.sensitivities import no_derivative
+
+        return jit_is_on() and not any(map(no_derivative, self.parameters))
 
     def result(self, point: Sequence[float]) -> Result:
         """The whole result of one point, as ``simulate`` gives it; errors as of that."""

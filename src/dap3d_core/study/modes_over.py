@@ -20,8 +20,7 @@ from dap3d_core.simulation.linearization.linearization import (
     Linearization,
     linearize,
 )
-from dap3d_core.study.parameter_values import read_values
-from dap3d_core.study.parameters import SceneParameter, with_values
+from dap3d_core.study.parameters import SceneParameter, read_values, with_values
 
 #: Weight of the distance of eigenvalues beside the likeness of shapes: it only breaks ties.
 TIE = 1e-3

@@ -12,7 +12,7 @@ from dap3d_core.interface.codegen.reactions import joints_read
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError, where_is
 from dap3d_core.interface.examine.examine import examine
-from dap3d_core.testing.checks import branches, contacts, forces, functions, joints, purity, states
+from dap3d_core.testing.checks import branches, elements, forces, joints, purity
 from dap3d_core.testing.checks.findings import (
     FAILED,
     LEFT_OUT,
@@ -143,7 +143,7 @@ def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
         raise ValueError(f"poses is {poses}; a check takes one or more")
     of_kind: dict[str, Callable[[SampledType], list[Check]]] = {
         "joint": _of_joint, "force": _of_force,
-        "function": lambda subject: [Check("derivatives", subject, "", functions.derivatives)],
+        "function": lambda subject: [Check("derivatives", subject, "", elements.derivatives)],
     }  # fmt: skip
     checks = []
     for subject in sampled_types(type_info, seed, poses):
@@ -154,8 +154,8 @@ def _checks(type_info: TypeInfo, poses: int, seed: int) -> list[Check]:
         checks += of_kind[subject.type.kind](subject)
         if "rate" in subject.type_info.kernels:
             ground = joints.against_ground(subject)
-            checks.append(Check("rate", subject, "", states.tangent))
-            checks.append(Check("rate frame", subject, ground, states.frame))
+            checks.append(Check("rate", subject, "", elements.tangent))
+            checks.append(Check("rate frame", subject, ground, elements.frame))
         checks.append(Check("branches", subject, "", branches.switches))
         checks.append(Check("rest", subject, "", branches.rest))
         checks.append(Check("purity", subject, "", purity.purity))
@@ -187,7 +187,7 @@ def _of_joint(subject: SampledType) -> list[Check]:
     if "G" in subject.type_info.kernels:
         checks.insert(0, Check("G", subject, "", joints.gradient_of_unknowns))
     if subject.type.is_contact and subject.type.grip is not None:
-        checks.append(Check("grip", subject, "", contacts.grip))
+        checks.append(Check("grip", subject, "", elements.grip))
     checks += _of_jumps(subject)
     if "friction" in subject.type_info.kernels:
         checks.append(Check("friction power", subject, "", _on_friction(forces.dissipation)))

@@ -13,8 +13,7 @@ import attrs
 from dap3d_core.interface import PluginError
 from dap3d_core.interface.hooks import EXTENSIONS
 from dap3d_core.registry import LOAD_LIMIT, Registry
-from dap3d_core.registry.declared_types import editable_folder
-from dap3d_core.registry.discovery import Source, discover
+from dap3d_core.registry.discovery import Source, discover, editable_folder
 from dap3d_core.registry.extensions import extensions
 from dap3d_core.registry.registry import OWN
 from dap3d_core.testing.checks.findings import OK, CheckOutcome, Finding, Report

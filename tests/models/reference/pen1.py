@@ -34,8 +34,4 @@ def quantities(t: float) -> dict[str, Array]:
 def closed_form(t: float) -> dict[str, Array]:
     """Return the same quantities, as far as the closed form gives them."""
     r, v, w, v_dot, w_dot = TOP.body(t, ARM, SPIN)
-    return {
-        "r.cone": r,
-        "v": np.concatenate([v, w]),
-        "v_dot": np.concatenate([v_dot, w_dot]),
-    }
+    return {"r.cone": r, "v": np.concatenate([v, w]), "v_dot": np.concatenate([v_dot, w_dot])}

@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
-from support.internals import Pose, compose, join, relative
+from support.internals import Pose, compose, join, relative, rotation_vector
 from support.joint_pairs import BETWEEN, STANDARD, compiled_pair
 from support.rotations import to_global
 
 from dap3d_core.assembly.motion.coordinates import angle_columns
 from dap3d_core.assembly.turns import RATE, STATE
-from dap3d_core.model.rigid_motion import rotation_vector
 
 #: Joints with one rotation and with two, axes parallel and not.
 JOINTS = {name: STANDARD[name] for name in ("rev", "univ", "cyl")}

@@ -181,12 +181,8 @@ def test_the_names_of_each_field_are_those_of_the_sources():
 
 def test_the_names_besides_those_of_fields_are_those_of_the_sources():
     """Of time, of a function's argument, of friction, of what prepare returns; of its bodies."""
-    from dap3d_core.interface.body_pose import BodyPose
-    from dap3d_core.interface.codegen.kernel_arguments import (
-        SLIP,
-        VELOCITY_KERNELS,
-        friction_names,
-    )
+    from dap3d_core.interface.codegen.kernel_arguments import SLIP, VELOCITY_KERNELS, friction_names
+    from dap3d_core.interface.types import BodyPose
 
     page = (DOCS / "reference" / "names.md").read_text()
     besides = rows_of(page, "where | names")

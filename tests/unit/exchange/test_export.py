@@ -11,8 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError
-from dap3d_core.view.scene3d.primitives import SOLIDS
-from dap3d_core.view.scene3d.solids import solid, spring
+from dap3d_core.view.scene3d.primitives import SOLIDS, solid, spring
 from dap3d_results.gltf import write_gltf
 from dap3d_results.moving_solids import MovingScene
 

@@ -6,11 +6,11 @@ import sys
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from support.internals import FormatError, Remarks, parse_xml
 from support.plain import long_in_plain_python
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.interface.formats import FormatError, Remarks, parse_xml
 from dap3d_formats.element_table import MOVES, NOTED, REFUSED, note_elements
 from dap3d_formats.mjcf.elements import MJCF
 from dap3d_formats.sdf.elements import SDF

@@ -55,7 +55,6 @@ from dap3d_core.kernels import (
     transpose,
     where,
 )
-from dap3d_core.kernels.runtime.loop_modules import Loop, build
 
 number = st.floats(-1e3, 1e3, allow_subnormal=False)
 vec = st.tuples(number, number, number)

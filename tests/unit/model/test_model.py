@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from support.internals import join, split, u_from_y, y_from_u
 from support.own_types import registry_of
 
 import dap3d_core as dap
@@ -9,9 +10,7 @@ from dap3d_core.interface import Body, Force, Joint, Vector, body, number, vecto
 from dap3d_core.kernels import row
 from dap3d_core.model import build_model
 from dap3d_core.model.rotations import rotation, to_body, to_global
-from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
-from dap3d_core.scene import check
-from dap3d_core.scene.tables import AnimationPoint
+from dap3d_core.scene import AnimationPoint, check
 
 ZERO = (0.0, 0.0, 0.0)
 

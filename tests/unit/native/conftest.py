@@ -1,5 +1,5 @@
-"""A compiler of C, without which nothing here can be built.
-Slow tests build optimised libraries."""
+"""A compiler of C, without which nothing here can be built; libraries are optimised where that is
+asked for."""
 
 import shutil
 
@@ -13,5 +13,10 @@ def _compiler(request):
         pytest.skip("compiled code is exported")
     if not any(shutil.which(name) for name in ("cc", "gcc", "clang")):
         pytest.importorskip("ziglang", reason="there is no C compiler")
-    if not request.node.get_closest_marker("slow"):
+    if "optimised_libraries" not in request.fixturenames:
         request.getfixturevalue("quick_libraries")
+
+
+@pytest.fixture
+def optimised_libraries():
+    """Export code as users have it: the long verification does so for all models."""

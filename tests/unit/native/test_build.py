@@ -100,6 +100,7 @@ def test_a_hundred_runs_in_eight_threads_are_clean_under_sanitizers(tmp_path, mo
         assert float.fromhex(ran.stdout) == run["cone.r.z"]
 
 
+@pytest.mark.slow
 def test_it_runs_in_an_empty_root(tmp_path):
     made = exported(tmp_path)
     root = tmp_path / "root"
@@ -120,10 +121,15 @@ def test_it_runs_in_an_empty_root(tmp_path):
 
 
 @pytest.mark.slow
-def test_the_shared_library_needs_the_c_library_alone(tmp_path):
+def test_the_shared_library_needs_the_c_library_alone(tmp_path, optimised_libraries):
+    """And has the bits of a run, optimised as it is."""
     if shutil.which("readelf") is None:
         pytest.skip("there is no readelf")
     made = exported(tmp_path)
+    run = dap.load_native(made.path).start(0.5)
+    run.step_to(0.5)
+    result = dap.simulate("pen1", t_end=0.5, dt=0.5)
+    assert [run[f"cone.r.{axis}"] for axis in "xyz"] == result.r[-1, 0].tolist()
     library = made.path / own_platform() / "libpen1.so"
     listed = subprocess.run(["readelf", "-dW", library], capture_output=True, text=True, check=True)
     needed = {line.split("[")[1].rstrip("]") for line in listed.stdout.splitlines()

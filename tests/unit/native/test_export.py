@@ -76,7 +76,7 @@ def differences(scene, folder, t_end, count=20, **settings):
     return np.array_equal(np.array(rows), expected)
 
 
-@pytest.mark.every(3)
+@pytest.mark.every(5)
 @pytest.mark.parametrize(
     ("model", "t_end", "settings"),
     [
@@ -93,6 +93,7 @@ def test_a_run_has_the_bits_of_simulate(tmp_path, model, t_end, settings):
     assert differences(dap.load(model), tmp_path, t_end, **settings)
 
 
+@pytest.mark.slow
 def test_so_have_runs_in_joint_coordinates(tmp_path):
     scene = dap.load("pen2")
     made, library = exported(scene, tmp_path, method="joint", outputs=states_of(scene))
@@ -105,6 +106,7 @@ def test_so_have_runs_in_joint_coordinates(tmp_path):
         np.testing.assert_allclose(run.values(made.outputs), expected, rtol=0, atol=2e-15)
 
 
+@pytest.mark.slow
 def test_auto_continues_with_radau_where_a_scene_is_stiff(tmp_path):
     scene = _written(SPRING, tmp_path)
     scene.forces["spring"].fields |= {"c": 2e5}
@@ -256,6 +258,7 @@ def test_the_example_compiles_without_a_warning_and_runs(tmp_path):
     assert last == [0.5, *run.values(["cone.r.x", "energy.total"])]
 
 
+@pytest.mark.slow
 def test_the_example_in_rust_gives_the_same(tmp_path):
     if shutil.which("rustc") is None:
         pytest.skip("there is no rustc")
@@ -321,6 +324,7 @@ def declared_ball():
     return scene
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("make", "more", "settings"), [
     (falling_ball, ["ball.rdd"], {}),
     (declared_ball, ["ball.rdd"], {"contact": "stepping", "contact_step": 2e-3}),
@@ -340,17 +344,36 @@ def test_steps_of_contacts_have_the_bits_of_simulate(tmp_path, make, more, setti
     assert np.array_equal(np.array(rows), expected)
 
 
-def test_friction_is_a_parameter_of_stepped_contacts(tmp_path):
-    scene, name = falling_ball(), "materials.surface.mu"
-    made, library = exported(scene, tmp_path, outputs=["ball.r"], parameters=[name])
+def test_friction_masses_and_places_are_parameters_of_stepped_contacts(tmp_path):
+    """A mass and inertias, of which steps have inverses, a place and a speed at the start."""
+    names = ["materials.surface.mu", "bodies.ball.mass", "bodies.ball.Jp.y", "bodies.ball.r.z",
+             "bodies.ball.r_dot.x"]  # fmt: skip
+    scene = falling_ball()
+    made, library = exported(scene, tmp_path, outputs=["ball.r"], parameters=names)
     run = library.start(0.3)
-    run[name] = 0.1
+    for name, value in zip(names, (0.1, 3.0, 0.009, 0.17, 2.5), strict=True):
+        run[name] = value
     run.step_to(0.3)
     scene.materials["surface"].mu = 0.1
+    ball = scene.bodies["ball"]
+    ball.mass, ball.Jp = 3.0, (0.008, 0.009, 0.008)
+    ball.r, ball.r_dot = (0.0, 0.0, 0.17), (2.5, 0.0, 0.0)
     expected = dap.simulate(scene, t_end=0.3, dt=0.3).r[-1, 0]
     assert np.array_equal(run.values(made.outputs), expected)
-    with pytest.raises(dap.SceneError, match=r"parameter bodies\.ball\.mass cannot be set"):
-        exported(scene, tmp_path, parameters=["bodies.ball.mass"])
+    ball.Jp = ((0.008, 1e-4, 0.0), (1e-4, 0.008, 0.0), (0.0, 0.0, 0.008))
+    with pytest.raises(dap.SceneError, match=r"parameter bodies\.ball\.Jp\.1\.1 cannot be set"):
+        exported(scene, tmp_path, parameters=["bodies.ball.Jp.1.1"])
+
+
+def test_a_mass_beside_joints_is_a_parameter_of_stepped_contacts(tmp_path):
+    scene, name = dap.load("quadruped"), "bodies.trunk.mass"
+    made, library = exported(scene, tmp_path, outputs=["trunk.r"], parameters=[name])
+    run = library.start(0.1)
+    run[name] = 11.0
+    run.step_to(0.1)
+    scene.bodies["trunk"].mass = 11.0
+    expected = dap.simulate(scene, t_end=0.1, dt=0.1).r[-1, 0]
+    assert np.array_equal(run.values(made.outputs), expected)
 
 
 def test_a_run_ends_where_contacts_have_no_room(tmp_path, monkeypatch):

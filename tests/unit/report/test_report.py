@@ -14,10 +14,10 @@ from support.plain import long_in_plain_python
 import dap3d_core as dap
 from dap3d_core.integrators import INTEGRATORS
 from dap3d_core.report import MeasuredRun, Report, Setting
-from dap3d_core.report.error_norms import final_position_error, first_parting, trajectory_error
-from dap3d_core.report.recommend import front, recommend
+from dap3d_core.report.measurement import Bench
+from dap3d_core.report.reference import final_position_error, first_parting, trajectory_error
+from dap3d_core.report.report import front, recommend
 from dap3d_core.report.settings_ladder import ADAPTIVE, MEASURED, ladder, ladder_of_steps
-from dap3d_core.report.timing import Bench
 from dap3d_core.settings import FIXED_STEP
 
 REQUIRED = {"method", "integrator", "time_s", "error", "energy_error", "constraint_error",
@@ -210,7 +210,7 @@ def test_the_reference_is_two_runs_that_differ_in_integrator_and_method(small):
 
 def test_where_references_part_errors_are_measured_up_to_there(monkeypatch):
     """Here already rounding counts as parting."""
-    monkeypatch.setattr("dap3d_core.report.error_norms.PARTED", 1e-300)
+    monkeypatch.setattr("dap3d_core.report.reference.PARTED", 1e-300)
     found = dap.report(
         problems.pendulum(), quick=True, t_end=0.2, dt=0.05, integrators=["rk4"],
         methods=["standard"],

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 import xarray
 from support import problems
-from support.internals import Evaluator
+from support.internals import Evaluator, scene_of
 from support.plain import long_in_plain_python
 from support.process import run
 from support.results import (
@@ -34,7 +34,6 @@ from dap3d_core.result import ResultError, RunMetadata, RunStatistics, open_resu
 from dap3d_core.result import arrays as arrays_module
 from dap3d_core.result.arrays import Arrays
 from dap3d_core.result.open import LazyArrays
-from dap3d_core.scene.files.read_toml import scene_of
 
 ABOUT = dict(
     status="interrupted",
@@ -67,8 +66,7 @@ def test_round_trip_is_bit_for_bit(tmp_path, name):
     assert found.record == result.record
     for constant in attrs.fields(type(result.summary)):
         np.testing.assert_array_equal(
-            getattr(found.summary, constant.name),
-            getattr(result.summary, constant.name),
+            getattr(found.summary, constant.name), getattr(result.summary, constant.name)
         )
     for array in ("r", "p", "rd", "w", "wp", "rdd", "wd", "wpd", "rP", "rPd", "rPdd"):
         np.testing.assert_array_equal(getattr(found, array), getattr(result, array))

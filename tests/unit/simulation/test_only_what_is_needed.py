@@ -72,6 +72,7 @@ LEFT_ALONE = {
 }  # fmt: skip
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("script", "others"), LEFT_ALONE.items(), ids=range(len(LEFT_ALONE)))
 def test_a_script_leaves_alone_what_it_does_not_need(script, others):
     """The package, its registry, scenes, results, a run, a page."""
@@ -85,6 +86,7 @@ def told(model, added="", method="auto"):
     return set(loops.split()), sizes, set(modules.split())
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize(
     ("model", "own", "others"),
     [
@@ -106,6 +108,7 @@ def test_a_scene_has_only_what_it_needs(model, own, others):
         assert "dap3d_core.formulations.standard" not in found
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("with_jumps", [False, True])
 def test_what_a_scene_names_is_there(with_jumps):
     """Each of what the scenes above do without; contacts and other jumps exclude one another."""
@@ -118,6 +121,7 @@ def test_what_a_scene_names_is_there(with_jumps):
     assert not any("state_derivatives" in m or "states_at_rest" in m for m in found)
 
 
+@pytest.mark.slow
 def test_joint_coordinates_are_imported_where_a_scene_takes_them():
     _, _, found = told("pen1", method="joint")
     assert "dap3d_core.formulations.joint" in found
@@ -153,6 +157,7 @@ def test_lanes_are_imported_by_long_studies():
     assert names <= imported(script)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(
     ("file", "needed"),
     [("arm.urdf", "urdf"), ("parallelogram.sdf", "sdf"), ("parallelogram.xml", "mjcf")],
@@ -182,6 +187,7 @@ def test_a_force_without_a_factor_has_the_loop_of_one_that_knows_of_none(keyword
     assert "F[" not in "\n".join(write(type_info, "wrench").lines)
 
 
+@pytest.mark.slow
 def test_a_run_needs_no_analysis_and_no_other_start(tmp_path):
     """``dap3d run`` imports no other analysis, nothing that these need, no starts from results."""
     found = imported(

@@ -9,6 +9,7 @@ import pytest
 from support import mechanisms, problems, trees
 from support.bouncing import bouncing, swinging
 from support.ended import EndedError, ended_at, leave, shorten_chunks
+from support.internals import FORMAT, Checkpoint, path_of, read_checkpoint, write_checkpoint
 from support.levels import quickly
 from support.on_axles import driven, stone, wheel
 from support.plain import jit_is_on
@@ -17,13 +18,6 @@ from support.state_types import stated
 
 import dap3d_core as dap
 from dap3d_core.simulation import CheckpointError
-from dap3d_core.simulation.checkpoint.file import (
-    FORMAT,
-    Checkpoint,
-    path_of,
-    read_checkpoint,
-    write_checkpoint,
-)
 
 
 def stiffer():
@@ -320,6 +314,7 @@ def test_a_checkpoint_that_was_cut_off_is_refused(copied):
         refused(copied, "it is cut off or damaged")
 
 
+@pytest.mark.slow
 def test_a_damaged_checkpoint_is_refused_or_does_no_harm(copied, left):
     """One byte after another: what is not noticed is none that the run goes on from."""
     whole = np.frombuffer(copied.read_bytes(), dtype=np.uint8)

@@ -138,6 +138,7 @@ def test_data_of_a_path(snap):
     assert "2 turning points, reached" in repr(snap)
 
 
+@pytest.mark.slow
 def test_pendulum_turns_at_its_largest_torque():
     """m g l sin(theta) turns at m g l; the path comes back upside down, and ends there."""
     found = dap.equilibrium_path(pendulum(), "parameters.torque", "0:20:5")
@@ -162,6 +163,7 @@ def test_turns_are_counted():
     assert found.stable.all()
 
 
+@pytest.mark.slow
 def test_column_buckles():
     """P L = k, where another path crosses: the straight column goes on, without stability."""
     found = dap.equilibrium_path(column(), "parameters.P", "0:120:4")

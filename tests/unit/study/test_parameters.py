@@ -7,12 +7,7 @@ from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.scene import check
-from dap3d_core.study import (
-    all_parameters,
-    names_under,
-    parameters_named,
-    with_values,
-)
+from dap3d_core.study import all_parameters, names_under, parameters_named, with_values
 
 #: Components by letters and by places, of fields that the scene gives or leaves to their types.
 HERE = {
@@ -165,6 +160,7 @@ def test_names_go_on_part_by_part(checked):
     assert names_under(checked, "bodies.none.") == names_under(checked, "none.") == []
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 def test_numbers_of_what_sticks_and_of_limits():
     """Friction that sticks and limits are contacts, and have their numbers as other elements."""

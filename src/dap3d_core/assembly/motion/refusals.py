@@ -9,7 +9,7 @@ from dap3d_core.assembly.arrays import Integers
 from dap3d_core.interface.codegen.instance_layout import prefix_of
 from dap3d_core.interface.codegen.kernel_arguments import DERIVATIVES
 from dap3d_core.interface.codegen.type_info import TypeInfo
-from dap3d_core.interface.element_unknowns import unknown_names
+from dap3d_core.interface.element_states import unknown_names
 from dap3d_core.model import Group
 
 #: Rows from which on joint coordinates cost less than the body coordinates and rows they replace.

@@ -35,7 +35,7 @@ def check(
     poses, whether the redundant rows agree, and which reactions are unique all the same.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.cli.console.progress import ProgressBar
 
     with ProgressBar(quiet=as_json) as progress:
@@ -45,10 +45,7 @@ def check(
             )
         progress.start()
         data = _data(compiled, correct_metric)
-    if as_json:
-        print_json(data)
-    else:
-        _show(stdout(), compiled, data)
+    show_data(data, lambda console: _show(console, compiled, data), as_json=as_json)
     return REFUSED if data["mistakes"] else DONE
 
 

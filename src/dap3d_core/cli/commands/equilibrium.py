@@ -81,7 +81,7 @@ def equilibrium(
     it are dashed. --json has all points. Exit code 3 where the path ends on its way.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.cli.framework.paths import open_state, write_text
 
     if quantities and over is None:
@@ -96,11 +96,8 @@ def equilibrium(
     rest = None if target is None else found.scene()
     if target is not None and rest is not None:
         write_text(target, rest.to_toml())
-    data = _data(found, model, rest.notes if rest is not None else [])
-    if as_json:
-        print_json(data | {"file": None if target is None else str(target)})
-    elif not quiet:
-        _show(stdout(), data, target)
+    data = _data(found, model, rest.notes if rest is not None else []) | {"file": target}
+    show_data(data, lambda console: _show(console, data, target), as_json=as_json, quiet=quiet)
     return DONE
 
 
@@ -239,7 +236,7 @@ def follow(
         SimulationError: there is no equilibrium at the first value.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.cli.console.progress import PreparationProgress
     from dap3d_core.result import UnknownNameError
 
@@ -251,17 +248,13 @@ def follow(
                                     announce=progress.announce)  # fmt: skip
     with refusing(UnknownNameError):
         names = list(quantities) or [path.largest_motion()]
-        data = {"scene": scene.name, **path.to_dict(*names)}
+        data = {"scene": scene.name, **path.to_dict(*names), "file": target}
     if target is not None:
         from dap3d_core.plot import save_plot
 
         save_plot(path, names, target, force=force)
-    if as_json:
-        print_json(data | {"file": None if target is None else str(target)})
-    elif not quiet:
-        _show_path(stdout(), scene.name, path, names)
-        if target is not None:
-            stdout().say(f"{target} written", whole=True)
+    show_data(data, lambda console: _show_path(console, scene.name, path, names), target,
+              as_json=as_json, quiet=quiet)  # fmt: skip
     return DONE if path.end in ("reached", "returned") else PARTIAL
 
 

@@ -61,7 +61,7 @@ def write_folder(
     """Write the scene of a folder, a plugin.py to be filled in, and the report."""
     import attrs
 
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.cli.framework.paths import writable, write_text
 
     sources = tuple(Path(report.folder) / f.name for f in report.files)
@@ -72,12 +72,10 @@ def write_folder(
     scene.save(target)
     if plugin is not None:
         write_text(plugin, report.stub)
-    if as_json:
-        holds = {table: len(getattr(scene, table)) for table, _, _ in TABLES}
-        about = {"scene": target, "plugin": plugin, "holds": holds}
-        print_json(about | attrs.asdict(report))
-    else:
-        _show(stdout(), scene, report, target, plugin, stub=stub)
+    holds = {table: len(getattr(scene, table)) for table, _, _ in TABLES}
+    data = {"scene": target, "plugin": plugin, "holds": holds, **attrs.asdict(report)}
+    show_data(data, lambda console: _show(console, scene, report, target, plugin, stub=stub),
+              as_json=as_json)  # fmt: skip
     return DONE
 
 

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
                  help="Free the base, where the format leaves open whether it is fixed."),
     click.option("--keep-fixed", is_flag=True, help="Keep fixed joints; do not merge their links."),
     click.option("--balance-inertia", is_flag=True,
-                 help="Replace principal moments that no body has by their mean."),
+                 help="Replace moments of inertia that no body has by their mean."),
     click.option("--no-shapes", is_flag=True, help="Leave shapes out; their files are not read."),
     click.option("--strict", is_flag=True, help="Refuse a model if something would be left out."),
     click.option("--allow-code", is_flag=True,
@@ -88,7 +88,7 @@ def import_model(
     with its line.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.formats.import_model import ImportReport
 
     scene, report = dap.import_model(
@@ -107,10 +107,8 @@ def import_model(
         return write_folder(scene, report, folder / "scene.toml", force=force, stub=stub,
                             as_json=as_json)  # fmt: skip
     target = _save(scene, report, folder, Path(file), force=force)
-    if as_json:
-        print_json({"scene": target} | _as_data(report))
-    else:
-        _show(stdout(), scene, report, target)
+    data = {"scene": target} | _as_data(report)
+    show_data(data, lambda console: _show(console, scene, report, target), as_json=as_json)
     return DONE
 
 

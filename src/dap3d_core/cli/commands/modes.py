@@ -80,7 +80,7 @@ def modes(
     dap3d modes pen1 --mode 1 -o mode.nc     then: dap3d view mode.nc
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
 
     targets = _targets(plot, output, force)
     if start is not None and time is not None:
@@ -102,12 +102,8 @@ def modes(
     if output is not None:
         with refusing(IndexError):
             found.motion((mode or 1) - 1).save(output, force=force)
-    if as_json:
-        print_json(data)
-    else:
-        _show(stdout(), data, len(found.mode_eigenvalues))
-        for target in targets:
-            stdout().say(f"{target} written", whole=True)
+    total = len(found.mode_eigenvalues)
+    show_data(data, lambda console: _show(console, data, total), *targets, as_json=as_json)
     return DONE
 
 
@@ -116,16 +112,12 @@ def _over(
     locus: bool, force: bool, allow_code: bool, as_json: bool,
 ) -> int:  # fmt: skip
     """Follow the modes over a parameter, and report them."""
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
 
     found = find_modes_over(scene, over, time, number or LISTED, allow_code=allow_code)
     _draw(found, ["eigenvalues" if locus else "frequencies"], plot, force=force)
-    if as_json:
-        print_json(data_of(scene.name, found))
-    else:
-        show(stdout(), scene.name, found)
-        if plot is not None:
-            stdout().say(f"{plot} written", whole=True)
+    data = data_of(scene.name, found)
+    show_data(data, lambda console: show(console, scene.name, found), plot, as_json=as_json)
     return DONE
 
 

@@ -12,6 +12,7 @@ from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import Refused, Terminated, refusing
 
 if TYPE_CHECKING:
+    from dap3d_core.cli.console.console import Terminal
     from dap3d_core.report import Report
     from dap3d_core.scene import Scene
 
@@ -69,7 +70,7 @@ def report(
     Ctrl-C ends it; what was measured until then is shown and written.
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import print_json, stderr, stdout
+    from dap3d_core.cli.console.console import show_data, stderr
     from dap3d_core.cli.console.report_tables import show_report
 
     scene = dap.load(model)
@@ -77,13 +78,12 @@ def report(
     targets = _targets(files, scene.path, force=force)
     measured, code = _measure(ctx, scene, given, quiet=as_json)
     written = _write(measured, targets, force=force)
-    if as_json:
-        print_json({"model": model, **measured.to_dict()})
-    else:
+
+    def show(console: "Terminal") -> None:
         with_target = given["target_error"] is not None
-        show_report(stdout(), measured, _run_command(model, given), with_target=with_target)
-        for path in written:
-            stdout().say(f"{path} written", whole=True)
+        show_report(console, measured, _run_command(model, given), with_target=with_target)
+
+    show_data({"model": model, **measured.to_dict()}, show, *written, as_json=as_json)
     if code != exit_codes.DONE:
         stderr().say("ended early; what was measured until then is above", "bold red")
     return code

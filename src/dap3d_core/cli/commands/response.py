@@ -66,7 +66,7 @@ def response(
     """
     import dap3d_core as dap
     from dap3d_core.cli.commands.modes import state_of
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.result import UnknownNameError
 
     if target is not None:
@@ -82,19 +82,14 @@ def response(
         frequencies = _frequencies(lin, first, last, number)
         found = lin.frequency_response(frequencies)
     if target is not None:
-        from dap3d_core.plot.bode import BodePicture
         from dap3d_core.plot.figure_file import save_figure
+        from dap3d_core.plot.modes_over import BodePicture
         from dap3d_core.plot.style import WIDTH
 
         picture = BodePicture(frequencies, found, inputs, outputs)
         save_figure(picture.draw, Path(target), (WIDTH, picture.height), 200.0, force=force)
     data = _data(scene.name, lin, frequencies, found)
-    if as_json:
-        print_json(data)
-    else:
-        _show(stdout(), data)
-        if target is not None:
-            stdout().say(f"{target} written", whole=True)
+    show_data(data, lambda console: _show(console, data), target, as_json=as_json)
     return DONE
 
 

@@ -50,7 +50,7 @@ def sensitivities(
     dap3d sensitivities pen2 --by bodies.rod.mass --of cylinder.r.z -o by-mass.png
     """
     import dap3d_core as dap
-    from dap3d_core.cli.console.console import print_json, stdout
+    from dap3d_core.cli.console.console import show_data
     from dap3d_core.result import UnknownNameError
 
     if output is not None:
@@ -64,12 +64,7 @@ def sensitivities(
         data = _data(scene.name, found, quantities)
     if output is not None:
         _write(found, quantities, Path(output), force=force)
-    if as_json:
-        print_json(data)
-    else:
-        _show(stdout(), data)
-        if output is not None:
-            stdout().say(f"{output} written", whole=True)
+    show_data(data, lambda console: _show(console, data), output, as_json=as_json)
     return DONE
 
 

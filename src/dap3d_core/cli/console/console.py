@@ -7,7 +7,7 @@ messages keep their lines, for programs that look for places in them.
 import json
 import math
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -199,6 +199,23 @@ def show_written(
     elif not quiet:
         stderr().items(notes)
         stdout().say(f"{target} written ({size(byte_count)}): {contents}", whole=True)
+
+
+def show_data(
+    data: Any,
+    show: Callable[[Terminal], None],
+    *written: str | Path | None,
+    as_json: bool,
+    quiet: bool = False,
+) -> None:
+    """Print data as JSON, or what ``show`` prints of it and the files that were written."""
+    if as_json:
+        print_json(data)
+    elif not quiet:
+        console = stdout()
+        show(console)
+        for target in filter(None, written):
+            console.say(f"{target} written", whole=True)
 
 
 def print_json(data: Any) -> None:

@@ -130,7 +130,7 @@ def _is_unexpected(error: BaseException) -> bool:
 
 def type_hint(name: str, names: list[str]) -> str:
     """The end of a message about an unknown type: how to install it, or the nearest name."""
-    from dap3d_core.registry.declared_types import not_yet_installed
+    from dap3d_core.registry.discovery import not_yet_installed
     from dap3d_core.registry.suggestions import nearest
 
     near = nearest(name, names)

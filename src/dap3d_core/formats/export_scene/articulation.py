@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.formats.export_scene.actuators import add_actuators
 from dap3d_core.formats.export_scene.elements import (
     ALIGNED,
     ModelBuilder,
     SceneElements,
     SceneJoint,
+    add_actuators,
     leave_out,
 )
 from dap3d_core.interface.formats.articulation import (
@@ -166,8 +166,8 @@ def geometries_of(builder: ModelBuilder, scene: Scene, body: str) -> list[Geomet
         pose = builder.in_link(body, Frame(fields.get("at", (0.0, 0.0, 0.0)), A))
         kind = str(element.type)
         if kind == "mesh":
-            scale = (float(fields.get("scale", 1.0)),) * 3
-            geometries.append(Geometry(kind, (), pose, fields["file"], scale, color))
+            scale = np.broadcast_to(fields.get("scale", 1.0), 3).astype(float).tolist()
+            geometries.append(Geometry(kind, (), pose, fields["file"], tuple(scale), color))
         elif kind in SIZES:
             names, factor = SIZES[kind]
             size = factor * np.ravel([fields[name] for name in names])

@@ -103,15 +103,18 @@ def _act_on_link(builder: SceneBuilder, actuator: Actuator, name: str) -> None:
 
 
 def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
-    """Add tendons: a spring and damper between two points, and rigid stops of their distance."""
+    """Add tendons: a spring and damper along points, and of two rigid stops of their distance."""
     for tendon in model.tendons:
-        if len({builder.member[link][0] for link, _ in tendon.ends}) == 1:
+        if len({builder.member[link][0] for link, _ in tendon.points}) == 1:
             continue
-        points = []
-        for (link, at), end in zip(tendon.ends, "ij", strict=True):
+        points, two = [], len(tendon.points) == 2
+        for k, (link, at) in enumerate(tendon.points):
             body, frame = builder.attached(link, Frame(at))
-            name = builder.names.free("points", f"{tendon.name}_{end}")
+            name = builder.names.free("points", f"{tendon.name}_{'ij'[k] if two else k + 1}")
             points.append(builder.scene.add_point(name, body, float_tuple(frame.r)))
+        if not two:
+            _add_cable(builder, tendon, points)
+            continue
         ends = dict(zip(("P_i", "P_j"), points, strict=True))
         if tendon.stiffness or tendon.damping:
             name = builder.names.free("forces", f"{tendon.name}_spring")
@@ -120,6 +123,22 @@ def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
                 l0=tendon.rest or None,
             )  # fmt: skip
         _add_limits(builder, tendon, ends)
+
+
+def _add_cable(builder: SceneBuilder, tendon: Tendon, points: list[str]) -> None:
+    """Add a spring and damper over more than two points."""
+    if tendon.limits.finite:
+        text = "limits of spatial tendons over more than two sites"
+        builder.remarks.leave_out(tendon.place, text, motion=True)
+    if tendon.stiffness and not tendon.rest:
+        text = "a spatial tendon over more than two sites, of springlength 0"
+        builder.remarks.leave_out(tendon.place, text, motion=True)
+    elif tendon.stiffness or tendon.damping:
+        name = builder.names.free("forces", f"{tendon.name}_spring")
+        builder.scene.add_force(
+            "cable", name, points=tuple(points), k=tendon.stiffness, c=tendon.damping or None,
+            length=tendon.rest or None,
+        )  # fmt: skip
 
 
 def _add_limits(builder: SceneBuilder, tendon: Tendon, ends: dict[str, str]) -> None:

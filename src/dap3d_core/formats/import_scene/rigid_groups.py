@@ -7,7 +7,12 @@ from dap3d_core.formats.import_scene.spanning_tree import SpanningTree
 from dap3d_core.interface.formats.articulation import WORLD, Inertial, Link
 from dap3d_core.interface.formats.frames import IDENTITY, Frame
 from dap3d_core.interface.formats.remarks import FormatError, Remarks
-from dap3d_core.interface.formats.solids import inertia_moved, total_inertia
+from dap3d_core.interface.formats.solids import (
+    balanced_inertia,
+    inertia_moved,
+    nearest_inertia,
+    total_inertia,
+)
 
 #: Mass and inertia of a link without any that moves, as a part of what its joint carries.
 STAND_IN = 1e-11
@@ -56,7 +61,7 @@ def rigid_groups(
         remarks: takes what is merged.
         fixed_base: links without a joint to a parent belong to the world.
         keep_fixed: fixed joints between moving links stay joints.
-        balance_inertia: principal moments that no body has are replaced by their mean.
+        balance_inertia: their mean replaces principal moments that no body has, not the nearest.
         stand_in: STAND_IN or STEPPED.
 
     Raises:
@@ -99,6 +104,8 @@ def rigid_groups(
 def _checked(link: Link, remarks: Remarks, balance_inertia: bool) -> Inertial:
     """The inertial of a link.
 
+    Principal moments that no body has are replaced by the nearest that one has, or their mean.
+
     Raises:
         FormatError: it is impossible.
     """
@@ -111,17 +118,20 @@ def _checked(link: Link, remarks: Remarks, balance_inertia: bool) -> Inertial:
     if np.abs(inertial.inertia - inertial.inertia.T).max(initial=0.0) > ASYMMETRY * scale:
         raise FormatError(f"link {link.name}: the inertia matrix is not symmetric", link.place)
     least, middle, most = np.linalg.eigvalsh(inertial.inertia).tolist()
-    if least < -ASYMMETRY * scale or least + middle < most * (1.0 - ASYMMETRY):
-        if balance_inertia:
-            text = "principal moments of inertia that no body has are replaced by their mean"
-            remarks.translate(link.place, text, motion=True)
-            mean = (least + middle + most) / 3.0
-            return Inertial(inertial.mass, inertial.com, mean * np.eye(3))
-        what = f"link {link.name}: no body has the principal moments of inertia {least:.4g}, "
-        what += f"{middle:.4g}, {most:.4g}: the largest is at most the sum of the others"
-        raise FormatError(what, link.place, "correct the file, or take their mean with "
-                          "--balance-inertia (balance_inertia=True)")  # fmt: skip
-    return inertial
+    if least >= -ASYMMETRY * scale and least + middle >= most * (1.0 - ASYMMETRY):
+        return inertial
+    what = f"link {link.name}: no body has the principal moments of inertia {least:.4g}, "
+    what += f"{middle:.4g}, {most:.4g}: "
+    if balance_inertia:
+        text, J = "their mean replaces them", balanced_inertia(inertial.inertia)
+    elif least < -ASYMMETRY * scale:
+        raise FormatError(f"{what}none is negative", link.place, "correct the file, or take their "
+                          "mean with --balance-inertia (balance_inertia=True)")  # fmt: skip
+    else:
+        J, lack = nearest_inertia(inertial.inertia), most - least - middle
+        text = f"the largest is at most the sum of the others, which are made {lack:.2g} more"
+    remarks.translate(link.place, what + text, motion=True)
+    return Inertial(inertial.mass, inertial.com, J)
 
 
 def _stand_in(

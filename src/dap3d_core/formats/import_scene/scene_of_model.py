@@ -52,6 +52,7 @@ WORDS = {
 TAKEN = {
     "revolute": tuple(WORDS), "prismatic": tuple(WORDS),
     "universal": ("damping", "stiffness", "friction", "limits"), "ball": ("damping", "stiffness"),
+    "free": ("damping",),
 }  # fmt: skip
 
 
@@ -67,7 +68,7 @@ class ImportOptions:
     Attributes:
         free_base: links without a joint to a parent are free, where the format leaves it open.
         keep_fixed: fixed joints between moving links stay joints.
-        balance_inertia: principal moments that no body has are replaced by their mean.
+        balance_inertia: their mean replaces principal moments that no body has, not the nearest.
         limits: of joints: one of LIMITS.
         positions, rates: of joints where the scene starts, by name, as the file counts them.
         contacts: shapes meet each other.
@@ -268,8 +269,8 @@ def _add_joint_forces(builder: SceneBuilder, joint: Joint) -> None:
             builder.remarks.leave_out(joint.place, text, motion=True)
     if not set(given) & set(taken):
         return
-    if joint.kind == "ball":
-        _add_ball_spring(builder, joint)
+    if joint.kind in ("ball", "free"):
+        (_add_ball_spring if joint.kind == "ball" else _add_drag)(builder, joint)
         return
     for k in range(len(joint.axes)):
         coordinate = _JointCoordinate(builder, joint, k)
@@ -295,6 +296,17 @@ def _add_ball_spring(builder: SceneBuilder, joint: Joint) -> None:
     name = builder.names.free("forces", f"{ends.name}_{'spring' if k else 'damper'}")
     builder.scene.add_force("sph_sd", name, body_i=ends.child, body_j=ends.parent, k=k or None,
                             c=c or None, p_c=rest)  # fmt: skip
+
+
+def _add_drag(builder: SceneBuilder, joint: Joint) -> None:
+    """Add a damper of a free link: against its velocity at its frame, and its angular velocity."""
+    body, frame = builder.attached(joint.child, Frame())
+    point, names = f"{body}.O", builder.names
+    if frame.r.any():
+        point = names.free("points", f"{body}_drag")
+        builder.scene.add_point(point, body, float_tuple(frame.r))
+    builder.scene.add_force("bushing", names.free("forces", f"{body}_drag"), P_i=f"{GROUND}.O",
+                            P_j=point, c=(joint.damping[0],) * 6)  # fmt: skip
 
 
 class _JointCoordinate:
@@ -430,14 +442,14 @@ class _JointCoordinate:
         return turning if self.turns else body.mass
 
     def add_friction(self) -> None:
-        """Add dry friction, which sticks, or fades at low rates where contacts are not events."""
+        """Add dry friction, which sticks, or fades at low rates where runs take no contacts."""
         friction, builder, ends = self._value("friction"), self.builder, self.ends
         if friction < 0.0:
             text = "friction below 0, which would drive"
             builder.remarks.leave_out(self.joint.place, text, motion=True)
         if friction <= 0.0:
             return
-        fading = None if builder.takes_contacts and not builder.stepped else FADING
+        fading = None if builder.takes_contacts else FADING
         if fading:
             unit = "rad/s" if self.turns else "m/s"
             text = f"dry friction of a joint fades below {fading:g} {unit}: it creeps, and does not"

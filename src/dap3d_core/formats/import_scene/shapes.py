@@ -149,15 +149,21 @@ def bodies_apart(builder: SceneBuilder, model: Articulation) -> dict[tuple[str, 
 
 def _joined(model: Articulation) -> Iterator[tuple[str, str]]:
     """Pairs of links that a joint holds together, through links that are fixed to one of them."""
+    held = _held_together(model)
+    for joint in model.joints.values():
+        if joint.kind not in ("fixed", "free") and WORLD not in (joint.parent, joint.child):
+            yield from product(held[joint.parent], held[joint.child])
+
+
+def _held_together(model: Articulation) -> dict[str, set[str]]:
+    """The links that are fixed to each link, directly or through others, itself included."""
     held: dict[str, set[str]] = {name: {name} for name in model.links}
     for joint in model.joints.values():
         if joint.kind == "fixed" and WORLD not in (joint.parent, joint.child):
             together = held[joint.parent] | held[joint.child]
             for name in together:
                 held[name] = together
-    for joint in model.joints.values():
-        if joint.kind not in ("fixed", "free") and WORLD not in (joint.parent, joint.child):
-            yield from product(held[joint.parent], held[joint.child])
+    return held
 
 
 def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
@@ -174,16 +180,21 @@ def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
 
 
 def _coefficients(model: Articulation, one: Contact, other: Contact) -> dict[str, float]:
-    """Friction and restitution of a pair: of the one that has priority, if one has."""
+    """Friction and restitution of a pair: its own, or of the one that has priority, if one has."""
+    own = model.friction.get(frozenset((one.surface, other.surface)))
     if one.priority != other.priority:
         one = other = max(one, other, key=lambda contact: contact.priority)
     mu = 0.0 if one.smooth and other.smooth else model.coefficient_of_pair(one.mu, other.mu)
     e = model.coefficient_of_pair(one.e, other.e)
-    return {"mu": mu} | ({"e": e} if e else {})
+    return {"mu": mu if own is None else own} | ({"e": e} if e else {})
 
 
 def _beyond_rows(model: Articulation) -> Iterator[tuple[str, str]]:
-    """Links that joints in a row, with links between them that have nothing, hold together."""
+    """Links that joints in a row, with links between them that have nothing, hold together.
+
+    And what is fixed to them.
+    """
+    held = _held_together(model)
     above = {joint.child: joint.parent for joint in model.joints.values() if not joint.closes}
     for name, link in model.links.items():
         parent = above.get(name, WORLD) if link.geometries else WORLD
@@ -192,7 +203,7 @@ def _beyond_rows(model: Articulation) -> Iterator[tuple[str, str]]:
                 break
             parent = above.get(parent, WORLD)
             if parent != WORLD:
-                yield name, parent
+                yield from product(held[name], held[parent])
 
 
 def _shapes(
@@ -243,12 +254,11 @@ def _mesh(
     if shape.mesh.suffix.lower() not in MESHES:
         _leave_out(builder, shape, f"a mesh other than {', '.join(MESHES)}")
         return []
-    uniform = len(set(shape.scale)) == 1 and shape.scale[0] > 0.0
-    if not uniform:
-        _leave_out(builder, shape, "a mesh with different or negative factors along its axes")
+    if 0.0 in shape.scale:
+        _leave_out(builder, shape, "a mesh with a factor of 0")
         return []
     name = meshes.name(shape.mesh, (1.0, 1.0, 1.0))
     builder.scene.files[name] = shape.mesh
-    factor = shape.scale[0]
+    factor = shape.scale[0] if len(set(shape.scale)) == 1 and shape.scale[0] > 0.0 else shape.scale
     fields = {"file": name, "at": float_tuple(frame.r), "p": quaternion(frame.A)}
     return [("mesh", fields | ({} if factor == 1.0 else {"scale": factor}))]

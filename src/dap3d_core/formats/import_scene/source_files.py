@@ -113,7 +113,7 @@ class SourceFiles:
         """
         if not self.shapes and not required:
             return None
-        path = self._inside(uri, place, base or self.path.parent)
+        path = self._inside(uri, place, base or self.path.parent, missing=True)
         if not os.path.isfile(path) and required:
             raise FormatError(f"there is no file {uri}, whose mass properties count", place)
         if not os.path.isfile(path):
@@ -138,8 +138,8 @@ class SourceFiles:
             self._meshes[path] = mesh
         return self._meshes[path]
 
-    def _inside(self, uri: str, place: Place, base: Path) -> Path:
-        """A path within the folder or a package.
+    def _inside(self, uri: str, place: Place, base: Path, *, missing: bool = False) -> Path:
+        """A path within the folder or a package; with ``missing`` also one that is nowhere.
 
         Raises:
             FormatError: it lies elsewhere, or its package is not known.
@@ -159,6 +159,8 @@ class SourceFiles:
             path = Path(os.path.normpath(base / name))
             roots = [root, *self.packages.values()]
             if any(path.resolve().is_relative_to(one.resolve()) for one in roots):
+                return path
+            if missing and not os.path.lexists(path):  # on the machine of its author
                 return path
         except (OSError, RuntimeError, ValueError) as error:
             raise FormatError(f"{uri!r} is no path: {error}", place) from None

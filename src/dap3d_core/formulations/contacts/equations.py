@@ -193,22 +193,17 @@ def force_of(t: float, c: int, force: Floats, out: Floats, system: System, loops
 
 
 @compiled
-def friction_of_one(t: float, c: int, own: Floats, system: System, loops: Any) -> None:
-    """Scaled friction of contact c by a normal force of one alone, and its power, into ``own``."""
-    size, states, near = (
-        system.acceleration.shape[0],
-        system.states,
-        system.contacts[c, STATE] + NEAR,
-    )
+def force_of_one(t: float, c: int, force: Floats, out: Floats, system: System, loops: Any) -> float:
+    """As ``force_of``, of the friction of contact c by a normal force or a load of one alone."""
+    states, near = system.states, system.contacts[c, STATE] + NEAR
     given = states[near], states[near + 1], states[near + 2]
     states[near] = states[near + 1] = states[near + 2] = 0.0
-    zero(own)
     zero(system.multipliers)
     place = system.contacts[c, LOAD] if system.contacts[c, LOADS] > 0 else system.contacts[c, ROW]
     system.multipliers[place] = -1.0
-    force = system.friction[size : 2 * size]
-    own[own.shape[0] - POWER] = force_of(t, c, force, own[:size], system, loops)
+    power = force_of(t, c, force, out, system, loops)
     states[near], states[near + 1], states[near + 2] = given
+    return power
 
 
 @compiled
@@ -220,24 +215,32 @@ def add_columns(t: float, system: System, loops: Any) -> int:
     size, count, contacts, x = system.acceleration.shape[0], 0, system.contacts, system.multipliers
     for c in range(contacts.shape[0]):
         if is_sliding(system, c) and contacts[c, LOADED] == 0:
-            own = column(system, count)
-            friction_of_one(t, c, own, system, loops)
+            own, force = column(system, count), system.friction[size : 2 * size]
+            zero(own)
+            power = force_of_one(t, c, force, own[:size], system, loops)
+            own[own.shape[0] - POWER] = power
             zero(x)
             solve_rows(system, own[:size])
             for k in range(x.shape[0]):
                 own[size + k] = x[k]
             own[own.shape[0] - PLACE] = float(c)
             count += 1
+    invert_responses(system, count)
+    return count
+
+
+@compiled
+def invert_responses(system: System, count: int) -> None:
+    """(I - L)^-1 behind the columns, where no load of a joint is among what presses."""
     if has_loads(system, count):
-        return count
-    A = inverse(system, count)
+        return
+    A, size = inverse(system, count), system.acceleration.shape[0]
     for r in range(count):
         place = row_of(system, r)
         for s in range(count):
             A[2 * count * r + s] = column(system, s)[size + place] + (1.0 if r == s else 0.0)
             A[2 * count * r + count + s] = 1.0 if r == s else 0.0
     invert(A, count)
-    return count
 
 
 @compiled_into
@@ -272,7 +275,21 @@ def inverse(system: System, count: int) -> Floats:
 @compiled
 def add_friction(system: System, count: int) -> None:
     """Add friction to ``acceleration`` and ``multipliers``, which were found without it."""
-    A, x, size = inverse(system, count), system.multipliers, system.acceleration.shape[0]
+    x, size = system.multipliers, system.acceleration.shape[0]
+    N = pressing(system, count)
+    for r in range(count):
+        own = column(system, r)
+        for k in range(size):
+            system.acceleration[k] += N[r] * own[k]
+        for k in range(x.shape[0]):
+            x[k] += N[r] * own[size + k]
+        own[own.shape[0] - FORCE] += N[r]
+
+
+@compiled_into
+def pressing(system: System, count: int) -> Floats:
+    """Changes N of normal forces and loads, from ``multipliers`` found without them."""
+    A, x = inverse(system, count), system.multipliers
     N = A[2 * count * count :]
     if has_loads(system, count):
         solve_loads(system, count)
@@ -281,13 +298,7 @@ def add_friction(system: System, count: int) -> None:
             N[r] = 0.0
             for s in range(count):
                 N[r] -= A[2 * count * r + count + s] * x[row_of(system, s)]
-    for r in range(count):
-        own = column(system, r)
-        for k in range(size):
-            system.acceleration[k] += N[r] * own[k]
-        for k in range(x.shape[0]):
-            x[k] += N[r] * own[size + k]
-        own[own.shape[0] - FORCE] += N[r]
+    return N
 
 
 @compiled

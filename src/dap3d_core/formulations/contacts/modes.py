@@ -23,6 +23,8 @@ INSIDE = tuple(1.0 - 0.5**k for k in range(1, 31))
 LOOSE = 1.0 - 1e-6
 #: Passes for the loads of joints, the part that the last one changes, and a load that holds all.
 LOAD_PASSES, LOAD_SETTLED, LARGE = 60, 1e-12, 1e200
+#: From this pass on loads have settled where rounding is left, of chains of many joints this part.
+LATE_PASS, LOAD_NOISE = 15, 1e-8
 
 
 class JamError(ValueError):
@@ -84,7 +86,7 @@ def _put_loaded(
 
     What may stick is held at first, however large its load: friction that raises its own load by
     more than itself holds. Then each pass takes the loads of the one before, extrapolated from
-    those of as many passes as there are loads (Anderson, J. ACM 12 (1965) 547).
+    those of as many passes as there are loads.
     """
     mine = [c for c in group if c in table.loads]
     ways, none = _ways(table, rows, group, sliding, limit), np.zeros(len(rows.G))
@@ -101,19 +103,30 @@ def _put_loaded(
         force[group] = found.force[group]
         given = rows.loads_by(force.ravel())[mine]
         rest = given - loads
-        if np.abs(rest).max() <= LOAD_SETTLED * max(given.max(), loads.max()):
+        part = LOAD_SETTLED if k < LATE_PASS else LOAD_NOISE
+        if np.abs(rest).max() <= part * max(given.max(), loads.max()):
             return
         if k == 0 and not slides.all():
             loads = np.where(slides, loads, given)
             continue
         taken, rests = [*taken, loads][-len(mine) - 1 :], [*rests, rest][-len(mine) - 1 :]
-        loads = given
-        if len(rests) > 1:
-            changes, moves = np.diff(rests, axis=0).T, np.diff(taken, axis=0).T
-            share = np.linalg.lstsq(changes, rest, rcond=1e-10)[0]
-            loads = given - (moves + changes) @ share
-        loads = np.maximum(loads, 0.0)
+        loads = np.maximum(extrapolated(given, taken, rests), 0.0)
     raise JamError(table.names[mine[int(np.argmax(np.abs(rest)))]])
+
+
+def extrapolated(given: Floats, taken: list[Floats], rests: list[Floats]) -> Floats:
+    """What a fixed point is taken for next (Anderson, J. ACM 12 (1965) 547).
+
+    Args:
+        given: what the last of ``taken`` gave.
+        taken, rests: the last guesses, and by how much each gave something else.
+    """
+    if len(rests) < 2:
+        return given
+    changes, moves = np.diff(rests, axis=0).T, np.diff(taken, axis=0).T
+    share = np.linalg.lstsq(changes, rests[-1], rcond=1e-10)[0]
+    found: Floats = given - (moves + changes) @ share
+    return found
 
 
 def _groups(rows: ContactRows, closed: list[int]) -> list[list[int]]:

@@ -9,10 +9,9 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly import turns as turn_columns
-from dap3d_core.assembly.arrays import Floats, Integers, System
+from dap3d_core.assembly.arrays import Floats, Integers, KeptRowArrays, System, TreeArrays
 from dap3d_core.assembly.motion.classify import classify
 from dap3d_core.assembly.motion.joint_motion import ModelMotions
-from dap3d_core.assembly.tree_arrays import KeptRowArrays, TreeArrays
 from dap3d_core.formulations import FUNCTIONS
 from dap3d_core.formulations.coordinates import Coordinates
 from dap3d_core.formulations.joint.equations import body_state

@@ -12,10 +12,20 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import KNOT, SCRATCH, SWITCH, VALUE, WRENCH, Floats, System
+from dap3d_core.assembly.arrays import (
+    KNOT,
+    SCRATCH,
+    SWITCH,
+    VALUE,
+    WRENCH,
+    Floats,
+    System,
+    coordinate_offset,
+    states_offset,
+    velocity_offset,
+)
 from dap3d_core.assembly.evaluate import call_kinds, place_metric, scale_forces, state_rates, zero
 from dap3d_core.assembly.metric import in_body_axes
-from dap3d_core.assembly.offsets import coordinate_offset, states_offset, velocity_offset
 from dap3d_core.assembly.turns import has_measured
 from dap3d_core.formulations.common.constraints import linearise, report_levels, report_multipliers
 from dap3d_core.formulations.common.friction import has_friction, solve_with_friction

@@ -8,7 +8,7 @@ from typing import Any
 
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.evaluate import place_states
-from dap3d_core.assembly.orientation import orient_by_state, put_rotation, square_of
+from dap3d_core.assembly.metric import orient_by_state, put_rotation, square_of
 from dap3d_core.formulations.joint.half_angles import half_angles
 from dap3d_core.formulations.joint.node_layout import (
     ACCELERATION,

@@ -4,8 +4,9 @@ Rows that do not hold are zero. Sliding friction is linear in the normal forces 
 
     N = N_0 + L N,    L_rs the normal force at r by friction of a normal force of one at s,
 
-found with the factors of the kept rows, once for each contact that slides. Its friction is then
-among the applied forces, and all else is as without contacts.
+found with the factors of the kept rows, once for each contact that slides, and by Newton's method
+where loads of joints are among them (contacts/equations.py). Its friction is then among the applied
+forces, and all else is as without contacts.
 """
 
 # What a compiled function returns is Any to mypy.
@@ -14,7 +15,7 @@ among the applied forces, and all else is as without contacts.
 from typing import Any
 
 from dap3d_core.assembly.arrays import KNOT, SCRATCH, SWITCH, Floats, System
-from dap3d_core.assembly.evaluate import call_kinds, state_rates, zero
+from dap3d_core.assembly.evaluate import call_kinds, scale_forces, state_rates, zero
 from dap3d_core.formulations.common.constraints import (
     power_of_drivers,
     report_levels,
@@ -25,13 +26,17 @@ from dap3d_core.formulations.contacts.equations import (
     BODY_I,
     BODY_J,
     LOADED,
-    NEAR,
-    ROW,
-    STATE,
+    LOADS,
+    PLACE,
+    column,
+    contact_of,
     force_of,
-    invert,
+    force_of_one,
+    has_loads,
+    invert_responses,
     is_given,
     is_sliding,
+    pressing,
 )
 from dap3d_core.formulations.joint.equations import accepted, apply_forces, linearise_tree
 from dap3d_core.formulations.joint.place import place_tree
@@ -79,85 +84,102 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
 def add_contact_forces(t: float, system: System, loops: Any) -> None:
     """Add to ``force`` what contacts do besides their rows, which are linearised.
 
-    Behind both forces in ``friction`` stand those without sliding friction, and what gives normal
-    forces: [I - L | I], then N.
+    A column of contacts/equations.py has here the force of a contact and changes of multipliers.
     """
     contacts, size, count = system.contacts, system.force.shape[0], 0
     zero(system.multipliers)
     for c in range(contacts.shape[0]):
         slides = is_sliding(system, c)
         if is_given(system, c) or (slides & (contacts[c, LOADED] == 1)):
-            force_of(t, c, system.friction[size:], system.friction, system, loops)
-            add_scaled(1.0, c, system.force, system)
-        count += 1 if slides & (contacts[c, LOADED] == 0) else 0
-    if count == 0:
-        return
-    without, A = system.friction[2 * size : 3 * size], system.friction[3 * size :]
-    N, n, s = A[2 * count * count :], 2 * count, 0
+            force_of(t, c, system.friction[size:], system.acceleration, system, loops)
+            add_scaled(1.0, c, system.friction[size:], system)
+        if slides & (contacts[c, LOADED] == 0):
+            own = column(system, count)
+            zero(own)
+            own[own.shape[0] - PLACE] = float(c)
+            count += 1
+    if count > 0:
+        find_columns(t, system, loops, count)
+        invert_responses(system, count)
+        N = pressing(system, count)
+        for s in range(count):
+            add_scaled(N[s], contact_of(system, s), column(system, s), system)
+
+
+@compiled
+def find_columns(t: float, system: System, loops: Any, count: int) -> None:
+    """Columns of contacts that slide, and ``multipliers`` without their friction.
+
+    Of rows that are kept; of all where loads of joints are wanted.
+    """
+    size, x, total = system.force.shape[0], system.multipliers, system.total
+    without, loaded = system.friction[system.friction.shape[0] - size :], has_loads(system, count)
     for k in range(size):
         without[k] = system.force[k]
+    if loaded:
+        linearise_tree(t, system, loops)
     reduce_nodes(system, system.force, True)
     factorise(system)
-    normal_forces(system, N)
-    for c in range(contacts.shape[0]):
-        if is_sliding(system, c) & (contacts[c, LOADED] == 0):
-            force_of_one(t, c, system, loops)
-            add_scaled(1.0, c, system.force, system)
+    find_multipliers(system, loaded)
+    for k in range(x.shape[0]):
+        total[k] = x[k]
+    for s in range(count):
+        own, c = column(system, s), contact_of(system, s)
+        force_of_one(t, c, system.friction[size:], system.acceleration, system, loops)
+        for side in range(BODY_I, BODY_J + 1):
+            for k in range(6 * system.contacts[c, side], 6 * system.contacts[c, side] + 6):
+                own[k] = system.friction[size + k]
+        add_scaled(1.0, c, own, system)
+        if not loaded:
             reduce_nodes(system, system.force, True)
-            normal_forces(system, N[count:])
-            for r in range(count):
-                A[n * r + s] = (1.0 if r == s else 0.0) - (N[count + r] - N[r])
-                A[n * r + count + s] = 1.0 if r == s else 0.0
-            for k in range(size):
-                system.force[k] = without[k]
-            s += 1
-    invert(A, count)
-    s = 0
-    for c in range(contacts.shape[0]):
-        if is_sliding(system, c) & (contacts[c, LOADED] == 0):
-            force_of_one(t, c, system, loops)
-            pushes = 0.0
-            for r in range(count):
-                pushes += A[n * s + count + r] * N[r]
-            add_scaled(pushes, c, system.force, system)
-            s += 1
+        find_multipliers(system, loaded)
+        for k in range(x.shape[0]):
+            own[size + k] = x[k] - total[k]
+        for k in range(size):
+            system.force[k] = without[k]
+    for k in range(x.shape[0]):
+        x[k] = total[k]
+    zero(total)
 
 
 @compiled
-def normal_forces(system: System, N: Floats) -> None:
-    """Normal forces of contacts that slide, of forces that ``reduce`` left."""
-    lacking_accelerations(system)
-    solve_profile(system)
-    kept, contacts, s = system.tree.kept, system.contacts, 0
-    for c in range(contacts.shape[0]):
-        if is_sliding(system, c) & (contacts[c, LOADED] == 0):
-            for q in range(kept.cuts.shape[0]):
-                if kept.cuts[q, FIRST_ROW] == contacts[c, ROW]:
-                    N[s] = kept.multipliers[kept.cuts[q, FIRST]]
-            s += 1
-
-
-@compiled
-def force_of_one(t: float, c: int, system: System, loops: Any) -> None:
-    """Friction of contact c by a normal force of one, into the second part of ``friction``."""
-    near, states, size = system.contacts[c, STATE] + NEAR, system.states, system.force.shape[0]
-    given = states[near], states[near + 1], states[near + 2]
-    states[near] = states[near + 1] = states[near + 2] = 0.0
-    system.multipliers[system.contacts[c, ROW]] = -1.0
-    force_of(t, c, system.friction[size:], system.friction, system, loops)
-    system.multipliers[system.contacts[c, ROW]] = 0.0
-    states[near], states[near + 1], states[near + 2] = given
+def find_multipliers(system: System, loaded: bool) -> None:
+    """-lambda by the present factors, of forces that ``reduce`` left; of loaded: of ``force``."""
+    if loaded:
+        scale_forces(system.body, system.metric, system.force, system.acceleration)
+        solve_all(system)
+    else:
+        lacking_accelerations(system)
+        solve_profile(system)
+        store_kept(system)
 
 
 @compiled_into
-def add_scaled(factor: float, c: int, force: Floats, system: System) -> None:
-    """Add a factor times the force of contact c, in the second part of ``friction``."""
+def solve_all(system: System) -> None:
+    """``acceleration`` and all ``multipliers``: friction is among the applied forces."""
     size = system.force.shape[0]
+    zero(system.friction[size : 2 * size])
+    solve(system)
+
+
+@compiled_into
+def store_kept(system: System) -> None:
+    """-lambda of the kept rows into ``multipliers``."""
+    kept = system.tree.kept
+    for q in range(kept.cuts.shape[0]):
+        first, place = kept.cuts[q, FIRST], kept.cuts[q, FIRST_ROW]
+        for r in range(kept.cuts[q, ROW_COUNT]):
+            system.multipliers[place + r] = -kept.multipliers[first + r]
+
+
+@compiled_into
+def add_scaled(factor: float, c: int, of_contact: Floats, system: System) -> None:
+    """Add a factor times the force of contact c to ``force``."""
     for side in range(BODY_I, BODY_J + 1):
         first = 6 * system.contacts[c, side]
         if first > 0:
             for k in range(first, first + 6):
-                force[k] += factor * system.friction[size + k]
+                system.force[k] += factor * of_contact[k]
 
 
 @compiled
@@ -171,8 +193,7 @@ def report(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None
     """v_dot (6 n, global axes), lambda (rows, in the order of the model), energy, residuals."""
     accelerate(t, y, system, loops)
     linearise_tree(t, system, loops)
-    zero(system.friction[: 2 * system.force.shape[0]])
-    solve(system)
+    solve_all(system)
     power_of_drivers(system)
     body_accelerations(system, out)
     report_multipliers(system, out)
@@ -185,11 +206,14 @@ def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 
     Those of closed contacts read multipliers.
     """
-    place_of_next, kept = system.settings[SCRATCH : SCRATCH + 1], system.tree.kept
+    place_of_next, loaded = system.settings[SCRATCH : SCRATCH + 1], 0
     accelerate(t, y, system, loops)
-    for q in range(kept.cuts.shape[0]):
-        first, place = kept.cuts[q, FIRST], kept.cuts[q, FIRST_ROW]
-        for r in range(kept.cuts[q, ROW_COUNT]):
-            system.multipliers[place + r] = -kept.multipliers[first + r]
+    for c in range(system.contacts.shape[0]):
+        loaded |= system.contacts[c, LOADS] > 0
+    if loaded != 0:
+        linearise_tree(t, system, loops)
+        solve_all(system)
+    else:
+        store_kept(system)
     place_of_next[0] = 0.0
     call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, system.multipliers)

@@ -1,4 +1,4 @@
-"""Columns of the tables of kept rows (assembly/tree_arrays.py)."""
+"""Columns of the tables of kept rows (assembly/arrays.py)."""
 
 #: Of ``KeptRowArrays.cuts``, one kept joint in each row: its rows; place of the first one in the
 #: row vectors, and among the kept ones; its first and last+1 rows of ``ends`` and of ``ways``.

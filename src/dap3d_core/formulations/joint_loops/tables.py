@@ -2,12 +2,12 @@
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.assembly.tree_arrays import KeptRowArrays
+from dap3d_core.assembly.arrays import Floats, Integers, KeptRowArrays
 from dap3d_core.formulations import RHS
 from dap3d_core.formulations.coordinates import UnsuitableError
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
@@ -93,7 +93,8 @@ def kept_rows(joints: Sequence[int], model: Model, nodes: TreeNodes) -> KeptRows
         found.append((sorted(way), k))
     found.sort()
     ways = tuple(tuple(way[::-1]) for way, _ in found)
-    rows = [int(model.joint_rows[k]) for _, k in found]
+    acting = _acting_rows(model)
+    rows = [acting[k][1] for _, k in found]
     first = np.concatenate([[0], np.cumsum(rows)]).astype(np.int64)
     passing = _passing(ways)
     coupled = np.repeat(_first_coupled(ways, first), rows)
@@ -105,6 +106,17 @@ def kept_rows(joints: Sequence[int], model: Model, nodes: TreeNodes) -> KeptRows
         numbers += count * size + PAIR_WIDTH * len(cuts) * (len(cuts) + 1) // 2
         work += CARRY * count + size * count * (count + 1) // 2
     return KeptRows(tuple(k for _, k in found), ways, first, coupled, numbers, work)
+
+
+def _acting_rows(model: Model) -> list[tuple[int, int]]:
+    """Of each joint the first of its rows that may hold, and how many: of friction, say, one."""
+    found = [(0, count) for count in model.joint_rows.tolist()]
+    for group in model.contacts:
+        type_: Any = group.type_info.type
+        which = np.flatnonzero(type_.holds).tolist()
+        for k in group.members.tolist():
+            found[k] = which[0], which[-1] + 1 - which[0]
+    return found
 
 
 def _passing(ways: Sequence[Sequence[int]]) -> dict[int, list[int]]:
@@ -144,20 +156,22 @@ def kept_row_arrays(
     places, size = [], 0
     node_of_body = {int(b): n for n, b in enumerate(nodes.body) if b > 0}
     parent, motion = nodes.table[:, PARENT].tolist(), nodes.table[:, MOTION].tolist()
+    acting = _acting_rows(model)
     for k, way, first in zip(kept.joints, kept.ways, kept.first.tolist(), strict=False):
-        rows, begin = int(model.joint_rows[k]), len(ways)
+        (row, rows), begin = acting[k], len(ways)
         step_of = {n: begin + j for j, n in enumerate(way)}
         first_end = len(ends)
         for body, block in zip(model.joint_slots[k], plan.joint_block[k], strict=True):
             if body:
-                ends.append((step_of[node_of_body[body]], block, body))
+                ends.append((step_of[node_of_body[body]], block + 6 * row, body))
         load = {}
         for n in way:
             load[n] = size
             ways.append((n, step_of.get(parent[n], -1), size))
             size += rows * FREEDOMS[motion[n]]
         places.append(load)
-        cuts.append((rows, int(plan.joint_row[k]), first, first_end, len(ends), begin, len(ways)))
+        place = int(plan.joint_row[k]) + row
+        cuts.append((rows, place, first, first_end, len(ends), begin, len(ways)))
     count = len(kept.coupled)
     width = np.arange(count) - kept.coupled + 1
     start = np.concatenate([[0], np.cumsum(width)]).astype(np.int64)

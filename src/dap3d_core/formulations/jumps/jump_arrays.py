@@ -6,8 +6,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, row_count
-from dap3d_core.interface.codegen.loop_source import stride
+from dap3d_core.interface.codegen.loop_source import JUMP_KINDS, row_count, stride
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.compiler.types import FLOAT, Array
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar

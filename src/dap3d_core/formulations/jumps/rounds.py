@@ -4,9 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import IMPULSE, KNOT, RESET, SWITCH, System
+from dap3d_core.assembly.arrays import IMPULSE, KNOT, RESET, SWITCH, System, velocity_offset
 from dap3d_core.assembly.evaluate import call_kinds, place, zero
-from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.formulations.jumps.held_joints import FACTOR, SOLVE
 from dap3d_core.formulations.jumps.jump_arrays import (
     BEFORE,

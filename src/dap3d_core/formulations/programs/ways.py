@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import Floats
-from dap3d_core.assembly.offsets import velocity_offset
+from dap3d_core.assembly.arrays import Floats, velocity_offset
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.formulations.joint.node_layout import RATE
 from dap3d_core.kernels.compiler import types as t

@@ -19,10 +19,16 @@ from typing import Any, ClassVar
 
 import attrs
 
-from dap3d_core.assembly.arrays import Floats, Integers, System
+from dap3d_core.assembly.arrays import (
+    Floats,
+    Integers,
+    System,
+    coordinate_offset,
+    states_offset,
+    velocity_offset,
+)
 from dap3d_core.assembly.evaluate import evaluate_forces, rates, state_rates, zero
 from dap3d_core.assembly.metric import in_body_axes, scaled, scaled_moment, unscaled
-from dap3d_core.assembly.offsets import coordinate_offset, states_offset, velocity_offset
 from dap3d_core.assembly.state_update import add_displacement
 from dap3d_core.formulations.common.constraints import (
     linearise,

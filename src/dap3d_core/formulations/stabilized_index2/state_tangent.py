@@ -7,7 +7,7 @@ With z the states of an element, x and v as there:
     rows by z                    of C and D v - nu, of joints
 
 All of them are blocks of the matrix of a stage, in which the states of an element are a node
-(linear/lu/plan.py).
+(linear/lu.py).
 """
 
 from typing import Any

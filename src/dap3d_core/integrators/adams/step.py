@@ -68,6 +68,8 @@ FIRST_PART = 0.01
 SLOWEST, STEADY = 0.5, 0.9
 #: The error that a next step is planned for, and how often a step fails before order 1 is taken.
 PLANNED, PATIENCE = 0.5, 3
+#: What each step keeps of the length of those before, which doubles anew where a switch cut one.
+KEPT = 0.99
 
 
 @compiled
@@ -224,6 +226,7 @@ def accept(work: AdamsState, t1: float, k: int, here: float, below: float, lower
     work.step_count += 1
     work.equal_steps += 1
     work.failure_count, work.last_order = 0, k
+    work.uncut_step = max(h, KEPT * work.uncut_step)
     plan(work, h, k, here, below, lower)
     update_switches_after_step(work, h, h, t1)
 

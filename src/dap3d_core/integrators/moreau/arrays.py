@@ -15,6 +15,7 @@ from dap3d_core.formulations.contacts.contact_rows import ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
+from dap3d_core.model import Model
 
 #: Contacts that there is room for at first, besides those declared.
 ROOM = 16
@@ -25,10 +26,12 @@ LOG_ROOM = 64
 #: Pairs of shapes a shape, and points a pair, that exported models have room for; entries of their
 #: matrices a body; contacts that joints hold.
 MOST_PAIRS, MOST_POINTS, MOST_ENTRIES, MOST_HELD = 32, 8, 16, 100
+#: Kinds of contacts: with a cone; friction of a joint along rows 1 and 2, or along all three.
+CONE, ALONE, WHOLE = range(3)
 #: Arrays of which a row belongs to a contact.
-OF_CONTACTS = ("bodies", "key", "group", "chosen", "J", "moved", "own", "own_held", "gap", "mu",
-               "e", "bias", "r", "left", "collides", "closing", "x", "u", "z", "B", "push", "kept",
-               "met", "x_bounce")  # fmt: skip
+OF_CONTACTS = ("bodies", "key", "kind", "group", "chosen", "J", "moved", "own", "own_held", "gap",
+               "mu", "rim", "e", "bias", "r", "left", "collides", "closing", "x", "u", "z", "B",
+               "push", "kept", "met", "x_bounce")  # fmt: skip
 
 
 def _integer() -> Scalar[int]:
@@ -48,7 +51,9 @@ class StepArrays(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(
-            ("integer", "key", "group", "chosen", "collides", "declared_gap", "declared_mode",
+            ("integer", "key", "kind", "group", "chosen", "collides", "declared_gap",
+             "declared_mode", "declared_kind", "declared_turns", "declared_law", "load_row",
+             "load_count", "load_pushes", "held",
              "row_start", "row_body", "row_place", "used", "place", "parent", "queue", "order",
              "entry_start", "entries", "bits", "slots"),
             INTEGERS,
@@ -127,6 +132,7 @@ class StepArrays(Arrays):
     # of contacts
     bodies: Integers  # (c, 2) i and j, ground 0
     key: Integers  # a number that a contact keeps
+    kind: Integers  # CONE, ALONE or WHOLE
     group: Integers  # the least body of those that contacts connect
     chosen: Integers  # contacts of a group
     collides: Integers  # what it does; the part of the step at which it closes
@@ -136,7 +142,8 @@ class StepArrays(Arrays):
     own: Floats  # (c, 9) J M^-1 J^T of each
     own_held: Floats  # the same with what joints answer
     gap: Floats
-    mu: Floats
+    mu: Floats  # of the cone
+    rim: Floats  # friction besides, N s
     e: Floats
     bias: Floats  # m/s, added to normal velocities
     r: Floats  # masses that rows feel, kg
@@ -153,20 +160,33 @@ class StepArrays(Arrays):
     declared_place: Integers  # (d, 6) place in D of the system: row normal of i and j, ...; or -1
     declared_gap: Integers  # in the residual of the system
     declared_mode: Integers  # first state
-    declared_mu: Floats
+    declared_kind: Integers
+    declared_turns: Integers  # 1 of moments
+    declared_law: Integers  # 1 of those whose law of friction is their own
+    declared_mu: Floats  # where it slides, where it sticks
+    declared_mu_s: Floats
+    declared_ratio: Floats  # the same along the second tangent, as parts of these: 1 but in
+    declared_ratio_s: Floats  # ellipses
     declared_e: Floats
-    declared_x: Floats  # (d, 3) impulses of the last step
+    held: Integers  # 1 where it has stuck until this step
+    grip: Floats  # coefficient that counts now, and ratio, by which the second row is multiplied
+    ratio: Floats
+    load_row: Integers  # of friction of a joint: its load's first row, their number, whether it
+    load_count: Integers  # pushes alone; none where friction is of a size of its own
+    load_pushes: Integers
+    declared_x: Floats  # (d, 7) impulses of the last step, modes, directions of slip
     # of rows of joints
     row_start: Integers  # (k + 1,) first entry of each
     row_body: Integers  # body of each entry, and where its six numbers are in D of the system
     row_place: Integers
     D: Floats  # (entries, 6)
     s: Floats  # masses that they feel
-    y: Floats  # impulses; tried, kept, and of the last step
+    y: Floats  # impulses; tried, kept, and of the last step; those of motion without contacts
     pull: Floats
     y_kept: Floats
     y_bounce: Floats
     joint_y: Floats
+    y_free: Floats
     # scratch
     slopes: Floats  # (2, y) flat: dy/dt
     changed: Floats
@@ -193,37 +213,19 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     """
     model = evaluator.model
     n, k = model.body_count, model.joint_row_count
-    layout, own = model.row_layout, _joint_rows(evaluator)
-    bodies: dict[str, Any] = {
-        **{name: np.zeros((n + 1, 9)) for name in ("Jp", "Jp_inverse", "spin", "spin_inverse")},
-        **{name: np.zeros((n + 1, 6)) for name in (
-            "before", "free", "v", "trial", "rest", "trial_rest", "end", "v_bounce")},
-        "bounce": np.zeros((n + 1, 5)),
-        **{name: np.zeros(n + 1) for name in (
-            "margin", "shape_reach", "mass", "mass_inverse", "hit", "flies")},
-        **{name: np.zeros(n + 1, dtype=np.int64) for name in (
-            "used", "place", "parent", "queue", "order")},
-        "entry_start": np.zeros(n + 2, dtype=np.int64),
-        **{name: np.zeros(0, dtype=np.int64) for name in ("bits", "entries")},
-    }  # fmt: skip
-    bodies["mass"][1:], bodies["mass_inverse"][1:] = model.mass, 1.0 / model.mass
-    bodies["Jp"][1:] = model.Jp.reshape(-1, 9)
-    bodies["Jp_inverse"][1:] = np.linalg.inv(model.Jp).reshape(-1, 9)
-    if model.collisions is not None:
-        far = np.linalg.norm(model.collisions.at, axis=1) + model.collisions.reach
-        np.maximum.at(bodies["shape_reach"], model.collisions.body, far)
-        bodies["shape_reach"][0] = 0.0
+    layout = model.row_layout
     scratch: dict[str, Any] = {
-        **{name: np.zeros(k) for name in ("s", "y", "pull", "y_kept", "y_bounce", "joint_y")},
+        **{name: np.zeros(k) for name in (
+            "s", "y", "pull", "y_kept", "y_bounce", "joint_y", "y_free")},
         **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
-    }
+    }  # fmt: skip
     arrays = StepArrays(
         shapes=placed_shapes(model.collisions),
         integer=np.zeros(len(StepArrays.indices("integer")), dtype=np.int64),
         real=np.zeros(len(StepArrays.indices("real"))),
         poses=np.zeros((n + 1, POSE)),
-        **bodies,
-        **own,
+        **_of_bodies(model),
+        **_joint_rows(evaluator),
         **_declared(evaluator),
         **_of_contacts(ROOM + model.contact_count),
         **scratch,
@@ -241,11 +243,36 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     return arrays
 
 
+def _of_bodies(model: Model) -> dict[str, Any]:
+    """Arrays of bodies, with their masses and how far their shapes reach."""
+    n = model.body_count
+    found: dict[str, Any] = {
+        **{name: np.zeros((n + 1, 9)) for name in ("Jp", "Jp_inverse", "spin", "spin_inverse")},
+        **{name: np.zeros((n + 1, 6)) for name in (
+            "before", "free", "v", "trial", "rest", "trial_rest", "end", "v_bounce")},
+        "bounce": np.zeros((n + 1, 5)),
+        **{name: np.zeros(n + 1) for name in (
+            "margin", "shape_reach", "mass", "mass_inverse", "hit", "flies")},
+        **{name: np.zeros(n + 1, dtype=np.int64) for name in (
+            "used", "place", "parent", "queue", "order")},
+        "entry_start": np.zeros(n + 2, dtype=np.int64),
+        **{name: np.zeros(0, dtype=np.int64) for name in ("bits", "entries")},
+    }  # fmt: skip
+    found["mass"][1:], found["mass_inverse"][1:] = model.mass, 1.0 / model.mass
+    found["Jp"][1:] = model.Jp.reshape(-1, 9)
+    found["Jp_inverse"][1:] = np.linalg.inv(model.Jp).reshape(-1, 9)
+    if (shapes := model.collisions) is not None:
+        far = np.linalg.norm(shapes.at, axis=1) + shapes.reach
+        np.maximum.at(found["shape_reach"], shapes.body, far)
+        found["shape_reach"][0] = 0.0
+    return found
+
+
 def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
     widths = {"bodies": 2, "J": 36, "moved": 36, "own": 9, "own_held": 9, "B": 9, "met": MET,
               **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
-    whole = ("bodies", "key", "group", "chosen", "collides")
+    whole = ("bodies", "key", "kind", "group", "chosen", "collides")
     return {
         name: np.zeros((room, widths[name]) if name in widths else room,
                        dtype=np.int64 if name in whole else float)
@@ -282,15 +309,31 @@ def _declared(evaluator: Evaluator) -> dict[str, Any]:
             contact, part = divmod(int(at), 3)
             for side in np.flatnonzero(bodies[contact] == b):
                 places[contact, 2 * part + side] = first
-    return {
+    found = {
         "declared_bodies": bodies.astype(np.int64),
         "declared_place": places,
         "declared_gap": np.ascontiguousarray(evaluator.system.row[own::3][:d]),
-        "declared_mode": np.zeros(0, dtype=np.int64) if table is None else table.mode,
-        "declared_mu": np.zeros(0) if table is None else table.mu,
-        "declared_e": np.zeros(0) if table is None else table.e,
-        "declared_x": np.zeros((d, 3)),
-    }
+        **{name: np.zeros(d, dtype=np.int64) for name in (
+            "declared_mode", "declared_kind", "declared_turns", "declared_law", "held",
+            "load_row", "load_count", "load_pushes")},
+        **{name: np.zeros(d) for name in (
+            "declared_mu", "declared_mu_s", "declared_e", "grip")},
+        **{name: np.ones(d) for name in ("declared_ratio", "declared_ratio_s", "ratio")},
+        "declared_x": np.zeros((d, 7)),
+    }  # fmt: skip
+    if table is not None:
+        found |= {"declared_mode": table.mode, "declared_mu": table.mu, "declared_e": table.e}
+        found |= {"declared_mu_s": table.mu_s, "declared_turns": table.turns.astype(np.int64)}
+        found["declared_kind"] = np.where(table.alone, np.where(table.holds[:, 0], WHOLE, ALONE),
+                                          CONE)  # fmt: skip
+        first = len(model.joint_names) - d
+        for group in model.contacts:
+            type_: Any = group.type_info.type
+            found["declared_law"][group.members - first] = type_.grip is not None
+        for c, (rows, pushes) in table.loads.items():
+            found["load_row"][c], found["load_count"][c] = rows[0], len(rows)
+            found["load_pushes"][c] = pushes
+    return found
 
 
 def all_room(s: StepArrays) -> StepArrays:

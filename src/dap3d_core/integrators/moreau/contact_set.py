@@ -9,16 +9,28 @@ from typing import Any
 from dap3d_core.assembly.arrays import ACCELERATION, POSITION, System
 from dap3d_core.assembly.collisions.find import find_touches
 from dap3d_core.assembly.evaluate import call_kinds, place
-from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.formulations.contacts.equations import (
+    BODY_I,
+    INTEGERS,
+    LOOP,
+    NUMBERS,
+    ROW,
+    STATE,
+)
+from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
+from dap3d_core.interface.contacts.rows import FAR_APART, SLIDES, STEPPED
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Of keys of declared contacts, which are beyond those of shapes.
 DECLARED = 2**52
 #: Points of a pair of shapes that keys tell apart.
 POINTS = 256
-#: Mode of a contact that sticks, and states after it: way and what is nearest, three of each.
-STUCK, NEAREST = 2.0, 4
+#: The least ratio of an ellipse of friction.
+THIN = 1e-9
+#: Of the states of a contact after its mode and way, what is nearest.
+NEAREST = 4
 
 
 @compiled
@@ -27,7 +39,8 @@ def find_contacts(
 ) -> bool:
     """Find the contacts at an integrated state y; False without room.
 
-    Shapes are nearer than the margins of bodies, declared contacts than ``most``.
+    Shapes are nearer than the margins of bodies, declared contacts than ``most``; friction of
+    joints is among them where that is FAR_APART.
     """
     place_poses(y, s)
     s.contact_count = s.touch_count = 0
@@ -44,7 +57,11 @@ def find_contacts(
         evaluate_rows(t, y, s, system, loops)
         s.contact_count = s.touch_count
         for k in range(s.declared_gap.size):
-            if system.residual[s.declared_gap[k]] < most:
+            if s.declared_kind[k] != CONE:
+                near = most >= FAR_APART
+            else:
+                near = system.residual[s.declared_gap[k]] < most
+            if near:
                 put_declared(k, s, system)
     return True
 
@@ -95,7 +112,7 @@ def put_touch(c: int, s: StepArrays) -> None:
     a, b = shapes.body[i], shapes.body[j]
     s.bodies[c, 0], s.bodies[c, 1] = a, b
     s.key[c] = (i * shapes.kind.size + j) * POINTS + which[2]
-    s.gap[c] = found[6]
+    s.gap[c], s.kind[c] = found[6], CONE
     first, second = shapes.material[i], shapes.material[j]
     s.mu[c], s.e[c] = shapes.mu[first, second], shapes.e[first, second]
     put_frame(found[3], found[4], found[5], J)
@@ -132,7 +149,7 @@ def evaluate_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any
     place(t, y, system, loops)
     for k in range(s.declared_mode.size):
         first = s.declared_mode[k]
-        system.states[first] = STUCK
+        system.states[first] = STEPPED
         for i in range(3):
             system.states[first + NEAREST + i] = 0.0
     if s.declared_gap.size > 0:
@@ -147,13 +164,79 @@ def evaluate_rows(t: float, y: Floats, s: StepArrays, system: System, loops: Any
 
 
 @compiled
+def find_grips(t: float, s: StepArrays, system: System, loops: Any) -> None:
+    """Find coefficients of contacts whose law of friction is their own, at slip of ``before``.
+
+    They are the friction that a normal force of one has at a slip along either tangent.
+    """
+    for c in range(s.touch_count, s.contact_count):
+        k = s.key[c] - DECLARED
+        if s.declared_law[k] != 0:
+            _, u1, u2 = velocity_of(s, c, s.before)
+            speed = math.sqrt(u1 * u1 + u2 * u2)
+            slides, sticks = (friction_at(t, s, c, 1, speed, system, loops),
+                              friction_at(t, s, c, 1, 0.0, system, loops))  # fmt: skip
+            across, held = (friction_at(t, s, c, 2, speed, system, loops),
+                            friction_at(t, s, c, 2, 0.0, system, loops))  # fmt: skip
+            s.declared_mu[k], s.declared_mu_s[k] = slides, sticks
+            s.declared_ratio[k] = max(across / slides, THIN) if slides > 0.0 else 1.0
+            s.declared_ratio_s[k] = max(held / sticks, THIN) if sticks > 0.0 else 1.0
+
+
+@compiled
+def friction_at(
+    t: float, s: StepArrays, c: int, along: int, speed: float, system: System, loops: Any
+) -> float:
+    """Friction of a normal force of one where a contact slides along a tangent, 1 or 2."""
+    row, J, x = system.contacts[s.key[c] - DECLARED], s.J[c], pointer(system.multipliers)
+    loop, force, first = loops[row[LOOP]], s.rest, row[STATE]
+    side = 0 if row[BODY_I] > 0 else 1
+    b, sign = row[BODY_I + side], 1.0 - 2.0 * side
+    e = J[12 * along + 6 * side :]
+    for k in range(3):
+        system.multipliers[row[ROW] + k] = -1.0 if k == 0 else 0.0
+        system.states[first + 1 + k] = sign * e[k]
+    system.states[first] = SLIDES
+    for one in range(2):
+        moved, velocity = row[BODY_I + one], system.body[row[BODY_I + one]]
+        for k in range(6):
+            s.trial[moved, k], velocity[12 + k] = velocity[12 + k], 0.0
+            force[moved, k] = 0.0
+    for k in range(3):
+        system.body[b, 12 + k] = speed * e[k]
+    loop(t, system, row[INTEGERS], row[NUMBERS], 1, pointer(force), x, x)
+    found = 0.0
+    for k in range(3):
+        found -= e[k] * force[b, k]
+    for one in range(2):
+        moved, velocity = row[BODY_I + one], system.body[row[BODY_I + one]]
+        for k in range(6):
+            velocity[12 + k] = s.trial[moved, k]
+    return found
+
+
+@compiled
+def velocity_of(s: StepArrays, c: int, v: Floats) -> tuple[float, float, float]:
+    """Normal and tangential velocities of contact c of velocities of bodies."""
+    a, b, J = v[s.bodies[c, 0]], v[s.bodies[c, 1]], s.J[c]
+    u0, u1, u2 = 0.0, 0.0, 0.0
+    for k in range(6):
+        u0 += J[k] * a[k] + J[6 + k] * b[k]
+        u1 += J[12 + k] * a[k] + J[18 + k] * b[k]
+        u2 += J[24 + k] * a[k] + J[30 + k] * b[k]
+    return u0, u1, u2
+
+
+@compiled
 def put_declared(k: int, s: StepArrays, system: System) -> None:
     """Make a contact of one that is declared."""
     c = s.contact_count
     s.contact_count = c + 1
     s.bodies[c, 0], s.bodies[c, 1] = s.declared_bodies[k, 0], s.declared_bodies[k, 1]
-    s.key[c], s.gap[c] = DECLARED + k, system.residual[s.declared_gap[k]]
-    s.mu[c], s.e[c] = s.declared_mu[k], s.declared_e[k]
+    s.key[c], s.gap[c], s.kind[c] = DECLARED + k, 0.0, s.declared_kind[k]
+    s.mu[c], s.e[c], s.ratio[k] = 0.0, s.declared_e[k], 1.0
+    if s.kind[c] == CONE:
+        s.gap[c], s.mu[c] = system.residual[s.declared_gap[k]], s.declared_mu[k]
     for side in range(6):
         first = s.declared_place[k, side]
         for i in range(6):

@@ -6,8 +6,7 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import System
-from dap3d_core.assembly.offsets import coordinate_offset
+from dap3d_core.assembly.arrays import System, coordinate_offset
 from dap3d_core.integrators.moreau.arrays import StepArrays
 from dap3d_core.integrators.stepping.integration_state import TRIAL, Function, Y
 from dap3d_core.integrators.stepping.vector_ops import copy
@@ -32,6 +31,8 @@ def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: 
         parts = math.ceil(min(wanted, 1.0 * MOST_PARTS))
     copy(free, y)
     h = s.h / parts
+    for k in range(s.y_free.size):
+        s.y_free[k] = 0.0
     for k in range(parts):
         begun = t + k * h
         rhs(begun, free, slope, system, loops)
@@ -40,6 +41,8 @@ def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: 
         rhs(begun + 0.5 * h, middle, slope, system, loops)
         for i in range(size):
             free[i] += h * slope[i]
+        for i in range(s.y_free.size if s.load_count.size > 0 else 0):
+            s.y_free[i] -= h * system.multipliers[system.row[i]]
         for b in range(1, s.mass.size):
             normalise(free, coordinate_offset(b) + 3)
         work.rhs_count += 2

@@ -10,8 +10,14 @@ no way from far away: sweeps that count in what joints answer with have one.
 import math
 
 from dap3d_core.formulations.jumps.multipliers import diagonalise
-from dap3d_core.integrators.moreau.arrays import StepArrays
-from dap3d_core.integrators.moreau.newton import newton, times_inverse, velocity_of
+from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
+from dap3d_core.integrators.moreau.contact_set import velocity_of
+from dap3d_core.integrators.moreau.newton import (
+    TINY,
+    newton,
+    rim_of,
+    times_inverse,
+)
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -24,8 +30,8 @@ DEPENDENT, HELD = 1e-12, 1e-12
 
 @compiled
 def sweep_bodies(
-    bodies: Integers, J: Floats, moved: Floats, own: Floats, bias: Floats, mu: Floats,
-    x: Floats, v: Floats, sweeps: int, tolerance: float, relax: float,
+    bodies: Integers, J: Floats, moved: Floats, own: Floats, bias: Floats, kind: Integers,
+    mu: Floats, rim: Floats, x: Floats, v: Floats, sweeps: int, tolerance: float, relax: float,
 ) -> int:  # fmt: skip
     """Sweep until no impulse changes by more than a part of the largest; sweeps done.
 
@@ -34,7 +40,8 @@ def sweep_bodies(
         J, moved: (m, 36) rows normal, tangents, each of bodies i and j; the same times M^-1.
         own: (m, 9) J moved^T of each contact.
         bias: (m,) m/s, added to the normal velocity.
-        mu: (m,).
+        kind: (m,) CONE, ALONE or WHOLE.
+        mu, rim: (m,) friction is at most mu times what pushes, and ``rim``, N s.
         x: (m, 3) impulses, N s, changed in place.
         v: (n + 1, 6) velocities with these impulses, changed with them.
         relax: 1, or more to go beyond what each contact asks for by itself.
@@ -49,12 +56,14 @@ def sweep_bodies(
                 u0 += rows[k] * a[k] + rows[6 + k] * b[k]
                 u1 += rows[12 + k] * a[k] + rows[18 + k] * b[k]
                 u2 += rows[24 + k] * a[k] + rows[30 + k] * b[k]
-            d0, d1, d2 = change_of(own[c], mu[c], x[c], relax * u0, relax * u1, relax * u2)
+            d0, d1, d2 = change_of(
+                own[c], kind[c], mu[c], rim[c], x[c], relax * u0, relax * u1, relax * u2
+            )
             for k in range(6):
                 a[k] += moves[k] * d0 + moves[12 + k] * d1 + moves[24 + k] * d2
                 b[k] += moves[6 + k] * d0 + moves[18 + k] * d1 + moves[30 + k] * d2
             change = max(change, abs(d0), abs(d1), abs(d2))
-            largest = max(largest, x[c, 0])
+            largest = max(largest, x[c, 0] if kind[c] == CONE else size_of(x[c]))
         if change <= tolerance * largest:
             return done + 1
     return sweeps
@@ -62,48 +71,61 @@ def sweep_bodies(
 
 @compiled
 def sweep_contacts(
-    felt: Floats, own: Floats, u: Floats, mu: Floats, x: Floats, sweeps: int, tolerance: float
-) -> int:
+    felt: Floats, own: Floats, u: Floats, kind: Integers, mu: Floats, rim: Floats, x: Floats,
+    sweeps: int, tolerance: float,
+) -> int:  # fmt: skip
     """The same where joints answer as well: u = felt x + what there is without impulses.
 
     Args:
         felt: (3 m, 3 m) how contacts feel each other, symmetric.
         own: (m, 9) its diagonal blocks; contacts whose first number is zero are left as they are.
         u: (m, 3) velocities with the impulses x, changed with them.
-        mu, x, sweeps, tolerance: as of ``sweep_bodies``.
+        kind, mu, rim, x, sweeps, tolerance: as of ``sweep_bodies``.
     """
     for done in range(sweeps):
         change, largest = 0.0, 1e-300
         for c in range(mu.size):
             if own[c, 0] == 0.0:
                 continue
-            d0, d1, d2 = change_of(own[c], mu[c], x[c], u[c, 0], u[c, 1], u[c, 2])
+            d0, d1, d2 = change_of(own[c], kind[c], mu[c], rim[c], x[c], u[c, 0], u[c, 1], u[c, 2])
             p, q, r = felt[3 * c], felt[3 * c + 1], felt[3 * c + 2]
             for k in range(mu.size):
                 for s in range(3):
                     u[k, s] += p[3 * k + s] * d0 + q[3 * k + s] * d1 + r[3 * k + s] * d2
             change = max(change, abs(d0), abs(d1), abs(d2))
-            largest = max(largest, x[c, 0])
+            largest = max(largest, x[c, 0] if kind[c] == CONE else size_of(x[c]))
         if change <= tolerance * largest:
             return done + 1
     return sweeps
 
 
 @compiled
+def size_of(x: Floats) -> float:
+    """The largest of three numbers."""
+    return max(abs(x[0]), abs(x[1]), abs(x[2]))
+
+
+@compiled
 def change_of(
-    own: Floats, mu: float, x: Floats, u0: float, u1: float, u2: float
+    own: Floats, kind: int, mu: float, rim: float, x: Floats, u0: float, u1: float, u2: float
 ) -> tuple[float, float, float]:
     """Bring the impulse of one contact into its cone, given its velocities; what it changes by."""
     old, p, q = x[0], x[1], x[2]
-    x[0] = max(0.0, old - u0 / own[0])
+    if kind == WHOLE:
+        big = own[0] + own[4] + own[8]
+        w, y, z = old - u0 / big, p - u1 / big, q - u2 / big
+        part = rim / max(rim, math.sqrt(w * w + y * y + z * z), TINY)
+        x[0], x[1], x[2] = part * w, part * y, part * z
+        return x[0] - old, x[1] - p, x[2] - q
+    x[0] = max(0.0, old - u0 / own[0]) if kind == CONE else 0.0
     d0 = x[0] - old
-    if mu > 0.0:
+    if mu > 0.0 or rim > 0.0:
         a, b, o = own[4], own[8], own[5]
         big = 0.5 * (a + b) + math.sqrt(0.25 * (a - b) * (a - b) + o * o)
         y, z = p - (u1 + own[3] * d0) / big, q - (u2 + own[6] * d0) / big
-        rim, far = mu * x[0], math.sqrt(y * y + z * z)
-        if far > rim:
-            y, z = y * rim / far, z * rim / far
+        most, far = mu * x[0] + rim, math.sqrt(y * y + z * z)
+        if far > most:
+            y, z = y * most / far, z * most / far
         x[1], x[2] = y, z
     else:
         x[1], x[2] = 0.0, 0.0
@@ -124,10 +146,10 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
         for r in range(3):
             for q in range(3):
                 own[3 * r + q] = s.felt[3 * c + r, 3 * c + q]
-        if own[0] * s.r[c] < HELD:
-            own[0] = 0.0
+        felt = own[0] if s.kind[c] == CONE else own[0] + own[4] + own[8]
+        own[0] = 0.0 if felt * s.r[c] < HELD else max(own[0], TINY)
     best = s.residual
-    keep(s)
+    copy_impulses(s.x, s.y, s.kept, s.y_kept, m)
     for _ in range(ROUNDS):
         for c in range(m):
             u = s.u[c]
@@ -137,7 +159,9 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
                 for q in range(m):
                     for k in range(3):
                         u[r] += s.felt[3 * c + r, 3 * q + k] * s.x[q, k]
-        sweep_contacts(s.felt, s.own_held, s.u, s.mu[:m], s.x, SWEEPS, aim)
+        for c in range(m):
+            s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.y)
+        sweep_contacts(s.felt, s.own_held, s.u, s.kind, s.mu[:m], s.rim, s.x, SWEEPS, aim)
         for k in range(s.y.size):
             s.y[k] = 0.0
             for c in range(m):
@@ -146,9 +170,9 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
         s.residual = newton(s, aim)
         if s.residual < best:
             best = s.residual
-            keep(s)
+            copy_impulses(s.x, s.y, s.kept, s.y_kept, m)
         else:
-            take_kept(s)
+            copy_impulses(s.kept, s.y_kept, s.x, s.y, m)
             s.residual = best
         if best <= tolerance:
             break
@@ -156,23 +180,13 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
 
 
 @compiled
-def keep(s: StepArrays) -> None:
-    """Keep the impulses."""
-    for c in range(s.contact_count):
+def copy_impulses(x: Floats, y: Floats, to_x: Floats, to_y: Floats, count: int) -> None:
+    """Copy the impulses of so many contacts, and of joints."""
+    for c in range(count):
         for k in range(3):
-            s.kept[c, k] = s.x[c, k]
-    for k in range(s.y.size):
-        s.y_kept[k] = s.y[k]
-
-
-@compiled
-def take_kept(s: StepArrays) -> None:
-    """Take those kept."""
-    for c in range(s.contact_count):
-        for k in range(3):
-            s.x[c, k] = s.kept[c, k]
-    for k in range(s.y.size):
-        s.y[k] = s.y_kept[k]
+            to_x[c, k] = x[c, k]
+    for k in range(y.size):
+        to_y[k] = y[k]
 
 
 @compiled

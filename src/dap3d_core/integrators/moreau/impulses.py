@@ -6,13 +6,17 @@
 import math
 from typing import Any
 
-from dap3d_core.integrators.moreau.arrays import MET, StepArrays
-from dap3d_core.integrators.moreau.contact_set import DECLARED
+from dap3d_core.integrators.moreau.arrays import CONE, MET, WHOLE, StepArrays
+from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
+from dap3d_core.integrators.moreau.newton import bound_of
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: A contact whose friction is on its cone to this part slides.
 ON_CONE = 1e-6
+#: Modes, and the slip of what sticks at the start, m/s (interface/contacts/rows.py).
+OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0
+STILL = 1e-8
 
 
 @compiled
@@ -26,7 +30,10 @@ def slot_of(memory: Any, slots: Integers, key: int) -> int:
 
 @compiled
 def recall(work: Any, s: StepArrays) -> None:
-    """Take the impulses of the last step in the frames of the contacts, zero of new ones."""
+    """Take the impulses of the last step in the frames of the contacts, zero of new ones.
+
+    Those that are declared stick or slide as they did, new ones by their slip.
+    """
     memory, slots, count = work.memory, s.slots, 0
     for k in range(slots.size):
         slots[k] = -1
@@ -39,35 +46,75 @@ def recall(work: Any, s: StepArrays) -> None:
         row, J = slots[slot_of(memory, slots, s.key[c])], s.J[c]
         for r in range(3):
             s.x[c, r] = 0.0
-            for k in range(3 if row >= 0 else 0):
+            if row >= 0 and s.kind[c] != CONE:
+                s.x[c, r] = memory[row, 1 + r]
+            for k in range(3 if row >= 0 and s.kind[c] == CONE else 0):
                 s.x[c, r] += J[12 * r + k] * memory[row, 1 + k]
-        s.x[c, 0] = max(s.x[c, 0], 0.0)
+        if s.kind[c] == CONE:
+            s.x[c, 0] = max(s.x[c, 0], 0.0)
+        if c >= s.touch_count:
+            u0, u1, u2 = velocity_of(s, c, s.before)
+            u0 = u0 if s.kind[c] == WHOLE else 0.0
+            rests = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) <= STILL
+            put_grip(s, c, rests if row < 0 else memory[row, 4] == STICKS)
+
+
+@compiled
+def put_grip(s: StepArrays, c: int, holds: bool) -> None:
+    """Let a declared contact have the coefficient of what sticks, or slides."""
+    k = s.key[c] - DECLARED
+    s.held[k] = 1 if holds else 0
+    s.grip[k] = s.declared_mu_s[k] if holds else s.declared_mu[k]
+    s.mu[c] = s.grip[k] if s.kind[c] == CONE else 0.0
+    ratio, J = s.declared_ratio_s[k] if holds else s.declared_ratio[k], s.J[c]
+    if ratio != s.ratio[k]:  # an ellipse is a disc that is stretched
+        for i in range(24, 36):
+            J[i] *= ratio / s.ratio[k]
+        s.x[c, 2] *= s.ratio[k] / ratio
+        s.ratio[k] = ratio
+
+
+@compiled
+def let_slip(s: StepArrays) -> bool:
+    """Let contacts slide that no longer stick; True where less friction holds them then."""
+    found = False
+    for c in range(s.touch_count, s.contact_count):
+        k = s.key[c] - DECLARED
+        if s.held[k] != 0 and mode_of(s, c) == SLIDES:
+            put_grip(s, c, False)
+            found |= s.declared_mu[k] < s.declared_mu_s[k]
+    return found
 
 
 @compiled
 def remember(work: Any, s: StepArrays) -> None:
-    """Keep the impulses of contacts that push."""
+    """Keep the impulses of contacts that push, and of friction of joints."""
     memory, count = work.memory, 0
     for c in range(s.contact_count):
-        if s.x[c, 0] > 0.0 and count < memory.shape[0]:
+        if (s.x[c, 0] > 0.0 or s.kind[c] != CONE) and count < memory.shape[0]:
             memory[count, 0] = s.key[c]
+            memory[count, 4] = SLIDES if c < s.touch_count else mode_of(s, c)
             for k in range(3):
                 total = 0.0
                 for r in range(3):
                     total += s.x[c, r] * s.J[c, 12 * r + k]
-                memory[count, 1 + k] = total
+                memory[count, 1 + k] = total if s.kind[c] == CONE else s.x[c, k]
             count += 1
     for k in range(count, memory.shape[0]):
-        for i in range(4):
+        for i in range(memory.shape[1]):
             memory[k, i] = -1.0
 
 
 @compiled
-def mode_of(x: Floats, mu: float) -> float:
-    """Mode of a contact by its impulse: 0 open, 1 slides, 2 sticks."""
-    if x[0] <= 0.0:
-        return 0.0
-    return 1.0 if math.sqrt(x[1] * x[1] + x[2] * x[2]) >= (1.0 - ON_CONE) * mu * x[0] else 2.0
+def mode_of(s: StepArrays, c: int) -> float:
+    """Mode of a contact by its impulse."""
+    x, first = s.x[c], 0.0
+    if s.kind[c] == CONE and x[0] <= 0.0:
+        return OPEN
+    if s.kind[c] == WHOLE:
+        first = x[0] * x[0]
+    most = (1.0 - ON_CONE) * bound_of(s, c, x[0], s.y)
+    return SLIDES if math.sqrt(first + (x[1] * x[1] + x[2] * x[2])) >= most else STICKS
 
 
 @compiled
@@ -76,14 +123,20 @@ def keep_for_reports(s: StepArrays) -> None:
     for k in range(s.y.size):
         s.joint_y[k] = s.y[k]
     for c in range(s.touch_count, s.contact_count):
+        d, x, J = s.key[c] - DECLARED, s.x[c], s.J[c]
+        kept, sign = s.declared_x[d], -1.0 if s.bodies[c, 0] > 0 else 1.0
+        axis = J[3 * s.declared_turns[d] + (0 if sign < 0.0 else 6) :]
+        kept[0], kept[1], kept[2], kept[3] = x[0], x[1], s.ratio[d] * x[2], mode_of(s, c)
         for k in range(3):
-            s.declared_x[s.key[c] - DECLARED, k] = s.x[c, k]
+            kept[4 + k] = 0.0
+            for r in range(3 if s.kind[c] != CONE and kept[3] == SLIDES else 0):
+                kept[4 + k] += sign * x[r] * axis[12 * r + k]
     s.met_count = 0
     for c in range(s.touch_count):
         if s.x[c, 0] > 0.0:
             row, J, x = s.met[s.met_count], s.J[c], s.x[c]
             row[1], row[2] = s.shapes.which[c, 0], s.shapes.which[c, 1]
-            row[3], row[4] = mode_of(x, s.mu[c]), s.gap[c]
+            row[3], row[4] = mode_of(s, c), s.gap[c]
             for k in range(3):
                 row[5 + k], row[8 + k] = s.shapes.found[c, k], J[k]
                 row[11 + k] = (x[0] * J[k] + x[1] * J[12 + k] + x[2] * J[24 + k]) / s.h
@@ -106,7 +159,8 @@ def complete_row(work: Any, s: StepArrays, row: Floats) -> None:
         x = s.declared_x[c]
         for k in range(3):
             row[s.first_lam + own + 3 * c + k] = x[k] / s.h
-        row[s.first_state + s.declared_mode[c]] = mode_of(x, s.declared_mu[c])
+        for k in range(4):
+            row[s.first_state + s.declared_mode[c] + k] = x[3 + k]
 
 
 @compiled

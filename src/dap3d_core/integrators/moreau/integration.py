@@ -19,6 +19,7 @@ import numpy as np
 
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.moreau.arrays import all_room, grown
+from dap3d_core.integrators.moreau.contact_set import POINTS
 from dap3d_core.integrators.moreau.free_motion import MOST_PARTS, PART
 from dap3d_core.integrators.moreau.problem import arrays_of
 from dap3d_core.integrators.moreau.step import advance
@@ -34,6 +35,8 @@ from dap3d_core.kernels.runtime.array_struct import MATRIX, Scalar
 
 #: Contacts of a shape whose impulses are kept for the next step.
 KEPT = 12
+#: Overlap at the start that is told, a part of the length of the scene.
+LEAST_OVERLAP = 1e-8
 
 
 def _measure() -> Scalar[float]:
@@ -48,11 +51,15 @@ class MoreauState(IntegrationState):
 
     rate = _measure()  # largest one of the forces without contacts, 1/s
     largest_residual = _measure()  # of all steps, a part of the largest impulse of each
-    friction_work = _measure()  # of all steps so far, J, not positive
+    contact_work = _measure()  # of all steps so far, J
+    friction_work = _measure()  # the part of friction
+    work_open = _measure()  # what moving by velocities behind impacts may change of energies, J
+    work_given = _measure()  # that of steps in which it is positive, J
     deepest = _measure()  # largest overlap at the end of a step, m
     overlap_at_start = _measure()  # that of before the first step, m, which moves bodies apart
+    overlap_key = _measure()  # of that contact
 
-    memory: Floats  # (room, 4) key of a contact, or -1, and its impulse, N s, global axes
+    memory: Floats  # (room, 5) key of a contact, or -1, its impulse, N s, and its mode
     measures: Floats  # scalars
 
 
@@ -78,7 +85,7 @@ class MoreauIntegration(Integration):
         """As ``Integration.own_arrays``."""
         model = self._evaluator.model
         shapes = 0 if model.collisions is None else np.count_nonzero(model.collisions.body)
-        memory = np.full((KEPT * shapes + model.contact_count, 4), -1.0)
+        memory = np.full((KEPT * shapes + model.contact_count, 5), -1.0)
         return {"memory": memory, "measures": np.zeros(len(MoreauState.indices("measures")))}
 
     @property
@@ -147,6 +154,20 @@ class MoreauIntegration(Integration):
             f"forces change motion at {rate:.2g} 1/s there, and a step of {h:g} s follows "
             f"{PART * MOST_PARTS / h:.2g} 1/s; let a joint do what so stiff a spring or damper "
             "does, give a shorter contact_step, or make it less stiff"
+        )
+
+    @property
+    def overlapping(self) -> str:
+        """As of ``Integration``."""
+        model, overlap = self._evaluator.model, float(self.work.overlap_at_start)
+        shapes = model.collisions
+        if shapes is None or not overlap > LEAST_OVERLAP * model.length:
+            return ""
+        pair = divmod(int(self.work.overlap_key) // POINTS, len(shapes.names))
+        one, other = (shapes.names[k] for k in pair)
+        return (
+            f"bodies overlapped by {overlap:.2g} m at the start, most of all shapes {one} and "
+            f"{other}: move them, or keep them apart by exclude in [collisions], or group and meets"
         )
 
     @property

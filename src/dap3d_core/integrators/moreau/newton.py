@@ -18,7 +18,8 @@ import math
 
 import numpy as np
 
-from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
+from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
 from dap3d_core.integrators.moreau.dense import solve_blocks, solve_square
 from dap3d_core.integrators.moreau.groups import block_at
 from dap3d_core.kernels.array_types import Floats
@@ -37,58 +38,105 @@ SMALL = 60
 
 
 @compiled
-def put_projected(z: Floats, mu: float, out: Floats) -> None:
-    """Put the impulse next to z that Coulomb's law allows, given the normal one."""
-    push, size = max(0.0, z[0]), max(math.sqrt(z[1] * z[1] + z[2] * z[2]), TINY)
-    part = min(1.0, mu * push / size)
-    out[0], out[1], out[2] = push, part * z[1], part * z[2]
+def put_projected(z: Floats, bound: float, kind: int, out: Floats) -> None:
+    """Put the impulse next to z that Coulomb's law allows, of friction up to a bound."""
+    size = max(math.sqrt(z[1] * z[1] + z[2] * z[2]), TINY)
+    out[0] = max(0.0, z[0])
+    if kind != CONE:
+        size = slip_size(z, kind)
+        out[0] = min(1.0, bound / size) * z[0] if kind == WHOLE else 0.0
+    part = min(1.0, bound / size)
+    out[1], out[2] = part * z[1], part * z[2]
 
 
 @compiled
-def put_slopes(z: Floats, mu: float, B: Floats) -> None:
-    """Put the derivatives of ``projected``, (9,) by rows."""
-    push, size = max(0.0, z[0]), max(math.sqrt(z[1] * z[1] + z[2] * z[2]), TINY)
-    part, d, e = min(1.0, mu * push / size), z[1] / size, z[2] / size
-    slides, pushes = 1.0 if mu * push < size else 0.0, 1.0 if push > 0.0 else 0.0
+def slip_size(z: Floats, kind: int) -> float:
+    """Length of what friction of a joint acts along."""
+    whole = z[0] * z[0] if kind == WHOLE else 0.0
+    return max(math.sqrt(whole + (z[1] * z[1] + z[2] * z[2])), TINY)
+
+
+@compiled
+def put_slopes(z: Floats, mu: float, bound: float, kind: int, B: Floats) -> None:
+    """Put the derivatives of ``projected``, (9,) by rows; mu: of the bound, of what pushes."""
+    size = max(math.sqrt(z[1] * z[1] + z[2] * z[2]), TINY)
+    pushes = 1.0 if z[0] > 0.0 else 0.0
+    if kind != CONE:
+        size, pushes = slip_size(z, kind), 0.0
+    part, d, e = min(1.0, bound / size), z[1] / size, z[2] / size
+    slides = 1.0 if bound < size else 0.0
     B[0], B[1], B[2] = pushes, 0.0, 0.0
     B[3], B[6] = slides * pushes * mu * d, slides * pushes * mu * e
     B[4], B[8] = part * (1.0 - slides * d * d), part * (1.0 - slides * e * e)
     B[5] = B[7] = -part * slides * d * e
+    if kind == WHOLE:
+        c = z[0] / size
+        B[0] = part * (1.0 - slides * c * c)
+        B[1] = B[3] = -part * slides * c * d
+        B[2] = B[6] = -part * slides * c * e
 
 
 @compiled
-def put_missed(x: Floats, u: Floats, mu: float, r: float, out: Floats) -> None:
+def put_missed(x: Floats, u: Floats, bound: float, kind: int, r: float, out: Floats) -> None:
     """Put what an impulse misses Coulomb's law by at a velocity.
 
     r: mass that the rows feel, kg, which makes an impulse of a velocity.
     """
     z0, z1, z2 = x[0] - r * u[0], x[1] - r * u[1], x[2] - r * u[2]
-    rim, size = mu * max(x[0], 0.0), math.sqrt(z1 * z1 + z2 * z2)
-    part = rim / max(size, TINY) if size > rim else 1.0
-    out[0], out[1], out[2] = x[0] - max(0.0, z0), x[1] - z1 * part, x[2] - z2 * part
+    size = math.sqrt(z1 * z1 + z2 * z2)
+    if kind == WHOLE:
+        size = math.sqrt(z0 * z0 + size * size)
+    part = bound / max(size, TINY) if size > bound else 1.0
+    if kind == CONE:
+        z0 = max(0.0, z0)
+    else:
+        z0 = z0 * part if kind == WHOLE else 0.0
+    out[0], out[1], out[2] = x[0] - z0, x[1] - z1 * part, x[2] - z2 * part
+
+
+@compiled
+def rim_of(s: StepArrays, c: int, y: Floats) -> float:
+    """Friction that contact c, of a joint, may have, N s.
+
+    y: impulses of joints, N s, besides those of free motion.
+    """
+    k = s.key[c] - DECLARED
+    first, total = s.load_row[k], 0.0
+    if s.load_count[k] == 0:
+        return s.grip[k] * s.h
+    for q in range(first, first + s.load_count[k]):
+        one = s.y_free[q] + y[q]
+        total += one * one if one > 0.0 or s.load_pushes[k] == 0 else 0.0
+    return s.grip[k] * math.sqrt(total)
+
+
+@compiled
+def bound_of(s: StepArrays, c: int, push: float, y: Floats) -> float:
+    """The most friction of contact c, N s, where it pushes with ``push`` and joints with y."""
+    return s.mu[c] * max(push, 0.0) if s.kind[c] == CONE else rim_of(s, c, y)
 
 
 def project(z: Floats, mu: Floats) -> Floats:
     """(m, 3) impulses next to z (m, 3) that Coulomb's law allows, given the normal ones."""
     found = np.zeros_like(z)
-    for rows in zip(z, mu, found, strict=True):
-        put_projected(*rows)
+    for one, k, out in zip(z, mu, found, strict=True):
+        put_projected(one, k * max(0.0, one[0]), CONE, out)
     return found
 
 
 def slopes(z: Floats, mu: Floats) -> Floats:
     """(m, 3, 3) derivatives of ``project``."""
     found = np.zeros((len(mu), 9))
-    for rows in zip(z, mu, found, strict=True):
-        put_slopes(*rows)
+    for one, k, out in zip(z, mu, found, strict=True):
+        put_slopes(one, k, k * max(0.0, one[0]), CONE, out)
     return found.reshape(-1, 3, 3)
 
 
 def distance(x: Floats, u: Floats, mu: Floats, r: Floats) -> Floats:
     """(m, 3) what impulses x miss Coulomb's law by at velocities u, both (m, 3)."""
     found = np.zeros_like(x)
-    for rows in zip(x, u, mu, r, found, strict=True):
-        put_missed(*rows)
+    for one, v, k, m, out in zip(x, u, mu, r, found, strict=True):
+        put_missed(one, v, k * max(0.0, one[0]), CONE, m, out)
     return found
 
 
@@ -153,18 +201,6 @@ def add_inverse(s: StepArrays, b: int, x: Floats, out: Floats) -> None:
 
 
 @compiled
-def velocity_of(s: StepArrays, c: int, v: Floats) -> tuple[float, float, float]:
-    """Normal and tangential velocities of contact c of velocities of bodies."""
-    a, b, J = v[s.bodies[c, 0]], v[s.bodies[c, 1]], s.J[c]
-    u0, u1, u2 = 0.0, 0.0, 0.0
-    for k in range(6):
-        u0 += J[k] * a[k] + J[6 + k] * b[k]
-        u1 += J[12 + k] * a[k] + J[18 + k] * b[k]
-        u2 += J[24 + k] * a[k] + J[30 + k] * b[k]
-    return u0, u1, u2
-
-
-@compiled
 def speed_of(s: StepArrays, k: int, v: Floats) -> float:
     """D v of row k of joints."""
     found = 0.0
@@ -181,8 +217,16 @@ def left_at(s: StepArrays, c: int, v: Floats) -> float:
     u = s.u[c]
     u[0], u[1], u[2] = velocity_of(s, c, v)
     u[0] += s.bias[c]
-    put_missed(s.x[c], u, s.mu[c], s.r[c], u)
+    put_missed(s.x[c], u, bound_of(s, c, s.x[c, 0], s.y), s.kind[c], s.r[c], u)
     return max(abs(u[0]), abs(u[1]), abs(u[2]))
+
+
+@compiled
+def impulse_of(s: StepArrays, c: int) -> float:
+    """The size of an impulse, or of the most that friction of a joint has."""
+    x = s.x[c]
+    found = max(abs(x[0]), abs(x[1]), abs(x[2]))
+    return found if s.kind[c] == CONE else max(found, rim_of(s, c, s.y))
 
 
 @compiled
@@ -193,7 +237,7 @@ def residual_of(s: StepArrays) -> float:
     for q in range(s.chosen_count):
         c = s.chosen[q]
         left = max(left, left_at(s, c, s.trial))
-        largest = max(largest, abs(s.x[c, 0]), abs(s.x[c, 1]), abs(s.x[c, 2]))
+        largest = max(largest, impulse_of(s, c))
     for k in range(s.y.size):
         speed = speed_of(s, k, s.trial) - speed_of(s, k, s.free)
         left, largest = max(left, abs(s.s[k] * speed)), max(largest, abs(s.y[k]))
@@ -261,7 +305,8 @@ def put_rest(s: StepArrays, v: Floats, weight: float, R: Floats) -> float:
         part, z, J = weight * s.r[c], s.z[c], s.J[c]
         z[0] = s.x[c, 0] - part * (u0 + s.bias[c])
         z[1], z[2] = s.x[c, 1] - part * u1, s.x[c, 2] - part * u2
-        put_projected(z, s.mu[c], s.push[c])
+        s.rim[c] = bound_of(s, c, z[0], s.pull)
+        put_projected(z, s.rim[c], s.kind[c], s.push[c])
         p, y, w = s.push[c, 0], s.push[c, 1], s.push[c, 2]
         first, second = R[s.bodies[c, 0]], R[s.bodies[c, 1]]
         for k in range(6):
@@ -269,38 +314,44 @@ def put_rest(s: StepArrays, v: Floats, weight: float, R: Floats) -> float:
             second[k] -= J[6 + k] * p + J[18 + k] * y + J[30 + k] * w
     merit = 0.0
     for q in range(s.used_count):
-        merit += size_of(R[s.used[q]], s.mass_inverse[s.used[q]], s.spin_inverse[s.used[q]])
+        merit += product_of(
+            R[s.used[q]], R[s.used[q]], s.mass_inverse[s.used[q]], s.spin_inverse[s.used[q]]
+        )
     return merit
 
 
 @compiled
-def size_of(x: Floats, m: float, spin: Floats) -> float:
-    """X . M x of six numbers, by the mass and the moments of inertia of a body."""
+def product_of(x: Floats, y: Floats, m: float, spin: Floats) -> float:
+    """X . M y of six numbers each, by the mass and the moments of inertia of a body."""
     total = 0.0
     for k in range(3):
-        turned = spin[3 * k] * x[3] + spin[3 * k + 1] * x[4] + spin[3 * k + 2] * x[5]
-        total += m * x[k] * x[k] + x[3 + k] * turned
+        turned = spin[3 * k] * y[3] + spin[3 * k + 1] * y[4] + spin[3 * k + 2] * y[5]
+        total += m * x[k] * y[k] + x[3 + k] * turned
     return total
 
 
 @compiled
 def solve_round(s: StepArrays, weight: float, tolerance: float) -> None:
     """Bring v to where it solves the equations of a round; impulses there in push and pull."""
-    size = TINY
+    size, rubs = TINY, False
+    for q in range(s.chosen_count):
+        rubs |= s.kind[s.chosen[q]] != CONE
     for q in range(s.used_count):
-        size += size_of(s.free[s.used[q]], s.mass[s.used[q]], s.spin[s.used[q]])
+        b = s.used[q]
+        x = s.free[b]
+        if rubs:  # friction of joints may be little beside the momentum of its bodies
+            x = s.change
+            for k in range(6):
+                x[k] = s.free[b, k] - s.v[b, k]
+        size += product_of(x, x, s.mass[b], s.spin[b])
     merit = put_rest(s, s.v, weight, s.rest)
     for _ in range(PASSES):
         if merit <= tolerance * tolerance * size:
             return
-        for q in range(s.chosen_count):
-            put_slopes(s.z[s.chosen[q]], s.mu[s.chosen[q]], s.B[s.chosen[q]])
-        better = try_pass(s, weight, merit)
+        better = try_pass(s, weight, merit, 1.0)
         if better < 0.0:
-            for q in range(s.chosen_count):
-                B = s.B[s.chosen[q]]
-                B[3] = B[6] = 0.0
-            better = try_pass(s, weight, merit)
+            put_rest(s, s.v, weight, s.rest)
+            better = try_pass(s, weight, merit, 0.0)
         if better < 0.0:
             put_rest(s, s.v, weight, s.rest)
             return
@@ -308,9 +359,15 @@ def solve_round(s: StepArrays, weight: float, tolerance: float) -> None:
 
 
 @compiled
-def try_pass(s: StepArrays, weight: float, merit: float) -> float:
-    """Take a Newton step, or a part of it, with slopes B; the new merit, -1 if none is better."""
-    assemble(s, weight)
+def try_pass(s: StepArrays, weight: float, merit: float, feels: float) -> float:
+    """Take a Newton step, or a part of it; the new merit, -1 if none is better.
+
+    feels: 1.0, or 0.0 where friction is taken as if it did not depend on what presses.
+    """
+    for q in range(s.chosen_count):
+        c = s.chosen[q]
+        put_slopes(s.z[c], feels * s.mu[c], s.rim[c], s.kind[c], s.B[c])
+    assemble(s, weight, feels)
     for q in range(s.used_count):
         for k in range(6):
             s.change[6 * q + k] = -s.rest[s.used[q], k]
@@ -336,8 +393,11 @@ def try_pass(s: StepArrays, weight: float, merit: float) -> float:
 
 
 @compiled
-def assemble(s: StepArrays, weight: float) -> None:
-    """Put the matrix of a Newton pass, M + J^T weight r B J + D^T weight s D."""
+def assemble(s: StepArrays, weight: float, feels: float) -> None:
+    """Put the matrix of a Newton pass, M + J^T weight r B J + D^T weight s D.
+
+    feels: as of ``try_pass``.
+    """
     K = s.K
     for k in range(s.matrix_size):
         K[k] = 0.0
@@ -359,6 +419,8 @@ def assemble(s: StepArrays, weight: float) -> None:
                     row = s.place[s.bodies[c, other]]
                     if row >= 0:
                         add_contact(s, block_at(s, row, first), s.J[c], 6 * other, turned)
+        if s.kind[c] != CONE and feels > 0.0:
+            add_load(s, c, weight)
     for k in range(s.y.size):
         for p in range(s.row_start[k], s.row_start[k + 1]):
             for q in range(s.row_start[k], s.row_start[k + 1]):
@@ -368,6 +430,33 @@ def assemble(s: StepArrays, weight: float) -> None:
                     part = weight * s.s[k] * s.D[p, i]
                     for j in range(6):
                         K[at + j] += part * s.D[q, j]
+
+
+@compiled
+def add_load(s: StepArrays, c: int, weight: float) -> None:
+    """Add to K that friction of a joint which slides grows with the joint's load."""
+    k, z = s.key[c] - DECLARED, s.z[c]
+    first, whole = s.load_row[k], z[0] if s.kind[c] == WHOLE else 0.0
+    size, rim = math.sqrt(whole * whole + z[1] * z[1] + z[2] * z[2]), rim_of(s, c, s.pull)
+    if not 0.0 < rim < size:
+        return
+    for q in range(first, first + s.load_count[k]):
+        load = s.y_free[q] + s.pull[q]
+        if load < 0.0 and s.load_pushes[k] != 0:
+            continue
+        part = s.grip[k] * s.grip[k] * load / (rim * size) * weight * s.s[q]
+        for p in range(s.row_start[q], s.row_start[q + 1]):
+            for side in range(2):
+                b, rows = s.bodies[c, side], s.J[c]
+                if b == 0:
+                    continue
+                J = rows[6 * side :]
+                start = block_at(s, s.place[b], s.place[s.row_body[p]])
+                for i in range(6):
+                    along = part * (whole * J[i] + z[1] * J[12 + i] + z[2] * J[24 + i])
+                    at = start + i * s.width
+                    for j in range(6):
+                        s.K[at + j] += along * s.D[p, j]
 
 
 @compiled

@@ -4,15 +4,17 @@
 # mypy: disable-error-code="no-any-return"
 
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.integrators.moreau.arrays import StepArrays, step_arrays
+from dap3d_core.integrators.moreau.arrays import CONE, StepArrays, step_arrays
 from dap3d_core.integrators.moreau.gauss_seidel import refine_held, sweep_bodies
 from dap3d_core.integrators.moreau.groups import choose, find_groups, lay_out
 from dap3d_core.integrators.moreau.newton import (
     SMALL,
     TINY,
+    impulse_of,
     left_at,
     newton,
     put_velocities,
+    rim_of,
     times_inverse,
 )
 from dap3d_core.kernels.runtime.cache import compiled
@@ -95,7 +97,7 @@ def judge(s: StepArrays) -> float:
     largest = TINY
     for c in range(s.contact_count):
         s.left[c] = left_at(s, c, s.trial)
-        largest = max(largest, abs(s.x[c, 0]), abs(s.x[c, 1]), abs(s.x[c, 2]))
+        largest = max(largest, impulse_of(s, c))
     s.residual = 0.0
     for c in range(s.contact_count):
         s.left[c] /= largest
@@ -108,7 +110,9 @@ def sweep(s: StepArrays, sweeps: int, tolerance: float, relax: float) -> None:
     """Sweeps of Gauss-Seidel over all contacts."""
     m = s.contact_count
     put_velocities(s, s.v)
-    sweep_bodies(s.bodies, s.J, s.moved, s.own, s.bias[:m], s.mu[:m], s.x, s.v, sweeps,
+    for c in range(m):
+        s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.y)
+    sweep_bodies(s.bodies, s.J, s.moved, s.own, s.bias, s.kind, s.mu[:m], s.rim, s.x, s.v, sweeps,
                  0.1 * tolerance, relax)  # fmt: skip
 
 

@@ -11,8 +11,9 @@ convex, and without a bounce nothing is gained.
 import math
 
 from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.integrators.moreau.contact_set import velocity_of
+from dap3d_core.integrators.moreau.gauss_seidel import copy_impulses
 from dap3d_core.integrators.moreau.groups import find_groups, root_of
-from dap3d_core.integrators.moreau.newton import velocity_of
 from dap3d_core.integrators.moreau.problem import solve
 from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.runtime.cache import compiled
@@ -36,10 +37,9 @@ def limit_bounces(s: StepArrays, tolerance: float) -> bool:
         return True
     for b in range(s.v.shape[0]):
         copy(s.v_bounce[b], s.v[b])
+    copy_impulses(s.x, s.y, s.x_bounce, s.y_bounce, s.contact_count)
     for c in range(s.contact_count):
-        copy(s.x_bounce[c], s.x[c])
         s.bias[c] = 0.0 if s.collides[c] == BOUNCES else s.bias[c]
-    copy(s.y_bounce, s.y)
     if not solve(s, tolerance):
         return False
     put_work(s, WITHOUT, 0.0)

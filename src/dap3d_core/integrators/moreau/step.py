@@ -6,20 +6,26 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import System
-from dap3d_core.assembly.offsets import coordinate_offset, velocity_offset
-from dap3d_core.integrators.moreau.arrays import StepArrays
-from dap3d_core.integrators.moreau.contact_set import axes_of, evaluate_rows, find_contacts
+from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
+from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
+from dap3d_core.integrators.moreau.contact_set import (
+    axes_of,
+    evaluate_rows,
+    find_contacts,
+    find_grips,
+    velocity_of,
+)
 from dap3d_core.integrators.moreau.free_motion import move_freely
 from dap3d_core.integrators.moreau.groups import find_groups, root_of
 from dap3d_core.integrators.moreau.impulses import (
     complete_row,
     keep_for_reports,
+    let_slip,
     log_contacts,
     recall,
     remember,
 )
-from dap3d_core.integrators.moreau.newton import speed_of, velocity_of
+from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
 from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
 from dap3d_core.integrators.stepping.integration_state import (
@@ -33,6 +39,7 @@ from dap3d_core.integrators.stepping.integration_state import (
 from dap3d_core.integrators.stepping.output import may_step, project_state
 from dap3d_core.integrators.stepping.step_control import count_turns, end_of_step
 from dap3d_core.integrators.stepping.vector_ops import all_finite, copy
+from dap3d_core.interface.contacts.rows import FAR_APART
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -40,8 +47,10 @@ from dap3d_core.kernels.runtime.cache import compiled
 OVERLAP, PASSES = 1e-12, 8
 #: A contact collides where it approaches by more than this times h times the acceleration.
 COLLIDES = 4.0
-#: A part of the step where bodies are not hit.
-NOT_HIT = 2.0
+#: Parts of the step where bodies are not hit, and those of them that rest.
+NOT_HIT, RESTS = 2.0, 1.5
+#: Velocities of rest, as parts of what they would become without contacts.
+STILL = 1e-8
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
@@ -108,10 +117,13 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     take_velocities(y, n, s.before)
     take_velocities(trial, n, s.free)
     put_margins(s)
-    if not find_contacts(work.t, y, 1e300, s, system, loops):
+    if not find_contacts(work.t, y, FAR_APART, s, system, loops):
         return False
     if work.step_count == 0:
         work.overlap_at_start = deepest_of(s)
+        for c in range(s.touch_count):
+            if -s.gap[c] == work.overlap_at_start:
+                work.overlap_key = 1.0 * s.key[c]
     else:  # what the projection of the last step has left
         work.deepest = max(work.deepest, deepest_of(s))
     s.is_solved = s.met_count = 0
@@ -121,11 +133,16 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         return True
     if s.declared_gap.size == 0 and s.y.size > 0:
         evaluate_rows(work.t, y, s, system, loops)
-    prepare_problem(s)
     any_collides = put_bias(s)
+    if s.declared_law.size > 0:
+        find_grips(work.t, s, system, loops)
     recall(work, s)
-    if not solve(s, work.rtol):
-        return False
+    while True:
+        prepare_problem(s)
+        if not solve(s, work.rtol):
+            return False
+        if not let_slip(s):
+            break
     put_hits(s, any_collides)
     if any_collides and not limit_bounces(s, work.rtol):
         return False
@@ -135,26 +152,42 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         copy(s.end[b], s.v[b])
     remember(work, s)
     keep_for_reports(s)
-    trial[trial.size - 1] += work_done(work, s)
     for b in range(1, n + 1):
         c, d = coordinate_offset(b), s.trial[b]
-        if s.hit[b] <= 1.0:  # from where it was
+        if s.hit[b] > 1.0 and rests(s, b):
+            s.hit[b] = RESTS
+        if s.hit[b] < NOT_HIT:  # from where it was
             for k in range(7):
                 trial[c + k] = y[c + k]
         for k in range(6):
             d[k] = way_of(s, b, k)
         move(trial, c, d[0], d[1], d[2], d[3], d[4], d[5])
+    trial[trial.size - 1] += work_done(work, s)
     return True
 
 
 @compiled
 def way_of(s: StepArrays, b: int, k: int) -> float:
-    """How far a body goes by impulses; one that is hit, at all."""
+    """How far a body goes by impulses; one that is hit, or rests, at all."""
     before, free, end, first = s.before[b, k], s.free[b, k], s.end[b, k], s.hit[b]
     if first > 1.0:
-        return 0.5 * s.h * (end - free)
+        return 0.5 * s.h * (end - free if first == NOT_HIT else before + end)
     fall, last = s.flies[b] * (free - before), 1.0 - first
     return s.h * (first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall))
+
+
+@compiled
+def rests(s: StepArrays, b: int) -> bool:
+    """True of a body at rest that something would turn: turned and turned back it would creep.
+
+    By (h w)^3 / 12 in each step, by which Euler parameters that are made of unit length are off.
+    """
+    turn, v, w = 0.0, 0.0, 0.0
+    for k in range(3):
+        turn = max(turn, abs(s.free[b, 3 + k] - s.before[b, 3 + k]))
+        v = max(v, abs(s.before[b, k]), abs(s.end[b, k]))
+        w = max(w, abs(s.before[b, 3 + k]), abs(s.end[b, 3 + k]))
+    return turn > 0.0 and w <= STILL * turn and v <= STILL * turn * s.length
 
 
 @compiled
@@ -202,9 +235,11 @@ def put_bias(s: StepArrays) -> bool:
         for k in range(6):
             fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
     for c in range(s.contact_count):
+        s.collides[c], s.bias[c] = 0, max(s.gap[c], 0.0) / s.h
+        if s.kind[c] != CONE:
+            continue
         approach, _, _ = velocity_of(s, c, s.before)
         normal, _, _ = velocity_of(s, c, s.free)
-        s.collides[c], s.bias[c] = 0, max(s.gap[c], 0.0) / s.h
         if approach < -COLLIDES * fall and s.gap[c] + s.h * min(approach, normal) < 0.0:
             s.collides[c], found = STOPS, True
             s.closing[c] = closing_of(max(s.gap[c], 0.0), s.h * approach, s.h * (normal - approach))
@@ -247,28 +282,39 @@ def put_hits(s: StepArrays, any_collides: bool) -> None:
 
 @compiled
 def work_done(work: Any, s: StepArrays) -> float:
-    """Work of the impulses behind free motion, J; that of friction is added to the sum."""
-    total, rubbed = 0.0, 0.0
-    put_means(s, s.before)
-    for c in range(s.contact_count):
-        _, u1, u2 = velocity_of(s, c, s.trial)
-        rubbed += s.x[c, 1] * u1 + s.x[c, 2] * u2
-    work.friction_work += rubbed
-    put_means(s, s.free)
+    """Work of the impulses behind free motion, J; those of contacts are added to the sums.
+
+    An impulse acts at the mean of the velocities before and behind it; what moved bodies without
+    contacts does work along the way that impulses add, ``trial``.
+    """
+    total, given = 0.0, 0.0
+    for b in range(1, s.trial.shape[0]):
+        for k in range(6):
+            way = s.trial[b, k]
+            if s.hit[b] < NOT_HIT:
+                way -= 0.5 * s.h * (s.before[b, k] + s.free[b, k])
+            s.change[k], s.turned[k] = s.free[b, k] - s.before[b, k], way / s.h
+        total += product_of(s.change, s.turned, s.mass[b], s.spin[b])
+        if s.flies[b] == 0.0:
+            work.work_open += product_of(s.change, s.change, s.mass[b], s.spin[b])
+    for b in range(s.trial.shape[0]):
+        first = s.hit[b] if s.hit[b] <= 1.0 else 0.5
+        for k in range(6):
+            fall = (2.0 * first - 1.0) * (s.free[b, k] - s.before[b, k])
+            s.trial[b, k] = 0.5 * (s.before[b, k] + s.end[b, k] + fall)
     for c in range(s.contact_count):
         u0, u1, u2 = velocity_of(s, c, s.trial)
-        total += s.x[c, 0] * u0 + s.x[c, 1] * u1 + s.x[c, 2] * u2
+        pushed, rubbed = s.x[c, 0] * u0, s.x[c, 1] * u1 + s.x[c, 2] * u2
+        if s.kind[c] == WHOLE:
+            pushed, rubbed = 0.0, rubbed + pushed
+        given += pushed + rubbed
+        work.friction_work += rubbed
+    work.contact_work += given
+    work.work_given += max(given, 0.0)
+    total += given
     for k in range(s.y.size):
         total += s.y[k] * speed_of(s, k, s.trial)
     return total
-
-
-@compiled
-def put_means(s: StepArrays, v: Floats) -> None:
-    """Put the means of velocities v and those of the end into ``trial``."""
-    for b in range(v.shape[0]):
-        for k in range(6):
-            s.trial[b, k] = 0.5 * (v[b, k] + s.end[b, k])
 
 
 @compiled

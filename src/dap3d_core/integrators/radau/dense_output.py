@@ -14,9 +14,8 @@ held to (integration.py).
 
 from typing import Any
 
-from dap3d_core.assembly.arrays import VALUE, Floats, System
+from dap3d_core.assembly.arrays import VALUE, Floats, System, states_offset, velocity_offset
 from dap3d_core.assembly.evaluate import call_kinds, place_state, rates, zero
-from dap3d_core.assembly.offsets import states_offset, velocity_offset
 from dap3d_core.formulations.common.constraints import (
     PART,
     acceleration_residual,

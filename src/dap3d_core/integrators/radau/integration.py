@@ -18,10 +18,9 @@ from dap3d_core.formulations.stabilized_index2.jacobian_tables import (
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau import state as at
 from dap3d_core.integrators.radau.dense_output import dense_state, find_slope
-from dap3d_core.integrators.radau.error import estimate_error, find_work
+from dap3d_core.integrators.radau.error import estimate_error, find_work, measure_stage_noise
 from dap3d_core.integrators.radau.newton import factorise_both, find_stages, find_tangent
 from dap3d_core.integrators.radau.order import set_tolerances
-from dap3d_core.integrators.radau.rounding import measure_stage_noise
 from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.step import advance
 from dap3d_core.integrators.radau.tableau import FEWEST, MOST_STAGES, ORDERS, STAGES, radau_method
@@ -32,7 +31,7 @@ from dap3d_core.kernels.array_types import Integers
 from dap3d_core.kernels.compiler.types import FLOAT, Signature
 from dap3d_core.kernels.runtime.cache import table_of
 from dap3d_core.kernels.runtime.function_lists import LOOP_LIST, procedure_signature
-from dap3d_core.linear.lu.plan import LuPlan, StateNode, make_lu_plan
+from dap3d_core.linear.lu import LuPlan, StateNode, make_lu_plan
 from dap3d_core.linear.ordering.ordering import JointNode
 from dap3d_core.model import Model
 from dap3d_core.model.state_layout import COORDINATES, VELOCITIES

@@ -36,8 +36,7 @@ from dap3d_core.integrators.stepping.rounding import ROUNDINGS, SAMPLES, change_
 from dap3d_core.kernels.compiler.types import Table
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, MATRIX, Arrays
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.linear.lu.factor import factor_lu, solve_lu
-from dap3d_core.linear.lu.plan import StateNode, make_lu_plan
+from dap3d_core.linear.lu import StateNode, factor_lu, make_lu_plan, solve_lu
 
 #: Step of a difference, as part of a component's size: short against the depth of stiff contact
 #: and against v_tol of friction, whose bends it must not reach over.

@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import Floats, System
+from dap3d_core.assembly.arrays import Floats, System, velocity_offset
 from dap3d_core.assembly.evaluate import largest, place, zero
-from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.assembly.state_update import add_displacement, add_velocity
 from dap3d_core.formulations.common.constraints import linearise
 from dap3d_core.formulations.stabilized_index2.jacobian import BENT, Tangent, differentiate
@@ -42,7 +41,7 @@ from dap3d_core.integrators.radau.state import RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.integration_state import SCRATCH, Y
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.linear.lu.factor import factor_lu, solve_lu
+from dap3d_core.linear.lu import factor_lu, solve_lu
 
 EPSILON = 2.220446049250313e-16
 #: Iterations at most with 3 stages, more for each further two; more where the step is fixed, for

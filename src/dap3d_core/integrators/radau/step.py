@@ -15,9 +15,9 @@ from dap3d_core.formulations.stabilized_index2.jacobian import BENT, MAY_BEND, T
 from dap3d_core.formulations.stabilized_index2.stage_equations import StageMatrix
 from dap3d_core.integrators.radau.convergence import is_at_rounding
 from dap3d_core.integrators.radau.dense_output import dense_state, prepare_dense
+from dap3d_core.integrators.radau.error import bound_stage_noise
 from dap3d_core.integrators.radau.newton import SAME_STEP, method_index, most_iterations, predict
 from dap3d_core.integrators.radau.order import change_order, lower_order, raise_order
-from dap3d_core.integrators.radau.rounding import bound_stage_noise
 from dap3d_core.integrators.radau.state import OLD, OLD_SLOPE, SLOPE, TRIAL_SLOPE, RadauState
 from dap3d_core.integrators.radau.tableau import FEWEST
 from dap3d_core.integrators.stepping.event_location import (

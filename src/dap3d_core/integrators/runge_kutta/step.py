@@ -24,10 +24,14 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.integrators.runge_kutta.error import error_beyond_rounding, error_norm
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
 from dap3d_core.integrators.runge_kutta.stiffness import detect_stiffness
-from dap3d_core.integrators.runge_kutta.sums import ABSCISSA, combine
+from dap3d_core.integrators.runge_kutta.sums import (
+    ABSCISSA,
+    combine,
+    error_beyond_rounding,
+    error_norm,
+)
 from dap3d_core.integrators.stepping.event_location import (
     end_is_across,
     is_sample_across,

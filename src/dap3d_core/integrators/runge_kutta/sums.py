@@ -6,15 +6,19 @@ a table. Both add up in the same order, four terms at a time.
 """
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from dap3d_core.integrators.runge_kutta.dop853 import DOP853
-from dap3d_core.integrators.runge_kutta.dopri5 import DOPRI5
-from dap3d_core.integrators.runge_kutta.rk4 import RK4
+from dap3d_core.integrators.runge_kutta.dopri5 import DOPRI5, RK4
 from dap3d_core.integrators.runge_kutta.tableau import Tableau
+from dap3d_core.integrators.stepping.integration_state import OTHER, SCRATCH, TRIAL, Y
+from dap3d_core.integrators.stepping.step_control import EPSILON, combined_error, work_error
+from dap3d_core.integrators.stepping.vector_ops import scaled_beyond, scaled_largest
 from dap3d_core.kernels.array_types import Floats, SeparateFloats
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.kernels.scalar_math import where
 
 #: Terms that are added to each other before they are added to the rest.
 GROUP = 4
@@ -99,3 +103,41 @@ def combine_by_table(
             out[i] += w0 * k[j0, i] + w1 * k[j1, i] + w2 * k[j2, i] + w3 * k[j3, i]
     for i in range(out.size):
         out[i] = share * y[i] + h * out[i]
+
+
+@compiled
+def error_norm(work: Any, h: float) -> float:
+    """Largest scaled error of the first components; 1 is just good enough.
+
+    The largest, as in the manual's ode45, and not HNW's root mean square: in a scene of many bodies
+    the mean would hide the error of the one that moves. Two estimates are combined as in HNW II.5:
+    |e5|^2 / sqrt(|e5|^2 + 0.01 |e3|^2).
+    """
+    size, rtol, tolerance = work.error_size, work.rtol, work.tolerance
+    y, trial, error = work.state[Y], work.state[TRIAL], work.state[SCRATCH]
+    ratios = work.state[OTHER]
+    k, table, first = work.k, work.table, work.k.shape[0]
+    combine(error, 0.0, y, h, table, first, k)
+    main = scaled_largest(ratios, error, y, trial, size, rtol, tolerance, h)
+    of_work = work_error(work, h, error[error.size - 1])
+    if work.estimate_count == 1:
+        return where(of_work > main, of_work, main)
+    combine(error, 0.0, y, h, table, first + 1, k)
+    other = scaled_largest(ratios, error, y, trial, size, rtol, tolerance, h)
+    main = combined_error(main, other)
+    of_work = combined_error(of_work, work_error(work, h, error[error.size - 1]))
+    return where(of_work > main, of_work, main)
+
+
+@compiled
+def error_beyond_rounding(work: Any, h: float) -> float:
+    """As ``error_norm``, of what exceeds the rounding of time in the rates."""
+    size, rtol, tolerance = work.error_size, work.rtol, work.tolerance
+    y, trial, error = work.state[Y], work.state[TRIAL], work.state[SCRATCH]
+    k, first, last = work.k, work.k.shape[0], work.k[work.stage_count - 1]
+    main, rounding = 0.0, EPSILON * max(abs(work.t), abs(work.t + h))
+    for e in range(work.estimate_count):
+        combine(error, 0.0, y, h, work.table, first + e, k)
+        found = scaled_beyond(error, y, trial, k[0], last, rounding, size, rtol, tolerance)
+        main = found if e == 0 else combined_error(main, found)
+    return main

@@ -70,6 +70,8 @@ MAX_STALLS = 20
 #: The same until what is zero is taken to stay so: a slow passage, by less than a bit in such a
 #: step, leaves zero in one of them, of a millionth of a usual step.
 MAX_STALLS_AT_ZERO = 10
+#: A step this part of a usual one has been cut, and grows anew.
+CUT_SHORT = 1e-3
 #: Attempts in a row that may be cut because a cubic, and no sample, shows two crossings; and the
 #: error of the cubic, as a part of its drop: of a sine 5 % in a step of 1.5 rad, 20 % in one of 3.
 MAX_SUSPICIONS, CUBIC_ERROR = 8, 0.25
@@ -103,6 +105,8 @@ def next_length(
     short *= 2.0 ** min(work.stalled_steps, MAX_STALLS)
     if h > short or h == end - work.t:
         return h
+    if work.stalled_steps != 0 and work.fixed_step == 0.0:
+        longest = work.step_limit - work.t  # a usual step may be as short as the stalled ones
     h = min(min(longest, 2.0 * short), work.times[work.next_report] - work.t)
     bisect_crossing(work, h, end, slope, project, watch, system, loops)
     return 0.0
@@ -257,7 +261,8 @@ def update_switches_after_step(
         return
     stalled = 0
     for k in range(s.shape[1]):
-        is_stalled = (work.cut_attempts > 0) & (s[FOUND, k] == s[VALUE, k])
+        is_short = (work.cut_attempts > 0) | (h < CUT_SHORT * work.uncut_step)
+        is_stalled = is_short & (s[FOUND, k] == s[VALUE, k])
         approaches = (s[SIDE, k] * s[RATE, k] < 0.0) | (s[DOES, k] == JUMPS)  # or its rate is noise
         stalled |= is_stalled & approaches
         s[BEND, k] = (s[FOUND_RATE, k] - s[RATE, k]) / h
@@ -313,7 +318,10 @@ def bisect_crossing(
             stays = 1  # a step to a crossing that changes no digit of its switch
         if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0 and s[SIDE, k] != 0.0:
             stays = 1
-            if work.stalled_steps >= MAX_STALLS_AT_ZERO:
+            if work.stalled_steps >= MAX_STALLS_AT_ZERO and s[DOES, k] == JUMPS:
+                s[SIDE, k] = s[CROSSED, k] = -s[SIDE, k]  # what follows at zero, jumps decide
+                crossed = True
+            elif work.stalled_steps >= MAX_STALLS_AT_ZERO:
                 s[SIDE, k] = 0.0  # it stays zero: it has no side until it leaves
     if crossed:
         work.stalled_steps = 0
@@ -389,5 +397,5 @@ def record_crossings(work: IntegrationState, t: float) -> None:
 @compiled
 def reset_step_control(work: IntegrationState) -> None:
     """Let step-size control start anew: what follows is another motion."""
-    work.h, work.last_error = 0.0, 1e-4
+    work.h, work.uncut_step, work.last_error = 0.0, 0.0, 1e-4
     work.first_stage_valid = work.switch_rates_valid = work.last_rejected = 0

@@ -339,6 +339,11 @@ class Integration(Restorable):
         return float(self.work.t_stop)
 
     @property
+    def overlapping(self) -> str:
+        """Shapes that overlapped at the start, in words; or ""."""
+        return ""
+
+    @property
     def too_fast(self) -> str:
         """In words, what its steps cannot follow, which makes numbers overflow; "" for nothing."""
         return ""

@@ -104,6 +104,7 @@ class IntegrationState(Arrays):
     largest_work = _real()  # magnitude of the last component at an accepted state
     failed_error_rate = _real()  # error per length of the last step that failed
     t_attempted = _real()  # t when attempts were counted last (output.py)
+    uncut_step = _real()  # of adams: length of its steps, as switches have not cut them
     longest_step = _real()  # a setting
     # output of project, followed by the singularity measures
     projection_moved = _real()

@@ -138,4 +138,4 @@ def time_span(work: IntegrationState) -> float:
 @compiled
 def usual_step(work: IntegrationState) -> float:
     """The step without switches."""
-    return work.fixed_step if work.fixed_step != 0.0 else work.h
+    return work.fixed_step if work.fixed_step != 0.0 else max(work.h, work.uncut_step)

@@ -5,7 +5,7 @@ import math
 from dap3d_core.integrators.stepping.integration_state import ABSOLUTE, MOST, NOISE
 from dap3d_core.kernels.array_types import Floats, SeparateFloats
 from dap3d_core.kernels.runtime.cache import compiled
-from dap3d_core.kernels.scalar_math import where
+from dap3d_core.kernels.scalar_math import values_alone, where
 
 #: Larger numbers leave double precision in products such as m v^2: they end a run before an energy
 #: of it becomes infinite. What a scene may give has the same bound (validate/coerce_values.py).
@@ -48,6 +48,7 @@ def scaled_largest(
     What of x_i is rounding of a step h (rounding.py) is not counted, and the rest is compared with
     no less than that; atol_i is ``least`` or more. ``ratios`` is scratch.
     """
+    values_alone()
     for i in range(size):
         a, b = abs(y0[i]), abs(y1[i])
         atol = tolerance[ABSOLUTE, i]
@@ -72,6 +73,7 @@ def scaled_beyond(
 
     Close to a pole that excuses nothing.
     """
+    values_alone()
     largest, most = 0.0, 0.0
     for i in range(size):
         most = max(most, abs(y0[i]), abs(y1[i]))

@@ -4,14 +4,16 @@ import inspect
 from collections.abc import Callable
 from typing import Any
 
-from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, JUMP_NAMES, jump_lines
 from dap3d_core.interface.codegen.kernel_arguments import parameters
 from dap3d_core.interface.codegen.loop_source import (
+    JUMP_KINDS,
+    JUMP_NAMES,
     LOOP_KINDS,
     append,
     called_with,
     computes_rate,
     gathering_lines,
+    jump_lines,
     kernels_of,
     store,
     store_angle,

@@ -8,8 +8,7 @@ from typing import Any
 
 import attrs
 
-from dap3d_core.interface.element_states import state_shape
-from dap3d_core.interface.element_unknowns import unknown_names
+from dap3d_core.interface.element_states import state_shape, unknown_names
 from dap3d_core.interface.fields import SLOTS, slot_of, specs_of
 from dap3d_core.interface.types import TypeBase, acts_on_all
 

@@ -23,7 +23,7 @@ from dap3d_core.interface.codegen.loop_source import (
     store_angle,
 )
 from dap3d_core.interface.codegen.type_info import TypeInfo
-from dap3d_core.interface.element_unknowns import GREATEST, LEAST
+from dap3d_core.interface.element_states import GREATEST, LEAST
 from dap3d_core.interface.types import Joint
 from dap3d_core.kernels.eliminate_unknowns import eliminate, least_change, settled, solved
 from dap3d_core.kernels.runtime.loop_modules import Loop

@@ -243,7 +243,7 @@ def _kernels(class_: Any) -> dict[str, Callable[..., Any]]:
     if special:
         return {name: bound(kernel) for name, kernel in special.items()}
     return {
-        "C": bound(rows.position),
+        "C": bound(rows.position_within if "reach" in declared else rows.position),
         "J": bound(rows.blocks if has_j else rows.block),
         "gamma": bound(rows.gamma),
         "friction": bound(rows.friction if has_j else rows.friction_of_one),

@@ -11,14 +11,16 @@ given besides: of contacts that share what they carry, the one that all cones al
 
 from dap3d_core.kernels import add, cross, dot, neg, row, scale, sqrt, sub, where
 
-#: Modes of a contact.
-OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0
+#: Modes of a contact; in the last one, of time stepping, all rows hold as where it sticks.
+OPEN, SLIDES, STICKS, STEPPED = 0.0, 1.0, 2.0, 3.0
 #: Speed, m/s, below which friction points against the direction in which sliding began.
 STILL = 1e-8
 #: The same of friction in an ellipse, which turns slip all the way to its end.
 STILL_IN_ELLIPSE = 1e-10
 #: Gap, m, of what does not touch as its surfaces end before.
 APART = 1.0
+#: The same in time stepping, which leaves out what is as far apart.
+FAR_APART = 1e300
 _ZERO = (0.0, 0.0, 0.0)
 
 
@@ -70,6 +72,12 @@ def tangent_rates(n, n_dot, grain=None, grain_dot=None):
 def position(gap, mode):
     """C: the gap of a closed contact."""
     return where(closed(mode), gap, 0.0)
+
+
+def position_within(gap, reach, mode):
+    """The same of surfaces that end; in time stepping they are far apart beyond their ends."""
+    is_beyond = (mode > 0.5 * (STICKS + STEPPED)) & (reach < 0.0)
+    return where(is_beyond, FAR_APART, position(gap, mode))
 
 
 def blocks(c, n, grain, r_i, r_j, mode):

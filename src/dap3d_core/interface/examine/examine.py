@@ -15,7 +15,6 @@ from warnings import catch_warnings
 
 import attrs
 
-from dap3d_core.interface.body_pose import BodyPose
 from dap3d_core.interface.codegen import return_shapes
 from dap3d_core.interface.codegen.instance_layout import (
     InstanceLayout,
@@ -24,7 +23,6 @@ from dap3d_core.interface.codegen.instance_layout import (
     size,
     state_places,
 )
-from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, jump_names, row_count
 from dap3d_core.interface.codegen.kernel_arguments import (
     SLIP,
     VALUES,
@@ -35,11 +33,12 @@ from dap3d_core.interface.codegen.kernel_arguments import (
     namespace,
     parameters,
 )
+from dap3d_core.interface.codegen.loop_source import JUMP_KINDS, jump_names, row_count
 from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.codegen.return_shapes import ShapeError, checked_shape, value_at
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
-from dap3d_core.interface.element_unknowns import unknown_names
+from dap3d_core.interface.element_states import unknown_names
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
 from dap3d_core.interface.examine.random_values import (
     numbers,
@@ -48,7 +47,7 @@ from dap3d_core.interface.examine.random_values import (
     random_quantity,
 )
 from dap3d_core.interface.fields import SLOTS, sized_fields, slot_of, specs_of
-from dap3d_core.interface.types import SYMBOLS, Force, Function, Joint, TypeBase
+from dap3d_core.interface.types import SYMBOLS, BodyPose, Force, Function, Joint, TypeBase
 
 #: Random inputs a type may refuse, or be undefined for, before it counts as broken.
 ATTEMPTS = 200
@@ -117,7 +116,7 @@ def _bounds(type_: type[TypeBase]) -> dict[str, tuple[str, ...]]:
     """Output of the distances of unknowns from their bounds."""
     if not unknown_names(type_):
         return {}
-    from dap3d_core.interface.examine.check_unknowns import bound_count
+    from dap3d_core.interface.examine.check_states import bound_count
 
     return {"bound": tuple(f"out[{k}]" for k in range(bound_count(type_)))}
 
@@ -340,7 +339,7 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
         raise PluginError(f"{who} acts on no body; declare a field such as P_i: Point = point()")
     _check_fields(type_)
     if unknown_names(type_) or "G" in kernels:
-        from dap3d_core.interface.examine.check_unknowns import check_unknowns
+        from dap3d_core.interface.examine.check_states import check_unknowns
 
         check_unknowns(type_)
     _check_members(type_)

@@ -4,13 +4,13 @@ import math
 import random
 from typing import Any
 
-from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.codegen.kernel_arguments import (
     PARTIALS,
     SEVERAL,
     KernelArgument,
 )
 from dap3d_core.interface.fields import FieldSpec
+from dap3d_core.interface.types import BodyPose, pose
 
 
 def numbers(rng: random.Random, n: int) -> tuple[float, ...]:

@@ -36,6 +36,7 @@ from dap3d_core.interface.formats.joint_inertia import LEAST, JointInertia
 from dap3d_core.interface.formats.joint_motion import held
 from dap3d_core.interface.formats.remarks import NOWHERE, FormatError, Place, Remark, Remarks
 from dap3d_core.interface.formats.solids import (
+    balanced_inertia,
     inertia_moved,
     inertia_of_mesh,
     inertia_of_solid,
@@ -74,6 +75,7 @@ __all__ = [
     "Tendon",
     "XmlElement",
     "axis_angle",
+    "balanced_inertia",
     "euler_angles",
     "from_quaternion",
     "held",

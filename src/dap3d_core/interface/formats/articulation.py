@@ -64,6 +64,7 @@ class Geometry:
         collision: True for the shape of contacts, which is drawn where a link has no other.
         contact: how it meets others, where contacts are imported; None if it does not.
         place: its place in the file.
+        name: its name in the file, or "".
     """
 
     kind: str
@@ -75,6 +76,7 @@ class Geometry:
     collision: bool = False
     contact: "Contact | None" = None
     place: Place = NOWHERE
+    name: str = ""
 
 
 @attrs.frozen
@@ -88,6 +90,7 @@ class Contact:
             in common.
         priority: of a pair the one with the larger decides alone.
         e: coefficient of restitution.
+        surface: a name where ``Articulation.friction`` has its friction with some others, or "".
     """
 
     mu: float = 1.0
@@ -96,6 +99,7 @@ class Contact:
     meets: int = 1
     priority: int = 0
     e: float = 0.0
+    surface: str = ""
 
 
 @attrs.define(eq=False)
@@ -259,11 +263,11 @@ class Actuator:
 
 @attrs.frozen(eq=False)
 class Tendon:
-    """A straight line between points of two links, with a spring, a damper and limits.
+    """A line from point to point of links, with a spring, a damper and limits of its length.
 
     Attributes:
         name: its name in the file.
-        ends: two links, and the points in their axes, (3,) each.
+        points: links, and the points in their axes, (3,) each.
         stiffness, damping: N/m, N s/m.
         rest: the length without force, m.
         limits: of its length, m.
@@ -271,7 +275,7 @@ class Tendon:
     """
 
     name: str
-    ends: tuple[tuple[str, Floats], tuple[str, Floats]]
+    points: tuple[tuple[str, Floats], ...]
     stiffness: float = 0.0
     damping: float = 0.0
     rest: float = 0.0
@@ -291,6 +295,7 @@ class Articulation:
         base_meets: whether links meet those that do not move and that a joint holds them at.
         coefficient_of_pair: friction and restitution of two shapes that meet, of those of both: max
             or min.
+        friction: of two surfaces, for pairs that do not take it of both.
         gravity: (3,) m/s^2.
         fixed_base: whether links without a joint to a parent are fixed to the world, rather than
             free; None where the format leaves it open.
@@ -307,6 +312,7 @@ class Articulation:
     excluded: list[tuple[str, str]] = attrs.Factory(list)
     base_meets: bool = False
     coefficient_of_pair: Callable[[float, float], float] = max
+    friction: dict[frozenset[str], float] = attrs.Factory(dict)
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     fixed_base: bool | None = None
     place: Place = NOWHERE

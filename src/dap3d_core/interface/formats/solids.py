@@ -103,6 +103,27 @@ def inertia_moved(inertial: Inertial, frame: Frame) -> Inertial:
     return Inertial(inertial.mass, com, frame.A @ inertial.inertia @ frame.A.T)
 
 
+def balanced_inertia(inertia: Floats) -> Floats:
+    """The mean of principal moments that no body has, for all three, as MuJoCo balances them."""
+    least, middle, most = np.linalg.eigvalsh(inertia).tolist()
+    if least + middle >= most:
+        return inertia
+    return (least + middle + most) / 3.0 * np.eye(3)
+
+
+def nearest_inertia(inertia: Floats) -> Floats:
+    """The nearest matrix (3, 3) that is the inertia of a body, by Frobenius' norm of S below.
+
+    S = tr(J) / 2 1 - J holds the second moments of the mass, none of which is negative: those that
+    are count as zero. So a largest principal moment stays, and of the others each gains half of
+    what their sum lacks.
+    """
+    moments, axes = np.linalg.eigh(0.5 * (inertia + inertia.T))
+    second = np.maximum(moments.sum() / 2.0 - moments, 0.0)
+    nearest: Floats = axes @ np.diag(second.sum() - second) @ axes.T
+    return nearest
+
+
 def total_inertia(parts: Iterable[Inertial]) -> Inertial:
     """Mass, mass centre and inertia of parts in the same axes, by Steiner's theorem."""
     listed = list(parts)

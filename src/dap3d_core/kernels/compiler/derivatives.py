@@ -8,7 +8,9 @@ function has no derivative, slopes are zero where they would be infinite, and el
 that is computed.
 
 Code may say what differentiation by instructions does not know (``with_slopes``,
-``is_differentiated`` of intrinsics.py): both are lines with a remark.
+``is_differentiated``, ``values_alone`` of intrinsics.py): these are lines with a remark.
+
+Sums of products of slopes may be fused (``contract``), as what gives lane 0 may not.
 
 The text is that of this compiler (writer.py, functions.py, trace.py), one instruction a line.
 Source: A. Griewank, A. Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 3.
@@ -19,10 +21,12 @@ from collections.abc import Callable
 
 from dap3d_core.kernels.compiler.lanes import CALL, NUMBER, VectorWriter, rewritten
 from dap3d_core.kernels.compiler.types import CompileError, bits
-from dap3d_core.kernels.compiler.writer import DIFFERENTIATED, SLOPES
+from dap3d_core.kernels.compiler.writer import DIFFERENTIATED, SLOPES, VALUES
 
 _BINARY = re.compile(r"(fmul|fdiv) double (\S+), (\S+)")
 _COMPARED = re.compile(r"fcmp (\w+) double (\S+), (\S+)")
+_OPERANDS = re.compile(r"(?:f(?:add|sub|mul|div|neg)|select i1|call) .*double.*")
+_NAMED = re.compile(r"(?<=double )%[\w.]+|(?<=, )%[\w.]+")
 _JOINED = re.compile(rf"select i1 true, double (\S+), double (\S+) {SLOPES}")
 _ZERO, _ONE = bits(0.0), bits(1.0)
 #: Of functions that derivatives call.
@@ -40,7 +44,7 @@ class _Differentiator(VectorWriter):
         self._first = f"<{count} x i32> <{', '.join(['i32 0', *others])}>"
         self._zeros = f"<{count} x i32> zeroinitializer"
         self._out: list[str] = []
-        self._name, self._parts = "", 0
+        self._name, self._parts, self._has_slopes = "", 0, True
 
     def constant(self, word: str) -> str:
         """A number without slopes."""
@@ -48,13 +52,18 @@ class _Differentiator(VectorWriter):
 
     def special(self, name: str, text: str) -> list[str] | None:
         """As of ``VectorWriter``."""
-        if "double" not in text and not text.endswith(DIFFERENTIATED):
+        if "double" not in text and not text.endswith((DIFFERENTIATED, VALUES)):
             return None
         self._out, self._name, self._parts = [], name, 0
         return self._out if self._has_written(text) else None
 
     def _has_written(self, text: str) -> bool:
-        if found := _BINARY.fullmatch(text):
+        if text.endswith(VALUES):
+            self._has_slopes = False
+            self._out.append(f"  {self._name} = {text}")
+        elif not self._has_slopes and self._has_written_value(text):
+            pass
+        elif found := _BINARY.fullmatch(text):
             operation, a, b = found.groups()
             write = self._product if operation == "fmul" else self._quotient
             write(a, b)
@@ -75,6 +84,17 @@ class _Differentiator(VectorWriter):
             self._function(found[1], [a.split()[-1] for a in found[2].split(", ")], text, found[2])
         else:
             return False
+        return True
+
+    def _has_written_value(self, text: str) -> bool:
+        """As ``_has_written``, where no number has slopes."""
+        if text.startswith("load double, "):
+            self._finish(self._new(text))
+            return True
+        found = CALL.match(text)
+        if not _OPERANDS.fullmatch(text) or (found and not self._is_of_numbers(found[1])):
+            return False
+        self._finish(self._new(_NAMED.sub(lambda word: self._value(word[0]), text)))
         return True
 
     def _is_of_numbers(self, function: str) -> bool:
@@ -140,8 +160,9 @@ class _Differentiator(VectorWriter):
             a, b = (self._splat(x) if NUMBER.fullmatch(x) else x for x in (a, b))
             self._out.append(f"  {self._name} = fmul {self.vector} {a}, {b}")
             return
-        one, other = self._wide("fmul", self._splat(a), b), self._wide("fmul", a, self._splat(b))
-        self._out.append(self._join(one, self._wide("fadd", one, other)))
+        one = self._wide("fmul", self._splat(a), b)
+        other = self._wide("fmul contract", a, self._splat(b))
+        self._out.append(self._join(one, self._wide("fadd contract", one, other)))
 
     def _quotient(self, a: str, b: str) -> None:
         """(a / b)' = (a' - (a / b) b') / b."""
@@ -155,8 +176,8 @@ class _Differentiator(VectorWriter):
             self._number("fdiv", _ONE, divisor),
         )
         first = self._new(f"insertelement {self.vector} undef, double {value}, i32 0")
-        part = self._wide("fmul", self._splat(first), b)
-        rest = self._wide("fsub", self._word(a), part)
+        part = self._wide("fmul contract", self._splat(first), b)
+        rest = self._wide("fsub contract", self._word(a), part)
         first = self._new(f"insertelement {self.vector} undef, double {over}, i32 0")
         self._finish(value, self._wide("fmul", rest, self._splat(first)))
 

@@ -9,7 +9,14 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.kernels.compiler import types as t
-from dap3d_core.kernels.compiler.writer import DIFFERENTIATED, EXACT, LIBRARY, SLOPES, Writer
+from dap3d_core.kernels.compiler.writer import (
+    DIFFERENTIATED,
+    EXACT,
+    LIBRARY,
+    SLOPES,
+    VALUES,
+    Writer,
+)
 
 #: Python functions by the name of their compiled form.
 KNOWN: dict[Any, str] = {
@@ -92,6 +99,10 @@ def _with_slopes(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
     return w.emit(t.FLOAT, f"select i1 true, double {x}, double {source} {SLOPES}")
 
 
+def _values_alone(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
+    return w.emit(t.BOOL, f"and i1 false, false {VALUES}")
+
+
 def _is_differentiated(w: Writer, node: ast.Call, values: list[t.Value]) -> t.Value:
     return w.emit(t.BOOL, f"and i1 false, false {DIFFERENTIATED}")
 
@@ -108,4 +119,5 @@ FORMS: dict[str, Form] = {
     "complex": _complex, "integer ceil": _ceil, "abs": _abs, "sign": _sign,
     "min": _extreme(ast.Lt()), "max": _extreme(ast.Gt()), "pointer": _pointer,
     "where": _where, "with_slopes": _with_slopes, "is_differentiated": _is_differentiated,
+    "values_alone": _values_alone,
 }  # fmt: skip

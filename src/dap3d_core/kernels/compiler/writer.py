@@ -15,7 +15,7 @@ EXACT = ("sqrt", "fabs", "floor", "ceil", "rint")
 LIBRARY = ("sin", "cos", "tan", "sinh", "cosh", "tanh", "exp", "log", "asin", "acos", "atan",
            "atan2", "pow", "hypot", "nextafter")  # fmt: skip
 #: Remarks on lines that mean more where a program is differentiated (derivatives.py).
-SLOPES, DIFFERENTIATED = "; slopes", "; differentiated"
+SLOPES, DIFFERENTIATED, VALUES = "; slopes", "; differentiated", "; values alone"
 
 
 class Writer:

@@ -24,8 +24,13 @@ from dap3d_core.kernels.compiler.units import Entry, Unit
 from dap3d_core.kernels.runtime import generated_modules, loop_support
 from dap3d_core.kernels.runtime.cache import cache_folder, jit_is_on, names_of
 from dap3d_core.kernels.runtime.function_lists import LOOP, LoopArrays
-from dap3d_core.kernels.runtime.outer_references import refuse_outer_references
-from dap3d_core.kernels.runtime.source_digest import places, reached, sources, sources_of
+from dap3d_core.kernels.runtime.source_digest import (
+    places,
+    reached,
+    refuse_outer_references,
+    sources,
+    sources_of,
+)
 
 #: Functions that the text of loops calls.
 _SUPPORT = (loop_support.vector_at, loop_support.matrix_at, loop_support.unwound,

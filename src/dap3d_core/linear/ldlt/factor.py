@@ -21,7 +21,7 @@ from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.linear.ldlt.panels import factor_panel, solve_panel_backwards, solve_panel_forwards
 from dap3d_core.linear.ldlt.plan import COPY, DIAGONAL, PRODUCTS, TRANSPOSE
-from dap3d_core.linear.ordering.supernodes import LEAST_ROWS
+from dap3d_core.linear.ordering.ordering import LEAST_ROWS
 
 #: Pivots are squares of lengths. Near a singular pose one is a hundredth in length of what it was
 #: at the start, and the product of its node has fallen by as much: to LESS at least, where others

@@ -74,7 +74,7 @@ def order_nodes(
 
     found = eliminated(None)
     if found.widest > WIDE:
-        from dap3d_core.linear.ordering.supernodes import with_panels
+        from dap3d_core.linear.ordering.ordering import with_panels
 
         other = eliminated(dissect(_neighbours(nodes, of_body, early, hubs), size))
         found = with_panels(min(found, other, key=lambda ordering: ordering.work))

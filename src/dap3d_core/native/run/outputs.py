@@ -14,7 +14,6 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.motion.joint_motion import ROTATION, TRANSLATION
-from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.interface.fields import SLOTS, specs_of
@@ -25,13 +24,14 @@ from dap3d_core.model.joint_angles import joint_angle_name
 from dap3d_core.model.state_layout import COORDINATES, VELOCITIES
 from dap3d_core.native.run.elements import Element, Elements
 from dap3d_core.native.run.prepared import PreparedRun, refusal
-from dap3d_core.result import Result, ResultError, RunMetadata
+from dap3d_core.result import Result, ResultError
 from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.quantities.catalogue import ACTIONS
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.scene.expressions.expression import WORDS
 from dap3d_core.simulation.control.state_view import NAMES, conjugate, product
+from dap3d_core.simulation.output.check_outputs import instant_of
 
 #: Quantities of a body that an export without outputs has.
 OF_BODIES = ("r", "p", "rd", "w")
@@ -141,12 +141,8 @@ def outputs_of(prepared: PreparedRun, names: Sequence[str] | None) -> Outputs:
 @IGNORE_FLOAT_ERRORS
 def _first_row(prepared: PreparedRun) -> Result:
     """The result of the start alone, for names, units and components."""
-    evaluator, y = prepared.evaluator, prepared.run.present.work.state[Y]
-    out = np.zeros(evaluator.report_size)
-    evaluator.functions[REPORT](0.0, y, out, evaluator.system, evaluator.loops)
-    row = np.concatenate([[0.0], evaluator.body_state(y), out])[None]
-    record = RunMetadata(scene_text=prepared.compiled.scene_text)
-    return Result.of_run(evaluator.model, evaluator.with_inputs(row), record, lambda: evaluator)
+    y, text = prepared.run.present.work.state[Y], prepared.compiled.scene_text
+    return instant_of(text, prepared.evaluator, 0.0, y)
 
 
 class _Quantities:

@@ -10,6 +10,7 @@ from typing import Any
 
 import attrs
 import numpy as np
+from numpy.typing import NDArray
 
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS
 from dap3d_core.integrators.stepping import integration_state as at
@@ -23,7 +24,7 @@ from dap3d_core.study.parameters import SceneParameter, with_values
 #: Factors on a parameter by which its places in the memory are found, and summands where it is 0.
 TRIALS = (1.001, 0.9975)
 #: What follows from other numbers at the start of a run.
-DERIVED = frozenset(("metric", "smallest", "F", "start"))
+DERIVED = frozenset(("metric", "smallest", "F", "start", "0.mass_inverse", "0.Jp_inverse"))
 #: Two corrections of a start agree to this part of the length of the scene.
 ALIKE = 1e-9
 
@@ -115,6 +116,8 @@ def _words(
         for one in theirs:
             moved |= (one != mine) & ~((one != one) & (mine != mine))
         if name in DERIVED:
+            if name == "0.Jp_inverse" and not _are_principal(mine, moved):
+                return None, derived
             derived |= {name} if moved.any() else set()
             continue
         for k in np.flatnonzero(moved).tolist():
@@ -126,6 +129,12 @@ def _words(
             found[prepared.image.at(array) + int(places[k])] = sign
     can_derive = prepared.start is not None or not derived
     return (found or None) if can_derive else None, derived
+
+
+def _are_principal(matrices: Floats, moved: NDArray[np.bool_]) -> bool:
+    """True if the matrices (9 numbers each) that moved are diagonal: their inverses are, too."""
+    own = matrices.reshape(-1, 3, 3)[moved.reshape(-1, 9).any(axis=1)]
+    return not np.any(own * (1.0 - np.eye(3)))
 
 
 def _numbers(prepared: PreparedRun) -> Iterator[tuple[str, Any, Any]]:

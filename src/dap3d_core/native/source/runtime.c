@@ -426,6 +426,16 @@ static void weigh(dap3d_model *m, int b)
     k[3] = 0.0 - (d * k[1] + f * k[2]) * k[6];
 }
 
+#if STEPS_CONTACTS
+/* Inverses of mass and principal moments of inertia of a body, for steps of contacts. */
+static void invert(dap3d_model *m, int b)
+{
+    numbers(m, MASS_INVERSE)[b] = 1.0 / numbers(m, MASS)[b];
+    for (int k = 9 * b; k < 9 * b + 9; k += 4)
+        numbers(m, JP_INVERSE)[k] = 1.0 / numbers(m, JP)[k];
+}
+#endif
+
 /* The state that the scene gives. */
 static void take_given(dap3d_model *m, double *y)
 {
@@ -466,8 +476,12 @@ static int find_start(dap3d_model *m)
             return 0;
     }
     for (size_t n = 0; n < sizeof heavy / sizeof *heavy; n++)
-        if (heavy[n] > 0)
+        if (heavy[n] > 0) {
             weigh(m, heavy[n]);
+#if STEPS_CONTACTS
+            invert(m, heavy[n]);
+#endif
+        }
     table_call(m, BEGIN, 0.0, y, none, 0);
     for (int n = 1; n < INTEGRATIONS; n++)
         memcpy(numbers(m, integrations[n].state), y, 8 * STATES);

@@ -15,7 +15,7 @@ from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result import UnknownNameError
 from dap3d_core.result.file.schema import SWEEP
 from dap3d_core.study import REDUCTIONS, PointStatus
-from dap3d_core.study.sweep.subsample import at_places, evenly
+from dap3d_core.study.sweep.dataset import at_places, evenly
 
 if TYPE_CHECKING:
     import xarray

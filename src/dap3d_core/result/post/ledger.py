@@ -9,6 +9,8 @@ larger ones. Drift is not accuracy: a small entry does not prove a right result,
 a wrong one.
 """
 
+from collections.abc import Mapping
+
 import attrs
 import numpy as np
 
@@ -34,6 +36,9 @@ PROJECTED = 1e-10
 SOLVED = 1e-9
 #: Roundings in the reactions of a solution, as a part of them: its backward error.
 BACKWARD = 10.0 * float(np.finfo(float).eps)
+#: A residual of stepped contacts, as a part of the largest impulse, and an overlap, as a part of
+#: the length of the scene.
+UNSOLVED = 1e-3
 #: Scales are not zero.
 SMALLEST = float(np.finfo(float).tiny)
 #: Deviation of normalised Euler parameters from unit length.
@@ -148,7 +153,8 @@ def ledger_of(summary: ModelSummary, arrays: Arrays, record: RunMetadata) -> dic
     """All entries of a run, by name; none for a run without reported instants.
 
     Names: energy (unless the work is defined by it, as in kinematics); total energy (where
-    potentials alone do work); momentum (where nothing outside acts on the bodies); position,
+    potentials, and contacts that are stepped, alone do work); residual, overlap and contact work of
+    contacts that are stepped; momentum (where nothing outside acts on the bodies); position,
     velocity, acceleration; quaternion.
     """
     if not len(arrays):
@@ -160,13 +166,40 @@ def ledger_of(summary: ModelSummary, arrays: Arrays, record: RunMetadata) -> dic
         change = (kinetic - kinetic[0]) - (work - work[0])
         what = "change of kinetic energy less work of forces and drivers"
         entries["energy"] = _energy(summary, course, record, change, what)
-    if summary.has_potential and _is_conservative(summary, course, record):
+    if stepping := record.stepping:
+        entries |= _contacts(summary, course, record, stepping)
+    elif summary.has_potential and _is_conservative(summary, course, record):
         what = "change of kinetic and potential energy"
         entries["total energy"] = _energy(summary, course, record, total - total[0], what)
     if summary.is_isolated:
         entries["momentum"] = _momentum(summary, course, record)
     entries |= _constraints(summary, course, record)
     entries["quaternion"] = _quaternion(course, record)
+    return entries
+
+
+def _contacts(
+    summary: ModelSummary, course: LedgerSeries, record: RunMetadata, found: Mapping[str, float]
+) -> dict[str, Entry]:
+    """What is left of contacts that are stepped, and of energy with what they take.
+
+    Positions are moved by other rules than velocities, and so work is compared with potentials. By
+    their laws contacts take energy in each step. Bodies that stop are moved by what they have
+    behind it: twice what free motion would do by its change of velocity meanwhile is allowed for.
+    """
+    took, rubbed = found["contact_work"], found["friction_work"]
+    words = f"work of friction {rubbed:.6g} J, of impacts {took - rubbed:.6g} J; that gained"
+    at_end = np.zeros_like(course.t)
+    at_end[-1] = 1.0
+    entries = {
+        "residual": _entry(found["largest_residual"], UNSOLVED, "1", "of the largest impulse"),
+        "overlap": _entry(found["deepest"], UNSOLVED * record.length, "m", "at ends of steps"),
+        "contact work": _energy(summary, course, record, found["work_given"] * at_end, words),
+    }
+    if summary.has_potential and record.settings.get("conservative") and record.status == "done":
+        total = course.kinetic + course.potential_energy
+        change, what = (total[-1] - total[0] - took) * at_end, "change of energy less their work"
+        entries["total energy"] = _energy(summary, course, record, change, what)
     return entries
 
 
@@ -234,6 +267,7 @@ def _energy(
     absolute = float(np.max(floors["v"] * course.speed + floors["w"] * course.spin))
     allowed = _relative_limit(record) * (scale + absolute) + _rounding_of_rates(course, record)
     allowed += _rounding_at_rest(summary, course, record)
+    allowed += record.stepping.get("work_open", 0.0)
     return _entry(worst / scale, min(allowed / scale, MOST), "1", text)
 
 

@@ -7,7 +7,14 @@ from typing import Any
 import attrs
 
 from dap3d_core.scene.errors import MISSING, Key
-from dap3d_core.scene.expressions.expression import Expression, fault_of_word, read_expression
+from dap3d_core.scene.expressions.expression import (
+    Call,
+    Expression,
+    ExpressionError,
+    Node,
+    fault_of_word,
+    read_expression,
+)
 from dap3d_core.scene.tables import SceneTables, fault_of_name
 from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
@@ -111,3 +118,44 @@ def _in_order(report: Collector, expressions: Mapping[str, Expression]) -> dict[
             what = f"outputs name one another in a chain of more than {LONGEST_CHAIN}"
             report.add(("outputs", name), expressions[name].text, what)
     return {name: expressions[name] for name in order}
+
+
+def read_condition(report: Collector, key: Key, value: Any) -> Expression | None:
+    """The condition of a key of a scene; None where a mistake is reported."""
+    expression: Expression | Fault = report.read(key, value, read_expression)
+    if isinstance(expression, Fault):
+        return None
+    try:
+        margin(expression.root)
+    except ExpressionError as error:
+        report.add(key, value, error.fault.what, remedy=error.fault.remedy)
+        return None
+    return expression.with_numbers(parameters_of(report))
+
+
+def margin(node: Node) -> Node:
+    """A number that is positive where a condition holds, and passes zero where it begins or ends.
+
+    b - a of a < b, the least of conditions that all hold, the largest of which one does.
+
+    Raises:
+        ExpressionError: it compares by == or !=, which hold or fail for an instant alone.
+    """
+    if not isinstance(node, Call):
+        return node
+    a, *others = node.arguments
+    match node.word:
+        case "<" | "<=":
+            return Call("-", (others[0], a))
+        case ">" | ">=":
+            return Call("-", (a, others[0]))
+        case "not":
+            return Call("neg", (margin(a),))
+        case "and":
+            return Call("minimum", (margin(a), margin(others[0])))
+        case "or":
+            return Call("maximum", (margin(a), margin(others[0])))
+        case "==" | "!=":
+            what = f"compares by {node.word}, which changes for an instant alone"
+            raise ExpressionError(what, "compare by <, <=, > or >=")
+    return node

@@ -30,6 +30,8 @@ def read_mesh(path: Path, name: str) -> Arrays | str:
         if len(data) > LARGEST_MESH:
             return f"{name} has more than {LARGEST_MESH >> 20} MiB; save fewer triangles, or binary"
         kind = path.suffix[1:].lower()
+        if kind == "msh":
+            return _checked(*_counted(data), name)
         whole = _without_groups(data) if kind == "obj" else _one_solid(data)
         # from memory: materials, which are other files, are not read
         with np.errstate(all="ignore"):  # numbers are judged below
@@ -40,10 +42,34 @@ def read_mesh(path: Path, name: str) -> Arrays | str:
         triangles = np.asarray(mesh.faces, dtype=np.int64)
     except Exception as error:  # a broken file makes a reader fail in any way
         return f"{name} cannot be read: {error or type(error).__name__}"
+    return _checked(vertices, triangles, name)
+
+
+def _checked(vertices: Any, triangles: Any, name: str) -> Arrays | str:
+    """The arrays of a file, or what is wrong with them."""
     if not len(triangles):
         return f"{name} holds no triangles; is it a mesh?"
     if not np.all(np.isfinite(vertices)):
         return f"{name} holds no numbers"
+    return vertices, triangles
+
+
+def _counted(data: bytes) -> tuple[Any, Any]:
+    """Vertices and triangles of MuJoCo's own format of meshes.
+
+    Four numbers of vertices, normals, texture coordinates and triangles, and then these.
+
+    Raises:
+        ValueError: it has another length, or names other vertices.
+    """
+    counts = [int(n) for n in np.frombuffer(data, "<i4", 4)]
+    ends = np.cumsum([16, *(4 * n * size for n, size in zip(counts, (3, 3, 2, 3), strict=True))])
+    if min(counts) < 0 or ends[-1] != len(data):
+        raise ValueError("its length is not that of its numbers")
+    vertices = np.frombuffer(data[16 : ends[1]], "<f4").astype(np.float64).reshape(-1, 3)
+    triangles = np.frombuffer(data[ends[3] :], "<i4").astype(np.int64).reshape(-1, 3)
+    if triangles.size and not 0 <= triangles.min() <= triangles.max() < len(vertices):
+        raise ValueError("a triangle names no vertex")
     return vertices, triangles
 
 

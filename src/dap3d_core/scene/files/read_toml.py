@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from dap3d_core.registry.arguments import checked
+from dap3d_core.registry.regular_files import read_regular
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene.coerce import canonical, entry_of, keys_of, plain, with_identifiers
 from dap3d_core.scene.contacts.tables import Collisions
 from dap3d_core.scene.errors import MISSING, Key, MistakeList, SceneError, dotted, file_error
-from dap3d_core.scene.files.text_file import read_text, unreadable
 from dap3d_core.scene.scene import Scene
 from dap3d_core.scene.tables import (
     HEADER_KEYS,
@@ -38,6 +38,9 @@ _LONG_KEY = re.compile(
 )
 #: Maximal nesting of tables and lists; a scene needs five levels.
 DEEPEST = 50
+
+#: The first bytes of HDF5 files, and so of results.
+HDF5 = b"\x89HDF"
 
 
 @checked
@@ -352,3 +355,37 @@ def _no_scene_in(path: Path, models: dict[str, Path]) -> SceneError:
     others = sorted(f.name for f in path.glob("*.toml"))
     remedy = f"it holds {', '.join(others[:5])}; give that file" if others else ""
     return file_error(path, f"the folder has no {SCENE_FILE}", remedy=remedy)
+
+
+def read_text(path: Path, largest: int, remedy: str = "save it as UTF-8") -> str:
+    """The text of a file of at most ``largest`` bytes, without a byte order mark.
+
+    Raises:
+        SceneError: it is too large, no regular file or no text; ``remedy`` is for other encodings.
+    """
+    try:
+        info = path.stat()
+        if not stat.S_ISREG(info.st_mode):
+            raise file_error(path, "is not a regular file")
+        if info.st_size > largest:
+            size, most = info.st_size / 2**20, largest >> 20
+            what = f"has {size:.{0 if most > 1 else 1}f} MiB; at most {most} MiB are read"
+            raise file_error(path, what, remedy="build a scene of this size with a script")
+        data = read_regular(path, largest)
+    except OSError as error:
+        raise unreadable(path, error) from None
+    if b"\0" in data:
+        hint = "it may be a result: dap3d info describes it" if data.startswith(HDF5) else ""
+        raise file_error(path, "is not a text file: it holds NUL bytes", remedy=hint)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        what = f"is not UTF-8 text: byte {error.object[error.start]:#04x} cannot be read"
+        raise file_error(path, what, line=line, remedy=remedy) from None
+
+
+def unreadable(path: Path, error: Exception) -> Exception:
+    """The error for a file or folder that the system does not read."""
+    reason = getattr(error, "strerror", None) or error
+    return file_error(path, f"cannot be read: {reason}")

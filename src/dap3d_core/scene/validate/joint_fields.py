@@ -162,7 +162,7 @@ def read_releases(
             continue
         joint.breaks_at = float(value)
         if ACTIVE in fields:
-            from dap3d_core.scene.expressions.condition import read_condition
+            from dap3d_core.scene.expressions.outputs import read_condition
 
             joint.active = read_condition(report, ("joints", joint.name, ACTIVE), fields[ACTIVE])
 

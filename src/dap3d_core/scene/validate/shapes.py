@@ -29,7 +29,7 @@ from dap3d_core.scene.validate.geometry import BAD, body_index_of
 from dap3d_core.scene.validate.mistake_collector import Collector
 
 #: Suffixes of mesh files.
-MESHES = (".obj", ".stl")
+MESHES = (".obj", ".stl", ".msh")
 
 
 @attrs.frozen
@@ -82,6 +82,14 @@ def _width(value: Any) -> Any:
     if not isinstance(size, Fault) and min(size) <= 0.0:
         return Fault("should be two edges, greater than 0")
     return size
+
+
+def _factors(value: Any) -> Any:
+    if not isinstance(value, tuple):
+        factor = _NUMBER.read(value)
+        return factor if isinstance(factor, Fault) else (factor,) * 3
+    factors = numbers_of(value, 3)
+    return Fault("no factor is 0") if not isinstance(factors, Fault) and 0.0 in factors else factors
 
 
 @attrs.frozen
@@ -140,10 +148,11 @@ SHAPES: Mapping[str, Mapping[str, Field]] = {
     "line": {"points": Field(points_of, None, "two or more points in the body, m"),
              "color": _COLOR},
     "mesh": {
-        "file": Field(text_of, None, "an STL or OBJ file in the folder of the scene"),
+        "file": Field(text_of, None, "an STL, OBJ or MSH (MuJoCo) file in the folder of the scene"),
         "at": Field(_AT.read, ZERO, "where the origin of the file lies in the body, m"),
         "p": _P,
-        "scale": Field(_NUMBER.read, 1.0, "m for one unit of the file"),
+        "scale": Field(_factors, (1.0, 1.0, 1.0), "m for one unit of the file; 3 numbers along its "
+                       "axes, which mirror where negative"),
         "color": _COLOR,
     } | _MEETS,
 }  # fmt: skip

@@ -7,7 +7,7 @@ from typing import Any
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.registry import Registry, UnknownTypeError
-from dap3d_core.registry.declared_types import declares
+from dap3d_core.registry.discovery import declares
 from dap3d_core.scene.errors import MISSING
 from dap3d_core.scene.tables import PLUGIN_FILE, Element
 from dap3d_core.scene.validate.coerce_values import Fault, text_of

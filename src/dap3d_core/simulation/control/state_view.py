@@ -8,15 +8,14 @@ import numpy as np
 
 from dap3d_core.assembly.motion.joint_motion import ROTATION, TRANSLATION
 from dap3d_core.assembly.turns import ANGLE, COORDINATE, OFFSET, STATE
-from dap3d_core.formulations import REPORT
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators.stepping.hold import T, quick_view
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import Y
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, A, P, R, V, W
-from dap3d_core.result import Result, RunMetadata
 from dap3d_core.simulation.compiled_model import CompiledModel
+from dap3d_core.simulation.output.check_outputs import instant_of
 
 Getter = Callable[[], Any]
 
@@ -161,14 +160,8 @@ class StateView:
     @IGNORE_FLOAT_ERRORS
     def _quantity(self, name: str) -> Any:
         """Any quantity, of a report of this state."""
-        evaluator, y = self._evaluator, self._integration.work.state[Y]
-        out = np.zeros(evaluator.report_size)
-        evaluator.functions[REPORT](self.t, y, out, evaluator.system, evaluator.loops)
-        row = np.concatenate([[self.t], evaluator.body_state(y), out])[None]
-        record = RunMetadata(scene_text=self._compiled.scene_text)
-        result = Result.of_run(
-            evaluator.model, evaluator.with_inputs(row), record, lambda: evaluator
-        )
+        y, text = self._integration.work.state[Y], self._compiled.scene_text
+        result = instant_of(text, self._evaluator, self.t, y)
         values = result.quantity(name).values[0]
         self._is_placed = False
         return values if np.ndim(values) else float(values)

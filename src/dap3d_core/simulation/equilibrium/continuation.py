@@ -17,8 +17,8 @@ import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.simulation.equilibrium.search import BALANCED, held_solution, zero_stiffness
 from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics, displacement
-from dap3d_core.simulation.equilibrium.trust_region import BALANCED, held_solution, zero_stiffness
 from dap3d_core.simulation.errors import AssemblyError, SimulationError
 
 #: The first step, and the shortest, at which the path ends; at most so many are taken. Lengths are
@@ -158,7 +158,7 @@ class ParameterStatics:
 
     def _check_states(self, pose: StaticPose) -> None:
         """Refuse a pose at which states of elements do not come to rest."""
-        from dap3d_core.simulation.equilibrium.states_at_rest import moving_states
+        from dap3d_core.simulation.equilibrium.statics import moving_states
 
         if moving := moving_states(self.evaluator, pose.u):
             names = ", ".join(f"{state.element}.{state.name}" for state in moving)

@@ -14,15 +14,21 @@ from dap3d_core.model import Group, Model
 from dap3d_core.model.state_layout import velocities_of
 from dap3d_core.registry.suggestions import some
 from dap3d_core.result import information
-from dap3d_core.simulation.equilibrium.search import Outcome, Search, search_equilibrium
-from dap3d_core.simulation.equilibrium.stability import Stability, stability_of
-from dap3d_core.simulation.equilibrium.states_at_rest import (
+from dap3d_core.simulation.equilibrium.search import (
+    Outcome,
+    Search,
+    Stability,
+    search_equilibrium,
+    stability_of,
+)
+from dap3d_core.simulation.equilibrium.statics import (
     MOST_STEPS,
     OPEN,
     SETTLED,
+    StaticPose,
+    Statics,
     unsettled_part,
 )
-from dap3d_core.simulation.equilibrium.statics import StaticPose, Statics
 from dap3d_core.simulation.errors import AssemblyError, SimulationError, refuse_collisions
 from dap3d_core.simulation.initial.start_state import StartState
 
@@ -192,7 +198,7 @@ def _with_states(evaluator: Evaluator, search: Search) -> Search:
     Raises:
         SimulationError: states do not come to rest; names them.
     """
-    from dap3d_core.simulation.equilibrium.states_at_rest import moving_states
+    from dap3d_core.simulation.equilibrium.statics import moving_states
 
     moving = moving_states(evaluator, search.pose.u)
     if not moving:

@@ -7,17 +7,20 @@ are the freedoms, so that redundant rows and singular poses need nothing of thei
 velocity level alone constrain displacements as they do velocities. All is at rest, at one time.
 """
 
+from collections.abc import Iterator
 from typing import Any
 
 import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import WRENCH
+from dap3d_core.formulations.common.state_derivatives import StateDerivatives, state_derivatives
 from dap3d_core.formulations.constraint_rows import ConstraintRows, scaled_rows
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import call_loop
 from dap3d_core.linear.rank.rank import tolerance_of
+from dap3d_core.model.element_states import ElementState, first_states, width_of
 from dap3d_core.model.state_layout import join, split
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import fit_of, weights_of
@@ -28,6 +31,12 @@ from dap3d_core.simulation.linearization.tangent import TangentMatrices, tangent
 NEARBY = 1e-3
 #: Passes that close the position rows.
 MOST_PASSES = 25
+
+
+#: Newton steps at most; rates below this part of their terms are zero.
+MOST_STEPS, SETTLED = 50, 1e-11
+#: Singular values below this part of the largest leave a state open.
+OPEN = 1e-10
 
 
 @attrs.frozen(eq=False)
@@ -151,15 +160,12 @@ class Statics:
         fixed = self.fixed_tangent(pose)
         if fixed.states is None:
             return fixed
-        from dap3d_core.simulation.equilibrium.states_at_rest import with_settled
 
         return with_settled(fixed, self.evaluator)
 
     def _settle(self, u: Floats) -> None:
         """Let the states of elements come to rest at a pose."""
         if self.evaluator.model.state_count and self.settles:
-            from dap3d_core.simulation.equilibrium.states_at_rest import settle
-
             settle(self.evaluator, self.t, u)
 
     def fixed_tangent(self, pose: StaticPose) -> TangentMatrices:
@@ -232,3 +238,80 @@ def displacement(u: Floats, other: Floats) -> tuple[Floats, Floats]:
     angle = 2.0 * np.arctan2(length, np.abs(cosine))
     factor = np.where(length > 0.0, angle / np.where(length > 0.0, length, 1.0), 2.0)
     return s - r, factor * sine
+
+
+def settle(evaluator: Evaluator, t: float, u: Floats) -> None:
+    """Bring ``evaluator.states`` to where their rates vanish at a pose, as far as they can be."""
+    before = np.inf
+    best = evaluator.states
+    for _ in range(MOST_STEPS):
+        own = _derivatives(evaluator, t, u)
+        left = unsettled_part(own, evaluator.states)
+        if not np.all(np.isfinite(own.rates)) or not left < before:
+            evaluator.states = best
+            return
+        best, before = evaluator.states, left
+        if left <= SETTLED:
+            return
+        evaluator.states = best - _inverse(evaluator, own.rate_by_states) @ own.rates
+
+
+def moving_states(evaluator: Evaluator, u: Floats) -> list[ElementState]:
+    """The states that do not come to rest at a pose."""
+    own = _derivatives(evaluator, 0.0, u)
+    moves = np.abs(own.rates) > 1e3 * SETTLED * _terms(own, evaluator.states)
+    return [s for s in evaluator.model.element_states
+            if np.any(moves[s.first : s.first + s.length])]  # fmt: skip
+
+
+def with_settled(tangent: "TangentMatrices", evaluator: Evaluator) -> "TangentMatrices":
+    """A tangent with the stiffness of settled states."""
+    own = tangent.states
+    if own is None:
+        return tangent
+    follows = _inverse(evaluator, own.rate_by_states) @ own.rate_by_displacement
+    return attrs.evolve(tangent, stiffness=tangent.stiffness + own.force_by_states @ follows)
+
+
+def _derivatives(evaluator: Evaluator, t: float, u: Floats) -> StateDerivatives:
+    model = evaluator.model
+    evaluator.place(t, u)
+    rest = np.zeros(6 * model.body_count)
+    return state_derivatives(evaluator, t, rest, np.zeros(model.row_count), rest)
+
+
+def _terms(own: StateDerivatives, states: Floats) -> Floats:
+    """Sizes of what the rates are sums of."""
+    by_states = abs(own.rate_by_states) @ np.abs(states)
+    by_motion = abs(own.rate_by_displacement).sum(axis=1) + abs(own.rate_by_velocity).sum(axis=1)
+    return by_states + NEARBY * np.asarray(by_motion).ravel()
+
+
+def unsettled_part(own: StateDerivatives, states: Floats) -> float:
+    """Largest rate as a part of its terms, of derivatives at a pose."""
+    terms, rates = _terms(own, states), np.abs(own.rates)
+    parts = np.where(rates > 0.0, rates / np.where(terms > 0.0, terms, rates + (rates == 0.0)), 0.0)
+    return float(np.max(parts, initial=0.0))
+
+
+def _elements(evaluator: Evaluator) -> Iterator[slice]:
+    """The states of each element that has some."""
+    for group in evaluator.model.acting:
+        if width := width_of(group):
+            for first in first_states(evaluator.model.acting, group).tolist():
+                yield slice(first, first + width)
+
+
+def _inverse(evaluator: Evaluator, by_states: Any) -> Any:
+    """(s, s) pseudo-inverse of the block-diagonal derivative of rates by states."""
+    from scipy.sparse import block_diag, csr_array
+
+    blocks = [_scaled_inverse(by_states[own, own].toarray()) for own in _elements(evaluator)]
+    return csr_array(block_diag(blocks, format="csr"))
+
+
+def _scaled_inverse(matrix: Floats) -> Floats:
+    """Pseudo-inverse of a matrix whose rows have units of their own."""
+    size = np.max(np.abs(matrix), axis=1, keepdims=True)
+    size[size == 0.0] = 1.0
+    return np.linalg.pinv(matrix / size, rcond=OPEN) / size.T

@@ -7,8 +7,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.model import Model
-from dap3d_core.scene.expressions.condition import margin
 from dap3d_core.scene.expressions.expression import Expression
+from dap3d_core.scene.expressions.outputs import margin
 from dap3d_core.simulation.errors import SimulationError
 from dap3d_core.simulation.events.event import Event, Instant
 from dap3d_core.simulation.redundancy.redundancy import Redundancy

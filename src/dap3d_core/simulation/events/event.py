@@ -8,12 +8,11 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.formulations import REPORT
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.parameter_change import Change, changed
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.registry.suggestions import nearest, some
-from dap3d_core.result import Result, RunMetadata
+from dap3d_core.result import Result
 from dap3d_core.simulation.compiled_model import CompiledModel
 
 Kind = TypeVar("Kind")
@@ -320,15 +319,10 @@ class Instant:
 
     @cached_property
     def _result(self) -> Result:
-        evaluator, y = self._compiled.evaluator, self._y
-        row = np.concatenate([[self.t], self._body_state, np.zeros(evaluator.report_size)])
-        with np.errstate(all="ignore"):  # as compiled code does
-            evaluator.functions[REPORT](
-                self.t, y, row[-evaluator.report_size :], evaluator.system, evaluator.loops
-            )
-        row = evaluator.with_inputs(row[None])
-        record = RunMetadata(scene_text=self._compiled.scene_text)
-        return Result.of_run(evaluator.model, row, record, lambda: evaluator)
+        from dap3d_core.simulation.output.check_outputs import instant_of
+
+        compiled = self._compiled
+        return instant_of(compiled.scene_text, compiled.evaluator, self.t, self._y)
 
 
 class Numbers:

@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.formulations import ACCEPTED, RHS, WATCH
+from dap3d_core.formulations import ACCEPTED
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.jumps.law import ImpossibleJumpError, Jump, JumpLaw
 from dap3d_core.integrators import Integration, Status
@@ -105,11 +105,7 @@ class Jumps:
             notes.append(
                 information(f"there were {self.count} jumps; the first {MOST_RECORDS} are kept")
             )
-        values = np.zeros(len(evaluator.switches))
-        with np.errstate(all="ignore"):  # as compiled code does
-            evaluator.functions[WATCH](
-                integration.t, integration.y, values, evaluator.system, evaluator.loops
-            )
+        values = evaluator.switch_values(integration.t, integration.y)
         passed = self._contact.pushes & (values < -PASSED * evaluator.model.length)
         return notes + [
             f"{self._title(k)}: its switch is {values[k]:.3g} at the end. Contact stayed, and "
@@ -263,20 +259,17 @@ class Jumps:
         The state lies beyond zero by rounding, and the way back is no crossing of its own.
         """
         evaluator, work = self._evaluator, integration.work
-        functions, arrays = evaluator.functions, (evaluator.system, evaluator.loops)
         t, y = integration.t, integration.y
         span = self._span_of(integration)
         h = DIFFERENCE * span
-        slope, (values, later) = np.zeros_like(y), np.zeros((2, len(evaluator.switches)))
-        functions[RHS](t, y, slope, *arrays)
-        functions[WATCH](t, y, values, *arrays)
-        functions[WATCH](t + h, y + h * slope, later, *arrays)
+        slope, values = evaluator.slope(t, y), evaluator.switch_values(t, y)
+        later = evaluator.switch_values(t + h, y + h * slope)
         rates = (later - values) / h
         at_once = np.abs(values) <= AT_ONCE * span * np.abs(rates)
         sides = np.where(at_once, np.sign(rates), jump.sides)
         work.switches[at.SIDE] = np.where(self._law.elements.is_jump, sides, 0.0)
         if work.calls_accepted:  # angles are extrapolated by their rates
-            functions[ACCEPTED](t, y, np.ones(1), *arrays)
+            evaluator.functions[ACCEPTED](t, y, np.ones(1), evaluator.system, evaluator.loops)
 
 
 def rows_to(u: Floats, bodies: Mapping[int, Floats]) -> list[tuple[Floats, float]]:

@@ -13,11 +13,10 @@ import attrs
 import numpy as np
 
 from dap3d_core.assembly.arrays import CHECKPOINTED
-from dap3d_core.formulations import RHS
 from dap3d_core.integrators import Integration, Status
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.validate import are_events, is_number
+from dap3d_core.result.metadata import EventRecord
 from dap3d_core.result.post.smooth_parts import cubic
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_events
@@ -187,7 +186,7 @@ class EventLocator:
         """End the joints that are not active where a run starts: None for the scene's start."""
         model, compiled = self.compiled.model, self.compiled
         if self.released is not None and model.active:
-            from dap3d_core.simulation.output.active_joints import inactive_joints
+            from dap3d_core.simulation.output.check_outputs import inactive_joints
 
             u = model.u0 if start is None else start.u
             self.released.release(inactive_joints(compiled.scene_text, compiled.evaluator, u))
@@ -246,12 +245,7 @@ class EventLocator:
         slope = integration.dy_dt
         if slope is not None:
             return slope
-        evaluator, found = self.compiled.evaluator, np.zeros_like(integration.y)
-        with np.errstate(all="ignore"):  # as compiled code does
-            evaluator.functions[RHS](
-                integration.t, integration.y, found, evaluator.system, evaluator.loops
-            )
-        return found
+        return self.compiled.evaluator.slope(integration.t, integration.y)
 
     def _within(
         self,

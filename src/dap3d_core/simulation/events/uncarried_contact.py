@@ -4,7 +4,6 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.formulations import RHS, WATCH
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.jumps.law import ImpossibleJumpError, JumpLaw
 from dap3d_core.kernels.array_types import Floats
@@ -51,13 +50,13 @@ class UncarriedContact:
         """
         if not self.is_bare.any():
             return []
-        values, size = self._values(t, y), max(1.0, self._evaluator.model.length)
+        values, size = self._evaluator.switch_values(t, y), max(1.0, self._evaluator.model.length)
         closed = (sides < 0.0) | (sides == 0.0) & (values <= SWITCH_ROUNDING * size)
         candidates = self.is_bare & closed & (self.pushes | (values >= -AT_ZERO * size))
         if not candidates.any():
             return []
         ahead = AHEAD * span
-        later = y + ahead * self._slope(t, y)
+        later = y + ahead * self._evaluator.slope(t, y)
         rates, rates_later = self._rates(t, y, span), self._rates(t, later, span)
         candidates &= (sides < 0.0) | (rates <= 0.0)  # else it is on its way out
         closes = rates_later < -SWITCH_ROUNDING * size / (DIFFERENCE * span)
@@ -80,17 +79,7 @@ class UncarriedContact:
         after = evaluator.coordinates.with_jump(y, jump.dv, states, 0.0)
         return bool(self._rates(t, after, span)[k] >= STOPPED * rate)
 
-    def _values(self, t: float, y: Floats) -> Floats:
-        evaluator, values = self._evaluator, np.zeros(len(self._evaluator.switches))
-        evaluator.functions[WATCH](t, y, values, evaluator.system, evaluator.loops)
-        return values
-
-    def _slope(self, t: float, y: Floats) -> Floats:
-        evaluator, slope = self._evaluator, np.zeros_like(y)
-        evaluator.functions[RHS](t, y, slope, evaluator.system, evaluator.loops)
-        return slope
-
     def _rates(self, t: float, y: Floats, span: float) -> Floats:
-        h = DIFFERENCE * span
-        rates: Any = self._values(t + h, y + h * self._slope(t, y)) - self._values(t, y)
-        return np.asarray(rates / h)
+        evaluator, h = self._evaluator, DIFFERENCE * span
+        later = evaluator.switch_values(t + h, y + h * evaluator.slope(t, y))
+        return np.asarray((later - evaluator.switch_values(t, y)) / h)

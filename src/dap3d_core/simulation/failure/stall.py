@@ -1,11 +1,14 @@
 """Words on a run that stalled: what limits its steps, and which setting changes that."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from dap3d_core.formulations import RHS
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.integrators import IMPLICIT, Integration
 from dap3d_core.integrators.stepping import integration_state as at
+from dap3d_core.result import information
 
 #: What components are, by their letters in tolerances.
 WORDS = {
@@ -19,6 +22,9 @@ WORDS = {
 SLOW = 0.3
 #: ``rounding_state`` where errors are rounding.
 AT_ROUNDING = 2
+
+#: A note says why where so many steps, and this part of those tried, were refused.
+MANY, PART = 10, 0.1
 
 
 def describe_stall(evaluator: Evaluator, integration: Integration) -> str:
@@ -74,3 +80,33 @@ def component_words(evaluator: Evaluator, component: int) -> str:
     coordinates = evaluator.coordinates
     name, body = WORDS[coordinates.quantities[component]], int(coordinates.bodies[component])
     return f"the {name} of body {evaluator.model.body_names[body]}" if body >= 0 else f"a {name}"
+
+
+def describe_refusals(evaluator: Evaluator, integration: Integration) -> str:
+    """Steps that were refused, by the reason; "" where none was."""
+    found, parts = integration.refusals, []
+    if found is None:
+        return ""
+    if found.iteration:
+        parts.append(
+            f"{found.iteration} whose iteration for the stages did not converge (what changed most "
+            f"there, most often: {component_words(evaluator, found.worst)})"
+        )
+    if found.singular:
+        parts.append(f"{found.singular} whose matrix was singular")
+    if found.error:
+        parts.append(f"{found.error} for their error")
+    return ", ".join(parts)
+
+
+def refusal_notes(evaluator: Evaluator, runs: Sequence[Integration]) -> list[str]:
+    """A note on each integration that refused many steps."""
+    notes: list[str] = []
+    for run in runs:
+        if run.refusals is None:
+            continue
+        refused, tried = sum(run.refusals[:3]), run.statistics.steps + run.statistics.rejected
+        if refused >= MANY and refused > PART * tried:
+            words = describe_refusals(evaluator, run)
+            notes.append(information(f"{run.name} refused {refused} of {tried} steps: {words}"))
+    return notes

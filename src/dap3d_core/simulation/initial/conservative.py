@@ -28,6 +28,8 @@ AGREE = 1e-6
 def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
     """True if neither dampers, drivers, friction nor forces without a potential can do work.
 
+    Contacts, which are open here, and friction that is one, may do work all the same.
+
     Args:
         evaluator: the model.
         u: (13 n,) a state about which the forces are tried.
@@ -38,7 +40,8 @@ def is_conservative(evaluator: Evaluator, u: Floats) -> bool:
         np.any(g.functions[:, : len(g.type_info.layout.functions)] > 0) for g in model.forces
     )
     drivers = any(getattr(g.type_info.type, "drives", False) for g in model.joints)
-    if driven or model.iterated_forces or (drivers and np.any(evaluator.rows(0.0, u).nu)):
+    reads = model.friction or any(group.read for group in model.forces)
+    if driven or reads or (drivers and np.any(evaluator.rows(0.0, u).nu)):
         return False
     if any("energy" not in g.type_info.kernels for g in model.forces):
         return False

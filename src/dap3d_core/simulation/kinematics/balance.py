@@ -21,6 +21,7 @@ class Balance:
     Attributes:
         tau: (k,) forces of the actuators, of least norm; Lam: (rows,) multipliers.
         rank: of the actuation; left: (f,) what it leaves of the forces, in the free motions.
+        forces: (k + c,) tau, then those of closed contacts; side: (f,) what all are to have done.
         shares: whether forces of contacts are not unique.
     """
 
@@ -34,6 +35,8 @@ class Balance:
     tau: Floats = attrs.field(factory=lambda: np.zeros(0), init=False)
     Lam: Floats = attrs.field(factory=lambda: np.zeros(0), init=False)
     left: Floats = attrs.field(factory=lambda: np.zeros(0), init=False)
+    forces: Floats = attrs.field(factory=lambda: np.zeros(0), init=False)
+    side: Floats = attrs.field(factory=lambda: np.zeros(0), init=False)
     rank: int = attrs.field(default=0, init=False)
     shares: bool = attrs.field(default=False, init=False)
 
@@ -53,6 +56,7 @@ class Balance:
             A, side = rows.free.T @ wrenches, rows.free.T @ needed
             forces = self.contacts.within(closed, self.t, A, side, forces)
             self.rank, self.shares = count, rank < A.shape[1]
+            self.forces, self.side = forces, side
         self.tau, self.Lam = forces[:count], np.zeros(len(self.held))
         self.left = rows.free.T @ (needed - wrenches @ forces)
         self.Lam[self.held] = rows.multipliers(needed - wrenches @ forces)

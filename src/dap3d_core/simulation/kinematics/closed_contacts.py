@@ -3,11 +3,15 @@
 import attrs
 import numpy as np
 
-from dap3d_core.formulations.contacts.contact_rows import GAP, REACH, ContactRows, ContactTable
+from dap3d_core.formulations.contacts.contact_rows import (
+    GAP,
+    REACH,
+    ContactRows,
+    ContactTable,
+    length_of,
+)
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.scene import Mistake, SceneError
-from dap3d_core.scene.errors import MISSING
 from dap3d_core.simulation.errors import SimulationError
 
 #: Gap, as a part of the scene's length, and speed, of that length a second, below which what is
@@ -15,6 +19,8 @@ from dap3d_core.simulation.errors import SimulationError
 CLOSED, STILL = 1e-6, 1e-6
 #: Forces leave a cone by this part of all forces, and no less, where a note says so.
 OUTSIDE = 1e-6
+#: What a length is divided by at least.
+TINY = 1e-300
 #: Passes of Dykstra's algorithm, and the part of the forces that it may leave.
 PASSES, LEFT = 20_000, 1e-9
 
@@ -30,6 +36,8 @@ class Closed:
             and the coefficient of that, or size where there is no normal force.
         Lam: (k,) row among those of contacts of each unknown force.
         states: of elements, with modes and directions of sliding.
+        loaded: the same where friction of joints, by their load, alone acts.
+        load: contact -> by what that size is multiplied: the load that its joint was found to have.
     """
 
     wrenches: Floats
@@ -37,6 +45,14 @@ class Closed:
     cones: dict[int, tuple[list[int], float]]
     Lam: list[int]
     states: Floats
+    loaded: Floats
+    load: dict[int, float]
+
+    def take_loads(self, table: ContactTable, Lam: Floats) -> None:
+        """Take the loads of joints from multipliers (rows,)."""
+        for c, (rows, pushes) in table.loads.items():
+            size = max(Lam[rows[0]], 0.0) if pushes else np.linalg.norm(Lam[rows])
+            self.load[c] = float(size)
 
 
 class ContactForces:
@@ -48,19 +64,8 @@ class ContactForces:
     """
 
     def __init__(self, evaluator: Evaluator) -> None:
-        """Args: the evaluator of the model, in which all contacts are open.
-
-        Raises:
-            SceneError: friction of a joint's load, or in three directions, sticks.
-        """
-        self.table = table = ContactTable(evaluator)
-        loaded = [c for c in range(table.count) if c in table.loads or table.gapless[c]]
-        if loaded:
-            what = "sticks, by the load of its joint: inverse dynamics does not know how much"
-            remedy = "give it a v_tol (w_tol), below which it fades"
-            raise SceneError(
-                [Mistake(table.names[c], MISSING, what, remedy=remedy) for c in loaded]
-            )
+        """Args: the evaluator of the model, in which all contacts are open."""
+        self.table = ContactTable(evaluator)
         self.outside: tuple[float, float, str] | None = None
 
     def at(self, t: float, u: Floats) -> Closed:
@@ -71,29 +76,32 @@ class ContactForces:
         near = (np.abs(outputs[:, GAP]) < CLOSED * length) & (outputs[:, REACH] >= 0.0)
         columns, places, known = [], list[int](), np.zeros(len(rows.v))
         cones: dict[int, tuple[list[int], float]] = {}
-        states = table.evaluator.states.copy()
+        states, loaded = table.evaluator.states.copy(), table.evaluator.states.copy()
         closed = (near & (np.abs(slip[:, 0]) < still)) | table.alone
         for c in np.flatnonzero(closed).tolist():
-            normal, *across = rows.G[3 * c : 3 * c + 3]
-            sliding = float(np.hypot(*slip[c, 1:])) > still
-            way = slip[c, 1:] / np.hypot(*slip[c, 1:]) if sliding else np.zeros(2)
-            friction = -table.mu[c] * (way @ across)
+            across = table.across(c)
+            normal, tangents = rows.G[3 * c], rows.G[3 * c : 3 * c + 3][across]
+            sliding = length_of(slip[c, across]) > still
+            way = slip[c, across] / length_of(slip[c, across]) if sliding else 0.0 * slip[c, across]
+            friction = -table.mu[c] * (way @ tangents)
             own, first = [], len(places)
-            if table.alone[c] and sliding:
+            if table.alone[c] and sliding and c not in table.loads:
                 known += friction
             elif not table.alone[c]:
                 own.append(normal + friction)
                 places.append(3 * c)
-            for k, tangent in enumerate(across, 1):
+            for k, tangent in enumerate(tangents, across.start):
                 if not sliding and table.mu_s[c] > 0.0 and tangent.any():
                     own.append(tangent)
                     places.append(3 * c + k)
             columns += own
             cones[c] = list(range(first, len(places))), float(table.mu_s[c])
-            states[table.mode[c]] = 1.0 if sliding else 2.0
-            states[table.way[c]] = way @ rows.frames[c, 1:]
+            for some in (states, loaded) if c in table.loads and sliding else (states,):
+                some[table.mode[c]] = 1.0 if sliding else 2.0
+                some[table.way[c]] = way @ rows.frames[c, across]
         wrenches = np.array(columns).reshape(-1, len(rows.v)).T
-        return Closed(wrenches, known, cones, places, states)
+        load = {c: np.inf if c in table.loads else 1.0 for c in cones}  # unknown at first
+        return Closed(wrenches, known, cones, places, states, loaded, load)
 
     def within(self, closed: Closed, t: float, A: Floats, side: Floats, x: Floats) -> Floats:
         """Forces x (k,) with A x as near to side: within the cones, where they leave a choice.
@@ -104,7 +112,7 @@ class ContactForces:
             SimulationError: none of the choices was found within the cones.
         """
         size, name = self._outside(closed, x)
-        limit = OUTSIDE * max(float(np.linalg.norm(side)), float(np.abs(x).max(initial=0.0)))
+        limit = self._limit(side, x)
         if size <= limit:
             return x
         if np.linalg.matrix_rank(A) < len(x):
@@ -116,9 +124,13 @@ class ContactForces:
                 f"cones was found: {name} would have to pull, or to hold more than its friction "
                 "does; name other actuators, or check the motion"
             )
-        if self.outside is None or size > self.outside[0]:
-            self.outside = size, t, name
         return x
+
+    def take(self, closed: Closed, t: float, x: Floats, side: Floats) -> None:
+        """Take note of forces x (k,) that leave their cones, where these are to have that side."""
+        size, name = self._outside(closed, x)
+        if size > self._limit(side, x) and (self.outside is None or size > self.outside[0]):
+            self.outside = size, t, name
 
     def notes(self) -> list[str]:
         """That the motion is none of these contacts."""
@@ -129,6 +141,10 @@ class ContactForces:
             f"contact {name} cannot do its part of the motion: at t = {t:.6g} s it would have to "
             f"pull, or to hold more than its friction does, by {size:.3g} N or N m"
         ]
+
+    def _limit(self, side: Floats, x: Floats) -> float:
+        """By how much forces may leave their cones."""
+        return OUTSIDE * max(float(np.linalg.norm(side)), float(np.abs(x).max(initial=0.0)))
 
     def _outside(self, closed: Closed, x: Floats) -> tuple[float, str]:
         """By how much forces leave their cones, at most, and the contact."""
@@ -145,10 +161,10 @@ class ContactForces:
         found = force.copy()
         for c, (places, mu) in closed.cones.items():
             x = force[places]
-            if self.table.alone[c]:
-                found[places] = np.clip(x, -mu, mu)
-                continue
             if not places:
+                continue
+            if self.table.alone[c]:
+                found[places] *= min(1.0, mu * closed.load[c] / max(float(np.linalg.norm(x)), TINY))
                 continue
             N, T = x[0], x[1:]
             size = float(np.linalg.norm(T))

@@ -9,6 +9,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.common.friction import PASSES, forces_by
+from dap3d_core.formulations.contacts.modes import extrapolated
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
@@ -20,7 +21,7 @@ from dap3d_core.result.post.point_motion import kinetic_energy
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError, refuse_collisions
-from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
+from dap3d_core.simulation.failure.monitors import UnilateralMonitor
 from dap3d_core.simulation.kinematics.actuators import Actuator, DriverActuator, actuators_of
 from dap3d_core.simulation.kinematics.balance import Balance
 from dap3d_core.simulation.kinematics.closed_contacts import ContactForces
@@ -38,6 +39,7 @@ from dap3d_core.simulation.kinematics.pose_equations import (
     required_forces,
 )
 from dap3d_core.simulation.redundancy.freedoms import motion_words
+from dap3d_core.simulation.redundancy.shared_reactions import refuse_shared, shared_laws
 from dap3d_core.simulation.settings import compile_exact
 
 Progress = Callable[[float, float], None]
@@ -48,8 +50,9 @@ NAME = "inverse dynamics"
 PRODUCED = 1e-8
 #: Forces below this part of those of the accelerations are rounding, as of a free fall.
 FORCE_ROUNDING = 1e-13
-#: Forces that joints bring have settled where a pass changes multipliers by less than this part.
-PASS_SETTLED = 1e-12
+#: Forces that depend on multipliers have settled where a pass changes these by less than this part;
+#: what is left after all passes; differences of passes from which the next is extrapolated.
+PASS_SETTLED, UNSETTLED, DEPTH = 1e-12, 1e-9, 8
 
 
 @checked
@@ -160,12 +163,12 @@ def _solved(
 ) -> Result:
     started, model = time.perf_counter(), evaluator.model
     chosen = actuators_of(compiled, evaluator, names)
-    _refuse_iterated(model)
     held = np.ones(model.row_count, dtype=bool)
     held[[a.row for a in chosen if isinstance(a, DriverActuator)]] = False
     held[model.joint_row_count :] = False  # contacts hold by their forces
     settings = compiled.scene.simulation
     start = compiled.start(True, settings.hold, str(settings.correct_metric))
+    refuse_shared(shared_laws(compiled.checked, evaluator, start.u, start.redundancy), evaluator)
     evaluator.start(0.0, start.u)
     motion = motion_on(evaluator, given, start.u, held, compiled.scene_text)
     evaluator.start(float(motion.t[0]), motion.u[0])
@@ -207,17 +210,6 @@ def _solved(
     return Result(summary, arrays, about, lambda: (model, lambda: compiled.evaluator))
 
 
-def _refuse_iterated(model: Model) -> None:
-    """SimulationError for forces that depend on reactions of joints."""
-    known = {*model.brought_forces.values(), *model.contact_names}
-    known -= {model.joint_names[k] for k in model.loaded_contacts}
-    if others := [n for n in model.iterated_forces if n not in known]:
-        raise SimulationError(
-            "inverse dynamics does not know Coulomb friction in joints, nor other forces that "
-            f"depend on their reactions: leave {', '.join(others)} out of the scene"
-        )
-
-
 def _forces(
     evaluator: Evaluator,
     motion: Motion,
@@ -253,13 +245,7 @@ def _forces(
         if closed is not None:
             out.states[k] = closed.states
         balance = Balance(t, rows, held, actuators, wrenches, contacts, closed)
-        balance.solve(needed)
-        for _ in range(PASSES if model.brought_forces else 0):
-            before = balance.Lam
-            evaluator.place(t, u)
-            balance.solve(needed - forces_by(t, evaluator.system, evaluator.loops, before)[6:])
-            if np.max(np.abs(balance.Lam - before)) <= PASS_SETTLED * np.max(np.abs(before)):
-                break
+        _solve(balance, evaluator, u, needed)
         out.tau[k], out.Lam[k] = balance.tau, balance.Lam
         v = u[-6 * model.body_count :]
         out.residuals[k] = (np.max(np.abs(rows.rows.C[held]), initial=0.0),
@@ -269,6 +255,40 @@ def _forces(
         if progress is not None:
             progress(t, float(motion.t[-1]))
     return out
+
+
+def _solve(balance: Balance, evaluator: Evaluator, u: Floats, needed: Floats) -> None:
+    """Solve a balance with the forces that depend on multipliers.
+
+    Raises:
+        SimulationError: these forces, and multipliers, do not settle.
+    """
+    closed, contacts, t, states = balance.closed, balance.contacts, balance.t, evaluator.states
+    balance.solve(needed)
+    guess, taken, rests, rest = balance.Lam, list[Floats](), list[Floats](), np.zeros(0)
+    for _ in range(PASSES if _is_iterated(evaluator.model) else 0):
+        if closed is not None and contacts is not None:
+            closed.take_loads(contacts.table, guess)
+            evaluator.states = closed.loaded
+        evaluator.place(t, u)
+        balance.solve(needed - forces_by(t, evaluator.system, evaluator.loops, guess)[6:])
+        evaluator.states, rest = states, balance.Lam - guess
+        if np.max(np.abs(rest), initial=0.0) <= PASS_SETTLED * np.max(np.abs(guess), initial=0.0):
+            break
+        taken, rests = [*taken, guess][-DEPTH:], [*rests, rest][-DEPTH:]
+        guess = extrapolated(balance.Lam, taken, rests)
+    if not np.max(np.abs(rest), initial=0.0) <= UNSETTLED * np.abs(balance.Lam).max(initial=0.0):
+        raise SimulationError(
+            f"forces that depend on reactions of joints do not settle at t = {t:.6g} s: they raise "
+            "their own load by more than that load"
+        )
+    if closed is not None and contacts is not None:
+        contacts.take(closed, t, balance.forces, balance.side)
+
+
+def _is_iterated(model: Model) -> bool:
+    """True if forces, friction of joints among them, depend on multipliers of joints."""
+    return len(model.iterated_forces) > model.contact_count or bool(model.loaded_contacts)
 
 
 def _notes(evaluator: Evaluator, actuators: list[Actuator], forces: _Forces) -> list[str]:

@@ -24,7 +24,7 @@ from dap3d_core.simulation.errors import (
     SimulationError,
     refuse_contacts,
 )
-from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
+from dap3d_core.simulation.failure.monitors import UnilateralMonitor
 from dap3d_core.simulation.initial_state import InitialState, start_notes
 from dap3d_core.simulation.kinematics.driver_coordinate import (
     DriverCoordinate,

@@ -18,8 +18,7 @@ from dap3d_core.result.arrays import LARGE, Arrays, arrays_of, joined
 from dap3d_core.result.file.atomic_write import check_utf8
 from dap3d_core.result.model_summary import summary_of
 from dap3d_core.result.open import arrays_in
-from dap3d_core.simulation.failure.creep import CreepMonitor
-from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
+from dap3d_core.simulation.failure.monitors import CreepMonitor, UnilateralMonitor
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.redundancy.shared_reactions import ShareSpread

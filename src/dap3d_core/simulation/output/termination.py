@@ -11,8 +11,7 @@ from dap3d_core.integrators.stepping.integration_state import LOGGED
 from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.result import EventRecord, information
 from dap3d_core.simulation.failure.diagnosis import AHEAD, fastest_body, find_offender
-from dap3d_core.simulation.failure.refused_steps import describe_refusals
-from dap3d_core.simulation.failure.stall import describe_stall
+from dap3d_core.simulation.failure.stall import describe_refusals, describe_stall
 from dap3d_core.simulation.redundancy.near_redundant import find_contradiction
 
 REASONS = {
@@ -57,6 +56,8 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
             f"{head}: a step of {step:g} s, as given, cannot be taken there; give a shorter step, "
             "or none, and rtol chooses the steps"
         )
+    if words := integration.overlapping:
+        return f"{message}: {words}"
     words = describe_refusals(evaluator, integration)
     if integration.status is Status.STEP_FLOOR and words:
         message = f"{message} (refused so far: {words})"

@@ -2,6 +2,7 @@
 
 import contextlib
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -11,10 +12,10 @@ from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.result.note import warnings_of
+from dap3d_core.result.metadata import warnings_of
 from dap3d_core.scene import SceneError, ValidatedScene, check
 from dap3d_core.simulation import AssemblyError, CompiledModel
-from dap3d_core.simulation.failure.negative_reactions import UnilateralMonitor
+from dap3d_core.simulation.failure.monitors import UnilateralMonitor
 from dap3d_core.simulation.initial.assemble import (
     SMALL_CORRECTION,
     Initial,
@@ -27,13 +28,21 @@ from dap3d_core.simulation.initial.undefined_directions import undefined_directi
 from dap3d_core.simulation.initial_state import InitialState, find_start, start_notes
 from dap3d_core.study.batch import driver, initial_state
 from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch, numbers_of
-from dap3d_core.study.batch.parameter_map import NotCopiedError, ParameterMap
+from dap3d_core.study.batch.parameter_map import Booleans, NotCopiedError, ParameterMap
+from dap3d_core.study.batch.slopes import (
+    COPIES,
+    MODELS,
+    DifferentiatedBatch,
+    Starts,
+    starts_with_slopes,
+)
 from dap3d_core.study.outputs import Reduction
 from dap3d_core.study.parameters import SceneParameter, with_values
+from dap3d_core.study.sensitivities.sensitivities import directions_of
 from dap3d_core.study.study import Batch, PointStatus
 
 if TYPE_CHECKING:
-    from dap3d_core.study.batch.joint_space_batch import TreePoints
+    from dap3d_core.study.batch.compiled_batch import TreePoints
 
 
 def batch_runner(reduction: Reduction, times: Floats) -> "BatchRunner | None":
@@ -87,6 +96,7 @@ class BatchRunner:
         self.compiled_batch = CompiledBatch(evaluator, compiled.scene.simulation, times, stops)
         self._runs = self._point_runs(start)
         self._pulling = UnilateralMonitor(compiled.model)
+        self._differentiated: DifferentiatedBatch | None = None
         self.parameter_map: ParameterMap | None = None
         with contextlib.suppress(NotCopiedError):
             parameter_map = ParameterMap(compiled.checked, evaluator, parameters)
@@ -99,7 +109,7 @@ class BatchRunner:
         batch, compiled = self.compiled_batch, self._compiled
         if batch.evaluator.coordinates.are_of_bodies:
             return batch
-        from dap3d_core.study.batch.joint_space_batch import TreePoints
+        from dap3d_core.study.batch.compiled_batch import TreePoints
 
         def of_bodies() -> CompiledBatch:
             return CompiledBatch(
@@ -117,10 +127,7 @@ class BatchRunner:
             which, rows = self._run_mapped(self.parameter_map, values)
         else:
             which, rows = self._run_rebuilt(values, batch.notes, first)
-        multipliers = self._compiled.model.row_layout["Lam"].start
-        good = rows.done & (rows.diagnostics[:, driver.FRICTION_FAILURES] == 0.0)
-        # those with joints that pull are run individually, and noted
-        good &= ~self._pulling.among(rows.rows[..., multipliers:])
+        good = self._good(rows)
         which = which[good]
         self._note_corrections(rows, np.flatnonzero(good), first + which, batch.notes)
         batch.status[first + which] = PointStatus.DONE
@@ -130,22 +137,85 @@ class BatchRunner:
         self, parameter_map: ParameterMap, values: Floats
     ) -> tuple[Integers, BatchRows]:
         """Run points by the parameter map: indices of those that were run, and their rows."""
-        evaluator = self.compiled_batch.evaluator
-        evaluator.coordinates.start(self._start.u)  # to which numbers of a tree refer
-        table, valid = parameter_map.table(values)
+        self._refer_to_start()
+        start, valid = self._mapped_starts(parameter_map, values)
         which = np.flatnonzero(valid)
-        model, moves_start = self._compiled.model, parameter_map.moves_start
-        if moves_start:
-            y0 = parameter_map.states(values[which], model.u0)
-        else:
-            y0 = np.repeat(evaluator.integrated(self._start.u)[None], len(which), axis=0)
-        parameter_map.set_states(y0, values[which])
-        table, places = table[which], parameter_map.places
-        start = driver.CORRECT if moves_start and model.row_count else driver.UNCORRECTED
-        rows = self._runs.run(table, places, y0, start)
+        table, y0 = start.table[which], start.y0[which]
+        rows = self._runs.run(table, start.places, y0, start.start)
         if parameter_map.moves:
             rows.done[parameter_map.are_undefined(table, rows.y0)] = False
         return which, rows
+
+    def _refer_to_start(self) -> None:
+        """Let the numbers of a tree refer to the start of the scene."""
+        self.compiled_batch.evaluator.coordinates.start(self._start.u)
+
+    def _mapped_starts(
+        self, parameter_map: ParameterMap, values: Floats, *, is_checked: bool = True
+    ) -> tuple[Starts, Booleans]:
+        """Starts of points (k, p) by the parameter map; those that the scene's check accepts.
+
+        is_checked: as of ``ParameterMap.table``.
+        """
+        table, valid = parameter_map.table(values, is_checked=is_checked)
+        model, moves_start = self._compiled.model, parameter_map.moves_start
+        if moves_start:
+            y0 = parameter_map.states(values, model.u0)
+        else:
+            y0 = self.compiled_batch.evaluator.integrated(self._start.u)[None]
+            y0 = np.repeat(y0, len(values), axis=0)
+        parameter_map.set_states(y0, values)
+        start = driver.CORRECT if moves_start and model.row_count else driver.UNCORRECTED
+        return Starts(table, parameter_map.places, y0, start), valid
+
+    def _copied_starts(self, parameter_map: ParameterMap, values: Floats) -> Starts:
+        """Starts of points (k, p) in coordinates of the formulation."""
+        start, _ = self._mapped_starts(parameter_map, values, is_checked=False)
+        coordinates = self.compiled_batch.evaluator.coordinates
+        if coordinates.are_of_bodies:
+            return start
+        y0 = coordinates.start(self._start.u)
+        return start._replace(y0=np.repeat(y0[None], len(values), axis=0))
+
+    def _rebuilt_starts(self, values: Floats) -> Starts | None:
+        """Starts of points (k, p) with models of their own; None where one cannot be run."""
+        points = [self._rebuilder.prepare(value) for value in values]
+        self.compiled_batch.evaluator.set_inputs(self._compiled.model.input_values)
+        found = [point for point in points if point is not None]
+        if len(found) < len(points):
+            return None
+        table, y0 = np.array([p.table for p in found]), np.array([p.y0 for p in found])
+        return Starts(table, self._rebuilder.places, y0, driver.UNCORRECTED)
+
+    def run_with_slopes(self, x: Floats, size: Floats) -> tuple[Floats, Floats] | None:
+        """Rows (nt, width) of a point x (p,) and (nt, width, p) their derivatives.
+
+        size: (p,) of the parameters. None where the point cannot be run so.
+        """
+        by_map, batch = self.parameter_map, self.compiled_batch
+        if by_map is None:
+            found = starts_with_slopes(self._rebuilt_starts, x, size, *MODELS)
+        else:
+            if by_map.moves_start and not batch.evaluator.coordinates.are_of_bodies:
+                return None
+            self._refer_to_start()
+            if not by_map.table(x[None])[1][0]:
+                return None
+            found = starts_with_slopes(partial(self._copied_starts, by_map), x, size, *COPIES)
+        if found is None:
+            return None
+        if self._differentiated is None:
+            self._differentiated = DifferentiatedBatch(batch, len(x), directions_of(len(x))[1])
+        rows, slopes = self._differentiated.run(*found)
+        if by_map is not None and by_map.moves and by_map.are_undefined(found[0].table, rows.y0)[0]:
+            return None
+        return (rows.rows[0], slopes) if self._good(rows)[0] else None
+
+    def _good(self, rows: BatchRows) -> Booleans:
+        """Points whose rows are those of a run alone; others are run individually, and noted."""
+        multipliers = self._compiled.model.row_layout["Lam"].start
+        good = rows.done & (rows.diagnostics[:, driver.FRICTION_FAILURES] == 0.0)
+        return good & ~self._pulling.among(rows.rows[..., multipliers:])
 
     def _run_rebuilt(
         self, values: Floats, notes: list[str], first: int

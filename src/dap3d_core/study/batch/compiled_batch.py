@@ -1,7 +1,7 @@
 """Sets up the compiled loop over points (driver.py) and calls it."""
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from dap3d_core.assembly.arrays import STEPS, System, step_functions
 from dap3d_core.formulations import Formulation
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.formulations.joint.coordinates import TreeCoordinates
 from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.integrators import EXPLICIT, IMPLICIT, INTEGRATORS
 from dap3d_core.integrators.runge_kutta.state import RungeKuttaState
@@ -18,10 +19,13 @@ from dap3d_core.integrators.stepping.integration_state import Status
 from dap3d_core.kernels.runtime.cache import jit_is_on, table_of
 from dap3d_core.kernels.runtime.function_lists import INTEGER, LOOP_LIST, procedure_signature
 from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.state_layout import u_from_y
 from dap3d_core.scene import Simulation
-from dap3d_core.simulation.initial.assemble import model_size
+from dap3d_core.simulation.initial.assemble import SMALL_CORRECTION, distance, model_size
+from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.simulation.settings import fits, integration_options
 from dap3d_core.study.batch import driver, initial_state
+from dap3d_core.study.batch.initial_state import STARTING
 
 if TYPE_CHECKING:
     from dap3d_core.study.batch.lanes import LaneBatch
@@ -35,6 +39,8 @@ CALL = 200_000
 UNIT_METRIC = np.array([1.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0])
 
 _DRIVE = procedure_signature(RungeKuttaState.type_of(), STEPS, System.type_of(), LOOP_LIST, INTEGER)
+
+MakeBatch = Callable[[], "CompiledBatch"]
 
 
 class BatchRows(NamedTuple):
@@ -98,7 +104,7 @@ class CompiledBatch:
         self._make, self.integration = make, make()
         work, unit = self.integration.work, UNIT_METRIC.copy()
         unit[0] = evaluator.model.length
-        starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size)
+        starting = np.zeros(initial_state.STARTING + evaluator.plan.row_size + len(y0))
         starting[initial_state.SIZE] = self.size
         without_position = np.flatnonzero(~evaluator.model.position_row)
         starting[initial_state.STARTING + evaluator.system.row[without_position]] = 1.0
@@ -177,6 +183,27 @@ class CompiledBatch:
         """Numbers that may differ from point to point."""
         return len(numbers_of(self.evaluator))
 
+    def points(
+        self, table: Floats, places: Integers, y0: Floats, start: int = driver.UNCORRECTED
+    ) -> driver.Points:
+        """Points to run; arguments as of ``run``."""
+        count, nt = len(table), len(self.integration.work.rows)
+        own = not self.evaluator.coordinates.are_of_bodies
+        return driver.Points(
+            at=np.array([0, 0, start, own], dtype=np.int64),
+            places=np.ascontiguousarray(places, dtype=np.int64),
+            table=np.array(table, dtype=float, order="C"),
+            y0=np.array(y0, dtype=float),
+            rows=np.empty((count * nt, self.evaluator.model.row_layout["inputs"].start)),
+            diagnostics=np.zeros((count, driver.COLUMNS)),
+            **self.constants,
+        )
+
+    def arguments(self, points: driver.Points) -> tuple[Any, ...]:
+        """Arguments of ``driver.run_points``."""
+        of, tables = self.evaluator, (self.evaluator.functions, _drives(), self._begin)
+        return points, self.integration.work, *tables, of.system, of.loops, CALL
+
     def run(
         self, table: Floats, places: Integers, y0: Floats, start: int = driver.UNCORRECTED
     ) -> BatchRows:
@@ -189,20 +216,9 @@ class CompiledBatch:
             start: UNCORRECTED, CORRECT, or CORRECT_ONLY (driver.py).
         """
         work, count = self.integration.work, len(table)
-        nt, width = len(work.rows), self.evaluator.model.row_layout["inputs"].start
-        own = not self.evaluator.coordinates.are_of_bodies
-        diagnostics = np.zeros((count, driver.COLUMNS))
-        points = driver.Points(
-            at=np.array([0, 0, start, own], dtype=np.int64),
-            places=np.ascontiguousarray(places, dtype=np.int64),
-            table=np.ascontiguousarray(table, dtype=float),
-            y0=np.array(y0, dtype=float),
-            rows=np.empty((count * nt, width)),
-            diagnostics=diagnostics,
-            **self.constants,
-        )
-        problem = (self.evaluator.functions, _drives(), self._begin)
-        system, loops = self.evaluator.system, self.evaluator.loops
+        points = self.points(table, places, y0, start)
+        diagnostics = points.diagnostics
+        arguments = self.arguments(points)
         programs = self._programs_for(points)
 
         def run(call: Callable[[], Any], *, needs_programs: bool = False) -> None:
@@ -226,23 +242,32 @@ class CompiledBatch:
             if not isinstance(lanes, str) and lanes.is_ready:
                 run(lambda: lanes.run(points, CALL), needs_programs=reads_rates(self.evaluator))
         while True:
-            run(lambda: driver.run_points(points, work, *problem, system, loops, CALL))
+            run(lambda: driver.run_points(*arguments))
             if points.at[driver.POINT] == count:
                 break
         if count:
             self.last_start = points.y0[-1]
             self._calls += float(np.sum(diagnostics[:, driver.CALLS]))
             self._point_calls = float(np.mean(diagnostics[:, driver.CALLS]))
-        rows = points.rows.reshape(count, nt, width)
+        return self.rows_of(points, y0)
+
+    def rows_of(self, points: driver.Points, given: Floats) -> BatchRows:
+        """Rows of points that were run; given: the states that were given."""
+        rows, diagnostics = points.rows, points.diagnostics
+        rows = rows.reshape(len(diagnostics), len(self.integration.work.rows), rows.shape[1])
         done = diagnostics[:, driver.ENDED] == Status.FINISHED
-        return BatchRows(done, rows, y0, points.y0, diagnostics)
+        return BatchRows(done, rows, given, points.y0, diagnostics)
+
+
+def arrays_of_numbers(evaluator: Evaluator) -> list[Floats]:
+    """Arrays of a model's numbers: par, body, metric and, where there is a tree, its constants."""
+    s = evaluator.system
+    return [s.par, s.body, s.metric, *([] if s.tree is None else [s.tree.constants])]
 
 
 def numbers_of(evaluator: Evaluator) -> Floats:
-    """Numbers of a model: par, body, metric and, where there is a tree, its constants."""
-    s = evaluator.system
-    tree = () if s.tree is None else (s.tree.constants,)
-    return np.concatenate([s.par, s.body.ravel(), s.metric.ravel(), *tree])
+    """The numbers of a model, all of them."""
+    return np.concatenate([array.ravel() for array in arrays_of_numbers(evaluator)])
 
 
 def varied_at(system: System, places: Integers) -> dict[str, Integers]:
@@ -260,7 +285,7 @@ def varied_at(system: System, places: Integers) -> dict[str, Integers]:
 def begin_functions(formulation: Formulation) -> Any:
     """Compiled functions that store the references of a start, and correct it."""
     if formulation.has_own_coordinates:
-        from dap3d_core.study.batch.tree_start import begin_tree, state_of_bodies
+        from dap3d_core.study.batch.initial_state import begin_tree, state_of_bodies
 
         return step_functions(begin_tree, begin_tree, state_of_bodies)  # none corrects a start
     if not formulation.needs_joints:
@@ -274,3 +299,38 @@ def begin_functions(formulation: Formulation) -> Any:
 def _drives() -> Any:
     """The integrator, by its address: compiled code that calls it has no copy of it."""
     return table_of(_DRIVE, (advance,))
+
+
+class TreePoints:
+    """Runs points whose poses at the start are those of the scene. Not for two threads at once."""
+
+    def __init__(self, batch: CompiledBatch, start: InitialState, make_other: MakeBatch) -> None:
+        """Args: what runs the points; start of the scene; makes what corrects velocities."""
+        self._batch, self._u, self._make_other = batch, start.u, make_other
+
+    @cached_property
+    def _other(self) -> CompiledBatch:
+        return self._make_other()
+
+    def run(self, table: Floats, places: Integers, y0: Floats, start: int) -> BatchRows:
+        """As ``CompiledBatch.run``; states (k, 13 n + 1), also those returned, are of bodies.
+
+        Points whose correction moves bodies from where they start in the scene are not done.
+        """
+        coordinates = self._batch.evaluator.coordinates
+        assert isinstance(coordinates, TreeCoordinates)
+        first = coordinates.start(self._u)
+        if start == driver.UNCORRECTED:
+            rows = self._batch.run(table, places, np.repeat(first[None], len(table), axis=0))
+            return rows._replace(given=y0, y0=y0)
+        known = places < self._other.number_count
+        corrected = self._other.run(table[:, known], places[known], y0, driver.CORRECT_ONLY)
+        y = coordinates.starts(self._u, u_from_y(corrected.y0))
+        rows = self._batch.run(table, places, y)
+        rows.diagnostics[:, :STARTING] = corrected.diagnostics[:, :STARTING]
+        moved, turned = distance(
+            u_from_y(corrected.y0), self._u, self._batch.evaluator.model.body_count
+        )
+        stays = np.maximum(moved / self._batch.size, turned) <= SMALL_CORRECTION
+        done = rows.done & corrected.done & stays
+        return BatchRows(done, rows.rows, y0, corrected.y0, rows.diagnostics)

@@ -50,7 +50,7 @@ class Points(Arrays):
     y0: Floats  # (k, n) states to start from
     metric: Floats  # of the model, where its numbers do not change from point to point
     unit: Floats  # (7,) constants of the metric of displacements at the start
-    starting: Floats  # (STARTING + rows,) arguments and results of the start (initial_state.py)
+    starting: Floats  # (STARTING + rows + n,) arguments and results of the start (initial_state.py)
     first_real: Floats  # the work as it is before a run
     first_integer: Integers
     first_switches: Floats

@@ -16,11 +16,12 @@ from dap3d_core.assembly.arrays import (
     LENGTH,
     SCRATCH,
     UNSETTLED,
+    VALUE,
     Floats,
     System,
+    velocity_offset,
 )
 from dap3d_core.assembly.evaluate import call_kinds, place, place_bodies
-from dap3d_core.assembly.offsets import velocity_offset
 from dap3d_core.assembly.state_update import apply_displacement, apply_velocity_change
 from dap3d_core.assembly.turns import begin_turns
 from dap3d_core.formulations.common.constraints import (
@@ -32,9 +33,12 @@ from dap3d_core.formulations.common.constraints import (
     residuals,
     velocity_residuals,
 )
+from dap3d_core.formulations.joint.equations import body_state
+from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.pivots import REDUNDANT
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import A, W
+from dap3d_core.kernels.scalar_math import is_differentiated, with_slopes
 from dap3d_core.linear.ldlt.factor import SINGULAR_PIVOT_RATIO, assemble, factor, weigh_rows
 from dap3d_core.linear.rank.rank import PIVOT_TOLERANCE
 from dap3d_core.simulation.initial.assemble import (
@@ -47,7 +51,8 @@ from dap3d_core.simulation.initial.assemble import (
 
 # Entries of ``out`` of these functions: a length of the model (given); largest residuals of
 # position and velocity before and after; Newton passes; the least pivot as a fraction of its row;
-# 1 where positions did not close. From STARTING on (given): 1 for rows without a position level.
+# 1 where positions did not close. From STARTING on (given): 1 for rows without a position level;
+# then room for a state, which differentiated code takes.
 SIZE, C_BEFORE, V_BEFORE, C_AFTER, V_AFTER, PASSES, LEAST_PIVOT, OPEN, STARTING = range(9)
 
 
@@ -156,22 +161,60 @@ def assemble_start(t: float, y: Floats, out: Floats, system: System, loops: Any)
         before = worst
         if passes == MOST_PASSES or not worst < 1e100:
             return
-        linearise(t, system, loops)
-        factor_positions(system, out[STARTING:])
-        correct(system)
-        limit_displacement(system, MOST_SHIFT * size / length)
-        apply_displacement(y, system)
-        place_with_spin(y, system)
+        correct_positions(t, y, out, system, loops)
         out[PASSES] += 1.0
+    if is_differentiated() and worst < 1e100:  # derivatives of a start that values leave as it is
+        kept = out[STARTING + system.multipliers.shape[0] :]
+        keep(kept, y)
+        correct_positions(t, y, out, system, loops)
+        put_back(y, kept)
+        place(t, y, system, loops)
     out[C_AFTER] = worst
     linearise(t, system, loops)
     factorise(system, None)
     out[LEAST_PIVOT] = least_pivot_fraction(system)
     if velocity_residuals(system) > 0.0:
-        correct(system)
-        apply_velocity_change(y, system.metric, system.change)
+        correct_velocities(y, system)
+        place_bodies(y, system.body, system.metric)
+    elif is_differentiated():
+        kept = out[STARTING + system.multipliers.shape[0] :]
+        keep(kept, y)
+        correct_velocities(y, system)
+        put_back(y, kept)
         place_bodies(y, system.body, system.metric)
     out[V_AFTER] = velocity_residuals(system)
+
+
+@compiled
+def correct_positions(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """One pass of Newton's iteration for the positions of a start."""
+    linearise(t, system, loops)
+    factor_positions(system, out[STARTING:])
+    correct(system)
+    limit_displacement(system, MOST_SHIFT * out[SIZE] / system.settings[LENGTH])
+    apply_displacement(y, system)
+    place_with_spin(y, system)
+
+
+@compiled_into
+def correct_velocities(y: Floats, system: System) -> None:
+    """Correct the velocities of a start by ``residual``."""
+    correct(system)
+    apply_velocity_change(y, system.metric, system.change)
+
+
+@compiled_into
+def keep(kept: Floats, y: Floats) -> None:
+    """Keep a state."""
+    for k in range(y.shape[0]):
+        kept[k] = y[k]
+
+
+@compiled_into
+def put_back(y: Floats, kept: Floats) -> None:
+    """Put a state back, with the derivatives of the one it has become."""
+    for k in range(y.shape[0]):
+        y[k] = with_slopes(kept[k], y[k])
 
 
 @compiled_into
@@ -231,3 +274,17 @@ def begin_regularised(t: float, y: Floats, out: Floats, system: System, loops: A
     place(t, y, system, loops)
     store_reference_pivots(t, system, loops, PART)
     store_start(t, y, system, loops)
+
+
+@compiled
+def begin_tree(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """Begin a run; ``out`` is not used."""
+    place_tree(y, system)
+    call_kinds(VALUE, VALUE, t, system, loops, system.force, system.force, system.force)
+    count_from_here(t, y, system, loops)
+
+
+@compiled
+def state_of_bodies(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """The state y in coordinates of bodies into ``out``."""
+    body_state(y, out, system)

@@ -17,11 +17,10 @@ from dap3d_core.assembly.metric import METRIC_CONSTANTS, METRIC_WIDTH
 from dap3d_core.assembly.turns import IS_POINT
 from dap3d_core.formulations.arrays import set_metric
 from dap3d_core.formulations.evaluator import Evaluator
-from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.element_states import INITIAL, TOLERANCE
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.types import Function, TypeBase, acts_on_all, turns_of
+from dap3d_core.interface.types import BodyPose, Function, TypeBase, acts_on_all, pose, turns_of
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
 from dap3d_core.model.groups import Floats, Integers
@@ -132,8 +131,10 @@ class ParameterMap:
             ]
         ).astype(np.int64)
 
-    def table(self, values: Floats) -> tuple[Floats, Booleans]:
+    def table(self, values: Floats, *, is_checked: bool = True) -> tuple[Floats, Booleans]:
         """Numbers for ``places`` of points whose varied parameters are ``values`` (k, d).
+
+        is_checked: masses and inertias that are not valid are those of the scene.
 
         Returns:
             (k, w) numbers; (k,) False where the scene's check refuses a point, and its numbers are
@@ -147,6 +148,10 @@ class ParameterMap:
         if len(self._bodies):
             mass, Jp, fine = self._inertias(values)
             valid &= fine
+            if is_checked:
+                mass[~fine], Jp[~fine] = (
+                    of[self._bodies] for of in (self._checked.mass, self._checked.Jp)
+                )
             metric = np.zeros((1 + mass.size, METRIC_WIDTH))
             set_metric(metric, mass.ravel(), Jp.reshape(-1, 3, 3))
             body = np.concatenate([mass[..., None], Jp.reshape(*mass.shape, 9)], axis=-1)
@@ -346,7 +351,6 @@ class ParameterMap:
         least, middle, most = np.linalg.eigvalsh(np.where(np.abs(Jp) <= LARGEST, Jp, 0.0)).T
         sound = (least > ZERO_INERTIA * most) & (most >= SMALLEST_INERTIA)
         valid &= np.all(sound & (most <= least + middle), axis=0)
-        mass[~valid], Jp[~valid] = checked.mass[self._bodies], checked.Jp[self._bodies]
         return mass, Jp, valid
 
 

@@ -71,7 +71,8 @@ def fit(
     """Find the values of parameters of a scene with which its run explains measured data best.
 
     The sum of the squares of (measured - predicted) / sigma is minimised within the bounds, by a
-    trust region; derivatives are central differences, all runs of which are one batch.
+    trust region. A run gives predictions and their exact derivatives; where it has none, as where
+    nothing is compiled, they are central differences, all runs of which are one batch.
 
     Args:
         scene: a Scene, or what ``load`` takes.
@@ -226,6 +227,8 @@ class _Search:
         self.floor = NoiseFloor.of(rtol, self.data)
         self.iterations = 0
         self._known: dict[bytes, Floats] = {}
+        self._exact: dict[bytes, Floats] = {}
+        self._is_exact = True
         self._slopes: Floats | None = None
         self._largest = 0.0
 
@@ -248,7 +251,15 @@ class _Search:
         """(m,) predictions at a point; NaN where its run fails."""
         key = x.tobytes()
         if key not in self._known:
-            self._known[key] = self.predict(x[None])[0]
+            found = None
+            if self._is_exact:
+                found = self.predict.with_slopes(x, self.differences.lengths(x))
+            if found is None:
+                self._known[key] = self.predict(x[None])[0]
+                # a run that succeeds without derivatives will have none elsewhere
+                self._is_exact &= not np.isfinite(self._known[key]).all()
+            else:
+                self._known[key], self._exact[key] = found
         return self._known[key]
 
     def _residual(self, x: Floats) -> Floats:
@@ -262,12 +273,16 @@ class _Search:
     def _regularised(self, x: Floats) -> tuple[Floats, Floats]:
         """Derivatives over the scales, and rows that hold parameters they do not determine."""
         self.iterations += 1
-        base = self.predicted(x)
-        self._known = {x.tobytes(): base}  # earlier points are not needed again
+        base, key = self.predicted(x), x.tobytes()
+        self._known = {key: base}  # earlier points are not needed again
+        self._exact = {key: self._exact[key]} if key in self._exact else {}
         if self.progress is not None:
             self.progress(self.iterations, 0.5 * float(np.sum((base - self.data) ** 2)))
-        steps = self.differences.steps(x, base, self._slopes)
-        self._slopes = self.differences(x, base, steps)
+        if key in self._exact:
+            self._slopes = self._exact[key]
+        else:
+            steps = self.differences.steps(x, base, self._slopes)
+            self._slopes = self.differences(x, base, steps)
         return regularised(self._slopes * self.differences.scale, self.floor)
 
     def _at_bounds(self, x: Floats) -> Floats:
@@ -283,8 +298,13 @@ class _Search:
         return x
 
     def final(self, x: Floats) -> tuple[Floats, Floats]:
-        """Derivatives at the optimum from steps of two lengths, and the error of one alone."""
+        """Derivatives at the optimum, and their error.
+
+        Of differences those from steps of two lengths, and the error of one alone.
+        """
         base = self.predicted(x)
+        if (exact := self._exact.get(x.tobytes())) is not None:
+            return exact, np.zeros_like(exact)
         short = self.differences.steps(x, base, self._slopes)
         one, two = (self.differences(x, base, f * short) for f in (1.0, 2.0))
         return (4.0 * one - two) / 3.0, one - two

@@ -1,4 +1,4 @@
-"""Predictions of the data of a fit, and their derivatives by differences."""
+"""Predictions of the data of a fit, and their derivatives: those of one run, or differences."""
 
 from collections.abc import Sequence
 
@@ -58,6 +58,22 @@ class Predictor:
         self.runs += len(points)
         return series
 
+    def with_slopes(self, x: Floats, size: Floats) -> tuple[Floats, Floats] | None:
+        """(m,) weighted predictions at a point x (d,) and (m, d) their derivatives, of one run.
+
+        size: (d,) of the parameters. None where predictions have no derivatives.
+        """
+        found = self.ensemble.series_with_slopes(x, size)
+        if found is None:
+            return None
+        self.runs += 1
+        parts = {
+            name: self.interpolator(np.vstack([values, slopes.T]))
+            for name, (values, slopes) in found.items()
+        }
+        weighted = self.data.weighted(parts)
+        return weighted[0], weighted[1:].T
+
     def __call__(self, points: Floats) -> Floats:
         """(k, m) weighted predictions of the m data at points (k, d); NaN where a run fails."""
         series = self.series(points)
@@ -95,13 +111,17 @@ class Differences:
         scale = np.array([p.size for p in parameters])
         return cls(predict, low, high, scale, float(np.cbrt(max(rtol, 1e-13))), names)
 
+    def lengths(self, x: Floats) -> Floats:
+        """(d,) sizes of parameters at a point."""
+        return np.maximum(np.abs(x), MIN_SIZE * self.scale)
+
     def steps(self, x: Floats, base: Floats, slopes: Floats | None) -> Floats:
         """(d,) steps at a point x where base (m,) is predicted, with derivatives so far.
 
         Where a parameter changes predictions fast, such as a stiffness the phase of many
         oscillations, its step changes them by ``relative`` of their size.
         """
-        length = np.maximum(np.abs(x), MIN_SIZE * self.scale)
+        length = self.lengths(x)
         if slopes is not None:
             size, speed = _deviation(base), np.array([_deviation(column) for column in slopes.T])
             fast = (speed * length > size) & (size > 0.0)

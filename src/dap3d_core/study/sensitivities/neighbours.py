@@ -4,9 +4,9 @@ Models are made and starts are corrected in Python. Nothing of that is integrate
 derivatives come from differences of sixth order, whose error is near rounding.
 """
 
-import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, NamedTuple
 
 import attrs
 import numpy as np
@@ -22,39 +22,25 @@ from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import settings_of
+from dap3d_core.study.differences import (
+    OFFSETS,
+    change_along,
+    differences,
+    power_of_two,
+    weighted,
+    weights_of,
+)
 from dap3d_core.study.parameters import SceneParameter, all_parameters, with_values
+from dap3d_core.study.sensitivities.copies import copied_slopes
 
 #: Steps of differences, over the size of the parameter: rounding over the step is near 1e-13, and
 #: what the sixth power of the step leaves of 1/sqrt(mass) below that. Others are for starts that
 #: wide changes tear apart.
 STEPS = (3e-3, 1e-3, 1e-4)
-#: Offsets of differences in steps: central, and to either side where a value has a limit.
-OFFSETS = (-3, -2, -1, 1, 2, 3), (0, 1, 2, 3, 4, 5, 6), (0, -1, -2, -3, -4, -5, -6)
-#: A change of a state, over its size, in differences of functions of it.
-CHANGE = 1e-3
 #: Residual of corrected starts: of rounding.
 EXACT = 1e-15
 #: What is written before it is read, or counts: without derivatives by parameters.
 WITHOUT = ("rows", "crossings")
-
-
-def weights_of(offsets: tuple[int, ...]) -> Floats:
-    """Weights of values at some offsets in the derivative at 0, of highest order."""
-    powers = np.vander(np.array(offsets, dtype=float), increasing=True).T
-    return np.linalg.solve(powers, np.eye(len(offsets))[1])
-
-
-def differences(function: Callable[[float], Floats], step: float) -> Floats:
-    """The derivative at 0 of a function, by central differences of sixth order."""
-    offsets = OFFSETS[0]
-    pairs = zip(offsets, weights_of(offsets), strict=True)
-    return weighted([(w, function(k * step)) for k, w in pairs]) / step
-
-
-def weighted(pairs: Sequence[tuple[float, Any]]) -> Any:
-    """The sum of weights times values, whose weights add up to zero: exactly 0 of equal values."""
-    _, first = pairs[0]
-    return sum(w * (value - first) for w, value in pairs[1:])
 
 
 class RunBeside(Run):
@@ -77,25 +63,47 @@ class RunBeside(Run):
         return attrs.evolve(start, u=exact.u)
 
 
-@attrs.frozen(eq=False)
-class Neighbours:
+class RunsBeside(NamedTuple):
     """Runs with other values of one parameter.
 
     Attributes:
-        parameter: which.
         runs: each at its start.
         weights: of what each run has, in the derivative.
         offsets: how far the parameter is from its value in each.
     """
 
-    parameter: SceneParameter
     runs: tuple[Run, ...]
     weights: tuple[float, ...]
     offsets: tuple[float, ...]
 
+
+@attrs.define(eq=False, slots=False)
+class Neighbours:
+    """A parameter, and runs with other values of it, made where they are needed.
+
+    Attributes:
+        parameter: which.
+        copied: as of ``copied_slopes``: the derivatives of all numbers by it, where they are known.
+    """
+
+    parameter: SceneParameter
+    copied: tuple[list[Floats], Floats] | None
+    _make: Callable[[], RunsBeside]
+
+    @cached_property
+    def made(self) -> RunsBeside:
+        """The runs. Errors as of ``neighbours_of``."""
+        return self._make()
+
+    @property
+    def is_brought_back(self) -> bool:
+        """True if a run that is not corrected was off the constraints."""
+        runs = self.made.runs if self.copied is None else ()
+        return any(isinstance(run, RunBeside) and run.is_brought_back for run in runs)
+
     def derivative(self, function: Callable[[Run], Any]) -> Any:
         """The derivative by the parameter of what a function gives of a run."""
-        pairs = zip(self.weights, self.runs, strict=True)
+        pairs = zip(self.made.weights, self.made.runs, strict=True)
         return weighted([(w, function(run)) for w, run in pairs])
 
 
@@ -122,7 +130,7 @@ def run_beside(
 def neighbours_of(
     compiled: CompiledModel, parameter: SceneParameter, given: dict[str, Any], base: Run
 ) -> Neighbours:
-    """Neighbours of a run by a parameter.
+    """Neighbours of a run by a parameter; runs are made now unless derivatives are known.
 
     Args:
         compiled: the model of the scene as given.
@@ -135,10 +143,26 @@ def neighbours_of(
         SimulationError: the scene cannot be run near its value, or has another structure there.
     """
     _check(parameter)
+    size = _size(compiled, parameter)
+    copied = copied_slopes(base, parameter, size)
+    found = Neighbours(parameter, copied, partial(_made, compiled, parameter, size, given, base))
+    if copied is None:
+        _ = found.made
+    return found
+
+
+def _made(
+    compiled: CompiledModel,
+    parameter: SceneParameter,
+    size: float,
+    given: dict[str, Any],
+    base: Run,
+) -> RunsBeside:
+    """Runs beside a run; arguments and errors as of ``neighbours_of``."""
     value, why = float(parameter.value or 0.0), ""
     for offsets in OFFSETS:
         for step in STEPS:
-            h = step * _size(compiled, parameter)
+            h = power_of_two(step * size)
             try:
                 runs = tuple(
                     run_beside(compiled, given, [(parameter, value + k * h)], base.start)
@@ -153,7 +177,7 @@ def neighbours_of(
                 why = "the model has another structure there"
                 continue
             weights = tuple((weights_of(offsets) / h).tolist())
-            return Neighbours(parameter, runs, weights, tuple(k * h for k in offsets))
+            return RunsBeside(runs, weights, tuple(k * h for k in offsets))
     raise SimulationError(
         f"there is no derivative by {parameter.name} at {value:g}: with values near it, the scene "
         f"cannot be run as here: {why}"
@@ -200,21 +224,15 @@ def _are_alike(one: Run, other: Run) -> bool:
     return bool(np.array_equal(*jumps))
 
 
-def change_along(state: Floats, slopes: Floats) -> float:
-    """How far to go along slopes, for differences of functions of a state; 0 where there are none.
-
-    So far that the state changes by ``CHANGE`` of its largest number.
-    """
-    size, speed = (float(np.max(np.abs(x), initial=0.0)) for x in (state, slopes))
-    return CHANGE * max(size, 1e-3) / speed if speed > 0.0 and math.isfinite(speed) else 0.0
-
-
 def total_derivative(
     function: Callable[[Run, Floats], Floats],
     beside: Sequence[Neighbours],
     base: Run,
     x: Floats,
     slopes: Floats,
+    motion: slice,
+    *,
+    of_model: bool = True,
 ) -> Floats:
     """Derivatives (..., p) of what Python computes of a run and of numbers x.
 
@@ -222,12 +240,15 @@ def total_derivative(
         function: of a run and numbers.
         beside: neighbours of the run by each parameter; base: the run itself.
         x: the numbers; slopes: (..., p) their derivatives.
+        motion: those of them (of the last axis) of which it may be a curved function.
+        of_model: False where the function reads nothing of the run's model that may vary.
     """
     found = []
+    none = 0.0 if of_model else np.zeros_like(function(base, x))
     for j, neighbours in enumerate(beside):
         along = slopes[..., j]
-        total = neighbours.derivative(lambda run: function(run, x))
-        if step := change_along(x, along):
+        total = neighbours.derivative(lambda run: function(run, x)) if of_model else none
+        if step := change_along(x[..., motion], along[..., motion]):
             total = total + differences(lambda e: function(base, x + e * along), step)  # noqa: B023
         found.append(total)
     return np.stack(found, axis=-1)

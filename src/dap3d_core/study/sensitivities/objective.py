@@ -89,7 +89,8 @@ class Objective:
         """Value and gradient at a point x (p,), of one run. Errors as of ``sensitivities``."""
         self.gradients += 1
         found = sensitivities(self._compiled(self._at(x)), self.names, **self._settings)
-        return float(self._of(found.result)), found.derivative(self._of)
+        gradient = found.of_number(self._quantity, self._number)
+        return float(self._of(found.result)), gradient
 
     def to_jax(self) -> Callable[[Any], Any]:
         """A function of JAX, for ``jax.grad`` and ``jax.jit`` (extra ``jax``).

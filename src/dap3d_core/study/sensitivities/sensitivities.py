@@ -27,10 +27,12 @@ from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import compiled_for, settings_of
 from dap3d_core.simulation.simulate import given_state, start_word
+from dap3d_core.study.batch.compiled_batch import arrays_of_numbers
+from dap3d_core.study.differences import motion_of
+from dap3d_core.study.outputs import Output, Reduction
 from dap3d_core.study.parameters import SceneParameter, parameters_named
 from dap3d_core.study.sensitivities.neighbours import (
     Neighbours,
-    RunBeside,
     arrays_of,
     floats_of,
     neighbours_of,
@@ -93,7 +95,10 @@ class Sensitivities:
         """
         if quantity not in self._known:
             find(self.result, quantity)
-            self._known[quantity] = self.derivative(lambda result: result.quantity(quantity).values)
+            of_model = not self._is_of_rows(quantity)
+            self._known[quantity] = self._derivative(
+                lambda result: result.quantity(quantity).values, of_model=of_model
+            )
         return self._known[quantity]
 
     def final(self, quantity: str) -> Floats:
@@ -102,14 +107,37 @@ class Sensitivities:
 
     def derivative(self, function: Callable[[Result], Any]) -> Floats:
         """Derivatives (..., p) of what a smooth function computes of a result."""
+        return self._derivative(function, of_model=True)
 
+    def of_number(self, quantity: str, number: Callable[[Floats, Floats], Any]) -> Floats:
+        """(p,) derivatives of a number of a quantity's values (nt,) and of the times (nt,)."""
+        return self._derivative(
+            lambda result: number(result.quantity(quantity).values, result.t),
+            of_model=not self._is_of_rows(quantity),
+        )
+
+    def _is_of_rows(self, quantity: str) -> bool:
+        """True if a quantity is computed from reported rows and what the parameters leave alone."""
+        outputs = [Output(quantity, quantity)]
+        return all(Reduction(self._base.compiled, self.parameters, outputs).of_rows.values())
+
+    def _derivative(self, function: Callable[[Result], Any], *, of_model: bool) -> Floats:
         def of_rows(run: Run, rows: Floats) -> Floats:
             evaluator, record = run.evaluator, RunMetadata(scene_text=run.compiled.scene_text)
             whole = evaluator.with_inputs(rows, evaluator.model.input_values)
             result = Result.of_run(evaluator.model, whole, record, lambda: evaluator)
             return np.asarray(function(result), dtype=float)
 
-        return total_derivative(of_rows, self._neighbours, self._base, self._rows, self._slopes)
+        motion = motion_of(self._base.evaluator.model.body_count)
+        return total_derivative(
+            of_rows,
+            self._neighbours,
+            self._base,
+            self._rows,
+            self._slopes,
+            motion,
+            of_model=of_model,
+        )
 
     @property
     def event_times(self) -> Floats:
@@ -261,10 +289,7 @@ def _notes(compiled: CompiledModel, runs: "Sequence[DifferentiatedRun]") -> list
     """Notes on laws, and where an uncorrected start leaves its constraints with a parameter."""
     of_laws = notes_on_derivatives(compiled.checked)
     found = [
-        beside.parameter.name
-        for run in runs
-        for beside in run.neighbours
-        if any(isinstance(one, RunBeside) and one.is_brought_back for one in beside.runs)
+        beside.parameter.name for run in runs for beside in run.neighbours if beside.is_brought_back
     ]
     if not found:
         return of_laws
@@ -350,6 +375,12 @@ class DifferentiatedRun(Run):
         arrays = floats_of(self)
         ends = np.cumsum([array.size for array in arrays.values()])[:-1]
         for j, beside in enumerate(self.neighbours):
+            if beside.copied is not None:
+                of_numbers, of_state = beside.copied
+                for array, slope in zip(arrays_of_numbers(self.evaluator), of_numbers, strict=True):
+                    self._slopes_of(array)[:, j] = slope
+                self._slopes_of(self.present.work.state[Y])[:, j] = of_state
+                continue
             found = beside.derivative(
                 lambda run: _finite(np.concatenate([*floats_of(run).values()]))
             )
@@ -376,7 +407,8 @@ class DifferentiatedRun(Run):
         slopes = self._slopes_of(work.rows)[: count * work.rows.shape[1]]
         slopes = slopes.reshape(count, work.rows.shape[1], len(self.neighbours)).copy()
         if count and not self.evaluator.coordinates.are_of_bodies:
-            slopes = self._derivative(lambda run, rows: run.evaluator.body_rows(rows), raw, slopes)
+            motion = slice(1, work.state.shape[1])  # without the work done, which may be large
+            slopes = self._derivative(_body_rows, raw, slopes, motion)
         if count:
             self.slopes.append(slopes)
             self.reported.append(self.evaluator.body_rows(raw))
@@ -386,9 +418,13 @@ class DifferentiatedRun(Run):
         return type(integration).rows(integration)
 
     def _derivative(
-        self, function: Callable[[Run, Floats], Floats], x: Floats, slopes: Floats
+        self,
+        function: Callable[[Run, Floats], Floats],
+        x: Floats,
+        slopes: Floats,
+        motion: slice,
     ) -> Floats:
-        return total_derivative(function, self.neighbours, self.base, x, slopes)
+        return total_derivative(function, self.neighbours, self.base, x, slopes, motion)
 
     def _jumping(self, change: Callable[..., None]) -> Callable[[Integration], None]:
         """A jump of velocities, whose derivatives are those of the law that Python solves."""
@@ -423,7 +459,8 @@ class DifferentiatedRun(Run):
                 return own.state[Y].copy()
 
             change(of, integration)
-            slopes = self._derivative(after, given, np.vstack([of_state, of_time]))
+            motion = slice(0, -2)  # without the work done and time
+            slopes = self._derivative(after, given, np.vstack([of_state, of_time]), motion)
             self.instants[float(work.t)] = of_time
             self._differentiation.take()
             self._slopes_of(work.state)[: work.state.shape[1]] = slopes
@@ -433,10 +470,15 @@ class DifferentiatedRun(Run):
     def _offset_of(self, run: Run) -> tuple[float, int]:
         """How far the parameter of a neighbour is from its value, and which one it is."""
         for j, beside in enumerate(self.neighbours):
-            for offset, other in zip(beside.offsets, beside.runs, strict=True):
+            made = beside.made
+            for offset, other in zip(made.offsets, made.runs, strict=True):
                 if other is run and run is not self.base:
                     return offset, j
         return 0.0, 0
+
+
+def _body_rows(run: Run, rows: Floats) -> Floats:
+    return run.evaluator.body_rows(rows)
 
 
 def _finite(x: Floats) -> Floats:

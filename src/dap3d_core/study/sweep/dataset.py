@@ -6,12 +6,13 @@ series have ``time`` as their last dimension. Derivatives, ``d NAME``, have ``pa
 """
 
 import json
+import math
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import attrs
 import numpy as np
@@ -22,7 +23,7 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.result import ResultError, current_versions
 from dap3d_core.result.arrays import LARGE
 from dap3d_core.result.file.checksum import check_checksums, check_signature
-from dap3d_core.result.file.library import NETCDF, unreadable
+from dap3d_core.result.file.library import opened, reading, unreadable
 from dap3d_core.result.file.schema import SWEEP, about
 from dap3d_core.result.file.validate import check_claims
 from dap3d_core.result.metadata import to_json
@@ -31,9 +32,6 @@ from dap3d_core.simulation.output.type_sources import digests_of
 from dap3d_core.study.design import Design
 from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.study import Batch, PointStatus, derivative_name
-
-if TYPE_CHECKING:
-    import xarray
 
 Read = TypeVar("Read")
 
@@ -52,6 +50,10 @@ ABOUT_STATUS = {
     "flag_meanings": " ".join(status.name.lower() for status in PointStatus),
 }
 ABOUT_NOTE = {"long_name": "what there is to say of the point", "units": "1"}
+
+
+#: Variables of up to so many bytes are read whole: single values from a file take far longer.
+READ_WHOLE = 2**30
 
 
 @attrs.frozen(eq=False)
@@ -254,20 +256,19 @@ def _opened(file: Path) -> "xarray.Dataset":
     import xarray
 
     check_checksums(file)
-    with NETCDF:
-        _check(file)
-        try:
-            found = xarray.open_dataset(
-                file, engine="netcdf4", decode_times=False, decode_timedelta=False
-            )
-            varied = [one["name"] for one in json.loads(found.attrs["varied"])]
-            found = found.set_coords([name for name in varied if name in found])
-            found = found.drop_encoding()  # how a file holds it is no property of the data
-            if found.nbytes <= LARGE:
-                with found:
-                    found.load()
-        except Exception as error:  # whatever a damaged file makes of it
-            raise unreadable(file, error) from error
+    with reading(file):
+        with opened(file) as dataset:
+            check_format(file, dataset)
+            check_claims(file, dataset)
+        found = xarray.open_dataset(
+            file, engine="netcdf4", decode_times=False, decode_timedelta=False
+        )
+        varied = [one["name"] for one in json.loads(found.attrs["varied"])]
+        found = found.set_coords([name for name in varied if name in found])
+        found = found.drop_encoding()  # how a file holds it is no property of the data
+        if found.nbytes <= LARGE:
+            with found:
+                found.load()
     sweep = _with_names(Sweep(found.data_vars, found.coords, found.attrs))
     sweep.set_close(found.close)
     return sweep
@@ -291,28 +292,9 @@ def is_sweep(path: str | os.PathLike[str]) -> bool:
 
 
 def _attributes_of(file: Path) -> list[str]:
-    import netCDF4
-
     check_checksums(file)
-    try:
-        with NETCDF, netCDF4.Dataset(os.path.abspath(file), "r") as dataset:
-            return list(dataset.ncattrs())
-    except Exception as error:  # whatever a damaged file makes of it
-        raise unreadable(file, error) from error
-
-
-def _check(file: Path) -> None:
-    """Refuse a file that is no sweep, or claims more than it can hold."""
-    import netCDF4
-
-    try:
-        with netCDF4.Dataset(os.path.abspath(file), "r") as dataset:
-            check_format(file, dataset)
-            check_claims(file, dataset)
-    except ResultError:
-        raise
-    except Exception as error:  # whatever a damaged file makes of it
-        raise unreadable(file, error) from error
+    with reading(file), opened(file) as dataset:
+        return list(dataset.ncattrs())
 
 
 def check_format(file: Path, dataset: Any) -> None:
@@ -401,3 +383,30 @@ def _ends(values: Any) -> tuple[Any, Any]:
     if not values.size:
         return "", ""
     return f"{np.min(values):.6g}", f"{np.max(values):.6g}"
+
+
+def at_places(data: "xarray.Dataset", places: Mapping[str, Integers]) -> "xarray.Dataset":
+    """A data set at some indices along its dimensions."""
+
+    def subset(array: "xarray.DataArray") -> "xarray.DataArray":
+        index = {axis: k for axis, k in places.items() if axis in array.dims}
+        return (array.compute() if array.nbytes <= READ_WHOLE else array).isel(index)
+
+    return data.map(subset, keep_attrs=True)
+
+
+def evenly(shape: Sequence[int], most: int) -> list[Integers]:
+    """Indices along each axis with at most ``most`` combinations (1 or more), (k,) rising.
+
+    No axis keeps more indices than the longest that is shortened; the first and the last index of
+    an axis are among them where it keeps two or more.
+    """
+    low, high = 1, max(shape, default=1)
+    while low < high:
+        cap = (low + high + 1) // 2
+        fits = math.prod(min(length, cap) for length in shape) <= most
+        low, high = (cap, high) if fits else (low, cap - 1)
+    return [
+        np.unique(np.linspace(0, length - 1, min(length, low)).round().astype(np.int64))
+        for length in shape
+    ]

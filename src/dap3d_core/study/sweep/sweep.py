@@ -18,8 +18,7 @@ from dap3d_core.study.ensemble import Ensemble
 from dap3d_core.study.outputs import outputs_of
 from dap3d_core.study.study import Study
 from dap3d_core.study.sweep.dataset import InMemory, layout_of, open_sweep
-from dap3d_core.study.sweep.file import SweepFile
-from dap3d_core.study.sweep.schema import NOTE
+from dap3d_core.study.sweep.file import NOTE, SweepFile
 from dap3d_core.study.workers.threads import RunPoints, run_here
 
 if TYPE_CHECKING:

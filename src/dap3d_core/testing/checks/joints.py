@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.interface.element_unknowns import unknown_names
+from dap3d_core.interface.element_states import unknown_names
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.testing.checks.compare import (

@@ -10,16 +10,14 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.interface.codegen.jump_source import JUMP_KINDS, jump_names
 from dap3d_core.interface.codegen.kernel_arguments import friction_names, parameters
-from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, kernels_of
+from dap3d_core.interface.codegen.loop_source import JUMP_KINDS, LOOP_KINDS, jump_names, kernels_of
 from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.errors import line_of, plain_words
 from dap3d_core.interface.examine.examine import ATTEMPTS
 from dap3d_core.interface.examine.random_values import random_quantity
 from dap3d_core.kernels.runtime.cache import jit_is_on
-from dap3d_core.kernels.runtime.outer_references import codes_in
-from dap3d_core.kernels.runtime.source_digest import reached
+from dap3d_core.kernels.runtime.source_digest import codes_in, reached
 from dap3d_core.testing.checks.compare import Comparison, left_out
 from dap3d_core.testing.checks.findings import CheckOutcome
 from dap3d_core.testing.samples.complex_step import Stepped

@@ -12,7 +12,6 @@ import attrs
 import numpy as np
 from numpy.typing import NDArray
 
-from dap3d_core.interface.body_pose import BodyPose, pose
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.codegen.instance_layout import ANGLE_WIDTH, size
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS, kernels_of
@@ -22,6 +21,7 @@ from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, prepared, set_ends
 from dap3d_core.interface.examine.random_values import numbers, random_field
 from dap3d_core.interface.fields import FieldSpec, specs_of
+from dap3d_core.interface.types import BodyPose, pose
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.function_lists import LoopArrays, call_loop, loop_list
 from dap3d_core.kernels.runtime.loop_modules import build, source_of

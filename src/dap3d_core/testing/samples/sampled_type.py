@@ -15,7 +15,7 @@ from dap3d_core.interface.codegen.specialise import bind_friction, bind_function
 from dap3d_core.interface.codegen.terms import bind_terms
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.contacts.rows import STICKS
-from dap3d_core.interface.element_unknowns import unknown_names
+from dap3d_core.interface.element_states import unknown_names
 from dap3d_core.interface.errors import where_is
 from dap3d_core.interface.examine.examine import ATTEMPTS, examine
 from dap3d_core.interface.examine.random_values import numbers

@@ -15,7 +15,6 @@ from dap3d_core.result import Result
 from dap3d_core.result.model_summary import ModelSummary
 from dap3d_core.scene import SceneError, load, parse
 from dap3d_core.scene.scene import Scene
-from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import colors
 from dap3d_core.view.scene3d.elements import ORIGIN, ElementGeometry, Elements
 from dap3d_core.view.scene3d.primitives import (
@@ -30,7 +29,7 @@ from dap3d_core.view.scene3d.primitives import (
     rod,
     turned_to,
 )
-from dap3d_core.view.scene3d.sampled_motion import Extent, Motion
+from dap3d_core.view.scene3d.sampled_motion import Extent, Motion, stage
 from dap3d_core.view.scene3d.shapes import Mesh, SceneShapes, scene_shapes
 
 #: The colour of what belongs to ground.

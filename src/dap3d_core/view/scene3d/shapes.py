@@ -18,8 +18,7 @@ from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.shapes import SHAPES, Shape, height_field, mesh_file, read_shapes
 from dap3d_core.view.scene3d.colors import color
-from dap3d_core.view.scene3d.primitives import Located, Mark, floats_of, turned_to
-from dap3d_core.view.scene3d.solids import Triangles, solid
+from dap3d_core.view.scene3d.primitives import Located, Mark, Triangles, floats_of, solid, turned_to
 
 #: Meshes of more triangles are not put into a page.
 MOST_TRIANGLES = 300_000
@@ -39,7 +38,7 @@ class Mesh:
     Attributes:
         body: index, ground 0.
         at, q: origin (3,), m, and Euler parameters (4,) of the axes of the file in the body.
-        scale: m for one unit of the file.
+        scale: m for one unit of the file, along its axes.
         vertices: (k, 3) in units of the file.
         triangles: (m, 3) indices of vertices.
         color, owner: as of a mark.
@@ -48,7 +47,7 @@ class Mesh:
     body: int
     at: tuple[float, ...]
     q: tuple[float, ...]
-    scale: float
+    scale: tuple[float, ...]
     vertices: Floats
     triangles: Integers
     color: str
@@ -101,9 +100,10 @@ def parts_of(marks: Sequence[Mark], meshes: Sequence[Mesh]) -> list[Part]:
         for m in marks
     ]
     for k, mesh in enumerate(meshes):
-        form, size = Triangles(mesh.vertices, mesh.triangles), (mesh.scale,) * 3
+        mirrored = bool(np.prod(np.sign(mesh.scale)) < 0.0)
+        form = Triangles(mesh.vertices, mesh.triangles[:, ::-1] if mirrored else mesh.triangles)
         parts.append(
-            Part(k, form, mesh.body, mesh.at, mesh.q, size, mesh.color, "shapes", mesh.owner)
+            Part(k, form, mesh.body, mesh.at, mesh.q, mesh.scale, mesh.color, "shapes", mesh.owner)
         )
     return parts
 
@@ -159,9 +159,9 @@ def _add(shapes: SceneShapes, shape: Shape, hue: str, folder: Path | None) -> st
             mesh = _mesh(folder, values["file"]) if shape.type == "mesh" else _own_mesh(shape)
         if isinstance(mesh, str):
             return mesh
-        piece = Mesh(at=values["at"], q=values["p"], scale=values.get("scale", 1.0),
+        piece = Mesh(at=values["at"], q=values["p"], scale=values.get("scale", (1.0,) * 3),
                      vertices=mesh[0], triangles=mesh[1], **about)  # fmt: skip
-        box = piece.scale * np.array([mesh[0].min(axis=0), mesh[0].max(axis=0)])
+        box = np.array(piece.scale) * np.array([mesh[0].min(axis=0), mesh[0].max(axis=0)])
         corners = _corners(shape.body, piece.at, piece.q, box)
     elif shape.type == "line":
         piece = Line(points=values["points"], **about)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import Pose, compose, relative, split
+from support.internals import Pose, compose, inverse, relative, rotation_vector, split
 from support.joint_pairs import BETWEEN, STANDARD, compiled_pair, pair
 from support.rotations import to_body
 
@@ -14,7 +14,6 @@ from dap3d_core.assembly.motion.coordinates import (
     coordinates,
     joint_coordinates,
 )
-from dap3d_core.model.rigid_motion import inverse, rotation_vector
 from dap3d_core.simulation import CompiledModel
 
 #: Joints with one factor and with two, axes parallel and not.

@@ -389,9 +389,7 @@ integrator = "{}"
 
 
 @pytest.mark.parametrize(
-    ("integrator", "step"),
-    [("dopri5", ""), ("dop853", "step = 0.005")],
-    ids=["adaptive", "fixed"],
+    ("integrator", "step"), [("dopri5", ""), ("dop853", "step = 0.005")], ids=["adaptive", "fixed"]
 )
 def test_an_exploding_run_ends_with_3_and_names_the_first_offender(call, folder, integrator, step):
     """x grows as exp(10^4 t), beyond all numbers at 0.07 s. SciPy's LSODA and Exudyn's explicit

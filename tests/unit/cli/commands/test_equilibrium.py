@@ -67,6 +67,7 @@ def test_table_fits_sixty_columns(model, capsys, monkeypatch):
     assert main([*model, "-o", "curve.png"]) == 2  # it exists
 
 
+@pytest.mark.slow
 def test_path_that_ends_on_its_way(tmp_path, capsys, monkeypatch):
     """What was found is printed; the exit code is that of a run that stopped early."""
     monkeypatch.setattr(continuation, "SHORTEST_STEP", 1e-2)

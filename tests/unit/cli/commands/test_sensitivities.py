@@ -50,6 +50,7 @@ def test_table_fits_sixty_columns(model, capsys, monkeypatch):
     assert main([*model, "-o", "stone.png"]) == 2  # it exists
 
 
+@pytest.mark.slow
 def test_file(model):
     """Quantities and derivatives over time."""
     assert main([*model, "--of", "stone.r.z", "-o", "stone.nc"]) == 0

@@ -5,11 +5,11 @@ import json
 import click
 import pytest
 from click.testing import CliRunner
+from support.internals import Refused, Terminated
 
 import dap3d_core as dap
 from dap3d_core.cli.framework import error_messages
 from dap3d_core.cli.framework.error_messages import report_error
-from dap3d_core.cli.process.exit_codes import Refused, Terminated
 from dap3d_core.scene import Mistake
 
 

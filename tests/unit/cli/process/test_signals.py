@@ -8,8 +8,8 @@ import sys
 import time
 
 import pytest
+from support.internals import Terminated
 
-from dap3d_core.cli.process.exit_codes import Terminated
 from dap3d_core.cli.process.signals import SignalHandler
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")

@@ -83,6 +83,7 @@ def test_coupled_joints_share_their_inertia(tmp_path, suffix, text, armature):
         np.testing.assert_allclose(angle, ratio * expected, rtol=1e-8, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_all_methods_find_the_reactions_of_coupled_joints():
     """The wheel is not so light that rows of both followers are taken for one."""
     scene, _ = dap.import_model(REPOSITORY / "models" / "robots" / "gripper.urdf")

@@ -1,6 +1,7 @@
 """Inertia of links whose file says too little."""
 
 import numpy as np
+import pytest
 
 import dap3d_core as dap
 
@@ -20,3 +21,21 @@ def test_a_moment_of_zero_is_a_part_of_the_others_also_before_a_link_without_ine
     np.testing.assert_allclose(scene.bodies["arm"].Jp, (3e-14, 3e-3, 3e-3), rtol=1e-9)
     assert any("moment of inertia of 0" in one.text for one in report.translated)
     assert dap.simulate(scene, t_end=0.01).r.shape[1] == 2
+
+
+@pytest.mark.parametrize(
+    ("compiler", "options", "expected"),
+    [
+        ("", {}, (0.3, 0.4, 0.7)),
+        ("", {"balance_inertia": True}, (0.4, 0.4, 0.4)),
+        ('<mujoco><compiler balanceinertia="true"/></mujoco>', {}, (0.4, 0.4, 0.4)),
+    ],
+)
+def test_moments_that_no_body_has(tmp_path, compiler, options, expected):
+    """0.3 + 0.4 = 0.7: half of the lack of 0.2 each; or the mean, as asked for or in the file."""
+    arm = LINK.format("arm", 1, 0.2, 0.3, 0.7, JOINT.format("arm", "base"))
+    (tmp_path / "a.urdf").write_text(f'<robot name="r">{compiler}<link name="base"/>{arm}</robot>')
+    scene, report = dap.import_model(tmp_path / "a.urdf", **options)
+    np.testing.assert_allclose(scene.bodies["arm"].Jp, expected, rtol=1e-15)
+    loud = [one.motion for one in report.translated if "principal moments" in one.text]
+    assert loud == [True] * (not compiler)

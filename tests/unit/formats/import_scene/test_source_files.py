@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from support.internals import FormatError
 from support.rotations import rotation
 
 import dap3d_core as dap
 from dap3d_core.formats.import_scene.source_files import SourceFiles
-from dap3d_core.interface.formats import FormatError
 
 INNER = """
 <sdf version="1.9"><model name="finger">

@@ -56,6 +56,7 @@ def test_evaluations_at_a_state_know_the_states_of_elements():
     assert rates[0] == pytest.approx(rates[1], rel=1e-14)
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize("ends", [("a", "b"), ("b", "a")])
 def test_a_weld_of_free_bodies_joins_them_either_way(ends):
     """Two spinning bodies as one: the far one is carried along."""

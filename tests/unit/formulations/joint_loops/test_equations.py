@@ -5,13 +5,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from support import loops, problems, redundant, singular, trees
-from support.internals import split
+from support.internals import matrices, split
 from support.plain import long_in_plain_python
 from unit.formulations.joint.test_equations import ACCELERATIONS, MULTIPLIERS, closed
 
 import dap3d_core as dap
 from dap3d_core.formulations.joint_loops import tables
-from dap3d_core.model.rigid_motion import matrices
 from dap3d_core.simulation import CompiledModel
 
 #: Singular values of the scaled Jacobian below this part of the largest belong to dependent rows:

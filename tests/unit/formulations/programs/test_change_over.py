@@ -46,6 +46,7 @@ def programs(records):
     return record.programs
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize(("model", "method"), [("pen1", "standard"), ("pen1", "joint"),
                          ("fourbar3", "joint"), ("fourbar2", "lsq"),
                          ("bodies2", "unconstrained")])  # fmt: skip
@@ -65,6 +66,7 @@ def test_switches_have_programs(at_once):
     assert set(programs(at_once)) == {RHS, PROJECT, BEHIND, WATCH}
 
 
+@pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_derivatives_run_by_programs(method, at_once, monkeypatch):
     """Numbers by which there are some are no constants; projections remain general ones."""

@@ -8,6 +8,7 @@ import pytest
 from support.plain import jit_is_on
 from support.process import run
 from verification.test_stepping import ball, collide, slope, tower
+from verification.test_sticking_under_load import pendulum
 
 import dap3d_core as dap
 from dap3d_core.assembly.collisions import placed_shapes
@@ -19,13 +20,15 @@ def quadruped():
     return dap.load("quadruped")
 
 
-#: Scene, and settings of a short run: impacts, joints, square matrices and blocks.
+#: Scene, and settings of a short run: impacts, joints, friction, squares and blocks.
 CASES = {
     "slope": (slope, {"t_end": 0.02, "dt": 0.01, "contact_step": 5e-3}),
     "ball": (lambda: ball(1e-3, mu=0.3, e=0.5), {"t_end": 0.02, "dt": 0.01, "contact_step": 5e-3}),
     "tower": (tower, {"t_end": 0.005, "dt": 0.005, "contact_step": 5e-3}),
+    "friction": (pendulum, {"t_end": 0.02, "dt": 0.01, "contact": "stepping",
+                            "contact_step": 5e-3}),
     "quadruped": (quadruped, {"t_end": 0.07, "dt": 0.01, "contact_step": 5e-3}),
-}
+}  # fmt: skip
 SCRIPT = f"""
 import sys
 sys.path.insert(0, {str(Path(__file__).parents[3])!r})
@@ -49,6 +52,7 @@ def digests():
     return [digest(name) for name in CASES]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 def test_compiled_steps_have_the_bits_of_plain_python():
     assert run(SCRIPT, DAP3D_PLAIN=1).split() == digests()

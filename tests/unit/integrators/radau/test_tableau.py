@@ -5,7 +5,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from dap3d_core.integrators.radau.tableau import ABSCISSAE, STAGES, radau_method
+from dap3d_core.integrators.radau.tableau import COEFFICIENTS, STAGES, radau_method
 
 
 def of(k):
@@ -40,7 +40,7 @@ def test_abscissae_are_roots_to_their_last_digits(k):
         return total
 
     assert value(Fraction(1)) == 0
-    for c in ABSCISSAE[k][:-1]:
+    for c in COEFFICIENTS["c"][k][:-1]:
         below, above = (Fraction(float(np.nextafter(c, to))) for to in (0.0, 1.0))
         assert value(below) * value(above) < 0
 
@@ -63,7 +63,7 @@ def test_coefficients_have_order_2s_minus_1(k):
         alpha, beta = poles[p], poles[p + 1]
         blocks[p : p + 2, p : p + 2] = [[alpha, -beta], [beta, alpha]]
     # T has a condition of up to 1100, A^-1 entries of up to 40
-    assert m["T_inverse"] @ m["inverse"] @ m["T"] == pytest.approx(blocks, abs=2e-11)
+    assert m["T_inverse"] @ m["inverse"] @ m["T"] == pytest.approx(blocks, abs=2e-12)
     assert poles[0] > 0.0
     assert (poles[1::2] > 0.0).all()
 
@@ -79,6 +79,40 @@ def test_error_estimate_is_zero_for_polynomials(k):
     # rates x^s: the stages of a quadrature are off by a multiple of ``bulge``
     z = m["A"] @ c**s
     assert z + (e @ z) * m["bulge"] == pytest.approx(c ** (s + 1) / (s + 1), abs=1e-14)
+
+
+@pytest.mark.parametrize("k", range(3))
+def test_transformation_is_known_to_its_last_digit(k):
+    """Eigenvectors of the derivatives of polynomials at the abscissae, found with 40 digits."""
+    mp = pytest.importorskip("mpmath").mp.clone()
+    mp.dps = 40
+    s, m = of(k)
+    roots = mp.polyroots([mp.mpf(int(a)) for a in radau_polynomial(s)[::-1]], maxsteps=200)
+    c = [mp.mpf(0), *sorted(mp.re(root) for root in roots)]
+    gap = [mp.fprod(a - b for b in c if a != b) for a in c]
+    slopes = mp.matrix(s + 1, s + 1)
+    for i in range(s + 1):
+        others = [j for j in range(s + 1) if j != i]
+        for j in others:
+            slopes[i, j] = gap[i] / gap[j] / (c[i] - c[j])
+        slopes[i, i] = mp.fsum(1 / (c[i] - c[j]) for j in others)
+    poles, vectors = mp.eig(slopes[1:, 1:])
+    order = sorted(
+        range(s), key=lambda n: mp.im(poles[n])
+    )  # conjugates first, the real one between
+    T, found = mp.matrix(s, s), [mp.re(poles[order[s // 2]])]
+    columns = [[mp.re(vectors[i, order[s // 2]] / vectors[s - 1, order[s // 2]]) for i in range(s)]]
+    for n in order[: s // 2]:
+        found += [mp.re(poles[n]), -mp.im(poles[n])]
+        scaled = [vectors[i, n] / vectors[s - 1, n] for i in range(s)]
+        columns += [[mp.re(a) for a in scaled], [mp.im(a) for a in scaled]]
+    for j, column in enumerate(columns):
+        for i in range(s):
+            T[i, j] = column[i]
+    exact = {"inverse": slopes[1:, 1:], "A": slopes[1:, 1:] ** -1, "T": T, "T_inverse": T**-1}
+    for name, matrix in exact.items():
+        assert (m[name] == [[float(a) for a in row] for row in matrix.tolist()]).all()
+    assert (m["poles"] == [float(a) for a in found]).all()
 
 
 def test_published_weights():

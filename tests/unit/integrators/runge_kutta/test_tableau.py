@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate._ivp import dop853_coefficients
 from scipy.integrate._ivp.rk import RK45
-from support.integrands import (
-    ALL,
-)
+from support.integrands import ALL
 
 from dap3d_core.integrators import TABLEAUS
 

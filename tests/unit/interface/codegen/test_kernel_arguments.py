@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import LoopArrays, call_loop, loop_list, specs_of
+from support.internals import LoopArrays, build, call_loop, loop_list, specs_of
 
 from dap3d_core.interface import (
     Body,
@@ -21,7 +21,6 @@ from dap3d_core.interface import (
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels import add
 from dap3d_core.kernels.runtime import loop_support
-from dap3d_core.kernels.runtime.loop_modules import build
 
 ZERO = (0.0, 0.0, 0.0)
 

@@ -23,7 +23,7 @@ from dap3d_core.kernels import (
     tan,
     where,
 )
-from dap3d_core.testing.kit import checks_for
+from dap3d_core.testing import checks_for
 
 
 class Pipe(Contact):
@@ -43,6 +43,7 @@ class Pipe(Contact):
         return scale(-1.0 / size, (0.0, r_P_i[1], r_P_i[2]))
 
 
+@pytest.mark.slow
 def test_a_type_of_ones_own_on_one_body():
     failed = [str(outcome) for check in checks_for(Pipe) if not (outcome := check.run()).ok]
     assert not failed
@@ -115,7 +116,7 @@ def test_rates_of_what_is_sought_follow_from_its_equation():
     assert s_dot == pytest.approx(2.0 / (3.0 * s * s + 1.0), rel=1e-14)
 
 
-@pytest.mark.every(4)
+@pytest.mark.slow
 @pytest.mark.parametrize("part", [8, 16, 21, 51])
 def test_corners_and_edges_of_boxes_are_exact_derivatives(part):
     class Part(BoxBox):

@@ -64,6 +64,7 @@ class Aligned(Joint):
         return sum(dot(axes[0], a) for a in axes[1:]) - total
 
 
+@pytest.mark.slow
 def test_the_formulas_of_all_samples_are_checked():
     report = check_type(examine(Anchors), poses=2)
     assert report.ok, report

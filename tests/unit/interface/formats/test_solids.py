@@ -2,15 +2,9 @@
 
 import numpy as np
 import pytest
+from support.internals import Frame, Inertial, inertia_of_mesh, inertia_of_solid, total_inertia
 
-from dap3d_core.interface.formats import (
-    Frame,
-    Inertial,
-    inertia_of_mesh,
-    inertia_of_solid,
-    total_inertia,
-)
-from dap3d_core.interface.formats.solids import inertia_moved
+from dap3d_core.interface.formats.solids import inertia_moved, nearest_inertia
 
 CORNERS = np.array([(x, y, z) for x in (0.0, 2.0) for y in (0.0, 3.0) for z in (0.0, 5.0)])
 FACES = np.array([(0, 1, 3), (0, 3, 2), (4, 6, 7), (4, 7, 5), (0, 4, 5), (0, 5, 1),
@@ -67,3 +61,22 @@ def test_parts_together():
     assert whole.mass == volume
     np.testing.assert_allclose(whole.com, (1.0, 0.0, 0.0))
     np.testing.assert_allclose(whole.inertia, volume * J, rtol=1e-14, atol=1e-13)
+
+
+def test_nearest_inertia_of_a_body():
+    """Closed form in turned axes; none of 1000 inertias of bodies beside it is nearer."""
+    rng = np.random.default_rng(3)
+    A = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    J = A @ np.diag((0.2, 0.3, 0.7)) @ A.T
+    found = nearest_inertia(J)
+    np.testing.assert_allclose(found, A @ np.diag((0.3, 0.4, 0.7)) @ A.T, atol=1e-15)
+    np.testing.assert_allclose(nearest_inertia(found), found, atol=1e-15)
+
+    def second(J):
+        return np.trace(J) / 2.0 * np.eye(3) - J
+
+    apart = np.linalg.norm(second(J) - second(found))
+    roots = np.linalg.cholesky(second(found) + 1e-12 * np.eye(3))
+    for _ in range(1000):
+        root = roots + 0.1 * rng.normal(size=(3, 3))
+        assert np.linalg.norm(second(J) - root @ root.T) > apart

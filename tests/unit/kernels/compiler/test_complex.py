@@ -6,10 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.at_all_levels import VALUES, compiled_at_all_levels, same_bits
-from support.internals import Array
+from support.internals import COMPLEX, Array
 from support.plain import jit_is_on
-
-from dap3d_core.kernels.compiler.types import COMPLEX
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 

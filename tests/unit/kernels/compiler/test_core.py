@@ -4,12 +4,10 @@ Calls are recorded in plain Python and repeated (tests/support/recorded_calls.py
 import json
 
 import pytest
-from support.internals import FLOAT, INT
+from support.internals import FLOAT, INT, Known, Struct
 from support.plain import jit_is_on
 from support.problems import short_runs
 from support.process import REPOSITORY, run
-
-from dap3d_core.kernels.compiler.types import Known, Struct
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -63,13 +61,13 @@ recorder.record(points, pendulum, {"bodies.bob.mass": (1.0, 3.0)}, "bob.w", meth
 in_joint_coordinates = ensemble(pendulum(), ["bodies.bob.mass"], ["bob.w"], method="joint")
 recorder.record(in_joint_coordinates.run, [[1.0], [3.0]])
 recorder.record(dap.simulate, "pen1", t_end=0.1, dt=0.1, rtol=1e-13, atol=1e-15)
-from dap3d_core.linear.ordering import elimination_order, supernodes
+from dap3d_core.linear.ordering import elimination_order, ordering
 from support.graphs import Case, check_solution
 from support.nets import plate_net
-usual = elimination_order.WIDE, elimination_order.LEAF, supernodes.ZEROS
-elimination_order.WIDE, elimination_order.LEAF, supernodes.ZEROS = 0, 4, 0.3
+usual = elimination_order.WIDE, elimination_order.LEAF, ordering.ZEROS
+elimination_order.WIDE, elimination_order.LEAF, ordering.ZEROS = 0, 4, 0.3
 recorder.record(lambda: check_solution(Case(plate_net(8), np.random.default_rng(1))))
-elimination_order.WIDE, elimination_order.LEAF, supernodes.ZEROS = usual
+elimination_order.WIDE, elimination_order.LEAF, ordering.ZEROS = usual
 from support.state_types import REGISTRY, stated, steered
 recorder.record(dap.simulate, dap.compile(steered(), registry=REGISTRY), t_end=0.1, dt=0.1,
                 integrator="radau")
@@ -90,8 +88,7 @@ NOT_CALLED = {
         "formulations.standard": "settle_rows",
         "integrators.adams.step": "reject",
         "integrators.stepping.vector_ops": "scaled_beyond",
-        "integrators.runge_kutta.error": "error_beyond_rounding",
-        "integrators.runge_kutta.sums": "combine_by_table",
+        "integrators.runge_kutta.sums": "combine_by_table error_beyond_rounding",
         "integrators.stepping.singular_poses": "predict_measures is_approaching "
         "least_time_to_singularity",
         "integrators.radau.step": "reject_iteration stage_is_across blame",
@@ -112,8 +109,6 @@ NOT_CALLED = {
         # of scenes with contacts, which have closed forms: verification/test_contacts.py
         # of shapes that collide: unit/assembly/collisions, verification/test_stepping.py
         "assembly.collisions.records": "add",
-        "assembly.collisions.rods": "balls along sphere_capsule capsules _pair",
-        "assembly.collisions.planes": "above at_plane _rims",
         "assembly.collisions.solids": "clamp local put ball_box sphere_cylinder capsule_box slope "
         "_lowest",
         "assembly.collisions.boxes": "dot_axis apart boxes _edges _face _facing _clip",
@@ -123,21 +118,21 @@ NOT_CALLED = {
         "bend flat_directions part_best touch_convex",
         "assembly.collisions.manifold": "turn outline clip tangents spread inside crossing "
         "at_plane_along put_points points_within",
-        "assembly.collisions.broad_phase": (
-            "find_pairs add_pair meet ranked place_of fill_cells grid_pairs"
-        ),
         "assembly.collisions.placed_shapes": "place_shapes",
-        "assembly.collisions.find": "has_formula touch find_touches",
+        "assembly.collisions.find": (
+            "has_formula touch find_touches find_pairs add_pair meet ranked place_of fill_cells "
+            "grid_pairs above at_plane _rims balls along sphere_capsule capsules _pair"
+        ),
         "integrators.moreau.dense": (
             "solve_dense solve_square solve_blocks invert multiply take take_from"
         ),
         "integrators.moreau.gauss_seidel": (
-            "sweep_bodies sweep_contacts change_of refine_held keep take_kept put_crossed "
+            "sweep_bodies sweep_contacts size_of change_of refine_held copy_impulses put_crossed "
             "put_answer put_felt"
         ),
         "integrators.moreau.contact_set": (
             "find_contacts place_poses axes_of turn_tensor put_touch put_frame evaluate_rows "
-            "put_declared"
+            "put_declared velocity_of find_grips friction_at"
         ),
         "integrators.moreau.free_motion": "move_freely normalise size_of largest_rate",
         "integrators.moreau.groups": (
@@ -145,12 +140,14 @@ NOT_CALLED = {
             "eliminate block_at"
         ),
         "integrators.moreau.impulses": (
-            "slot_of recall remember mode_of keep_for_reports complete_row log_contacts"
+            "slot_of recall put_grip let_slip remember mode_of keep_for_reports complete_row "
+            "log_contacts"
         ),
         "integrators.moreau.newton": (
-            "put_projected put_slopes put_missed put_velocities clear add_pull times_inverse "
-            "add_inverse velocity_of speed_of left_at residual_of newton exchange put_rest "
-            "size_of solve_round try_pass assemble put_turned add_contact"
+            "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of add_load "
+            "put_velocities clear add_pull times_inverse add_inverse speed_of left_at residual_of "
+            "newton exchange put_rest product_of solve_round try_pass assemble put_turned "
+            "add_contact"
         ),
         "integrators.moreau.problem": "prepare_problem solve judge sweep finish refine_groups",
         "integrators.moreau.restitution": (
@@ -158,7 +155,7 @@ NOT_CALLED = {
         ),
         "integrators.moreau.step": (
             "advance goes_on state_at meet take_velocities put_margins length_of deepest_of "
-            "put_bias put_hits work_done move part finish way_of closing_of put_means"
+            "put_bias put_hits work_done move part finish way_of closing_of rests"
         ),
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",
@@ -166,13 +163,13 @@ NOT_CALLED = {
         "formulations.jumps.held_joints": "place_alone solve_free",
         "formulations.contacts.cone": "residual_of shorten sweep",
         "formulations.contacts.equations": (
-            "accelerate add_columns add_friction column force_of friction_of_one has_settled "
-            "inverse invert is_given is_sliding mode_of row_of "
+            "accelerate add_columns add_friction column force_of force_of_one has_settled "
+            "inverse invert invert_responses is_given is_sliding mode_of pressing row_of "
             "largest_given project report rhs watch contact_of fill_load has_loads solve_loads"
         ),
         "formulations.joint_loops.contacts": (
-            "accelerate add_contact_forces add_scaled force_of_one normal_forces project report "
-            "rhs watch"
+            "accelerate add_contact_forces add_scaled find_columns find_multipliers project report "
+            "rhs solve_all store_kept watch"
         ),
         # of runs with derivatives: study/sensitivities compares their values with those without
         "integrators.stepping.integration": "project_here",

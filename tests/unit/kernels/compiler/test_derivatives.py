@@ -11,15 +11,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from support.at_all_levels import function_of, made_of, programs, same_bits
-from support.internals import INTEGERS, MATRIX, Arrays, CompileError, Program, compiled, pointer
+from support.internals import (
+    INTEGERS,
+    MATRIX,
+    Arrays,
+    CompileError,
+    Program,
+    compiled,
+    pointer,
+    type_of,
+)
 from support.plain import jit_is_on
 from support.structs import Inner, Numbers
 
 from dap3d_core.kernels import scalar_math
 from dap3d_core.kernels.compiler.derivatives import differentiate
-from dap3d_core.kernels.compiler.units import type_of
 from dap3d_core.kernels.runtime.lanes import DifferentiatedArrays, differentiated
-from dap3d_core.kernels.scalar_math import is_differentiated, with_slopes
+from dap3d_core.kernels.scalar_math import is_differentiated, values_alone, with_slopes
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
@@ -74,6 +82,16 @@ def with_remarks(numbers):
     out[0] = with_slopes(x[0], x[1] * x[2])
     out[1] = with_slopes(x[0], 0.0)
     out[2] = 2.0 if is_differentiated() else 1.0
+
+
+@compiled
+def norm(numbers):
+    values_alone()
+    x, out = numbers.x, numbers.out
+    largest = 0.0
+    for k in range(3):
+        largest = max(largest, abs(-x[k]) / (math.sin(x[k]) + 2.0 * k + 3.0) - x[0] * x[1])
+        out[k] = largest
 
 
 @compiled
@@ -175,6 +193,14 @@ def test_code_says_what_derivatives_of_results_are():
     assert plain.out[:3].tolist() == [one.x[0], one.x[0], 1.0]
     assert scalar_math.with_slopes(1.0, 2.0) == 1.0
     assert not scalar_math.is_differentiated()
+
+
+def test_norms_have_values_alone():
+    one = arrays(np.random.default_rng(1))
+    values, slopes = differentiated_run(norm, one, np.eye(3))
+    norm(one)
+    assert values.tobytes() == one.out.tobytes()
+    assert not slopes.any()
 
 
 def test_slopes_are_finite_where_functions_have_corners():

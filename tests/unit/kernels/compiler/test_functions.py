@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 from support.at_all_levels import compiled_at_all_levels
+from support.internals import FLOAT, INT, MATRIX, VECTOR, Array, CompileError
 from support.plain import jit_is_on
 
 from dap3d_core.kernels.compiler.functions import Program
-from dap3d_core.kernels.compiler.types import FLOAT, INT, Array, CompileError
-from dap3d_core.kernels.runtime.array_struct import MATRIX, VECTOR
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 

@@ -7,12 +7,11 @@ from itertools import count
 
 import numpy as np
 import pytest
-from support.internals import FLOAT, Array, Program, Signature
+from support.internals import FLOAT, Array, Entry, Functions, Program, Signature, Unit
 from support.plain import jit_is_on
 from support.process import run, start
 
 from dap3d_core.kernels.compiler import background, objects, units
-from dap3d_core.kernels.compiler.units import Entry, Functions, Unit
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 

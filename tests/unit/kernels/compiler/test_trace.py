@@ -3,7 +3,15 @@
 import numpy as np
 import pytest
 from support.at_all_levels import made_of, same_bits, targets
-from support.internals import BODY_WIDTH, LoopArrays, sample_classes
+from support.internals import (
+    BODY_WIDTH,
+    LOOP,
+    LoopArrays,
+    array_members,
+    sample_classes,
+    sized_fields,
+    source_of,
+)
 from support.plain import jit_is_on
 
 import dap3d_core as dap
@@ -12,11 +20,8 @@ from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.interface.codegen.loop_source import LOOP_KINDS
 from dap3d_core.interface.codegen.reactions import bind_joints, joints_read
 from dap3d_core.interface.codegen.specialise import bind_friction
-from dap3d_core.interface.fields import sized_fields
 from dap3d_core.kernels.compiler.trace import trace
 from dap3d_core.kernels.runtime import generated_modules
-from dap3d_core.kernels.runtime.function_lists import LOOP
-from dap3d_core.kernels.runtime.loop_modules import array_members, source_of
 from dap3d_core.testing.samples.sampled_type import with_functions
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
@@ -72,11 +77,17 @@ TYPES = [(kind, keyword) for kind in ("joint", "force", "function")
          for keyword in REGISTRY.keywords(kind)]  # fmt: skip
 
 
+#: Of each type what is optimised; of every third one the other levels, which know no types.
+CASES = [(*one, "O3") for one in TYPES] + [
+    pytest.param(*one, level, marks=pytest.mark.slow)
+    for one in TYPES[::3]
+    for level in targets()
+    if level != "O3"
+]
+
+
 @pytest.mark.every(4)
-@pytest.mark.parametrize(
-    "level", [pytest.param(n, marks=[pytest.mark.slow] if n != "O3" else []) for n in targets()]
-)
-@pytest.mark.parametrize(("kind", "keyword"), TYPES)
+@pytest.mark.parametrize(("kind", "keyword", "level"), CASES)
 def test_traced_loops_have_the_bits_of_plain_python(kind, keyword, level):
     for type_info, loop in loops_of(REGISTRY.get(kind, keyword)):
 

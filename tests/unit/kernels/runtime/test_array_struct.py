@@ -6,11 +6,9 @@ import attrs
 import numpy as np
 import pytest
 from support.at_all_levels import compiled_at_all_levels, function_of
+from support.internals import FLOAT, INT, CompileError, Program, compiled, jit_is_on
 
-from dap3d_core.kernels.compiler.functions import Program
-from dap3d_core.kernels.compiler.types import FLOAT, INT, CompileError
 from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, Arrays, Scalar, pointer
-from dap3d_core.kernels.runtime.cache import compiled, jit_is_on
 
 
 @attrs.frozen(eq=False, kw_only=True, slots=False)

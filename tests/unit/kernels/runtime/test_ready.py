@@ -4,14 +4,13 @@ import sys
 
 import numpy as np
 import pytest
-from support.internals import FLOAT, Array, Entry, Program, Signature
+from support.internals import FLOAT, Array, Entry, Program, Signature, Unit
 from support.plain import jit_is_on
 from support.process import REPOSITORY
 
+from dap3d_core.kernels import atan2, sin, sqrt
 from dap3d_core.kernels.compiler import objects, units
-from dap3d_core.kernels.compiler.units import Unit
 from dap3d_core.kernels.runtime import ready
-from dap3d_core.kernels.scalar_math import atan2, sin, sqrt
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 sys.path.append(str(REPOSITORY / "tools"))

@@ -4,12 +4,10 @@ import shutil
 from pathlib import Path
 
 import pytest
-from support.internals import LoopArrays
+from support.internals import Loop, LoopArrays, Struct, source_of, unit_names
 
 import dap3d_core
-from dap3d_core.kernels.compiler.types import Struct
 from dap3d_core.kernels.runtime import source_digest
-from dap3d_core.kernels.runtime.loop_modules import Loop, source_of, unit_names
 
 
 @pytest.fixture

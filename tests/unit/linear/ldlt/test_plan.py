@@ -2,15 +2,7 @@
 
 import numpy as np
 import pytest
-from support.graphs import (
-    Case,
-    chain,
-    free_star,
-    full_case,
-    ring,
-    star,
-    tree,
-)
+from support.graphs import Case, chain, free_star, full_case, ring, star, tree
 
 from dap3d_core.linear.ldlt.plan import make_plan
 

@@ -13,7 +13,7 @@ from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.linear.ldlt import plan
-from dap3d_core.linear.ordering import elimination_order, supernodes
+from dap3d_core.linear.ordering import elimination_order, ordering
 from dap3d_core.linear.ordering.elimination_order import dissect, order_nodes
 from dap3d_core.linear.rank import rank
 
@@ -101,7 +101,7 @@ def panels_everywhere(request, monkeypatch):
     """Dissection down to four nodes and panels, whatever the size, many zeros in them."""
     monkeypatch.setattr(elimination_order, "WIDE", 0)
     monkeypatch.setattr(elimination_order, "LEAF", 4)
-    monkeypatch.setattr(supernodes, "ZEROS", request.param)
+    monkeypatch.setattr(ordering, "ZEROS", request.param)
 
 
 NETS = {
@@ -149,7 +149,7 @@ def test_random_graphs_are_solved(n, pairs, seed):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(elimination_order, "WIDE", 0)
         patch.setattr(elimination_order, "LEAF", 2)
-        patch.setattr(supernodes, "ZEROS", 0.9)
+        patch.setattr(ordering, "ZEROS", 0.9)
         check_solution(Case((n, joints), np.random.default_rng(seed)))
 
 
@@ -161,8 +161,8 @@ def test_each_row_of_the_matrix_is_in_one_node():
     assert made.nodes[-1, 1] == made.row_size == rows.sum()
     panels = rows[rows > 6]
     assert len(panels) == len(made.ordering.panels) > 10
-    assert panels.min() >= supernodes.LEAST_ROWS
-    assert panels.max() <= supernodes.MOST_ROWS + 6
+    assert panels.min() >= ordering.LEAST_ROWS
+    assert panels.max() <= ordering.MOST_ROWS + 6
 
 
 def test_the_fill_that_is_reported_is_that_of_the_matrix():

@@ -5,8 +5,7 @@ import pytest
 from tests.unit.native.test_export import SPRING, _written, exported
 
 import dap3d_core as dap
-from dap3d_core.result import ResultError
-from dap3d_core.result.errors import UnknownNameError
+from dap3d_core.result import ResultError, UnknownNameError
 
 PARTS = ("force", "moment", "force_body", "moment_body", "moment_at_point")
 
@@ -27,6 +26,7 @@ def elements_of(result, scene):
     return found
 
 
+@pytest.mark.every(5)
 @pytest.mark.parametrize("model", ["fourbar3", "quarter_car", "crane", "planetary", "A03"])
 def test_reactions_and_forces_are_those_of_a_result(tmp_path, model):
     scene = dap.load(model)

@@ -9,6 +9,7 @@ from tests.unit.native.test_export import differences, exported
 import dap3d_core as dap
 
 
+@pytest.mark.every(6)
 @pytest.mark.parametrize(
     ("make", "settings"),
     [
@@ -34,6 +35,7 @@ def test_what_touches_at_the_start_jumps_there_and_once(tmp_path):
     assert run["ball.rd.z"] == pytest.approx(0.5, rel=1e-14)
 
 
+@pytest.mark.slow
 def test_jumps_between_steps_with_inputs(tmp_path):
     scene = bouncing()
     scene.add_input("wind", value=0.0)
@@ -49,6 +51,7 @@ def test_jumps_between_steps_with_inputs(tmp_path):
             assert there[name] == here.state[name]
 
 
+@pytest.mark.slow
 def test_a_saved_state_continues_behind_a_jump(tmp_path):
     _, library = exported(bouncing(), tmp_path, outputs=["ball.r.z"])
     run, other = library.start(2.0), library.start(2.0)

@@ -9,16 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from PIL import Image
-from support.results import (
-    ARM,
-    PIVOT,
-    RATE,
-    circling,
-    circling_scene,
-    model_of,
-    result_of,
-    rows_of,
-)
+from support.results import ARM, PIVOT, RATE, circling, circling_scene, model_of, result_of, rows_of
 
 import dap3d_core as dap
 from dap3d_core.plot.film.animation import frame_times, usual_speed
@@ -26,7 +17,7 @@ from dap3d_core.plot.film.frame import Stage
 from dap3d_core.plot.film.projection import camera_of, visible_rectangle, with_margin
 from dap3d_core.plot.film.stick_figure import SHADES, pose_at, shapes_of, sticks_of
 from dap3d_core.result import ResultError
-from dap3d_core.scene.tables import AnimationPoint
+from dap3d_core.scene import AnimationPoint
 from dap3d_core.view.scene3d.shapes import GROUND_COLOR
 
 

@@ -14,7 +14,7 @@ from dap3d_core.plot.sweep.panels import Band, Heat, Lines, Scatter, Strands, ed
 from dap3d_core.plot.sweep.sweep_plot import Parallel, sweep_picture
 from dap3d_core.plot.sweep.sweep_table import Variable, table_of
 from dap3d_core.result import UnknownNameError
-from dap3d_core.study.sweep.subsample import evenly
+from dap3d_core.study.sweep.dataset import evenly
 
 MASS, LENGTH, K = "bodies.bob.mass", "points.A.sPp.z", "forces.spring.k"
 T = np.linspace(0.0, 1.0, 5)

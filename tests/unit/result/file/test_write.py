@@ -10,13 +10,13 @@ from contextlib import closing
 
 import numpy as np
 import pytest
+from support.internals import COLUMNS, arrays_of
 from support.plain import in_another_process
 from support.process import REPOSITORY, run
 from support.results import circling, grown, model_of, noisy, same_bits
 
 import dap3d_core as dap
 from dap3d_core.result import ResultError, ResultWriter, RunMetadata, open_result
-from dap3d_core.result.arrays import COLUMNS, arrays_of
 from dap3d_core.result.file.schema import write_rows
 
 TESTS = str(REPOSITORY / "tests")

@@ -9,8 +9,7 @@ import pytest
 from support import problems
 
 import dap3d_core as dap
-from dap3d_core.result import Note, estimated_error
-from dap3d_core.result.post.global_error import ErrorEstimate
+from dap3d_core.result import ErrorEstimate, Note, estimated_error
 
 #: The module; the package has a function of its name.
 LOOP = importlib.import_module("dap3d_core.simulation.run")

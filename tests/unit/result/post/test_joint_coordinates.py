@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
-from support.internals import columns_of
+from support.internals import columns_of, dataset_to_write
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.result import ResultError, UnknownNameError, names_of
-from dap3d_core.result.open import open_result
-from dap3d_core.result.quantities.netcdf_export import dataset_to_write
+from dap3d_core.result import ResultError, UnknownNameError, names_of, open_result
 
 RATE, SPEED, TILT = 100.0, 0.7, 0.4
 #: Cosine and sine of half a turn by TILT about z.

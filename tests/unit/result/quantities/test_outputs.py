@@ -5,15 +5,13 @@ import csv
 import attrs
 import numpy as np
 import pytest
+from support.internals import columns_of, dataset_to_write, selected, write_csv
 from support.plain import in_another_process
 from support.process import run
 from support.results import ARM, MASS, RATE, circling
 
 import dap3d_core as dap
-from dap3d_core.result import ResultError, UnknownNameError, find, names_of
-from dap3d_core.result.open import open_result
-from dap3d_core.result.quantities.csv_table import columns_of, selected, write_csv
-from dap3d_core.result.quantities.netcdf_export import dataset_to_write
+from dap3d_core.result import ResultError, UnknownNameError, find, names_of, open_result
 
 OUTPUTS = {
     "angle": "atan2(arm.y, arm.x)",

@@ -88,17 +88,18 @@ def test_a_material_that_there_is_not_is_told_once():
 
 
 def test_a_mesh_collides_as_its_hull(tmp_path):
-    """A tetrahedron, and a point within it that the hull leaves out, of millimetres."""
+    """A tetrahedron, and a point within it that the hull leaves out, of millimetres, mirrored."""
     corners = [(0, 0, 0), (60, 0, 0), (0, 60, 0), (0, 0, 60), (10, 10, 10)]
     lines = ["v {} {} {}".format(*v) for v in corners]
     lines += ["f {} {} {}".format(*f) for f in ((1, 2, 3), (1, 2, 4), (1, 3, 4), (2, 3, 5))]
     (tmp_path / "t.obj").write_text("\n".join(lines))
     scene = two_boxes()
-    scene.add_shape("mesh", "t", body="a", file="t.obj", scale=1e-3, at=[0.1, 0, 0], collides=True)
+    scene.add_shape("mesh", "t", body="a", file="t.obj", scale=[1e-3, 2e-3, -1e-3],
+                    at=[0.1, 0, 0], collides=True)  # fmt: skip
     found = read(dap.load(scene.save(tmp_path / "scene.toml")))
     k = found.names.index("t")
     first, count = found.corners[k]
     hull = found.vertices[first : first + count] + found.at[k]
-    expected = [[0.1, 0, 0], [0.1, 0, 0.06], [0.1, 0.06, 0], [0.16, 0, 0]]
+    expected = [[0.1, 0, -0.06], [0.1, 0, 0], [0.1, 0.12, 0], [0.16, 0, 0]]
     assert np.array(sorted(hull.round(9).tolist())) == pytest.approx(np.array(expected), abs=1e-15)
-    assert found.size[k] == pytest.approx([0.03] * 3, abs=1e-15)
+    assert found.size[k] == pytest.approx([0.03, 0.06, 0.03], abs=1e-15)

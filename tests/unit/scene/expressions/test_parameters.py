@@ -6,7 +6,7 @@ from support.plain import long_in_plain_python
 
 import dap3d_core as dap
 from dap3d_core.scene import parse
-from dap3d_core.study.parameters import names_under
+from dap3d_core.study import names_under
 
 ROD = """\
 [scene]

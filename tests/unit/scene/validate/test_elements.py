@@ -5,7 +5,7 @@ from support.own_types import registry_of
 
 import dap3d_core as dap
 from dap3d_core.interface import Body, Force, body, number
-from dap3d_core.scene.validate.validate import check
+from dap3d_core.scene import check
 
 ZERO = (0.0, 0.0, 0.0)
 

@@ -1,10 +1,10 @@
 """Shapes of a scene: every mistake at once, nothing lost in writing, no file of elsewhere."""
 
 import pytest
+from support.internals import Collector
 
 import dap3d_core as dap
 from dap3d_core.scene import check, parse
-from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.shapes import SHAPES, mesh_file, read_shapes
 
 GOOD = """\

@@ -18,7 +18,7 @@ from dap3d_core.interface import (
 )
 from dap3d_core.kernels import scale
 from dap3d_core.simulation.control.held_inputs import HeldInputs
-from dap3d_core.testing.kit import check_type
+from dap3d_core.testing import check_type
 
 
 def test_changes_are_told_and_stand_in_the_arrays():

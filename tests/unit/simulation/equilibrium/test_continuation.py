@@ -6,7 +6,7 @@ from support.plain import long_in_plain_python
 from unit.simulation.equilibrium.test_states_at_rest import hanging
 
 import dap3d_core as dap
-from dap3d_core.simulation.equilibrium.trust_region import held_solution
+from dap3d_core.simulation.equilibrium.search import held_solution
 
 
 def stopped():
@@ -70,13 +70,11 @@ def test_toggle_turns_where_virtual_work_says():
     assert any("redundant" in note for note in found.notes)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 @pytest.mark.parametrize(
     ("parameter", "values"),
-    [
-        ("points.crank_a.sPp.x", "-0.5:-0.4:3"),
-        pytest.param("points.wall.sPp.x", "4:3.8:3", marks=pytest.mark.slow),
-    ],
+    [("points.crank_a.sPp.x", "-0.5:-0.4:3"), ("points.wall.sPp.x", "4:3.8:3")],
 )
 def test_geometry_as_parameter(parameter, values):
     """Joints close at each value; poses are those that a search finds there."""
@@ -115,6 +113,7 @@ def test_path_that_ends_on_its_way():
     assert "no step goes on there" in found.notes[-1]
 
 
+@pytest.mark.slow
 def test_states_of_elements_follow():
     """The relaxed part of a solid: its state is its extension, m g / k_p."""
     found = dap.equilibrium_path(hanging(), "forces.solid.k_p", "100:200:2")

@@ -48,6 +48,7 @@ def compiled():
     return dap.compile(pendulum(LIMIT))
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("integrator", ["dop853", "adams", "radau"])
 def test_a_pendulum_whose_rod_breaks_flies_on(compiled, integrator):
     result = dap.simulate(compiled, t_end=0.6, dt=0.1, integrator=integrator, **TIGHT)
@@ -65,6 +66,7 @@ def test_a_pendulum_whose_rod_breaks_flies_on(compiled, integrator):
     assert result.ledger["energy"].value < 1e-11
 
 
+@pytest.mark.slow
 def test_the_model_holds_again_afterwards(compiled, tmp_path):
     first = dap.simulate(compiled, t_end=0.6, dt=0.1, estimate_error=True)
     assert np.array_equal(dap.simulate(compiled, t_end=0.6, dt=0.1).u, first.u)
@@ -212,6 +214,7 @@ def test_a_checkpoint_is_refused(compiled, tmp_path):
         dap.simulate(compiled, t_end=1.0, output=tmp_path / "out.nc", checkpoint=1.0)
 
 
+@pytest.mark.slow
 def test_one_for_an_interruption_alone_is_left_out(compiled, tmp_path):
     """As runs of the command line ask for."""
     out = tmp_path / "out.nc"

@@ -187,6 +187,7 @@ def test_a_box_that_falls_on_its_face_comes_to_rest_on_four_corners():
     assert result.contact("floor#1").gap == pytest.approx(contact.gap[:, 0])
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_a_sweep_runs_contacts_one_by_one():
     scene = bouncing()
@@ -291,6 +292,7 @@ def test_a_ball_may_start_in_the_middle_of_a_hollow_one():
     assert result.r[-1, 0] == pytest.approx([0.0, 0.0, -0.9], abs=1e-12)
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_a_box_that_falls_flat_sticks_where_it_lands():
     """Modes behind an impact follow from the velocities behind it: it has stopped turning."""

@@ -74,8 +74,7 @@ def test_a_number_that_comes_and_goes_within_a_step(compiled):
 
 @long_in_plain_python
 @pytest.mark.parametrize(
-    ("frequency", "settings"),
-    [(20.0, {}), (2.0, {"direction": 1}), (2.0, {"every": 5e-3})],
+    ("frequency", "settings"), [(20.0, {}), (2.0, {"direction": 1}), (2.0, {"every": 5e-3})]
 )
 def test_every_change_of_sign_of_a_fast_function_is_found(compiled, frequency, settings):
     """Free flight is five steps; the function swings tens of times in one."""

@@ -3,14 +3,7 @@
 import numpy as np
 import pytest
 from support.internals import split
-from support.mechanisms import (
-    bent_chain,
-    door,
-    planar_four_bar,
-    rough_four_bar,
-    torn,
-    two_motors,
-)
+from support.mechanisms import bent_chain, door, planar_four_bar, rough_four_bar, torn, two_motors
 from support.own_types import registry_of
 
 import dap3d_core as dap

@@ -46,6 +46,49 @@ def test_the_forces_of_a_run_are_found_from_its_motion(scene):
     assert len(found.contacts) == len(run.contacts)
 
 
+def pendulum(motor=0.0, **friction):
+    """A rod on a hinge that rubs by its load, from the horizontal; motor: N m that push it up."""
+    scene = dap.Scene(name="pendulum")
+    scene.add_body("rod", mass=1.0, Jp=(0.01, 0.01, 0.01), r=(0.5, 0.0, 0.0))
+    scene.add_point("top", "rod", (-0.5, 0.0, 0.0))
+    axis = {"P_i": "top", "P_j": "ground.O", "a_i": "rod.y", "a_j": "ground.y"}
+    scene.add_joint("rev", "pin", **axis)
+    scene.add_force("weight", "gravity", gravity=g)
+    scene.add_force("friction", "rub", joint="pin", mu=0.5, radius=0.15, **friction)
+    scene.add_force("n", "push", body_i="rod", n=(0.0, -motor, 0.0))
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("scene", "first"),
+    [(pendulum(), 1), (pendulum(4.8), 0)],
+    ids=["slides and sticks", "sticks"],
+)
+def test_friction_of_a_loaded_hinge_is_found_from_its_motion(scene, first):
+    """Its load depends on it. Where it starts from rest it counts as holding, whatever follows."""
+    run = dap.simulate(scene, t_end=4.0, dt=0.25, **TIGHT)
+    found = dap.inverse(scene, run, actuators=[])
+    held, same = (result.reaction("pin")["i"].force for result in (run, found))
+    assert held == pytest.approx(same, abs=1e-9)
+    assert not any("cannot" in note for note in found.notes)
+    for name in run.contact_names:
+        one, other = run.contact(name), found.contact(name)
+        assert np.array_equal(one.mode[first:], other.mode[first:])
+        assert one.normal_force == pytest.approx(other.normal_force, abs=1e-9)
+        assert one.friction == pytest.approx(other.friction, abs=1e-9)
+
+
+def test_a_hinge_that_would_have_to_hold_more_than_its_friction_is_named():
+    """Of m g L = 4.905 N m a load of 9.81 N holds 0.5 * 0.15 * 9.81 = 0.736."""
+    t = np.linspace(0.0, 1.0, 11)
+    still = {"r.x": 0.5, "r.y": 0.0, "r.z": 0.0, "p.e1": 0.0, "p.e2": 0.0, "p.e3": 0.0}
+    motion = {"t": t} | {f"rod.{name}": value + 0.0 * t for name, value in still.items()}
+    found = dap.inverse(pendulum(), motion, actuators=[])
+    (note,) = [note for note in found.notes if "cannot do its part" in note]
+    assert note.startswith("contact rub")
+    assert "by 4.17 N" in note
+
+
 def test_a_limit_that_a_hinge_rests_at():
     """Moment of the weight about the hinge: 2 g 0.5 cos(a)."""
     scene = dap.Scene(name="limit")
@@ -129,6 +172,7 @@ def test_a_contact_that_would_have_to_pull_is_named():
     assert "by 19.6 N" in note
 
 
+@pytest.mark.slow
 def test_feet_that_cannot_hold_are_refused():
     scene, motion = table((1.5, 0.0))
     with pytest.raises(dap.SimulationError, match="none within their cones was found"):

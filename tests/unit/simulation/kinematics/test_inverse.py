@@ -9,7 +9,7 @@ from support.plain import long_in_plain_python
 from support.trees import mixed_chain
 
 import dap3d_core as dap
-from dap3d_core.result.quantities.lookup import find
+from dap3d_core.result import find
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +80,7 @@ def test_actuation_is_stored(scene, motion, tmp_path):
                           result.force("torque").on["i"].moment)  # fmt: skip
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_positions_as_data_are_differentiated_by_splines(scene, motion, tmp_path):
     """Of two columns, one more than freedoms, from a CSV file; the error is of order dt^4."""
@@ -110,6 +111,7 @@ def test_angles_of_joints_are_data_over_many_turns(scene):
     assert np.max(np.abs(result.r - turning.r)) < 1e-12
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_data_that_contradict_the_joints_are_met_halfway(scene, motion):
     """The crank's place is too far out by 1 mm: the note says by how much it is missed."""

@@ -7,7 +7,7 @@ from support.mechanisms import planar_four_bar
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
-from dap3d_core.result.quantities.lookup import find
+from dap3d_core.result import find
 
 A, B, HEIGHT = 0.1, 0.35, 0.02
 

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from support import mechanisms, trees
+from support.internals import JP
 from support.on_axles import driven, stone, wheel
 from support.plain import jit_is_on
 from support.state_types import stated
@@ -13,7 +14,6 @@ from unit.study.batch.test_batch import pendulum as ball_pendulum
 import dap3d_core as dap
 from dap3d_core.assembly.metric import METRIC_CONSTANTS
 from dap3d_core.formulations.programs import change_over, scene_program
-from dap3d_core.kernels.runtime.loop_support import JP
 from dap3d_core.study import Ensemble
 from dap3d_core.study.batch import compiled_batch
 from dap3d_core.study.batch import lanes as study_lanes
@@ -169,7 +169,7 @@ CASES = {
 }
 
 
-@pytest.mark.every(4)
+@pytest.mark.every(7)
 @pytest.mark.parametrize("case", CASES)
 def test_points_of_all_kinds_have_the_bits_of_points_alone(case):
     make, vary, output = CASES[case]
@@ -198,6 +198,7 @@ def with_friction(scene):
     scene.add_force("friction", "rubbing", joint="hinge", mu=0.1, radius=0.05, v_tol=0.1)
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("change", [with_table, with_bend, with_turns])
 def test_trees_with_more_have_the_bits_of_points_alone(change):
     """What decides by a number is a guard; where it fails, rates are evaluated alone."""
@@ -232,6 +233,7 @@ def test_notes_say_how_points_are_run():
     assert of.notes == (f"points are run in {lanes_of(of).count} lanes of a vector",)
 
 
+@pytest.mark.slow
 def test_turns_are_counted_in_steps_near_singular_poses():
     """A crank turns by 1.6 rad a step through poses in line, to which each run steps by itself.
     Of two such steps whose turns were not counted, the second one would be cut."""

@@ -172,6 +172,7 @@ def test_a_start_that_a_parameter_takes_off_the_constraints(how):
     assert np.max(np.abs(s.of("constraint.position"))) < 1e-8
 
 
+@pytest.mark.slow
 def test_what_nothing_reads_has_derivatives_of_zero():
     """No rounding either, whose part of a quantity would look like a derivative."""
     scene = dap.load("pen2")

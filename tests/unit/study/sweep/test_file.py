@@ -1,10 +1,13 @@
 """A sweep's file that is not as it was written is refused before any library reads it."""
 
+import math
 import os
 
 import netCDF4
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from support.plain import long_in_plain_python
 from unit.result.file.test_checksum import REFUSED, SIZE, changed_files, no_library, written
 from unit.study.sweep.test_sweep import spring
@@ -14,6 +17,7 @@ from dap3d_core.result import ResultError
 from dap3d_core.result.file import checksum
 from dap3d_core.study.sweep import file
 from dap3d_core.study.sweep.dataset import is_sweep
+from dap3d_core.study.sweep.file import NOTE, boxes, note_letters
 
 __all__ = ["no_library"]  # a fixture
 ASKED = {"vary": {"forces.spring.k": [1.0, 4.0]}, "outputs": "block.r.x", "t_end": 0.1}
@@ -109,3 +113,25 @@ def test_what_a_reader_hindered_is_soon_written(tmp_path, monkeypatch):
     dap.sweep(spring(), vary, outputs="block.r.x", t_end=0.1, output=path, threads=1,
               progress=progress)  # fmt: skip
     assert found[2] > found[1] > 0
+
+
+@given(st.lists(st.integers(1, 4), min_size=1, max_size=4).map(tuple), st.data())
+def test_boxes_cover_a_run_of_places_once_and_in_order(shape, data):
+    """Whatever the grid and the run: against the places themselves."""
+    whole = np.arange(math.prod(shape))
+    first = data.draw(st.integers(0, len(whole)))
+    last = data.draw(st.integers(first, len(whole)))
+    found = []
+    for index, count in boxes(shape, first, last):
+        block = whole.reshape(shape)[index]
+        assert block.size == count > 0
+        found += block.ravel().tolist()
+    assert found == list(range(first, last))
+    assert len(list(boxes(shape, first, last))) <= 2 * len(shape) - 1
+
+
+def test_notes_are_cut_between_letters():
+    short, long = note_letters(np.array(["short", "ü" * NOTE], dtype=object))
+    assert short.tobytes().rstrip(b"\0") == b"short"
+    assert len(long) == NOTE
+    assert long.tobytes().rstrip(b"\0").decode().endswith("ü ...")

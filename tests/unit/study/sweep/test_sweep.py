@@ -463,6 +463,7 @@ def test_whole_numbers_stay_whole(monkeypatch):
     assert (found["status"] == 1).all()
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not jit_is_on(), reason="derivatives are of compiled code")
 def test_derivatives_by_what_varies(swept, tmp_path):
     """Outputs have the bits that they have without; derivatives those of the closed form, to 1e-7.

@@ -122,6 +122,7 @@ def test_an_early_end_leaves_the_rest(how):
     assert not ours()
 
 
+@pytest.mark.slow
 @long_in_plain_python
 def test_an_early_end_does_not_wait_for_a_long_point(monkeypatch):
     """Its thread runs it to its end, begins no other one and does not keep the process alive."""

@@ -510,6 +510,7 @@ def test_a_kernel_that_fails_on_some_input_is_a_finding():
     assert "it could not be carried out: LookupError: no such thing" in str(report)
 
 
+@pytest.mark.slow
 def test_a_type_without_a_finite_number_is_told():
     """It was finite where the type was examined, at other times."""
 

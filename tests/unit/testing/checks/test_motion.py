@@ -117,6 +117,7 @@ def test_motion_of_installed_types(keyword):
     ]
 
 
+@pytest.mark.every(3)
 @pytest.mark.parametrize("type_", OWN, ids=lambda type_: type_.keyword)
 def test_motion_of_types_of_authors(type_):
     (motion,) = type_motions(examine(type_))

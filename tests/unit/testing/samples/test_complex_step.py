@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 import pytest
+from support.internals import unwound
 
 from dap3d_core.kernels import atan2, cos, lookup, norm2, sin, sqrt, tanh, where
-from dap3d_core.kernels.runtime.loop_support import unwound
 from dap3d_core.testing.samples.complex_step import STEP, Stepped
 
 X = 0.7

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from support.internals import specs_of
+from support.internals import SYMBOLS, specs_of
 from support.own_types import registry_of
 from support.results import model_of, result_of, rows_of
 from support.rotations import to_global
@@ -11,15 +11,13 @@ from unit.view.test_page import numbers, shaped
 
 import dap3d_core as dap
 from dap3d_core.interface import Body, Force, Joint, Point, Vector, body, examine, point, vector
-from dap3d_core.interface.types import SYMBOLS
 from dap3d_core.kernels import dot, sub
 from dap3d_core.model import build_model
 from dap3d_core.scene import check
-from dap3d_core.view.scene3d.camera import stage
 from dap3d_core.view.scene3d.colors import CYCLE, chains_of, colors
 from dap3d_core.view.scene3d.elements import elements_of, joints_of
 from dap3d_core.view.scene3d.primitives import turned_to
-from dap3d_core.view.scene3d.sampled_motion import Extent, Motion, instants_to_show
+from dap3d_core.view.scene3d.sampled_motion import Extent, Motion, instants_to_show, stage
 from dap3d_core.view.scene3d.scene_data import (
     DRAWINGS,
     MODEST,

@@ -16,12 +16,14 @@ pytest.importorskip("trimesh")
 TRIANGLE = struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
 CORNERS = b"v 0 0 0\nv 1 0 0\nv 0 1 0\n"
 HEAD = b"\0" * 80
+COUNTED = struct.pack("<4i9f3f2f3i", 3, 1, 1, 1, *(0, 0, 0, 1, 0, 0, 0, 1, 0), *[0] * 5, 0, 1, 2)
 
 
 def test_good_ones_are_read(tmp_path):
     (tmp_path / "a.stl").write_bytes(HEAD + struct.pack("<I", 1) + TRIANGLE)
     (tmp_path / "a.obj").write_bytes(CORNERS + b"f 1 2 3\n")
-    for name in ("a.stl", "a.obj"):
+    (tmp_path / "a.msh").write_bytes(COUNTED)
+    for name in ("a.stl", "a.obj", "a.msh"):
         vertices, triangles = shapes._mesh(tmp_path, name)
         assert (len(vertices), len(triangles)) == (3, 1)
 
@@ -42,6 +44,9 @@ def test_good_ones_are_read(tmp_path):
         ("many.obj", CORNERS + b"f 1 2 3\n" * (shapes.MOST_TRIANGLES + 1)),
         ("bytes.obj", bytes(range(256)) * 100),
         ("words.obj", b"v " * 100_000),
+        ("short.msh", COUNTED[:-4]),
+        ("claims.msh", b"\xff" * 16 + COUNTED[16:]),
+        ("far.msh", COUNTED[:-1] + b"\1"),
     ],
 )
 def test_bad_ones_are_told(tmp_path, name, data):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dap3d_core.simulation.equilibrium.trust_region import trust_region_step
+from dap3d_core.simulation.equilibrium.search import trust_region_step
 
 
 def test_a_short_step_is_newtons_also_without_symmetry():

@@ -31,6 +31,7 @@ def compared(model, names, factors, folder, t_end=0.3, **settings):
     return np.array(rows), np.hstack([result.quantity(name).values for name in outputs])
 
 
+@pytest.mark.every(4)
 @pytest.mark.parametrize(
     ("model", "names"),
     [
@@ -46,6 +47,7 @@ def test_masses_and_inertias_give_the_bits_of_simulate(tmp_path, model, names):
     np.testing.assert_array_equal(found, expected)
 
 
+@pytest.mark.slow
 def test_points_of_joints_move_the_start(tmp_path):
     """It is brought onto the constraints by other code than in Python: equal to rounding."""
     found, expected = compared("fourbar3", ["points.P3.sPp.z"], [1.01], tmp_path)

@@ -5,8 +5,7 @@ import pytest
 from support.graphs import chain, star
 from support.internals import compiled
 
-from dap3d_core.linear.lu.factor import factor_lu, solve_lu
-from dap3d_core.linear.lu.plan import make_lu_plan
+from dap3d_core.linear.lu import factor_lu, make_lu_plan, solve_lu
 from dap3d_core.linear.ordering.elimination_order import order_nodes
 
 

@@ -2,10 +2,10 @@
 
 import pytest
 from support import problems
+from support.internals import Refusals
 
 import dap3d_core as dap
-from dap3d_core.integrators.stepping.integration import Refusals
-from dap3d_core.simulation.failure.refused_steps import describe_refusals, refusal_notes
+from dap3d_core.simulation.failure.stall import describe_refusals, refusal_notes
 
 
 class Run:

@@ -1,1 +1,0 @@
-"""Unsymmetric block LU factorisation."""
