@@ -13,7 +13,8 @@ import dap3d_core as dap
 
 #: s simulated; s of CPU time after which a run hangs; settings.
 SPAN, HANG = 1.0, 60.0
-SETTINGS = {"t_end": SPAN, "dt": SPAN / 60, "rtol": 1e-10, "atol": 1e-12, "integrator": "dop853"}
+SETTINGS = {"t_end": SPAN, "dt": SPAN / 60, "rtol": 1e-10, "atol": 1e-12, "integrator": "dop853",
+            "contact": "events"}  # fmt: skip
 #: Gains of energy, and depths, as parts of energy and length of the scene. Where a run reports
 #: between events a gap is as good as the state.
 GAIN, DEPTH = 1e-9, 1e-9
