@@ -287,6 +287,34 @@ def test_a_hinged_rod_rebounds_from_the_floor_with_its_hinge_held():
     assert result.ledger["energy"].value < TOLERANCE
 
 
+@pytest.mark.parametrize(("mu", "lean"), [(1.0, 1.0), (2.5, 1.0), (1.6, 1.1)])
+def test_slip_that_presses_a_rod_into_the_floor_is_stopped_by_an_impulse(mu, lean):
+    """Painleve: of a rod whose end leads as it slides, m = L = 1, N W_NN = g + mu N W_NT.
+    Where that has no N the impulse that stops its end is in the cone, and does the work -v p_T / 2.
+    """
+    v, arm = 1.0, 0.5 * np.array([np.cos(lean), -np.sin(lean)])
+    scene = dap.Scene(name="chalk")
+    p, r = [np.cos(lean / 2), 0.0, np.sin(lean / 2), 0.0], [0.0, 0.0, -arm[1]]
+    scene.add_body("rod", mass=1.0, Jp=[1e-3, 1 / 12, 1 / 12], r=r, p=p, r_dot=[v, 0.0, 0.0])
+    scene.add_point("end", "rod", [0.5, 0.0, 0.0])
+    scene.add_force("weight", "g")
+    scene.add_contact("ball_plane", "floor", P_i="end", mu=mu)
+    result = dap.simulate(scene, t_end=0.02, dt=0.01, **TIGHT)
+    rows = np.array([[0.0, 1.0, -arm[0]], [1.0, 0.0, arm[1]]])
+    W = rows @ np.diag([1.0, 1.0, 12.0]) @ rows.T
+    impacts = [event for event in result.events if event.kind == "impact"]
+    if mu * W[0, 1] < W[0, 0]:
+        assert not impacts
+        return
+    impulse = np.linalg.solve(W, [0.0, -v])
+    assert -impulse[1] < mu * impulse[0]
+    assert impacts[0].work == pytest.approx(0.5 * v * impulse[1], rel=1e-12)
+    assert impacts[0].u_after[7:13] == pytest.approx(
+        [v + impulse[1], 0.0, impulse[0], 0.0, 12.0 * (rows[:, 2] @ impulse), 0.0], abs=1e-12
+    )
+    assert abs(result.ledger["energy"].value) < TOLERANCE
+
+
 def test_at_usual_tolerances_instants_and_states_are_right_to_a_millionth():
     v, mu = 3.0, 0.3
     result = dap.simulate(ball(v=v, mu=mu), t_end=2.0, dt=0.1)

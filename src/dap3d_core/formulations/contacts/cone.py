@@ -84,7 +84,8 @@ def solve_cone(
         y, _ = _newton(firm, moved, mu, y, r, more, free)
         new, rest = _newton(A, b, mu, y, r, more, free)
         x, left = (x, left) if rest >= left else (new, rest)
-    return x, left / scale if np.isfinite(left) else np.inf  # where there is none it may grow
+    left += RESIDUAL_ROUNDING * float(np.abs(x).max())  # without one x may grow
+    return x, left / scale if np.isfinite(left) else np.inf
 
 
 @compiled

@@ -23,8 +23,8 @@ ROUNDS = 500
 LAST_HEIGHT = 1e-13
 
 
-#: Contacts that answer in a round, and coefficients of restitution of all.
-Round = tuple[list[int], Floats]
+#: Contacts that answer in a round, and coefficients of restitution of all; none where slip jammed.
+Round = tuple[list[int], Floats | None]
 
 
 @attrs.frozen
@@ -52,7 +52,11 @@ def repeat(table: ContactTable, rows: ContactRows, impact: Impact) -> Impact:
     """The rounds of an impact once more, of the same contacts, from other velocities."""
     work = 0.0
     for taking, e in impact.rounds:
-        x = _impulses(table, rows, taking, np.where(e > 0.0, table.e, 0.0))
+        if e is None:
+            x = _stopping(table, rows, taking)
+        else:
+            x = _impulses(table, rows, taking, np.where(e > 0.0, table.e, 0.0))
+        x = np.zeros(3 * len(taking)) if x is None else x
         before = rows.slip[taking] - rows.driven[taking]
         rows.kick(_spread(x, taking, table.count))
         after = rows.slip[taking] - rows.driven[taking]
@@ -91,6 +95,40 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
         impulses[taking] += x.reshape(-1, 3)
     low = _stop_low_rocking(rows, touching, length)
     return Impact(impulses, work, exchanged, rest, rounds, low)
+
+
+def unjam(
+    table: ContactTable, rows: ContactRows, touching: list[int], impact: Impact, length: float
+) -> Impact | None:
+    """Stop slip that jams behind an impact, by an impulse without a collision; None if none does.
+
+    While it slips its friction presses bodies together, however short the time: an impulse, until
+    it sticks; then that turns what approaches back (Genot, Brogliato, Eur. J. Mech. A 18 (1999)
+    653). So what holds is at rest then, and nothing bounces.
+    """
+    closed = [c for c in touching if rows.closing[c] < AT_REST * length]
+    x = _stopping(table, rows, closed)
+    if x is None:
+        return None
+    parts, before = x.reshape(-1, 3), (rows.slip - rows.driven)[closed]
+    rows.kick(_spread(x, closed, table.count))
+    shares = parts * 0.5 * np.stack([before, (rows.slip - rows.driven)[closed]])
+    work, impulses = impact.work.copy(), impact.impulses.copy()
+    work[closed] += shares.sum(axis=(0, 2))
+    impulses[closed] += parts
+    exchanged = impact.exchanged + float(np.abs(shares).sum())
+    rounds = [*impact.rounds, (closed, None)]
+    return Impact(impulses, work, exchanged, impact.rest, rounds, impact.low)
+
+
+def _stopping(table: ContactTable, rows: ContactRows, closed: list[int]) -> Floats | None:
+    """(3 k,) impulses that stop slip, of contacts that do not approach; None but zero."""
+    which, u = rows.rows_of(closed), rows.slip[closed].ravel()
+    A = rows.W[np.ix_(which, which)]
+    stops = np.linalg.lstsq(A, -u, rcond=1e-12)[0]
+    x, left = solve_cone(A, u, table.mu[closed], start=stops, gapless=table.gapless[closed],
+                         ratio=table.ratio[closed])  # fmt: skip
+    return x if left <= 1e-6 and np.any(x[::3] > 0.0) else None
 
 
 def _stop_low_rocking(rows: ContactRows, touching: list[int], length: float) -> list[int]:

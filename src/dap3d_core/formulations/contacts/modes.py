@@ -156,7 +156,7 @@ def _put_modes(
             _put(table, rows, closed, {}, limit, found, inner)
             return
         which = rows.rows_of(closed)
-        if not left and _share(table, closed, rows.W[np.ix_(which, which)]):
+        if not left and _share(table, closed, rows.W[np.ix_(which, which)], {}):
             # what each of them carried was a choice, and so is the direction of it
             _put(table, rows, closed, {}, limit, found, loose=True)
             return
@@ -252,7 +252,7 @@ def _put(
     x, a = _solve(table, rows, closed, A, ways, loose=loose)
     still = [c for c in closed if c not in ways] or closed  # what slides may turn far faster
     big = float(np.abs(rows.free[rows.rows_of(still)]).max()) + 1e-300
-    shares = _share(table, closed, A)
+    shares = _share(table, closed, A, ways)
     if inner is None and not loose:
         inner = _inside(table, rows, closed, sliding, limit)
     x = x if inner is None else inner
@@ -315,17 +315,18 @@ def _leave_to_others(
         found.way[c, k] = 1.0
 
 
-def _share(table: ContactTable, closed: list[int], A: Floats) -> bool:
+def _share(table: ContactTable, closed: list[int], A: Floats, ways: dict[int, Floats]) -> bool:
     """True if forces of contacts may change without a change of the motion."""
-    own = _own_rows(table, closed)
+    own = _own_rows(table, closed, ways)
     block = A[np.ix_(own, own)]
     return bool(np.linalg.matrix_rank(block, tol=DEPENDENT * np.abs(A).max()) < len(own))
 
 
-def _own_rows(table: ContactTable, closed: list[int]) -> Integers:
-    """Rows along which contacts act: of smooth ones the normal, of friction alone the second."""
-    acts = table.holds[closed]
-    acts[:, 1:] &= (table.alone[closed] | (table.mu_s[closed] > 0.0))[:, None]
+def _own_rows(table: ContactTable, closed: list[int], ways: dict[int, Floats]) -> Integers:
+    """Rows along which contacts act: of what slides, and of smooth ones, the normal alone."""
+    acts, slides = table.holds[closed], np.array([c in ways for c in closed])
+    acts[:, 1:] &= (~slides & (table.alone[closed] | (table.mu_s[closed] > 0.0)))[:, None]
+    acts[:, 0] &= ~slides | ~table.alone[closed]
     return np.flatnonzero(acts)
 
 
@@ -340,9 +341,9 @@ def _inside(
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
     best, low, high = None, 0, len(INSIDE) - 1
     A, ways = _matrix(table, rows, closed, sliding, limit)
-    if not _share(table, closed, A):
+    if not _share(table, closed, A, ways):
         return None
-    own = _own_rows(table, closed)
+    own = _own_rows(table, closed, ways)
     while low <= high:  # what one part allows, so does every larger one
         k = high if best is None else (low + high) // 2
         x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=best, tries=3)

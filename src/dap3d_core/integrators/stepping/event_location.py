@@ -162,10 +162,12 @@ def is_cut_at_sample(work: IntegrationState, t: float) -> bool:
     """``is_sample_across`` once the values of the sample are known.
 
     Not of what is UNSEEN: where a function takes another form it is smooth: a step may mix both.
+    Nor of what JUMPS and begins in its band, such as a contact that opens: an early stage, an Euler
+    step, errs by the curvature of what slides, the end does not.
     """
     s = work.switches
     for k in range(s.shape[1]):
-        if s[DOES, k] == UNSEEN:
+        if s[DOES, k] == UNSEEN or (s[DOES, k] == JUMPS and may_rest(s, k)):
             s[SAMPLE, k] = s[SIDE, k]
     if not changes_sign(s, SAMPLE):
         return False

@@ -18,7 +18,7 @@ from dap3d_core.formulations.contacts.contact_rows import (
     ContactTable,
     length_of,
 )
-from dap3d_core.formulations.contacts.impacts import AT_REST, Impact, collide, repeat
+from dap3d_core.formulations.contacts.impacts import AT_REST, Impact, collide, repeat, unjam
 from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.switches import POSITION_ROUNDING
@@ -291,11 +291,7 @@ class ContactJumps(Jumps):
         try:
             modes = find_modes(table, rows, closed, sliding, leaving)
         except JamError as error:
-            raise SimulationError(
-                f"the run stopped at t = {t:.9g} s: contact {error} jams: its friction presses "
-                "the bodies together by more than it lets them give way, and no motion with "
-                "Coulomb's law goes on from here"
-            ) from error
+            impact, modes = self._unjam(rows, closed, impact, str(error))
         held = [c for c in closed if modes.mode[c] > 0.5]
         others = [c for c in closed if modes.mode[c] < 0.5]
         rows.change(rows.lifted(rows.closing, held, others))
@@ -319,6 +315,28 @@ class ContactJumps(Jumps):
         ):
             if (kind := CHANGES.get((int(old), int(new)), "")) and (old or not table.alone[c]):
                 self._note(c, t, kind, u)
+
+    def _unjam(
+        self, rows: ContactRows, closed: list[int], impact: Impact, name: str
+    ) -> tuple[Impact, Modes]:
+        """Impacts and modes where a contact jams: an impulse may stop its slip.
+
+        Raises:
+            SimulationError: none does.
+        """
+        table = self.table
+        stopped = unjam(table, rows, closed, impact, self._evaluator.model.length)
+        try:
+            if stopped is not None:
+                table.find_grips(rows.t, rows.with_velocities(rows.v))
+                return stopped, find_modes(table, rows, closed, {}, [])
+        except JamError as error:
+            name = str(error)
+        raise SimulationError(
+            f"the run stopped at t = {rows.t:.9g} s: contact {name} jams: its friction presses "
+            "the bodies together by more than it lets them give way, and no motion with "
+            "Coulomb's law goes on from here"
+        )
 
     def _apart(self, rows: ContactRows, gaps: Floats, held: list[int], others: list[int]) -> Floats:
         """(6 n,) changes of positions that close the gaps of what holds, and part what overlaps.
