@@ -5,11 +5,13 @@ from pathlib import Path
 from typing import Any
 
 import attrs
+import numpy as np
 
 from dap3d_core.formats.export_scene.articulation import articulation_of
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.interface.formats import (
+    NOWHERE,
     Articulation,
     FormatError,
     Geometry,
@@ -75,6 +77,9 @@ def export_model(
     given = scene if isinstance(scene, Scene) else load(scene)
     valid = check(given, load_registry() if registry is None else registry)
     remarks = Remarks()
+    if not (np.array_equal(valid.r, valid.r_0) and np.array_equal(valid.p, valid.p_0)):
+        what = "the poses at the start: bodies are where coordinates of joints are zero"
+        remarks.leave_out(NOWHERE, what, motion=True)
     try:
         model = articulation_of(_plain_scene(valid), remarks)
         if path is not None and given.path is not None:
@@ -121,14 +126,15 @@ def _write(path: Path, text: str, *, force: bool) -> None:
 
 
 def _plain_scene(checked: ValidatedScene) -> Scene:
-    """A copy of a valid scene with its poses as Euler parameters and its numbers in SI units.
+    """A copy of a valid scene in its reference poses, as Euler parameters, and in SI units.
 
     Elements that name the joint they act in have its bodies, points and axis in place of it.
     """
     scene = checked.scene.copy()
-    for name, p in zip(checked.body_names, checked.p.tolist(), strict=True):
+    poses = zip(checked.r_0.tolist(), checked.p_0.tolist(), strict=True)
+    for name, (r, p) in zip(checked.body_names, poses, strict=True):
         body = scene.bodies[name]
-        body.p, body.rpy, body.axis_angle = tuple(p), None, None
+        body.r, body.p, body.rpy, body.axis_angle = tuple(r), tuple(p), None, None
     for contact in checked.contacts:
         joint, _, end = contact.name.rpartition("_")
         if end in LIMITS and joint in scene.joints:

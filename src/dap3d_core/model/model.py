@@ -49,6 +49,7 @@ class Model:
         body_names: (n,) without ground, for reports only.
         mass: (n,) kg.            Jp: (n, 3, 3) inertia matrix in body axes, kg m^2.
         r, p: (n, 3), (n, 4) position and unit Euler parameters as given.
+        r_0, p_0: the same of the reference poses, in which coordinates of joints are zero.
         v, w: (n, 3) velocity and global angular velocity as given.
         joint_names, force_names, function_names: in file order, for reports.
         joint_rows: (joints,) rows of each joint.
@@ -76,6 +77,8 @@ class Model:
     Jp: Floats
     r: Floats
     p: Floats
+    r_0: Floats
+    p_0: Floats
     v: Floats
     w: Floats
     joint_names: tuple[str, ...]
@@ -342,7 +345,7 @@ def build_model(checked: ValidatedScene) -> Model:
         ModelError: the ``prepare`` of types refuses elements: all of them.
         PluginError: the ``prepare`` of a type failed.
     """
-    poses = _Poses(checked)
+    poses = ReferencePoses(checked)
     holding = checked.holding
     rows = np.array([j.type_info.row_count for j in holding], dtype=np.int64)
     mask = [j.type_info.type.constraint_mask() for j in holding]  # type: ignore[attr-defined]
@@ -353,6 +356,8 @@ def build_model(checked: ValidatedScene) -> Model:
         Jp=checked.Jp,
         r=checked.r,
         p=checked.p,
+        r_0=checked.r_0,
+        p_0=checked.p_0,
         v=checked.r_dot,
         w=checked.w,
         joint_names=tuple(j.name for j in holding),
@@ -388,7 +393,7 @@ def build_model(checked: ValidatedScene) -> Model:
 class _Groups:
     """The groups of a scene's elements; each kind names its own elements where one is refused."""
 
-    def __init__(self, checked: ValidatedScene, poses: "_Poses") -> None:
+    def __init__(self, checked: ValidatedScene, poses: "ReferencePoses") -> None:
         n = len(checked.body_names)
         kinds = ("joint", "force", "function")
         by_kind = {k: Grouping(k, poses, n, checked.functions) for k in kinds}
@@ -447,8 +452,8 @@ def _faults(
     return [(kind, instances[member].name, words) for member, words in error.faults]
 
 
-class _Poses(dict[int, BodyPose]):
-    """Poses as given, made when a type's ``prepare`` asks for them."""
+class ReferencePoses(dict[int, BodyPose]):
+    """Reference poses by body index, ground included, made when a type's ``prepare`` asks."""
 
     def __init__(self, checked: ValidatedScene) -> None:
         super().__init__({0: pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))})
@@ -456,6 +461,6 @@ class _Poses(dict[int, BodyPose]):
 
     def __missing__(self, body: int) -> BodyPose:
         checked, k = self._checked, body - 1
-        made = pose(checked.r[k], checked.p[k], checked.Jp[k])
+        made = pose(checked.r_0[k], checked.p_0[k], checked.Jp[k])
         self[body] = made
         return made

@@ -7,9 +7,8 @@ import attrs
 import numpy as np
 
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.types import pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers
-from dap3d_core.model.model import Model
+from dap3d_core.model.model import Model, ReferencePoses
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.scene import ValidatedScene
 from dap3d_core.scene.validate.coerce_values import (
@@ -81,11 +80,7 @@ def _of_force(
 ) -> Change:
     force = checked.forces[place]
     n = len(checked.body_names)
-    poses = {0: pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))}
-    poses |= {
-        b: pose(checked.r[b - 1], checked.p[b - 1], checked.Jp[b - 1]) for b in range(1, n + 1)
-    }
-    grouping = Grouping("force", poses, n, checked.functions)
+    grouping = Grouping("force", ReferencePoses(checked), n, checked.functions)
     given = {**force.values, **values}
     try:
         (old,) = grouping.groups([force], [place])

@@ -318,6 +318,8 @@ class _Part:
         place = self.place
         if table == "bodies":
             entry.r = place.position(entry.r)
+            if entry.r_0 is not None:
+                entry.r_0 = place.position(entry.r_0)
             for field in ("r_dot", "w"):
                 if (value := getattr(entry, field)) is not ZERO:
                     setattr(entry, field, place.direction(value))
@@ -328,6 +330,9 @@ class _Part:
                     mistakes.add((table, entry.name), MISSING, what)
                 else:
                     entry.p, entry.rpy, entry.axis_angle = p, None, None
+                if entry.p_0 is not None:
+                    p = place.orientation({"p": entry.p_0})
+                    entry.p_0 = entry.p_0 if isinstance(p, Fault) else p
         elif table == "points" and entry.body == GROUND:
             entry.sPp = place.position(entry.sPp)
         elif table == "vectors" and entry.body == GROUND:

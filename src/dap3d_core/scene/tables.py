@@ -38,6 +38,8 @@ class Body:
         axis_angle: an axis, 3 numbers of any length, and the angle about it.
         r_dot: velocity, 3 numbers, m/s.
         w: angular velocity in global axes, 3 numbers, rad/s.
+        r_0, p_0: the reference pose: what types take from the poses of the scene, such as the
+            zero of a joint's coordinate, is that of these; None for r and p.
         color: for drawings, "" for the next of the colour cycle.
     """
 
@@ -50,6 +52,8 @@ class Body:
     axis_angle: Any = attrs.field(default=None, converter=plain)
     r_dot: Any = attrs.field(default=ZERO, converter=plain)
     w: Any = attrs.field(default=ZERO, converter=plain)
+    r_0: Any = attrs.field(default=None, converter=plain)
+    p_0: Any = attrs.field(default=None, converter=plain)
     color: Any = ""
 
 

@@ -33,8 +33,8 @@ NUMERIC = ("number", "numbers", "vec3", "matrix", "square")
 #: Defaults of a body (scene/validate/bodies.py).
 BODY_DEFAULTS: dict[str, Any] = {"mass": 1.0, "Jp": (1.0, 1.0, 1.0)}
 #: Units of fields that do not belong to a type.
-UNITS = {"mass": "kg", "Jp": "kg m^2", "r": "m", "r_dot": "m/s", "w": "rad/s", "sPp": "m",
-         "t_end": "s", "dt": "s", "step": "s", "Omega": "rad/s"}  # fmt: skip
+UNITS = {"mass": "kg", "Jp": "kg m^2", "r": "m", "r_0": "m", "r_dot": "m/s", "w": "rad/s",
+         "sPp": "m", "t_end": "s", "dt": "s", "step": "s", "Omega": "rad/s"}  # fmt: skip
 #: Largest number of names in a message.
 MAX_NAMES = 6
 FORM = "names are TABLE.NAME.FIELD, such as bodies.crank.mass, simulation.FIELD, parameters.NAME"
@@ -184,7 +184,7 @@ class _Field:
             return ()
         if len(value) == 3:
             return AXES
-        return EULER_PARAMETERS if self.path[-1] == "p" and len(value) == 4 else ()
+        return EULER_PARAMETERS if self.path[-1] in ("p", "p_0") and len(value) == 4 else ()
 
     def parameter(self, name: str, index: tuple[int, ...] = ()) -> SceneParameter | None:
         """The parameter at an index; None where there is none."""

@@ -153,14 +153,14 @@ def classify(model: Model, u: Floats | None = None) -> ModelMotions:
     Args:
         model: the model.
         u: (13 n,) the state whose poses are the reference, moved onto C = 0 joint by joint; left
-            out, the poses of the scene.
+            out, the reference poses of the scene.
 
     Raises:
         PluginError: the kernels of a type cannot be compiled.
     """
     mass = np.concatenate([[np.inf], model.mass])
     Jp = np.concatenate([np.zeros((1, 3, 3)), model.Jp])
-    r, p, _, _ = split(model.u0 if u is None else u)
+    r, p = (model.r_0, model.p_0) if u is None else split(u)[:2]
     r = np.concatenate([np.zeros((1, 3)), r])
     p = np.concatenate([[[1.0, 0.0, 0.0, 0.0]], p])
     motions: list[JointMotions] = []

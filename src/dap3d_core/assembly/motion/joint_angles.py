@@ -97,12 +97,16 @@ def _origin_of_motions(model: Model) -> Any:
         places = (group.members, group.bodies, group.functions)
         numbers = group.packed_numbers(0).tobytes()
         groups.append((group.type_info.type, loops, numbers, *(a.tobytes() for a in places)))
-    return (*groups, model.part_size, *(a.tobytes() for a in (model.mass, model.Jp, model.u0)))
+    arrays = (model.mass, model.Jp, model.u0, model.r_0, model.p_0)
+    return (*groups, model.part_size, *(a.tobytes() for a in arrays))
 
 
 def _has_same_joints(model: Model, other: Model) -> bool:
     """True if joints and poses of two models of one structure are equal."""
-    pairs = [(getattr(model, name), getattr(other, name)) for name in ("r", "p", "mass", "Jp")]
+    pairs = [
+        (getattr(model, name), getattr(other, name))
+        for name in ("r", "p", "r_0", "p_0", "mass", "Jp")
+    ]
     pairs += [
         (mine.packed_numbers(0), theirs.packed_numbers(0))
         for mine, theirs in zip(model.joints, other.joints, strict=True)

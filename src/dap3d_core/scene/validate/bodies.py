@@ -6,7 +6,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.scene.errors import MISSING
+from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.tables import NO_TURN, Body
 from dap3d_core.scene.validate.coerce_columns import Keys, numbers, vectors
 from dap3d_core.scene.validate.coerce_values import (
@@ -46,6 +46,8 @@ class Bodies:
     p: Floats
     r_dot: Floats
     w: Floats
+    r_0: Floats
+    p_0: Floats
 
 
 def read_bodies(report: Collector) -> Bodies:
@@ -67,16 +69,36 @@ def read_bodies(report: Collector) -> Bodies:
         vectors(report, Keys("bodies", names, field), [getattr(b, field) for b in bodies], 3)
         for field in ("r", "r_dot", "w")
     )
+    p = _quaternions(report, Keys("bodies", names, "p"), [
+        _orientation(report, name, body) for name, body in table.items()
+    ])  # fmt: skip
     return Bodies(
         names,
         {"ground": 0} | {name: k for k, name in enumerate(names, 1)},
         _masses(report, names, bodies),
         _inertias(report, names, bodies),
         r,
-        _quaternions(report, names, bodies),
+        p,
         r_dot,
         w,
+        *_references(report, names, bodies, r, p),
     )
+
+
+def _references(
+    report: Collector, names: tuple[str, ...], bodies: list[Body], r: Floats, p: Floats
+) -> tuple[Floats, Floats]:
+    """The reference poses: those of the bodies, or others that are given."""
+    r_0, p_0 = r.copy(), p.copy()
+    for field, poses in (("r_0", r_0), ("p_0", p_0)):
+        given = [k for k, body in enumerate(bodies) if getattr(body, field) is not None]
+        keys = Keys("bodies", [names[k] for k in given], field)
+        values = [getattr(bodies[k], field) for k in given]
+        if given and field == "r_0":
+            poses[given] = vectors(report, keys, values, 3)
+        elif given:
+            poses[given] = _quaternions(report, keys, values)
+    return r_0, p_0
 
 
 def _masses(report: Collector, names: tuple[str, ...], bodies: list[Body]) -> Floats:
@@ -92,27 +114,22 @@ def _masses(report: Collector, names: tuple[str, ...], bodies: list[Body]) -> Fl
     return mass
 
 
-def _quaternions(report: Collector, names: tuple[str, ...], bodies: list[Body]) -> Floats:
-    keys = Keys("bodies", names, "p")
-    p = vectors(
-        report,
-        keys,
-        [_orientation(report, name, b) for name, b in zip(names, bodies, strict=True)],
-        4,
-    )
+def _quaternions(report: Collector, keys: Keys, given: list[Any]) -> Floats:
+    """(n, 4) Euler parameters of unit length."""
+    p = vectors(report, keys, given, 4)
     length = np.sqrt(np.einsum("nk,nk->n", p, p))
     deviation = np.abs(length - 1.0)
     for k in np.flatnonzero(deviation > UNIT_LENGTH_ROUNDING):
         if length[k] == 0.0:
             what = "Euler parameters of zero length mean no rotation at all"
             remedy = "write [1.0, 0.0, 0.0, 0.0] for a body that is not turned"
-            report.add(keys[k], bodies[k].p, what, remedy=remedy)
+            report.add(keys[k], given[k], what, remedy=remedy)
         elif deviation[k] > UNIT_TOLERANCE:
             unit = ", ".join(f"{x:.16g}" for x in p[k] / length[k])
             remedy = f"if the direction is meant, write [{unit}]"
-            report.add(keys[k], bodies[k].p, not_unit(length[k]), remedy=remedy)
+            report.add(keys[k], given[k], not_unit(length[k]), remedy=remedy)
         else:
-            text = f"bodies.{names[k]}.p: length {length[k]:.12g}, normalised to 1"
+            text = f"{dotted(keys[k])}: length {length[k]:.12g}, normalised to 1"
             report.note(text, "Euler parameters normalised")
     with np.errstate(invalid="ignore", divide="ignore"):
         return np.asarray(p / length[:, None])

@@ -70,6 +70,8 @@ class ValidatedScene:
         p: (n, 4) Euler parameters of unit length.
         r_dot: (n, 3) velocities, m/s.
         w: (n, 3) angular velocities in global axes, rad/s.
+        r_0, p_0: (n, 3), (n, 4) reference poses: those from which ``prepare`` finds constants, and
+            in which coordinates of joints are zero.
         point_names: declared points in file order, then animation points (``animation.1``, ...).
         point_body: (points,) body index of each.
         point_local: (points, 3) coordinates on that body, m.
@@ -90,6 +92,8 @@ class ValidatedScene:
     p: "Floats"
     r_dot: "Floats"
     w: "Floats"
+    r_0: "Floats"
+    p_0: "Floats"
     point_names: tuple[str, ...]
     point_body: "Integers"
     point_local: "Floats"

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping
 import attrs
 import numpy as np
 
-from dap3d_core.model import build_model
 from dap3d_core.model.joint_angles import JOINT_ANGLES
 from dap3d_core.model.rotations import read_only
 from dap3d_core.model.state_layout import split
@@ -15,7 +14,7 @@ from dap3d_core.result import information
 from dap3d_core.result.errors import unknown
 from dap3d_core.result.post.force_output import reactions_of
 from dap3d_core.result.post.reactions import Reaction
-from dap3d_core.scene import Scene, check
+from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.equilibrium.rest import EquilibriumSolution, find_rest
 from dap3d_core.simulation.errors import SimulationError
@@ -23,9 +22,6 @@ from dap3d_core.simulation.initial.assemble import violation
 from dap3d_core.simulation.initial.start_state import NamedState, Start, start_state
 from dap3d_core.simulation.redundancy.redundancy import Redundancy, redundancy_of
 from dap3d_core.simulation.settings import compiled_for
-
-#: Constants that a type takes from the poses of the scene are the same to this part.
-SAME_CONSTANT = 1e-8
 
 
 class Equilibrium:
@@ -119,14 +115,16 @@ class Equilibrium:
     def scene(self) -> Scene:
         """A copy of the scene whose bodies start here, at rest; it can be saved.
 
-        Types that take a reference from the poses of the scene, such as the unloaded pose of a
-        bushing, take it from these, and angles whose turns are counted begin within half a
-        turn: ``scene.notes`` names such elements. ``simulate(scene, start=equilibrium)`` keeps
-        references and turns as they are.
+        The reference poses of the bodies, r_0 and p_0, stay those of the scene: coordinates of
+        joints are zero in these, a bushing is unloaded there. Angles whose turns are counted begin
+        within half a turn: ``scene.notes`` names such elements.
+        ``simulate(scene, start=equilibrium)`` keeps turns as they are.
         """
-        scene = self.compiled.scene.copy()
-        for body, r, p in zip(scene.bodies.values(), self.r.tolist(), self.p.tolist(), strict=True):
-            body.r, body.p = tuple(r), tuple(p)
+        scene, checked = self.compiled.scene.copy(), self.compiled.checked
+        poses = zip(self.r.tolist(), self.p.tolist(), checked.r_0.tolist(), checked.p_0.tolist(),
+                    strict=True)  # fmt: skip
+        for body, (r, p, r_0, p_0) in zip(scene.bodies.values(), poses, strict=True):
+            body.r, body.p, body.r_0, body.p_0 = tuple(r), tuple(p), tuple(r_0), tuple(p_0)
             body.rpy = body.axis_angle = None
             body.r_dot = body.w = (0.0, 0.0, 0.0)
         contacts = self.compiled.model.contact_names
@@ -137,12 +135,6 @@ class Equilibrium:
             element = getattr(scene, f"{state.kind}s")[state.element]
             element.fields[f"{state.name}_0"] = values[0] if state.length == 1 else tuple(values)
         scene.simulation.start = "scene"
-        changed = self._changed_references(scene)
-        if changed:
-            scene.notes.append(
-                "the reference that these take from the poses of the scene is another one at rest, "
-                f"and so may be their forces: {', '.join(changed)}"
-            )
         wound = [name.rpartition(".")[0] for name, angle in self.state.angles.items()
                  if abs(angle) > np.pi and not name.startswith(JOINT_ANGLES)]  # fmt: skip
         if wound:
@@ -150,20 +142,6 @@ class Equilibrium:
                 f"whole turns are no part of a scene, these begin without them: {', '.join(wound)}"
             )
         return scene
-
-    def _changed_references(self, scene: Scene) -> list[str]:
-        """Elements whose constants depend on the poses that the scene gives."""
-        checked = check(scene, self.compiled.checked.registry)
-        before, after = self.compiled.model, build_model(checked)
-        changed = []
-        for kind in ("joint", "force"):
-            names = getattr(before, f"{kind}_names")
-            groups = zip(getattr(before, f"{kind}s"), getattr(after, f"{kind}s"), strict=True)
-            for old, new in groups:
-                size = SAME_CONSTANT * (1.0 + np.abs(old.numbers))
-                differs = np.any(np.abs(old.numbers - new.numbers) > size, axis=1)
-                changed += [f"{kind}s.{names[int(k)]}" for k in old.members[differs]]
-        return changed
 
 
 @checked

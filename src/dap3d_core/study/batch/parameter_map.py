@@ -20,10 +20,11 @@ from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.element_states import INITIAL, TOLERANCE
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
-from dap3d_core.interface.types import BodyPose, Function, TypeBase, acts_on_all, pose, turns_of
+from dap3d_core.interface.types import BodyPose, Function, TypeBase, acts_on_all, turns_of
 from dap3d_core.kernels.runtime.loop_support import BODY_WIDTH, JP, MASS
 from dap3d_core.model import Group
 from dap3d_core.model.groups import Floats, Integers
+from dap3d_core.model.model import ReferencePoses
 from dap3d_core.model.state_layout import join, split, u_from_y, y_from_u
 from dap3d_core.scene import Instance, ValidatedScene
 from dap3d_core.scene.validate.bodies import SMALLEST_INERTIA, ZERO_INERTIA
@@ -97,7 +98,7 @@ class ParameterMap:
         """
         self._checked, self._evaluator = checked, evaluator
         self._elements = (*checked.joints, *checked.forces, *checked.functions)
-        self._poses = poses_of(checked)
+        self._poses = ReferencePoses(checked)
         self._dependence: dict[int, _Dependence] = {}
         self.parameters = tuple(self._mapped(parameter) for parameter in parameters)
         self.moves_start = any(p.moves_start for p in self.parameters)
@@ -352,14 +353,6 @@ class ParameterMap:
         sound = (least > ZERO_INERTIA * most) & (most >= SMALLEST_INERTIA)
         valid &= np.all(sound & (most <= least + middle), axis=0)
         return mass, Jp, valid
-
-
-def poses_of(checked: ValidatedScene) -> dict[int, BodyPose]:
-    """Poses of the bodies of a scene by index, ground included."""
-    poses = {0: pose((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))}
-    for k in range(len(checked.body_names)):
-        poses[k + 1] = pose(checked.r[k], checked.p[k], checked.Jp[k])
-    return poses
 
 
 def _point_fields(checked: ValidatedScene, instance: Instance, point: str) -> Iterator[str]:

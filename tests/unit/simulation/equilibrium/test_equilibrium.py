@@ -46,15 +46,43 @@ def test_the_scene_at_rest_can_be_saved_and_is_at_rest(tmp_path):
     assert again.r == pytest.approx(found.r, abs=1e-15)
 
 
-def test_references_that_the_scene_at_rest_changes_are_named():
-    """A bushing is unloaded in the poses of its scene."""
-    scene = at_rest.ball()
-    scene.add_force("bushing", "mount", P_i="ball.O", P_j="ground.O",
-                    k=(1e3, 1e3, 1e3, 10.0, 10.0, 10.0))  # fmt: skip
+def referring():
+    """An arm, a slider in it and a ball whose elements count from the poses of the scene."""
+    scene = at_rest.pendulum(1.2, "referring")
+    scene.joints["J1"].fields |= {"lower": -0.5, "upper": 0.5}
+    scene.add_force("rot_sda", "coil", joint="J1", k=60.0, c=0.4)
+    scene.add_body("block", mass=0.5, Jp=(0.01, 0.01, 0.01), r=scene.bodies["rod"].r,
+                   p=scene.bodies["rod"].p)  # fmt: skip
+    scene.add_joint("tran", "J2", P_i="block.O", P_j="rod.O", a_j="rod.z")
+    scene.add_input("u", 0.5)
+    scene.add_force("actuator", "servo", joint="J2", control="u", k=40.0, c=0.2)
+    scene.add_body("ball", mass=1.0, Jp=(0.1, 0.1, 0.1), r=(3.0, 0.0, 0.0))
+    scene.add_point("Q", "ground", (3.0, 0.0, 0.0))
+    scene.add_force("bushing", "mount", P_i="ball.O", P_j="Q", k=(1e3, 1e3, 1e3, 10.0, 10.0, 10.0))
     scene.add_force("n", body_i="ball", n=(1.0, 0.0, 0.0))
+    return scene
+
+
+def test_references_stay_those_of_the_scene(tmp_path):
+    """Coordinates of joints at rest, modes and motion are those of the scene, from its state."""
+    scene = referring()
     found = dap.equilibrium(scene)
-    assert found.r[0, 2] == pytest.approx(-at_rest.G / 1e3, rel=1e-12)
-    assert any("forces.mount" in note for note in found.scene().notes)
+    assert found.r[2, 2] == pytest.approx(-at_rest.G / 1e3, rel=1e-12)
+    rest = found.scene().save(tmp_path / "rest.toml")
+    again = dap.equilibrium(rest)
+    assert again.steps <= 1  # of last digits
+    assert again.r == pytest.approx(found.r, abs=1e-12)
+    modes, wanted = (dap.linearize(s, at=found).eigenvalues for s in (rest, scene))
+    assert np.sort_complex(modes) == pytest.approx(np.sort_complex(wanted), abs=1e-9)
+    runs = (
+        dap.simulate(rest, t_end=0.1, dt=0.1),
+        dap.simulate(scene, start=found, t_end=0.1, dt=0.1),
+    )
+    for name in ("J1.angle", "J2.length", "energy.total"):
+        first, second = (run.quantity(name).values for run in runs)
+        assert first == pytest.approx(second, abs=1e-9)
+        assert np.ptp(first) < 1e-9
+    assert runs[0].quantity("J1.angle").values[0] > 0.1
 
 
 def test_a_reaction_is_that_of_one_instant():

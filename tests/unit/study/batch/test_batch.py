@@ -7,10 +7,11 @@ from support.on_axles import driven, stone, wheel
 from support.plain import long_in_plain_python
 
 import dap3d_core as dap
+from dap3d_core.model.model import ReferencePoses
 from dap3d_core.study import Ensemble, PointStatus, Study, outputs_of, with_values
 from dap3d_core.study.batch import driver
 from dap3d_core.study.batch.batch import ModelRebuilder
-from dap3d_core.study.batch.parameter_map import ParameterMap, dependence_of, poses_of
+from dap3d_core.study.batch.parameter_map import ParameterMap, dependence_of
 
 DONE, STOPPED, FAILED = PointStatus.DONE, PointStatus.STOPPED, PointStatus.FAILED
 
@@ -258,7 +259,7 @@ def test_a_number_that_prepare_reads_is_not_copied():
     compiled = dap.compile("fourbar3")
     poses = dict.fromkeys(range(4))
     joint = next(j for j in compiled.checked.joints if j.name == "J1")
-    found = dependence_of(joint, poses_of(compiled.checked), len(poses) - 1)
+    found = dependence_of(joint, ReferencePoses(compiled.checked), len(poses) - 1)
     assert found.fields == {"a_j"}
     assert found.constants == {"n_j", "m_j"}
     assert not found.poses
@@ -268,7 +269,7 @@ def test_poses_that_prepare_reads():
     """``fix`` keeps the relative pose that the bodies are given in."""
     compiled = dap.compile("fourbar4")
     joint = next(j for j in compiled.checked.joints if j.type_info.type.keyword == "fix")
-    found = dependence_of(joint, poses_of(compiled.checked), len(compiled.checked.body_names))
+    found = dependence_of(joint, ReferencePoses(compiled.checked), len(compiled.checked.body_names))
     assert {part for _, part in found.poses} == {"r", "p"}
 
 
