@@ -29,11 +29,12 @@ def test_what_is_changed_or_assumed_is_noted(scene_of, registry, old, new, words
 
 
 def test_what_is_noted_is_done(scene_of, registry):
-    text = BASE.replace("p = [1.0, 0.0", "p = [0.9999999, 0.0").replace(
-        "sp = [1.0, 0.0, 0.0]", "sp = [2.0, 0.0, 0.0]"
-    )
+    text = BASE.replace(
+        "\np = [1.0, 0.0", "\np_0 = [0, 0, 0, 0.9999999]\np = [0.9999999, 0.0"
+    ).replace("sp = [1.0, 0.0, 0.0]", "sp = [2.0, 0.0, 0.0]")
     checked = check(scene_of(text), registry)
     np.testing.assert_array_equal(checked.p[0], [1, 0, 0, 0])
+    np.testing.assert_array_equal(checked.p_0[0], [0, 0, 0, 1])
     assert checked.joints[0].values["a_i"] == (1.0, 0.0, 0.0)
 
 
