@@ -1,4 +1,8 @@
-"""Joints that carry and cannot pull: multipliers that must not be negative, and were."""
+"""Monitors of a run: joints that carry and pulled, regularised friction that crept.
+
+Multipliers of joints that cannot pull must not be negative. Friction that fades below a speed, as
+tanh(v / v_tol) does, holds nothing at rest: what should stick creeps, and it is noted how far.
+"""
 
 import math
 from typing import Any
