@@ -1,9 +1,9 @@
-"""Draw the pictures of the README: the page of `dap3d view`, and a film of a mechanism.
+"""Draw the pictures of the README: the page of `dap3d view`, and films of a mechanism and a grasp.
 
     python tools/readme_pictures.py [FOLDER]
 
-Writes view.png and leg.gif into FOLDER, docs/pictures by default. The page is drawn by an installed
-Chromium (on Debian: apt-get install chromium), which playwright drives.
+Writes view.png, leg.gif and gripper.gif into FOLDER, docs/pictures by default. The page is drawn by
+an installed Chromium (on Debian: apt-get install chromium), which playwright drives.
 """
 
 import shutil
@@ -40,16 +40,20 @@ def draw_page(page: Path, picture: Path) -> None:
 
 
 def main(folder: Path) -> None:
-    """Draw both pictures into a folder."""
+    """Draw the pictures into a folder."""
     folder.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory() as place:
         page = Path(place) / "page.html"
         dap.view(dap.simulate("fourbar3", dt=0.01)).save(page)
         draw_page(page, folder / "view.png")
-    scene, _ = dap.import_model(ROOT / "models" / "robots" / "jansen.xml")
-    motion = dap.simulate(scene, t_end=4.0, dt=0.02)
-    dap.animate(motion, folder / "leg.gif", size=(360, 320), fps=15, force=True)
-    for name in ("view.png", "leg.gif"):
+    jansen, _ = dap.import_model(ROOT / "models" / "robots" / "jansen.xml")
+    films = {
+        "leg.gif": dap.simulate(jansen, t_end=4.0, dt=0.02),
+        "gripper.gif": dap.simulate("gripper"),
+    }
+    for name, motion in films.items():
+        dap.animate(motion, folder / name, size=(360, 320), fps=15, force=True)
+    for name in ("view.png", *films):
         print(f"{folder / name} written")
 
 

@@ -38,7 +38,7 @@ def test_every_kind_of_check_is_there():
         "friction power", "friction frame", "friction balance", "energy", "derivatives", "purity",
         "plain", "compiled", "rate", "rate frame", "unilateral",
         "impulse and reaction", "restitution", "round", "jump rows", "jump frame",
-            "branches", "rest", "impulse energy", "velocity form", "unloaded",
+        "branches", "rest", "impulse energy", "velocity form", "unloaded", "normal",
     }  # fmt: skip
 
 

@@ -32,7 +32,7 @@ VARIABLES = {
 INTEGRATOR_MODULES = {
     "dop853": "dap3d_core.integrators.runge_kutta.dop853",
     "dopri5": "dap3d_core.integrators.runge_kutta.dopri5",
-    "rk4": "dap3d_core.integrators.runge_kutta.dopri5",
+    "rk4": "dap3d_core.integrators.runge_kutta.rk4",
     "adams": "dap3d_core.integrators.adams.step",
     "radau": "dap3d_core.integrators.radau.step",
     "moreau": "dap3d_core.integrators.moreau.integration",

@@ -8,8 +8,9 @@ import attrs
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.runge_kutta.dop853 import DOP853
-from dap3d_core.integrators.runge_kutta.dopri5 import DOPRI5, RK4
+from dap3d_core.integrators.runge_kutta.dopri5 import DOPRI5
 from dap3d_core.integrators.runge_kutta.integration import RungeKutta
+from dap3d_core.integrators.runge_kutta.rk4 import RK4
 from dap3d_core.integrators.runge_kutta.tableau import Tableau
 from dap3d_core.integrators.stepping.integration import Integration, StepCounts
 from dap3d_core.integrators.stepping.integration_state import Status

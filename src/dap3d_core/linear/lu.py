@@ -1,4 +1,4 @@
-"""Block LU of a matrix that is not symmetric, by the program of plan.py; real or complex.
+"""Block LU of a matrix that is not symmetric, by a program of its nodes; real or complex.
 
 Rows are exchanged within a node alone: the static order leaves every node's pivot block regular.
 Inner loops run along rows, which compiled code turns into vector instructions; blocks are half

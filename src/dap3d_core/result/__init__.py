@@ -1,16 +1,11 @@
 """The result layer: what a run left behind, on disk and in memory; the post-processor's arrays."""
 
 from dap3d_core.result.errors import Computed, ResultError, UnknownNameError
+from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.atomic_write import check_target
 from dap3d_core.result.file.write import ResultWriter
-from dap3d_core.result.metadata import (
-    EventRecord,
-    Note,
-    RunMetadata,
-    RunStatistics,
-    current_versions,
-    information,
-)
+from dap3d_core.result.metadata import RunMetadata, RunStatistics, current_versions
+from dap3d_core.result.note import Note, information
 from dap3d_core.result.open import open_result
 from dap3d_core.result.post.global_error import ErrorEstimate, estimated_error
 from dap3d_core.result.post.ledger import Entry

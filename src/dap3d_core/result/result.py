@@ -15,8 +15,10 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.result.arrays import Arrays, arrays_of
 from dap3d_core.result.display import ResultDisplay
 from dap3d_core.result.errors import ResultError, UnknownNameError, unknown
-from dap3d_core.result.metadata import EventRecord, Note, RunMetadata, RunStatistics
+from dap3d_core.result.event_record import EventRecord
+from dap3d_core.result.metadata import RunMetadata, RunStatistics
 from dap3d_core.result.model_summary import ModelSummary, summary_of
+from dap3d_core.result.note import Note
 from dap3d_core.result.post.contact_output import POINT, ResultContacts
 from dap3d_core.result.post.force_output import ForceOutput, force_output, reactions_of
 from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of

@@ -15,7 +15,7 @@ from dap3d_core.integrators import EXPLICIT, STEPPING, Integrator
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
-from dap3d_core.result.metadata import information
+from dap3d_core.result.note import information
 from dap3d_core.scene import MISSING, Mistake, Scene, SceneError, Simulation, check_simulation
 from dap3d_core.scene.validate.settings import notes_of
 from dap3d_core.settings import METHODS, SETTINGS

@@ -13,7 +13,7 @@ from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.kernels.runtime.cache import jit_is_on
 from dap3d_core.model.groups import Floats
 from dap3d_core.result import Computed, Result
-from dap3d_core.result.metadata import warnings_of
+from dap3d_core.result.note import warnings_of
 from dap3d_core.scene import Scene, SceneError
 from dap3d_core.simulation import CompiledModel, SimulationError, report_times, simulate
 from dap3d_core.study.differences import OFFSETS, change_along, motion_of, weights_of

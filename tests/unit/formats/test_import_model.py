@@ -220,7 +220,8 @@ CONTACTS = """
 <body name="c" pos="0 0 1"><joint type="hinge"/><joint type="hinge" axis="0 1 0"/>
 <geom type="capsule" size="0.1 0.2" conaffinity="0" contype="0"/>
 <geom type="ellipsoid" size="0.1 0.2 0.3" density="0"/></body>
-<body name="head" pos="0 0 0.2"><geom size="0.1"/></body></body></worldbody>
+<body name="neck"><body name="head" pos="0 0 0.2">
+<geom size="0.1"/></body></body></body></worldbody>
 <contact><exclude body1="a" body2="b"/><exclude body1="a" body2="head"/></contact>"""
 
 

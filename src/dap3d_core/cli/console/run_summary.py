@@ -166,7 +166,7 @@ def report_run(
     outcome: RunOutcome, model: str, target: Path, *, strict: bool, as_json: bool, quiet: bool
 ) -> int:
     """Report a run that was saved; returns the exit code."""
-    from dap3d_core.result.metadata import warnings_of
+    from dap3d_core.result.note import warnings_of
 
     data = run_data(outcome.result)
     initial = _correction(outcome)

@@ -202,7 +202,7 @@ def _beyond_rows(model: Articulation) -> Iterator[tuple[str, str]]:
             if model.links[parent].inertial is not None:
                 break
             parent = above.get(parent, WORLD)
-            if parent != WORLD:
+            if parent != WORLD and parent not in held[name]:
                 yield from product(held[name], held[parent])
 
 

@@ -26,7 +26,7 @@ HELD = 1e-9
 
 def length_of(vector: Floats) -> float:
     """The length of a vector of one component or more."""
-    return float(reduce(np.hypot, vector))
+    return float(reduce(np.hypot, vector, 0.0))
 
 
 class ContactTable:
@@ -199,12 +199,12 @@ class ContactRows:
         if own:
             held = self.inverse @ self.D.T
             mobility = self.D @ held
-            answer = held @ np.linalg.pinv(mobility, rcond=1e-12)
+            answer = held @ np.linalg.pinv(mobility, rcond=1e-12, hermitian=True)
             self.P = self.inverse - answer @ held.T
             self.driven = (self.G @ (answer @ self._nu)).reshape(-1, 3)
             if table.loads:  # of rows that depend on each other the least, as equations.py has them
                 s = 1.0 / np.sqrt(np.maximum(np.diag(mobility), 1e-300))
-                least = np.linalg.pinv(s[:, None] * mobility * s, rcond=1e-12)
+                least = np.linalg.pinv(s[:, None] * mobility * s, rcond=1e-12, hermitian=True)
                 self._reaction = -s[:, None] * (least @ (s[:, None] * held.T @ self.G.T))
         self.W = self.G @ self.P @ self.G.T
 

@@ -79,7 +79,7 @@ class StageMatrix(Arrays):
         "spin": MATRIX,
     }
 
-    nodes: Integers  # of linear.lu_plan.LuPlan, as the next two
+    nodes: Integers  # of linear.lu.LuPlan, as the next two
     columns: Integers
     updates: Integers
     body_first: Integers  # (n + 1,) first unknown of each body

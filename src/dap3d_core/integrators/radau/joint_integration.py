@@ -59,7 +59,7 @@ class RateTangent(Arrays):
         "J": MATRIX,
     }
 
-    nodes: Integers  # of linear.lu_plan.LuPlan, as the next two
+    nodes: Integers  # of linear.lu.LuPlan, as the next two
     columns: Integers
     updates: Integers
     bends: Floats  # (1,) as of ``Tangent``

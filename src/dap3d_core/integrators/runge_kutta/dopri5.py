@@ -41,13 +41,3 @@ DOPRI5 = Tableau(
     factor_min=1 / 5,
     factor_max=10.0,
 )
-
-RK4 = Tableau(
-    name="rk4",
-    order=4,
-    stages=4,
-    c=[0, 1 / 2, 1 / 2, 1, 1],
-    a=lower_triangle([1 / 2], [0, 1 / 2], [0, 0, 1], [1 / 6, 1 / 3, 1 / 3, 1 / 6]),
-    e=[],
-    d=[],
-)

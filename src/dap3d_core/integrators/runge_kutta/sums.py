@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from dap3d_core.integrators.runge_kutta.dop853 import DOP853
-from dap3d_core.integrators.runge_kutta.dopri5 import DOPRI5, RK4
+from dap3d_core.integrators.runge_kutta.dopri5 import DOPRI5
+from dap3d_core.integrators.runge_kutta.rk4 import RK4
 from dap3d_core.integrators.runge_kutta.tableau import Tableau
 from dap3d_core.integrators.stepping.integration_state import OTHER, SCRATCH, TRIAL, Y
 from dap3d_core.integrators.stepping.step_control import EPSILON, combined_error, work_error

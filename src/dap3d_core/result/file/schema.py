@@ -8,7 +8,8 @@ import numpy as np
 
 from dap3d_core.result.arrays import AXES, COLUMNS, EULER, U_ERROR, Arrays, Column, column_sizes
 from dap3d_core.result.contact_table import FIELDS, ContactTable, no_contacts
-from dap3d_core.result.metadata import RUNNING, EventRecord, RunMetadata, RunStatistics, to_json
+from dap3d_core.result.event_record import EventRecord
+from dap3d_core.result.metadata import RUNNING, RunMetadata, RunStatistics, to_json
 from dap3d_core.result.model_summary import ModelSummary
 
 #: Version of this layout, raised when an older reader would misread it.

@@ -27,7 +27,7 @@ from dap3d_core.integrators.stepping import integration_state as at
 from dap3d_core.interface.contacts.rows import APART
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.result import EventRecord
-from dap3d_core.result.metadata import information
+from dap3d_core.result.note import information
 from dap3d_core.scene import Mistake, SceneError
 from dap3d_core.scene.errors import MISSING
 from dap3d_core.simulation.errors import SimulationError

@@ -16,8 +16,8 @@ from dap3d_core.assembly.arrays import CHECKPOINTED
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators import STEPPING, Integration, Status
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.file.validate import are_events, are_texts, is_number
-from dap3d_core.result.metadata import EventRecord
 from dap3d_core.result.post.smooth_parts import cubic
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.events.event import Event, Instant, Numbers, checked_events

@@ -1,4 +1,10 @@
-"""Joints that carry and cannot pull: multipliers that must not be negative, and were."""
+"""Monitors of a run: joints that carry and pulled, regularised friction that crept.
+
+Multipliers of joints that cannot pull must not be negative. Friction that fades below a speed, as
+tanh(v / v_tol) does, holds nothing at rest: what should stick creeps at a part of v_tol. Which part
+is seen by evaluating the law twice, as it is and with a v_tol that is far smaller, where its
+friction is whole: the ratio is tanh(v / v_tol).
+"""
 
 import math
 from typing import Any

@@ -56,8 +56,6 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
             f"{head}: a step of {step:g} s, as given, cannot be taken there; give a shorter step, "
             "or none, and rtol chooses the steps"
         )
-    if words := integration.overlapping:
-        return f"{message}: {words}"
     words = describe_refusals(evaluator, integration)
     if integration.status is Status.STEP_FLOOR and words:
         message = f"{message} (refused so far: {words})"
@@ -70,7 +68,8 @@ def why_stopped(evaluator: Evaluator, integration: Integration, rank: int) -> st
     culprit = jammed_forces(evaluator, t, y) or find_offender(evaluator, t, y, t_stop)
     if not culprit and integration.status is Status.NOT_FINITE:
         culprit = integration.too_fast or fastest_body(evaluator, y)
-    return f"{message}: {culprit}" if culprit else message
+    reasons = [words for words in (culprit, integration.overlapping) if words]
+    return f"{message}: {'; '.join(reasons)}" if reasons else message
 
 
 def jammed_forces(evaluator: Evaluator, t: float, y: Any) -> str:

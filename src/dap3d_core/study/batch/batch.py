@@ -12,7 +12,7 @@ from dap3d_core.formulations.switches import effects_of
 from dap3d_core.integrators.plugin_integrators import integrator_named
 from dap3d_core.model import Model, ModelError, build_model
 from dap3d_core.model.groups import Floats, Integers
-from dap3d_core.result.metadata import warnings_of
+from dap3d_core.result.note import warnings_of
 from dap3d_core.scene import SceneError, ValidatedScene, check
 from dap3d_core.simulation import AssemblyError, CompiledModel
 from dap3d_core.simulation.failure.monitors import UnilateralMonitor

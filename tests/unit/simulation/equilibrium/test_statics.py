@@ -4,8 +4,12 @@ import numpy as np
 import pytest
 from support import at_rest
 from support.mechanisms import rough_four_bar
+from support.own_types import registry_of
+from support.plain import long_in_plain_python
+from support.state_types import ZERO
 
 import dap3d_core as dap
+from dap3d_core.interface import Body, Force, body, number
 from dap3d_core.simulation.equilibrium.statics import Statics, displacement
 from dap3d_core.simulation.equilibrium.statics import at_rest as without_velocities
 
@@ -51,3 +55,119 @@ def test_displacements_are_found_back():
     angle = np.linalg.norm(x[:, 3:], axis=1, keepdims=True)
     assert shift == pytest.approx(statics.length * x[:, :3], rel=1e-12)
     assert turn == pytest.approx(x[:, 3:] / angle * 2 * np.arctan(angle / 2), rel=1e-12)
+
+
+#: A mass of 2 kg hangs below a solid of stiffness 100 N/m, or is held at a height.
+WEIGHT = 2.0 * 9.81
+
+
+class Held(Force):
+    """f = gain e + integral z - damping v, z_dot = e, e = target - height of body i."""
+
+    keyword, states = "test-held", ("z",)
+    body_i: Body = body()
+    gain: float = number()
+    integral: float = number()
+    damping: float = number(20.0)
+    target: float = number(0.3)
+
+    def rate(r_i, target):
+        return target - r_i[2]
+
+    def wrench(r_i, v_i, z, gain, integral, damping, target):
+        return (0.0, 0.0, gain * (target - r_i[2]) + integral * z - damping * v_i[2]), ZERO
+
+
+class Growing(Held):
+    """A state that grows without end."""
+
+    keyword = "test-growing"
+
+    def rate():
+        return 1.0
+
+
+REGISTRY = registry_of(Held, Growing)
+
+
+def hanging(**fields):
+    scene = dap.Scene(name="hanging")
+    scene.add_body("bob", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(0.1, 0.0, -1.0))
+    scene.add_force("weight", "gravity")
+    scene.add_force("maxwell", "solid", P_i="bob.O", P_j="ground.O", k=50.0, c=3.0, k_p=100.0,
+                    l0=1.0, z_0=0.3, **fields)  # fmt: skip
+    return scene
+
+
+def held(keyword="test-held", **fields):
+    scene = dap.Scene(name="held")
+    scene.add_body("bob", mass=2.0, Jp=(1.0, 1.0, 1.0), r=(0.0, 0.0, -1.0))
+    scene.add_force("weight", "gravity")
+    scene.add_force(keyword, "servo", body_i="bob", gain=50.0, integral=10.0, **fields)
+    return dap.compile(scene, registry=REGISTRY)
+
+
+@long_in_plain_python
+def test_a_solid_has_its_slow_stiffness():
+    """The damper has crept: x = z = m g / k_p; a run from there stays."""
+    eq = dap.equilibrium(hanging())
+    assert eq.r[0] == pytest.approx((0.0, 0.0, -1.0 - WEIGHT / 100.0), abs=1e-12)
+    assert eq.states == pytest.approx([WEIGHT / 100.0], abs=1e-12)
+    assert eq.stable
+    result = dap.simulate(hanging(), start=eq, t_end=0.5, dt=0.1)
+    assert np.ptp(result.quantity("bob.r.z").values) < 1e-12
+    assert eq.scene().forces["solid"].fields["z_0"] == pytest.approx(WEIGHT / 100.0)
+    assert result.quantity("solid.z").values == pytest.approx(WEIGHT / 100.0, abs=1e-12)
+
+
+@long_in_plain_python
+def test_what_integrates_its_error_finds_the_pose():
+    """e = 0 and integral z = m g; slow enough it is stable, with a negative damper it is not."""
+    eq = dap.equilibrium(held())
+    assert eq.r[0] == pytest.approx((0.0, 0.0, 0.3), abs=1e-12)
+    assert eq.states == pytest.approx([WEIGHT / 10.0], rel=1e-12)
+    assert eq.stable
+    assert not dap.equilibrium(held(damping=-0.1)).stable
+
+
+def test_bristles_at_rest_stay_bent():
+    """A rate that is zero at rest leaves the state as it was, and its force with it."""
+    scene = dap.Scene(name="stuck")
+    scene.add_body("block", mass=2.0, Jp=(1.0, 1.0, 1.0))
+    law = {"f_n": 20.0, "mu_c": 0.3, "mu_s": 0.5, "v_s": 0.05, "sigma_0": 1e4}
+    scene.add_force("lugre", "floor", P_i="block.O", a_j="ground.x", z_0=-1e-4, **law)
+    scene.add_point("wall", "ground", (-1.0, 0.0, 0.0))
+    scene.add_force("ptp", "spring", P_i="block.O", P_j="wall", k=100.0, l0=1.0)
+    eq = dap.equilibrium(scene)
+    assert eq.states == pytest.approx([-1e-4])
+    assert eq.r[0, 0] == pytest.approx(1e4 * 1e-4 / 100.0, abs=1e-12)
+
+
+@pytest.mark.slow
+def test_a_state_that_never_rests_is_refused():
+    """By its name."""
+    with pytest.raises(dap.SimulationError, match=r"the rate of servo\.z vanishes neither"):
+        dap.equilibrium(held("test-growing"))
+
+
+@long_in_plain_python
+def test_a_run_may_begin_at_rest():
+    """The setting start = "equilibrium" has the states, too."""
+    scene = hanging()
+    scene.simulation.start = "equilibrium"
+    result = dap.simulate(scene, t_end=0.2, dt=0.1)
+    assert result.quantity("solid.z").values == pytest.approx(WEIGHT / 100.0, abs=1e-12)
+
+
+def test_runs_start_from_the_states_of_results():
+    """At a reported instant exactly; between two by a cubic."""
+    first = dap.simulate(hanging(), t_end=1.0, dt=0.01, rtol=1e-10)
+    later = dap.simulate(hanging(), start=(first, 0.5), t_end=0.5, dt=0.1, rtol=1e-10)
+    want = first.quantity("solid.z").values[50::10]
+    assert later.quantity("solid.z").values[0] == want[0]
+    assert later.quantity("solid.z").values == pytest.approx(want, abs=1e-8)
+    between = dap.simulate(hanging(), start=(first, 0.505), t_end=0.1, dt=0.1)
+    near = first.quantity("solid.z").values[49:53]
+    assert between.quantity("solid.z").values[0] == pytest.approx(
+        (-near[0] + 9.0 * near[1] + 9.0 * near[2] - near[3]) / 16.0, abs=1e-12
+    )
