@@ -139,7 +139,8 @@ class Equilibrium:
                  if abs(angle) > np.pi and not name.startswith(JOINT_ANGLES)]  # fmt: skip
         if wound:
             scene.notes.append(
-                f"whole turns are no part of a scene, these begin without them: {', '.join(wound)}"
+                "whole turns are no part of a scene: it may not be at rest, as these begin without "
+                f"them: {', '.join(wound)}"
             )
         return scene
 
