@@ -152,7 +152,7 @@ def _output(label: Any, of: Any) -> Output | Mistake:
 def _moves_joints(parameter: SceneParameter) -> bool:
     """True if joints may have other axes, points or poses in the scene with another value."""
     if parameter.table == "bodies":
-        return parameter.path[2] in ("r", "p")
+        return parameter.path[2] not in ("mass", "Jp", "r_dot", "w")
     return parameter.table not in ("forces", "simulation")
 
 

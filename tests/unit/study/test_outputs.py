@@ -63,3 +63,18 @@ def falling():
     scene = dap.Scene(name="fall")
     scene.add_body("stone", mass=1.0, Jp=(1.0, 1.0, 1.0))
     return scene
+
+
+@pytest.mark.parametrize(("field", "turn"), [("rpy.y", 0.4), ("r_0.x", None)])
+def test_coordinates_of_joints_follow_the_poses_they_count_from(field, turn):
+    """A joint counts from the pose of its scene, or from the reference pose; it starts at rest."""
+    scene = dap.Scene(name="slide")
+    scene.add_body("b", mass=1.0, Jp=(0.1, 0.1, 0.1), rpy=(0.0, 0.0, 0.0), r_0=(0.1, 0.0, 0.0))
+    scene.add_joint("tran", "T", P_i="b.O", P_j="ground.O", a_j="ground.x")
+    scene.add_body("c", mass=1.0, Jp=(0.1, 0.1, 0.1), rpy=(0.0, 0.0, 0.0))
+    scene.add_joint("rev", "h", P_i="c.O", P_j="ground.O", a_i="c.y", a_j="ground.y")
+    name, quantity = ("c", "h.angle") if turn else ("b", "T.length")
+    swept = dap.sweep(scene, {f"bodies.{name}.{field}": [0.2, 0.4]}, outputs=[f"{quantity}:end"],
+                      t_end=0.1, dt=0.1)  # fmt: skip
+    wanted = [0.0, 0.0] if turn else [-0.2, -0.4]
+    assert swept[f"{quantity}:end"].values == pytest.approx(wanted, abs=1e-12)
