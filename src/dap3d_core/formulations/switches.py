@@ -6,7 +6,7 @@ from typing import Any
 import attrs
 import numpy as np
 
-from dap3d_core.assembly.arrays import BEGINS, ENDS, JUMPS, UNSEEN, Floats
+from dap3d_core.assembly.arrays import BEGINS, ENDS, JUMPS, MODE_ENDS, UNSEEN, Floats
 from dap3d_core.interface.codegen.specialise import is_knots
 from dap3d_core.model import Group, Model
 from dap3d_core.model.knots import narrowest
@@ -69,12 +69,14 @@ class Switch:
 
     @property
     def effect(self) -> int:
-        """Effect on a run: ENDS, BEGINS, UNSEEN or JUMPS."""
+        """Effect on a run: ENDS, BEGINS, UNSEEN, JUMPS or MODE_ENDS."""
         if self.words:
             return ENDS
         if self.kind == "knot":
             return UNSEEN
-        return JUMPS if self.jumps else BEGINS
+        if self.jumps:
+            return MODE_ENDS if self.is_contact else JUMPS
+        return BEGINS
 
     @property
     def band(self) -> float:

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.assembly.arrays import ENDS, JUMPS, UNSEEN
+from dap3d_core.assembly.arrays import ENDS, JUMPS, MODE_ENDS, UNSEEN
 from dap3d_core.integrators.stepping.integration_state import (
     BAND,
     BEND,
@@ -162,12 +162,12 @@ def is_cut_at_sample(work: IntegrationState, t: float) -> bool:
     """``is_sample_across`` once the values of the sample are known.
 
     Not of what is UNSEEN: where a function takes another form it is smooth: a step may mix both.
-    Nor of what JUMPS and begins in its band, such as a contact that opens: an early stage, an Euler
-    step, errs by the curvature of what slides, the end does not.
+    Nor of contacts that begin in their band, as one that opens does: an early stage, an Euler step,
+    errs by the curvature of what slides, the end does not.
     """
     s = work.switches
     for k in range(s.shape[1]):
-        if s[DOES, k] == UNSEEN or (s[DOES, k] == JUMPS and may_rest(s, k)):
+        if s[DOES, k] == UNSEEN or (s[DOES, k] == MODE_ENDS and may_rest(s, k)):
             s[SAMPLE, k] = s[SIDE, k]
     if not changes_sign(s, SAMPLE):
         return False
@@ -263,7 +263,7 @@ def update_switches_after_step(
     for k in range(s.shape[1]):
         is_short = (work.cut_attempts > 0) | (h < CUT_SHORT * work.uncut_step)
         is_stalled = is_short & (s[FOUND, k] == s[VALUE, k])
-        approaches = (s[SIDE, k] * s[RATE, k] < 0.0) | (s[DOES, k] == JUMPS)  # or its rate is noise
+        approaches = (s[SIDE, k] * s[RATE, k] < 0.0) | (s[DOES, k] >= JUMPS)  # or its rate is noise
         stalled |= is_stalled & approaches
         s[BEND, k] = (s[FOUND_RATE, k] - s[RATE, k]) / h
         s[VALUE, k], s[RATE, k] = s[FOUND, k], s[FOUND_RATE, k]
@@ -318,7 +318,7 @@ def bisect_crossing(
             stays = 1  # a step to a crossing that changes no digit of its switch
         if s[VALUE, k] == 0.0 and s[FOUND, k] == 0.0 and s[SIDE, k] != 0.0:
             stays = 1
-            if work.stalled_steps >= MAX_STALLS_AT_ZERO and s[DOES, k] == JUMPS:
+            if work.stalled_steps >= MAX_STALLS_AT_ZERO and s[DOES, k] >= JUMPS:
                 s[SIDE, k] = s[CROSSED, k] = -s[SIDE, k]  # what follows at zero, jumps decide
                 crossed = True
             elif work.stalled_steps >= MAX_STALLS_AT_ZERO:
@@ -385,7 +385,7 @@ def record_crossings(work: IntegrationState, t: float) -> None:
         record_crossing(work, k, t)
         if s[DOES, k] == ENDS and s[SIDE, k] < 0.0:
             work.end_status, work.terminal_switch = SWITCHED, k
-        if s[DOES, k] == JUMPS:
+        if s[DOES, k] >= JUMPS:
             s[CROSSED, k] = s[SIDE, k]
         if s[COUNT, k] == 0.0 or t - s[SINCE, k] > CHATTER_SPAN * (work.times[-1] - work.times[0]):
             s[SINCE, k], s[COUNT, k] = t, 0.0

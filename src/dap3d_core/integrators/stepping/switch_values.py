@@ -120,7 +120,7 @@ def changes_sign(s: Floats, row: int) -> bool:
 @compiled
 def record_crossing(work: IntegrationState, k: int, t: float) -> None:
     """Record that a switch changed its sign, unless it is UNSEEN, or velocities jump there."""
-    if work.switches[DOES, k] == UNSEEN or work.switches[DOES, k] == JUMPS:
+    if work.switches[DOES, k] == UNSEEN or work.switches[DOES, k] >= JUMPS:
         return
     count = work.crossing_count
     if count < LOGGED:
