@@ -27,22 +27,15 @@ from dap3d_core.simulation.initial.breakpoints import stops_of
 from dap3d_core.simulation.initial.undefined_directions import undefined_directions
 from dap3d_core.simulation.initial_state import InitialState, find_start, start_notes
 from dap3d_core.study.batch import driver, initial_state
-from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch, numbers_of
+from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch, Starts, numbers_of
 from dap3d_core.study.batch.parameter_map import Booleans, NotCopiedError, ParameterMap
-from dap3d_core.study.batch.slopes import (
-    COPIES,
-    MODELS,
-    DifferentiatedBatch,
-    Starts,
-    starts_with_slopes,
-)
 from dap3d_core.study.outputs import Reduction
 from dap3d_core.study.parameters import SceneParameter, with_values
-from dap3d_core.study.sensitivities.sensitivities import directions_of
 from dap3d_core.study.study import Batch, PointStatus
 
 if TYPE_CHECKING:
     from dap3d_core.study.batch.compiled_batch import TreePoints
+    from dap3d_core.study.batch.slopes import DifferentiatedBatch
 
 
 def batch_runner(reduction: Reduction, times: Floats) -> "BatchRunner | None":
@@ -192,6 +185,14 @@ class BatchRunner:
 
         size: (p,) of the parameters. None where the point cannot be run so.
         """
+        from dap3d_core.study.batch.slopes import (
+            COPIES,
+            MODELS,
+            DifferentiatedBatch,
+            starts_with_slopes,
+        )
+        from dap3d_core.study.sensitivities.sensitivities import directions_of
+
         by_map, batch = self.parameter_map, self.compiled_batch
         if by_map is None:
             found = starts_with_slopes(self._rebuilt_starts, x, size, *MODELS)

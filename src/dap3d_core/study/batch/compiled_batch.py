@@ -43,6 +43,15 @@ _DRIVE = procedure_signature(RungeKuttaState.type_of(), STEPS, System.type_of(),
 MakeBatch = Callable[[], "CompiledBatch"]
 
 
+class Starts(NamedTuple):
+    """What k points start from: arguments of ``CompiledBatch.run``."""
+
+    table: Floats
+    places: Integers
+    y0: Floats
+    start: int
+
+
 class BatchRows(NamedTuple):
     """Rows and diagnostics of k runs.
 

@@ -6,26 +6,14 @@ numbers and a state, are differences, exact where parameters are copied.
 """
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.lanes import Differentiation
-from dap3d_core.model.groups import Integers
 from dap3d_core.study.batch import driver
-from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch
+from dap3d_core.study.batch.compiled_batch import BatchRows, CompiledBatch, Starts
 from dap3d_core.study.differences import power_of_two, weighted, weights_of
-
-
-class Starts(NamedTuple):
-    """What k points give to the loop: arguments of ``CompiledBatch.run``."""
-
-    table: Floats
-    places: Integers
-    y0: Floats
-    start: int
-
 
 #: Steps and offsets of differences: of numbers that are copied, and of models that are made anew,
 #: to second order, whose error is some 1e-8.

@@ -8,9 +8,9 @@ import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.simulation.run import Run
-from dap3d_core.study.batch.compiled_batch import arrays_of_numbers
+from dap3d_core.study.batch.compiled_batch import Starts, arrays_of_numbers
 from dap3d_core.study.batch.parameter_map import NotCopiedError, ParameterMap
-from dap3d_core.study.batch.slopes import COPIES, Starts, starts_with_slopes
+from dap3d_core.study.batch.slopes import COPIES, starts_with_slopes
 from dap3d_core.study.parameters import SceneParameter
 
 

@@ -120,10 +120,12 @@ NOT_CALLED = {
         "assembly.collisions.manifold": "turn outline clip tangents spread inside crossing "
         "at_plane_along put_points points_within",
         "assembly.collisions.placed_shapes": "place_shapes",
-        "assembly.collisions.find": (
-            "has_formula touch find_touches find_pairs add_pair meet ranked place_of fill_cells "
-            "grid_pairs above at_plane _rims balls along sphere_capsule capsules _pair"
+        "assembly.collisions.rods": "balls along sphere_capsule capsules _pair",
+        "assembly.collisions.planes": "above at_plane _rims",
+        "assembly.collisions.broad_phase": (
+            "find_pairs add_pair meet ranked place_of fill_cells grid_pairs"
         ),
+        "assembly.collisions.find": "has_formula touch find_touches",
         "integrators.moreau.dense": (
             "solve_dense solve_square solve_blocks invert multiply take take_from"
         ),
