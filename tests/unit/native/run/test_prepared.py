@@ -73,3 +73,22 @@ def test_what_nothing_carries_is_refused_by_name(tmp_path):
 def test_a_method_in_coordinates_of_joints_is_refused(tmp_path):
     with pytest.raises(dap.SceneError, match="method standard or lsq"):
         exported(swinging(), tmp_path, method="joint")
+
+
+@pytest.mark.slow
+def test_a_driver_that_an_input_sets_does_work(tmp_path):
+    """A disk of 1.08 kg m^2 about its hub is given speeds at once: its work is its energy, in J."""
+    scene = dap.Scene(name="turntable")
+    scene.add_body("disk", mass=2.0, Jp=(0.5, 0.5, 0.9), r=(0.3, 0, 0))
+    scene.add_input("speed", value=0.0)
+    scene.add_point("hub", "disk", (-0.3, 0, 0))
+    scene.add_joint("rev", "axle", P_i="hub", P_j="ground.O", a_i="disk.z", a_j="ground.z")
+    scene.add_joint("motor", "drive", joint="axle", speed="speed")
+    _, library = exported(scene, tmp_path, outputs=["work"])
+    here, there = dap.start(scene, t_end=1.0), library.start(1.0)
+    for speed in (2.0, -1.0):
+        here.step(0.1, inputs={"speed": speed})
+        there["speed"] = speed
+        there.step_to(here.t)
+        assert there["work"] == pytest.approx(0.5 * 1.08 * speed**2, rel=1e-13)
+        assert there["work"] == pytest.approx(here.state["work"], rel=1e-14)
