@@ -6,7 +6,9 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
+from dap3d_core.assembly.arrays import ACCELERATION, System, coordinate_offset, velocity_offset
+from dap3d_core.assembly.collisions.placed_shapes import POSE
+from dap3d_core.assembly.evaluate import call_kinds, place
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import (
     axes_of,
@@ -25,7 +27,7 @@ from dap3d_core.integrators.moreau.impulses import (
     recall,
     remember,
 )
-from dap3d_core.integrators.moreau.newton import product_of, speed_of
+from dap3d_core.integrators.moreau.newton import impulse_of, product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
 from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
 from dap3d_core.integrators.stepping.integration_state import (
@@ -49,8 +51,13 @@ OVERLAP, PASSES = 1e-12, 8
 COLLIDES = 4.0
 #: Parts of the step where bodies are not hit, and those of them that rest.
 NOT_HIT, RESTS = 2.0, 1.5
-#: Velocities of rest, as parts of what they would become without contacts.
-STILL = 1e-8
+#: Changes of velocities by which a body turns little, as parts of those without contacts.
+KEPT = 0.5
+#: Parts of a step by which times differ that are meant to be one.
+SAME_TIME = 1e-9
+#: Solutions that bring velocities of joints to where bodies have moved; of the largest impulse, what
+#: they may leave.
+AIMS, FITS = 3, 1e-12
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
@@ -69,7 +76,7 @@ def advance(
     limit = work.rhs_count + budget
     while s.stage != 0 or goes_on(work, s, functions, system, loops, limit):
         if s.stage == 0:
-            s.t1 = min(end_of_step(work), work.step_limit)
+            s.t1 = next_end(work)
             s.h = s.t1 - work.t
             move_freely(work, s, functions[0], system, loops)
             s.stage = FREE
@@ -86,6 +93,16 @@ def advance(
         finish(work, s, functions, system, loops)
     if s.stage != 0 and s.is_exported != 0:
         work.t_stop, work.status, s.stage = s.t1, NO_ROOM, 0
+
+
+@compiled
+def next_end(work: Any) -> float:
+    """The time at which the step that comes next ends.
+
+    A limit that rounding alone keeps from it makes no step, whose forces would be rounding.
+    """
+    t1, limit = end_of_step(work), work.step_limit
+    return max(t1, limit) if abs(limit - t1) <= SAME_TIME * (t1 - work.t) else min(t1, limit)
 
 
 @compiled
@@ -137,6 +154,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     if s.declared_law.size > 0:
         find_grips(work.t, s, system, loops)
     recall(work, s)
+    put_aims(s)
     while True:
         prepare_problem(s)
         if not solve(s, work.rtol):
@@ -146,24 +164,66 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     put_hits(s, any_collides)
     if any_collides and not limit_bounces(s, work.rtol):
         return False
+    for b in range(1, n + 1):
+        for k in range(POSE):
+            s.fallen[b, k] = trial[coordinate_offset(b) + k]
+    move_bodies(s, y, trial)
+    for _ in range(AIMS):
+        if any_collides or s.y.size == 0 or meets_aims(s, trial, system, loops):
+            break
+        if not solve(s, work.rtol):
+            return False
+        move_bodies(s, y, trial)
     s.is_solved = 1
     work.largest_residual = max(work.largest_residual, s.residual)
-    for b in range(n + 1):
-        copy(s.end[b], s.v[b])
     remember(work, s)
     keep_for_reports(s)
-    for b in range(1, n + 1):
+    trial[trial.size - 1] += work_done(work, s)
+    return True
+
+
+@compiled
+def put_aims(s: StepArrays) -> None:
+    """Seek the velocities of rows of joints that there are without contacts."""
+    for k in range(s.y.size):
+        s.aim[k] = speed_of(s, k, s.free)
+
+
+@compiled
+def meets_aims(s: StepArrays, trial: Floats, system: System, loops: Any) -> bool:
+    """Whether velocities fit the joints where bodies have moved to; else with other aims.
+
+    Those without contacts fit them at another place: what rests under a load would creep.
+    """
+    place(s.t1, trial, system, loops)
+    call_kinds(ACCELERATION, ACCELERATION, s.t1, system, loops, system.D, system.gamma, system.nu)
+    fits, largest = True, 0.0
+    for c in range(s.contact_count):
+        largest = max(largest, impulse_of(s, c))
+    for k in range(s.y.size):
+        speed = -system.nu[k]
+        for q in range(s.row_start[k], s.row_start[k + 1]):
+            for i in range(6):
+                speed += system.D[s.row_place[q] + i] * s.end[s.row_body[q], i]
+        s.aim[k] -= speed
+        fits = fits and abs(s.s[k] * speed) <= FITS * largest
+    return fits
+
+
+@compiled
+def move_bodies(s: StepArrays, y: Floats, trial: Floats) -> None:
+    """Move bodies by the velocities found, from where they were or would have moved to."""
+    for b in range(s.v.shape[0]):
+        copy(s.end[b], s.v[b])
+    for b in range(1, s.v.shape[0]):
         c, d = coordinate_offset(b), s.trial[b]
-        if s.hit[b] > 1.0 and rests(s, b):
-            s.hit[b] = RESTS
-        if s.hit[b] < NOT_HIT:  # from where it was
-            for k in range(7):
-                trial[c + k] = y[c + k]
+        if s.hit[b] > 1.0:
+            s.hit[b] = RESTS if rests(s, b) else NOT_HIT
+        for k in range(POSE):
+            trial[c + k] = y[c + k] if s.hit[b] < NOT_HIT else s.fallen[b, k]
         for k in range(6):
             d[k] = way_of(s, b, k)
         move(trial, c, d[0], d[1], d[2], d[3], d[4], d[5])
-    trial[trial.size - 1] += work_done(work, s)
-    return True
 
 
 @compiled
@@ -178,16 +238,15 @@ def way_of(s: StepArrays, b: int, k: int) -> float:
 
 @compiled
 def rests(s: StepArrays, b: int) -> bool:
-    """True of a body at rest that something would turn: turned and turned back it would creep.
+    """True of a body that impulses keep from turning: turned and turned back it would creep.
 
     By (h w)^3 / 12 in each step, by which Euler parameters that are made of unit length are off.
     """
-    turn, v, w = 0.0, 0.0, 0.0
-    for k in range(3):
-        turn = max(turn, abs(s.free[b, 3 + k] - s.before[b, 3 + k]))
-        v = max(v, abs(s.before[b, k]), abs(s.end[b, k]))
-        w = max(w, abs(s.before[b, 3 + k]), abs(s.end[b, 3 + k]))
-    return turn > 0.0 and w <= STILL * turn and v <= STILL * turn * s.length
+    turn, turned = 0.0, 0.0
+    for k in range(3, 6):
+        turn = max(turn, abs(s.free[b, k] - s.before[b, k]))
+        turned = max(turned, abs(s.end[b, k] - s.before[b, k]))
+    return turned < KEPT * turn
 
 
 @compiled
@@ -357,6 +416,7 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         for b in range(s.free.shape[0]):
             for k in range(6):
                 s.free[b, k] = 0.0
+        put_aims(s)
         for c in range(s.contact_count):
             s.bias[c], s.mu[c] = s.gap[c], 0.0
             s.x[c, 0] = s.x[c, 1] = s.x[c, 2] = 0.0
