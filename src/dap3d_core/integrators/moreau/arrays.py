@@ -60,8 +60,7 @@ class StepArrays(Arrays):
         ),
         **dict.fromkeys(("bodies", "declared_bodies", "declared_place"), INTEGER_MATRIX),
         **dict.fromkeys(
-            ("poses", "fallen", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v",
-             "trial",
+            ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "trial",
              "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z", "B",
              "push",
              "kept", "met", "D", "declared_x", "log", "values", "vectors", "crossed", "answer",
@@ -101,8 +100,7 @@ class StepArrays(Arrays):
     integer: Integers
     real: Floats
     # of bodies, with ground first
-    poses: Floats  # (n + 1, POSE) where contacts are sought; where bodies fall without them
-    fallen: Floats
+    poses: Floats  # (n + 1, POSE) where contacts are sought
     margin: Floats  # m
     shape_reach: Floats  # m, how far shapes reach from the mass centre
     mass: Floats
@@ -183,7 +181,6 @@ class StepArrays(Arrays):
     row_place: Integers
     D: Floats  # (entries, 6)
     s: Floats  # masses that they feel
-    aim: Floats  # D v that is sought
     y: Floats  # impulses; tried, kept, and of the last step; those of motion without contacts
     pull: Floats
     y_kept: Floats
@@ -219,7 +216,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     layout = model.row_layout
     scratch: dict[str, Any] = {
         **{name: np.zeros(k) for name in (
-            "s", "aim", "y", "pull", "y_kept", "y_bounce", "joint_y", "y_free")},
+            "s", "y", "pull", "y_kept", "y_bounce", "joint_y", "y_free")},
         **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
     }  # fmt: skip
     arrays = StepArrays(
@@ -253,7 +250,6 @@ def _of_bodies(model: Model) -> dict[str, Any]:
         **{name: np.zeros((n + 1, 9)) for name in ("Jp", "Jp_inverse", "spin", "spin_inverse")},
         **{name: np.zeros((n + 1, 6)) for name in (
             "before", "free", "v", "trial", "rest", "trial_rest", "end", "v_bounce")},
-        "fallen": np.zeros((n + 1, POSE)),
         "bounce": np.zeros((n + 1, 5)),
         **{name: np.zeros(n + 1) for name in (
             "margin", "shape_reach", "mass", "mass_inverse", "hit", "flies")},

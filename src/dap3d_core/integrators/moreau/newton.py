@@ -3,7 +3,7 @@
 An augmented Lagrangian in the velocities v of bodies: with weights rho, from impulses x of contacts
 and y of joints,
 
-    M (v - v_free) = J^T P(x - rho (J v + b)) + D^T (y - rho (D v - a)),
+    M (v - v_free) = J^T P(x - rho (J v + b)) + D^T (y - rho D (v - v_free)),
 
 P the projection of Coulomb's law (Alart, Curnier, Comp. Meth. Appl. Mech. Eng. 92, 1991), is solved
 by Newton's method; then the impulses become what they are there. Its matrix M + J^T rho P' J is
@@ -236,7 +236,7 @@ def residual_of(s: StepArrays) -> float:
         left = max(left, left_at(s, c, s.trial))
         largest = max(largest, impulse_of(s, c))
     for k in range(s.y.size):
-        speed = speed_of(s, k, s.trial) - s.aim[k]
+        speed = speed_of(s, k, s.trial) - speed_of(s, k, s.free)
         left, largest = max(left, abs(s.s[k] * speed)), max(largest, abs(s.y[k]))
     return left / (largest + TINY)
 
@@ -285,7 +285,7 @@ def put_rest(s: StepArrays, v: Floats, weight: float, R: Floats) -> float:
     ``push`` and ``pull`` become the impulses there, z what is projected.
     """
     for k in range(s.y.size):
-        speed = speed_of(s, k, v) - s.aim[k]
+        speed = speed_of(s, k, v) - speed_of(s, k, s.free)
         s.pull[k] = s.y[k] - weight * s.s[k] * speed
     clear(s, R)
     add_pull(s, s.pull, R)

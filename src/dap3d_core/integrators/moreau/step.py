@@ -6,9 +6,7 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import ACCELERATION, System, coordinate_offset, velocity_offset
-from dap3d_core.assembly.collisions.placed_shapes import POSE
-from dap3d_core.assembly.evaluate import call_kinds, place
+from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import (
     axes_of,
@@ -27,7 +25,7 @@ from dap3d_core.integrators.moreau.impulses import (
     recall,
     remember,
 )
-from dap3d_core.integrators.moreau.newton import impulse_of, product_of, speed_of
+from dap3d_core.integrators.moreau.newton import product_of, speed_of
 from dap3d_core.integrators.moreau.problem import NEAR, prepare_problem, solve
 from dap3d_core.integrators.moreau.restitution import BOUNCES, STOPS, limit_bounces
 from dap3d_core.integrators.stepping.integration_state import (
@@ -49,15 +47,10 @@ from dap3d_core.kernels.runtime.cache import compiled
 OVERLAP, PASSES = 1e-12, 8
 #: A contact collides where it approaches by more than this times h times the acceleration.
 COLLIDES = 4.0
-#: Parts of the step where bodies are not hit, and those of them that rest.
-NOT_HIT, RESTS = 2.0, 1.5
-#: Changes of velocities by which a body turns little, as parts of those without contacts.
-KEPT = 0.5
+#: Part of the step where bodies are not hit.
+NOT_HIT = 2.0
 #: Parts of a step by which times differ that are meant to be one.
 SAME_TIME = 1e-9
-#: Solutions that bring velocities of joints to where bodies have moved; of the largest impulse, what
-#: they may leave.
-AIMS, FITS = 3, 1e-12
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
@@ -133,6 +126,9 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     y, trial, n = work.state[Y], work.state[TRIAL], s.mass.size - 1
     take_velocities(y, n, s.before)
     take_velocities(trial, n, s.free)
+    for b in range(1, n + 1 if work.pushed[0, 0] != 0.0 else 1):
+        for k in range(6):
+            s.free[b, k] -= s.h * work.pushed[b, k]
     put_margins(s)
     if not find_contacts(work.t, y, FAR_APART, s, system, loops):
         return False
@@ -144,7 +140,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     else:  # what the projection of the last step has left
         work.deepest = max(work.deepest, deepest_of(s))
     s.is_solved = s.met_count = 0
-    if s.contact_count == 0:
+    if s.contact_count == 0 and work.pushed[0, 0] == 0.0:
         for b in range(n + 1):
             copy(s.end[b], s.free[b])
         return True
@@ -154,7 +150,6 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     if s.declared_law.size > 0:
         find_grips(work.t, s, system, loops)
     recall(work, s)
-    put_aims(s)
     while True:
         prepare_problem(s)
         if not solve(s, work.rtol):
@@ -164,89 +159,44 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     put_hits(s, any_collides)
     if any_collides and not limit_bounces(s, work.rtol):
         return False
-    for b in range(1, n + 1):
-        for k in range(POSE):
-            s.fallen[b, k] = trial[coordinate_offset(b) + k]
-    move_bodies(s, y, trial)
-    for _ in range(AIMS):
-        if any_collides or s.y.size == 0 or meets_aims(s, trial, system, loops):
-            break
-        if not solve(s, work.rtol):
-            return False
-        move_bodies(s, y, trial)
     s.is_solved = 1
     work.largest_residual = max(work.largest_residual, s.residual)
     remember(work, s)
     keep_for_reports(s)
+    for b in range(n + 1):
+        copy(s.end[b], s.v[b])
+    for b in range(1, n + 1):
+        c, d = coordinate_offset(b), s.trial[b]
+        for k in range(7 if s.hit[b] != NOT_HIT else 0):  # from where it was
+            trial[c + k] = y[c + k]
+        for k in range(6):
+            d[k] = way_of(work, s, b, k)
+        move(trial, c, d[0], d[1], d[2], d[3], d[4], d[5])
     trial[trial.size - 1] += work_done(work, s)
+    keep_pushed(work, s)
     return True
 
 
 @compiled
-def put_aims(s: StepArrays) -> None:
-    """Seek the velocities of rows of joints that there are without contacts."""
-    for k in range(s.y.size):
-        s.aim[k] = speed_of(s, k, s.free)
-
-
-@compiled
-def meets_aims(s: StepArrays, trial: Floats, system: System, loops: Any) -> bool:
-    """Whether velocities fit the joints where bodies have moved to; else with other aims.
-
-    Those without contacts fit them at another place: what rests under a load would creep.
-    """
-    place(s.t1, trial, system, loops)
-    call_kinds(ACCELERATION, ACCELERATION, s.t1, system, loops, system.D, system.gamma, system.nu)
-    fits, largest = True, 0.0
-    for c in range(s.contact_count):
-        largest = max(largest, impulse_of(s, c))
-    for k in range(s.y.size):
-        speed = -system.nu[k]
-        for q in range(s.row_start[k], s.row_start[k + 1]):
-            for i in range(6):
-                speed += system.D[s.row_place[q] + i] * s.end[s.row_body[q], i]
-        s.aim[k] -= speed
-        fits = fits and abs(s.s[k] * speed) <= FITS * largest
-    return fits
-
-
-@compiled
-def move_bodies(s: StepArrays, y: Floats, trial: Floats) -> None:
-    """Move bodies by the velocities found, from where they were or would have moved to."""
-    for b in range(s.v.shape[0]):
-        copy(s.end[b], s.v[b])
-    for b in range(1, s.v.shape[0]):
-        c, d = coordinate_offset(b), s.trial[b]
-        if s.hit[b] > 1.0:
-            s.hit[b] = RESTS if rests(s, b) else NOT_HIT
-        for k in range(POSE):
-            trial[c + k] = y[c + k] if s.hit[b] < NOT_HIT else s.fallen[b, k]
-        for k in range(6):
-            d[k] = way_of(s, b, k)
-        move(trial, c, d[0], d[1], d[2], d[3], d[4], d[5])
-
-
-@compiled
-def way_of(s: StepArrays, b: int, k: int) -> float:
-    """How far a body goes by impulses; one that is hit, or rests, at all."""
+def way_of(work: Any, s: StepArrays, b: int, k: int) -> float:
+    """How far a body goes by impulses; one that is hit, at all."""
     before, free, end, first = s.before[b, k], s.free[b, k], s.end[b, k], s.hit[b]
-    if first > 1.0:
-        return 0.5 * s.h * (end - free if first == NOT_HIT else before + end)
+    if first == NOT_HIT:
+        return 0.5 * s.h * (end - free - s.h * work.pushed[b, k])
     fall, last = s.flies[b] * (free - before), 1.0 - first
     return s.h * (first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall))
 
 
 @compiled
-def rests(s: StepArrays, b: int) -> bool:
-    """True of a body that impulses keep from turning: turned and turned back it would creep.
-
-    By (h w)^3 / 12 in each step, by which Euler parameters that are made of unit length are off.
-    """
-    turn, turned = 0.0, 0.0
-    for k in range(3, 6):
-        turn = max(turn, abs(s.free[b, k] - s.before[b, k]))
-        turned = max(turned, abs(s.end[b, k] - s.before[b, k]))
-    return turned < KEPT * turn
+def keep_pushed(work: Any, s: StepArrays) -> None:
+    """Keep the accelerations that contacts have given; those of impacts do not go on."""
+    work.pushed[0, 0] = 0.0
+    for b in range(1, s.end.shape[0]):
+        for k in range(6):
+            change = s.end[b, k] - s.free[b, k] if s.hit[b] == NOT_HIT else 0.0
+            work.pushed[b, k] = change / s.h
+            if change != 0.0:
+                work.pushed[0, 0] = 1.0
 
 
 @compiled
@@ -352,7 +302,7 @@ def work_done(work: Any, s: StepArrays) -> float:
         for k in range(6):
             way = s.trial[b, k]
             if s.hit[b] < NOT_HIT:
-                way -= 0.5 * s.h * (s.before[b, k] + s.free[b, k])
+                way -= 0.5 * s.h * (s.before[b, k] + s.free[b, k] + s.h * work.pushed[b, k])
             s.change[k], s.turned[k] = s.free[b, k] - s.before[b, k], way / s.h
         total += product_of(s.change, s.turned, s.mass[b], s.spin[b])
         if s.flies[b] == 0.0:
@@ -416,7 +366,6 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         for b in range(s.free.shape[0]):
             for k in range(6):
                 s.free[b, k] = 0.0
-        put_aims(s)
         for c in range(s.contact_count):
             s.bias[c], s.mu[c] = s.gap[c], 0.0
             s.x[c, 0] = s.x[c, 1] = s.x[c, 2] = 0.0
