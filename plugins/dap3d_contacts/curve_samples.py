@@ -54,25 +54,25 @@ class Curve:
         import numpy as np
 
         period = self.s[-1] - self.s[0]
-        again = self.s[[0, PLACES // 3]]
-        for name, one, other in zip(("place", "direction", "bend"), self.at(again),
-                                    self.at(again + period), strict=True):  # fmt: skip
-            size = np.max(np.abs(self.at(self.s[:-1])), axis=(1, 2))[
-                ("place", "direction", "bend").index(name)
-            ]
-            if np.max(np.abs(one - other)) > EQUAL * size:
-                k = int(np.argmax(np.max(np.abs(one - other), axis=1)))
+        # at its ends themselves, then beyond them
+        for s in (self.s[0], self.s[PLACES // 3]):
+            one, other = self.at(np.array([s, s + period])).transpose(1, 0, 2)
+            for name, here, there, every in zip(("place", "direction", "bend"), one, other,
+                                                self.at(self.s), strict=True):  # fmt: skip
+                if np.max(np.abs(here - there)) > EQUAL * np.max(np.abs(every)):
+                    raise ValueError(
+                        f"the curve is not closed: its {name} at s = {s + period:g} is "
+                        f"{_words(there)}, and at {s:g}, a period before, {_words(here)}; give "
+                        "functions of this period, such as a spline with periodic = true whose "
+                        "first value comes again as its last, or leave out closed"
+                    )
+        if len(self.functions) < 3:
+            s = self.s + 0.382 * (self.s[1] - self.s[0])  # not where it crosses itself by symmetry
+            if (pair := crossing(self.at(s)[0, :, :2])) is not None:
                 raise ValueError(
-                    f"the curve is not closed: its {name} at s = {again[k] + period:g} is "
-                    f"{_words(other[k])}, and at {again[k]:g}, a period before, {_words(one[k])}; "
-                    "give functions of this period, such as a spline with periodic = true whose "
-                    "first value comes again as its last, or leave out closed"
+                    f"the closed curve crosses itself, near s = {s[pair[0]]:g} and "
+                    f"{s[pair[1]]:g}, and has no outside"
                 )
-        if len(self.functions) < 3 and (pair := crossing(self.point[:, :2])) is not None:
-            raise ValueError(
-                f"the closed curve crosses itself, near s = {self.s[pair[0]]:g} and "
-                f"{self.s[pair[1]]:g}, and has no outside"
-            )
 
     def is_clockwise(self) -> bool:
         """True of a closed plane curve with its outside on its left."""

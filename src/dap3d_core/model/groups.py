@@ -281,8 +281,10 @@ class Grouping:
 
     def _callable(self, function: Instance) -> Callable[[float], Any]:
         """A function of one argument in Python."""
+        from dap3d_core.kernels.runtime import loop_support  # what loops call
+
         type_info, numbers, tables = self._combined([function], [0])
-        places = {"par": _packed(numbers, tables, 0).tolist(), "p1": 0}
+        places = {**vars(loop_support), "par": _packed(numbers, tables, 0).tolist(), "p1": 0}
         names, kernel = names_behind(type_info, type_info.layout), type_info.kernels["value"]
         given = {n: eval(names[n].code, places) for n in parameters(kernel) if n != "x"}
         return lambda x: kernel(**given, x=x)
