@@ -169,7 +169,8 @@ def test_a_ball_swings_in_a_pipe():
     scene.add_body("ball", mass=mass, Jp=[1e-3] * 3, r=[far, 0.0, 0.0])
     scene.add_force("weight", "g")
     add_harmonics(scene, x=(0.0, a, 0.5 * np.pi), z=(0.0, a, 0.0))
-    scene.add_function("a", "y", coeff=[0.0, 0.0, 0.0])
+    scene.add_function("a", "flat", coeff=[0.0, 0.0, 0.0])
+    scene.add_function("sum", "y", functions=["flat", "flat"])
     scene.add_contact("point_curve", "pipe", P_i="ball.O", x="x", y="y", z="z", s_max=TURN,
                       closed=True, radius=radius, radius_j=pipe, side="below")  # fmt: skip
     t = ellipk(0.5) * np.sqrt(far / G)
