@@ -12,7 +12,7 @@ method finds N. Where there is no such N friction jams, and nothing is returned 
 The compliance of the rows is so large that multipliers of rows that depend on each other have no
 rounding of their own: they are the least ones. Passes (lsq.py) remove what it changes. Where rows
 hold so weakly that passes do not, it is made smaller. Where pivots show that rows do not depend on
-each other it is next to nothing, and two passes are enough.
+each other it is next to nothing, and one pass is enough.
 """
 
 # What a compiled function returns is Any to mypy.
@@ -60,13 +60,12 @@ from dap3d_core.kernels.scalar_math import is_differentiated, where
 #: and the least. That of rows that do not depend on each other: no pivot is less than this part of
 #: the square of its row.
 PART, SMALLER, LEAST = 1e-4, 1e-3, 1e-12
-PART_OF_INDEPENDENT, LEAST_PIVOT = 1e-11, 1e-2
+PART_OF_INDEPENDENT, LEAST_PIVOT = 1e-16, 1e-1
 #: Passes at most; each is to leave this part of the one before. They end where they change
 #: multipliers by a part, as the next would by a compliance of that, or where they change them by
-#: rounding alone, which rows that depend on each other enlarge. Parts of the multipliers; of those
-#: of independent rows; of shares: of what sticks, which is not to creep, by no rounding of these.
-PASSES, FALLING, NOISE = 12, 0.1, 1e-9
-SETTLED, SETTLED_INDEPENDENT, AT_REST = 1e-12, 1e-10, 1e-20
+#: rounding alone, which rows that depend on each other enlarge. Parts of the multipliers; where some
+#: slide of shares as well. What sticks is not to creep, not even by rounding of its share.
+PASSES, FALLING, SETTLED, NOISE = 12, 0.1, 1e-12, 1e-9
 #: A projection that leaves this many times the tolerance, which rounding does not, goes on.
 REACHED = 1e3
 #: Columns of ``System.contacts``: of each point its loop and where its integers and numbers begin,
@@ -435,8 +434,9 @@ def has_settled(system: System, count: int, given: float, part: float) -> bool:
                 of_row, of_all = abs(x[r]), abs(total[r])
                 change = where(of_row > change, of_row, change)
                 found = where(of_all > found, of_all, found)
-        enough = (SETTLED_INDEPENDENT if part == PART_OF_INDEPENDENT else SETTLED) * found
-        enough += (SETTLED if count > 0 else AT_REST) * given
+        if part == PART_OF_INDEPENDENT:
+            return True
+        enough = SETTLED * (found + given if count > 0 else found)
         if change <= enough or (k > 0 and not change < FALLING * before):
             if settled != 0 or not is_differentiated():
                 break
