@@ -62,9 +62,9 @@ from dap3d_core.kernels.scalar_math import is_differentiated, where
 PART, SMALLER, LEAST = 1e-4, 1e-3, 1e-12
 PART_OF_INDEPENDENT, LEAST_PIVOT = 1e-16, 1e-1
 #: Passes at most; each is to leave this part of the one before. They end where they change
-#: multipliers by a part, as the next would by a compliance of that, or where they change them by
-#: rounding alone, which rows that depend on each other enlarge. Parts of the multipliers; where some
-#: slide of shares as well. What sticks is not to creep, not even by rounding of its share.
+#: multipliers by this part, as the next would by a compliance of that, or where they change them
+#: by rounding alone, which rows that depend on each other enlarge. Where some slide it is a part of
+#: shares as well; what sticks is not to creep, not even by rounding of its share.
 PASSES, FALLING, SETTLED, NOISE = 12, 0.1, 1e-12, 1e-9
 #: A projection that leaves this many times the tolerance, which rounding does not, goes on.
 REACHED = 1e3
@@ -427,6 +427,8 @@ def has_settled(system: System, count: int, given: float, part: float) -> bool:
             x[r] = system.gamma[r]
         solve_rows(system, system.acceleration)
         add_friction(system, count)
+        if part == PART_OF_INDEPENDENT:
+            return True
         change, found = 0.0, 0.0
         for r in range(rows):
             total[r] += x[r]
@@ -434,8 +436,6 @@ def has_settled(system: System, count: int, given: float, part: float) -> bool:
                 of_row, of_all = abs(x[r]), abs(total[r])
                 change = where(of_row > change, of_row, change)
                 found = where(of_all > found, of_all, found)
-        if part == PART_OF_INDEPENDENT:
-            return True
         enough = SETTLED * (found + given if count > 0 else found)
         if change <= enough or (k > 0 and not change < FALLING * before):
             if settled != 0 or not is_differentiated():
@@ -449,7 +449,14 @@ def has_settled(system: System, count: int, given: float, part: float) -> bool:
 
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """As in lsq.py; where switches were read last at this state, it is known already."""
+    """As in lsq.py."""
+    if not take_watched(t, y, out, system):
+        find_rates(t, y, out, system, loops)
+
+
+@compiled
+def take_watched(t: float, y: Floats, out: Floats, system: System) -> bool:
+    """True where switches were read last at this state: then dy/dt is known."""
     watched, n = system.watched, y.shape[0]
     is_known = watched[0] == t and not is_differentiated()
     if is_known:
@@ -459,8 +466,15 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     if is_known:
         for k in range(n):
             out[k] = watched[1 + n + k]
-    else:
-        find_rates(t, y, out, system, loops)
+    return is_known
+
+
+@compiled
+def store_watched(t: float, y: Floats, system: System) -> None:
+    """Note the state at which dy/dt stands in ``watched``."""
+    system.watched[0] = t
+    for k in range(y.shape[0]):
+        system.watched[1 + k] = y[k]
 
 
 @compiled
@@ -513,9 +527,7 @@ def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
         place(t, y, system, loops)
     else:
         n = y.shape[0]
-        find_rates(t, y, watched[1 + n :], system, loops)
-        watched[0] = t
-        for k in range(n):
-            watched[1 + k] = y[k]
+        find_rates(t, y, watched[1 + n : 1 + 2 * n], system, loops)
+        store_watched(t, y, system)
     place_of_next[0] = 0.0
     call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, system.multipliers)
