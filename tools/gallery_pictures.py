@@ -17,6 +17,7 @@ AT = {
     "domino_row": 0.24,
     "gripper": 0.8,
     "hand": 1.0,
+    "humanoid": 2.0,
     "marble_run": 0.9,
     "quadruped": 0.4,
     "crane": 1.5,

@@ -19,9 +19,9 @@ from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Parts of a step are at most this over the largest rate of the forces: an oscillation of that rate
-#: gains 5e-4 of its amplitude in one. Steps between two estimates of it, and their passes, which
-#: change y by this part; parts of a step at most.
-PART, RENEWED, RATE_PASSES, RATE_CHANGE, MOST_PARTS = 0.25, 25, 8, 1e-7, 1000
+#: gains 5e-4 of its amplitude in one. Parts of a step as asked for, at most. Passes of an estimate
+#: of the rate, which change y by this part.
+PART, MOST_PARTS, RATE_PASSES, RATE_CHANGE = 0.25, 1000, 8, 1e-7
 
 
 @compiled
@@ -29,11 +29,9 @@ def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: 
     """Put the state at the end of the step with the last accelerations, as the trial state."""
     t, y, free, size = work.t, work.state[Y], work.state[TRIAL], work.state.shape[1]
     slope, middle = s.slopes[:size], s.slopes[size:]
-    if work.step_count % RENEWED == 0:
-        work.rate = largest_rate(work, s, rhs, system, loops)
     wanted, parts = s.h * work.rate / PART, 1
     if wanted > 1.0:
-        parts = math.ceil(min(wanted, 1.0 * MOST_PARTS))
+        parts = math.ceil(min(wanted, MOST_PARTS * s.h / work.fixed_step))
     copy(free, y)
     h = s.h / parts
     for k in range(s.y_free.size):

@@ -158,7 +158,7 @@ class MoreauIntegration(Integration):
     @property
     def too_fast(self) -> str:
         """As of ``Integration``."""
-        rate, h = float(self.work.rate), float(self._arrays.h)
+        rate, h = float(self.work.rate), float(self.work.fixed_step)
         if not h * rate > PART * MOST_PARTS:
             return ""
         return (

@@ -15,7 +15,7 @@ from dap3d_core.integrators.moreau.contact_set import (
     find_grips,
     velocity_of,
 )
-from dap3d_core.integrators.moreau.free_motion import move_freely
+from dap3d_core.integrators.moreau.free_motion import largest_rate, move_freely
 from dap3d_core.integrators.moreau.groups import find_groups, root_of
 from dap3d_core.integrators.moreau.impulses import (
     complete_row,
@@ -51,6 +51,9 @@ COLLIDES = 4.0
 NOT_HIT = 2.0
 #: Parts of a step by which times differ that are meant to be one.
 SAME_TIME = 1e-9
+#: Steps between two estimates of the rate of forces. Of this over the rate are steps at most: what
+#: contacts give bodies is known to their forces in the step that follows. Parts of a step at most.
+RENEWED, FOLLOWED, MOST_STEPS = 25, 2.0, 100
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
@@ -69,6 +72,8 @@ def advance(
     limit = work.rhs_count + budget
     while s.stage != 0 or goes_on(work, s, functions, system, loops, limit):
         if s.stage == 0:
+            if work.step_count % RENEWED == 0:
+                work.rate = largest_rate(work, s, functions[0], system, loops)
             s.t1 = next_end(work)
             s.h = s.t1 - work.t
             move_freely(work, s, functions[0], system, loops)
@@ -94,8 +99,11 @@ def next_end(work: Any) -> float:
 
     A limit that rounding alone keeps from it makes no step, whose forces would be rounding.
     """
-    t1, limit = end_of_step(work), work.step_limit
-    return max(t1, limit) if abs(limit - t1) <= SAME_TIME * (t1 - work.t) else min(t1, limit)
+    t, t1, limit = work.t, end_of_step(work), work.step_limit
+    t1 = max(t1, limit) if abs(limit - t1) <= SAME_TIME * (t1 - t) else min(t1, limit)
+    rate = min(work.rate / FOLLOWED, MOST_STEPS / work.fixed_step)
+    parts = math.ceil((t1 - t) * rate - SAME_TIME)
+    return t + (t1 - t) / parts if parts > 1 else t1
 
 
 @compiled
@@ -391,11 +399,11 @@ def finish(work: Any, s: StepArrays, functions: Any, system: System, loops: Any)
         trial[f + 3] = a * end[3] + e * end[4] + i * end[5]
         trial[f + 4] = c * end[3] + g * end[4] + k * end[5]
         trial[f + 5] = d * end[3] + h * end[4] + m * end[5]
+    work.segment_step += 1 if s.t1 >= end_of_step(work) else 0
     copy(work.state[OTHER], y)
     copy(y, trial)
     work.t_dense, work.h_dense, work.t = work.t, s.h, s.t1
     work.step_count += 1
-    work.segment_step += 1
     failure = RUNNING
     if not all_finite(y):
         failure = NOT_FINITE
