@@ -341,11 +341,10 @@ class ContactJumps(Jumps):
     def _apart(self, rows: ContactRows, gaps: Floats, held: list[int], others: list[int]) -> Floats:
         """(6 n,) changes of positions that close the gaps of what holds, and part what overlaps.
 
-        What opens from rest would stop the run again where its gap is as deep as a switch passes.
+        What opens would stop the run again where its gap is as deep as a switch passes.
         """
         rounding = POSITION_ROUNDING * self._evaluator.model.length
-        still = AT_REST * self._evaluator.model.length
-        deep = [c for c in others if rows.closing[c] < still and gaps[c] < -0.5 * rounding]
+        deep = [c for c in others if gaps[c] < -0.5 * rounding]
         return rows.lifted(gaps, [*held, *deep], others, 2.0 * rounding)
 
     def _outputs(self, t: float, u: Floats) -> Floats:
