@@ -17,7 +17,7 @@ STILL, ZERO, DEPENDENT = 1e-9, 1e-9, 1e-12
 BESIDE = 1e-3
 #: Part of the largest acceleration that may be left where contacts hold, by shares alone: their
 #: rows take it, within what the cones leave.
-HELD, OF_REST = 1e-9, 0.05
+HELD, OF_REST, ROUNDING = 1e-9, 0.05, 1e-13
 #: Parts of their cones within which contacts that share what they carry are to stay, each leaving
 #: half of what the one before leaves: what they carry reaches its limit with so much left, 1e-9.
 INSIDE = tuple(1.0 - 0.5**k for k in range(1, 31))
@@ -163,15 +163,30 @@ def _put_modes(
             # what each of them carried was a choice, and so is the direction of it
             _put(table, rows, closed, {}, limit, found, loose=True)
             return
-    without = [c for c in closed if c not in left]
-    if left and without:
+    _put(table, rows, _staying(table, rows, closed, sliding, left, limit), sliding, limit, found)
+
+
+def _staying(
+    table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
+    leaving: list[int], limit: float,
+) -> list[int]:  # fmt: skip
+    """Contacts that stay where some leave, unless these would close again at once.
+
+    What carries nothing leaves with them: it would be the next to.
+    """
+    big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
+    gone: list[int] = []
+    while leaving:
+        gone, without = [*gone, *leaving], [c for c in closed if c not in leaving]
         x, _ = _solve(table, rows, without, *_matrix(table, rows, without, sliding, limit))
-        big = float(np.abs(rows.free).max()) + 1e-300
-        rates = _rates(rows, without, x, left)
-        closed = without if all(rate >= -ZERO * big for rate in rates) else closed
-    elif left:
-        closed = [c for c in left if rows.free[3 * c] < -ZERO * float(np.abs(rows.free).max())]
-    _put(table, rows, closed, sliding, limit, found)
+        rates = _rates(rows, without, x, gone)
+        if any(rate < -ZERO * big for rate in rates):
+            only = [c for c, rate in zip(gone, rates, strict=True) if rate < -ZERO * big]
+            return closed if without else only
+        normal = x[::3]
+        idle = ~table.alone[without] & (normal <= ZERO * normal.max(initial=0.0))
+        closed, leaving = without, [c for c, is_idle in zip(without, idle, strict=True) if is_idle]
+    return closed
 
 
 def _rates(rows: ContactRows, contacts: list[int], x: Floats, wanted: list[int]) -> list[float]:
@@ -376,11 +391,13 @@ def _inside(
     if not _share(table, closed, A, ways):
         return None
     own = _own_rows(table, closed, ways)
-    big = np.repeat(_sizes(table, rows, closed, {}), 3)[own]
+    big, own_rates = _sizes(table, rows, closed, {}), np.diag(A).reshape(-1, 3).max(axis=1)
     while low <= high:  # what one part allows, so does every larger one
         k = high if best is None else (low + high) // 2
         x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=best, tries=3)
-        if np.all(np.abs(a[own]) <= min(HELD, OF_REST * (1.0 - INSIDE[k])) * big):
+        carried = table.mu_s[closed] * (x[::3] + rows.load[closed])
+        rest = OF_REST * (1.0 - INSIDE[k]) * own_rates * carried + ROUNDING * big.max()
+        if np.all(np.abs(a[own]) <= np.repeat(np.minimum(HELD * big, rest), 3)[own]):
             best, high = x, k - 1
         elif best is None:
             return None
