@@ -17,13 +17,17 @@ STILL, ZERO, DEPENDENT = 1e-9, 1e-9, 1e-12
 BESIDE = 1e-3
 #: Part of the largest acceleration that may be left where contacts hold, by shares alone: their
 #: rows take it, within what the cones leave.
-HELD, OF_REST, ROUNDING = 1e-9, 0.05, 1e-13
+HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
 #: Parts of their cones within which contacts that share what they carry are to stay, each leaving
 #: half of what the one before leaves: what they carry reaches its limit with so much left, 1e-9.
 INSIDE = tuple(1.0 - 0.5**k for k in range(1, 31))
 #: Part of its cone in which friction of contacts that share stays where they begin to slip: what it
 #: leaves shows which of them do, and where to.
 LOOSE = 1.0 - 1e-6
+#: Part of its mobility that friction leaves a contact whose steps become endless: it jams.
+NEARLY = 1e-2
+#: Part of the largest force that is to be left for a contact that stays as others can carry less.
+TO_STAY = 1e-6
 #: Passes for the loads of joints, the part that the last one changes, and a load that holds all.
 LOAD_PASSES, LOAD_SETTLED, LARGE = 60, 1e-12, 1e200
 #: From this pass on loads have settled where rounding is left, of chains of many joints this part.
@@ -155,7 +159,9 @@ def _put_modes(
     if left or any(c in sliding for c in closed):
         # of contacts that share, one at the end of its cone may only have to carry less
         inner = _inside(table, rows, closed, {}, limit)
-        if inner is not None and all(inner[3 * closed.index(c)] > ZERO * inner.max() for c in left):
+        if inner is not None and all(
+            inner[3 * closed.index(c)] > TO_STAY * inner.max() for c in left
+        ):
             _put(table, rows, closed, {}, limit, found, inner)
             return
         which = rows.rows_of(closed)
@@ -178,7 +184,10 @@ def _staying(
     gone: list[int] = []
     while leaving:
         gone, without = [*gone, *leaving], [c for c in closed if c not in leaving]
-        x, _ = _solve(table, rows, without, *_matrix(table, rows, without, sliding, limit))
+        try:
+            x, _ = _solve(table, rows, without, *_matrix(table, rows, without, sliding, limit))
+        except JamError:
+            return closed
         rates = _rates(rows, without, x, gone)
         if any(rate < -ZERO * big for rate in rates):
             only = [c for c, rate in zip(gone, rates, strict=True) if rate < -ZERO * big]
@@ -228,6 +237,20 @@ def _matrix(
             if A[3 * k, 3 * k] <= 0.0 and not table.alone[c]:
                 raise JamError(table.names[c])
     return A, ways
+
+
+def nearly_jams(table: ContactTable, rows: ContactRows, closed: list[int]) -> str:
+    """Name of a contact whose friction leaves next to nothing of how it gives way; "" of none.
+
+    Its normal force grows beyond all bounds there, in a finite time.
+    """
+    limit = STILL * max(1.0, table.evaluator.model.length)
+    pushed = [c for c in closed if not table.alone[c]]
+    A, ways = _matrix(table, rows, pushed, {}, limit)
+    for k, c in enumerate(pushed):
+        if c in ways and A[3 * k, 3 * k] < NEARLY * rows.W[3 * c, 3 * c]:
+            return table.names[c]
+    return ""
 
 
 def _solve(
@@ -396,7 +419,7 @@ def _inside(
         k = high if best is None else (low + high) // 2
         x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=best, tries=3)
         carried = table.mu_s[closed] * (x[::3] + rows.load[closed])
-        rest = OF_REST * (1.0 - INSIDE[k]) * own_rates * carried + ROUNDING * big.max()
+        rest = OF_REST * (1.0 - INSIDE[k]) * own_rates * carried + RATE_ROUNDING * big.max()
         if np.all(np.abs(a[own]) <= np.repeat(np.minimum(HELD * big, rest), 3)[own]):
             best, high = x, k - 1
         elif best is None:

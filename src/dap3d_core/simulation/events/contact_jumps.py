@@ -19,7 +19,7 @@ from dap3d_core.formulations.contacts.contact_rows import (
     length_of,
 )
 from dap3d_core.formulations.contacts.impacts import AT_REST, Impact, collide, repeat, unjam
-from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes
+from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes, nearly_jams
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.switches import POSITION_ROUNDING
 from dap3d_core.integrators import Integration, Status
@@ -95,7 +95,7 @@ class ContactJumps(Jumps):
         #: What the last instant decided; where ``repeats``, what is decided at the next.
         self.decided: Decided | None = None
         self.repeats = False
-        self._stood = (0, -np.inf)
+        self._stood, self._jammed = (0, -np.inf), ""
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
 
     def begin(self, integration: Integration) -> None:
@@ -183,7 +183,11 @@ class ContactJumps(Jumps):
         self.decided, self.repeats = other.decided, True
 
     def follow(self, integration: Integration) -> None:
-        """SimulationError where steps have become too short for the run to come to an end."""
+        """Where steps have become too short for the run to come to an end: slip jams, or it ends.
+
+        Raises:
+            SimulationError: it ends.
+        """
         steps, t = integration.statistics.steps, integration.t
         (before, since), span = self._stood, self._span_of(integration)
         if t - since > SLOW * span or steps < before:
@@ -192,7 +196,12 @@ class ContactJumps(Jumps):
             u, modes = self._state_of(integration), self._evaluator.states[self.table.mode]
             slip = np.linalg.norm(self._outputs(t, u)[:, SLIP], axis=1)
             sliding = np.where(modes == 1.0, slip, np.inf)
-            names = [self.table.names[c] for c in np.flatnonzero(modes > 0.5)]
+            closed = np.flatnonzero(modes > 0.5).tolist()
+            self._jammed = nearly_jams(self.table, ContactRows(self.table, t, u), closed)
+            if self._jammed:
+                self._stood, integration.work.status = (steps, t), Status.JUMPED
+                return
+            names = [self.table.names[c] for c in closed]
             slowest = (
                 f"the slowest slip is {sliding.min():.2g} m/s; " if np.any(modes == 1.0) else ""
             )
@@ -289,7 +298,10 @@ class ContactJumps(Jumps):
         opening = {c for c, _ in ended if before[c] < 0.5 and rows.closing[c] > 0.0}
         impact = collide(table, rows, closed, evaluator.model.length)
         table.find_grips(t, rows.with_velocities(rows.v))
+        jammed, self._jammed = self._jammed, ""
         try:
+            if jammed:
+                raise JamError(jammed)
             modes = find_modes(table, rows, closed, sliding, leaving)
         except JamError as error:
             impact, modes = self._unjam(rows, closed, impact, str(error))
@@ -349,8 +361,8 @@ class ContactJumps(Jumps):
         """
         rounding = POSITION_ROUNDING * self._evaluator.model.length
         still = AT_REST * self._evaluator.model.length
-        deep = [c for c in others
-                if (rows.closing[c] < still or c in opening) and gaps[c] < -0.5 * rounding]  # fmt: skip
+        slow = [c for c in others if rows.closing[c] < still or c in opening]
+        deep = [c for c in slow if gaps[c] < -0.5 * rounding]
         return rows.lifted(gaps, [*held, *deep], others, 2.0 * rounding)
 
     def _outputs(self, t: float, u: Floats) -> Floats:
