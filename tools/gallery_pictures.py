@@ -18,6 +18,7 @@ AT = {
     "gripper": 0.8,
     "marble_run": 0.9,
     "quadruped": 0.4,
+    "sphere_box": 0.08,
     "crane": 1.5,
     "engine": 0.004,
     "excavator": 2.5,
