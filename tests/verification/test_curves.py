@@ -278,7 +278,13 @@ def test_curves_that_are_none_are_refused():
         scene.add_function("harmonic", "y", amplitude=0.2, frequency=1.0)
 
     refused("crosses itself, near s = .* has no outside", add_eight)
-    refused(r"0.3 m .* hollow at s = .*, of radius 0.2 m: .* two points", side="below", radius=0.3)
+    refused(r"0.3 m .* at s = .*, a hollow of radius 0.2 m: .* two", side="below", radius=0.3)
+    s = np.linspace(0.0, TURN, 121)
+    lobes = 1.0 + 0.7 * np.cos(2.0 * s)  # 0.6 wide in the middle
+    waist = [*(lobes * np.cos(s))[:-1], 1.7], [*(lobes * np.sin(s))[:-1], 0.0]
+    refused("0.31 m .* between s = .* and", add_lines(*waist, periodic=True), side="below",
+            radius=0.31)  # fmt: skip
+    dap.compile(cam(add_lines(*waist, periodic=True), side="below", radius=0.29))
     refused("s_max = -1 is not beyond s_min = 0", s_max=-1.0)
     refused("takes s_max, its end", s_max=None)
     refused("by x and y, or by x, y and z; this one has x", y=None)
