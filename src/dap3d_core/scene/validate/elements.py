@@ -389,7 +389,9 @@ class _Reading:
                 entry_fields(name, letters), self.places[name], strict=True
             ):
                 self.values[entry] = local
-        return Shape(tuple((n, k) for n, (k, _) in sizes.items()), tuple(slots.items()))
+        constants = [(name, self.values[name]) for name, s in self.reader.lists.items() if s.constant]
+        counts = tuple((n, k) for n, (k, _) in sizes.items())
+        return Shape(counts, tuple(slots.items()), tuple(constants))
 
     # ---------------------------------------------------------------- bodies of slots
 
