@@ -19,6 +19,9 @@ from dap3d_forces.wrapping import wrapped
 
 interface_version = 1
 
+#: Of ``ways``.
+PAST_SIDE, INSIDE = 1.0, 2.0
+
 
 class Tendon(TendonLaw):
     """Spring and damper, or an actuator, along a massless cable that wraps over drums.
@@ -26,9 +29,8 @@ class Tendon(TendonLaw):
     The cable runs from point to point, and without friction over the ``drums`` between them: the
     shortest way, straight where it does not touch. Drum k, of the radius ``radii`` about a point of
     any body, lies after point ``after``, counted from 1. Drums are spheres but the first ones, which
-    are cylinders about ``axes``, without ends. Its way is that around the drum which is shorter, or
-    with ``sides``, a point for each drum, that which does not pass opposite to it; a side in the
-    drum's centre is none. With ``inside`` = 1 it is drawn into the circle instead, as through a ring.
+    are cylinders about ``axes``, without ends. ``ways`` says how it passes each: 0, on the shorter
+    way; 1, not opposite to its point of ``sides``; 2, through the drum, as through a ring.
 
     ``divisors``, one for each point, are those of the span that begins there: a part of the cable
     behind a pulley whose length counts divided by it, as a tackle's does; 0 where the cable ends
@@ -52,17 +54,17 @@ class Tendon(TendonLaw):
     synonyms = ("muscle", "wrap", "drum", "capstan", "tackle")
     example: ClassVar[dict[str, str]] = {"k": "1e3"}
     samples: ClassVar = (
-        {"points": (0, 1), "drums": (2,), "after": (1.0,)},
+        {"points": (0, 1), "drums": (2,), "after": (1.0,), "sides": (0,), "ways": (1.0,)},
         {"points": (0, 1, 1, 2), "drums": (2, 0), "axes": (2,), "sides": (2, 1),
-         "after": (1.0, 3.0), "divisors": (2.0, 0.0, 1.0, 1.0)},
+         "after": (1.0, 3.0), "ways": (1.0, 0.0), "divisors": (2.0, 0.0, 1.0, 1.0)},
     )  # fmt: skip
     points: tuple = places("n", least=2, doc="ends, and points that it is led over, in order")
     drums: tuple = places("m", least=0, doc="centres of the drums")
     after: tuple = numbers("m", 0.0, constant=True, doc="the point before each drum, from 1")
     radii: tuple = numbers("m", 1.0, positive=True, unit="m", doc="radii of the drums")
     axes: tuple = vectors("a", least=0, doc="axes of the drums that are cylinders, the first ones")
-    sides: tuple = places("s", least=0, doc="the sides on which the cable passes the drums")
-    inside: tuple = numbers("m", 0.0, constant=True, doc="1 of drums that it is drawn into")
+    sides: tuple = places("s", least=0, doc="points on whose side the cable passes, of each drum")
+    ways: tuple = numbers("m", 0.0, constant=True, doc="past each drum: 0, 1 or 2 as above")
     divisors: tuple = numbers("n", 1.0, constant=True, doc="by which spans count less; 0 for none")
 
     def prepare(self, bodies):
@@ -74,27 +76,28 @@ class Tendon(TendonLaw):
         if any(one is not other for one, other in zip(bodies["axes"], bodies["drums"], strict=False)):
             raise ValueError("axes should lie on the bodies of their drums, the first ones")
         drums = found["drums"], self.radii, axes, found["sides"]
-        path = spans(found["points"], *drums, self.after, self.inside, self.divisors)
+        path = spans(found["points"], *drums, self.after, self.ways, self.divisors)
         return numbers_of(self, total(path))
 
     def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
-               w_drums, on_drums, axes, r_sides, radii, after, inside, divisors, spring):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, inside, divisors)
+               w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring):  # fmt: skip
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
         T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
         return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
 
-    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, inside,
+    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
                 divisors, spring):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, inside, divisors)
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
         return passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
 
-    def energy(r_points, r_drums, axes, r_sides, radii, after, inside, divisors, spring):
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, inside, divisors)
+    def energy(r_points, r_drums, axes, r_sides, radii, after, ways, divisors, spring):
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
         return stored(total(path), spring)
 
-    def switch(r_points, r_drums, axes, r_sides, radii, after, inside, divisors, spring):
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, inside, divisors)
-        return (total(path) - spring[0], *(way[5] for _, _, drum, way in path if drum is not None))
+    def switch(r_points, r_drums, axes, r_sides, radii, after, ways, divisors, spring):
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        changes = [x for _, _, drum, way in path if drum is not None for x in way[5:]]
+        return total(path) - spring[0], *(x for x in changes if x is not None)
 
 
 class Driven(Tendon, activation="none", control=True):
@@ -103,18 +106,18 @@ class Driven(Tendon, activation="none", control=True):
     energy = None
 
     def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
-               w_drums, on_drums, axes, r_sides, radii, after, inside, divisors, spring, control,
+               w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring, control,
                control_min, control_max, gain, bias, tension_min, tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, inside, divisors)
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
         T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
         T = T + bias + gain * within(control, control_min, control_max)
         T = within(T, tension_min, tension_max)
         return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
 
-    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, inside,
+    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
                 divisors, spring, control, control_min, control_max, gain, bias, tension_min,
                 tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, inside, divisors)
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
         T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
         T = T + bias + gain * within(control, control_min, control_max)
         return within(T, tension_min, tension_max)
@@ -131,16 +134,16 @@ class Lagging(Tendon, activation="lag"):
         return kept(z_dot, z, activation_min, activation_max)
 
     def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
-               w_drums, on_drums, axes, r_sides, radii, after, inside, divisors, spring, z, gain,
+               w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring, z, gain,
                bias, tension_min, tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, inside, divisors)
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
         T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
         T = within(T + bias + gain * z, tension_min, tension_max)
         return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
 
-    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, inside,
+    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
                 divisors, spring, z, gain, bias, tension_min, tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, inside, divisors)
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
         T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
         return within(T + bias + gain * z, tension_min, tension_max)
 
@@ -161,17 +164,17 @@ class Muscle(Lagging, activation="muscle"):
         return kept(z_dot, z, activation_min, activation_max)
 
     def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
-               w_drums, on_drums, axes, r_sides, radii, after, inside, divisors, spring, z, muscle,
+               w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring, z, muscle,
                tension_min, tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, inside, divisors)
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
         L, L_dot = total(path), rate_of(path, v_points, v_drums, w_drums)
         T = passive(L, L_dot, spring) + contracted(L, L_dot, z, muscle)
         T = within(T, tension_min, tension_max)
         return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
 
-    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, inside,
+    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
                 divisors, spring, z, muscle, tension_min, tension_max):  # fmt: skip
-        path = spans(r_points, r_drums, radii, axes, r_sides, after, inside, divisors)
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
         L, L_dot = total(path), rate_of(path, v_points, v_drums, w_drums)
         T = passive(L, L_dot, spring) + contracted(L, L_dot, z, muscle)
         return within(T, tension_min, tension_max)
@@ -190,11 +193,13 @@ def check_drums(tendon):
         raise ValueError("after has one point twice; give a point between two drums")
     if len(tendon.axes) > count or len(tendon.sides) not in (0, count):
         raise ValueError("there should be as many sides as drums, or none, and no more axes")
+    if not all(x in (0.0, 2.0) or (x == PAST_SIDE and tendon.sides) for x in tendon.ways):
+        raise ValueError("ways should be 0, 1 with sides, or 2 for each drum")
     if not all(x >= 0.0 for x in tendon.divisors):
         raise ValueError("divisors should not be below 0")
 
 
-def spans(r, drums, radii, axes, sides, after, inside, divisors):
+def spans(r, drums, radii, axes, sides, after, ways, divisors):
     """Of each span: its first point, its share in the length, its drum or None, and its way."""
     found = []
     for k in range(len(r) - 1):
@@ -208,8 +213,9 @@ def spans(r, drums, radii, axes, sides, after, inside, divisors):
             way = (l, u, u)
         else:
             axis = axes[drum] if drum < len(axes) else None
-            side = sides[drum] if sides else None
-            way = wrapped(r[k], r[k + 1], drums[drum], radii[drum], axis, side, inside[drum])
+            side = sides[drum] if sides and ways[drum] == PAST_SIDE else None
+            way = wrapped(r[k], r[k + 1], drums[drum], radii[drum], axis, side,
+                          inside=ways[drum] == INSIDE)  # fmt: skip
         found.append((k, 1.0 / divisors[k], drum, way))
     return found
 

@@ -33,19 +33,20 @@ def wrapped(A, B, centre, radius, axis, side, inside):
         A, B: points; where one lies in the solid the way is straight.
         centre, radius: of the solid.
         axis: direction of a cylinder; None for a sphere.
-        side: the way does not pass the centre opposite to it; None, or the centre, for the shorter.
+        side: the way does not pass the centre opposite to it; None for the shorter.
         inside: the way comes through the circle, at a point where it is shortest, from outside.
 
     Returns:
         length; directions of the way from A and to B; arms from the centre to the points where it
-        meets the solid and leaves it; a number that is positive where it touches.
+        meets the solid and leaves it; a number that is positive where it touches; one that changes
+        its sign where it changes sides, None where that is at points alone.
     """
     a, b, rise = sub(A, centre), sub(B, centre), 0.0
     if axis is not None:
         low = dot(axis, a)
         rise = dot(axis, b) - low
         a, b = sub(a, scale(low, axis)), sub(b, scale(low + rise, axis))
-    n, phi = _plane(a, b, axis)
+    n, phi, sides = _plane(a, b, axis)
     aa, bb, rr = dot(a, a), dot(b, b), radius * radius
     free = minimum(aa, bb) - rr
     l_a, l_b = (sqrt(where(free > 0.0, x, 4.0 * rr)) for x in (aa, bb))
@@ -63,7 +64,7 @@ def wrapped(A, B, centre, radius, axis, side, inside):
         if side is not None:
             s = sub(side, centre)
             opposite = minimum(dot(n, cross(s, a)), dot(n, cross(b, s)))  # between a and b
-            way = where(opposite > 0.0, -1.0, 1.0)
+            way, sides = where(opposite > 0.0, -1.0, 1.0), opposite
             arc = where(opposite > 0.0, arc + 2.0 * (PI - phi), arc)
         P, Q = _tangents(e_a, e_b, n, (l_a, l_b, t_a, t_b), radius, way)
         on_a, on_b = (scale(way / radius, cross(n, p)) for p in (P, Q))
@@ -81,7 +82,7 @@ def wrapped(A, B, centre, radius, axis, side, inside):
     u = scale(1.0 / straight, d)
     length, on_a, on_b = (_chosen(touches, *pair) for pair in
                           ((length, straight), (on_a, u), (on_b, u)))  # fmt: skip
-    return length, on_a, on_b, P, Q, touches
+    return length, on_a, on_b, P, Q, touches, None if inside else sides
 
 
 def _chosen(touches, on, off):
@@ -91,19 +92,19 @@ def _chosen(touches, on, off):
 
 
 def _plane(a, b, axis):
-    """The direction about which a turns to b the short way, and the angle; any normal of a line."""
+    """The direction about which a turns to b the short way, the angle, and the sense about axis."""
     c, along = cross(a, b), dot(a, b)
     if axis is not None:
         c = dot(axis, c)
         turn = where(c < 0.0, -1.0, 1.0)
-        return scale(turn, axis), atan2(turn * c, along)
+        return scale(turn, axis), atan2(turn * c, along), c
     square, x = dot(c, c), a[0] * a[0]
     other = tuple(where(3.0 * x < dot(a, a), *pair) for pair in ((1.0, 0.0), (0.0, 1.0), (0.0, 0.0)))
     line = square <= STRAIGHT * STRAIGHT * dot(a, a) * dot(b, b)
     c_0 = cross(a, other)
     size = sqrt(where(line, 1.0, square))
     normal = tuple(where(line, y, x) for x, y in zip(c, c_0, strict=True))
-    return scale(1.0 / sqrt(dot(normal, normal)), normal), atan2(where(line, 0.0, size), along)
+    return scale(1.0 / sqrt(dot(normal, normal)), normal), atan2(where(line, 0.0, size), along), None
 
 
 def _turned(e, n, psi):
