@@ -137,8 +137,8 @@ def sized_class(type_: Any, shape: Shape) -> Any:
             for entry in entry_fields(name, on[name]):
                 one = attrs.evolve(spec, kind=ENTRIES[spec.kind], size="")
                 members[entry] = field_of(one)
-        elif spec.constant:  # a word with one choice
-            value = dict(shape.constants)[name]
+        elif spec.constant or not sizes[spec.size]:  # a word with one choice
+            value = dict(shape.constants).get(name, ())
             one = attrs.evolve(spec, kind="choice", choices=(value,), default=value, size="")
             members[name] = field_of(one)
         else:
@@ -193,6 +193,8 @@ def _known_names(type_: Any, shape: Shape) -> dict[str, tuple[list[str], str]]:
     specs = specs_of(type_)
     slots = list(body_slots(type_))
     slots += sorted({s for _, on in shape.on for s in on} - set(slots), key=SLOTS.index)
+    empty = [n for n, spec in sized_fields(type_).items() if not dict(shape.sizes)[spec.size]]
+    known |= {name: ([], "()") for name in empty}
     known |= {name: ([], repr(numbers)) for name, numbers in shape.constants}
     known["body_count"] = [], str(len(slots))
     for field, on in shape.on:
