@@ -16,6 +16,7 @@ AT = {
     "cradle": 0.5,
     "domino_row": 0.24,
     "gripper": 0.8,
+    "hand": 1.0,
     "marble_run": 0.9,
     "quadruped": 0.4,
     "crane": 1.5,

@@ -20,8 +20,8 @@ FRICTION, SLIP, PLACE = slice(2, 5), slice(5, 8), slice(8, 11)
 REACH, FORCE, WIDTH = 11, slice(12, 15), 15
 #: Those of a law of friction of its own, behind them: coefficients that slide, and that stick.
 SLIDING, STICKING, LAW_WIDTH = slice(0, 2), slice(2, 4), 4
-#: Velocities that are set are met to this part of their size.
-HELD = 1e-9
+#: Velocities that are set are met to this part of their size; of a change this part is rounding.
+HELD, CANCELLED = 1e-9, 1e-15
 
 
 def length_of(vector: Floats) -> float:
@@ -275,8 +275,10 @@ class ContactRows:
         return found
 
     def change(self, dv: Floats) -> None:
-        """Change the velocities by dv (6 n,)."""
-        self.v, self._free, self._free_multipliers = self.v + dv, None, None
+        """Change the velocities by dv (6 n,); of what cancels no rounding is left."""
+        v = self.v + dv
+        v[np.abs(v) <= CANCELLED * np.abs(dv)] = 0.0
+        self.v, self._free, self._free_multipliers = v, None, None
 
     def follow(self, given: Sequence[tuple[Floats, float]] = ()) -> bool:
         """Bring velocities onto the joints by impulses in them, and rows to what they are given.
