@@ -89,7 +89,8 @@ class Lagging(JointTendon, activation="lag"):
     states = ("x", "z")
 
     def rate(r_movers, v_movers, w_movers, r_holders, v_holders, w_holders, axes, coefs, slides,
-             control, control_min, control_max, activation_min, activation_max, time, z):  # fmt: skip
+             control, control_min, control_max, activation_min, activation_max,
+             time, z):  # fmt: skip
         i, j = (r_movers, v_movers, w_movers), (r_holders, v_holders, w_holders)
         z_dot = kept((within(control, control_min, control_max) - z) / time, z, activation_min,
                      activation_max)  # fmt: skip
@@ -108,7 +109,8 @@ class Summing(Lagging, activation="integral"):
     """The integral of a control acts."""
 
     def rate(r_movers, v_movers, w_movers, r_holders, v_holders, w_holders, axes, coefs, slides,
-             control, control_min, control_max, activation_min, activation_max, time, z):  # fmt: skip
+             control, control_min, control_max, activation_min, activation_max,
+             time, z):  # fmt: skip
         i, j = (r_movers, v_movers, w_movers), (r_holders, v_holders, w_holders)
         z_dot = kept(within(control, control_min, control_max) / time, z, activation_min,
                      activation_max)  # fmt: skip
@@ -119,7 +121,8 @@ class Muscle(Lagging, activation="muscle"):
     """A control activates a muscle."""
 
     def rate(r_movers, v_movers, w_movers, r_holders, v_holders, w_holders, axes, coefs, slides,
-             control, control_min, control_max, activation_min, activation_max, muscle, z):  # fmt: skip
+             control, control_min, control_max, activation_min, activation_max,
+             muscle, z):  # fmt: skip
         i, j = (r_movers, v_movers, w_movers), (r_holders, v_holders, w_holders)
         z_dot = kept(activated(within(control, control_min, control_max), z, muscle), z,
                      activation_min, activation_max)  # fmt: skip

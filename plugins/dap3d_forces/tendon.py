@@ -4,7 +4,7 @@ from typing import ClassVar
 
 from dap3d_core.interface import hookimpl, numbers, vectors
 from dap3d_core.interface import points as places
-from dap3d_core.kernels import add, by_body, cross, dot, scale, sqrt, sub, where
+from dap3d_core.kernels import add, by_body, cross, dot, scale, sub, where
 from dap3d_forces.actuator import kept
 from dap3d_forces.bounds import within
 from dap3d_forces.tendon_law import (
@@ -15,7 +15,7 @@ from dap3d_forces.tendon_law import (
     passive,
     stored,
 )
-from dap3d_forces.wrapping import wrapped
+from dap3d_forces.wrapping import length_of, wrapped
 
 interface_version = 1
 
@@ -28,8 +28,8 @@ class Tendon(TendonLaw):
 
     The cable runs from point to point, and without friction over the ``drums`` between them: the
     shortest way, straight where it does not touch. Drum k, of the radius ``radii`` about a point of
-    any body, lies after point ``after``, counted from 1. Drums are spheres but the first ones, which
-    are cylinders about ``axes``, without ends. ``ways`` says how it passes each: 0, on the shorter
+    any body, lies after point ``after``, counted from 1. Drums are spheres, but the first are
+    cylinders about ``axes``, without ends. ``ways`` says how it passes each: 0, on the shorter
     way; 1, not opposite to its point of ``sides``; 2, through the drum, as through a ring.
 
     ``divisors``, one for each point, are those of the span that begins there: a part of the cable
@@ -73,7 +73,9 @@ class Tendon(TendonLaw):
                  for name in ("points", "drums", "sides")}  # fmt: skip
         axes = [pose.to_global(a) for a, pose in zip(self.axes, bodies["axes"], strict=True)]
         check_drums(self)
-        if any(one is not other for one, other in zip(bodies["axes"], bodies["drums"], strict=False)):
+        if any(
+            one is not other for one, other in zip(bodies["axes"], bodies["drums"], strict=False)
+        ):
             raise ValueError("axes should lie on the bodies of their drums, the first ones")
         drums = found["drums"], self.radii, axes, found["sides"]
         path = spans(found["points"], *drums, self.after, self.ways, self.divisors)
@@ -207,9 +209,7 @@ def spans(r, drums, radii, axes, sides, after, ways, divisors):
         if divisors[k] == 0.0:
             continue
         if drum is None:
-            d = sub(r[k + 1], r[k])
-            l = sqrt(dot(d, d))
-            u = scale(1.0 / l, d)
+            l, u = length_of(sub(r[k + 1], r[k]))
             way = (l, u, u)
         else:
             axis = axes[drum] if drum < len(axes) else None
@@ -251,7 +251,9 @@ def acting(T, path, s, on_points, s_drums, on_drums, body_count):
     parts = [(on_points[k], s[k], F) for k, F in at_points]
     parts += [(on_drums[b], add(s_drums[b], arm), F) for b, arm, F in at_drums]
     forces = [(on, s, scale(T, F)) for on, s, F in parts]
-    return by_body([on for on, _, _ in forces], [(F, cross(s, F)) for _, s, F in forces], body_count)
+    return by_body(
+        [on for on, _, _ in forces], [(F, cross(s, F)) for _, s, F in forces], body_count
+    )
 
 
 @hookimpl

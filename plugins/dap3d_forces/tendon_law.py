@@ -28,11 +28,15 @@ class TendonLaw(Force):
     peak: float = number(0.0, unit="N", doc="of a muscle: greatest active force")
     optimum: float = number(1.0, unit="m", doc="of a muscle: length of fibres at that force")
     sinew: float = number(0.0, unit="m", doc="of a muscle: length without that of its fibres")
-    l_min: float = number(0.5, maximum=1.0, doc="of a muscle: length of fibres, over optimum, without force")
+    l_min: float = number(
+        0.5, maximum=1.0, doc="of a muscle: length of fibres, over optimum, without force"
+    )
     l_max: float = number(1.6, minimum=1.0, doc="of a muscle: that on the other side")
     v_max: float = number(1.5, unit="1/s", positive=True, doc="of a muscle: speed without force")
     fp_max: float = number(1.3, doc="of a muscle: passive force at l_max, over 1.5 peak")
-    fv_max: float = number(1.2, minimum=1.0, doc="of a muscle: force as it lengthens fast, over the peak")
+    fv_max: float = number(
+        1.2, minimum=1.0, doc="of a muscle: force as it lengthens fast, over the peak"
+    )
     time_up: float = number(0.01, unit="s", positive=True, doc="of a muscle: of activation")
     time_down: float = number(0.04, unit="s", positive=True, doc="of a muscle: of deactivation")
     smoothing: float = number(0.0, minimum=0.0, doc="of a muscle: width between both times")
@@ -66,7 +70,7 @@ def passive(L, L_dot, spring):
     """Tension of spring and damper, N."""
     high, low, k, c, pushes = spring
     T = k * (maximum(L - high, 0.0) - maximum(low - L, 0.0)) + c * L_dot
-    return where(pushes > 0.0, T, where(L < high, 0.0, maximum(T, 0.0)))
+    return where(pushes > 0.0, T, where(high > L, 0.0, maximum(T, 0.0)))
 
 
 def stored(L, spring):

@@ -54,11 +54,9 @@ def wrapped(A, B, centre, radius, axis, side, inside):
     e_a, e_b = scale(1.0 / l_a, a), scale(1.0 / l_b, b)
     arc = phi - atan2(t_a, radius) - atan2(t_b, radius)
     if inside:
-        P = Q = scale(radius, _turned(e_a, n, _nearest(l_a, l_b, radius, phi)))
-        to_P, from_Q = sub(P, a), sub(b, Q)
-        s_a, s_b = sqrt(dot(to_P, to_P)), sqrt(dot(from_Q, from_Q))
-        on_a, on_b, on = scale(1.0 / s_a, to_P), scale(1.0 / s_b, from_Q), 0.0
-        touches = -arc
+        psi, on, touches = _nearest(l_a, l_b, radius, phi), 0.0, -arc
+        P = Q = add(scale(radius * cos(psi), e_a), scale(radius * sin(psi), cross(n, e_a)))
+        (s_a, on_a), (s_b, on_b) = length_of(sub(P, a)), length_of(sub(b, Q))
     else:
         way, s_a, s_b = 1.0, t_a, t_b
         if side is not None:
@@ -69,26 +67,25 @@ def wrapped(A, B, centre, radius, axis, side, inside):
         P, Q = _tangents(e_a, e_b, n, (l_a, l_b, t_a, t_b), radius, way)
         on_a, on_b = (scale(way / radius, cross(n, p)) for p in (P, Q))
         touches, on = arc, radius * arc
-    flat = s_a + on + s_b
-    length = flat
+    length = flat = s_a + on + s_b
     if axis is not None:
         length = sqrt(flat * flat + rise * rise)
-        on_a, on_b = (add(scale(flat / length, e), scale(rise / length, axis)) for e in (on_a, on_b))
+        on_a, on_b = (
+            add(scale(flat / length, e), scale(rise / length, axis)) for e in (on_a, on_b)
+        )
         P = add(P, scale(low + rise * s_a / flat, axis))
         Q = add(Q, scale(low + rise * (s_a + on) / flat, axis))
     touches = minimum(touches, free)
-    d = sub(B, A)
-    straight = sqrt(dot(d, d))
-    u = scale(1.0 / straight, d)
-    length, on_a, on_b = (_chosen(touches, *pair) for pair in
-                          ((length, straight), (on_a, u), (on_b, u)))  # fmt: skip
+    (straight, u), on = length_of(sub(B, A)), touches > 0.0
+    on_a, on_b = (tuple(map(where, (on,) * 3, e, u)) for e in (on_a, on_b))
+    length = where(on, length, straight)
     return length, on_a, on_b, P, Q, touches, None if inside else sides
 
 
-def _chosen(touches, on, off):
-    if isinstance(on, tuple):
-        return tuple(where(touches > 0.0, x, y) for x, y in zip(on, off, strict=True))
-    return where(touches > 0.0, on, off)
+def length_of(d):
+    """The length of a vector, and its direction."""
+    length = sqrt(dot(d, d))
+    return length, scale(1.0 / length, d)
 
 
 def _plane(a, b, axis):
@@ -99,16 +96,18 @@ def _plane(a, b, axis):
         turn = where(c < 0.0, -1.0, 1.0)
         return scale(turn, axis), atan2(turn * c, along), c
     square, x = dot(c, c), a[0] * a[0]
-    other = tuple(where(3.0 * x < dot(a, a), *pair) for pair in ((1.0, 0.0), (0.0, 1.0), (0.0, 0.0)))
+    other = tuple(
+        where(3.0 * x < dot(a, a), *pair) for pair in ((1.0, 0.0), (0.0, 1.0), (0.0, 0.0))
+    )
     line = square <= STRAIGHT * STRAIGHT * dot(a, a) * dot(b, b)
     c_0 = cross(a, other)
     size = sqrt(where(line, 1.0, square))
     normal = tuple(where(line, y, x) for x, y in zip(c, c_0, strict=True))
-    return scale(1.0 / sqrt(dot(normal, normal)), normal), atan2(where(line, 0.0, size), along), None
-
-
-def _turned(e, n, psi):
-    return add(scale(cos(psi), e), scale(sin(psi), cross(n, e)))
+    return (
+        scale(1.0 / sqrt(dot(normal, normal)), normal),
+        atan2(where(line, 0.0, size), along),
+        None,
+    )
 
 
 def _tangents(e_a, e_b, n, lengths, radius, way):

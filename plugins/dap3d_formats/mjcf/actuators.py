@@ -152,12 +152,18 @@ class ActuatorReader:
         gear = element.numbers("gear", None, (1.0,))[0]
         times = (*element.numbers("dynprm", None, (1.0,)), 0.0, 0.0)[:3]
         if element.name == "muscle":
-            times = (*element.numbers("timeconst", 2, (0.01, 0.04)), element.number("tausmooth", 0.0))
+            times = (
+                *element.numbers("timeconst", 2, (0.01, 0.04)),
+                element.number("tausmooth", 0.0),
+            )
         optimum = (high - low) / (at_high - at_low)
         if not gear or not min(times[:2]) > 0.0:
             return "a muscle of gear 0 or a time constant of 0"
-        muscle = {"peak": gear * force, "optimum": optimum / gear,
-                  "sinew": (low - at_low * optimum) / gear}
+        muscle = {
+            "peak": gear * force,
+            "optimum": optimum / gear,
+            "sinew": (low - at_low * optimum) / gear,
+        }
         muscle |= dict(zip(("l_min", "l_max", "v_max", "fp_max", "fv_max"),
                            (number[k][0] for k in ("lmin", "lmax", "vmax", "fpmax", "fvmax")),
                            strict=True))  # fmt: skip

@@ -121,7 +121,9 @@ def _drawn(reader: MjcfReader, line: Tendon) -> float | None:
         text = "the rest length of a tendon over geoms is that where the scene starts"
         reader.document.source.remarks.translate(line.place, text)
         return None
-    places = np.array([(pose_of(reader, link, at_rest=True) @ Frame(at)).r for link, at in line.points])
+    places = np.array(
+        [(pose_of(reader, link, at_rest=True) @ Frame(at)).r for link, at in line.points]
+    )
     lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
     counts = [1.0 / d if d else 0.0 for d in line.divisors[:-1]] or 1.0
     return float((lengths * counts).sum())
@@ -140,5 +142,3 @@ def pose_of(reader: MjcfReader, link: str, *, at_rest: bool = False) -> Frame:
             step = Frame(q[:3], from_quaternion(q[3:]))
         pose, link = step @ pose, joint.parent
     return pose
-
-

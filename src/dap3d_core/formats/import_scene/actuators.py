@@ -1,7 +1,7 @@
 """Actuators of a model as inputs, with the forces that they set; tendons."""
 
 import re
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -148,7 +148,7 @@ def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
             fields, spring["l0"] = ends, tendon.rest or None
         else:
             keyword = "tendon" if keyword == "ptp" else keyword
-            _add_stops(builder, tendon, keyword, fields)
+            _add_stops(builder, model, tendon, keyword, fields)
             spring |= {"length": tendon.rest, "play": tendon.play or None}
         if tendon.stiffness or tendon.damping:
             name = builder.names.free("forces", f"{tendon.name}_spring")
@@ -225,14 +225,24 @@ def _sum_of_joints(
     return "joint_tendon", fields | {"x_0": length}
 
 
-def _add_stops(builder: SceneBuilder, tendon: Tendon, keyword: str, fields: Any) -> None:
-    """Add soft stops at the limits of a tendon, critically damped."""
-    limits = tendon.limits
-    if not limits.finite:
+def _add_stops(
+    builder: SceneBuilder, model: Articulation, tendon: Tendon, keyword: str, fields: Any
+) -> None:
+    """Add soft stops at the limits of a tendon, critically damped, unless those of joints do."""
+    limits, ends = tendon.limits, np.zeros(2)
+    for name, factor in tendon.terms:
+        joint = model.joints[name]
+        q = np.array([joint.limits[0].lower, joint.limits[0].upper]) + joint.reference
+        ends += np.sort(factor * q) if factor else 0.0
+    lower, upper = (limits.lower, limits.upper)
+    if tendon.terms and builder.limits != "off":
+        lower = -inf if ends[0] >= lower else lower
+        upper = inf if ends[1] <= upper else upper
+    if lower == -inf and upper == inf:
         return
     factors: dict[str, float] = {}
-    for joint, factor in tendon.terms:
-        factors[joint] = factors.get(joint, 0.0) + factor
+    for name, factor in tendon.terms:
+        factors[name] = factors.get(name, 0.0) + factor
     inertia = builder.inertia.of_sum(factors) if factors else None
     if builder.limits == "off" or inertia is None:
         text = "limits of tendons over more than two points, with limits = off, or without inertia"
@@ -240,7 +250,7 @@ def _add_stops(builder: SceneBuilder, tendon: Tendon, keyword: str, fields: Any)
         return
     text = "limits of tendons are soft stops, critically damped, of a time constant of 2 ms"
     builder.remarks.translate(tendon.place, text, motion=True)
-    for side, sign, bound in (("max", 1.0, limits.upper), ("min", -1.0, limits.lower)):
+    for side, sign, bound in (("max", 1.0, upper), ("min", -1.0, lower)):
         if isfinite(bound):  # below its least length its negative is too long
             name = builder.names.free("forces", f"{tendon.name}_{side}_stop")
             given = {"coefs": tuple(sign * c for c in fields["coefs"]), "x_0": sign * fields["x_0"]}

@@ -68,7 +68,9 @@ class JointInertia:
             along[self._columns[name]] += factor
         left = free.T @ (along / scale)
         yields = float(left @ inverse @ left)
-        return 1.0 / yields if yields > DEPENDENT * float((along / scale) @ (along / scale)) else None
+        return (
+            1.0 / yields if yields > DEPENDENT * float((along / scale) @ (along / scale)) else None
+        )
 
     @cached_property
     def _columns(self) -> dict[str, slice]:

@@ -214,7 +214,12 @@ def list_of(value: Any, spec: FieldSpec | None = None) -> Any:
     if type(value) is not tuple or not value:
         return Fault(f"should be a list of numbers, not {_kind(value)}")
     numbers = numbers_of(value, len(value))
-    if spec is not None and spec.positive and not isinstance(numbers, Fault) and min(numbers) <= 0.0:
+    if (
+        spec is not None
+        and spec.positive
+        and not isinstance(numbers, Fault)
+        and min(numbers) <= 0.0
+    ):
         return Fault("should be a list of numbers above 0")
     return numbers
 
