@@ -34,9 +34,9 @@ def test_type(key, others):
 def test_every_kind_of_check_is_there():
     """No check is lost for all types: each applies to one at least."""
     assert {check.name for checks in CHECKS.values() for check in checks} == {
-        "J", "G", "nu", "gamma", "virtual power", "assembly", "rank", "frame", "action and reaction",
+        "J", "nu", "gamma", "virtual power", "assembly", "rank", "frame", "action and reaction",
         "friction power", "friction frame", "friction balance", "energy", "derivatives", "purity",
-        "plain", "compiled", "rate", "rate frame", "unilateral",
+        "plain", "compiled", "rate", "rate frame", "unilateral", "G",
         "impulse and reaction", "restitution", "round", "jump rows", "jump frame",
         "branches", "rest", "impulse energy", "velocity form", "unloaded", "normal",
     }  # fmt: skip
