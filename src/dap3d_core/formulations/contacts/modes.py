@@ -409,23 +409,28 @@ def _inside(
 
     None where they do not share, or there are none.
     """
-    best, low, high = None, 0, len(INSIDE) - 1
     A, ways = _matrix(table, rows, closed, sliding, limit)
     if not _share(table, closed, A, ways):
         return None
-    own = _own_rows(table, closed, ways)
-    big, own_rates = _sizes(table, rows, closed, {}), np.diag(A).reshape(-1, 3).max(axis=1)
-    while low <= high:  # what one part allows, so does every larger one
-        k = high if best is None else (low + high) // 2
-        x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=best, tries=3)
+    own, own_rates = _own_rows(table, closed, ways), np.diag(A).reshape(-1, 3).max(axis=1)
+    big = _sizes(table, rows, closed, {})
+
+    def forces(k: int, start: Floats | None) -> Floats | None:
+        x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=start, tries=3)
         carried = table.mu_s[closed] * (x[::3] + rows.load[closed])
         rest = OF_REST * (1.0 - INSIDE[k]) * own_rates * carried + RATE_ROUNDING * big.max()
-        if np.all(np.abs(a[own]) <= np.repeat(np.minimum(HELD * big, rest), 3)[own]):
-            best, high = x, k - 1
-        elif best is None:
-            return None
-        else:
-            low = k + 1
+        limits = np.repeat(np.minimum(HELD * big, rest), 3)
+        return x if np.all(np.abs(a[own]) <= limits[own]) else None
+
+    best = forces(0, None)  # as a rule
+    if best is not None:
+        return best
+    low, high = 1, len(INSIDE) - 2
+    best = forces(high + 1, None)
+    while best is not None and low <= high:  # what one part allows, so does every larger one
+        k = (low + high) // 2
+        x = forces(k, best)
+        best, low, high = (best, k + 1, high) if x is None else (x, low, k - 1)
     return best
 
 
