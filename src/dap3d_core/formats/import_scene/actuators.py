@@ -110,7 +110,7 @@ def _act_on_link(builder: SceneBuilder, actuator: Actuator, name: str) -> None:
 
 def _act_on_tendon(builder: SceneBuilder, model: Articulation, actuator: Actuator) -> None:
     """Add an actuator or a muscle of a tendon, whose tension is less its force."""
-    line = actuator.tendon and _line(builder, model, actuator.tendon)
+    line = None if actuator.tendon is None else _line(builder, model, actuator.tendon)
     if line is None:
         text = "an actuator of a tendon that does not move"
         builder.remarks.leave_out(actuator.place, text, motion=True)
