@@ -167,12 +167,15 @@ NOT_CALLED = {
         "formulations.contacts.cone": "residual_of shorten sweep",
         "formulations.contacts.equations": (
             "accelerate add_columns add_friction column force_of force_of_one has_settled "
-            "inverse invert invert_responses is_given is_sliding mode_of pressing row_of "
-            "largest_given project report rhs watch contact_of fill_load has_loads solve_loads"
+            "inverse invert_responses is_given is_sliding mode_of pressing row_of find_rates "
+            "largest_given project report rhs watch contact_of fill_load has_loads solve_loads "
+            "are_independent"
         ),
+        "formulations.contacts.inverse": "invert",
+        "formulations.contacts.watched_rates": "store_watched take_watched",
         "formulations.joint_loops.contacts": (
             "accelerate add_contact_forces add_scaled find_columns find_multipliers project report "
-            "rhs solve_all store_kept watch"
+            "rhs solve_all store_kept watch find_rates"
         ),
         # of runs with derivatives: study/sensitivities compares their values with those without
         "integrators.stepping.integration": "project_here",
