@@ -1,5 +1,7 @@
 """Friction of joints that sticks, by stepping: closed forms, and events on the same scene."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from verification.test_sticking_friction import hinge, slider
@@ -114,3 +116,27 @@ def test_what_hangs_on_a_joint_that_ends_falls_onto_the_floor(ends, t, shapes):
     assert (event.kind, event.name) == ("break", "hook")
     assert event.t == pytest.approx(t, abs=1e-9)
     assert result.r[-1, 0, 2] == pytest.approx(0.1, abs=STEPS["contact_step"] ** 2)
+
+
+def test_friction_beside_a_damper_is_of_second_order():
+    """A block slides against mu m g and c v: dampers know the speed that friction leaves.
+
+    v = (v0 + a / k) e^(-k t) - a / k with a = mu g, k = c / m; half the step leaves a quarter.
+    """
+    mass, mu, c, t, errors = 2.0, 0.3, 4.0, 0.4, []
+    for h in (0.02, 0.01, 0.005):
+        scene = dap.Scene(name="block")
+        scene.add_material("surface", mu=mu)
+        scene.add_collisions(material="surface")
+        scene.add_body("b", mass=mass, Jp=[0.01] * 3, r=[0.0, 0.0, 0.1], r_dot=[3.0, 0.0, 0.0])
+        scene.add_shape("box", body="b", size=[0.2] * 3, collides=True)
+        scene.add_shape("plane", body="ground", collides=True)
+        scene.add_force("weight", "gravity")
+        scene.add_point("far", "ground", [-10.0, 0.0, 0.1])
+        scene.add_force("ptp", "damper", P_i="b.O", P_j="far", l0=10.0, c=c)
+        run = dap.simulate(scene, t_end=t, dt=t, contact_step=h, estimate_error=False)
+        a, k = mu * 9.81, c / mass
+        x = (3.0 + a / k) * (1.0 - np.exp(-k * t)) / k - a / k * t
+        errors.append(abs(run.r[-1, 0, 0] - x))
+    assert errors[0] < 1e-3
+    assert all(3.8 < one / half < 4.2 for one, half in pairwise(errors))

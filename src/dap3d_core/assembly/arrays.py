@@ -141,7 +141,7 @@ class System(LoopArrays):
     smallest: Floats  # (rows,) a pivot not above this is singular
     settings: Floats  # (SETTINGS,) see above
     friction: Floats  # where forces depend on multipliers (common/friction.py: memory_size)
-    watched: Floats  # of contacts: t, power, y where switches were read (contacts/equations.py)
+    watched: Floats  # of contacts: t, y, dy/dt where switches were read (contacts/equations.py)
     groups: Integers  # (loops, 3) i0, p0, count
     kinds: Integers  # (KINDS + 1,) first loop of each kind
     row: Integers  # (model rows,) place of each constraint row in the row vectors

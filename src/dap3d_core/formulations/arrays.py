@@ -106,7 +106,9 @@ def build_system(model: Model, plan: Plan, what: list[tuple[str, Group]]) -> Sys
         ),
         friction=np.zeros(_friction_size(model, plan)),
         contacts=_contacts_of(model, plan, what, groups),
-        watched=np.full(2 + model.integrated_layout["work"].stop if model.contacts else 0, np.nan),
+        watched=np.full(
+            (1 + 2 * model.integrated_layout["work"].stop) * bool(model.contacts), np.nan
+        ),
         idx=idx,
         groups=groups,
         kinds=starts,

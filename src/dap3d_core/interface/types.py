@@ -96,6 +96,16 @@ class TypeBase:
         """
         return {}
 
+    def prepare_functions(
+        self, functions: Mapping[str, Callable[[float], tuple[float, ...]]]
+    ) -> dict[str, Any]:
+        """Constants that take the functions of an argument which the scene gives, by field.
+
+        Each returns (f, f', f'', f''') of a number. Names and shapes are those of ``prepare``,
+        whose values these replace. A ``ValueError`` refuses the functions.
+        """
+        return {}
+
 
 class Joint(TypeBase):
     """A kinematic constraint or driver: ``rows`` equations between one, two or more bodies.

@@ -9,7 +9,12 @@ import numpy as np
 
 from dap3d_core.interface.codegen.instance_layout import shape_of, size
 from dap3d_core.interface.codegen.kernel_arguments import parameters
-from dap3d_core.interface.codegen.specialise import bind_friction, bind_functions, uncalled
+from dap3d_core.interface.codegen.specialise import (
+    bind_friction,
+    bind_functions,
+    names_behind,
+    uncalled,
+)
 from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.examine.examine import prepared
 from dap3d_core.interface.fields import FieldSpec, specs_of
@@ -86,12 +91,7 @@ class Group:
 
     def packed_numbers(self, p0: int) -> Floats:
         """The numbers as ``par`` holds them from p0 on, tables behind them, their places put in."""
-        numbers = self.numbers.copy()
-        end = p0 + numbers.size
-        for k, offset, rows in self.tables:
-            numbers[k, offset] = end
-            end += rows.size
-        return np.concatenate([numbers.ravel(), *(rows.ravel() for _, _, rows in self.tables)])
+        return _packed(self.numbers, self.tables, p0)
 
 
 class Grouping:
@@ -216,6 +216,8 @@ class Grouping:
         else:
             numbers, tables = self._numbers(type_info, instances, members)
         functions = [self._given(i) for i in instances]
+        if type_info.type.prepare_functions is not TypeBase.prepare_functions:
+            self._prepare_functions(instances, members, numbers)
         if functions[0]:
             type_info, numbers, more = self._with_functions(type_info, functions, numbers, members)
             tables += more
@@ -257,6 +259,35 @@ class Grouping:
             counts[field] = knots.shape[1]
             numbers = np.hstack([numbers, more, knots])
         return bind_functions(type_info, types, counts), numbers, tables
+
+    def _prepare_functions(
+        self, instances: list[Instance], members: Sequence[int], numbers: Floats
+    ) -> None:
+        """Put in place the numbers that types find from functions of an argument."""
+        faults = []
+        for row, instance, member in zip(numbers, instances, members, strict=True):
+            layout = instance.type_info.layout
+            try:
+                given = {n: self._callable(f) for n, f in self._given(instance).items()}
+                constants = _thing(instance).prepare_functions(given)
+            except ValueError as error:
+                faults.append((member, str(error)))
+                continue
+            for name, value in constants.items():
+                offset, shape = layout.numbers[name]
+                row[offset : offset + size(shape)] = np.reshape(value, -1)
+        if faults:
+            raise PrepareError(*faults)
+
+    def _callable(self, function: Instance) -> Callable[[float], Any]:
+        """A function of one argument in Python."""
+        from dap3d_core.kernels.runtime import loop_support  # what loops call
+
+        type_info, numbers, tables = self._combined([function], [0])
+        places = {**vars(loop_support), "par": _packed(numbers, tables, 0).tolist(), "p1": 0}
+        names, kernel = names_behind(type_info, type_info.layout), type_info.kernels["value"]
+        given = {n: eval(names[n].code, places) for n in parameters(kernel) if n != "x"}
+        return lambda x: kernel(**given, x=x)
 
     def _combined(
         self, functions: list[Instance], members: Sequence[int]
@@ -351,6 +382,26 @@ def _prepares(type_: Any) -> bool:
     return type_.prepare not in (base.__dict__.get("prepare") for base in TypeBase.__subclasses__())
 
 
+def _packed(numbers: Floats, tables: Iterable[tuple[int, int, Floats]], p0: int) -> Floats:
+    """Numbers with tables behind them, as ``par`` holds them from p0 on."""
+    numbers = numbers.copy()
+    end = p0 + numbers.size
+    for k, offset, rows in tables:
+        numbers[k, offset] = end
+        end += rows.size
+    return np.concatenate([numbers.ravel(), *(rows.ravel() for _, _, rows in tables)])
+
+
+def _thing(instance: Instance) -> Any:
+    """An instance as an object of its class, which ``prepare`` reads."""
+    type_: Any = instance.type_info.type
+    fields, values = specs_of(type_), instance.values
+    thing = type_(**{n: values[n] for n in fields if n in values})
+    if any(spec.kind == "vector2" for spec in fields.values()):
+        thing.P_i, thing.P_j = values["P_i"], values["P_j"]
+    return thing
+
+
 def _prepared(
     type_info: TypeInfo,
     fields: Mapping[str, FieldSpec],
@@ -359,11 +410,7 @@ def _prepared(
     poses: Mapping[int, BodyPose],
 ) -> dict[str, Any]:
     """Values that ``prepare`` returns for an instance, with the names and shapes examined."""
-    type_: Any = type_info.type
-    values = instance.values
-    thing = type_(**{n: values[n] for n in fields if n in values})
-    if any(spec.kind == "vector2" for spec in fields.values()):
-        thing.P_i, thing.P_j = values["P_i"], values["P_j"]
+    thing = _thing(instance)
     bodies = {s: poses[b] for s, b in zip(type_info.layout.slots, instance.bodies, strict=True)}
     try:
         constants = prepared(thing, bodies)

@@ -11,7 +11,8 @@ method finds N. Where there is no such N friction jams, and nothing is returned 
 
 The compliance of the rows is so large that multipliers of rows that depend on each other have no
 rounding of their own: they are the least ones. Passes (lsq.py) remove what it changes. Where rows
-hold so weakly that passes do not, it is made smaller.
+hold so weakly that passes do not, it is made smaller. Where pivots show that rows do not depend on
+each other it is next to nothing, and one pass is enough.
 """
 
 # What a compiled function returns is Any to mypy.
@@ -53,14 +54,17 @@ from dap3d_core.formulations.common.constraints import (
 from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
-from dap3d_core.kernels.scalar_math import is_differentiated
+from dap3d_core.kernels.scalar_math import is_differentiated, where
 
 #: Compliance of a row as part of its squared length; how much less where passes do not converge,
-#: and the least.
-PART, SMALLER, LEAST = 1e-4, 1e-3, 1e-11
+#: and the least. That of rows that do not depend on each other: no pivot is less than this part of
+#: the square of its row.
+PART, SMALLER, LEAST = 1e-4, 1e-3, 1e-12
+PART_OF_INDEPENDENT, LEAST_PIVOT = 1e-16, 1e-1
 #: Passes at most; each is to leave this part of the one before. They end where they change
-#: multipliers by this part: the next would by a ``PART`` of it; or where they change them by
-#: rounding alone, which rows that depend on each other enlarge.
+#: multipliers by this part, as the next would by a compliance of that, or where they change them
+#: by rounding alone, which rows that depend on each other enlarge. Where some slide it is a part of
+#: shares as well; what sticks is not to creep, not even by rounding of its share.
 PASSES, FALLING, SETTLED, NOISE = 12, 0.1, 1e-12, 1e-9
 #: A projection that leaves this many times the tolerance, which rounding does not, goes on.
 REACHED = 1e3
@@ -106,11 +110,15 @@ def accelerate(t: float, y: Floats, system: System, loops: Any) -> float:
     applied = system.friction[:size]
     for k in range(size):
         applied[k] = system.acceleration[k]
-    part = PART
+    given = largest_given(system)
+    part = PART if given > 0.0 else PART_OF_INDEPENDENT
     factorise(system, part)
+    if given == 0.0 and not are_independent(system):
+        part = PART
+        factorise(system, part)
     count = add_columns(t, system, loops)
-    while not has_settled(system, count) and part > LEAST:
-        part *= SMALLER
+    while not has_settled(system, count, given, part) and part > LEAST:
+        part = PART if part == PART_OF_INDEPENDENT else part * SMALLER
         factorise(system, part)
         count = add_columns(t, system, loops)
         for k in range(size):
@@ -161,7 +169,8 @@ def largest_given(system: System) -> float:
         if is_given(system, c):
             near = system.contacts[c, STATE] + NEAR
             for k in range(near, near + 3):
-                found = max(found, abs(states[k]))
+                size = abs(states[k])
+                found = where(size > found, size, found)
     return found
 
 
@@ -392,11 +401,23 @@ def invert(A: Floats, count: int) -> None:
 
 
 @compiled
-def has_settled(system: System, count: int) -> bool:
+def are_independent(system: System) -> bool:
+    """True if the factors, of ``PART_OF_INDEPENDENT``, have no small pivot."""
+    nodes, small = system.nodes, 0
+    for k in range(nodes.shape[0] - 1):
+        m, f, d = nodes[k, 0], nodes[k, 1], nodes[k, 2]
+        for r in range(m if nodes[k, 3] < 0 else 0):
+            of_row = abs(system.K[d + r * (m + 1)]) * system.compliance[f + r]
+            small |= not of_row * LEAST_PIVOT < PART_OF_INDEPENDENT
+    return small == 0
+
+
+@compiled
+def has_settled(system: System, count: int, given: float, part: float) -> bool:
     """``acceleration`` and ``multipliers`` from the forces in ``acceleration``, in passes.
 
-    In each what it finds for contacts that slide has its friction. False where passes did not
-    converge.
+    In each what it finds for contacts that slide has its friction. given: the largest share. part:
+    of the factors. False where passes did not converge.
     """
     x, total, rows = system.multipliers, system.total, system.total.shape[0]
     before, change, found, settled = 0.0, 0.0, 0.0, 0
@@ -406,30 +427,60 @@ def has_settled(system: System, count: int) -> bool:
             x[r] = system.gamma[r]
         solve_rows(system, system.acceleration)
         add_friction(system, count)
+        if part == PART_OF_INDEPENDENT:
+            return True
         change, found = 0.0, 0.0
         for r in range(rows):
             total[r] += x[r]
             if system.compliance[r] != 0.0:  # else a hub's place, or a row that is zero
-                change, found = max(change, abs(x[r])), max(found, abs(total[r]))
-        if change <= SETTLED * found or (k > 0 and not change < FALLING * before):
+                of_row, of_all = abs(x[r]), abs(total[r])
+                change = where(of_row > change, of_row, change)
+                found = where(of_all > found, of_all, found)
+        enough = SETTLED * (found + given if count > 0 else found)
+        if change <= enough or (k > 0 and not change < FALLING * before):
             if settled != 0 or not is_differentiated():
                 break
             settled = 1  # derivatives follow a pass later
         before = change
     for r in range(rows):
         x[r] = total[r]
-    return change <= NOISE * max(largest_given(system), found)
+    return change <= NOISE * (found + given)
 
 
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
-    """As in lsq.py; where switches were read last at this state, it is solved already."""
-    watched = system.watched
+    """As in lsq.py."""
+    if not take_watched(t, y, out, system):
+        find_rates(t, y, out, system, loops)
+
+
+@compiled
+def take_watched(t: float, y: Floats, out: Floats, system: System) -> bool:
+    """True where switches were read last at this state: then dy/dt is known."""
+    watched, n = system.watched, y.shape[0]
     is_known = watched[0] == t and not is_differentiated()
-    for k in range(y.shape[0]):
-        is_known &= watched[2 + k] == y[k]
-    power = watched[1] if is_known else accelerate(t, y, system, loops)
+    if is_known:
+        for k in range(n):
+            is_known &= watched[1 + k] == y[k]
     watched[0] = np.inf - np.inf  # once: numbers of the scene may change
+    if is_known:
+        for k in range(n):
+            out[k] = watched[1 + n + k]
+    return is_known
+
+
+@compiled
+def store_watched(t: float, y: Floats, system: System) -> None:
+    """Note the state at which dy/dt stands in ``watched``."""
+    system.watched[0] = t
+    for k in range(y.shape[0]):
+        system.watched[1 + k] = y[k]
+
+
+@compiled
+def find_rates(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """dy/dt of a state, the power of forces and drivers last."""
+    power = accelerate(t, y, system, loops)
     rates(y, system.metric, system.acceleration, out)
     state_rates(t, out, system, loops)
     out[out.shape[0] - 1] = power
@@ -475,9 +526,8 @@ def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     if closed == 0:
         place(t, y, system, loops)
     else:
-        watched[1] = accelerate(t, y, system, loops)
-        watched[0] = t
-        for k in range(y.shape[0]):
-            watched[2 + k] = y[k]
+        n = y.shape[0]
+        find_rates(t, y, watched[1 + n : 1 + 2 * n], system, loops)
+        store_watched(t, y, system)
     place_of_next[0] = 0.0
     call_kinds(SWITCH, KNOT, t, system, loops, out, place_of_next, system.multipliers)

@@ -339,18 +339,23 @@ def _inside(
     None where they do not share, or there are none.
     """
     big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
-    best, low, high = None, 0, len(INSIDE) - 1
     A, ways = _matrix(table, rows, closed, sliding, limit)
     if not _share(table, closed, A, ways):
         return None
     own = _own_rows(table, closed, ways)
-    while low <= high:  # what one part allows, so does every larger one
-        k = high if best is None else (low + high) // 2
-        x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=best, tries=3)
-        if np.abs(a[own]).max() <= min(HELD, OF_REST * (1.0 - INSIDE[k])) * big:
-            best, high = x, k - 1
-        elif best is None:
-            return None
-        else:
-            low = k + 1
+
+    def forces(k: int, start: Floats | None) -> Floats | None:
+        x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=start, tries=3)
+        holds = np.abs(a[own]).max() <= min(HELD, OF_REST * (1.0 - INSIDE[k])) * big
+        return x if holds else None
+
+    best = forces(0, None)  # as a rule
+    if best is not None:
+        return best
+    low, high = 1, len(INSIDE) - 2
+    best = forces(high + 1, None)
+    while best is not None and low <= high:  # what one part allows, so does every larger one
+        k = (low + high) // 2
+        x = forces(k, best)
+        best, low, high = (best, k + 1, high) if x is None else (x, low, k - 1)
     return best

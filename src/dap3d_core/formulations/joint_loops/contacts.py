@@ -37,6 +37,8 @@ from dap3d_core.formulations.contacts.equations import (
     is_given,
     is_sliding,
     pressing,
+    store_watched,
+    take_watched,
 )
 from dap3d_core.formulations.joint.equations import accepted, apply_forces, linearise_tree
 from dap3d_core.formulations.joint.place import place_tree
@@ -59,6 +61,13 @@ __all__ = ["accepted", "project", "report", "rhs", "watch"]
 @compiled
 def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """dy/dt of a state, the power of forces and drivers last."""
+    if not take_watched(t, y, out, system):
+        find_rates(t, y, out, system, loops)
+
+
+@compiled
+def find_rates(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
+    """As ``rhs``, of a state at which switches were not read."""
     power = accelerate(t, y, system, loops)
     spread_tree(y, out, system)
     state_rates(t, out, system, loops)
@@ -206,8 +215,9 @@ def watch(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
 
     Those of closed contacts read multipliers.
     """
-    place_of_next, loaded = system.settings[SCRATCH : SCRATCH + 1], 0
-    accelerate(t, y, system, loops)
+    place_of_next, loaded, n = system.settings[SCRATCH : SCRATCH + 1], 0, y.shape[0]
+    find_rates(t, y, system.watched[1 + n : 1 + 2 * n], system, loops)
+    store_watched(t, y, system)
     for c in range(system.contacts.shape[0]):
         loaded |= system.contacts[c, LOADS] > 0
     if loaded != 0:

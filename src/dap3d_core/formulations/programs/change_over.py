@@ -76,14 +76,14 @@ class ChangeOver:
         """
         model = evaluator.model
         self._evaluator, self._varied, self._count = evaluator, varied, count
-        self._name: str | None = None
+        #: Names of the programs, by modes of contacts.
+        self._names: dict[Any, str] = {}
         #: Constants of the programs: where they stand, and their numbers.
         self._parts: list[tuple[Floats, Integers]] = []
         self._constants = b""
         sizes = model.body_count, model.row_count, len(evaluator.loop_groups)
         self._key = evaluator.method, *sizes, count
-        # friction of contacts is solved for, in passes; joints may break
-        takes_one = not (model.contact_count or model.breaks)
+        takes_one = not model.breaks and (varied is None or not model.contact_count)
         self._is_open = jit_is_on() and takes_one and 0 < model.body_count <= MOST_BODIES
 
     def during(self, integration: Any, run: "Callable[[], object]") -> None:
@@ -96,9 +96,13 @@ class ChangeOver:
         def counts() -> tuple[int, int]:
             return work.rhs_count, work.projection_count
 
+        def start() -> "tuple[float, Floats]":
+            state, of_elements = integration.trial, slice(-1 - self._evaluator.states.size, -1)
+            state[of_elements] = integration.y[of_elements]
+            return integration.t, state
+
         if self._is_open and integration.takes_programs:
-            addresses = self._evaluator.functions.addresses
-            self.call(run, addresses, lambda: (integration.t, integration.trial), counts)
+            self.call(run, self._evaluator.functions.addresses, start, counts)
         else:
             run()
 
@@ -122,7 +126,8 @@ class ChangeOver:
             counts: right-hand sides and projections so far.
             needs_programs: do not make it without them.
         """
-        record = self._record_of(start)
+        modes = self._modes(start)
+        record = self._record_of(modes, start)
         # taken at once, as another thread may give them up
         programs = None if record is None else record.programs
         if record is None or not programs:
@@ -130,7 +135,7 @@ class ChangeOver:
                 return
             clock = time.perf_counter()
             run()
-            _spent[self._key] = _spent.get(self._key, 0.0) + time.perf_counter() - clock
+            _spent[modes] = _spent.get(modes, 0.0) + time.perf_counter() - clock
             return
         general, done = addresses.copy(), counts()
         replaced = [(k, programs[k]) for k in MOST_FAILURES if k in programs]
@@ -149,34 +154,44 @@ class ChangeOver:
             if program.failures() - before > 1 + most:
                 _give_up(record, program, k, start())
 
-    def _record_of(self, start: "Start") -> Record | None:
+    def _modes(self, start: "Start") -> Any:
+        """A rough description of the scene, with the modes of its contacts."""
+        if not (self._is_open and self._evaluator.model.contact_count):
+            return self._key
+        from dap3d_core.formulations.programs.contact_modes import mode_states
+
+        return self._key, *(array.tobytes() for array in mode_states(self._evaluator, start()[1]))
+
+    def _record_of(self, modes: Any, start: "Start") -> Record | None:
         """The record, where this call may run its programs."""
-        if not self._is_open or _spent.get(self._key, 0.0) < LOAD_AFTER:
+        if not self._is_open or _spent.get(modes, 0.0) < LOAD_AFTER:
             return None
         from dap3d_core.formulations.programs import scene_program
 
-        if self._name is None:
+        if not self._parts:
             if not scene_program.is_optimised(self._evaluator):
                 return None
             self._parts = scene_program.constant_parts(self._evaluator, self._varied)
             self._constants = scene_program.constant_numbers(self._parts)
-            of = start()[1].size, self._constants, self._varied
-            self._name = scene_program.name_of(self._evaluator, *of)
         if self._constants != scene_program.constant_numbers(self._parts):
             return None
-        record = _records.get(self._name)
+        name = self._names.get(modes)
+        if name is None:
+            of = start()[1].size, self._constants + repr(modes).encode(), self._varied
+            name = self._names[modes] = scene_program.name_of(self._evaluator, *of)
+        record = _records.get(name)
         if record is not None and record.programs:
             return record
         with _making:
-            record = _records.setdefault(self._name, Record())
+            record = _records.setdefault(name, Record())
             if not (record.programs or record.reason):
                 try:
-                    self._make(record, self._name, start)
+                    self._make(record, name, modes, start)
                 except Exception as error:  # the general code runs on, whatever it was
                     record.reason = f"{type(error).__name__}: {error}"
         return record if record.programs else None
 
-    def _make(self, record: Record, name: str, start: "Start") -> None:
+    def _make(self, record: Record, name: str, modes: Any, start: "Start") -> None:
         """Load programs that the cache folder has, or let them be compiled."""
         from dap3d_core.formulations.programs import scene_program
 
@@ -185,7 +200,7 @@ class ChangeOver:
             path.unlink(missing_ok=True)
         stored = None if path is None else objects.read_object(path)
         if stored is None:
-            if record.is_requested or _spent.get(self._key, 0.0) < MAKE_AFTER:
+            if record.is_requested or _spent.get(modes, 0.0) < MAKE_AFTER:
                 return
             place, others = record.first or record.anew or start(), None
             if record.anew is None:

@@ -17,7 +17,12 @@ import numpy as np
 from dap3d_core.assembly.arrays import Floats, Integers
 from dap3d_core.formulations import OUTCOMES, PROJECT, RHS, WATCH
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
-from dap3d_core.formulations.programs.symbolic_arrays import SymbolicSystem, Varied, constants
+from dap3d_core.formulations.programs.symbolic_arrays import (
+    SymbolicSystem,
+    Varied,
+    constants,
+    word_of,
+)
 from dap3d_core.formulations.programs.ways import Results, merged
 from dap3d_core.interface.codegen.compile_loops import write
 from dap3d_core.kernels.compiler import objects
@@ -65,6 +70,15 @@ define i64 @{counter}() nounwind {{
 }}
 """
 _HEAD = "  br label %program"
+#: Of a right-hand side where switches were read before at this state: it is known.
+_WATCHED_HEAD = """  %at = getelementptr inbounds i64, ptr %system, i64 {word}
+  %watched = load ptr, ptr %at, align 8
+  %time = load double, ptr %watched, align 8
+  %valid = fcmp oeq double %time, %t
+  br i1 %valid, label %known, label %program
+known:
+  call void @{rhs}({arguments})
+  ret void"""
 #: Of a projection at a state whose right-hand side was not the last one evaluated.
 _PROJECTION_HEAD = """  %first = load double, ptr %out, align 8
   %valid = fcmp oeq double %first, 1.0
@@ -151,6 +165,8 @@ def write_program(
     def trace(state: Floats) -> tuple[Results, Any]:
         system = SymbolicSystem(evaluator, tracer, varied)
         y, outcome = _items(tracer, "%y", state), _items(tracer, "%out", first)
+        places, modes = mode_states(evaluator, state)
+        y[places] = modes
         t_now = Symbol(tracer, tracer.at(t.Value(t.FLOAT, ("%t",)), time))
         out = results(evaluator, k, t_now, y, outcome, system.struct)
         stores: list[tuple[Callable[[], str], int, Any]] = [
@@ -181,13 +197,22 @@ def _items(tracer: StraightLine, base: str, numbers: Floats) -> Any:
     )
 
 
+def mode_states(evaluator: Evaluator, state: Floats) -> tuple[Integers, Floats]:
+    """Places in a state of constants that contacts have there, and their numbers."""
+    if not evaluator.model.contact_count:
+        return np.zeros(0, dtype=np.int64), np.zeros(0)
+    from dap3d_core.formulations.programs import contact_modes
+
+    return contact_modes.mode_states(evaluator, state)
+
+
 def name_of(evaluator: Evaluator, size: int, numbers: bytes, varied: Varied = None) -> str:
     """Name of the programs of an evaluator: a digest of all that decides them.
 
     Args:
         evaluator: of the scene.
         size: of the state.
-        numbers: constants of the programs.
+        numbers: constants of the programs, modes of contacts among them.
         varied: as of ``constants``.
     """
     parts: list[str | bytes] = [f"{size} {evaluator.model.input_rows}", numbers]
@@ -265,6 +290,9 @@ def write_programs(
         general[k], head = _named(entries[k]), _HEAD
         program, counter = symbols_of(name, k)
         names = {"name": program, "counter": counter, "general": general[k]}
+        if k == RHS and evaluator.system.watched.size:
+            word = word_of(evaluator.system, "watched")
+            head = _WATCHED_HEAD.format(word=word, rhs=general[RHS], arguments=ARGUMENTS)
         if k == PROJECT:
             given = {"project": general[PROJECT], "arguments": ARGUMENTS}
             head = _PROJECTION_HEAD.format(**given)

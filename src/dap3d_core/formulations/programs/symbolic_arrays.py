@@ -23,6 +23,10 @@ from dap3d_core.kernels.compiler.units import address_of
 from dap3d_core.kernels.runtime.array_struct import Arrays
 from dap3d_core.kernels.runtime.loop_support import MASS
 
+#: Arrays that outlive an evaluation.
+KEPT = (*CHECKPOINTED, "watched")
+#: Numbers of arrays in which nothing is ever written that is not zero, or that no program reads.
+UNREAD = {"nu": 0.0, "watched": np.nan}
 #: Numbers of ``settings`` that a run changes.
 COUNTED = (SCRATCH, UNSETTLED, SINGULAR, DOUBTFUL)
 #: Members of a system -> flat indices of numbers that differ from run to run; None: all runs are
@@ -72,6 +76,13 @@ def _of_rows(array: Floats, columns: slice) -> Integers:
     return np.flatnonzero(chosen)
 
 
+def word_of(arrays: Arrays, name: str) -> int:
+    """Which word of a struct the address of a member is."""
+    members = arrays.type_of().members
+    before = members[: [member for member, _ in members].index(name)]
+    return sum(len(type_.words) for _, type_ in before)
+
+
 class SymbolicStruct:
     """A class of arrays whose floats are symbols; its scalars are items of these."""
 
@@ -105,11 +116,10 @@ class SymbolicSystem:
 
     def symbolic(self, arrays: Arrays, base: Callable[[], str], before: str) -> SymbolicStruct:
         """The arrays of a struct; ``base`` gives its address, ``before`` begins names."""
-        struct, word = SymbolicStruct(self._tracer, type(arrays).scalars), 0
+        struct = SymbolicStruct(self._tracer, type(arrays).scalars)
         for name, type_ in arrays.type_of().members:
             member = getattr(arrays, name)
-            pointer = self.pointer(base, word)
-            word += len(type_.words)
+            pointer = self.pointer(base, word_of(arrays, name))
             if isinstance(type_, Struct) and member is not None:
                 member = self.symbolic(member, pointer, f"{before}{name}.")
             elif isinstance(type_, Array) and type_.item is FLOAT:
@@ -133,12 +143,11 @@ class SymbolicSystem:
         symbols = self._memory[id(root)][1][first : first + array.size]
         numbers = array.ravel().tolist()
         for k, number in enumerate(numbers):
-            if symbols[k] is None:  # of rows that do not move nothing is ever written
-                item = Item(self._tracer, (pointer, k), number)
-                symbols[k] = 0.0 if name == "nu" else item
+            if symbols[k] is None:
+                symbols[k] = UNREAD.get(name, Item(self._tracer, (pointer, k), number))
         for k in self._constants.get(name, ()):
             symbols[k] = numbers[k]
-        if name in CHECKPOINTED:
+        if name in KEPT:
             self._kept.append((name, symbols, pointer, symbols.copy()))
         return symbols.reshape(array.shape)
 

@@ -1,4 +1,8 @@
-"""The state at the end of a step without contacts, by the explicit midpoint rule in parts."""
+"""The state at the end of a step without contacts, by the explicit midpoint rule in parts.
+
+Forces are those along the way that bodies go with the accelerations that contacts gave them in the
+last step: a damper of what rests has none.
+"""
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
 # mypy: disable-error-code="no-any-return"
@@ -6,8 +10,9 @@
 import math
 from typing import Any
 
-from dap3d_core.assembly.arrays import System, coordinate_offset
+from dap3d_core.assembly.arrays import System, coordinate_offset, velocity_offset
 from dap3d_core.integrators.moreau.arrays import StepArrays
+from dap3d_core.integrators.moreau.contact_set import axes_of
 from dap3d_core.integrators.stepping.integration_state import TRIAL, Function, Y
 from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats
@@ -21,7 +26,7 @@ PART, RENEWED, RATE_PASSES, RATE_CHANGE, MOST_PARTS = 0.25, 25, 8, 1e-7, 1000
 
 @compiled
 def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: Any) -> None:
-    """Put the state at the end of the step without contacts, as the trial state."""
+    """Put the state at the end of the step with the last accelerations, as the trial state."""
     t, y, free, size = work.t, work.state[Y], work.state[TRIAL], work.state.shape[1]
     slope, middle = s.slopes[:size], s.slopes[size:]
     if work.step_count % RENEWED == 0:
@@ -36,9 +41,11 @@ def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: 
     for k in range(parts):
         begun = t + k * h
         rhs(begun, free, slope, system, loops)
+        add_pushed(work.pushed, free, slope)
         for i in range(size):
             middle[i] = free[i] + 0.5 * h * slope[i]
         rhs(begun + 0.5 * h, middle, slope, system, loops)
+        add_pushed(work.pushed, middle, slope)
         for i in range(size):
             free[i] += h * slope[i]
         for i in range(s.y_free.size if s.load_count.size > 0 else 0):
@@ -46,6 +53,20 @@ def move_freely(work: Any, s: StepArrays, rhs: Function, system: System, loops: 
         for b in range(1, s.mass.size):
             normalise(free, coordinate_offset(b) + 3)
         work.rhs_count += 2
+
+
+@compiled
+def add_pushed(pushed: Floats, y: Floats, slope: Floats) -> None:
+    """Add accelerations by contacts, whose turning is in global axes, to dy/dt."""
+    n = pushed.shape[0] - 1
+    for b in range(1, n + 1 if pushed[0, 0] != 0.0 else 1):
+        p, f, a = y[coordinate_offset(b) :], velocity_offset(b, n), pushed[b]
+        for k in range(3):
+            slope[f + k] += a[k]
+            c, d, e = axes_of(p, k)
+            slope[f + 3] += c * a[3 + k]
+            slope[f + 4] += d * a[3 + k]
+            slope[f + 5] += e * a[3 + k]
 
 
 @compiled

@@ -48,7 +48,7 @@ def _measure() -> Scalar[float]:
 class MoreauState(IntegrationState):
     """State of an integration by time stepping."""
 
-    types: ClassVar[dict[str, Any]] = {**IntegrationState.types, "memory": MATRIX}
+    types: ClassVar[dict[str, Any]] = {**IntegrationState.types, "memory": MATRIX, "pushed": MATRIX}
 
     rate = _measure()  # largest one of the forces without contacts, 1/s
     largest_residual = _measure()  # of all steps, a part of the largest impulse of each
@@ -61,6 +61,7 @@ class MoreauState(IntegrationState):
     overlap_key = _measure()  # of that contact
 
     memory: Floats  # (room, 5) key of a contact, or -1, its impulse, N s, and its mode
+    pushed: Floats  # (n + 1, 6) accelerations by contacts, global axes; 1 in the first item if any
     measures: Floats  # scalars
 
 
@@ -87,7 +88,12 @@ class MoreauIntegration(Integration):
         model = self._evaluator.model
         shapes = 0 if model.collisions is None else np.count_nonzero(model.collisions.body)
         memory = np.full((KEPT * shapes + model.contact_count, 5), -1.0)
-        return {"memory": memory, "measures": np.zeros(len(MoreauState.indices("measures")))}
+        pushed = np.zeros((model.body_count + 1, 6))
+        return {
+            "memory": memory,
+            "pushed": pushed,
+            "measures": np.zeros(len(MoreauState.indices("measures"))),
+        }
 
     @property
     def loop_arguments(self) -> tuple[Any, ...]:

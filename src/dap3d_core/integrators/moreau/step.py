@@ -47,10 +47,10 @@ from dap3d_core.kernels.runtime.cache import compiled
 OVERLAP, PASSES = 1e-12, 8
 #: A contact collides where it approaches by more than this times h times the acceleration.
 COLLIDES = 4.0
-#: Parts of the step where bodies are not hit, and those of them that rest.
-NOT_HIT, RESTS = 2.0, 1.5
-#: Velocities of rest, as parts of what they would become without contacts.
-STILL = 1e-8
+#: Part of the step where bodies are not hit.
+NOT_HIT = 2.0
+#: Parts of a step by which times differ that are meant to be one.
+SAME_TIME = 1e-9
 #: Margin of contacts, as parts of the way of a step, and m of a scene of ordinary size.
 MARGIN, LEAST_MARGIN = 1.2, 1e-6
 #: Stages of a step that waits for room: the trial state is that without contacts; it is that where
@@ -69,7 +69,7 @@ def advance(
     limit = work.rhs_count + budget
     while s.stage != 0 or goes_on(work, s, functions, system, loops, limit):
         if s.stage == 0:
-            s.t1 = min(end_of_step(work), work.step_limit)
+            s.t1 = next_end(work)
             s.h = s.t1 - work.t
             move_freely(work, s, functions[0], system, loops)
             s.stage = FREE
@@ -86,6 +86,16 @@ def advance(
         finish(work, s, functions, system, loops)
     if s.stage != 0 and s.is_exported != 0:
         work.t_stop, work.status, s.stage = s.t1, NO_ROOM, 0
+
+
+@compiled
+def next_end(work: Any) -> float:
+    """The time at which the step that comes next ends.
+
+    A limit that rounding alone keeps from it makes no step, whose forces would be rounding.
+    """
+    t1, limit = end_of_step(work), work.step_limit
+    return max(t1, limit) if abs(limit - t1) <= SAME_TIME * (t1 - work.t) else min(t1, limit)
 
 
 @compiled
@@ -116,6 +126,9 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     y, trial, n = work.state[Y], work.state[TRIAL], s.mass.size - 1
     take_velocities(y, n, s.before)
     take_velocities(trial, n, s.free)
+    for b in range(1, n + 1 if work.pushed[0, 0] != 0.0 else 1):
+        for k in range(6):
+            s.free[b, k] -= s.h * work.pushed[b, k]
     put_margins(s)
     if not find_contacts(work.t, y, FAR_APART, s, system, loops):
         return False
@@ -127,7 +140,7 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
     else:  # what the projection of the last step has left
         work.deepest = max(work.deepest, deepest_of(s))
     s.is_solved = s.met_count = 0
-    if s.contact_count == 0:
+    if s.contact_count == 0 and work.pushed[0, 0] == 0.0:
         for b in range(n + 1):
             copy(s.end[b], s.free[b])
         return True
@@ -148,46 +161,42 @@ def meet(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         return False
     s.is_solved = 1
     work.largest_residual = max(work.largest_residual, s.residual)
-    for b in range(n + 1):
-        copy(s.end[b], s.v[b])
     remember(work, s)
     keep_for_reports(s)
+    for b in range(n + 1):
+        copy(s.end[b], s.v[b])
     for b in range(1, n + 1):
         c, d = coordinate_offset(b), s.trial[b]
-        if s.hit[b] > 1.0 and rests(s, b):
-            s.hit[b] = RESTS
-        if s.hit[b] < NOT_HIT:  # from where it was
-            for k in range(7):
-                trial[c + k] = y[c + k]
+        for k in range(7 if s.hit[b] != NOT_HIT else 0):  # from where it was
+            trial[c + k] = y[c + k]
         for k in range(6):
-            d[k] = way_of(s, b, k)
+            d[k] = way_of(work, s, b, k)
         move(trial, c, d[0], d[1], d[2], d[3], d[4], d[5])
     trial[trial.size - 1] += work_done(work, s)
+    keep_pushed(work, s)
     return True
 
 
 @compiled
-def way_of(s: StepArrays, b: int, k: int) -> float:
-    """How far a body goes by impulses; one that is hit, or rests, at all."""
+def way_of(work: Any, s: StepArrays, b: int, k: int) -> float:
+    """How far a body goes by impulses; one that is hit, at all."""
     before, free, end, first = s.before[b, k], s.free[b, k], s.end[b, k], s.hit[b]
-    if first > 1.0:
-        return 0.5 * s.h * (end - free if first == NOT_HIT else before + end)
+    if first == NOT_HIT:
+        return 0.5 * s.h * (end - free - s.h * work.pushed[b, k])
     fall, last = s.flies[b] * (free - before), 1.0 - first
     return s.h * (first * (before + 0.5 * first * fall) + last * (end - 0.5 * last * fall))
 
 
 @compiled
-def rests(s: StepArrays, b: int) -> bool:
-    """True of a body at rest that something would turn: turned and turned back it would creep.
-
-    By (h w)^3 / 12 in each step, by which Euler parameters that are made of unit length are off.
-    """
-    turn, v, w = 0.0, 0.0, 0.0
-    for k in range(3):
-        turn = max(turn, abs(s.free[b, 3 + k] - s.before[b, 3 + k]))
-        v = max(v, abs(s.before[b, k]), abs(s.end[b, k]))
-        w = max(w, abs(s.before[b, 3 + k]), abs(s.end[b, 3 + k]))
-    return turn > 0.0 and w <= STILL * turn and v <= STILL * turn * s.length
+def keep_pushed(work: Any, s: StepArrays) -> None:
+    """Keep the accelerations that contacts have given; those of impacts do not go on."""
+    work.pushed[0, 0] = 0.0
+    for b in range(1, s.end.shape[0]):
+        for k in range(6):
+            change = s.end[b, k] - s.free[b, k] if s.hit[b] == NOT_HIT else 0.0
+            work.pushed[b, k] = change / s.h
+            if change != 0.0:
+                work.pushed[0, 0] = 1.0
 
 
 @compiled
@@ -293,7 +302,7 @@ def work_done(work: Any, s: StepArrays) -> float:
         for k in range(6):
             way = s.trial[b, k]
             if s.hit[b] < NOT_HIT:
-                way -= 0.5 * s.h * (s.before[b, k] + s.free[b, k])
+                way -= 0.5 * s.h * (s.before[b, k] + s.free[b, k] + s.h * work.pushed[b, k])
             s.change[k], s.turned[k] = s.free[b, k] - s.before[b, k], way / s.h
         total += product_of(s.change, s.turned, s.mass[b], s.spin[b])
         if s.flies[b] == 0.0:

@@ -396,7 +396,12 @@ def _check_fields(type_: type[TypeBase]) -> None:
 def _check_members(type_: type[TypeBase]) -> None:
     """A public function that nothing calls is a misspelt kernel."""
     kind = type_.kind
-    allowed = [*type_.kernel_names, "prepare", *["breaks"] * (getattr(type_, "arguments", 0) == 1)]
+    allowed = [
+        *type_.kernel_names,
+        "prepare",
+        "prepare_functions",
+        *["breaks"] * (getattr(type_, "arguments", 0) == 1),
+    ]
     for name, value in vars(type_).items():
         is_public = isinstance(value, (staticmethod, FunctionType)) and not name.startswith("_")
         if is_public and name not in allowed:

@@ -253,6 +253,8 @@ class ParameterMap:
         spec = specs_of(type_).get(field)
         if spec is None or spec.kind not in ("number", "vec3"):
             raise NotCopiedError
+        if type_.prepare_functions is not TypeBase.prepare_functions:
+            raise NotCopiedError
         if table == "joints" and self._has_angle(name):
             raise NotCopiedError  # its axis may depend on the number
         if field.endswith(TOLERANCE) and field.removesuffix(TOLERANCE) in type_.state_lengths():

@@ -66,6 +66,30 @@ def test_switches_have_programs(at_once):
     assert set(programs(at_once)) == {RHS, PROJECT, BEHIND, WATCH}
 
 
+def sliding_rod():
+    """It lies on a floor, slides along itself and turns until it rests."""
+    scene = dap.Scene(name="rod")
+    scene.add_body("rod", mass=1.0, Jp=[0.01, 0.1, 0.1], r=[0.0, 0.0, 0.05], r_dot=[0.2, 0.1, 0.0])
+    scene.add_force("weight", "g")
+    ends = {"P_i": "foot", "Q_i": "tip"}
+    scene.add_point("foot", "rod", [-0.5, 0.0, 0.0])
+    scene.add_point("tip", "rod", [0.5, 0.0, 0.0])
+    scene.add_contact("capsule_plane", "floor", **ends, radius=0.05, mu=0.3)
+    return scene
+
+
+@pytest.mark.parametrize("method", ["lsq", "joint"])
+def test_contacts_run_by_programs_of_their_modes(method, at_once):
+    """One for each set of modes; where switches have just been read rates are known."""
+    for _ in range(2):
+        result = dap.simulate(sliding_rod(), method=method, **SETTINGS)
+        assert_same(result, general(sliding_rod(), method=method))
+    assert {"stick"} <= {event.kind for event in result.events}
+    assert len(at_once) > 1
+    assert not any(record.reason for record in at_once.values())
+    assert all({RHS, WATCH} <= set(record.programs) for record in at_once.values())
+
+
 @pytest.mark.every(2)
 @pytest.mark.parametrize("method", ["standard", "joint"])
 def test_derivatives_run_by_programs(method, at_once, monkeypatch):
@@ -105,7 +129,7 @@ def test_controllers_run_by_programs(at_once):
 @pytest.mark.parametrize("record", [None, change_over.Record()])
 def test_a_call_that_needs_programs_is_not_made_without_them(record, monkeypatch):
     """Also where another thread has just given them up."""
-    monkeypatch.setattr(ChangeOver, "_record_of", lambda self, start: record)
+    monkeypatch.setattr(ChangeOver, "_record_of", lambda self, modes, start: record)
     calls, addresses = [], np.zeros(2, dtype=np.int64)
     call = ChangeOver(dap.compile("pen1").evaluator).call
     given = addresses, lambda: (0.0, np.zeros(0)), lambda: (0, 0)
