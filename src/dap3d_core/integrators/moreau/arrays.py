@@ -259,7 +259,7 @@ def _put_carried(s: StepArrays) -> None:
         bodies = s.row_body[first:last]
         carried[bodies] = np.maximum(carried[bodies], own[bodies].max(axis=0))
     light = (own < LIGHT * carried).any(axis=1)
-    s.carried[light], s.light_count = 1.0 / carried[light], np.count_nonzero(light)
+    s.carried[light], s.light_count = 1.0 / carried[light], int(light.sum())
 
 
 def _of_bodies(model: Model) -> dict[str, Any]:
