@@ -286,6 +286,7 @@ class ContactJumps(Jumps):
                   and (before[c] > 0.5 or near[c] or (c, 0) in ended)]  # fmt: skip
         sliding, leaving, stopped = self._what_ended(rows, outputs, before, ended)
         closed = self._movable(rows, closed)
+        opening = {c for c, _ in ended if before[c] < 0.5 and rows.closing[c] > 0.0}
         impact = collide(table, rows, closed, evaluator.model.length)
         table.find_grips(t, rows.with_velocities(rows.v))
         try:
@@ -296,7 +297,7 @@ class ContactJumps(Jumps):
         others = [c for c in closed if modes.mode[c] < 0.5]
         rows.change(rows.lifted(rows.closing, held, others))
         gaps = np.where(np.abs(outputs[:, GAP]) < touching, outputs[:, GAP], 0.0)
-        moved = self._apart(rows, gaps, held, others)
+        moved = self._apart(rows, gaps, held, others, opening)
         states = evaluator.states.copy()
         states[table.mode], states[table.way], states[table.near] = (
             modes.mode, modes.way, modes.near
@@ -338,14 +339,18 @@ class ContactJumps(Jumps):
             "Coulomb's law goes on from here"
         )
 
-    def _apart(self, rows: ContactRows, gaps: Floats, held: list[int], others: list[int]) -> Floats:
+    def _apart(
+        self, rows: ContactRows, gaps: Floats, held: list[int], others: list[int], opening: set[int]
+    ) -> Floats:
         """(6 n,) changes of positions that close the gaps of what holds, and part what overlaps.
 
-        What opens from rest would stop the run again where its gap is as deep as a switch passes.
+        What opens from rest, or opened already, would stop the run again where its gap is as deep
+        as a switch passes.
         """
         rounding = POSITION_ROUNDING * self._evaluator.model.length
         still = AT_REST * self._evaluator.model.length
-        deep = [c for c in others if rows.closing[c] < still and gaps[c] < -0.5 * rounding]
+        deep = [c for c in others
+                if (rows.closing[c] < still or c in opening) and gaps[c] < -0.5 * rounding]  # fmt: skip
         return rows.lifted(gaps, [*held, *deep], others, 2.0 * rounding)
 
     def _outputs(self, t: float, u: Floats) -> Floats:
