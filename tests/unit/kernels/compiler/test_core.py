@@ -149,10 +149,12 @@ NOT_CALLED = {
         "integrators.moreau.newton": (
             "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of add_load "
             "put_velocities clear add_pull times_inverse add_inverse speed_of left_at residual_of "
-            "newton exchange put_rest product_of solve_round try_pass assemble put_turned "
-            "add_contact"
+            "residual_after newton exchange put_rest product_of solve_round try_pass assemble "
+            "put_turned add_contact"
         ),
-        "integrators.moreau.problem": "prepare_problem solve judge sweep finish refine_groups",
+        "integrators.moreau.problem": (
+            "prepare_problem take_carried felt_by solve judge sweep finish refine_groups"
+        ),
         "integrators.moreau.restitution": (
             "limit_bounces any_gains put_work part_without_gain mix"
         ),
