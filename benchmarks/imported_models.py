@@ -12,7 +12,8 @@ fluids are off. Files that are refused are listed with the reason.
 
 With --contacts MJCF files alone are compared with MuJoCo as it is hardest: moved for half a second
 from their first named keyframe or pose, then at rest, with rigid limits, contacts and friction. A
-row has the largest difference of accelerations relative to the largest, or 1, and the contacts.
+row has the largest difference of accelerations relative to the largest, or 1; that from rigid
+contacts with Coulomb's law, solved with MuJoCo's own matrices; and the contacts.
 
 With --count each file is imported with contacts and no option but a root, its folder: a row says
 whether it was, or why not; the sums are of the files that MuJoCo reads (SDF: of all) and in which
@@ -156,7 +157,10 @@ def differences(oracle, scene, names, *, accelerations):
 
 
 def compare_contacts(path, root):
-    """The largest difference of accelerations with contacts; contacts of both; what is left out."""
+    """The largest differences of accelerations with contacts; contacts of both; what is left out.
+
+    The second one is from rigid contacts with Coulomb's law by MuJoCo's own matrices.
+    """
     from support.hard_mujoco import HardOracle
 
     try:
@@ -181,6 +185,15 @@ def compare_contacts(path, root):
             del scene.forces[force]
     result = dap.simulate(scene, t_end=STEP, dt=STEP, contact_step=STEP, contact="stepping")
     found = np.hstack([result.rd[-1] - result.rd[0], result.w[-1] - result.w[0]]) / STEP
+    worst = largest_difference(oracle, scene, result, found)
+    oracle.follow_coulomb()
+    worst = worst, largest_difference(oracle, scene, result, found)
+    left = [one.text for one in report.left_out if one.motion and not SOFT & {*one.text.split()}]
+    return worst, (int(oracle.data.ncon), len(result.contacts.t)), left
+
+
+def largest_difference(oracle, scene, result, found):
+    """The largest difference of accelerations found, relative to the largest or 1."""
     places, pairs = {name: k for k, name in enumerate(scene.bodies)}, []
     for name, (com, a) in oracle.accelerations():
         apart = np.abs(result.r[0] - com).max(axis=1)  # of one without a name the nearest
@@ -189,9 +202,7 @@ def compare_contacts(path, root):
     if not pairs:
         raise PeerError("no body that both have")
     largest = max(1.0, *(np.abs(a).max() for _, a in pairs))
-    worst = max(np.abs(here - a).max() for here, a in pairs) / largest
-    left = [one.text for one in report.left_out if one.motion and not SOFT & {*one.text.split()}]
-    return worst, (int(oracle.data.ncon), len(result.contacts.t)), left
+    return max(np.abs(here - a).max() for here, a in pairs) / largest
 
 
 def count(path, root):
@@ -265,14 +276,15 @@ def main():
         _summarise_contacts(rows) if options.contacts else _summarise(rows)
     if options.csv:
         with options.csv.open("w", newline="") as file:
-            columns = ("file", "peer", "end", "bodies", *COLUMNS, "contact", "seconds", "why")
+            columns = ("file", "peer", "end", "bodies", *COLUMNS, "contact", "coulomb", "seconds",
+                       "why")  # fmt: skip
             writer = csv.DictWriter(file, columns, extrasaction="ignore")
             writer.writeheader()
             writer.writerows(rows)
 
 
 def _print(row, base):
-    figures = "  ".join(f"{row[c]:8.1e}" for c in (*COLUMNS, "contact") if c in row)
+    figures = "  ".join(f"{row[c]:8.1e}" for c in (*COLUMNS, "contact", "coulomb") if c in row)
     name = str(Path(row["file"]).relative_to(base))[-50:]
     print(f"{name:50} {row['peer']:9} {row['end']:8} {figures} {row['why'][:90]}", flush=True)
 
@@ -290,8 +302,10 @@ def _summarise(rows):
 def _summarise_contacts(rows):
     """Print how many models were read by both, and how many of those that touch are within."""
     print(dict(Counter(row["end"] for row in rows)))
-    values = [row["contact"] for row in rows if row["end"] == "ok" and row["bodies"]]
-    print(f"  with contacts: {sum(v <= RIGID for v in values)} of {len(values)} within {RIGID:g}")
+    for column, what in (("contact", "MuJoCo's"), ("coulomb", "Coulomb's law")):
+        values = [row[column] for row in rows if row["end"] == "ok" and row["bodies"]]
+        within = sum(v <= RIGID for v in values)
+        print(f"  with contacts: {within} of {len(values)} within {RIGID:g} of {what}")
     values = [row["contact"] for row in rows if row["end"] == "ok" and not row["bodies"]]
     print(f"  without: {sum(v <= RIGID for v in values)} of {len(values)}")
 
@@ -324,7 +338,9 @@ def _row(path, peer, options, root):
             left = count(path, root)
             row |= {"left": left, "why": "; ".join(left)}
         elif options.contacts:
-            row["contact"], (row["bodies"], mine), left = compare_contacts(path, root)
+            (row["contact"], row["coulomb"]), (row["bodies"], mine), left = compare_contacts(
+                path, root
+            )
             row["why"] = f"{row['bodies']} contacts, {mine} here; {'; '.join(left[:3])}"
         else:
             worst, row["bodies"] = compare(path, peer, options.poses, root)

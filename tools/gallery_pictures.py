@@ -20,6 +20,7 @@ AT = {
     "humanoid": 2.0,
     "marble_run": 0.9,
     "quadruped": 0.4,
+    "sphere_box": 0.08,
     "crane": 1.5,
     "engine": 0.004,
     "excavator": 2.5,

@@ -10,6 +10,8 @@ EQUAL = 1e-9
 STILL = 1e-6
 #: What touches fits a hollow by this part of its radius.
 FITS = 0.98
+#: Another part of the curve is nearer by this part, beyond rounding.
+NEARER = 1e-6
 
 
 class Curve:
@@ -79,8 +81,8 @@ class Curve:
         x, y, _ = self.point.T
         return bool(sum(x[:-1] * y[1:] - x[1:] * y[:-1]) < 0.0)
 
-    def check_hollows(self, left: float, reach: float) -> None:
-        """Refuses what touches and is wider than a hollow: it would touch at two points.
+    def check_room(self, left: float, reach: float) -> None:
+        """Refuses what touches and is wider than a hollow or a neck: it would touch at two points.
 
         Args:
             left: 1.0: it is on the left of a plane curve, -1.0 on its right; 0.0: in space.
@@ -92,12 +94,20 @@ class Curve:
         bend = left * turn[:, 2] if left else np.linalg.norm(turn, axis=1)
         bend = bend / self.speed**3
         most = int(np.argmax(bend))
-        if reach * bend[most] > FITS:
+        tight = f"at s = {self.s[most]:g}, a hollow of radius {1.0 / max(bend[most], 1e-99):.4g} m"
+        fits = reach * bend[most] <= FITS
+        if fits and left:  # nearer to another part than to the one it touches
+            normal = np.cross([0.0, 0.0, left], self.first) / self.speed[:, None]
+            centre = self.point + reach * normal
+            away = np.linalg.norm(centre[:, None] - self.point[None], axis=2)
+            one, other = np.unravel_index(int(np.argmin(away)), away.shape)
+            fits = away[one, other] >= reach * (1.0 - NEARER)
+            tight = f"between s = {self.s[one]:g} and {self.s[other]:g}"
+        if not fits:
             raise ValueError(
-                f"{reach:g} m from the curve to the centre of what touches are too much for the "
-                f"hollow at s = {self.s[most]:g}, of radius {1.0 / bend[most]:.4g} m: it would "
-                "touch at two points; make it smaller, or give a contact for either side of the "
-                "hollow by s_min and s_max"
+                f"{reach:g} m from the curve to the centre of what touches are too much {tight}: "
+                "it would touch at two points; make it smaller, or give a contact for either part "
+                "of the curve by s_min and s_max"
             )
 
     def samples(self) -> Any:

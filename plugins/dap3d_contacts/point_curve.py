@@ -102,7 +102,7 @@ def without_rates(values):
     return tuple(getattr(value, "plain", value) for value in values)
 
 
-def before(samples, place):
+def nearest_sample(samples, place):
     """The parameter of that sample (s, *point) of a curve which is nearest to a place."""
     place = without_rates(place)
     start, least = 0.0, math.inf
@@ -132,7 +132,7 @@ def foot(place, start, curve):
     return s, left
 
 
-def within(s, left, s_min, s_max, is_closed):
+def reach_of(s, left, s_min, s_max, is_closed):
     """Not negative where a point of a curve is on it, and found."""
     reach = where(s - s_min < s_max - s, s - s_min, s_max - s)
     return where(is_closed > 0.5, 1.0, where(left < LEFT, reach, -1.0))
@@ -144,16 +144,16 @@ def parametric(*axes):
 
 
 def at_plane_curve(r_P_i, r_P_j, A_j, sense, samples, curve):
-    """``nearest``, of a curve given by its parameter, and ``foot``."""
+    """``nearest``, of a curve given by its parameter."""
     place = seen_from(r_P_i, r_P_j, A_j)
-    start = before([sample[:3] for sample in samples], place)
+    start = nearest_sample([sample[:3] for sample in samples], place)
     return nearest(place, start, sense, curve)
 
 
 def at_space_curve(r_P_i, r_P_j, A_j, samples, curve):
     """The distance of P_i from a curve in space, the direction away from it, the point nearest."""
     place = seen_from(r_P_i, r_P_j, A_j)
-    start = before(samples, place)
+    start = nearest_sample(samples, place)
     s, left = foot(place, start, curve)
     point = where(left < LEFT, curve(s)[0], curve(start)[0])
     d = sub(place, point)
@@ -176,10 +176,10 @@ class PointCurve(Contact):
     A plane curve goes on along z, as a plate does: where P_i is along z has no part. ``side``
     above is y > f(x), outside of what is closed, and left of a part, seen in the direction of s.
     f is of period 2 pi where it is polar, x, y and z of s_max - s_min where they are ``closed``.
-    All are smooth, and hollows wider than a roller. With ``x`` that point of the whole curve counts
-    which is nearest to P_i; from y = f(x) and polar ones the one next to where P_i is. Beyond
-    the ends of a part nothing touches; what may touch at two points at once has a contact for
-    each part.
+    All are smooth, and hollows and necks wider than a roller. With ``x`` that point of the whole
+    curve counts which is nearest to P_i; from y = f(x) and polar ones the one next to where P_i is.
+    Beyond the ends of a part nothing touches; what may touch at two points at once has a contact
+    for each part.
 
         gap = distance of P_i from the curve - radius,   less than nothing on the other side
         gap = distance - radius_j - radius of a wire, radius_j - distance - radius in a pipe
@@ -233,10 +233,10 @@ class PointCurve(Contact):
         if in_space:
             if sense < 0.0 and not self.radius_j > self.radius:
                 raise ValueError("what is in a pipe, side = below, has a radius below radius_j")
-            curve.check_hollows(0.0, sense * self.radius + self.radius_j)
+            curve.check_room(0.0, sense * self.radius + self.radius_j)
         else:
             sense = -sense if self.closed and not curve.is_clockwise() else sense
-            curve.check_hollows(sense, self.radius)
+            curve.check_room(sense, self.radius)
         return {"sense": sense, "samples": curve.samples()}
 
     gap, at, normal = kernels_of(of_height)
@@ -280,7 +280,9 @@ class InSpace(PointCurve, x=True, z=True):
     ):  # fmt: skip
         curve = parametric((x, x_dot, x_ddot), (y, y_dot, y_ddot), (z, z_dot, z_ddot))
         place = seen_from(r_P_i, r_P_j, A_j)
-        return within(*foot(place, before(samples, place), curve), s_min, s_max, is_closed)
+        return reach_of(
+            *foot(place, nearest_sample(samples, place), curve), s_min, s_max, is_closed
+        )
 
 
 class InPlane(PointCurve, x=True):
@@ -305,9 +307,9 @@ class InPlane(PointCurve, x=True):
         r_P_i, r_P_j, A_j, samples, s_min, s_max, is_closed, x, x_dot, x_ddot, y, y_dot, y_ddot
     ):
         place = seen_from(r_P_i, r_P_j, A_j)
-        start = before([sample[:3] for sample in samples], place)
+        start = nearest_sample([sample[:3] for sample in samples], place)
         curve = parametric((x, x_dot, x_ddot), (y, y_dot, y_ddot))
-        return within(*foot(place[:2], start, curve), s_min, s_max, is_closed)
+        return reach_of(*foot(place[:2], start, curve), s_min, s_max, is_closed)
 
 
 @hookimpl

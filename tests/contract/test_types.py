@@ -36,7 +36,7 @@ def test_every_kind_of_check_is_there():
     assert {check.name for checks in CHECKS.values() for check in checks} == {
         "J", "nu", "gamma", "virtual power", "assembly", "rank", "frame", "action and reaction",
         "friction power", "friction frame", "friction balance", "energy", "derivatives", "purity",
-        "plain", "compiled", "rate", "rate frame", "unilateral",
+        "plain", "compiled", "rate", "rate frame", "unilateral", "G",
         "impulse and reaction", "restitution", "round", "jump rows", "jump frame",
         "branches", "rest", "impulse energy", "velocity form", "unloaded", "normal",
     }  # fmt: skip

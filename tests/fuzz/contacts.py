@@ -1,7 +1,8 @@
 """Random scenes that touch with friction go on, or end with one clear error.
 Of balls and boxes, half of them with a linkage as well, that has limits, stops and friction.
-An input is the number of a scene. Energy is never gained, nothing sinks in, all numbers are
-finite."""
+An input is the number of a scene; from ``LEGS`` on a body stands on 2 to 4 legs that share it.
+Energy is never gained, nothing sinks in, all numbers are finite, and forces obey Newton's and
+Coulomb's laws, of which the scene alone says the numbers."""
 
 import time
 
@@ -19,16 +20,22 @@ SETTINGS = {"t_end": SPAN, "dt": SPAN / 60, "rtol": 1e-10, "atol": 1e-12, "integ
 #: between events a gap is as good as the state.
 GAIN, DEPTH = 1e-9, 1e-9
 #: Words of the errors that a run may end with.
-ENDINGS = ("jams", "ever faster", "asks for steps as short")
+ENDINGS = ("jams", "asks for steps as short")
+#: Number of the first scene of legs.
+LEGS = 10**6
+#: Forces, N, and slips, m/s, that are rounding of such scenes: forces are some 1e2, of slips of 1.
+FORCE, SLIP = 1e-6, 1e-8
 
 
 def numbers():
     """Numbers of scenes."""
-    return st.integers(0, 10**6).map(lambda n: str(n).encode())
+    return st.integers(0, 2 * LEGS).map(lambda n: str(n).encode())
 
 
 def scene_of(number):
-    """1 to 4 contacts: balls and boxes that fall on a floor, balls on each other."""
+    """1 to 4 contacts: balls and boxes that fall on a floor, balls on each other; or legs."""
+    if number >= LEGS:
+        return scene_on_legs(number)
     rng = np.random.default_rng(number)
     scene = dap.Scene(name=f"contacts {number}")
     scene.add_force("weight", "g")
@@ -105,6 +112,75 @@ def add_linkage(scene, rng):
         scene.add_force("ptp_stop", "rope", P_i="tip", P_j="rail", l_stop=0.6, side="max", e=0.2)
 
 
+def scene_on_legs(number):
+    """A body on 2 to 4 legs on a slope: at rest, sliding, falling, pulled, or with a pendulum."""
+    rng = np.random.default_rng(number)
+    scene = dap.Scene(name=f"legs {number}")
+    scene.add_force("weight", "g")
+    count, h = int(rng.integers(2, 5)), float(rng.uniform(0.1, 0.5))
+    angle = float(rng.choice([0.0, 0.2, 0.5]))
+    c, s = np.cos(angle), np.sin(angle)
+    R, p = (
+        np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]]),
+        [np.cos(angle / 2), 0, -np.sin(angle / 2), 0],
+    )
+    scene.add_vector("n", "ground", R[:, 2])
+    v, w = rng.choice([0.0, 1.0]) * R @ [*rng.normal(size=2), 0], R @ [0, 0, 3 * rng.normal()]
+    w, centre = w * rng.choice([0.0, 1.0]), h + float(rng.choice([0.0, 0.03]))
+    scene.add_body("b", mass=float(rng.uniform(0.5, 5)), Jp=0.05 * rng.uniform(1, 1.9, size=3), p=p,
+                   r=R @ [0, 0, centre], r_dot=v, w=w)  # fmt: skip
+    alike, law = rng.random() < 0.5, {}
+    for k in range(count):
+        if not (alike and law):
+            mu = float(rng.choice([0.0, 0.2, 0.5, 1.0]))
+            law = {"mu": mu, "mu_s": mu * float(rng.choice([1.0, 1.3])),
+                   "e": float(rng.choice([0.0, 0.4]))}  # fmt: skip
+        a, reach = 2 * np.pi * k / count + 0.3 * rng.normal(), rng.uniform(0.2, 0.4)
+        scene.add_point(f"f{k}", "b", [reach * np.cos(a), reach * np.sin(a), -h])
+        scene.add_contact("ball_plane", f"c{k}", P_i=f"f{k}", a_j="n", **law)
+    kind = rng.integers(3)
+    if kind == 1:
+        scene.add_point("A", "ground", R @ [rng.uniform(0.5, 1.5), 0.5 * rng.normal(), h])
+        scene.add_force("ptp", "spring", P_i="b.O", P_j="A", k=float(rng.uniform(2, 60)), l0=0.5)
+    elif kind == 2:
+        at = R @ [0.3, 0, 0.2]
+        scene.add_body("arm", mass=1.0, Jp=[0.001, 0.02, 0.02], p=p, r=R @ [0, 0, centre] + at,
+                       r_dot=v + np.cross(w, at), w=w)  # fmt: skip
+        scene.add_point("pin", "arm", [-0.3, 0, 0])
+        scene.add_point("eye", "b", [0, 0, 0.2])
+        scene.add_joint("rev", "hinge", P_i="pin", P_j="eye", a_i="arm.y", a_j="b.y")
+    return scene
+
+
+def check_laws(scene, contact, name):
+    """Complementarity and Coulomb's law of a contact of the scene, at all reported instants."""
+    fields = scene.contacts[name.split("#")[0]].fields
+    mu, N, T = fields["mu"], contact.normal_force, contact.friction
+    size, slip = np.linalg.norm(T, axis=-1), np.linalg.norm(contact.slip, axis=-1)
+    rest = FORCE * (1.0 + N)
+    open_, slides, sticks = (contact.mode == k for k in range(3))
+    assert np.all(N >= -FORCE), name
+    assert np.all(size[open_] + np.abs(N[open_]) == 0.0), name
+    assert np.all(np.abs(contact.gap[~open_]) <= DEPTH), name
+    assert np.all(size[sticks] <= (fields.get("mu_s", mu) * N + rest)[sticks]), name
+    assert np.all(slip[sticks] <= SLIP), name
+    fast = slides & (slip > 1e3 * SLIP)
+    against = T + mu * (N / np.where(fast, slip, 1.0))[..., None] * contact.slip
+    assert np.all(np.linalg.norm(against, axis=-1)[fast] <= rest[fast]), name
+    assert np.all(np.abs(size - mu * N)[slides] <= rest[slides]), name
+
+
+def check_newton(scene, result):
+    """Newton's law of a body on legs alone: weight, and what contacts say they push with."""
+    if not scene.name.startswith("legs") or len(scene.bodies) > 1 or "spring" in scene.forces:
+        return
+    n = np.asarray(scene.vectors["n"].sp)
+    contacts = [result.contact(name) for name in result.contact_names]
+    force = sum(c.normal_force[:, None] * n + c.friction for c in contacts)
+    left = scene.bodies["b"].mass * (result.rdd[:, 0] + [0.0, 0.0, 9.81]) - force
+    assert np.max(np.abs(left)) <= FORCE * (1.0 + np.max(np.abs(force)))
+
+
 def check_contacts(data: bytes) -> str:
     """How the run of a scene ended, in words."""
     scene, began = scene_of(int(data)), time.process_time()
@@ -129,5 +205,7 @@ def check_contacts(data: bytes) -> str:
     for name in names:
         contact = result.contact(name)
         assert np.min(contact.gap) >= -DEPTH, name
-        assert np.min(contact.normal_force) >= -1e-6, name
+        if name.split("#")[0] in scene.contacts:
+            check_laws(scene, contact, name)
+    check_newton(scene, result)
     return words or "done"

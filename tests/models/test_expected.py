@@ -15,7 +15,7 @@ EXPECTED = {
     if (folder / "expected.toml").exists()
 }
 #: Of forty loops, stiff, and of hundreds of steps with contacts.
-LONG = {"A02-40", "A05", "domino_row", "marble_run"}
+LONG = {"A02-40", "A05", "domino_row", "marble_run", "sphere_box"}
 COUNTS = ("rows", "rank", "dof")
 
 

@@ -65,6 +65,9 @@ def scene_for(type_info, rng, *, ground=None, values=None):
             del fields[name]
             for end in ("P_i", "P_j"):
                 fields[end] = scene.add_point(end, owner[end[-1]], rng.uniform(-1, 1, 3))
+    if type_info.layout.unknowns:  # off a bent curve the rows that remain turn: no rates of C
+        for function in scene.functions.values():
+            function.fields["coeff"] = [*function.fields["coeff"][:2], 0.0]
     getattr(scene, f"add_{type_info.type.kind}")(type_info.type.keyword, "element", **fields)
     return scene
 

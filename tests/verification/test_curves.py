@@ -182,6 +182,29 @@ def test_a_ball_swings_in_a_pipe():
     assert contact.at[-1] == pytest.approx([0.0, 0.0, -a - pipe], abs=TOLERANCE)
 
 
+def test_a_ball_rests_on_two_parts_of_a_hollow():
+    """In y = k x^2, where 1 + y'^2 = (2 k R)^2: each pushes m g k R; none beyond its end."""
+    k, radius, mass = 40.0, 0.1, 0.5
+    slope = np.sqrt((2.0 * k * radius) ** 2 - 1.0)
+    scene = dap.Scene(name="hollow")
+    scene.add_body("ball", mass=mass, Jp=[1e-3] * 3, r=[0.0, 1.0, 0.0])
+    scene.add_body("past", mass=mass, Jp=[1e-3] * 3, r=[1.2, 50.0, 0.0])
+    scene.add_force("weight", "g", wgt=[0.0, -1.0, 0.0])
+    scene.add_function("a", "x", coeff=[0.0, 1.0, 0.0])
+    scene.add_function("a", "y", coeff=[0.0, 0.0, k])
+    for body, name, ends in (("ball", "left", (-1.0, -0.03)), ("ball", "right", (0.03, 1.0)),
+                             ("past", "past", (0.03, 1.0))):  # fmt: skip
+        ends = {"s_min": ends[0], "s_max": ends[1]}
+        scene.add_contact("point_curve", name, P_i=f"{body}.O", x="x", y="y", radius=radius,
+                          **ends)  # fmt: skip
+    result = dap.simulate(scene, t_end=1.0, **TIGHT)
+    height = slope**2 / (4.0 * k) + 1.0 / (2.0 * k)  # of the point of contact, and of R / (2 k R)
+    assert result.r[-1, 0] == pytest.approx([0.0, height, 0.0], abs=TOLERANCE)
+    for name in ("left", "right"):
+        assert result.contact(name).normal_force[-1] == pytest.approx(mass * G * k * radius)
+    assert result.r[-1, 1, 1] == pytest.approx(50.0 - 0.5 * G, abs=TOLERANCE)
+
+
 def test_a_bead_slides_down_a_helix():
     """Along it by g sin(pitch) t^2 / 2, for several turns; the wire turned and moved on a body."""
     radius, rise = 0.3, 0.05
@@ -255,7 +278,13 @@ def test_curves_that_are_none_are_refused():
         scene.add_function("harmonic", "y", amplitude=0.2, frequency=1.0)
 
     refused("crosses itself, near s = .* has no outside", add_eight)
-    refused(r"0.3 m .* hollow at s = .*, of radius 0.2 m: .* two points", side="below", radius=0.3)
+    refused(r"0.3 m .* at s = .*, a hollow of radius 0.2 m: .* two", side="below", radius=0.3)
+    s = np.linspace(0.0, TURN, 121)
+    lobes = 1.0 + 0.7 * np.cos(2.0 * s)  # 0.6 wide in the middle
+    waist = [*(lobes * np.cos(s))[:-1], 1.7], [*(lobes * np.sin(s))[:-1], 0.0]
+    refused("0.31 m .* between s = .* and", add_lines(*waist, periodic=True), side="below",
+            radius=0.31)  # fmt: skip
+    dap.compile(cam(add_lines(*waist, periodic=True), side="below", radius=0.29))
     refused("s_max = -1 is not beyond s_min = 0", s_max=-1.0)
     refused("takes s_max, its end", s_max=None)
     refused("by x and y, or by x, y and z; this one has x", y=None)

@@ -600,3 +600,31 @@ def test_what_changes_the_motion_comes_first(tmp_path):
         assert moves[0]
     assert "contact" in report.left_out[0].text
     assert not report.left_out[-1].motion
+
+
+# --------------------------------------------------------------------------- contacts
+
+LEGS = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body pos="0 0 .1"><freejoint/>
+  <inertial mass=".01" pos="0 0 0" diaginertia="1e-5 1e-5 1e-5"/>{}</body></worldbody></mujoco>"""
+LEG = """<body euler="0 0 {}"><inertial mass=".001" pos="0 0 0" diaginertia="1e-6 1e-6 1e-6"/>
+  <body pos=".05 0 0"><joint axis="0 1 0" armature="1"/>
+  <inertial mass=".001" pos=".05 0 -.04" diaginertia="1e-6 1e-6 1e-6"/>
+  <geom type="sphere" size=".02" pos=".1 0 -.08000001"/></body></body>"""
+
+
+def test_feet_of_light_links_with_heavy_rotors_stick(tmp_path):
+    """A rotor of 1e6 times the moment of its leg gives no foot away: nothing accelerates.
+
+    By statics each leg carries N = W / 4, and N d = T d + m g d / 2 about its hip, d = 0.1 m; the
+    overlap of 1e-8 m at the start, without which gaps are rounding, turns legs by 1e-7.
+    """
+    text = LEGS.format("".join(LEG.format(angle) for angle in (0, 90, 180, 270)))
+    scene, _ = imported(tmp_path, text, "xml", contacts=True)
+    h = 1e-6
+    found = dap.simulate(scene, t_end=h, dt=h, contact_step=h, contact="stepping")
+    g, push = 9.81, 0.018 * 9.81 / 4.0
+    assert np.abs(found.w[-1]).max() / h < 1e-9  # 1.2e-3 rad/s^2 by the legs' own masses
+    assert np.abs(found.rd[-1]).max() / h < 1e-9 * g
+    force = found.contacts.force
+    assert np.allclose(force[:, 2], push, rtol=1e-6)
+    assert np.allclose(np.hypot(*force[:, :2].T), push - 0.001 * g / 2.0, rtol=1e-6)

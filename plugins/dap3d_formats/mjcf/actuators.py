@@ -14,11 +14,16 @@ from dap3d_core.interface.formats import (
     FormatError,
     Joint,
     JointInertia,
+    Tendon,
     XmlElement,
 )
-from dap3d_formats.mjcf.constraints import SCALAR, tendon_of
 from dap3d_formats.mjcf.keyframes import Keyframe, actuators_of
 from dap3d_formats.mjcf.reader import MjcfReader
+from dap3d_formats.mjcf.tendons import SCALAR, line_of, tendon_of
+
+#: Numbers of a muscle as MJCF has them in gainprm, with their defaults.
+MUSCLE = {"range": (0.75, 1.05), "force": (-1.0,), "scale": (200.0,), "lmin": (0.5,),
+          "lmax": (1.6,), "vmax": (1.5,), "fpmax": (1.3,), "fvmax": (1.2,)}  # fmt: skip
 
 Bounds = tuple[float, float]
 
@@ -53,7 +58,7 @@ def read_actuators(reader: MjcfReader, inertia: JointInertia, keyframe: Keyframe
 
 def _dynamics(element: XmlElement) -> str:
     """How the control of an actuator acts: "none", or the kind of its state."""
-    lag = "timeconst" in element.attributes and element.number("timeconst") > 0.0
+    lag = element.name == "position" and element.number("timeconst", 0.0) > 0.0
     kinds = {"cylinder": "filter", "intvelocity": "integrator", "muscle": "muscle",
              "position": "filterexact" if lag else "none"}  # fmt: skip
     usual = kinds.get(element.name, "none")
@@ -98,21 +103,89 @@ class ActuatorReader:
             self._name(element), "", place=place, control=self._control(element),
             force=self._range(element, "force"), start=start, **activation or {},
         )  # fmt: skip
-        why = ""
-        if law is None or activation is None:
+        why, line = "", self._line(element, targets)
+        if activation is not None and activation["activation"] == "muscle":
+            why = self._muscle(element, actuator, line)
+        elif law is None or activation is None:
             why = "its law"
         elif "site" in element.attributes:
             why = self._act_at_site(element, attrs.evolve(actuator, gear=law[0]), law)
+        elif line is not None and (not targets or (len(targets) > 1 and any(law[1:]))):
+            gear, (gain, constant, position, rate) = element.numbers("gear", None, (1.0,))[0], law
+            ends = sorted(gear * bound for bound in actuator.force) if gear else (0.0, 0.0)
+            if position > 0.0 or rate > 0.0:
+                why = "a servo of a tendon with dampratio, or that drives it away"
+            else:
+                self.reader.model.actuators.append(attrs.evolve(
+                    actuator, tendon=line, gear=gear * gain, bias=gear * constant,
+                    stiffness=-gear * gear * position, damping=-gear * gear * rate,
+                    force=(ends[0], ends[1]),
+                ))  # fmt: skip
         elif not targets:
-            why = "on this tendon or body, or a joint of several coordinates"
-        elif len(targets) > 1 and any(law[1:]):
-            why = "a servo of a tendon of several joints"
+            why = "on this body, or a joint of several coordinates"
         else:
             for joint, gear in targets:
                 self._act_in_joint(element, attrs.evolve(actuator, joint=joint, gear=gear), law)
         if why:
             text = f"an actuator <{element.name}>: {why}"
             self.reader.document.source.remarks.leave_out(place, text, motion=True)
+
+    def _line(self, element: XmlElement, targets: list[tuple[str, float]]) -> Tendon | None:
+        """The line of the tendon, or of the joint of one coordinate, that an actuator acts on."""
+        if "tendon" in element.attributes:
+            return line_of(self.reader, tendon_of(self.reader, element, "tendon"), "")
+        terms = tuple((name, 1.0) for name, _ in targets)
+        return Tendon(self._name(element), terms=terms, place=element.place) if terms else None
+
+    def _muscle(self, element: XmlElement, actuator: Actuator, line: Tendon | None) -> str:
+        """Add a muscle; why not, or ""."""
+        kinds = (element.get(key, "muscle") for key in ("gaintype", "biastype"))
+        if line is None or (element.name == "general" and set(kinds) != {"muscle"}):
+            return "its law"
+        low, high = self._length_range(element, line)
+        number = dict(zip(MUSCLE, _muscle_numbers(element), strict=True))
+        (at_low, at_high), (force,) = number["range"], number["force"]
+        if not low < high or not at_low < at_high:
+            return "a muscle without lengthrange, not of a joint with limits"
+        if force < 0.0:
+            return "a muscle whose force is scaled by the mass matrix"
+        gear = element.numbers("gear", None, (1.0,))[0]
+        times = (*element.numbers("dynprm", None, (1.0,)), 0.0, 0.0)[:3]
+        if element.name == "muscle":
+            times = (
+                *element.numbers("timeconst", 2, (0.01, 0.04)),
+                element.number("tausmooth", 0.0),
+            )
+        optimum = (high - low) / (at_high - at_low)
+        if not gear or not min(times[:2]) > 0.0:
+            return "a muscle of gear 0 or a time constant of 0"
+        muscle = {
+            "peak": gear * force,
+            "optimum": optimum / gear,
+            "sinew": (low - at_low * optimum) / gear,
+        }
+        muscle |= dict(zip(("l_min", "l_max", "v_max", "fp_max", "fv_max"),
+                           (number[k][0] for k in ("lmin", "lmax", "vmax", "fpmax", "fvmax")),
+                           strict=True))  # fmt: skip
+        muscle |= dict(zip(("time_up", "time_down", "smoothing"), times, strict=True))
+        ends = sorted(gear * bound for bound in actuator.force)
+        self.reader.model.actuators.append(
+            attrs.evolve(actuator, tendon=line, muscle=muscle, force=(ends[0], ends[1]))
+        )
+        return ""
+
+    def _length_range(self, element: XmlElement, line: Tendon) -> Bounds:
+        """The lengths of the actuator at its ends; of one joint without them its limits."""
+        if "lengthrange" in element.attributes:
+            low, high = element.numbers("lengthrange", 2)
+            return low, high
+        if len(line.terms) != 1 or line.points:
+            return 0.0, 0.0
+        joint, gear = self.reader.model.joints[line.terms[0][0]], line.terms[0][1]
+        gear *= element.numbers("gear", None, (1.0,))[0]
+        ends = sorted(gear * (q + joint.reference) for q in
+                      (joint.limits[0].lower, joint.limits[0].upper))  # fmt: skip
+        return (ends[0], ends[1]) if np.isfinite(ends).all() else (0.0, 0.0)
 
     def _name(self, element: XmlElement) -> str:
         names = {one.name for one in self.reader.model.actuators}
@@ -192,6 +265,8 @@ class ActuatorReader:
         kind = _dynamics(element)
         if kind == "none":
             return {"activation": ""}
+        if kind == "muscle":
+            return {"activation": "muscle", "active": self._range(element, "act")}
         if kind not in ("integrator", "filter", "filterexact"):
             return None
         time = element.numbers("dynprm", None, (1.0,))[0]
@@ -200,6 +275,14 @@ class ActuatorReader:
         else:
             found = {"activation": "lag", "time": element.number("timeconst", time)}
         return found | {"active": self._range(element, "act")}
+
+
+def _muscle_numbers(element: XmlElement) -> list[tuple[float, ...]]:
+    """Those of MUSCLE, of <muscle> by name, else of gainprm."""
+    if element.name == "muscle":
+        return [element.numbers(key, len(usual), usual) for key, usual in MUSCLE.items()]
+    low, high, *others = (*element.numbers("gainprm", None, (1.0,)), *[0.0] * 9)[:9]
+    return [(low, high), *((x,) for x in others)]
 
 
 def _critical(kp: float, gear: float, inertia: float) -> float:

@@ -1,23 +1,18 @@
-"""Equalities of MJCF, with the tendons that they hold."""
-
-import attrs
-import numpy as np
+"""Equalities of MJCF."""
 
 from dap3d_core.interface.formats import (
-    UNBOUNDED,
     WORLD,
     Coupling,
     FormatError,
     Frame,
     Joint,
-    Limits,
     Place,
-    Tendon,
     XmlElement,
     from_quaternion,
     held,
 )
 from dap3d_formats.mjcf.reader import MjcfReader
+from dap3d_formats.mjcf.tendons import pose_of, tendon_of
 
 #: Joints with one coordinate.
 SCALAR = ("revolute", "prismatic")
@@ -84,19 +79,7 @@ def _weld(reader: MjcfReader, element: XmlElement, parent: str, child: str) -> t
 
 def _relative(reader: MjcfReader, of: str, other: str) -> Frame:
     """The pose of link ``other`` in link ``of``, where the model starts."""
-    return _pose(reader, of).inverse() @ _pose(reader, other)
-
-
-def _pose(reader: MjcfReader, link: str) -> Frame:
-    pose = Frame()
-    while link != WORLD:
-        joint = next(j for j in reader.model.joints.values() if j.child == link and not j.closes)
-        step = joint.in_parent @ joint.in_child.inverse()
-        if joint.kind == "free":
-            q = joint.position
-            step = Frame(q[:3], from_quaternion(q[3:]))
-        pose, link = step @ pose, joint.parent
-    return pose
+    return pose_of(reader, of).inverse() @ pose_of(reader, other)
 
 
 def _joint(reader: MjcfReader, name: str, place: Place) -> Joint:
@@ -125,56 +108,6 @@ def _couple(reader: MjcfReader, element: XmlElement) -> None:
     reader.model.couplings.append(
         Coupling(element.get("name") or "", joint, other, a1, a0, element.place)
     )
-
-
-def tendon_of(reader: MjcfReader, element: XmlElement, key: str) -> XmlElement:
-    """The tendon that an element names.
-
-    Raises:
-        FormatError: it is not there.
-    """
-    name, holders = element.require(key), reader.document.root.all("tendon")
-    found = next((t for holder in holders for t in holder if t.get("name") == name), None)
-    if found is None:
-        raise FormatError(f"there is no tendon {name!r}", element.place)
-    return _settled_tendon(reader, found)
-
-
-def _settled_tendon(reader: MjcfReader, tendon: XmlElement) -> XmlElement:
-    """A tendon with the attributes of its class, which all tendons share."""
-    settled = reader.document.settled(attrs.evolve(tendon, name="tendon"), "main")
-    return attrs.evolve(settled, name=tendon.name)
-
-
-def read_tendons(reader: MjcfReader) -> None:
-    """Read spatial tendons over sites; others that act are left out, remarked.
-
-    Raises:
-        FormatError: one names a site that is not there.
-    """
-    tendons = [t for holder in reader.document.root.all("tendon") for t in holder.all("spatial")]
-    for k, given in enumerate(tendons, 1):
-        tendon = _settled_tendon(reader, given)
-        low, high = reader.document.bounds(tendon, "range", "limited")
-        stiffness, damping = (tendon.numbers(key, None, (0.0,))[0]
-                              for key in ("stiffness", "damping"))  # fmt: skip
-        if not (stiffness or damping or (low, high) != UNBOUNDED):
-            continue
-        rest = tendon.numbers("springlength", None, (-1.0,))
-        if {part.name for part in tendon} != {"site"} or len(set(rest)) > 1:
-            text = (
-                "forces and limits of spatial tendons with geoms or pulleys, or two springlengths"
-            )
-            reader.document.source.remarks.leave_out(tendon.place, text, motion=True)
-            continue
-        sites = [reader.site(site, "site") for site in tendon]
-        places = np.array([(_pose(reader, link) @ at).r for link, at in sites])
-        drawn = float(np.linalg.norm(np.diff(places, axis=0), axis=1).sum())
-        reader.model.tendons.append(Tendon(
-            tendon.get("name") or f"tendon{k}", tuple((link, at.r) for link, at in sites),
-            stiffness, damping, drawn if rest[0] < 0.0 else rest[0], Limits(low, high),
-            tendon.place,
-        ))  # fmt: skip
 
 
 def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:

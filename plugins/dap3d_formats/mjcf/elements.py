@@ -12,20 +12,28 @@ _ACTUATOR = (
     taken(
         "name class joint jointinparent tendon site gear kp kv gaintype gainprm biastype biasprm "
         "dyntype dynprm timeconst group ctrllimited forcelimited actlimited ctrlrange forcerange "
-        "actrange inheritrange area diameter bias"
+        "actrange inheritrange area diameter bias lengthrange range force scale lmin lmax vmax "
+        "fpmax fvmax tausmooth"
     )
     | translated("dampratio", "damping, by the mass matrix where the model starts")
-    | noted("user actdim lengthrange", _DRAWING)
+    | noted("user actdim", _DRAWING)
     | moves("refsite cranksite slidersite cranklength body", _LAW)
     | moves(
-        "actearly plugin kd gain scale range force vmax fpmax fvmax "
-        "lmin lmax vmin tausmooth input nsample interp delay armature damping ffrange velrange "
+        "actearly plugin kd gain vmin input nsample interp delay armature damping ffrange velrange "
         "cogging controller inductance lugre motorconst nominal resistance saturation thermal imax "
         "ki posrange slewmax",
         _LAW,
     )
 )
 _EQUALITY = taken("name class active") | translated("solref solimp", "the equality holds exactly")
+
+_TENDON = (
+    taken("name class limited range stiffness damping springlength")
+    | noted("group width material rgba user", _DRAWING)
+    | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
+    | moves("frictionloss armature actuatorfrclimited actuatorfrcrange springyield",
+            "friction, armature and bounds of tendons")
+)  # fmt: skip
 
 MJCF: Table = {
     "mujoco": taken() | taken("model"),
@@ -134,31 +142,18 @@ MJCF: Table = {
         "frictionloss armature actuatorfrclimited actuatorfrcrange springyield margin "
         "solreflimit solimplimit solreffriction solimpfriction", "of tendons",
     ) | taken("class limited range stiffness damping springlength group width material rgba user"),
-    "fixed": translated("", "where an equality or an actuator takes it") | taken("name class")
-    | noted("group width material rgba user", _DRAWING)
-    | moves(
-        "limited actuatorfrclimited range actuatorfrcrange solreflimit solimplimit "
-        "solreffriction solimpfriction frictionloss margin springlength stiffness damping "
-        "armature springyield",
-        "forces and limits of tendons",
-    ),
+    "fixed": taken() | _TENDON,
     "fixed/joint": taken() | taken("joint coef"),
-    "spatial": translated("", "over sites a spring and a damper, between two also rigid stops")
-    | taken("name class limited range stiffness damping springlength")
-    | noted("group width material rgba user", _DRAWING)
-    | moves("solreflimit solimplimit solreffriction solimpfriction margin", _SOFT)
-    | moves("frictionloss armature actuatorfrclimited actuatorfrcrange springyield",
-            "friction, armature and bounds of tendons"),
+    "spatial": taken() | _TENDON,
     "spatial/site": taken() | taken("site"),
-    "spatial/geom": noted("", "wrapping"), "pulley": noted("", "pulleys"),
+    "spatial/geom": taken() | taken("geom sidesite"), "pulley": taken() | taken("divisor"),
     "actuator": taken(),
     **dict.fromkeys(
-        ("motor", "general", "position", "velocity", "intvelocity", "cylinder"),
+        ("motor", "general", "position", "velocity", "intvelocity", "cylinder", "muscle"),
         taken() | _ACTUATOR,
     ),
     **dict.fromkeys(
-        ("damper", "muscle", "adhesion",
-         "dcmotor", "orientation", "pid"),
+        ("damper", "adhesion", "dcmotor", "orientation", "pid"),
         moves("", _LAW) | _ACTUATOR,
     ),
     "actuator/plugin": noted("", "plugins of a simulator are not run"),

@@ -13,13 +13,14 @@ class MjcfImporter(Importer):
         """The model in a file."""
         from dap3d_formats.element_table import note_elements
         from dap3d_formats.mjcf.actuators import read_actuators
-        from dap3d_formats.mjcf.constraints import read_equalities, read_tendons
+        from dap3d_formats.mjcf.constraints import read_equalities
         from dap3d_formats.mjcf.contacts import read_contacts
         from dap3d_formats.mjcf.document import Document
         from dap3d_formats.mjcf.elements import CONTACTS, MJCF
         from dap3d_formats.mjcf.keyframes import Keyframe
         from dap3d_formats.mjcf.reader import MjcfReader
         from dap3d_formats.mjcf.replicate import expand_replicas
+        from dap3d_formats.mjcf.tendons import read_tendons
 
         document = Document.of(source)
         table = CONTACTS if source.contacts else MJCF

@@ -14,6 +14,7 @@ from dap3d_core.interface.formats import (
     Articulation,
     FormatError,
     Frame,
+    Geometry,
     Inertial,
     Joint,
     JointInertia,
@@ -122,6 +123,19 @@ class MjcfReader:
             what = f"{key} of <{element.name}>: there is no site {name!r}"
             raise FormatError(what, element.place)
         return self.sites[name]
+
+    def solid(self, element: XmlElement) -> tuple[str, Geometry]:
+        """The link of a sphere or cylinder that an element names, and its shape.
+
+        Raises:
+            FormatError: it is not there.
+        """
+        name = element.require("geom")
+        for link in self.model.links.values():
+            for shape in link.geometries:
+                if shape.name == name and shape.kind in ("sphere", "cylinder"):
+                    return link.name, shape
+        raise FormatError(f"there is no sphere or cylinder {name!r}", element.place)
 
     def _site(self, site: XmlElement) -> Frame:
         if "fromto" in site.attributes:

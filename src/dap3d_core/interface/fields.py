@@ -60,6 +60,7 @@ class FieldSpec:
             all else.
         least: smallest number of entries of a list.
         apart: each entry of a list is on a body of its own.
+        constant: numbers of a list are constants of the kernels.
     """
 
     kind: str
@@ -93,6 +94,7 @@ class FieldSpec:
     size: str = ""
     least: int = 1
     apart: bool = False
+    constant: bool = False
 
     @property
     def for_prepare(self) -> bool:
@@ -207,14 +209,25 @@ def vec3(
     return field_of(spec)
 
 
-def numbers(count: int | str, default: Any = REQUIRED, *, unit: str = "", doc: str = "") -> Any:
+def numbers(
+    count: int | str,
+    default: Any = REQUIRED,
+    *,
+    constant: bool = False,
+    positive: bool = False,
+    unit: str = "",
+    doc: str = "",
+) -> Any:
     """As many finite numbers as ``count``.
 
     With the name of a size, ``numbers("n")``, the length of the list in the scene is that size, and
-    a default is one number, of all entries (docs/how-to/what-a-type-can-say.md, Sizes).
+    a default is one number, of all entries (docs/how-to/what-a-type-can-say.md, Lists). With
+    ``constant`` these numbers are known when kernels are compiled, which may index and branch by
+    them; each other list makes another type. Those of a list may have to be ``positive``.
     """
     if isinstance(count, str):
-        return field_of(FieldSpec("numbers", default, unit, doc, size=count))
+        spec = FieldSpec("numbers", default, unit, doc, positive, size=count, constant=constant)
+        return field_of(spec)
     return field_of(FieldSpec("numbers", default, unit, doc, columns=count))
 
 
@@ -224,9 +237,10 @@ def points(size: str = "n", *, least: int = 1, apart: bool = False, doc: str = "
     Several may lie on one body, unless they are ``apart``. A field ``points`` offers tuples
     ``r_points``, ``s_points``, ``v_points``, ``s_points_dot``, and ``w_points`` of the bodies that
     they lie on; ``on_points`` are the indices of these bodies, for ``by_body``; the size and
-    ``body_count`` are whole numbers.
+    ``body_count`` are whole numbers. A list of ``least=0`` may be left out.
     """
-    return field_of(FieldSpec("points", REQUIRED, "m", doc, size=size, least=least, apart=apart))
+    default = () if least == 0 else REQUIRED
+    return field_of(FieldSpec("points", default, "m", doc, size=size, least=least, apart=apart))
 
 
 def vectors(size: str = "n", *, least: int = 1, doc: str = "") -> Any:
@@ -234,7 +248,8 @@ def vectors(size: str = "n", *, least: int = 1, doc: str = "") -> Any:
 
     A field ``axes`` offers tuples ``axes``, ``axes_dot`` and ``w_axes``, and ``on_axes``.
     """
-    spec = FieldSpec("vectors", REQUIRED, "", doc, unit_length=True, size=size, least=least)
+    default = () if least == 0 else REQUIRED
+    spec = FieldSpec("vectors", default, "", doc, unit_length=True, size=size, least=least)
     return field_of(spec)
 
 

@@ -52,6 +52,8 @@ class TypeBase:
     symbol: ClassVar[str] = ""
     #: Of the example of ``describe``: fields -> what is written there, where no value is usual.
     example: ClassVar[Mapping[str, str]] = {}
+    #: For checks of a type with lists: bodies of the entries of each, and lists of constants.
+    samples: ClassVar[tuple[Mapping[str, Sequence[float]], ...]] = ()
     #: Other names of the type, of other programs, say: messages suggest its keyword for them.
     synonyms: ClassVar[tuple[str, ...]] = ()
     #: True for impulses that drive bodies: check-plugin lets them add kinetic energy.

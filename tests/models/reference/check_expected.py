@@ -44,7 +44,7 @@ ENGINEERING = (
     "wiper",
 )
 #: Scenes of contacts.
-CONTACT = ("cradle", "domino_row", "gripper", "marble_run", "quadruped")
+CONTACT = ("cradle", "domino_row", "gripper", "marble_run", "quadruped", "sphere_box")
 #: The folder of each model that is in one.
 GROUPS = {
     **dict.fromkeys(BENCHMARKS, "benchmarks"),

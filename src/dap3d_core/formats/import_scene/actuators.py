@@ -1,7 +1,7 @@
 """Actuators of a model as inputs, with the forces that they set; tendons."""
 
 import re
-from math import isfinite
+from math import inf, isfinite
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,16 @@ from dap3d_core.interface.formats.articulation import Actuator, Articulation, Te
 from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.scene.tables import GROUND
 
+#: Time constant of soft stops of tendons, s.
+TIME = 2e-3
+
 
 def add_actuators(builder: SceneBuilder, model: Articulation) -> None:
     """Add actuators: of joints, and forces and moments on links."""
     for actuator in model.actuators:
+        if actuator.tendon is not None:
+            _act_on_tendon(builder, model, actuator)
+            continue
         link = actuator.link or model.joints[actuator.joint].child
         joint = model.joints.get(actuator.joint)
         if joint is not None and (joint.kind == "fixed" or builder.moves_alone(joint)):
@@ -102,43 +108,158 @@ def _act_on_link(builder: SceneBuilder, actuator: Actuator, name: str) -> None:
         builder.scene.add_force("np", about, body_i=body, np=float_tuple(moment), **given)
 
 
+def _act_on_tendon(builder: SceneBuilder, model: Articulation, actuator: Actuator) -> None:
+    """Add an actuator or a muscle of a tendon, whose tension is less its force."""
+    line = None if actuator.tendon is None else _line(builder, model, actuator.tendon)
+    if line is None:
+        text = "an actuator of a tendon that does not move, or of more than 8 bodies"
+        builder.remarks.leave_out(actuator.place, text, motion=True)
+        return
+    keyword, fields = ("tendon" if line[0] == "ptp" else line[0]), line[1]
+    name = _input(builder, actuator)
+    low, high = actuator.force
+    given: dict[str, Any] = {
+        "k": actuator.stiffness, "c": actuator.damping, "bias": -actuator.bias,
+        "activation": actuator.activation, "z_0": actuator.start[0], **actuator.muscle,
+    }  # fmt: skip
+    if actuator.activation in ("lag", "integral"):
+        given["time"] = actuator.time
+    if actuator.stiffness:
+        fields["length"] = 0.0
+    builder.scene.add_force(
+        keyword, builder.names.free("forces", f"{name}_force"), **fields, control=name,
+        **({} if actuator.muscle else {"gain": -actuator.gear}),
+        **_bounds(control=actuator.control, activation=actuator.active, tension=(-high, -low)),
+        **{key: value for key, value in given.items() if value},
+    )  # fmt: skip
+
+
 def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
-    """Add tendons: a spring and damper along points, and of two rigid stops of their distance."""
+    """Add springs and dampers of tendons, and stops at their limits; rigid of two points."""
     for tendon in model.tendons:
-        if len({builder.member[link][0] for link, _ in tendon.points}) == 1:
+        line = _line(builder, model, tendon)
+        if line is None:
+            text = "springs and limits of a tendon that does not move, or of more than 8 bodies"
+            builder.remarks.leave_out(tendon.place, text, motion=True)
             continue
-        points, two = [], len(tendon.points) == 2
-        for k, (link, at) in enumerate(tendon.points):
-            body, frame = builder.attached(link, Frame(at))
-            name = builder.names.free("points", f"{tendon.name}_{'ij'[k] if two else k + 1}")
-            points.append(builder.scene.add_point(name, body, float_tuple(frame.r)))
-        if not two:
-            _add_cable(builder, tendon, points)
-            continue
-        ends = dict(zip(("P_i", "P_j"), points, strict=True))
+        keyword, fields = line
+        spring: dict[str, Any] = {"k": tendon.stiffness or None, "c": tendon.damping or None}
+        if keyword == "ptp" and not tendon.play:
+            ends = dict(zip(("P_i", "P_j"), fields["points"], strict=True))
+            _add_limits(builder, tendon, ends)
+            fields, spring["l0"] = ends, tendon.rest or None
+        else:
+            keyword = "tendon" if keyword == "ptp" else keyword
+            _add_stops(builder, model, tendon, keyword, fields)
+            spring |= {"length": tendon.rest, "play": tendon.play or None}
         if tendon.stiffness or tendon.damping:
             name = builder.names.free("forces", f"{tendon.name}_spring")
+            builder.scene.add_force(keyword, name, **fields, **spring)
+
+
+def _line(
+    builder: SceneBuilder, model: Articulation, tendon: Tendon
+) -> tuple[str, dict[str, Any]] | None:
+    """The keyword and the fields of the line of a tendon; "ptp" of two points; None if rigid."""
+    if tendon.terms:
+        return _sum_of_joints(builder, model, tendon)
+    links = [link for link, _ in tendon.points] + [drum.link for drum in tendon.drums]
+    if not 1 < len({builder.member[link][0] for link in links}) <= 8:
+        return None
+    names, made = builder.names, builder.names.scene_names
+
+    def point(link: str, at: Any, suffix: str) -> str:
+        body, frame = builder.attached(link, Frame(at))
+        key = ("tendon", f"{body}: {float_tuple(frame.r)}")
+        if key not in made:
+            name = names.free("points", f"{tendon.name}_{suffix}")
+            made[key] = builder.scene.add_point(name, body, float_tuple(frame.r))
+        return made[key]
+
+    two = len(tendon.points) == 2 and not tendon.drums
+    points = [point(link, at, "ij"[k] if two else str(k + 1))
+              for k, (link, at) in enumerate(tendon.points)]  # fmt: skip
+    fields: dict[str, Any] = {"points": tuple(points)}
+    if two and not tendon.divisors:
+        return "ptp", fields
+    if tendon.divisors:
+        fields["divisors"] = tendon.divisors
+    drums = sorted(tendon.drums, key=lambda drum: not drum.cylinder)
+    if drums:
+        centres = [point(drum.link, drum.at.r, f"drum{k + 1}") for k, drum in enumerate(drums)]
+        fields |= {"drums": tuple(centres), "radii": tuple(drum.radius for drum in drums),
+                   "after": tuple(float(drum.after) for drum in drums)}  # fmt: skip
+        axes = []
+        for k, drum in enumerate(drums):
+            if drum.cylinder:
+                body, frame = builder.attached(drum.link, drum.at)
+                axis = names.free("vectors", f"{tendon.name}_axis{k + 1}")
+                axes.append(builder.scene.add_vector(axis, body, float_tuple(frame.A[:, 2])))
+        ways = tuple(2.0 if drum.inside else float(drum.side is not None) for drum in drums)
+        if axes:
+            fields["axes"] = tuple(axes)
+        if any(ways):
+            fields["ways"] = ways
+        if 1.0 in ways:
+            fields["sides"] = tuple(point(*drum.side, f"side{k + 1}") if drum.side else centre
+                                    for k, (drum, centre) in
+                                    enumerate(zip(drums, centres, strict=True)))  # fmt: skip
+    return "tendon", fields
+
+
+def _sum_of_joints(
+    builder: SceneBuilder, model: Articulation, tendon: Tendon
+) -> tuple[str, dict[str, Any]] | None:
+    columns: list[tuple[str, str, str, float, float]] = []
+    length = 0.0
+    for name, factor in tendon.terms:
+        joint = model.joints[name]
+        length += factor * ((*joint.position, 0.0)[0] + joint.reference)
+        if joint.kind == "fixed" or builder.moves_alone(joint):
+            continue
+        ends = named_ends(builder, from_ground(builder, joint))
+        axis = ends.vector("j", ends.joint.axes[0], "_axis")
+        columns.append((ends.child, ends.parent, axis, factor, float(joint.kind == "prismatic")))
+    if not columns or len({body for child, parent, *_ in columns for body in (child, parent)}) > 8:
+        return None
+    fields = dict(zip(("movers", "holders", "axes", "coefs", "slides"),
+                      zip(*columns, strict=True), strict=True))  # fmt: skip
+    return "joint_tendon", fields | {"x_0": length}
+
+
+def _add_stops(
+    builder: SceneBuilder, model: Articulation, tendon: Tendon, keyword: str, fields: Any
+) -> None:
+    """Add soft stops at the limits of a tendon, critically damped, unless those of joints do."""
+    limits, ends = tendon.limits, np.zeros(2)
+    for name, factor in tendon.terms:
+        joint = model.joints[name]
+        q = np.array([joint.limits[0].lower, joint.limits[0].upper]) + joint.reference
+        ends += np.sort(factor * q) if factor else 0.0
+    lower, upper = (limits.lower, limits.upper)
+    if tendon.terms and builder.limits != "off":
+        lower = -inf if ends[0] >= lower else lower
+        upper = inf if ends[1] <= upper else upper
+    if lower == -inf and upper == inf:
+        return
+    factors: dict[str, float] = {}
+    for name, factor in tendon.terms:
+        factors[name] = factors.get(name, 0.0) + factor
+    inertia = builder.inertia.of_sum(factors) if factors else None
+    if builder.limits == "off" or inertia is None:
+        text = "limits of tendons over more than two points, with limits = off, or without inertia"
+        builder.remarks.leave_out(tendon.place, text, motion=True)
+        return
+    text = "limits of tendons are soft stops, critically damped, of a time constant of 2 ms"
+    builder.remarks.translate(tendon.place, text, motion=True)
+    for side, sign, bound in (("max", 1.0, upper), ("min", -1.0, lower)):
+        if isfinite(bound):  # below its least length its negative is too long
+            name = builder.names.free("forces", f"{tendon.name}_{side}_stop")
+            given = {"coefs": tuple(sign * c for c in fields["coefs"]), "x_0": sign * fields["x_0"]}
             builder.scene.add_force(
-                "ptp", name, **ends, k=tendon.stiffness or None, c=tendon.damping or None,
-                l0=tendon.rest or None,
+                keyword, name, **(fields | given), length=sign * bound, k=inertia / TIME**2,
+                c=2.0 * inertia / TIME, slack=True,
             )  # fmt: skip
-        _add_limits(builder, tendon, ends)
-
-
-def _add_cable(builder: SceneBuilder, tendon: Tendon, points: list[str]) -> None:
-    """Add a spring and damper over more than two points."""
-    if tendon.limits.finite:
-        text = "limits of spatial tendons over more than two sites"
-        builder.remarks.leave_out(tendon.place, text, motion=True)
-    if tendon.stiffness and not tendon.rest:
-        text = "a spatial tendon over more than two sites, of springlength 0"
-        builder.remarks.leave_out(tendon.place, text, motion=True)
-    elif tendon.stiffness or tendon.damping:
-        name = builder.names.free("forces", f"{tendon.name}_spring")
-        builder.scene.add_force(
-            "cable", name, points=tuple(points), k=tendon.stiffness, c=tendon.damping or None,
-            length=tendon.rest or None,
-        )  # fmt: skip
 
 
 def _add_limits(builder: SceneBuilder, tendon: Tendon, ends: dict[str, str]) -> None:

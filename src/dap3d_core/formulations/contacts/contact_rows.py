@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from dap3d_core.formulations.constraint_rows import ConstraintRows
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -177,7 +176,9 @@ class ContactRows:
         evaluator, self.t, self.u = table.evaluator, t, u
         self._table, model = table, evaluator.model
         self.states = evaluator.states
-        rows = self._stuck(u)
+        evaluator.states = self._stuck_states()
+        rows = evaluator.rows(t, u)
+        evaluator.states = self.states
         D, own = rows.dense(), model.joint_row_count
         self.D, self.G, self._nu = D[:own], D[own:], rows.nu[:own]
         self.C = rows.C[own:].reshape(-1, 3)[:, 0]
@@ -220,31 +221,26 @@ class ContactRows:
             found[k] = sign * blocks[k, :, body - 1]
         return found
 
-    def _stuck(self, u: Floats) -> ConstraintRows:
-        """The rows at a state u (13 n,), as if all contacts stuck."""
-        evaluator, table = self._table.evaluator, self._table
-        stuck = self.states.copy()
+    def _stuck_states(self) -> Floats:
+        """States of elements as if all contacts stuck."""
+        table, stuck = self._table, self.states.copy()
         stuck[table.mode] = 2.0
         stuck[table.way.ravel()] = stuck[table.near.ravel()] = 0.0
-        evaluator.states = stuck
-        rows = evaluator.rows(self.t, u)
-        evaluator.states = self.states
-        return rows
+        return stuck
 
     @property
     def free(self) -> Floats:
         """(3 m,) rates of slip at these velocities, where all contacts are open, joints held."""
         if self._free is None:
             evaluator, table = self._table.evaluator, self._table
-            u, apart = self.with_velocities(self.v), self.states.copy()
-            gamma = self._stuck(u).gamma[table.evaluator.model.joint_row_count :]
+            apart, own = self.states.copy(), evaluator.model.joint_row_count
             apart[table.mode] = 0.0
             evaluator.states = apart
-            report = evaluator.report(self.t, u)
-            v_dot, own = report[: len(self.v)], evaluator.model.joint_row_count
+            report = evaluator.report(self.t, self.with_velocities(self.v))
             self._free_multipliers = report[evaluator.model.report_layout["Lam"]][:own]
             evaluator.states = self.states
-            self._free = self.G @ v_dot - gamma
+            gamma = evaluator.placed_gamma(self.t, self._stuck_states())[own:]
+            self._free = self.G @ report[: len(self.v)] - gamma
         return self._free
 
     def loads_by(self, x: Floats) -> Floats:

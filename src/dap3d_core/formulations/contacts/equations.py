@@ -52,6 +52,8 @@ from dap3d_core.formulations.common.constraints import (
     solve_rows,
 )
 from dap3d_core.formulations.common.projection import project_onto
+from dap3d_core.formulations.contacts.inverse import invert
+from dap3d_core.formulations.contacts.watched_rates import store_watched, take_watched
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.scalar_math import is_differentiated, where
@@ -379,28 +381,6 @@ def fill_load(system: System, count: int, r: int, A: Floats) -> float:
 
 
 @compiled
-def invert(A: Floats, count: int) -> None:
-    """The inverse of a matrix, behind it in each row of A (count, 2 count), takes its place.
-
-    Not numbers where it has none.
-    """
-    n = 2 * count
-    for k in range(count):
-        best = k
-        for r in range(k + 1, count):
-            best = r if abs(A[r * n + k]) > abs(A[best * n + k]) else best
-        for q in range(k, n):
-            A[k * n + q], A[best * n + q] = A[best * n + q], A[k * n + q]
-        pivot = A[k * n + k]
-        for q in range(k, n):
-            A[k * n + q] /= pivot
-        for r in range(count):
-            w = A[r * n + k]
-            for q in range(k, n):
-                A[r * n + q] -= w * A[k * n + q] if r != k else 0.0
-
-
-@compiled
 def are_independent(system: System) -> bool:
     """True if the factors, of ``PART_OF_INDEPENDENT``, have no small pivot."""
     nodes, small = system.nodes, 0
@@ -452,29 +432,6 @@ def rhs(t: float, y: Floats, out: Floats, system: System, loops: Any) -> None:
     """As in lsq.py."""
     if not take_watched(t, y, out, system):
         find_rates(t, y, out, system, loops)
-
-
-@compiled
-def take_watched(t: float, y: Floats, out: Floats, system: System) -> bool:
-    """True where switches were read last at this state: then dy/dt is known."""
-    watched, n = system.watched, y.shape[0]
-    is_known = watched[0] == t and not is_differentiated()
-    if is_known:
-        for k in range(n):
-            is_known &= watched[1 + k] == y[k]
-    watched[0] = np.inf - np.inf  # once: numbers of the scene may change
-    if is_known:
-        for k in range(n):
-            out[k] = watched[1 + n + k]
-    return is_known
-
-
-@compiled
-def store_watched(t: float, y: Floats, system: System) -> None:
-    """Note the state at which dy/dt stands in ``watched``."""
-    system.watched[0] = t
-    for k in range(y.shape[0]):
-        system.watched[1 + k] = y[k]
 
 
 @compiled

@@ -11,16 +11,23 @@ from dap3d_core.kernels.array_types import Floats, Integers
 
 #: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
 #: is zero; part of the largest entry of A below which rows depend on each other.
-STILL, ZERO, DEPENDENT = 1e-9, 1e-9, 1e-9
+STILL, ZERO, DEPENDENT = 1e-9, 1e-9, 1e-12
+#: Part of the largest acceleration of a group that counts as one of each of its contacts: what
+#: joints let turn fast beside what they let slide is no measure of it, but its rounding is there.
+BESIDE = 1e-3
 #: Part of the largest acceleration that may be left where contacts hold, by shares alone: their
 #: rows take it, within what the cones leave.
-HELD, OF_REST = 1e-9, 0.05
+HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
 #: Parts of their cones within which contacts that share what they carry are to stay, each leaving
 #: half of what the one before leaves: what they carry reaches its limit with so much left, 1e-9.
 INSIDE = tuple(1.0 - 0.5**k for k in range(1, 31))
 #: Part of its cone in which friction of contacts that share stays where they begin to slip: what it
 #: leaves shows which of them do, and where to.
 LOOSE = 1.0 - 1e-6
+#: Part of its mobility that friction leaves a contact whose steps become endless: it jams.
+NEARLY = 1e-2
+#: Part of the largest force that is to be left for a contact that stays as others can carry less.
+TO_STAY = 1e-6
 #: Passes for the loads of joints, the part that the last one changes, and a load that holds all.
 LOAD_PASSES, LOAD_SETTLED, LARGE = 60, 1e-12, 1e200
 #: From this pass on loads have settled where rounding is left, of chains of many joints this part.
@@ -152,7 +159,9 @@ def _put_modes(
     if left or any(c in sliding for c in closed):
         # of contacts that share, one at the end of its cone may only have to carry less
         inner = _inside(table, rows, closed, {}, limit)
-        if inner is not None and all(inner[3 * closed.index(c)] > ZERO * inner.max() for c in left):
+        if inner is not None and all(
+            inner[3 * closed.index(c)] > TO_STAY * inner.max() for c in left
+        ):
             _put(table, rows, closed, {}, limit, found, inner)
             return
         which = rows.rows_of(closed)
@@ -160,15 +169,33 @@ def _put_modes(
             # what each of them carried was a choice, and so is the direction of it
             _put(table, rows, closed, {}, limit, found, loose=True)
             return
-    without = [c for c in closed if c not in left]
-    if left and without:
-        x, _ = _solve(table, rows, without, *_matrix(table, rows, without, sliding, limit))
-        big = float(np.abs(rows.free).max()) + 1e-300
-        rates = _rates(rows, without, x, left)
-        closed = without if all(rate >= -ZERO * big for rate in rates) else closed
-    elif left:
-        closed = [c for c in left if rows.free[3 * c] < -ZERO * float(np.abs(rows.free).max())]
-    _put(table, rows, closed, sliding, limit, found)
+    _put(table, rows, _staying(table, rows, closed, sliding, left, limit), sliding, limit, found)
+
+
+def _staying(
+    table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
+    leaving: list[int], limit: float,
+) -> list[int]:  # fmt: skip
+    """Contacts that stay where some leave, unless these would close again at once.
+
+    What carries nothing leaves with them: it would be the next to.
+    """
+    big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
+    gone: list[int] = []
+    while leaving:
+        gone, without = [*gone, *leaving], [c for c in closed if c not in leaving]
+        try:
+            x, _ = _solve(table, rows, without, *_matrix(table, rows, without, sliding, limit))
+        except JamError:
+            return closed
+        rates = _rates(rows, without, x, gone)
+        if any(rate < -ZERO * big for rate in rates):
+            only = [c for c, rate in zip(gone, rates, strict=True) if rate < -ZERO * big]
+            return closed if without else only
+        normal = x[::3]
+        idle = ~table.alone[without] & (normal <= ZERO * normal.max(initial=0.0))
+        closed, leaving = without, [c for c, is_idle in zip(without, idle, strict=True) if is_idle]
+    return closed
 
 
 def _rates(rows: ContactRows, contacts: list[int], x: Floats, wanted: list[int]) -> list[float]:
@@ -212,18 +239,35 @@ def _matrix(
     return A, ways
 
 
+def nearly_jams(table: ContactTable, rows: ContactRows, closed: list[int]) -> str:
+    """Name of a contact whose friction leaves next to nothing of how it gives way; "" of none.
+
+    Its normal force grows beyond all bounds there, in a finite time.
+    """
+    limit = STILL * max(1.0, table.evaluator.model.length)
+    pushed = [c for c in closed if not table.alone[c]]
+    A, ways = _matrix(table, rows, pushed, {}, limit)
+    for k, c in enumerate(pushed):
+        if c in ways and A[3 * k, 3 * k] < NEARLY * rows.W[3 * c, 3 * c]:
+            return table.names[c]
+    return ""
+
+
 def _solve(
     table: ContactTable, rows: ContactRows, closed: list[int], A: Floats, ways: dict[int, Floats],
-    part: float = 1.0, *, loose: bool = False, **more: Any,
+    part: float = 1.0, *, slipping: Any = (), **more: Any,
 ) -> tuple[Floats, Floats]:  # fmt: skip
-    """Forces (3 k,) with sliding friction, and accelerations; A, ways: of ``_matrix``."""
+    """Forces (3 k,) with sliding friction, and accelerations; A, ways: of ``_matrix``.
+
+    part: of the cones; slipping: contacts that have mu, not mu_s.
+    """
     b, load = rows.free[rows.rows_of(closed)].copy(), rows.load[closed]
     for k, c in enumerate(closed):
         if c in ways and table.gapless[c]:
             b -= load[k] * table.mu[c] * A[:, 3 * k : 3 * k + 3] @ ways[c]
         elif c in ways and table.alone[c]:  # in its first column is what a load of one does
             b += load[k] * A[:, 3 * k]
-    mu = LOOSE * table.mu[closed] if loose else part * table.mu_s[closed]
+    mu = part * np.where([c in slipping for c in closed], table.mu[closed], table.mu_s[closed])
     mu[[c in ways for c in closed]] = 0.0
     gapless, ratio = table.gapless[closed], table.ratio_s[closed]
     x, left = solve_cone(A, b, mu, load, gapless=gapless, ratio=ratio, **more)
@@ -249,24 +293,25 @@ def _put(
     if not closed:
         return
     A, ways = _matrix(table, rows, closed, sliding, limit)
-    x, a = _solve(table, rows, closed, A, ways, loose=loose)
-    still = [c for c in closed if c not in ways] or closed  # what slides may turn far faster
-    big = float(np.abs(rows.free[rows.rows_of(still)]).max()) + 1e-300
     shares = _share(table, closed, A, ways)
     if inner is None and not loose:
         inner = _inside(table, rows, closed, sliding, limit)
-    x = x if inner is None else inner
+    if inner is None:
+        x, moves = _begin(table, rows, closed, A, ways, LOOSE if loose else 1.0)
+    else:
+        x, moves = inner, np.zeros_like(inner)  # all of them hold
     for k, c in enumerate(closed):
-        force, rate, frame = x[3 * k : 3 * k + 3], a[3 * k : 3 * k + 3], rows.frames[c]
+        force, rate, frame = x[3 * k : 3 * k + 3], moves[3 * k : 3 * k + 3], rows.frames[c]
         across = table.across(c)
-        is_pushed = force[0] > 0.0 or table.alone[c]
-        if not is_pushed and (rate[0] > ZERO * big or (len(closed) == 1 and rate[0] > -ZERO)):
+        if not table.alone[c] and rate[0] > max(A[3 * k, 3 * k] * force[0], 0.0):
             continue  # it opens
+        if len(closed) == 1 and not table.alone[c] and force[0] <= 0.0:
+            continue
         if c in ways:
             mode, way = 1.0, ways[c]
         elif table.mu_s[c] == 0.0:
             mode, way = 1.0, np.zeros_like(rate[across])
-        elif length_of(rate[across]) > ZERO * max(big, _stops(table, rows, c)):
+        elif np.any(rate[across]):
             has_force = table.mu[c] > 0.0 and np.any(force[across])
             along = table.slip_against(c, force[across]) if has_force else rate[across]
             mode, way = 1.0, along / length_of(along)
@@ -278,6 +323,32 @@ def _put(
             found.near[c] = force @ frame if mode == 2.0 else normal * frame[0]
     if shares:
         _leave_to_others(table, rows, closed, found)
+
+
+def _begin(
+    table: ContactTable, rows: ContactRows, closed: list[int], A: Floats, ways: dict[int, Floats],
+    part: float,
+) -> tuple[Floats, Floats]:  # fmt: skip
+    """Forces (3 k,), and accelerations (3 k,), zero where these are rounding.
+
+    What begins to slip has mu, not mu_s, and then others may slip as well.
+    """
+    slipping: set[int] = set()
+    while True:
+        x, a = _solve(table, rows, closed, A, ways, part, slipping=slipping)
+        least = ZERO * _sizes(table, rows, closed, ways)
+        moves = a.reshape(-1, 3)
+        for k, c in enumerate(closed):
+            across = table.across(c)
+            moves[k, across] *= length_of(moves[k, across]) > max(
+                least[k], ZERO * _stops(table, rows, c)
+            )
+            if not table.gapless[c]:
+                moves[k, 0] *= abs(moves[k, 0]) > least[k]
+        new = {c for k, c in enumerate(closed) if np.any(moves[k, table.across(c)])}
+        if new <= slipping or not np.any(table.mu_s[closed] > table.mu[closed]):
+            return x, moves.ravel()
+        slipping |= new
 
 
 def _stops(table: ContactTable, rows: ContactRows, c: int) -> float:
@@ -338,19 +409,37 @@ def _inside(
 
     None where they do not share, or there are none.
     """
-    big = float(np.abs(rows.free[rows.rows_of(closed)]).max()) + 1e-300
-    best, low, high = None, 0, len(INSIDE) - 1
     A, ways = _matrix(table, rows, closed, sliding, limit)
     if not _share(table, closed, A, ways):
         return None
-    own = _own_rows(table, closed, ways)
-    while low <= high:  # what one part allows, so does every larger one
-        k = high if best is None else (low + high) // 2
-        x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=best, tries=3)
-        if np.abs(a[own]).max() <= min(HELD, OF_REST * (1.0 - INSIDE[k])) * big:
-            best, high = x, k - 1
-        elif best is None:
-            return None
-        else:
-            low = k + 1
+    own, own_rates = _own_rows(table, closed, ways), np.diag(A).reshape(-1, 3).max(axis=1)
+    big = _sizes(table, rows, closed, {})
+
+    def forces(k: int, start: Floats | None) -> Floats | None:
+        x, a = _solve(table, rows, closed, A, ways, INSIDE[k], start=start, tries=3)
+        carried = table.mu_s[closed] * (x[::3] + rows.load[closed])
+        rest = OF_REST * (1.0 - INSIDE[k]) * own_rates * carried + RATE_ROUNDING * big.max()
+        limits = np.repeat(np.minimum(HELD * big, rest), 3)
+        return x if np.all(np.abs(a[own]) <= limits[own]) else None
+
+    best = forces(0, None)  # as a rule
+    if best is not None:
+        return best
+    low, high = 1, len(INSIDE) - 2
+    best = forces(high + 1, None)
+    while best is not None and low <= high:  # what one part allows, so does every larger one
+        k = (low + high) // 2
+        x = forces(k, best)
+        best, low, high = (best, k + 1, high) if x is None else (x, low, k - 1)
     return best
+
+
+def _sizes(
+    table: ContactTable, rows: ContactRows, closed: list[int], ways: dict[int, Floats]
+) -> Floats:
+    """(k,) sizes of accelerations of contacts: part of one is rounding."""
+    own = np.abs(rows.free).reshape(-1, 3).max(axis=1)
+    still = [c for c in closed if c not in ways] or closed  # what slides may turn far faster
+    least = BESIDE * own[still].max() + 1e-300
+    found: Floats = np.maximum(own[closed], least)
+    return found

@@ -37,9 +37,8 @@ from dap3d_core.formulations.contacts.equations import (
     is_given,
     is_sliding,
     pressing,
-    store_watched,
-    take_watched,
 )
+from dap3d_core.formulations.contacts.watched_rates import store_watched, take_watched
 from dap3d_core.formulations.joint.equations import accepted, apply_forces, linearise_tree
 from dap3d_core.formulations.joint.place import place_tree
 from dap3d_core.formulations.joint.reduce import reduce_nodes

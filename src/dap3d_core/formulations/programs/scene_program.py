@@ -283,16 +283,12 @@ def write_programs(
     """
     entries = evaluator.functions.entries
     found, general = programmed(evaluator), {}
-    texts: list[str] = []
-    needs: dict[str, str] = {}
-    written: list[int] = []
+    texts, needs, written = list[str](), dict[str, str](), list[int]()
     for k in found:
-        general[k], head = _named(entries[k]), _HEAD
-        program, counter = symbols_of(name, k)
-        names = {"name": program, "counter": counter, "general": general[k]}
-        if k == RHS and evaluator.system.watched.size:
-            word = word_of(evaluator.system, "watched")
-            head = _WATCHED_HEAD.format(word=word, rhs=general[RHS], arguments=ARGUMENTS)
+        general[k] = _named(entries[k])
+        head = _rates_head(evaluator, general[k]) if k == RHS else _HEAD
+        own = zip(("name", "counter"), symbols_of(name, k), strict=True)
+        names = dict(own, general=general[k])
         if k == PROJECT:
             given = {"project": general[PROJECT], "arguments": ARGUMENTS}
             head = _PROJECTION_HEAD.format(**given)
@@ -317,6 +313,13 @@ def write_programs(
     declared = [f"declare void @{symbol}({ARGUMENTS})" for symbol in general.values()]
     text = "\n".join([*needs.values(), *declared, *texts, _WEIGHTS])
     return text if count == 1 else differentiate(text, count), written
+
+
+def _rates_head(evaluator: Evaluator, rhs: str) -> str:
+    if not evaluator.system.watched.size:
+        return _HEAD
+    word = word_of(evaluator.system, "watched")
+    return _WATCHED_HEAD.format(word=word, rhs=rhs, arguments=ARGUMENTS)
 
 
 def load_programs(

@@ -1,5 +1,6 @@
 """What a step works on: bodies, the contacts near, rows of joints, and scratch of the solution."""
 
+import itertools
 from typing import Any, ClassVar
 
 import attrs
@@ -26,6 +27,8 @@ LOG_ROOM = 64
 #: Pairs of shapes a shape, and points a pair, that exported models have room for; entries of their
 #: matrices a body; contacts that joints hold.
 MOST_PAIRS, MOST_POINTS, MOST_ENTRIES, MOST_HELD = 32, 8, 16, 100
+#: Part of the mass, or moment, of what a joint holds at a body below which that body is light.
+LIGHT = 1e-3
 #: Kinds of contacts: with a cone; friction of a joint along rows 1 and 2, or along all three.
 CONE, ALONE, WHOLE = range(3)
 #: Arrays of which a row belongs to a contact.
@@ -64,7 +67,8 @@ class StepArrays(Arrays):
              "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z", "B",
              "push",
              "kept", "met", "D", "declared_x", "log", "values", "vectors", "crossed", "answer",
-             "felt", "bounce", "v_bounce", "x_bounce"),
+             "felt", "bounce", "v_bounce", "x_bounce",
+             "carried"),
             MATRIX,
         ),
         "shapes": PlacedShapes.type_of(),
@@ -85,8 +89,10 @@ class StepArrays(Arrays):
     entry_count = _integer()  # blocks of K below the diagonal
     bit_size = _integer()  # words of bits
     held_count = _integer()  # contacts that scratch of held ones is needed for
+    carries = _integer()  # 1: r and s are of the masses that light links carry
     is_exported = _integer()  # 1: Python makes no room, and takes no log
     # constants
+    light_count = _integer()  # bodies that carry far heavier ones
     dense_size = _integer()  # unknowns up to which K is a square
     first_v_dot = _integer()  # places in reported rows
     first_lam = _integer()
@@ -105,6 +111,7 @@ class StepArrays(Arrays):
     shape_reach: Floats  # m, how far shapes reach from the mass centre
     mass: Floats
     mass_inverse: Floats  # zero of ground
+    carried: Floats  # (n + 1, 2) 1/kg, 1/(kg m^2) of what joints hold at a body far lighter, or 0
     Jp: Floats  # (n + 1, 9), and its inverse; in global axes
     Jp_inverse: Floats
     spin: Floats
@@ -240,7 +247,19 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     arrays.dense_size, arrays.length = dense_size, model.length
     arrays.first_v_dot, arrays.first_lam = layout["v_dot"].start, layout["Lam"].start
     arrays.first_state = layout["states"].start
+    _put_carried(arrays)
     return arrays
+
+
+def _put_carried(s: StepArrays) -> None:
+    """Put what joints hold at bodies that are far lighter: stand-in links, feet with a rotor."""
+    own = np.array([s.mass, np.linalg.eigvalsh(s.Jp.reshape(-1, 3, 3))[:, -1]]).T
+    carried = own.copy()
+    for first, last in itertools.pairwise(s.row_start):
+        bodies = s.row_body[first:last]
+        carried[bodies] = np.maximum(carried[bodies], own[bodies].max(axis=0))
+    light = (own < LIGHT * carried).any(axis=1)
+    s.carried[light], s.light_count = 1.0 / carried[light], int(light.sum())
 
 
 def _of_bodies(model: Model) -> dict[str, Any]:
@@ -251,6 +270,7 @@ def _of_bodies(model: Model) -> dict[str, Any]:
         **{name: np.zeros((n + 1, 6)) for name in (
             "before", "free", "v", "trial", "rest", "trial_rest", "end", "v_bounce")},
         "bounce": np.zeros((n + 1, 5)),
+        "carried": np.zeros((n + 1, 2)),
         **{name: np.zeros(n + 1) for name in (
             "margin", "shape_reach", "mass", "mass_inverse", "hit", "flies")},
         **{name: np.zeros(n + 1, dtype=np.int64) for name in (

@@ -17,6 +17,7 @@ from dap3d_core.integrators.moreau.newton import (
     rim_of,
     times_inverse,
 )
+from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: Residual from which Newton's method begins, and sweeps of Gauss-Seidel that lead there.
@@ -38,6 +39,7 @@ def arrays_of(evaluator: Evaluator, size: int, remembered: int) -> StepArrays:
 @compiled
 def prepare_problem(s: StepArrays) -> None:
     """What contacts and joints feel of the masses: J M^-1, its diagonal blocks, and those of D."""
+    s.carries = 0
     for c in range(s.contact_count):
         J, moved, own = s.J[c], s.moved[c], s.own[c]
         for side in range(6):
@@ -57,6 +59,40 @@ def prepare_problem(s: StepArrays) -> None:
             for i in range(6):
                 felt += D[i] * turned[i]
         s.s[k] = 1.0 / max(felt, TINY)
+
+
+@compiled
+def take_carried(s: StepArrays) -> None:
+    """Take rows of light bodies as those of what these carry, which is what resists.
+
+    With their own masses, 1e-6 of those, a round of Newton's method leaves nearly all it finds.
+    """
+    s.carries = 1
+    for c in range(s.contact_count):
+        i, j, J, most = s.bodies[c, 0], s.bodies[c, 1], s.J[c], TINY
+        if s.carried[i, 0] + s.carried[j, 0] > 0.0:
+            for r in range(3):
+                felt = felt_by(s, i, J[12 * r :]) + felt_by(s, j, J[12 * r + 6 :])
+                most = max(most, felt)
+            s.r[c] = 1.0 / most
+    for k in range(s.y.size):
+        felt, light = TINY, 0.0
+        for q in range(s.row_start[k], s.row_start[k + 1]):
+            felt += felt_by(s, s.row_body[q], s.D[q])
+            light += s.carried[s.row_body[q], 0]
+        if light > 0.0:
+            s.s[k] = 1.0 / felt
+
+
+@compiled
+def felt_by(s: StepArrays, b: int, J: Floats) -> float:
+    """J M^-1 J^T of body b, of what it carries where that is far heavier."""
+    heavy, turned, found = s.carried[b], s.turned, 0.0
+    times_inverse(s, b, J, turned)
+    for k in range(6):
+        felt = J[k] * heavy[k // 3] if heavy[0] > 0.0 else turned[k]
+        found += felt * J[k]
+    return found
 
 
 @compiled
@@ -80,9 +116,12 @@ def solve(s: StepArrays, tolerance: float) -> bool:
             return False
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
         s.residual = newton(s, aim)
+        if s.residual > aim and s.light_count > 0:
+            take_carried(s)
+            s.residual = newton(s, aim)
         if few and joined and s.residual > tolerance and not refine_held(s, tolerance, aim):
             return False
-    if judge(s) > tolerance and not joined:
+    if s.carries == 0 and judge(s) > tolerance and not joined:
         sweep(s, SWEEPS, max(tolerance, NEAR), RELAX)
         if not finish(s, tolerance):
             return False

@@ -101,7 +101,7 @@ def next_end(work: Any) -> float:
     """
     t, t1, limit = work.t, end_of_step(work), work.step_limit
     t1 = max(t1, limit) if abs(limit - t1) <= SAME_TIME * (t1 - t) else min(t1, limit)
-    rate = min(work.rate / FOLLOWED, MOST_STEPS / work.fixed_step)
+    rate = min(MOST_STEPS / work.fixed_step, work.rate / FOLLOWED)
     parts = math.ceil((t1 - t) * rate - SAME_TIME)
     return t + (t1 - t) / parts if parts > 1 else t1
 

@@ -80,6 +80,8 @@ def random_field(spec: FieldSpec, rng: random.Random) -> Any:
         return None
     if spec.kind in ("point", "vec3", "vector2"):
         return numbers(rng, 3)
+    if spec.positive and spec.kind == "numbers":
+        return tuple(x * x + 0.01 for x in numbers(rng, spec.columns))
     if spec.kind in ("numbers", "square"):
         return numbers(rng, spec.columns)
     if spec.kind == "vector":

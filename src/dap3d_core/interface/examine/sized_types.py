@@ -42,10 +42,12 @@ class Shape:
     Attributes:
         sizes: (name of a size, number of entries).
         on: (field of a list, slots of its entries).
+        constants: (field of a list, its numbers).
     """
 
     sizes: tuple[tuple[str, int], ...]
     on: tuple[tuple[str, tuple[str, ...]], ...]
+    constants: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
     def __str__(self) -> str:
         sizes = [f"{name} = {count}" for name, count in self.sizes]
@@ -88,7 +90,9 @@ def sample_classes(type_: Any) -> list[Any]:
         return [type_]
     fixed, least = range(len(body_slots(type_))), max(spec.least for spec in lists.values())
     on_bodies = any(spec.kind in ENTRIES for spec in lists.values())
-    classes = []
+    classes = [_declared_sample(type_, lists, fixed, sample) for sample in type_.samples]
+    if classes:
+        return classes
     apart = any(spec.apart for spec in lists.values())
     for entries in SAMPLES if on_bodies and not apart else SAMPLES[:1]:
         bodies = [*entries, *range(max(entries) + 1, max(entries) + 1 + least - len(entries))]
@@ -97,6 +101,19 @@ def sample_classes(type_: Any) -> list[Any]:
         sizes = {spec.size: len(bodies) for spec in lists.values()}
         classes.append(sized_class(type_, Shape(tuple(sizes.items()), tuple(slots.items()))))
     return classes
+
+
+def _declared_sample(
+    type_: Any, lists: Mapping[str, FieldSpec], fixed: Sequence[int], sample: Mapping[str, Any]
+) -> Any:
+    given = {name: sample.get(name, ()) for name, s in lists.items() if s.kind in ENTRIES}
+    sizes = {lists[name].size: len(entries) for name, entries in given.items()}
+    constants = tuple(
+        (name, tuple(sample.get(name) or (float(spec.default),) * sizes[spec.size]))
+        for name, spec in lists.items() if spec.constant
+    )  # fmt: skip
+    slots = shared_slots(fixed, given)[1]
+    return sized_class(type_, Shape(tuple(sizes.items()), tuple(slots.items()), constants))
 
 
 def sized(type_info: TypeInfo, shape: Shape, examine: Callable[..., TypeInfo]) -> TypeInfo:
@@ -120,6 +137,10 @@ def sized_class(type_: Any, shape: Shape) -> Any:
             for entry in entry_fields(name, on[name]):
                 one = attrs.evolve(spec, kind=ENTRIES[spec.kind], size="")
                 members[entry] = field_of(one)
+        elif spec.constant or not sizes[spec.size]:  # a word with one choice
+            value = dict(shape.constants).get(name, ())
+            one = attrs.evolve(spec, kind="choice", choices=(value,), default=value, size="")
+            members[name] = field_of(one)
         else:
             members[name] = field_of(of_length(spec, sizes[spec.size]))
     members["__annotations__"] = {n: Any for n in members if n[0] != "_" and n != "shape_of_lists"}
@@ -172,6 +193,9 @@ def _known_names(type_: Any, shape: Shape) -> dict[str, tuple[list[str], str]]:
     specs = specs_of(type_)
     slots = list(body_slots(type_))
     slots += sorted({s for _, on in shape.on for s in on} - set(slots), key=SLOTS.index)
+    empty = [n for n, spec in sized_fields(type_).items() if not dict(shape.sizes)[spec.size]]
+    known |= {name: ([], "()") for name in empty}
+    known |= {name: ([], repr(numbers)) for name, numbers in shape.constants}
     known["body_count"] = [], str(len(slots))
     for field, on in shape.on:
         known[f"on_{field}"] = [], f"({''.join(f'{slots.index(s)}, ' for s in on)})"

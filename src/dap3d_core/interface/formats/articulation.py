@@ -4,7 +4,7 @@ Every importer makes one and every exporter is given one, so that a format is tr
 each direction. Lengths in m, angles in rad, masses in kg.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from math import inf, isfinite
 from typing import Any
 
@@ -226,6 +226,58 @@ class Coupling:
 
 
 @attrs.frozen(eq=False)
+class Drum:
+    """A sphere, or a cylinder about z, that a tendon wraps over.
+
+    Attributes:
+        link, at: its link, and its frame there.
+        radius: m.
+        after: number of the point of the tendon that it lies behind, from 1.
+        cylinder: False for a sphere.
+        side: a link and a point of it on whose side the tendon passes; None for the shorter way.
+        inside: the tendon passes through it.
+    """
+
+    link: str
+    at: Frame
+    radius: float
+    after: int
+    cylinder: bool = False
+    side: "tuple[str, Floats] | None" = None
+    inside: bool = False
+
+
+@attrs.frozen(eq=False)
+class Tendon:
+    """A line from point to point of links, or a sum of coordinates of joints, with its length.
+
+    Attributes:
+        name: its name in the file.
+        points: links, and the points in their axes, (3,) each.
+        stiffness, damping: N/m, N s/m.
+        rest: the length above which its spring pulls, m; None for that where the model starts.
+        limits: of its length, m.
+        place: its place in the file.
+        play: by how much it is shorter where the spring pushes, m.
+        drums: between points.
+        divisors: by which the line behind each point counts less, 0 where there is none; () for 1.
+        terms: joints of one coordinate, and their factors in the sum.
+    """
+
+    name: str
+    points: tuple[tuple[str, Floats], ...] = ()
+    stiffness: float = 0.0
+    damping: float = 0.0
+    rest: float | None = 0.0
+    limits: Limits = Limits()
+    place: Place = NOWHERE
+    play: float = 0.0
+    drums: tuple[Drum, ...] = ()
+    divisors: tuple[float, ...] = ()
+    terms: tuple[tuple[str, float], ...] = ()
+
+
+@attrs.frozen(eq=False)
 class Actuator:
     """A force on the coordinate q of a joint, or a force and moment on a link, by an input u.
 
@@ -241,6 +293,8 @@ class Actuator:
         activation: "lag" or "integral" where u acts by a state, with the time constant ``time``.
         start: that state, and the input, where the model starts.
         link, at, wrench: of a link, the frame and the (6,) force and moment for u = 1 in its axes.
+        tendon: whose length is q; F lengthens it.
+        muscle: with the activation "muscle": its numbers, of a force that shortens the tendon.
     """
 
     name: str
@@ -259,28 +313,8 @@ class Actuator:
     link: str = ""
     at: Frame = IDENTITY
     wrench: tuple[float, ...] = ()
-
-
-@attrs.frozen(eq=False)
-class Tendon:
-    """A line from point to point of links, with a spring, a damper and limits of its length.
-
-    Attributes:
-        name: its name in the file.
-        points: links, and the points in their axes, (3,) each.
-        stiffness, damping: N/m, N s/m.
-        rest: the length without force, m.
-        limits: of its length, m.
-        place: its place in the file.
-    """
-
-    name: str
-    points: tuple[tuple[str, Floats], ...]
-    stiffness: float = 0.0
-    damping: float = 0.0
-    rest: float = 0.0
-    limits: Limits = Limits()
-    place: Place = NOWHERE
+    tendon: Tendon | None = None
+    muscle: Mapping[str, float] = attrs.Factory(dict)
 
 
 @attrs.define(eq=False)

@@ -58,6 +58,20 @@ class JointInertia:
             return None
         return float(self._masses[0][place.start + k, place.start + k]) or None
 
+    def of_sum(self, factors: Mapping[str, float]) -> float | None:
+        """The inertia of a sum of coordinates, each of a joint that has one, as ``of``."""
+        if self._modes is None or not factors.keys() <= self._columns.keys():
+            return None
+        free, inverse, scale = self._modes
+        along = np.zeros(len(scale))
+        for name, factor in factors.items():
+            along[self._columns[name]] += factor
+        left = free.T @ (along / scale)
+        yields = float(left @ inverse @ left)
+        return (
+            1.0 / yields if yields > DEPENDENT * float((along / scale) @ (along / scale)) else None
+        )
+
     @cached_property
     def _columns(self) -> dict[str, slice]:
         """The coordinates of each joint."""
@@ -74,8 +88,8 @@ class JointInertia:
         return self._matrix(size) if 0 < size <= MOST else None
 
     @cached_property
-    def _inverse(self) -> Floats | None:
-        """The diagonal of the inverse of the mass matrix, of all motions that are left."""
+    def _modes(self) -> tuple[Floats, Floats, Floats] | None:
+        """Motions that are left, the inverse of their mass matrix, and scales of coordinates."""
         if self._masses is None or not (np.diag(self._masses[0]) > 0.0).all():
             return None
         M, rates = self._masses
@@ -88,7 +102,15 @@ class JointInertia:
         left = free.T @ (M / np.outer(scale, scale)) @ free
         if not free.size or not np.linalg.cond(left) < 1.0 / np.finfo(float).eps:
             return None
-        inverse = np.einsum("ij,jk,ik->i", free, np.linalg.inv(left), free)
+        return free, np.linalg.inv(left), scale
+
+    @cached_property
+    def _inverse(self) -> Floats | None:
+        """The diagonal of the inverse of the mass matrix, of all motions that are left."""
+        if self._modes is None:
+            return None
+        free, inverted, scale = self._modes
+        inverse = np.einsum("ij,jk,ik->i", free, inverted, free)
         moves = np.sqrt((free * free).sum(axis=1)) > DEPENDENT
         return np.asarray(np.where(moves, inverse, 0.0) / scale**2)
 

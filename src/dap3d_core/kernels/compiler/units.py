@@ -139,6 +139,7 @@ class Entry:
         self._address: int = 0
         self._function: Any = None
         self._words: Any = None
+        self._unchecked: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the function.
@@ -149,6 +150,12 @@ class Entry:
         if self._words is None:  # many entries are never called from Python
             self._words = _words_of(self.signature.arguments)
         return self._run(*self._words(*arguments))
+
+    def unchecked(self, *arguments: Any) -> Any:
+        """As ``__call__``, with arguments of these types."""
+        if self._unchecked is None:
+            self._unchecked = _words_of(self.signature.arguments, is_checked=False)
+        return self._run(*self._unchecked(*arguments))
 
     def prepared(self, *arguments: Any) -> Callable[..., Any]:
         """The function with its first arguments, to be called with the scalars that follow them."""
@@ -189,25 +196,28 @@ def address_of(array: Any) -> int:
         return int(array.ctypes.data) if array.size else 0
 
 
-def _words_of(types: Sequence[Any]) -> Callable[..., Any]:
-    """A Python function that returns the machine words of arguments.
+def _words_of(types: Sequence[Any], *, is_checked: bool = True) -> Callable[..., Any]:
+    """A Python function that returns the machine words of arguments, unless of other types.
 
     It is generated, as ``collections.namedtuple`` does: loops and closures take twice as long.
     """
     checks: dict[str, Any] = {"address_of": address_of}
-    words = [_words_text(f"a{k}", type_, checks) for k, type_ in enumerate(types)]
+    words = [_words_text(f"a{k}", type_, checks, is_checked) for k, type_ in enumerate(types)]
     names = ", ".join(f"a{k}" for k in range(len(types)))
     source = f"lambda {names}: [{', '.join(filter(None, words))}]"
     return eval(source, checks)
 
 
-def _words_text(name: str, type_: Any, checks: dict[str, Any]) -> str:
+def _words_text(name: str, type_: Any, checks: dict[str, Any], is_checked: bool) -> str:
     """Python text of the machine words of an argument; adds the functions that it calls."""
     if isinstance(type_, t.Array) and type_.ndim > 0:
+        if not is_checked:
+            return f"address_of({name}), *{name}.shape"
         checks[f"array{len(checks)}"] = _array_check(type_)
         return f"array{len(checks) - 1}({name}), *{name}.shape"
     if isinstance(type_, t.Tuple):
-        parts = (_words_text(f"{name}[{k}]", item, checks) for k, item in enumerate(type_.items))
+        items = enumerate(type_.items)
+        parts = (_words_text(f"{name}[{k}]", item, checks, is_checked) for k, item in items)
         return ", ".join(filter(None, parts))
     if isinstance(type_, t.Scalar):
         return {t.INT: f"int({name})", t.NOTHING: ""}.get(type_, name)

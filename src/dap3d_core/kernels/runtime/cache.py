@@ -138,7 +138,7 @@ class Compiled:
         entry = self._quick.get(key)
         if entry is None:
             entry = self._quick[key] = self.compile([type_of(a) for a in arguments])
-        return entry(*arguments)
+        return entry.unchecked(*arguments)
 
     def prepared(self, *arguments: Any) -> Callable[..., Any]:
         """As ``prepared``."""

@@ -3,6 +3,7 @@
 import os
 import re
 import stat
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -89,6 +90,12 @@ def shipped_models() -> dict[str, Path]:
 
     A group is a folder of models, such as ``benchmarks``.
     """
+    return dict(_shipped_models())
+
+
+@cache
+def _shipped_models() -> dict[str, Path]:
+    """The same, looked for once: a scene may include hundreds of files."""
     root = _models_folder()
     files = [f for depth in ("*", "*/*") for f in sorted(root.glob(f"{depth}/{SCENE_FILE}"))]
     return {file.parent.name: file.parent for file in files}

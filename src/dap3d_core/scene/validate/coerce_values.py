@@ -208,12 +208,20 @@ def square_of(value: Any, size: int) -> Any:
     return rows
 
 
-def list_of(value: Any) -> Any:
-    """One or more finite numbers as a tuple."""
+def list_of(value: Any, spec: FieldSpec | None = None) -> Any:
+    """One or more finite numbers as a tuple; above 0 where a field says so."""
     value = plain(value)
     if type(value) is not tuple or not value:
         return Fault(f"should be a list of numbers, not {_kind(value)}")
-    return numbers_of(value, len(value))
+    numbers = numbers_of(value, len(value))
+    if (
+        spec is not None
+        and spec.positive
+        and not isinstance(numbers, Fault)
+        and min(numbers) <= 0.0
+    ):
+        return Fault("should be a list of numbers above 0")
+    return numbers
 
 
 def rows_of(value: Any) -> Any:
@@ -327,7 +335,7 @@ READERS: dict[str, Callable[[FieldSpec, Any], Any]] = {
         maximum=spec.maximum,
         whole=spec.whole,
     ),
-    "numbers": lambda spec, x: list_of(x) if spec.size else numbers_of(x, spec.columns),
+    "numbers": lambda spec, x: list_of(x, spec) if spec.size else numbers_of(x, spec.columns),
     "vec3": lambda spec, value: numbers_of(value, 3),
     "matrix": lambda spec, value: matrix_of(value),
     "square": lambda spec, value: square_of(value, spec.columns),

@@ -32,7 +32,7 @@ from dap3d_core.scene.validate.geometry import (
 )
 from dap3d_core.scene.validate.joint_fields import with_joint_fields
 from dap3d_core.scene.validate.mistake_collector import Collector
-from dap3d_core.scene.validate.types import Types
+from dap3d_core.scene.validate.types import Types, completed_type
 from dap3d_core.scene.validate.validated_scene import Instance, arguments_of
 
 #: Keys of a table's elements that are read before their fields.
@@ -152,10 +152,10 @@ class Reader:
             added = own.keys() - specs_of(self.type_info.type).keys()
             values |= {name: own[name].default for name in added}
         if shape is not None:
-            from dap3d_core.interface.examine.examine import examine
-            from dap3d_core.interface.examine.sized_types import sized
-
-            type_info, bodies = sized(type_info, shape, examine), tuple(reading.bodies)
+            completed = completed_type(type_info, shape, partial(reading.refuse, ""))
+            if completed is None:
+                return None
+            type_info, bodies = completed, tuple(reading.bodies)
         functions = tuple([reading.rows.get(name, 0) for name in type_info.layout.functions])
         others = tuple([reading.others[name] for name in type_info.layout.others])
         return Instance(element.name, type_info, bodies, functions, values, others)
@@ -349,8 +349,7 @@ class _Reading:
         self.values[field.name] = value
         kind, least = field.spec.kind, field.spec.least
         if type(value) is not tuple or len(value) < least:
-            self.refuse(field.name, f"should be a list of {least} or more {kind}, by name")
-            return
+            return self.refuse(field.name, f"should be a list of {least} or more {kind}, by name")
         key, geometry = (*self.key, field.name), self.reader.geometry
         places = [entry_of(self.report, geometry, key, kind, name) for name in value]
         self.good &= None not in places
@@ -372,9 +371,9 @@ class _Reading:
             if count != len(value):
                 what = f"has {len(value)} entries, and {first} has {count}: they go together"
                 self.refuse(name, what)
-        for name in self.reader.lists.keys() - given.keys():  # a default, one number
-            spec = self.reader.lists[name]
-            self.values[name] = (float(spec.default),) * sizes[spec.size][0]
+        for name, spec in self.reader.lists.items():
+            if name not in given:  # a default, one number
+                self.values[name] = (float(spec.default),) * sizes[spec.size][0]
         on = {name: [body for body, _ in places] for name, places in self.places.items()}
         try:
             self.bodies, slots = shared_slots(self.bodies, on)
@@ -389,7 +388,9 @@ class _Reading:
                 entry_fields(name, letters), self.places[name], strict=True
             ):
                 self.values[entry] = local
-        return Shape(tuple((n, k) for n, (k, _) in sizes.items()), tuple(slots.items()))
+        constants = {n: self.values[n] for n, s in self.reader.lists.items() if s.constant}
+        counts = {n: k for n, (k, _) in sizes.items()}
+        return Shape(*(tuple(part.items()) for part in (counts, slots, constants)))
 
     # ---------------------------------------------------------------- bodies of slots
 

@@ -1,6 +1,6 @@
 """Types that a scene names, from the registry; the model's own file only where needed."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -120,3 +120,19 @@ class Types:
 
 class _NotAllowedError(Exception):
     """The model's own file would be needed, and may not be run."""
+
+
+def completed_type(
+    type_info: TypeInfo, shape: Any, refuse: Callable[[str], None]
+) -> TypeInfo | None:
+    """The type for one shape of its lists; None, refused, if prepare takes no numbers with it."""
+    from dap3d_core.interface.examine.examine import examine
+    from dap3d_core.interface.examine.sized_types import sized
+
+    try:
+        return sized(type_info, shape, examine)
+    except PluginError as error:
+        if not isinstance(error.__cause__, ValueError):
+            raise
+        refuse(str(error.__cause__))
+        return None

@@ -19,7 +19,7 @@ from dap3d_core.formulations.contacts.contact_rows import (
     length_of,
 )
 from dap3d_core.formulations.contacts.impacts import AT_REST, Impact, collide, repeat, unjam
-from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes
+from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes, nearly_jams
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.switches import POSITION_ROUNDING
 from dap3d_core.integrators import Integration, Status
@@ -95,7 +95,7 @@ class ContactJumps(Jumps):
         #: What the last instant decided; where ``repeats``, what is decided at the next.
         self.decided: Decided | None = None
         self.repeats = False
-        self._stood = (0, -np.inf)
+        self._stood, self._jammed = (0, -np.inf), ""
         self._latest: deque[tuple[float, str]] = deque(maxlen=MOST_CHANGES)
 
     def begin(self, integration: Integration) -> None:
@@ -183,7 +183,11 @@ class ContactJumps(Jumps):
         self.decided, self.repeats = other.decided, True
 
     def follow(self, integration: Integration) -> None:
-        """SimulationError where steps have become too short for the run to come to an end."""
+        """Where steps have become too short for the run to come to an end: slip jams, or it ends.
+
+        Raises:
+            SimulationError: it ends.
+        """
         steps, t = integration.statistics.steps, integration.t
         (before, since), span = self._stood, self._span_of(integration)
         if t - since > SLOW * span or steps < before:
@@ -192,7 +196,12 @@ class ContactJumps(Jumps):
             u, modes = self._state_of(integration), self._evaluator.states[self.table.mode]
             slip = np.linalg.norm(self._outputs(t, u)[:, SLIP], axis=1)
             sliding = np.where(modes == 1.0, slip, np.inf)
-            names = [self.table.names[c] for c in np.flatnonzero(modes > 0.5)]
+            closed = np.flatnonzero(modes > 0.5).tolist()
+            self._jammed = nearly_jams(self.table, ContactRows(self.table, t, u), closed)
+            if self._jammed:
+                self._stood, integration.work.status = (steps, t), Status.JUMPED
+                return
+            names = [self.table.names[c] for c in closed]
             slowest = (
                 f"the slowest slip is {sliding.min():.2g} m/s; " if np.any(modes == 1.0) else ""
             )
@@ -286,9 +295,13 @@ class ContactJumps(Jumps):
                   and (before[c] > 0.5 or near[c] or (c, 0) in ended)]  # fmt: skip
         sliding, leaving, stopped = self._what_ended(rows, outputs, before, ended)
         closed = self._movable(rows, closed)
+        opening = {c for c, _ in ended if before[c] < 0.5 and rows.closing[c] > 0.0}
         impact = collide(table, rows, closed, evaluator.model.length)
         table.find_grips(t, rows.with_velocities(rows.v))
+        jammed, self._jammed = self._jammed, ""
         try:
+            if jammed:
+                raise JamError(jammed)
             modes = find_modes(table, rows, closed, sliding, leaving)
         except JamError as error:
             impact, modes = self._unjam(rows, closed, impact, str(error))
@@ -296,7 +309,7 @@ class ContactJumps(Jumps):
         others = [c for c in closed if modes.mode[c] < 0.5]
         rows.change(rows.lifted(rows.closing, held, others))
         gaps = np.where(np.abs(outputs[:, GAP]) < touching, outputs[:, GAP], 0.0)
-        moved = self._apart(rows, gaps, held, others)
+        moved = self._apart(rows, gaps, held, others, opening)
         states = evaluator.states.copy()
         states[table.mode], states[table.way], states[table.near] = (
             modes.mode, modes.way, modes.near
@@ -338,14 +351,18 @@ class ContactJumps(Jumps):
             "Coulomb's law goes on from here"
         )
 
-    def _apart(self, rows: ContactRows, gaps: Floats, held: list[int], others: list[int]) -> Floats:
+    def _apart(
+        self, rows: ContactRows, gaps: Floats, held: list[int], others: list[int], opening: set[int]
+    ) -> Floats:
         """(6 n,) changes of positions that close the gaps of what holds, and part what overlaps.
 
-        What opens from rest would stop the run again where its gap is as deep as a switch passes.
+        What opens from rest, or opened already, would stop the run again where its gap is as deep
+        as a switch passes.
         """
         rounding = POSITION_ROUNDING * self._evaluator.model.length
         still = AT_REST * self._evaluator.model.length
-        deep = [c for c in others if rows.closing[c] < still and gaps[c] < -0.5 * rounding]
+        slow = [c for c in others if rows.closing[c] < still or c in opening]
+        deep = [c for c in slow if gaps[c] < -0.5 * rounding]
         return rows.lifted(gaps, [*held, *deep], others, 2.0 * rounding)
 
     def _outputs(self, t: float, u: Floats) -> Floats:

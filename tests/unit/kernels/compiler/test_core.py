@@ -149,10 +149,12 @@ NOT_CALLED = {
         "integrators.moreau.newton": (
             "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of add_load "
             "put_velocities clear add_pull times_inverse add_inverse speed_of left_at residual_of "
-            "newton exchange put_rest product_of solve_round try_pass assemble put_turned "
-            "add_contact"
+            "residual_after newton exchange put_rest product_of solve_round try_pass assemble "
+            "put_turned add_contact"
         ),
-        "integrators.moreau.problem": "prepare_problem solve judge sweep finish refine_groups",
+        "integrators.moreau.problem": (
+            "prepare_problem take_carried felt_by solve judge sweep finish refine_groups"
+        ),
         "integrators.moreau.restitution": (
             "limit_bounces any_gains put_work part_without_gain mix"
         ),
@@ -167,12 +169,15 @@ NOT_CALLED = {
         "formulations.contacts.cone": "residual_of shorten sweep",
         "formulations.contacts.equations": (
             "accelerate add_columns add_friction column force_of force_of_one has_settled "
-            "inverse invert invert_responses is_given is_sliding mode_of pressing row_of "
-            "largest_given project report rhs watch contact_of fill_load has_loads solve_loads"
+            "inverse invert_responses is_given is_sliding mode_of pressing row_of find_rates "
+            "largest_given project report rhs watch contact_of fill_load has_loads solve_loads "
+            "are_independent"
         ),
+        "formulations.contacts.inverse": "invert",
+        "formulations.contacts.watched_rates": "store_watched take_watched",
         "formulations.joint_loops.contacts": (
             "accelerate add_contact_forces add_scaled find_columns find_multipliers project report "
-            "rhs solve_all store_kept watch"
+            "rhs solve_all store_kept watch find_rates"
         ),
         # of runs with derivatives: study/sensitivities compares their values with those without
         "integrators.stepping.integration": "project_here",

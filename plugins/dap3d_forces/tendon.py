@@ -1,0 +1,262 @@
+"""Cable over spheres and cylinders, with pulleys; a tendon with an actuator or a muscle."""
+
+from typing import ClassVar
+
+from dap3d_core.interface import hookimpl, numbers, vectors
+from dap3d_core.interface import points as places
+from dap3d_core.kernels import add, by_body, cross, dot, scale, sub, where
+from dap3d_forces.actuator import kept
+from dap3d_forces.bounds import within
+from dap3d_forces.tendon_law import (
+    TendonLaw,
+    activated,
+    contracted,
+    numbers_of,
+    passive,
+    stored,
+)
+from dap3d_forces.wrapping import length_of, wrapped
+
+interface_version = 1
+
+#: Of ``ways``.
+PAST_SIDE, INSIDE = 1.0, 2.0
+
+
+class Tendon(TendonLaw):
+    """Spring and damper, or an actuator, along a massless cable that wraps over drums.
+
+    The cable runs from point to point, and without friction over the ``drums`` between them: the
+    shortest way, straight where it does not touch. Drum k, of the radius ``radii`` about a point of
+    any body, lies after point ``after``, counted from 1. Drums are spheres, but the first are
+    cylinders about ``axes``, without ends. ``ways`` says how it passes each: 0, on the shorter
+    way; 1, not opposite to its point of ``sides``; 2, through the drum, as through a ring.
+
+    ``divisors``, one for each point, are those of the span that begins there: a part of the cable
+    behind a pulley whose length counts divided by it, as a tackle's does; 0 where the cable ends
+    and goes on at the next point, as one of several branches. With the lengths l_k of the spans,
+    L = sum l_k / divisor_k, and x = max(0, L - length) - max(0, length - play - L):
+
+        T = k x + c L_dot,  energy = k x^2 / 2
+        with a control: T = k x + c L_dot + bias + gain u, kept within tension_min and tension_max
+        with a muscle:  T = k x + c L_dot + peak (f_l(l) f_v(v) z + f_p(l)), in the same bounds
+
+    and a force T / divisor along both ends of each span. ``length`` is that of the start if left
+    out. With ``slack`` spring and damper do not push. u acts at once, or by a state z within its
+    bounds: lag, z_dot = (u - z) / time; integral, z_dot = u / time; muscle, faster up than down.
+    Of a muscle l = (L - sinew) / optimum and v = l_dot / v_max; its curves are those of MuJoCo: f_l
+    is 1 at l = 1 and 0 beyond l_min and l_max, f_v falls to 0 at v = -1, f_p rises from l = 1.
+
+    T is continuous where the cable comes to touch a drum, and its slope is not: a ``switch``.
+    """
+
+    keyword = "tendon"
+    synonyms = ("muscle", "wrap", "drum", "capstan", "tackle")
+    example: ClassVar[dict[str, str]] = {"k": "1e3"}
+    samples: ClassVar = (
+        {"points": (0, 1), "drums": (2,), "after": (1.0,), "sides": (0,), "ways": (1.0,)},
+        {"points": (0, 1, 1, 2), "drums": (2, 0), "axes": (2,), "sides": (2, 1),
+         "after": (1.0, 3.0), "ways": (1.0, 0.0), "divisors": (2.0, 0.0, 1.0, 1.0)},
+    )  # fmt: skip
+    points: tuple = places("n", least=2, doc="ends, and points that it is led over, in order")
+    drums: tuple = places("m", least=0, doc="centres of the drums")
+    after: tuple = numbers("m", 0.0, constant=True, doc="the point before each drum, from 1")
+    radii: tuple = numbers("m", 1.0, positive=True, unit="m", doc="radii of the drums")
+    axes: tuple = vectors("a", least=0, doc="axes of the drums that are cylinders, the first ones")
+    sides: tuple = places("s", least=0, doc="points on whose side the cable passes, of each drum")
+    ways: tuple = numbers("m", 0.0, constant=True, doc="past each drum: 0, 1 or 2 as above")
+    divisors: tuple = numbers("n", 1.0, constant=True, doc="by which spans count less; 0 for none")
+
+    def prepare(self, bodies):
+        found = {name: [pose.place(P) for P, pose in zip(getattr(self, name), bodies[name],
+                                                         strict=True)]
+                 for name in ("points", "drums", "sides")}  # fmt: skip
+        axes = [pose.to_global(a) for a, pose in zip(self.axes, bodies["axes"], strict=True)]
+        check_drums(self)
+        if any(
+            one is not other for one, other in zip(bodies["axes"], bodies["drums"], strict=False)
+        ):
+            raise ValueError("axes should lie on the bodies of their drums, the first ones")
+        drums = found["drums"], self.radii, axes, found["sides"]
+        path = spans(found["points"], *drums, self.after, self.ways, self.divisors)
+        return numbers_of(self, total(path))
+
+    def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
+               w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring):  # fmt: skip
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
+
+    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
+                divisors, spring):  # fmt: skip
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        return passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+
+    def energy(r_points, r_drums, axes, r_sides, radii, after, ways, divisors, spring):
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        return stored(total(path), spring)
+
+    def switch(r_points, r_drums, axes, r_sides, radii, after, ways, divisors, spring):
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        changes = [x for _, _, drum, way in path if drum is not None for x in way[5:]]
+        return total(path) - spring[0], *(x for x in changes if x is not None)
+
+
+class Driven(Tendon, activation="none", control=True):
+    """A control acts at once."""
+
+    energy = None
+
+    def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
+               w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring, control,
+               control_min, control_max, gain, bias, tension_min, tension_max):  # fmt: skip
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        T = T + bias + gain * within(control, control_min, control_max)
+        T = within(T, tension_min, tension_max)
+        return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
+
+    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
+                divisors, spring, control, control_min, control_max, gain, bias, tension_min,
+                tension_max):  # fmt: skip
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        T = T + bias + gain * within(control, control_min, control_max)
+        return within(T, tension_min, tension_max)
+
+
+class Lagging(Tendon, activation="lag"):
+    """A control acts with a lag."""
+
+    energy = None
+    states = ("z",)
+
+    def rate(control, control_min, control_max, activation_min, activation_max, time, z):
+        z_dot = (within(control, control_min, control_max) - z) / time
+        return kept(z_dot, z, activation_min, activation_max)
+
+    def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
+               w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring, z, gain,
+               bias, tension_min, tension_max):  # fmt: skip
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        T = within(T + bias + gain * z, tension_min, tension_max)
+        return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
+
+    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
+                divisors, spring, z, gain, bias, tension_min, tension_max):  # fmt: skip
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        T = passive(total(path), rate_of(path, v_points, v_drums, w_drums), spring)
+        return within(T + bias + gain * z, tension_min, tension_max)
+
+
+class Summing(Lagging, activation="integral"):
+    """The integral of a control acts."""
+
+    def rate(control, control_min, control_max, activation_min, activation_max, time, z):
+        z_dot = within(control, control_min, control_max) / time
+        return kept(z_dot, z, activation_min, activation_max)
+
+
+class Muscle(Lagging, activation="muscle"):
+    """A control activates a muscle."""
+
+    def rate(control, control_min, control_max, activation_min, activation_max, muscle, z):
+        z_dot = activated(within(control, control_min, control_max), z, muscle)
+        return kept(z_dot, z, activation_min, activation_max)
+
+    def wrench(r_points, s_points, v_points, on_points, body_count, r_drums, s_drums, v_drums,
+               w_drums, on_drums, axes, r_sides, radii, after, ways, divisors, spring, z, muscle,
+               tension_min, tension_max):  # fmt: skip
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        L, L_dot = total(path), rate_of(path, v_points, v_drums, w_drums)
+        T = passive(L, L_dot, spring) + contracted(L, L_dot, z, muscle)
+        T = within(T, tension_min, tension_max)
+        return acting(T, path, s_points, on_points, s_drums, on_drums, body_count)
+
+    def tension(r_points, v_points, r_drums, v_drums, w_drums, axes, r_sides, radii, after, ways,
+                divisors, spring, z, muscle, tension_min, tension_max):  # fmt: skip
+        path = spans(r_points, r_drums, radii, axes, r_sides, after, ways, divisors)
+        L, L_dot = total(path), rate_of(path, v_points, v_drums, w_drums)
+        T = passive(L, L_dot, spring) + contracted(L, L_dot, z, muscle)
+        return within(T, tension_min, tension_max)
+
+
+def check_drums(tendon):
+    """Refuse lists of drums that contradict each other.
+
+    Raises:
+        ValueError: they do.
+    """
+    last, count = len(tendon.points) - 1, len(tendon.drums)
+    if not all(x in range(1, last + 1) for x in tendon.after):
+        raise ValueError(f"after should have a number from 1 to {last} for each drum")
+    if len(set(tendon.after)) < count:
+        raise ValueError("after has one point twice; give a point between two drums")
+    if len(tendon.axes) > count or len(tendon.sides) not in (0, count):
+        raise ValueError("there should be as many sides as drums, or none, and no more axes")
+    if not all(x in (0.0, 2.0) or (x == PAST_SIDE and tendon.sides) for x in tendon.ways):
+        raise ValueError("ways should be 0, 1 with sides, or 2 for each drum")
+    if not all(x >= 0.0 for x in tendon.divisors):
+        raise ValueError("divisors should not be below 0")
+
+
+def spans(r, drums, radii, axes, sides, after, ways, divisors):
+    """Of each span: its first point, its share in the length, its drum or None, and its way."""
+    found = []
+    for k in range(len(r) - 1):
+        drum = after.index(k + 1.0) if k + 1.0 in after else None
+        if divisors[k] == 0.0:
+            continue
+        if drum is None:
+            l, u = length_of(sub(r[k + 1], r[k]))
+            way = (l, u, u)
+        else:
+            axis = axes[drum] if drum < len(axes) else None
+            side = sides[drum] if sides and ways[drum] == PAST_SIDE else None
+            way = wrapped(r[k], r[k + 1], drums[drum], radii[drum], axis, side,
+                          inside=ways[drum] == INSIDE)  # fmt: skip
+        found.append((k, 1.0 / divisors[k], drum, way))
+    return found
+
+
+def total(path):
+    """The length L, m."""
+    return sum(share * way[0] for _, share, _, way in path)
+
+
+def pulls(path):
+    """The forces of a tension of 1: of each its point or drum, the arm from there, the force."""
+    at_points, at_drums = [], []
+    for k, share, drum, way in path:
+        u, v = scale(share, way[1]), scale(-share, way[2])
+        at_points += [(k, u), (k + 1, v)]
+        if drum is not None:  # where it does not touch, the two forces are opposite
+            touches = way[5] > 0.0
+            P, Q = (tuple(where(touches, x, 0.0) for x in arm) for arm in way[3:5])
+            at_drums += [(drum, P, scale(-1.0, u)), (drum, Q, scale(-1.0, v))]
+    return at_points, at_drums
+
+
+def rate_of(path, v, v_drums, w_drums):
+    """The rate of L, m/s: less the power of a tension of 1."""
+    at_points, at_drums = pulls(path)
+    power = sum(dot(F, v[k]) for k, F in at_points)
+    return -power - sum(dot(F, add(v_drums[b], cross(w_drums[b], arm))) for b, arm, F in at_drums)
+
+
+def acting(T, path, s, on_points, s_drums, on_drums, body_count):
+    """The wrench of a tension on each body."""
+    at_points, at_drums = pulls(path)
+    parts = [(on_points[k], s[k], F) for k, F in at_points]
+    parts += [(on_drums[b], add(s_drums[b], arm), F) for b, arm, F in at_drums]
+    forces = [(on, s, scale(T, F)) for on, s, F in parts]
+    return by_body(
+        [on for on, _, _ in forces], [(F, cross(s, F)) for _, s, F in forces], body_count
+    )
+
+
+@hookimpl
+def dap3d_forces():
+    """The force types of this module."""
+    return [Tendon]

@@ -1,0 +1,144 @@
+"""Tendons of MJCF: lines over sites, spheres and cylinders, with pulleys; sums of coordinates."""
+
+import attrs
+import numpy as np
+
+from dap3d_core.interface.formats import (
+    UNBOUNDED,
+    WORLD,
+    Drum,
+    FormatError,
+    Frame,
+    Limits,
+    Tendon,
+    XmlElement,
+    from_quaternion,
+    held,
+)
+from dap3d_formats.mjcf.reader import MjcfReader
+
+#: Joints with one coordinate.
+SCALAR = ("revolute", "prismatic")
+
+
+def tendon_of(reader: MjcfReader, element: XmlElement, key: str) -> XmlElement:
+    """The tendon that an element names.
+
+    Raises:
+        FormatError: it is not there.
+    """
+    name, holders = element.require(key), reader.document.root.all("tendon")
+    found = next((t for holder in holders for t in holder if t.get("name") == name), None)
+    if found is None:
+        raise FormatError(f"there is no tendon {name!r}", element.place)
+    return settled_tendon(reader, found)
+
+
+def settled_tendon(reader: MjcfReader, tendon: XmlElement) -> XmlElement:
+    """A tendon with the attributes of its class, which all tendons share."""
+    settled = reader.document.settled(attrs.evolve(tendon, name="tendon"), "main")
+    return attrs.evolve(settled, name=tendon.name)
+
+
+def read_tendons(reader: MjcfReader) -> None:
+    """Read tendons with a spring, a damper or limits.
+
+    Raises:
+        FormatError: one names a site, geom or joint that is not there.
+    """
+    tendons = [t for holder in reader.document.root.all("tendon") for t in holder]
+    for k, given in enumerate(tendons, 1):
+        tendon = settled_tendon(reader, given)
+        low, high = reader.document.bounds(tendon, "range", "limited")
+        if reader.document.disables("limit", "constraint"):
+            low, high = UNBOUNDED
+        stiffness, damping = (tendon.numbers(key, None, (0.0,))[0]
+                              for key in ("stiffness", "damping"))  # fmt: skip
+        if not (stiffness or damping or (low, high) != UNBOUNDED):
+            continue
+        line = line_of(reader, tendon, f"tendon{k}")
+        if line is None:
+            continue
+        rest = tendon.numbers("springlength", None, (-1.0,))
+        drawn = set(rest) == {-1.0}
+        reader.model.tendons.append(attrs.evolve(
+            line, stiffness=stiffness, damping=damping, limits=Limits(low, high),
+            rest=_drawn(reader, line) if drawn else rest[-1], play=rest[-1] - rest[0],
+        ))  # fmt: skip
+
+
+def line_of(reader: MjcfReader, tendon: XmlElement, name: str) -> Tendon | None:
+    """The line of a tendon; None, remarked, for joints of several coordinates.
+
+    Raises:
+        FormatError: it names a site, geom or joint that is not there.
+    """
+    name, place = tendon.get("name") or name, tendon.place
+    if tendon.name == "fixed":
+        terms = tuple((t.require("joint"), t.number("coef")) for t in tendon.all("joint"))
+        for joint, _ in terms:
+            if joint not in reader.model.joints:
+                raise FormatError(f"<fixed>: there is no joint {joint!r}", place)
+        if any(reader.model.joints[joint].kind not in (*SCALAR, "fixed") for joint, _ in terms):
+            text = "a fixed tendon of a joint of several coordinates"
+            reader.document.source.remarks.leave_out(place, text, motion=True)
+            return None
+        return Tendon(name, terms=terms, place=place)
+    points, drums, divisors, divisor = [], [], [], 1.0
+    for part in tendon:
+        if part.name == "site":
+            link, at = reader.site(part, "site")
+            points.append((link, at.r))
+            divisors.append(divisor)
+        elif part.name == "pulley":
+            divisor = part.number("divisor")
+            divisors[-1:] = [0.0] if divisors else []
+        elif part.name == "geom":
+            drums.append(_drum(reader, part, len(points)))
+    uniform = set(divisors[:-1]) <= {1.0}
+    return Tendon(name, tuple(points), place=place, drums=tuple(drums),
+                  divisors=() if uniform else tuple(divisors))  # fmt: skip
+
+
+def _drum(reader: MjcfReader, part: XmlElement, after: int) -> Drum:
+    link, shape = reader.solid(part)
+    frame, radius = shape.pose, shape.size[0]
+    side, inside = None, False
+    if "sidesite" in part.attributes:
+        on, at = reader.site(part, "sidesite")
+        side = (on, at.r)
+        arm = (pose_of(reader, on) @ at).r - (pose_of(reader, link) @ frame).r
+        inside = bool(np.linalg.norm(arm) < radius)
+    return Drum(link, frame, radius, after, shape.kind == "cylinder", side, inside)
+
+
+def _drawn(reader: MjcfReader, line: Tendon) -> float | None:
+    """The length where the springs of all joints are at rest; None over drums."""
+    if line.terms:
+        joints = [(reader.model.joints[name], factor) for name, factor in line.terms]
+        return sum(factor * (joint.rest[0] + joint.reference) for joint, factor in joints)
+    if line.drums:
+        text = "the rest length of a tendon over geoms is that where the scene starts"
+        reader.document.source.remarks.translate(line.place, text)
+        return None
+    places = np.array(
+        [(pose_of(reader, link, at_rest=True) @ Frame(at)).r for link, at in line.points]
+    )
+    lengths = np.linalg.norm(np.diff(places, axis=0), axis=1)
+    counts = [1.0 / d if d else 0.0 for d in line.divisors[:-1]] or 1.0
+    return float((lengths * counts).sum())
+
+
+def pose_of(reader: MjcfReader, link: str, *, at_rest: bool = False) -> Frame:
+    """The pose of a link where the file draws it, or with the springs of joints at rest."""
+    pose = Frame()
+    while link != WORLD:
+        joint = next(j for j in reader.model.joints.values() if j.child == link and not j.closes)
+        if at_rest and joint.kind in SCALAR:
+            joint = held(joint, joint.rest[0])
+        step = joint.in_parent @ joint.in_child.inverse()
+        if joint.kind == "free":
+            q = joint.position
+            step = Frame(q[:3], from_quaternion(q[3:]))
+        pose, link = step @ pose, joint.parent
+    return pose
