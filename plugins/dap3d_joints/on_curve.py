@@ -24,7 +24,7 @@ class OnCurve(Joint):
     """
 
     keyword, rows, unknowns = "oncurve", 2, ("s",)
-    synonyms = ("slot", "wire", "bead")
+    synonyms = ("slot", "wire", "bead-on-wire")
     symbol = "block"
     P_i: Point = point(doc="the point that stays on the curve")
     P_j: Point = point("ground.O", doc="origin of the curve")

@@ -163,6 +163,7 @@ ALLOWED = {
     ("kernels/compiler/units.py", "eval"): "calls of compiled functions, by their types",
     ("kernels/compiler/background.py", "subprocess"): "Python itself, to compile beside",
     ("kernels/compiler/objects.py", "subprocess"): "Python itself, to try a named processor",
+    ("model/groups.py", "eval"): "places of numbers in the loops of functions",
     ("registry/arguments.py", "eval"): "annotations of public functions",
     ("testing/packages.py", "subprocess"): "pytest, on the tests of packages, when it is asked for",
     ("plot/film/animation.py", "subprocess"): "ffmpeg, without a shell",

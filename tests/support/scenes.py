@@ -46,7 +46,7 @@ def scene_for(type_info, rng, *, ground=None, values=None):
         scene.add_body(name, mass=rng.uniform(0.5, 2.0), Jp=J, r=rng.uniform(-1, 1, 3), p=p)
     if ground:
         owner[ground] = "ground"
-    fields = {}
+    fields, sample = {}, next(iter(type_info.type.samples), {})
     specs = specs_of(type_info.type)
     chosen = [n for n, s in specs.items() if s.instead_of and values.get(n)]
     replaced = {other for n in chosen for other in specs[n].instead_of}
@@ -54,7 +54,7 @@ def scene_for(type_info, rng, *, ground=None, values=None):
     for name, spec in specs.items():
         if name in replaced:
             continue
-        value = _field(scene, name, spec, owner, rng, values.get(name))
+        value = _field(scene, name, spec, owner, rng, values.get(name), sample)
         if value is not None:
             fields[name] = value
     for low in [name for name in fields if name.endswith("_min")]:
@@ -72,11 +72,15 @@ def scene_for(type_info, rng, *, ground=None, values=None):
     return scene
 
 
-def _list(scene, name, spec, owner, rng):
-    """Three entries on different bodies; small numbers, such as radii."""
+def _list(scene, name, spec, owner, rng, sample):
+    """Three entries on different bodies; small numbers, such as radii; or those of a sample."""
     on = list(owner.values())
+    if sample and spec.kind == "numbers":
+        return list(sample[name]) if name in sample else None
+    if sample:
+        on = [on[k] for k in sample.get(name, ())]
     if spec.kind == "points":
-        return [scene.add_point(f"{name}_{b}", b, rng.uniform(-1, 1, 3)) for b in on]
+        return [scene.add_point(f"{name}_{k}", b, rng.uniform(-1, 1, 3)) for k, b in enumerate(on)]
     if spec.kind == "vectors":
         return [scene.add_vector(f"{name}_{b}", b, rng.normal(size=3)) for b in on]
     if spec.kind == "bodies":
@@ -84,11 +88,11 @@ def _list(scene, name, spec, owner, rng):
     return rng.uniform(0.05, 0.1, len(on)) if spec.required else None
 
 
-def _field(scene, name, spec, owner, rng, wanted):
+def _field(scene, name, spec, owner, rng, wanted, sample):
     if not spec.given or spec.kind == "joint_fields":
         return None
     if spec.size:
-        return _list(scene, name, spec, owner, rng)
+        return _list(scene, name, spec, owner, rng, sample)
     body = owner.get(slot_of(name) or "", "b1")
     if spec.kind == "point":
         return scene.add_point(name, body, rng.uniform(-1, 1, 3))

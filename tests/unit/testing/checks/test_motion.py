@@ -46,6 +46,7 @@ INSTALLED = {
     "parallel": ["refused: its 2 rows cost less than 4 joint coordinates"],
     "inline": ["refused: its 2 rows cost less than 4 joint coordinates"],
     "inplane": [ONE_ROW],
+    "oncurve": ["refused: it has unknowns of its own: s"] * 2,
     "cv": ["refused: the axes of its free motions are constant in neither body"],
     "motor": [ON_TIME, *[ON_VELOCITY] * 2, ON_TIME, *[ON_VELOCITY] * 2],
     "couple": ["refused: it joins three bodies"],
