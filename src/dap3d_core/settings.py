@@ -74,7 +74,7 @@ SETTINGS = {
         Setting("contact", "word", "auto",
                 "follow contacts by events, exact, or by stepping, for any number of them",
                 ("auto", "events", "stepping")),
-        Setting("contact_step", "time", 1e-3, "step of contact stepping, s"),
+        Setting("contact_step", "time", 1e-3, "longest step of contact stepping, s"),
         Setting("alpha", "number", 1e7, "factor of penalty forces", on_command_line=False),
         Setting("Omega", "number", 10.0, "natural frequency of method penalty, rad/s",
                 on_command_line=False),

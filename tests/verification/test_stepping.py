@@ -443,3 +443,29 @@ def test_times_that_differ_by_rounding_make_no_step_of_their_own():
     assert 0.7 not in run.t  # 0.7000000000000001
     # the floor's acceleration is at most 5.8 * 0.1 / 0.5^2 = 2.3 m/s^2
     assert np.all(np.abs(run.contact("under").normal_force[1:] - 0.981) < 0.24)
+
+
+def test_a_servo_that_is_fast_for_the_step_makes_it_shorter():
+    """A foot of 0.03 kg m^2 with a damper of 40 N m s/rad: 1333 1/s; a note says so.
+
+    It presses on the floor with the servo's moment over its length, whatever the step; 100 time
+    constants later the rest of its fall is below rounding.
+    """
+    scene = dap.Scene(name="foot")
+    scene.add_body("foot", mass=1.0, Jp=[0.02] * 3, r=[0.1, 0.0, 0.0])
+    scene.add_point("hip", "ground", [0.0, 0.0, 0.0])
+    scene.add_point("heel", "foot", [-0.1, 0.0, 0.0])
+    scene.add_point("toe", "foot", [0.1, 0.0, 0.0])
+    scene.add_joint("rev", "pin", P_i="heel", P_j="hip", a_i="foot.y", a_j="ground.y")
+    scene.add_force("rot_sda", "servo", joint="pin", k=50.0, n_a=3.0, c=40.0)
+    scene.add_shape("sphere", "sole", body="foot", radius=0.02, at=[0.1, 0.0, 0.0], collides=True)
+    scene.add_shape("plane", body="ground", at=[0.0, 0.0, -0.0201], collides=True)
+    scene.add_material("hard")
+    scene.add_collisions(material="hard")
+    run = dap.simulate(scene, t_end=0.2, dt=0.1, contact_step=2e-2, estimate_error=False)
+    turned = run.quantity("pin.angle").values[-1]
+    moment = 3.0 - 50.0 * turned
+    assert turned == pytest.approx(np.arcsin(1e-4 / 0.2), rel=1e-6)
+    push = run.contacts.of("sole").at(run.t[-1:]).force[0, 2]
+    assert push == pytest.approx(moment / (0.2 * np.cos(turned)), rel=1e-8)
+    assert any("steps are 0.0015 s" in n and "at 1.3e+03 1/s" in n for n in run.notes)

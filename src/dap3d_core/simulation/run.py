@@ -376,4 +376,5 @@ def stepping_notes(integrations: Sequence[Integration], length: float) -> list[s
             "move apart"
         )
     first = next(one for one in integrations if one.name == STEPPING.name)
-    return [*notes, words] if (words := first.overlapping) else notes
+    notes += [words] if (words := first.overlapping) else []
+    return [*notes, information(words)] if (words := first.shortened) else notes

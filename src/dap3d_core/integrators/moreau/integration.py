@@ -23,7 +23,7 @@ from dap3d_core.integrators.moreau.contact_set import POINTS
 from dap3d_core.integrators.moreau.free_motion import MOST_PARTS, PART
 from dap3d_core.integrators.moreau.impulses import complete_row
 from dap3d_core.integrators.moreau.problem import arrays_of
-from dap3d_core.integrators.moreau.step import advance
+from dap3d_core.integrators.moreau.step import FOLLOWED, MOST_STEPS, advance
 from dap3d_core.integrators.stepping.integration import Integration
 from dap3d_core.integrators.stepping.integration_state import (
     OTHER,
@@ -165,6 +165,17 @@ class MoreauIntegration(Integration):
             f"forces change motion at {rate:.2g} 1/s there, and a step of {h:g} s follows "
             f"{PART * MOST_PARTS / h:.2g} 1/s; let a joint do what so stiff a spring or damper "
             "does, give a shorter contact_step, or make it less stiff"
+        )
+
+    @property
+    def shortened(self) -> str:
+        """As of ``Integration``."""
+        rate, h = float(self.work.rate), float(self.work.fixed_step)
+        if not h * rate > FOLLOWED:
+            return ""
+        return (
+            f"steps are {max(FOLLOWED / rate, h / MOST_STEPS):.2g} s long where {h:g} s were asked "
+            f"for: forces change motion at {rate:.2g} 1/s at the end"
         )
 
     @property

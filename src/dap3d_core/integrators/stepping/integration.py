@@ -347,6 +347,11 @@ class Integration(Restorable):
         return ""
 
     @property
+    def shortened(self) -> str:
+        """Why steps are shorter than asked for, in words; or ""."""
+        return ""
+
+    @property
     def too_fast(self) -> str:
         """In words, what its steps cannot follow, which makes numbers overflow; "" for nothing."""
         return ""
