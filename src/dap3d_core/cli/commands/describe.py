@@ -293,6 +293,9 @@ def bodies_text(data: dict[str, Any]) -> str:
         return "every body of the scene"
     if data.get("each_pair"):
         return "every two bodies of the scene"
+    lists = [field["name"] for field in data["fields"] if field["kind"] in ("points", "bodies")]
+    if lists:
+        return f"the bodies of {', '.join(lists)}"
     if not data["bodies"]:
         return "the bodies of its joint"
     return f"{', '.join(data['bodies'])}; the last letter of a field is the body's"

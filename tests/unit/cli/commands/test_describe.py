@@ -85,6 +85,7 @@ def test_the_freedoms_that_joints_leave():
         ("disk", ["zn is nz"]),  # allowed words with their aliases
         ("rot_sda", ["false, true", "of theta - theta_0"]),  # what a function is of
         ("friction", ["the bodies of its joint"]),
+        ("cable", ["the bodies of points"]),
         ("rev", ["called revolute, hinge, pin elsewhere"]),
         # states by name, with the fields that come with them
         ("maxwell", ["states z; initial values by fields in _0, tolerances by fields in _atol",
