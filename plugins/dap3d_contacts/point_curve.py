@@ -1,6 +1,8 @@
 """A point, a roller or a ball at a curve: cams, rails, wires, pipes."""
 
 import math
+from collections.abc import Mapping
+from typing import ClassVar
 
 from dap3d_contacts.ball_surface import LEFT, seen_from
 from dap3d_contacts.curve_samples import SAMPLES, Curve
@@ -186,6 +188,7 @@ class PointCurve(Contact):
     """
 
     keyword = "point_curve"
+    example: ClassVar[Mapping[str, str]] = {"function": '"motor"'}
     P_i: Point = point(doc="the point, centre of the roller")
     radius: float = number(0.0, unit="m", minimum=0.0, doc="of the roller; 0: a point")
     P_j: Point = point("ground.O", doc="origin of the curve")

@@ -1,5 +1,8 @@
 """A point that stays on a curve: beads on wires, pins in slots."""
 
+from collections.abc import Mapping
+from typing import ClassVar
+
 from dap3d_core.interface import REQUIRED, Joint, Point, function, hookimpl, number, point
 from dap3d_core.kernels import add, cross, rotate, row, scale, sub, transpose
 
@@ -26,6 +29,7 @@ class OnCurve(Joint):
     keyword, rows, unknowns = "oncurve", 2, ("s",)
     synonyms = ("slot", "wire", "bead-on-wire")
     symbol = "block"
+    example: ClassVar[Mapping[str, str]] = {"s_0": "0.5"}
     P_i: Point = point(doc="the point that stays on the curve")
     P_j: Point = point("ground.O", doc="origin of the curve")
     x: str = function(REQUIRED, argument="s", doc="x of the curve, m")

@@ -121,6 +121,8 @@ class _Example:
                     self._body_named(body)
             if spec.kind == "joint":
                 self.add(self.first("joint", partial(_is_joint_for, spec, specs)), "J1")
+            if own is not None and spec.kind == "function":
+                self._function_named(motor, spec)
             values = self._values(field, spec, owners, motor) if own is None else [(field, own)]
             for key, value in values:
                 line = f"{key} = {value}"
@@ -129,6 +131,12 @@ class _Example:
                 comment = ", ".join(filter(None, remarks))
                 lines.append(f"{line:22s} # {comment}" if comment else line)
         self.elements[f"{type_.kind}.{name}"] = "\n".join(lines) + "\n"
+
+    def _function_named(self, name: str, spec: Any) -> None:
+        """Add a function for a field, unless there is one of the name."""
+        if f"function.{name}" not in self.elements:
+            count = spec.arguments
+            self.add(self.first("function", lambda f: _arguments(f) == count), name)
 
     def _values(
         self, name: str, spec: Any, owners: dict[str, str], motor: str
@@ -151,9 +159,7 @@ class _Example:
             yield name, f'"{self._body_named(owner)}"'
         elif spec.kind == "function":
             if spec.required or not spec.argument:  # it would replace other fields
-                if f"function.{motor}" not in self.elements:
-                    count = spec.arguments
-                    self.add(self.first("function", lambda f: _arguments(f) == count), motor)
+                self._function_named(motor, spec)
                 yield name, f'"{motor}"'
         elif spec.kind == "functions":
             self.add(self.first("function", lambda other: other.layout.numbers != {}), "first")

@@ -137,7 +137,7 @@ NOT_CALLED = {
             "find_contacts place_poses axes_of turn_tensor put_touch put_frame evaluate_rows "
             "put_declared velocity_of find_grips friction_at"
         ),
-        "integrators.moreau.free_motion": "move_freely normalise size_of largest_rate",
+        "integrators.moreau.free_motion": "add_pushed move_freely normalise size_of largest_rate",
         "integrators.moreau.groups": (
             "root_of find_groups choose lay_out connect join bit_count order_bodies degree_of "
             "eliminate block_at"
@@ -159,8 +159,8 @@ NOT_CALLED = {
             "limit_bounces any_gains put_work part_without_gain mix"
         ),
         "integrators.moreau.step": (
-            "advance goes_on state_at meet take_velocities put_margins length_of deepest_of "
-            "put_bias put_hits work_done move part finish way_of closing_of rests"
+            "next_end keep_pushed advance goes_on state_at meet take_velocities put_margins "
+            "length_of deepest_of put_bias put_hits work_done move part finish way_of closing_of"
         ),
         # of jumps with closed forms: unit/formulations/jumps, unit/simulation/events
         "formulations.jumps.multipliers": "rotate seek_active",
