@@ -5,6 +5,7 @@ import importlib.util
 
 import pytest
 
+from fuzz.contacts import check_contacts
 from fuzz.guided import GUIDED
 from fuzz.targets import TARGETS
 
@@ -38,6 +39,13 @@ def test_some_inputs(name):
 @pytest.mark.parametrize("name", COUNTS)
 def test_more_inputs(name):
     TARGETS[name].run(1, COUNTS[name][1])
+
+
+@pytest.mark.every(4)
+@pytest.mark.parametrize("number", [1_000_014, 1357, 1477, 2021])
+def test_contacts_that_once_ended_falsely(number):
+    """As "ever faster", by steps as short as rounding, or with a force that pulls."""
+    assert check_contacts(str(number).encode()) == "done"
 
 
 @pytest.mark.parametrize("name", GUIDED)
