@@ -30,7 +30,7 @@ def test_a_long_run_whose_method_was_left_open_says_that_joint_is_quicker(
 
 def ran(residual):
     work = SimpleNamespace(largest_residual=residual, deepest=1e-12)
-    return SimpleNamespace(name="moreau", work=work, overlapping="")
+    return SimpleNamespace(name="moreau", work=work, overlapping="", shortened="")
 
 
 def test_what_is_not_solved_is_a_warning():
