@@ -36,6 +36,7 @@ class Variable:
         first: word of an input; of a parameter 1 where the start depends on it; index of others.
         start: its value at the start.
         words: of a parameter: words of the memory that it is, each with its sign.
+        is_mean: an output that is no function of the state, but a mean of a step of contacts.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Variable:
     first: int
     start: float = 0.0
     words: tuple[tuple[int, float], ...] = ()
+    is_mean: bool = False
 
 
 def variables_of(
@@ -61,10 +63,16 @@ def variables_of(
         word = image.at(F) + row * F.shape[1]
         found.append(Variable(name, "input", "1", f"input {name}", word, value))
     found += parameters
-    found += [Variable(o.name, "output", o.unit, o.label, k) for k, o in enumerate(outputs)]
+    means = prepared.steps_contacts
+    found += [
+        Variable(o.name, "output", o.unit, o.label, k, is_mean=means and not o.is_of_state)
+        for k, o in enumerate(outputs)
+    ]
     y = prepared.run.present.work.state[at.Y].tolist()
     states = list(enumerate(zip(prepared.state_names, units, y, strict=True)))
     found += [Variable(n, "state", unit, n, k, x) for k, (n, unit, x) in states]
+    if means:
+        return found
     found += [
         Variable(f"der({n})", "derivative", rate_unit(unit), f"derivative of {n}", k)
         for k, (n, unit, _) in states
@@ -135,7 +143,8 @@ def data_of(
         if prepared.stops else ["{0.0, 0, 0.0}"],
     )  # fmt: skip
     lines += _table(
-        "static const struct { const char *name, *unit; int kind, first, count; } variables[]",
+        "static const struct { const char *name, *unit; int kind, first, count, is_mean; }\n"
+        "variables[]",
         _rows_of(variables),
     )
     lines.append(f"void dap3d_outputs({', '.join(['const double *'] * 4)}, double *);")
@@ -188,7 +197,8 @@ def _rows_of(variables: Sequence[Variable]) -> list[str]:
         place = first if v.kind in PARAMETERS else v.first
         first += len(v.words)
         name, unit = c_text(v.name), c_text(v.unit)
-        rows.append(f"{{{name}, {unit}, DAP3D_{v.kind.upper()}, {place}, {len(v.words)}}}")
+        numbers = f"{place}, {len(v.words)}, {int(v.is_mean)}"
+        rows.append(f"{{{name}, {unit}, DAP3D_{v.kind.upper()}, {numbers}}}")
     return rows
 
 
@@ -257,6 +267,7 @@ def _completion(prepared: PreparedRun) -> list[str]:
     given = ", ".join(f"w + {prepared.image.at(part)}" for part in one.arguments[:2])
     return [
         "#define COMPLETES 1",
+        f"#define PUSHED {prepared.image.at(one.arguments[0].pushed)}",
         f"void {symbol}(void *, void *, double *, int64_t);",
         f"static void complete(int64_t *w, double *row) {{ {symbol}({given}, row, ROW); }}",
     ]
@@ -339,6 +350,8 @@ def _directions(
     four = "void *, void *, void *, void *"
     given = [arrays, prepared.functions, evaluator.system, evaluator.loops]
     for name, entry in (("rates", directions.rates), ("report", directions.report)):
+        if entry is None:
+            continue
         words, symbol = ", ".join(f"x + {2 * place(part)}" for part in given), symbol_of(entry)
         lines.append(f"void {symbol}({four});")
         lines.append(f"static void {name}_along(double *x) {{ {symbol}({words}); }}")
@@ -376,8 +389,7 @@ def _start(prepared: PreparedRun, variables: Sequence[Variable]) -> list[str]:
         "ELEMENT_STATES": len(prepared.evaluator.model.initial_states),
     }
     first = prepared.advances[0]
-    numbers["STEPS_CONTACTS"] = int(first.completes is not None)
-    if first.completes is not None:
+    if prepared.steps_contacts:
         steps = first.arguments[1]
         for name in ("mass", "mass_inverse", "Jp", "Jp_inverse"):
             numbers[name.upper()] = place(getattr(steps, name))

@@ -109,7 +109,8 @@ def _capabilities(root: Element, model: Exported, fmi: int) -> None:
     if model.directions is not None:
         common[f"providesDirectionalDerivative{'s' if fmi == 3 else ''}"] = "true"
     steps = "needsCompletedIntegratorStep" if fmi == 3 else "completedIntegratorStepNotNeeded"
-    SubElement(root, "ModelExchange", common | {steps: "true" if fmi == 3 else "false"})
+    if not model.prepared.steps_contacts:
+        SubElement(root, "ModelExchange", common | {steps: "true" if fmi == 3 else "false"})
     able = ["canHandleVariableCommunicationStepSize"]
     if fmi == 3:
         able += ["hasEventMode", "mightReturnEarlyFromDoStep", "providesIntermediateUpdate",

@@ -43,6 +43,7 @@ _SIGNATURES: dict[str, tuple[Any, list[Any]]] = {
     "state_count": (_INT, []),
     "directional": (_INT, [_MODEL, _MODEL, _INT, _MODEL, _INT, _MODEL, _MODEL]),
     "derivatives": (_INT, [_MODEL, _DOUBLE, _MODEL, _MODEL]),
+    "set_states": (_INT, [_MODEL, _DOUBLE, _MODEL]),
 }
 
 

@@ -230,6 +230,10 @@ def test_steps_that_make_no_sense_are_refused(tmp_path):
     run = library.start(1.0)
     with pytest.raises(dap.SimulationError, match="beyond the end"):
         run.step_to(2.0)
+    for t in (np.inf, np.nan):
+        with pytest.raises(dap.SimulationError):
+            run.step_to(t)
+    assert run.t == 0.0
     run.step_to(1.0)
     with pytest.raises(dap.SimulationError, match="goes forward"):
         run.step_to(0.5)
@@ -238,6 +242,18 @@ def test_steps_that_make_no_sense_are_refused(tmp_path):
         run["state.cone.r.x"] = 1.0
     with pytest.raises(KeyError, match="no variable"):
         run["nothing"]
+
+
+def test_steps_go_on_from_a_state_that_is_set_behind_the_end(tmp_path):
+    _, library = exported(dap.load("pen1"), tmp_path)
+    states = [name for name, kind in library.kinds.items() if kind == "state"]
+    run = library.start(0.2)
+    start = run.values(states)
+    assert run.step_to(0.2)
+    expected = run.values(states)
+    assert not library.functions.dap3d_set_states(run._model, 0.0, start.ctypes.data)
+    assert run.step_to(0.2)
+    assert np.array_equal(run.values(states), expected)
 
 
 def test_the_example_compiles_without_a_warning_and_runs(tmp_path):
@@ -382,8 +398,10 @@ def test_a_run_ends_where_contacts_have_no_room(tmp_path, monkeypatch):
         monkeypatch.setattr(module, name, 0)
     _, library = exported(falling_ball(), tmp_path, outputs=["ball.r"])
     run = library.start(1.0)
-    with pytest.raises(dap.SimulationError, match=r"t = 0\.0[6-9]\d* s: more contacts came near"):
-        run.step_to(1.0)  # it falls by 0.05 m within 0.1 s
+    said = r"t = 0\.0[6-9]\d* s: more contacts came near"  # it falls by 0.05 m within 0.1 s
+    for t in (1.0, 2.0):  # it stays an error
+        with pytest.raises(dap.SimulationError, match=said):
+            run.step_to(t)
 
 
 def test_contacts_that_events_follow_are_refused(tmp_path):

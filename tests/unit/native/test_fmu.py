@@ -7,7 +7,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 from support.bouncing import bouncing
-from tests.unit.native.test_export import SPRING, _written
+from tests.unit.native.test_export import SPRING, _written, falling_ball
 
 import dap3d_core as dap
 from dap3d_core.native.fmu import _in_base_units
@@ -112,6 +112,49 @@ def test_a_state_is_kept_and_serialised(tmp_path, fmi):
     fmu.reset()
     assert get([reference])[0] == pytest.approx(dap.compile(scene).model.r[0, 2], abs=1e-9)
     fmu.terminate()
+    fmu.freeInstance()
+
+
+@VERSIONS
+def test_stepped_contacts_are_of_co_simulation_alone(tmp_path, fmi):
+    """Rates of the state would be those of bodies that fall through each other."""
+    from fmpy.validation import validate_fmu
+
+    made = written(falling_ball(), tmp_path, fmi=fmi, outputs=["ball.r"])
+    assert validate_fmu(str(made.path)) == []
+    assert fmpy.read_model_description(str(made.path)).modelExchange is None
+    rows = fmpy.simulate_fmu(str(made.path), stop_time=0.3, output_interval=0.1)
+    expected = dap.simulate(falling_ball(), t_end=0.3, dt=0.1).r[:, 0, 2]
+    assert rows["ball.r.z"].tolist() == expected.tolist()
+    with pytest.raises(Exception, match="Failed to instantiate"):
+        begun(made, tmp_path, fmi, kind="ModelExchange")
+
+
+@VERSIONS
+def test_wrong_use_is_an_error_and_changes_nothing(tmp_path, fmi):
+    made = written(dap.load("pen1"), tmp_path, fmi=fmi, outputs=["cone.r"])
+    fmu, at = begun(made, tmp_path, fmi)
+    get, put = (fmu.getReal, fmu.setReal) if fmi == 2 else (fmu.getFloat64, fmu.setFloat64)
+    fmu.doStep(0.0, 0.5)
+    before = get([at["cone.r.z"]])
+    for call in (
+        lambda: fmu.doStep(0.2, 0.1),
+        lambda: fmu.doStep(0.5, -0.1),
+        lambda: fmu.doStep(0.5, np.inf),
+        lambda: get([2**32 - 1]),
+        lambda: put([len(at)], [1.0]),
+        lambda: put([at["cone.r.z"]], [1.0]),
+        lambda: put([at["state.cone.r.x"]], [np.nan]),
+    ):
+        with pytest.raises(fmpy.fmi1.FMICallException):
+            call()
+        assert get([at["cone.r.z"]]) == before
+    fmu.terminate()
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        fmu.doStep(0.5, 0.1)
+    fmu.reset()
+    with pytest.raises(fmpy.fmi1.FMICallException):  # before it is initialised
+        fmu.doStep(0.0, 0.1)
     fmu.freeInstance()
 
 

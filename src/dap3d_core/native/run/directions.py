@@ -97,7 +97,7 @@ class Directions:
 
     Attributes:
         arrays: where they are taken.
-        rates, report: differentiated functions.
+        rates, report: differentiated functions; rates are None where steps follow contacts.
         elements: of each call of ``Elements``.
         text, symbol: LLVM IR of the differentiated outputs.
     """
@@ -115,7 +115,7 @@ class Directions:
         )
         self._prepared, self._elements = prepared, elements
         given = self.arrays, prepared.functions, evaluator.system, evaluator.loops
-        self.rates = _pair(rates_along, given)
+        self.rates = None if prepared.steps_contacts else _pair(rates_along, given)
         self.report = _pair(report_along, given)
         calls = elements.calls
         self.elements = [
@@ -130,9 +130,7 @@ class Directions:
 
     @classmethod
     def of(cls, prepared: PreparedRun, outputs: Outputs) -> "Directions | None":
-        """Those of a model; None where a function has no derivative, or contacts are stepped."""
-        if prepared.advances[0].completes is not None:
-            return None
+        """Those of a model; None where a function has no derivative."""
         try:
             return cls(prepared, outputs)
         except CompileError:
@@ -141,7 +139,8 @@ class Directions:
     @property
     def entries(self) -> list[PairEntry]:
         """All functions that are called."""
-        return [self.rates, self.report, *self.elements, *self.codes.values()]
+        rates = [] if self.rates is None else [self.rates]
+        return [*rates, self.report, *self.elements, *self.codes.values()]
 
     @property
     def codes(self) -> dict[int, PairEntry]:

@@ -54,6 +54,7 @@ class Element:
         group, index: the element.
         first: of the blocks of a joint, or of the forces on all bodies.
         energy, tension: of a force.
+        reads_loads: it is a force that reads multipliers.
     """
 
     group: Group
@@ -61,6 +62,7 @@ class Element:
     first: int
     energy: int = -1
     tension: int = -1
+    reads_loads: bool = False
 
     def place(self, slot: str) -> int:
         """The index of a slot, "" for the first; ValueError for one that it has not."""
@@ -147,7 +149,8 @@ class Elements:
         law = "wrench" if "wrench" in loops else "friction"
         first = self._take(s.force.size)
         place = self._place(loops[law], group, index)
-        given = (self.minus,) * 2 if group.read or law == "friction" else (first, first)
+        reads_loads = bool(group.read) or law == "friction"
+        given = (self.minus if reads_loads else first,) * 2
         self.calls.append(Call(evaluator.loops, loops[law], s, place, first, s.force.size, given))
         energy = tension = -1
         if "energy" in loops:
@@ -158,4 +161,4 @@ class Elements:
             tension = self._take(len(paths))
             table = loop_list([compiled_loop(group.type_info, "tension")])
             self.calls.append(Call(table, 0, s, place, tension, len(paths), (self.counter,) * 2))
-        return Element(group, index, first, energy, tension)
+        return Element(group, index, first, energy, tension, reads_loads)

@@ -55,11 +55,14 @@ class Output:
     Attributes:
         name: of the quantity, with its component.
         unit, label: as of ``Quantity``.
+        is_of_state: it is a function of time, state and inputs: steps of contacts report
+            accelerations and reactions as means of a step.
     """
 
     name: str
     unit: str
     label: str
+    is_of_state: bool
 
 
 class NotExportedError(Exception):
@@ -109,6 +112,7 @@ def outputs_of(prepared: PreparedRun, names: Sequence[str] | None) -> Outputs:
     for name in chosen:
         try:
             quantity = find(result, name)
+            quantities.is_of_state = True
             value = quantities.value(name)
         except (UnknownNameError, ResultError) as error:
             raise SceneError([Mistake("outputs", name, str(error))]) from error
@@ -124,7 +128,8 @@ def outputs_of(prepared: PreparedRun, names: Sequence[str] | None) -> Outputs:
         parts = list(value) if isinstance(value, tuple) else [value]
         for end, part in zip(ends, parts, strict=True):
             if name + end not in [output.name for output in found]:
-                found.append(Output(name + end, quantity.unit, quantity.label))
+                found.append(Output(name + end, quantity.unit, quantity.label,
+                                    quantities.is_of_state))  # fmt: skip
                 values.append(part)
     for k, x in enumerate(values):
         word = tracer.word(x)
@@ -151,6 +156,8 @@ class _Quantities:
     def __init__(self, prepared: PreparedRun, result: Result, tracer: Tracer) -> None:
         self._tracer, self._result, self._prepared = tracer, result, prepared
         self.elements = Elements(prepared)
+        #: False once a value needs rates.
+        self.is_of_state = True
         self._values = NumberArray(tracer, "%elements")
         model = self._model = prepared.evaluator.model
         self._body = NumberArray(tracer, "%bodies", width=BODY_WIDTH)
@@ -244,6 +251,7 @@ class _Quantities:
         return tuple(_dot(rows, Lam) for rows in column)
 
     def _wrench(self, element: Element, slot: str) -> tuple[Any, ...]:
+        self.is_of_state &= not element.reads_loads
         body = int(element.group.bodies[element.index][element.place(slot)])
         return tuple(self._values[element.first + 6 * body + v] for v in range(6))
 
@@ -300,6 +308,8 @@ class _Quantities:
         return tuple(self._vector(body, A + 3 * k) for k in range(3))
 
     def _reported(self, part: str, k: int) -> Any:
+        if part in ("v_dot", "Lam") or (part, k) == ("residuals", 2):
+            self.is_of_state = False
         return self._row[self._report + self._layout[part].start + k]
 
     def _acceleration(self, body: int, first: int) -> tuple[Any, ...]:

@@ -268,6 +268,11 @@ class PreparedRun:
         parts += [] if self.start is None else [self.start.arrays, self.start.functions]
         return Image(self.evaluator.loops, *parts, *self.more)
 
+    @property
+    def steps_contacts(self) -> bool:
+        """True if steps follow contacts: rates of states are no functions of them then."""
+        return self.advances[0].completes is not None
+
     def _refuse_jumps(self) -> None:
         self.jumps: JumpCode | None = None
         if integrator_named(self.run.settings.integrator).steps_contacts:

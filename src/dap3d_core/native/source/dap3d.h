@@ -137,13 +137,15 @@ DAP3D_API int dap3d_states(const dap3d_model *model, double *y);
 /* Make t and y the present time and state; steps continue from there. */
 DAP3D_API int dap3d_set_states(dap3d_model *model, double t, const double *y);
 
-/* Their derivatives at t and y. DAP3D_ERROR if they are not finite. */
+/* Their derivatives at t and y. DAP3D_ERROR if they are not finite; DAP3D_INVALID where contacts are
+   stepped: velocities jump there. */
 DAP3D_API int dap3d_derivatives(dap3d_model *model, double t, const double *y, double *rates);
 
 /* Derivatives of unknowns (outputs, derivatives) at the present time and state along a direction: by
    knowns (states, inputs, tunable parameters, time), each times its seed. They are exact to rounding,
    as is the code that is differentiated; where a function bends, those of the side that is computed.
-   DAP3D_INVALID for variables of other kinds, and of models without derivatives. */
+   DAP3D_INVALID for variables of other kinds, outputs that are means of a step of contacts
+   (accelerations, reactions), and models without derivatives. */
 DAP3D_API int dap3d_directional(dap3d_model *model, const int *unknowns, int count,
                                 const int *knowns, int known_count, const double *seed,
                                 double *result);

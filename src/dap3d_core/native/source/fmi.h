@@ -33,14 +33,13 @@ typedef struct {
     bool early_return;       /* of FMI 3: steps may end early */
     bool has_events;         /* of FMI 3: event mode is used in co-simulation */
     void *intermediate;      /* of FMI 3: callback */
-    double t_end, moved;
+    double moved;
 } fmu;
 
 /* A state that was kept: of the instance, then of the model. */
 typedef struct {
     uint64_t identity;
     bool is_initialised, is_terminated;
-    double t_end;
 } fmu_state;
 
 /* Largest change by a projection, for which an integrator of the environment need not stop. */
@@ -54,10 +53,18 @@ static fmi_status fmi_failed(fmu *f, fmi_status status, const char *words)
     return status;
 }
 
-static fmu *fmi_create(const char *name, const char *token)
+/* Why there is no instance; NULL where there may be one. */
+static const char *fmi_refusal(const char *name, const char *token, bool is_exchange)
 {
     if (name == NULL || token == NULL || strcmp(token, FMI_TOKEN) != 0)
-        return NULL;
+        return "the instantiation token (GUID) is another";
+    if (is_exchange && COMPLETES)
+        return "steps follow contacts here: there is co-simulation alone";
+    return NULL;
+}
+
+static fmu *fmi_create(const char *name)
+{
     fmu *f = calloc(1, sizeof *f);
     if (f == NULL)
         return NULL;
@@ -132,6 +139,9 @@ static fmi_status fmi_step(fmu *f, double t, double end, bool *ended)
 {
     double now = dap3d_time(f->model);
     *ended = false;
+    if (f->is_exchange || !f->is_initialised || f->is_terminated)
+        return fmi_failed(f, fmi_error, "steps of co-simulation begin when it is initialised and end "
+                                        "when it is terminated");
     if (fabs(t - now) > 1e-9 * fmax(fabs(t), 1e-3))
         return fmi_failed(f, fmi_error, "the communication point is not where the last step ended");
     if (!(end > t))
@@ -221,7 +231,7 @@ static size_t fmi_state_size(void) { return sizeof(fmu_state) + dap3d_state_size
 
 static void fmi_keep(const fmu *f, char *bytes)
 {
-    fmu_state head = {IDENTITY, f->is_initialised, f->is_terminated, f->t_end};
+    fmu_state head = {IDENTITY, f->is_initialised, f->is_terminated};
     memcpy(bytes, &head, sizeof head);
     dap3d_save(f->model, bytes + sizeof head);
 }

@@ -45,13 +45,12 @@ FMI_API I fmi2Instantiate(const char *name, int type, const char *token, const c
                           const callbacks2 *callbacks, int visible, int logs)
 {
     UNUSED(location), UNUSED(visible);
-    fmu *f = fmi_create(name, token);
-    if (f == NULL) {
-        if (callbacks != NULL && callbacks->logger != NULL)
-            callbacks->logger(callbacks->environment, name, fmi_error, "logStatusError",
-                              "the GUID is another");
+    const char *refusal = fmi_refusal(name, token, type == 0);
+    if (refusal != NULL && callbacks != NULL && callbacks->logger != NULL)
+        callbacks->logger(callbacks->environment, name, fmi_error, "logStatusError", "%s", refusal);
+    fmu *f = refusal == NULL ? fmi_create(name) : NULL;
+    if (f == NULL)
         return NULL;
-    }
     if (callbacks != NULL) {
         memcpy(&f->logger, &callbacks->logger, sizeof callbacks->logger);
         f->environment = callbacks->environment;

@@ -31,12 +31,12 @@ FMI_API S fmi3SetDebugLogging(I instance, bool on, size_t n, const char *const c
 static I instantiate(const char *name, const char *token, bool logs, void *environment,
                      logger3 logger, bool is_exchange)
 {
-    fmu *f = fmi_create(name, token);
-    if (f == NULL) {
-        if (logger != NULL)
-            logger(environment, fmi_error, "logStatusError", "the instantiation token is another");
+    const char *refusal = fmi_refusal(name, token, is_exchange);
+    if (refusal != NULL && logger != NULL)
+        logger(environment, fmi_error, "logStatusError", refusal);
+    fmu *f = refusal == NULL ? fmi_create(name) : NULL;
+    if (f == NULL)
         return NULL;
-    }
     memcpy(&f->logger, &logger, sizeof logger);
     f->environment = environment;
     f->logs = logs;

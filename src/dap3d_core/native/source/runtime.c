@@ -20,6 +20,7 @@ enum { RUNNING, FINISHED, STEP_FLOOR, NOT_FINITE, PROJECTION_FAILED, SWITCHED, C
 #define HORIZON 1e5
 #define ALIKE 1e-9
 #define LARGEST 1e100
+enum { GOES_ON, OVER, FAILED }; /* is_over */
 
 struct dap3d_model {
     uint64_t identity;
@@ -97,7 +98,7 @@ static void set_stops(dap3d_model *m)
 static void begin(dap3d_model *m, double t_end)
 {
     const int64_t *next = content;
-    memset(m, 0, sizeof *m);
+    memset(m, 0, offsetof(dap3d_model, wide));
     for (size_t k = 0; k < sizeof runs / sizeof *runs; k++, next += runs[k - 1][1])
         memcpy(m->w + runs[k][0], next, 8 * (size_t)runs[k][1]);
     place(m);
@@ -232,6 +233,8 @@ static int set_fixed(dap3d_model *m, int v, double x)
 int dap3d_set(dap3d_model *m, int v, double x)
 {
     int kind = dap3d_kind(v);
+    if (kind < 0)
+        return fail(m, DAP3D_INVALID, "there is no variable of such a reference");
     if ((kind != DAP3D_INPUT && !is_parameter(v)) || !(fabs(x) <= LARGEST))
         return fail(m, DAP3D_INVALID, "only inputs and parameters are set, to finite numbers");
     if (kind == DAP3D_INPUT) {
@@ -426,7 +429,7 @@ static void weigh(dap3d_model *m, int b)
     k[3] = 0.0 - (d * k[1] + f * k[2]) * k[6];
 }
 
-#if STEPS_CONTACTS
+#if COMPLETES
 /* Inverses of mass and principal moments of inertia of a body, for steps of contacts. */
 static void invert(dap3d_model *m, int b)
 {
@@ -478,7 +481,7 @@ static int find_start(dap3d_model *m)
     for (size_t n = 0; n < sizeof heavy / sizeof *heavy; n++)
         if (heavy[n] > 0) {
             weigh(m, heavy[n]);
-#if STEPS_CONTACTS
+#if COMPLETES
             invert(m, heavy[n]);
 #endif
         }
@@ -544,10 +547,10 @@ static int stopped(dap3d_model *m)
         "more contacts came near than the model has room for"};
     int64_t status = integer_of(m)[I_status];
     double t = status == FINISHED ? real_of(m)[R_t] : real_of(m)[R_t_stop];
-    m->is_over = 1;
+    m->is_over = status == SWITCHED || status == FINISHED ? OVER : FAILED;
     snprintf(m->message, sizeof m->message, "the run stopped at t = %.9g s: %s", t,
              words[status >= 0 && status <= NO_ROOM ? status : 0]);
-    return status == SWITCHED || status == FINISHED ? DAP3D_ENDED : DAP3D_ERROR;
+    return m->is_over == FAILED ? DAP3D_ERROR : DAP3D_ENDED;
 }
 
 /* At the end of a step, before that of a call: whether the call ends here; *end may become earlier. */
@@ -588,7 +591,7 @@ static int step_freely(dap3d_model *m, double t)
     m->has_row = 0; /* outputs are not known yet */
     if (m->t < t)
         return stopped(m);
-    m->is_over = m->t == m->t_end;
+    m->is_over = m->t == m->t_end ? OVER : GOES_ON;
     return DAP3D_OK;
 }
 
@@ -669,7 +672,7 @@ static int hold_to(dap3d_model *m, double end)
     m->t = end;
     m->has_row = m->is_ahead = 0;
     if (integer[I_status] == FINISHED) {
-        m->is_over = 1;
+        m->is_over = OVER;
         return DAP3D_OK;
     }
     real[R_t] = end; /* as Hold.land */
@@ -696,11 +699,13 @@ int dap3d_step_to(dap3d_model *m, double t)
     if (!(t > m->t))
         return t == m->t ? DAP3D_OK
                          : fail(m, DAP3D_INVALID, "time goes forward only; load a saved state");
+    if (m->is_over == FAILED)
+        return stopped(m);
     if (m->is_over) {
         snprintf(m->message, sizeof m->message, "the run has ended at t = %.9g s", m->t);
         return DAP3D_ENDED;
     }
-    if (fabs(t - m->t_end) <= ALIKE * (t - m->t))
+    if (t <= LARGEST && fabs(t - m->t_end) <= ALIKE * (t - m->t))
         t = m->t_end;
     if (t > m->t_end)
         return fail(m, DAP3D_INVALID, "the time is beyond the end that dap3d_create was given");
@@ -763,8 +768,12 @@ int dap3d_set_states(dap3d_model *m, double t, const double *y)
     memmove(y_of(m), y, 8 * STATES);
     m->t = real[R_t] = t;
     m->has_row = m->is_ahead = 0;
-    if (!m->is_over)
-        integer_of(m)[I_status] = RUNNING;
+    m->is_over = GOES_ON;
+    integer_of(m)[I_status] = RUNNING;
+    integer_of(m)[I_next_report] = 1;
+#if COMPLETES
+    *numbers(m, PUSHED) = 0.0; /* contacts of the state before push no more */
+#endif
     integer_of(m)[I_segment_step] = integer_of(m)[I_segment_step_count] = 0;
     restart(m);
     if (integer_of(m)[I_calls_accepted]) {
@@ -778,6 +787,8 @@ int dap3d_set_states(dap3d_model *m, double t, const double *y)
 
 int dap3d_derivatives(dap3d_model *m, double t, const double *y, double *rates)
 {
+    if (COMPLETES) /* equations without contacts would be another model */
+        return fail(m, DAP3D_INVALID, "steps follow contacts here: states have no derivatives");
     call(m, RHS, t, y, rates, STATES);
     for (int k = 0; k < STATES; k++)
         if (!(fabs(rates[k]) <= LARGEST))
@@ -828,10 +839,16 @@ int dap3d_directional(dap3d_model *m, const int *unknowns, int count, const int 
         }
     }
     int needs = 0;
-    for (int k = 0; k < count; k++)
-        needs |= dap3d_kind(unknowns[k]) == DAP3D_OUTPUT ? 2 : 1;
+    for (int k = 0; k < count; k++) {
+        int kind = dap3d_kind(unknowns[k]);
+        if (kind == DAP3D_OUTPUT && variables[unknowns[k]].is_mean)
+            return fail(m, DAP3D_INVALID, "a mean of a step of contacts has no derivative");
+        needs |= kind == DAP3D_OUTPUT ? 2 : kind == DAP3D_DERIVATIVE;
+    }
+#if !COMPLETES
     if (needs & 1)
         rates_along(x);
+#endif
     if (needs & 2) {
         report_along(x);
 #if CALLS

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from tests.unit.native.test_export import SPRING, _written, exported
+from tests.unit.native.test_export import SPRING, _written, exported, falling_ball
 
 import dap3d_core as dap
 
@@ -61,3 +61,32 @@ def test_a_cart_on_a_spring_has_the_derivatives_of_its_equation(tmp_path):
     assert run.directional(["double"], {"state.cart.r.x": 1.0}) == pytest.approx([2.0])
     with pytest.raises(dap.SimulationError, match="derivative by such"):
         run.directional([rate], {"cart.r.x": 1.0})
+
+
+def test_stepped_contacts_have_derivatives_of_what_the_state_gives(tmp_path):
+    """Against differences of outputs; accelerations are means of a step, and have none."""
+    scene = falling_ball()
+    scene.add_point("anchor", "ground", (0.0, 0.0, 1.0))
+    scene.add_vector2("line", "ball.O", "anchor")
+    scene.add_force("ptp", "spring", d="line", k=40.0, l0=0.5, c=3.0)
+    names = ["ball.r", "ball.w", "spring.force", "energy.total"]
+    made, library = exported(scene, tmp_path, outputs=[*names, "ball.rdd"])
+    run = library.start(0.5)
+    run.step_to(0.1)
+    states = [n for n, kind in library.kinds.items() if kind == "state"]
+    assert "derivative" not in library.kinds.values()
+    y, d = run.values(states), np.random.default_rng(1).normal(size=len(states))
+    wanted = made.outputs[: -len("xyz")]
+
+    def at(part):
+        moved = np.ascontiguousarray(y + part * d)
+        assert not library.functions.dap3d_set_states(run._model, 0.1, moved.ctypes.data)
+        return run.values(wanted)
+
+    found = run.directional(wanted, dict(zip(states, d.tolist(), strict=True)))
+    # differences: of order h^2, and rounding over h
+    np.testing.assert_allclose(found, (at(1e-6) - at(-1e-6)) / 2e-6, rtol=1e-7, atol=1e-7)
+    with pytest.raises(dap.SimulationError, match="a mean of a step"):
+        run.directional(["ball.rdd.x"], {"state.ball.r.x": 1.0})
+    with pytest.raises(dap.SimulationError, match="no derivatives"):
+        run.derivatives(0.1, y)
