@@ -10,21 +10,30 @@ which ends at rounding (Alart and Curnier, Comp. Meth. Appl. Mech. Eng. 92, 1991
 Friction without a normal may act in all three directions: x = proj(mu more; x - r u).
 Where contacts share what they carry Newton may stall. Then the proximal point method comes nearer
 (Rockafellar, SIAM J. Control Optim. 14, 1976): A + D and b - D x, x of the problem before.
+Friction in an ellipse is that in a circle of rows that are stretched.
 Dense, for as many contacts as touch in one place.
 """
 
-from typing import Any
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
 
+from typing import Any, ClassVar
+
+import attrs
 import numpy as np
 
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.array_types import Floats, Integers
+from dap3d_core.kernels.runtime.array_struct import INTEGERS, MATRIX, Arrays, Scalar
 from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.linear.least_squares import factor_least, solve_least
 
 #: Sweeps of the first try after Newton alone, and how many tries, each of four times as many.
 SWEEPS, TRIES = 50, 6
 FIRST = 5
 #: Newton passes, halvings of a step in one, and where it stands at rounding.
 PASSES, CUTS, RESIDUAL_ROUNDING = 50, 12, 1e-15
+#: Part of the longest column below which those of a pass depend on each other.
+DEPENDENT = 1e-13
 #: Of the scale of the solution: a problem counts as solved.
 SOLVED = 1e-12
 #: Parts of mobilities that are added to them; sweeps of a step, and how many steps with each.
@@ -32,95 +41,167 @@ ADDED, CLOSER, STEPS = (1e-4, 1e-5, 1e-6), 1000, 40
 TINY = 1e-300
 
 
-def solve_cone(
-    A: Floats,
-    b: Floats,
-    mu: Any,
-    more: Any = None,
-    start: Any = None,
-    tries: int = TRIES,
-    gapless: Any = None,
-    ratio: Any = None,
-) -> tuple[Floats, float]:
-    """The solution x (3 m,), and the residual of the equations over its size, inf of none.
+def _integer() -> Scalar[int]:
+    return Scalar("integer")
 
-    Args:
-        A, b: (3 m, 3 m), (3 m,) of u = A x + b.
-        mu: (m,) coefficients of friction.
-        more: (m,) normal impulses of an earlier phase, which widen the discs.
-        start: (3 m,) where to begin.
-        tries: at most; fewer where it is to be known whether there is a solution nearby, and then
-            nothing else is tried.
-        gapless: (m,) 1 of friction in three directions, else 0.
-        ratio: (m,) of coefficients along t2 to mu, that along t1, where friction is in an ellipse.
-    """
-    if ratio is not None and np.any(ratio != 1.0):  # stretched to a circle
-        stretch = np.column_stack([np.ones((len(ratio), 2)), ratio]).ravel()
-        start = None if start is None else start / np.where(stretch > 0.0, stretch, 1.0)
-        stretched = stretch[:, None] * A * stretch
-        x, left = solve_cone(stretched, stretch * b, mu, more, start, tries, gapless)
-        return stretch * x, left
-    count = len(b) // 3
-    mu, more = np.asarray(mu, dtype=float), np.zeros(count) if more is None else more
-    free = np.zeros(count) if gapless is None else gapless
-    x = np.zeros(len(b)) if start is None else start.copy()
-    left = 0.0
-    if not count:
-        return x, left
-    r = 1.0 / np.maximum(np.diag(A).reshape(-1, 3).max(axis=1), TINY)
-    scale = float(np.abs(b / np.maximum(np.diag(A), TINY)).max()) + TINY
-    for k in range(tries):
-        sweep(A, b, mu, x, r, more, free, SWEEPS * 4 ** (k - 1) if k else FIRST)
-        x, left = _newton(A, b, mu, x, r, more, free)
-        if left <= SOLVED * scale:
-            break
-    y = np.zeros_like(x)
-    for part in np.repeat(ADDED, STEPS) if tries == TRIES else ():
-        if left <= SOLVED * scale or not np.all(np.isfinite(y)):
-            break
-        own = part * np.diag(A)
-        firm, moved = A + np.diag(own), b - own * y
-        sweep(firm, moved, mu, y, r, more, free, CLOSER)
-        y, _ = _newton(firm, moved, mu, y, r, more, free)
-        new, rest = _newton(A, b, mu, y, r, more, free)
-        x, left = (x, left) if rest >= left else (new, rest)
-    left += RESIDUAL_ROUNDING * float(np.abs(x).max())  # without one x may grow
-    return x, left / scale if np.isfinite(left) else np.inf
+
+@attrs.define(eq=False, kw_only=True, slots=False)
+class Cone(Arrays):
+    """A problem of ``count`` contacts, of m at most, and scratch."""
+
+    types: ClassVar[dict[str, Any]] = {
+        "integer": INTEGERS,
+        "order": INTEGERS,
+        **dict.fromkeys(("A", "K", "firm", "S", "w"), MATRIX),
+    }
+
+    count = _integer()
+
+    integer: Integers
+    A: Floats  # (3 m, 3 m), (3 m,) of u = A x + b
+    b: Floats
+    x: Floats  # where to begin, and the solution
+    mu: Floats  # (m,) coefficients of friction
+    more: Floats  # (m,) normal impulses of an earlier phase, which widen the discs
+    gapless: Floats  # (m,) 1 of friction in three directions, else 0
+    ratio: Floats  # (m,) of coefficients along t2 to mu, that along t1
+    K: Floats  # A and b stretched; and firmer, with its derivatives
+    q: Floats
+    firm: Floats
+    moved: Floats
+    S: Floats
+    r: Floats  # (m,) 1 over the largest mobility of each
+    F: Floats  # (3 m,) residual, step, trial, solutions
+    step: Floats
+    trial: Floats
+    y: Floats
+    z: Floats
+    new: Floats
+    w: Floats  # of factors
+    order: Integers
+
+
+def cone_of(m: int) -> Cone:
+    """Room for problems of m contacts."""
+    n = 3 * m
+    vectors = ("b", "x", "q", "moved", "F", "step", "trial", "y", "z", "new")
+    return Cone(
+        integer=np.zeros(1, dtype=np.int64),
+        **{name: np.zeros((n, n)) for name in ("A", "K", "firm", "S")},
+        **{name: np.zeros(n) for name in vectors},
+        **{name: np.zeros(m) for name in ("mu", "more", "gapless", "r")},
+        ratio=np.ones(m),
+        w=np.zeros((3, n)),
+        order=np.zeros(n, dtype=np.int64),
+    )
 
 
 @compiled
-def residual_of(
-    A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats, free: Floats, F: Floats,
-    S: Floats,
-) -> None:  # fmt: skip
-    """The residual F of the equations at x, and a generalised derivative S of it, unless empty."""
+def solve_cone(c: Cone, tries: int) -> float:
+    """Solve for ``x``, from what stands there; the residual over its size, infinite of none.
+
+    tries: at most; fewer than TRIES where it is to be known whether there is a solution nearby, and
+        then nothing else is tried.
+    """
+    n = 3 * c.count
+    if n == 0:
+        return 0.0
+    scale = stretch(c)
+    z, left, sweeps = c.z[:n], 0.0, FIRST
+    for k in range(tries):
+        sweep(c, c.K, c.q, z, sweeps)
+        sweeps = 4 * sweeps if k > 0 else SWEEPS
+        left = newton(c, c.K, c.q, z)
+        if left <= SOLVED * scale:
+            break
+    if tries == TRIES and not left <= SOLVED * scale:
+        left = come_nearer(c, left, scale)
+    largest = 0.0
+    for k in range(n):
+        c.x[k] = z[k] * (c.ratio[k // 3] if k % 3 == 2 else 1.0)
+        largest = max(largest, abs(z[k]))
+    left += RESIDUAL_ROUNDING * largest  # without one x may grow
+    return left / scale if left < np.inf else np.inf
+
+
+@compiled
+def stretch(c: Cone) -> float:
+    """Stretch what friction in ellipses acts along until these are circles; the scale of x."""
+    scale = 0.0
+    for i in range(3 * c.count):
+        own = c.ratio[i // 3] if i % 3 == 2 else 1.0
+        for k in range(3 * c.count):
+            c.K[i, k] = own * c.A[i, k] * (c.ratio[k // 3] if k % 3 == 2 else 1.0)
+        c.q[i], c.z[i] = own * c.b[i], c.x[i] / own if own > 0.0 else c.x[i]
+        scale = max(scale, abs(c.q[i] / max(c.K[i, i], TINY)))
+    for k in range(c.count):
+        c.r[k] = 1.0 / max(c.K[3 * k, 3 * k], c.K[3 * k + 1, 3 * k + 1],
+                           c.K[3 * k + 2, 3 * k + 2], TINY)  # fmt: skip
+    return scale + TINY
+
+
+@compiled
+def come_nearer(c: Cone, left: float, scale: float) -> float:
+    """Come nearer to a solution z by problems that are firmer; the residual."""
+    n = 3 * c.count
+    y, z, new, firm, moved = c.y[:n], c.z[:n], c.new[:n], c.firm, c.moved
+    for k in range(n):
+        y[k] = 0.0
+    for part in ADDED:
+        for _ in range(STEPS):
+            total = 0.0
+            for i in range(n):
+                total += abs(y[i])
+            if (left <= SOLVED * scale) | (not total < np.inf):
+                return left
+            for i in range(n):
+                for k in range(n):
+                    firm[i, k] = c.K[i, k]
+                firm[i, i] += part * c.K[i, i]
+                moved[i] = c.q[i] - part * c.K[i, i] * y[i]
+            sweep(c, firm, moved, y, CLOSER)
+            newton(c, firm, moved, y)
+            for k in range(n):
+                new[k] = y[k]
+            rest = newton(c, c.K, c.q, new)
+            if rest < left:
+                left = rest
+                for k in range(n):
+                    z[k] = new[k]
+    return left
+
+
+@compiled
+def residual_of(c: Cone, A: Floats, b: Floats, x: Floats, derives: bool) -> None:
+    """The residual F of the equations at x, and a generalised derivative S of it if asked for."""
+    F, S, mu, r, more, free = c.F, c.S, c.mu, c.r, c.more, c.gapless
     size = x.shape[0]
-    for c in range(mu.shape[0]):
-        k = 3 * c
-        z0, z1, z2 = x[k] - r[c] * b[k], x[k + 1] - r[c] * b[k + 1], x[k + 2] - r[c] * b[k + 2]
+    for j in range(c.count):
+        k = 3 * j
+        z0, z1, z2 = x[k] - r[j] * b[k], x[k + 1] - r[j] * b[k + 1], x[k + 2] - r[j] * b[k + 2]
         for q in range(size):
-            z0 -= r[c] * A[k, q] * x[q]
-            z1 -= r[c] * A[k + 1, q] * x[q]
-            z2 -= r[c] * A[k + 2, q] * x[q]
-        is_free = free[c] != 0.0
-        pressing = more[c] if is_free else x[k] + more[c]
+            z0 -= r[j] * A[k, q] * x[q]
+            z1 -= r[j] * A[k + 1, q] * x[q]
+            z2 -= r[j] * A[k + 2, q] * x[q]
+        is_free = free[j] != 0.0
+        pressing = more[j] if is_free else x[k] + more[j]
         first = z0 if is_free else 0.0
-        radius = mu[c] * max(pressing, 0.0)
+        radius = mu[j] * max(pressing, 0.0)
         length = np.sqrt(first * first + z1 * z1 + z2 * z2)
         part = radius / length if length > radius else 1.0
         F[k] = x[k] - (part * z0 if is_free else max(0.0, z0))
         F[k + 1], F[k + 2] = x[k + 1] - part * z1, x[k + 2] - part * z2
-        if S.shape[0] == 0:
+        if not derives:
             continue
         d1, d2 = (z1 / length, z2 / length) if length > radius else (0.0, 0.0)
         d0 = first / length if length > radius else 0.0
-        rim = mu[c] if pressing > 0.0 and not is_free else 0.0
+        rim = mu[j] if pressing > 0.0 and not is_free else 0.0
         for q in range(size):
             own0, own1, own2 = float(q == k), float(q == k + 1), float(q == k + 2)
-            s1, s2 = own1 - r[c] * A[k + 1, q], own2 - r[c] * A[k + 2, q]
-            s0 = own0 - r[c] * A[k, q]
+            s1, s2 = own1 - r[j] * A[k + 1, q], own2 - r[j] * A[k + 2, q]
+            s0 = own0 - r[j] * A[k, q]
             along = d0 * s0 + d1 * s1 + d2 * s2
-            S[k, q] = r[c] * A[k, q] if z0 > 0.0 else own0
+            S[k, q] = r[j] * A[k, q] if z0 > 0.0 else own0
             if is_free:
                 S[k, q] = own0 - part * (s0 - along * d0)
             S[k + 1, q] = own1 - part * (s1 - along * d1) - rim * d1 * own0
@@ -128,27 +209,26 @@ def residual_of(
 
 
 @compiled
-def sweep(
-    A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats, free: Floats, sweeps: int
-) -> None:
+def sweep(c: Cone, A: Floats, b: Floats, x: Floats, sweeps: int) -> None:
     """Projected Gauss-Seidel, in place."""
+    mu, r, more, free = c.mu, c.r, c.more, c.gapless
     size = x.shape[0]
     for _ in range(sweeps):
         change = largest = 0.0
-        for c in range(mu.shape[0]):
-            k = 3 * c
+        for j in range(c.count):
+            k = 3 * j
             u0, u1, u2 = b[k], b[k + 1], b[k + 2]
             for q in range(size):
                 u0 += A[k, q] * x[q]
                 u1 += A[k + 1, q] * x[q]
                 u2 += A[k + 2, q] * x[q]
-            is_free = free[c] != 0.0
+            is_free = free[j] != 0.0
             n = x[k] if is_free else max(0.0, x[k] - u0 / max(A[k, k], TINY))
             u1 += A[k + 1, k] * (n - x[k])
             u2 += A[k + 2, k] * (n - x[k])
-            z1, z2 = x[k + 1] - r[c] * u1, x[k + 2] - r[c] * u2
-            z0 = x[k] - r[c] * u0 if is_free else 0.0
-            radius = mu[c] * max(more[c] if is_free else n + more[c], 0.0)
+            z1, z2 = x[k + 1] - r[j] * u1, x[k + 2] - r[j] * u2
+            z0 = x[k] - r[j] * u0 if is_free else 0.0
+            radius = mu[j] * max(more[j] if is_free else n + more[j], 0.0)
             length = np.sqrt(z0 * z0 + z1 * z1 + z2 * z2)
             factor = radius / length if length > radius else 1.0
             n = factor * z0 if is_free else n
@@ -162,45 +242,56 @@ def sweep(
 
 
 @compiled
-def shorten(
-    A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats, free: Floats,
-    F: Floats, none: Floats, step: Floats, new: Floats, best: float,
-) -> float:  # fmt: skip
-    """The residual at ``new``, which is x and the first part of a step that makes it less.
+def newton(c: Cone, A: Floats, b: Floats, x: Floats) -> float:
+    """Semismooth Newton with a line search, in place; the residual."""
+    n, least = x.shape[0], 0.0
+    for k in range(n):
+        least = max(least, abs(b[k] / max(A[k, k], TINY)))
+    residual_of(c, A, b, x, False)
+    best = largest_residual(c, n)
+    for _ in range(PASSES):
+        largest = 0.0
+        for k in range(n):
+            largest = max(largest, abs(x[k]))
+        if (best <= RESIDUAL_ROUNDING * (largest + least + TINY)) | (not best < np.inf):
+            break
+        residual_of(c, A, b, x, True)
+        for k in range(n):
+            c.F[k] = -c.F[k]
+        rank = factor_least(c.S, n, n, DEPENDENT, 0.0, c.w, c.order)
+        solve_least(c.S, n, n, rank, c.w, c.order, c.F, c.step)
+        size = shorten(c, A, b, x, best)
+        if not size < best:
+            break
+        best = size
+        for k in range(n):
+            x[k] = c.trial[k]
+    return best
+
+
+@compiled
+def shorten(c: Cone, A: Floats, b: Floats, x: Floats, best: float) -> float:
+    """The residual at ``trial``, which is x and the first part of a step that makes it less.
 
     The parts are 1, 1/2, ...; infinite where none does.
     """
-    part = 1.0
+    n, part = x.shape[0], 1.0
+    trial = c.trial[:n]
     for _ in range(CUTS):
-        for q in range(x.shape[0]):
-            new[q] = x[q] + step[q] * part
-        residual_of(A, b, mu, new, r, more, free, F, none)
-        size = total = 0.0
-        for q in range(x.shape[0]):
-            size, total = max(size, abs(F[q])), total + abs(F[q])
-        if (size < best) & (total < np.inf):  # else not numbers
+        for k in range(n):
+            trial[k] = x[k] + c.step[k] * part
+        residual_of(c, A, b, trial, False)
+        size = largest_residual(c, n)
+        if size < best:
             return size
         part *= 0.5
     return np.inf
 
 
-def _newton(
-    A: Floats, b: Floats, mu: Floats, x: Floats, r: Floats, more: Floats, free: Floats
-) -> tuple[Floats, float]:
-    """Semismooth Newton with a line search; x and its residual."""
-    F, S, none = np.empty_like(x), np.empty_like(A), np.empty((0, 0))
-    least = float(np.abs(b / np.maximum(np.diag(A), TINY)).max())
-    residual_of(A, b, mu, x, r, more, free, F, none)
-    best = float(np.abs(F).max())
-    for _ in range(PASSES):
-        rounding = RESIDUAL_ROUNDING * (float(np.abs(x).max()) + least + TINY)
-        if best <= rounding or not np.isfinite(best):
-            break
-        residual_of(A, b, mu, x, r, more, free, F, S)
-        step = np.linalg.lstsq(S, -F, rcond=1e-13)[0]
-        new = np.empty_like(x)
-        size = shorten(A, b, mu, x, r, more, free, F, none, step, new, best)
-        if not size < best:
-            break
-        x, best = new, size
-    return x, best
+@compiled
+def largest_residual(c: Cone, n: int) -> float:
+    """The largest component of the residual; infinite where one is not a number."""
+    size = total = 0.0
+    for k in range(n):
+        size, total = max(size, abs(c.F[k])), total + abs(c.F[k])
+    return size if total < np.inf else np.inf

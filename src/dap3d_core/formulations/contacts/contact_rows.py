@@ -4,8 +4,12 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property, reduce
 from typing import Any
 
+import attrs
 import numpy as np
 
+from dap3d_core.formulations.contacts.contact_arrays import ContactArrays, contact_arrays
+from dap3d_core.formulations.contacts.loads import find_modes as seek_modes
+from dap3d_core.formulations.contacts.modes import nearly_jams as seek_jam
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.interface.codegen.compile_loops import compiled_loop
 from dap3d_core.kernels.array_types import Floats, Integers
@@ -35,7 +39,7 @@ class ContactTable:
         names: of each point of contact.
         mu, mu_s, e: (m,) coefficients of friction, along the first tangent, and restitution.
         ratio, ratio_s: (m,) the same along the second tangent, as parts of them: 1 but in ellipses.
-        newton: (m,) True where the law of impact is Newton's.
+        arrays: of compiled code; it has these numbers.
         turns: (m,) 1 of those whose gap or slip is an angle, 0 of others.
         movable: (m,) True of those that a scene may have moved until they touch.
         alone: (m,) True of friction without a gap: of joints.
@@ -52,13 +56,14 @@ class ContactTable:
         first = len(model.joint_names) - self.count
         self.names = model.contact_names
         self.turns = np.zeros(self.count)
-        self.alone = np.zeros(self.count, dtype=bool)
-        self.holds = np.ones((self.count, 3), dtype=bool)
         self.loads: dict[int, tuple[Integers, bool]] = {}
-        self.newton = np.array([law == "newton" for law in model.contact_laws], dtype=bool)
-        self.numbers = {name: np.zeros(self.count) for name in ("mu", "mu_s", "e")}
+        loads = sum(group.count for group in model.contacts if group.loaded is not None)
+        self.arrays = s = contact_arrays(self.count, model.joint_row_count, loads)
+        s.length = model.length
+        s.newton[:] = [law == "newton" for law in model.contact_laws]
+        self.mu, self.mu_s, self.e, self.ratio, self.ratio_s = s.mu, s.mu_s, s.e, s.ratio, s.ratio_s
+        self.gapless = s.gapless
         self.movable = np.array(["#" not in name for name in self.names], dtype=bool)
-        self.ratio, self.ratio_s = np.ones((2, self.count))
         self.mode = np.zeros(self.count, dtype=np.int64)
         self.switches: Integers = np.zeros((self.count, 2), dtype=np.int64)
         self._loops = []
@@ -66,25 +71,27 @@ class ContactTable:
         for group in model.contacts:
             which, layout = group.members - first, group.type_info.layout
             type_: Any = group.type_info.type
-            self.turns[which], self.alone[which] = type_.at is None, type_.is_friction_alone()
-            self.holds[which] = type_.holds
+            self.turns[which], s.alone[which] = type_.at is None, type_.is_friction_alone()
+            s.holds[which] = type_.holds
             if group.loaded is not None:
                 starts = model.joint_start[group.loaded][:, None] + type_.load
                 self.loads |= {int(c): (rows, type_.pushes)
                                for c, rows in zip(which, starts, strict=True)}  # fmt: skip
+                s.load_row[which], s.load_count[which] = starts[:, 0], starts.shape[1]
+                s.load_pushes[which] = type_.pushes
             self.movable[which] &= not type_.is_smooth
-            for name, values in self.numbers.items():
-                values[which] = group.numbers[:, layout.numbers[name][0]]
+            for name in ("mu", "mu_s", "e"):
+                getattr(s, name)[which] = group.numbers[:, layout.numbers[name][0]]
             self.mode[which] = [places[self.names[k], "mode"] for k in which]
             q = next(q for q, (kind, g) in enumerate(evaluator.loop_groups)
                      if g is group and kind == "switch")  # fmt: skip
             loop = loop_list([compiled_loop(group.type_info, "tension")])
             width = WIDTH + LAW_WIDTH * (type_.grip is not None)
             self._loops.append((loop, evaluator.system.groups[q], which, width))
-        self.gapless = (self.alone & self.holds[:, 0]).astype(float)
+        self.alone, self.holds = s.alone != 0, s.holds != 0
+        self.gapless[:] = self.alone & self.holds[:, 0]
         self.way: Integers = self.mode[:, None] + np.arange(1, 4)
         self.near: Integers = self.mode[:, None] + np.arange(4, 7)
-        self.mu, self.mu_s, self.e = (self.numbers[n] for n in ("mu", "mu_s", "e"))
         for k, switch in enumerate(evaluator.switches):
             if switch.is_contact:
                 place = int(switch.group.members[switch.place]) - first
@@ -166,8 +173,7 @@ class ContactRows:
         driven: (m, 3) velocity at each contact, in its frame, of the motion that drivers prescribe:
             of those that the joints allow the one of least energy. Impulses do their work, with
             that of the drivers, along what is left of the slip.
-        load: (m,) of friction alone, by which mu is multiplied: of friction of a constant size 1,
-            of that of a joint what was put there last (modes.py); else 0.
+        reaction: (rows, 3 m) what forces of contacts change of multipliers of joints.
     """
 
     @IGNORE_FLOAT_ERRORS
@@ -183,7 +189,7 @@ class ContactRows:
         self.D, self.G, self._nu = D[:own], D[own:], rows.nu[:own]
         self.C = rows.C[own:].reshape(-1, 3)[:, 0]
         self._free: Floats | None = None
-        self._free_multipliers: Any = None
+        self.free_multipliers: Any = None
         _, p, v, w = split(u)
         self.v = np.hstack([v, w]).ravel()
         n = model.body_count
@@ -195,8 +201,7 @@ class ContactRows:
             self.M[k, k] = A[b] @ model.Jp[b] @ A[b].T
             self.inverse[k, k] = A[b] @ np.linalg.inv(model.Jp[b]) @ A[b].T
         self.P, self.driven = self.inverse, np.zeros((table.count, 3))
-        self.load = table.alone.astype(float)
-        self._reaction = np.zeros((own, 3 * table.count))
+        self.reaction = np.zeros((own, 3 * table.count))
         if own:
             held = self.inverse @ self.D.T
             mobility = self.D @ held
@@ -206,7 +211,7 @@ class ContactRows:
             if table.loads:  # of rows that depend on each other the least, as equations.py has them
                 s = 1.0 / np.sqrt(np.maximum(np.diag(mobility), 1e-300))
                 least = np.linalg.pinv(s[:, None] * mobility * s, rcond=1e-12, hermitian=True)
-                self._reaction = -s[:, None] * (least @ (s[:, None] * held.T @ self.G.T))
+                self.reaction = -s[:, None] * (least @ (s[:, None] * held.T @ self.G.T))
         self.W = self.G @ self.P @ self.G.T
 
     @cached_property
@@ -237,21 +242,11 @@ class ContactRows:
             apart[table.mode] = 0.0
             evaluator.states = apart
             report = evaluator.report(self.t, self.with_velocities(self.v))
-            self._free_multipliers = report[evaluator.model.report_layout["Lam"]][:own]
+            self.free_multipliers = report[evaluator.model.report_layout["Lam"]][:own]
             evaluator.states = self.states
             gamma = evaluator.placed_gamma(self.t, self._stuck_states())[own:]
             self._free = self.G @ report[: len(self.v)] - gamma
         return self._free
-
-    def loads_by(self, x: Floats) -> Floats:
-        """(m,) loads of friction alone where contacts have the forces x (3 m,), in their frames."""
-        if self._free_multipliers is None:
-            _ = self.free
-        loads = self._table.alone.astype(float)
-        lam = self._free_multipliers + self._reaction @ x
-        for c, (rows, pushes) in self._table.loads.items():
-            loads[c] = max(lam[rows[0]], 0.0) if pushes else np.linalg.norm(lam[rows])
-        return loads
 
     @cached_property
     def feels(self) -> Any:
@@ -259,7 +254,7 @@ class ContactRows:
         count = len(self.W) // 3
         size = np.abs(self.W).max(initial=0.0)
         found = np.abs(self.W).reshape(count, 3, -1, 3).max(axis=(1, 3)) > 1e-14 * size
-        changes, least = np.abs(self._reaction), 1e-14 * np.abs(self._reaction).max(initial=0.0)
+        changes, least = np.abs(self.reaction), 1e-14 * np.abs(self.reaction).max(initial=0.0)
         for c, (rows, _) in self._table.loads.items():
             found[c] |= (changes[rows] > least).reshape(-1, count, 3).any(axis=(0, 2))
         return found | found.T if self._table.loads else found
@@ -274,7 +269,7 @@ class ContactRows:
         """Change the velocities by dv (6 n,); of what cancels no rounding is left."""
         v = self.v + dv
         v[np.abs(v) <= CANCELLED * np.abs(dv)] = 0.0
-        self.v, self._free, self._free_multipliers = v, None, None
+        self.v, self._free, self.free_multipliers = v, None, None
 
     def follow(self, given: Sequence[tuple[Floats, float]] = ()) -> bool:
         """Bring velocities onto the joints by impulses in them, and rows to what they are given.
@@ -335,3 +330,69 @@ class ContactRows:
         """The rows of some contacts."""
         rows: Integers = (3 * np.array(contacts, dtype=np.int64)[:, None] + np.arange(3)).ravel()
         return rows
+
+    def put(self, contacts: list[int]) -> ContactArrays:
+        """Arrays of compiled code for some contacts at these velocities."""
+        s = self._table.arrays
+        s.W[:], s.slip[:] = self.W, self.slip
+        s.touching[: len(contacts)], s.touching_count = contacts, len(contacts)
+        return s
+
+
+class JamError(ValueError):
+    """No mode is consistent: sliding presses its bodies together; names the contact."""
+
+
+@attrs.frozen
+class Modes:
+    """Modes, directions of sliding and shares of all contacts, global axes.
+
+    Attributes:
+        mode: (m,) 0 open, 1 slides, 2 sticks.
+        way: (m, 3) unit vectors of sliding, zero where none is known; of friction alone that
+            sticks 1.0 for rows that do not hold, as others hold what they would.
+        near: (m, 3) forces on body i of those that share what they carry.
+        force: (m, 3) forces with which they were found, in the frames of the contacts.
+    """
+
+    mode: Floats
+    way: Floats
+    near: Floats
+    force: Floats
+
+
+def find_modes(
+    table: ContactTable,
+    rows: ContactRows,
+    touching: list[int],
+    sliding: dict[int, Floats],
+    leaving: list[int],
+) -> Modes:
+    """The modes at the state of ``rows``.
+
+    Args:
+        table, rows: the contacts, and what they are at this state.
+        touching: contacts of no gap.
+        sliding: contacts at rest that begin to slide -> direction in their frames, (2,).
+        leaving: contacts whose normal force has just vanished: they open where nothing keeps them.
+
+    Raises:
+        JamError: a contact jams.
+    """
+    s = rows.put(touching)
+    s.free[:], s.frames[:], s.feels[:], s.load[:] = rows.free, rows.frames, rows.feels, table.alone
+    s.lam_free[:], s.reaction[:] = rows.free_multipliers, rows.reaction
+    s.begins[:] = s.leaves[:] = 0
+    for c, way in sliding.items():
+        s.begins[c], s.begin_way[c, 0] = 1, 0.0
+        s.begin_way[c, table.across(c)] = way
+    s.leaves[leaving] = 1
+    if not seek_modes(s):
+        raise JamError(" with ".join(table.names[c] for c in np.flatnonzero(s.jams)))
+    return Modes(s.mode.copy(), s.way.copy(), s.near.copy(), s.force.copy())
+
+
+def nearly_jams(table: ContactTable, rows: ContactRows, closed: list[int]) -> str:
+    """Name of a contact whose friction leaves next to nothing of how it gives way; "" of none."""
+    c = seek_jam(rows.put(closed))
+    return table.names[c] if c >= 0 else ""

@@ -10,8 +10,8 @@ touch, as through Newton's cradle. Where e is zero everywhere one round of all t
 import attrs
 import numpy as np
 
-from dap3d_core.formulations.contacts.cone import solve_cone
 from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
+from dap3d_core.formulations.contacts.impulses import put_impulses, stop_slip
 from dap3d_core.kernels.array_types import Floats
 
 #: Normal speed, m/s of a scene of ordinary size, below which what touches does not approach.
@@ -53,9 +53,9 @@ def repeat(table: ContactTable, rows: ContactRows, impact: Impact) -> Impact:
     work = 0.0
     for taking, e in impact.rounds:
         if e is None:
-            x = _stopping(table, rows, taking)
+            x = _stopping(rows, taking)
         else:
-            x = _impulses(table, rows, taking, np.where(e > 0.0, table.e, 0.0))
+            x = _impulses(rows, taking, np.where(e > 0.0, table.e, 0.0))
         x = np.zeros(3 * len(taking)) if x is None else x
         before = rows.slip[taking] - rows.driven[taking]
         rows.kick(_spread(x, taking, table.count))
@@ -80,7 +80,7 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
         bounces = np.any(e[touching] > 0.0) and not last
         taking = approach if bounces else touching
         of = np.zeros_like(e) if last else e
-        x = _impulses(table, rows, taking, of)
+        x = _impulses(rows, taking, of)
         short = _last_bounces(table, rows, taking, x, e, length)
         if short:
             rest |= short
@@ -107,7 +107,7 @@ def unjam(
     653). So what holds is at rest then, and nothing bounces.
     """
     closed = [c for c in touching if rows.closing[c] < AT_REST * length]
-    x = _stopping(table, rows, closed)
+    x = _stopping(rows, closed)
     if x is None:
         return None
     parts, before = x.reshape(-1, 3), (rows.slip - rows.driven)[closed]
@@ -121,14 +121,10 @@ def unjam(
     return Impact(impulses, work, exchanged, impact.rest, rounds, impact.low)
 
 
-def _stopping(table: ContactTable, rows: ContactRows, closed: list[int]) -> Floats | None:
+def _stopping(rows: ContactRows, closed: list[int]) -> Floats | None:
     """(3 k,) impulses that stop slip, of contacts that do not approach; None but zero."""
-    which, u = rows.rows_of(closed), rows.slip[closed].ravel()
-    A = rows.W[np.ix_(which, which)]
-    stops = np.linalg.lstsq(A, -u, rcond=1e-12)[0]
-    x, left = solve_cone(A, u, table.mu[closed], start=stops, gapless=table.gapless[closed],
-                         ratio=table.ratio[closed])  # fmt: skip
-    return x if left <= 1e-6 and np.any(x[::3] > 0.0) else None
+    s = rows.put(closed)
+    return s.x[: 3 * len(closed)].copy() if stop_slip(s) else None
 
 
 def _stop_low_rocking(rows: ContactRows, touching: list[int], length: float) -> list[int]:
@@ -151,21 +147,11 @@ def _spread(x: Floats, contacts: list[int], count: int) -> Floats:
     return every.ravel()
 
 
-def _impulses(table: ContactTable, rows: ContactRows, contacts: list[int], e: Floats) -> Floats:
+def _impulses(rows: ContactRows, contacts: list[int], e: Floats) -> Floats:
     """(3 k,) impulses of one round."""
-    which = rows.rows_of(contacts)
-    A, u, mu = rows.W[np.ix_(which, which)], rows.slip[contacts].ravel(), table.mu[contacts]
-    of, newton, gapless = e[contacts], table.newton[contacts], table.gapless[contacts]
-    b = u.copy()
-    b[::3] += np.where(newton, of, 0.0) * np.minimum(u[::3], 0.0)
-    ratio = table.ratio[contacts]
-    first, _ = solve_cone(A, b, mu, gapless=gapless, ratio=ratio)
-    more = np.where(newton, 0.0, of) * first[::3]  # friction of joints alone has none
-    if not more.any():
-        return first
-    given = np.kron(more, [1.0, 0.0, 0.0])
-    second, _ = solve_cone(A, u + A @ (first + given), mu, more, gapless=gapless, ratio=ratio)
-    return first + second + given
+    s = rows.put(contacts)
+    put_impulses(s, e)
+    return s.x[: 3 * len(contacts)].copy()
 
 
 def _last_bounces(

@@ -119,8 +119,13 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
     Raises:
         SimulationError: bodies overlap, or a contact slips.
     """
-    from dap3d_core.formulations.contacts.contact_rows import GAP, ContactRows, ContactTable
-    from dap3d_core.formulations.contacts.modes import JamError, find_modes
+    from dap3d_core.formulations.contacts.contact_rows import (
+        GAP,
+        ContactRows,
+        ContactTable,
+        JamError,
+        find_modes,
+    )
 
     table, still = ContactTable(evaluator), u.copy()
     velocities_of(still)[:] = 0.0

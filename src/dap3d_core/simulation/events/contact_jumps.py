@@ -16,10 +16,13 @@ from dap3d_core.formulations.contacts.contact_rows import (
     SLIP,
     ContactRows,
     ContactTable,
+    JamError,
+    Modes,
+    find_modes,
     length_of,
+    nearly_jams,
 )
 from dap3d_core.formulations.contacts.impacts import AT_REST, Impact, collide, repeat, unjam
-from dap3d_core.formulations.contacts.modes import JamError, Modes, find_modes, nearly_jams
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.switches import POSITION_ROUNDING
 from dap3d_core.integrators import Integration, Status

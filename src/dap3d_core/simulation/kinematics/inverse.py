@@ -9,7 +9,6 @@ import attrs
 import numpy as np
 
 from dap3d_core.formulations.common.friction import PASSES, forces_by
-from dap3d_core.formulations.contacts.modes import extrapolated
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model import Model
@@ -276,7 +275,7 @@ def _solve(balance: Balance, evaluator: Evaluator, u: Floats, needed: Floats) ->
         if np.max(np.abs(rest), initial=0.0) <= PASS_SETTLED * np.max(np.abs(guess), initial=0.0):
             break
         taken, rests = [*taken, guess][-DEPTH:], [*rests, rest][-DEPTH:]
-        guess = extrapolated(balance.Lam, taken, rests)
+        guess = _extrapolated(balance.Lam, taken, rests)
     if not np.max(np.abs(rest), initial=0.0) <= UNSETTLED * np.abs(balance.Lam).max(initial=0.0):
         raise SimulationError(
             f"forces that depend on reactions of joints do not settle at t = {t:.6g} s: they raise "
@@ -284,6 +283,21 @@ def _solve(balance: Balance, evaluator: Evaluator, u: Floats, needed: Floats) ->
         )
     if closed is not None and contacts is not None:
         contacts.take(closed, t, balance.forces, balance.side)
+
+
+def _extrapolated(given: Floats, taken: list[Floats], rests: list[Floats]) -> Floats:
+    """What a fixed point is taken for next (Anderson, J. ACM 12 (1965) 547).
+
+    Args:
+        given: what the last of ``taken`` gave.
+        taken, rests: the last guesses, and by how much each gave something else.
+    """
+    if len(rests) < 2:
+        return given
+    changes, moves = np.diff(rests, axis=0).T, np.diff(taken, axis=0).T
+    share = np.linalg.lstsq(changes, rests[-1], rcond=1e-10)[0]
+    found: Floats = given - (moves + changes) @ share
+    return found
 
 
 def _is_iterated(model: Model) -> bool:

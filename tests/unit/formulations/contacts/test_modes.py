@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 import dap3d_core as dap
-from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable
-from dap3d_core.formulations.contacts.modes import find_modes
+from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable, find_modes
 from dap3d_core.simulation import CompiledModel
 
 MASS, HEIGHT, MU, G = 3.0, 0.2, 0.3, 9.81

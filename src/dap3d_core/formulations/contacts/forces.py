@@ -1,0 +1,237 @@
+"""Forces of contacts that are closed, by the cone problem of the accelerations."""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+import math
+
+from dap3d_core.formulations.contacts.cone import TRIES, solve_cone
+from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
+from dap3d_core.kernels.array_types import Floats
+from dap3d_core.kernels.runtime.cache import compiled
+
+#: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
+#: is zero.
+STILL, ZERO = 1e-9, 1e-9
+#: Part of the largest acceleration of a group that counts as one of each of its contacts: what
+#: joints let turn fast beside what they let slide is no measure of it, but its rounding is there.
+BESIDE = 1e-3
+#: What is left of a cone problem that has no solution.
+UNSOLVED = 1e-6
+
+
+@compiled
+def still_speed(s: ContactArrays) -> float:
+    """Speed, m/s, below which contacts are at rest."""
+    return STILL * max(1.0, s.length)
+
+
+@compiled
+def size_across(s: ContactArrays, c: int, u: Floats) -> float:
+    """The length of what of u (3,) is slip of a contact."""
+    first = u[0] * u[0] if s.gapless[c] > 0.0 else 0.0
+    return math.sqrt(first + u[1] * u[1] + u[2] * u[2])
+
+
+@compiled
+def put_across(s: ContactArrays, c: int, u: Floats, part: float, out: Floats) -> None:
+    """Put a part of what of u (3,) is slip of a contact."""
+    out[0] = part * u[0] if s.gapless[c] > 0.0 else 0.0
+    out[1], out[2] = part * u[1], part * u[2]
+
+
+@compiled
+def against(ratio: float, way: Floats) -> tuple[float, float]:
+    """What friction that slides acts against along the tangents, in parts of mu: a unit vector."""
+    if ratio == 1.0:
+        return way[1], way[2]
+    size = max(math.sqrt(way[1] * way[1] + ratio * ratio * way[2] * way[2]), 1e-300)
+    return way[1] / size, ratio * ratio * way[2] / size
+
+
+@compiled
+def put_slip_against(s: ContactArrays, c: int, force: Floats, out: Floats) -> None:
+    """Put the direction in which a contact begins to slip against friction at its limit."""
+    put_across(s, c, force, -1.0, out)
+    if s.ratio_s[c] != 1.0:
+        out[2] /= s.ratio_s[c] * s.ratio_s[c]
+    put_across(s, c, out, 1.0 / size_across(s, c, out), out)
+
+
+@compiled
+def put_matrix(s: ContactArrays, begins: bool) -> bool:
+    """Rates by forces of closed contacts, along normals with sliding friction; False if one jams.
+
+    begins: those that begin to slide, slide.
+    """
+    put_plain(s)
+    limit = still_speed(s)
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        size = size_across(s, c, s.slip[c])
+        if size > limit:
+            put_across(s, c, s.slip[c], 1.0 / size, s.along[c])
+            s.slides[c] = 1
+        elif begins and s.begins[c] != 0:
+            put_across(s, c, s.begin_way[c], 1.0, s.along[c])
+            s.slides[c] = 1
+    return add_sliding(s)
+
+
+@compiled
+def put_plain(s: ContactArrays) -> None:
+    """Rates by forces of closed contacts, as if none slid."""
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        s.slides[c] = 0
+        for i in range(3):
+            row, from_row = s.cone.A[3 * k + i], s.W[3 * c + i]
+            for q in range(s.closed_count):
+                d = 3 * s.closed[q]
+                row[3 * q], row[3 * q + 1] = from_row[d], from_row[d + 1]
+                row[3 * q + 2] = from_row[d + 2]
+
+
+@compiled
+def add_sliding(s: ContactArrays) -> bool:
+    """Add what friction of what slides does along with normal forces; False if one jams."""
+    A = s.cone.A
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        if s.slides[c] != 0 and s.gapless[c] == 0.0:
+            first, second = against(s.ratio[c], s.along[c])
+            for i in range(3 * s.closed_count):
+                A[i, 3 * k] -= s.mu[c] * (A[i, 3 * k + 1] * first + A[i, 3 * k + 2] * second)
+            if A[3 * k, 3 * k] <= 0.0 and s.alone[c] == 0:
+                s.jams[c] = 1
+                return False
+    return True
+
+
+@compiled
+def solve_forces(s: ContactArrays, part: float, tries: int) -> bool:
+    """Forces of closed contacts into ``cone.x``, which is where it begins, and ``rates``.
+
+    False where there are none; of fewer tries than all that is left open.
+
+    part: of the cones; contacts that are ``slipping`` have mu, not mu_s.
+    """
+    n, cone = 3 * s.closed_count, s.cone
+    cone.count = s.closed_count
+    for k in range(n):
+        cone.b[k] = s.free[3 * s.closed[k // 3] + k % 3]
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        for i in range(n if s.slides[c] != 0 else 0):
+            row = cone.A[i][3 * k : 3 * k + 3]
+            if s.gapless[c] > 0.0:
+                way = s.along[c]
+                along = row[0] * way[0] + row[1] * way[1] + row[2] * way[2]
+                cone.b[i] -= s.load[c] * s.mu[c] * along
+            elif s.alone[c] != 0:  # in its first column is what a load of one does
+                cone.b[i] += s.load[c] * row[0]
+        mu = s.mu[c] if s.slipping[c] != 0 else s.mu_s[c]
+        cone.mu[k] = 0.0 if s.slides[c] != 0 else part * mu
+        cone.more[k], cone.gapless[k], cone.ratio[k] = s.load[c], s.gapless[c], s.ratio_s[c]
+    left = solve_cone(cone, tries)
+    if left > UNSOLVED and tries == TRIES:
+        for k in range(s.closed_count):
+            s.jams[s.closed[k]] = 1
+        return False
+    for i in range(n):
+        s.rates[i] = cone.b[i]
+        for k in range(n):
+            s.rates[i] += cone.A[i, k] * cone.x[k]
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        if s.slides[c] != 0:
+            put_sliding_force(s, c, cone.x[3 * k : 3 * k + 3])
+    return True
+
+
+@compiled
+def put_sliding_force(s: ContactArrays, c: int, x: Floats) -> None:
+    """Put friction of a contact that slides beside its normal force."""
+    if s.gapless[c] > 0.0:
+        for i in range(3):
+            x[i] = -s.mu[c] * s.load[c] * s.along[c, i]
+        return
+    first, second = against(s.ratio[c], s.along[c])
+    friction = s.mu[c] * (x[0] + s.load[c])
+    x[1], x[2] = -friction * first, -friction * second
+
+
+@compiled
+def put_sizes(s: ContactArrays, all_hold: bool) -> float:
+    """Sizes of accelerations of closed contacts, and the largest of them.
+
+    all_hold: none is taken for one that slides.
+    """
+    found, beside, largest = 0, 0.0, 0.0
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        s.sizes[k] = own = max(abs(s.free[3 * c]), abs(s.free[3 * c + 1]), abs(s.free[3 * c + 2]))
+        largest = max(largest, own)
+        if all_hold or s.slides[c] == 0:  # what slides may turn far faster
+            beside, found = max(beside, own), 1
+    least = BESIDE * (beside if found != 0 else largest) + 1e-300
+    for k in range(s.closed_count):
+        s.sizes[k] = max(s.sizes[k], least)
+        largest = max(largest, least)
+    return largest
+
+
+@compiled
+def largest_entry(A: Floats, n: int) -> float:
+    """The largest magnitude among the first n rows and columns."""
+    found = 0.0
+    for i in range(n):
+        for k in range(n):
+            found = max(found, abs(A[i, k]))
+    return found
+
+
+@compiled
+def begin_to_move(s: ContactArrays, part: float) -> bool:
+    """Forces of closed contacts, and accelerations that are zero where they are rounding.
+
+    What begins to slip has mu, not mu_s, and then others may slip as well. False if they jam.
+    """
+    differs = False
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        s.slipping[c] = 0
+        differs |= s.mu_s[c] > s.mu[c]
+    while True:
+        for k in range(3 * s.closed_count):
+            s.cone.x[k] = 0.0
+        if not solve_forces(s, part, TRIES):
+            return False
+        put_sizes(s, False)
+        more = False
+        for k in range(s.closed_count):
+            c, a = s.closed[k], s.rates[3 * k : 3 * k + 3]
+            clear_rounding(s, c, ZERO * s.sizes[k], a)
+            if size_across(s, c, a) > 0.0 and s.slipping[c] == 0:
+                s.slipping[c], more = 1, True
+        if not (more and differs):
+            return True
+
+
+@compiled
+def clear_rounding(s: ContactArrays, c: int, least: float, a: Floats) -> None:
+    """Put zero for accelerations that are rounding.
+
+    Less than a part of what friction alone could change is that as well.
+    """
+    row, stops = 3 * c, 0.0
+    if s.alone[c] != 0:
+        own = max(s.W[row, row], s.W[row + 1, row + 1], s.W[row + 2, row + 2])
+        stops = ZERO * s.mu_s[c] * s.load[c] * own
+    across = size_across(s, c, a) > max(least, stops)
+    if s.gapless[c] == 0.0:
+        a[0] = a[0] if abs(a[0]) > least else 0.0
+    elif not across:
+        a[0] = 0.0
+    if not across:
+        a[1] = a[2] = 0.0

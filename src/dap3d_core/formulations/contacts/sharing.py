@@ -1,0 +1,158 @@
+"""Contacts that share what they carry: forces well within cones, and rows that do not hold."""
+
+# An element of an array, and what a compiled function returns, is Any to mypy.
+# mypy: disable-error-code="no-any-return"
+
+from dap3d_core.formulations.contacts.contact_arrays import ContactArrays
+from dap3d_core.formulations.contacts.forces import largest_entry, put_sizes, solve_forces
+from dap3d_core.kernels.runtime.cache import compiled
+from dap3d_core.linear.least_squares import factor_least, solve_least
+
+#: Part of the largest entry of A below which rows depend on each other.
+DEPENDENT = 1e-12
+#: Part of the largest acceleration that may be left where contacts hold, by shares alone: their
+#: rows take it, within what the cones leave.
+HELD, OF_REST, RATE_ROUNDING = 1e-9, 0.05, 1e-13
+#: How many parts of their cones within which contacts that share what they carry may be to stay,
+#: each leaving half of what the one before leaves: what they carry reaches its limit with so much
+#: left, 1e-9.
+PARTS = 30
+#: Tries of a cone problem that may have no solution.
+FEW = 3
+
+
+@compiled
+def do_share(s: ContactArrays) -> bool:
+    """True if forces of closed contacts may change without a change of the motion."""
+    n, A = put_own_rows(s), s.cone.A
+    for i in range(n):
+        for k in range(n):
+            s.B[i, k] = A[s.rows[i], s.rows[k]]
+    least = DEPENDENT * largest_entry(A, 3 * s.closed_count)
+    return factor_least(s.B, n, n, 0.0, least, s.w, s.order) < n
+
+
+@compiled
+def put_own_rows(s: ContactArrays) -> int:
+    """Rows along which closed contacts act: of what slides, or is smooth, the normal alone."""
+    count = 0
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        slides, alone = s.slides[c] != 0, s.alone[c] != 0
+        for i in range(3):
+            acts = not (slides and alone)
+            if i > 0:
+                acts = not slides and (alone or s.mu_s[c] > 0.0)
+            if acts and s.holds[c, i] != 0:
+                s.rows[count] = 3 * k + i
+                count += 1
+    return count
+
+
+@compiled
+def part_of_cones(k: int) -> float:
+    """The part of their cones of a number."""
+    left = 1.0
+    for _ in range(k + 1):
+        left *= 0.5
+    return 1.0 - left
+
+
+@compiled
+def hold_inside(s: ContactArrays) -> bool:
+    """Forces ``inner`` well within the cones of closed contacts that share, and hold, if any."""
+    for k in range(3 * s.closed_count):
+        s.cone.x[k] = 0.0
+    for k in range(s.closed_count):
+        s.slipping[s.closed[k]] = 0
+    if are_held_within(s, 0):  # as a rule
+        return True
+    for k in range(3 * s.closed_count):
+        s.cone.x[k] = 0.0
+    if not are_held_within(s, PARTS - 1):
+        return False
+    low, high = 1, PARTS - 2
+    while low <= high:  # what one part allows, so does every larger one
+        k = (low + high) // 2
+        for q in range(3 * s.closed_count):
+            s.cone.x[q] = s.inner[q]
+        if are_held_within(s, k):
+            high = k - 1
+        else:
+            low = k + 1
+    return True
+
+
+@compiled
+def are_held_within(s: ContactArrays, part: int) -> bool:
+    """True if forces within a part of the cones hold; these are ``inner`` then."""
+    solve_forces(s, part_of_cones(part), FEW)
+    x, A, big = s.cone.x, s.cone.A, put_sizes(s, True)
+    for q in range(put_own_rows(s)):
+        k = s.rows[q] // 3
+        c = s.closed[k]
+        own = max(A[3 * k, 3 * k], A[3 * k + 1, 3 * k + 1], A[3 * k + 2, 3 * k + 2])
+        carried = s.mu_s[c] * (x[3 * k] + s.load[c])
+        rest = OF_REST * (1.0 - part_of_cones(part)) * own * carried + RATE_ROUNDING * big
+        if not abs(s.rates[s.rows[q]]) <= min(HELD * s.sizes[k], rest):
+            return False
+    for k in range(3 * s.closed_count):
+        s.inner[k] = x[k]
+    return True
+
+
+@compiled
+def leave_to_others(s: ContactArrays) -> None:
+    """Let rows of friction alone not hold where others, and the joints, hold what they would.
+
+    They carry what was found for them; joints and rows would divide that between them otherwise.
+    """
+    count, left = 0, 0
+    for k in range(s.closed_count):
+        c = s.closed[k]
+        for i in range(3):
+            holds = s.mode[c] > (0.5 if i == 0 else 1.5)
+            if s.alone[c] == 0 and holds:
+                s.rows[count] = 3 * c + i
+                count += 1
+            elif s.alone[c] != 0 and s.mode[c] == 2.0 and s.holds[c, i] != 0:
+                s.way[c, i] = 1.0  # until it is found to hold
+                left += 1
+    least = DEPENDENT * largest_entry(s.W, s.W.shape[0])
+    while left > 0:
+        rank = factor_rows(s, count)
+        best, most = -1, least
+        for k in range(s.closed_count):
+            c = s.closed[k]
+            for i in range(3 if s.alone[c] != 0 and s.mode[c] == 2.0 else 0):
+                if s.holds[c, i] != 0 and s.way[c, i] == 1.0:
+                    free = freedom_of(s, 3 * c + i, count, rank)
+                    if free > most:
+                        best, most = 3 * c + i, free
+        if best < 0:
+            return
+        s.rows[count] = best
+        s.way[best // 3, best % 3] = 0.0
+        count += 1
+        left -= 1
+
+
+@compiled
+def factor_rows(s: ContactArrays, count: int) -> int:
+    """Factors of what rows change of each other; their rank."""
+    for i in range(count):
+        for k in range(count):
+            s.B[i, k] = s.W[s.rows[i], s.rows[k]]
+    return factor_least(s.B, count, count, DEPENDENT, 0.0, s.w, s.order)
+
+
+@compiled
+def freedom_of(s: ContactArrays, row: int, count: int, rank: int) -> float:
+    """What a row changes of itself where some rows hold."""
+    for k in range(count):
+        s.x[k] = s.W[s.rows[k], row]
+    solve_least(s.B, count, count, rank, s.w, s.order, s.x, s.inner)
+    found = s.W[row, row]
+    for k in range(count):
+        found -= s.W[row, s.rows[k]] * s.inner[k]
+    return found
