@@ -32,7 +32,7 @@ class PlacedShapes(Arrays):
         ),
         **dict.fromkeys(("corners", "bits", "cells", "pairs", "which"), INTEGER_MATRIX),
         **dict.fromkeys(
-            ("at", "local", "size", "vertices", "mu", "e", "centre", "axes", "found", "scratch",
+            ("at", "local", "size", "vertices", "mu", "mu_roll", "mu_spin", "e", "centre", "axes", "found", "scratch",
              "work"),
             MATRIX,
         ),
@@ -40,6 +40,8 @@ class PlacedShapes(Arrays):
 
     pair_count = Scalar[int]("integer")
     point_count = Scalar[int]("integer")  # where it is beyond the room, the points are not all
+
+    resistance_count = Scalar[int]("integer")  # as of CollisionShapes
 
     integer: Integers
     kind: Integers  # those of the model, as in CollisionShapes
@@ -52,6 +54,8 @@ class PlacedShapes(Arrays):
     bits: Integers
     material: Integers
     mu: Floats
+    mu_roll: Floats  # none where nothing resists rolling, or spinning
+    mu_spin: Floats
     e: Floats
     apart: Integers
     reach: Floats
@@ -79,20 +83,20 @@ def placed_shapes(shapes: CollisionShapes | None) -> PlacedShapes:
         none, zero, of_two = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 2))
         shapes = CollisionShapes(
             (), none, none, zero, np.zeros((0, 4)), zero, of_two.astype(np.int64), zero, none,
-            of_two.astype(np.int64), np.zeros((0, 0)), np.zeros((0, 0)), none,
+            of_two.astype(np.int64), *np.zeros((4, 0, 0)), none,
         )  # fmt: skip
     m = len(shapes.kind)
     solids = np.flatnonzero(shapes.kind != PLANE)
-    names = ("kind", "body", "at", "size", "corners", "vertices", "bits", "material", "mu", "e",
-             "apart")  # fmt: skip
+    names = ("kind", "body", "at", "size", "corners", "vertices", "bits", "material", "mu",
+             "mu_roll", "mu_spin", "e", "apart")  # fmt: skip
     given: dict[str, Any] = {name: np.ascontiguousarray(getattr(shapes, name)) for name in names}
     whole: dict[str, Any] = {
         name: np.zeros(len(solids), dtype=np.int64) for name in ("small", "large", "following")
     }
-    return PlacedShapes(
+    placed = PlacedShapes(
         **given,
         **whole,
-        integer=np.zeros(2, dtype=np.int64),
+        integer=np.zeros(3, dtype=np.int64),
         local=np.ascontiguousarray(rotation(shapes.p).reshape(-1, 9)),
         reach=np.ascontiguousarray(shapes.reach, dtype=float),
         solids=solids,
@@ -109,6 +113,8 @@ def placed_shapes(shapes: CollisionShapes | None) -> PlacedShapes:
         scratch=np.zeros((CORNERS + 2, 3)),
         work=np.zeros((ROWS, 3)),
     )
+    placed.resistance_count = shapes.resistance_count
+    return placed
 
 
 def with_room(s: PlacedShapes) -> PlacedShapes:

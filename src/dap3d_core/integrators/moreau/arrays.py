@@ -29,12 +29,13 @@ LOG_ROOM = 64
 MOST_PAIRS, MOST_POINTS, MOST_ENTRIES, MOST_HELD = 32, 8, 16, 100
 #: Part of the mass, or moment, of what a joint holds at a body below which that body is light.
 LIGHT = 1e-3
-#: Kinds of contacts: with a cone; friction of a joint along rows 1 and 2, or along all three.
+#: Kinds of contacts: with a cone; friction of a joint, or of what rolls, along rows 1 and 2; of a
+#: joint along all three.
 CONE, ALONE, WHOLE = range(3)
 #: Arrays of which a row belongs to a contact.
-OF_CONTACTS = ("bodies", "key", "kind", "group", "chosen", "J", "moved", "own", "own_held", "gap",
-               "mu", "rim", "e", "bias", "r", "left", "collides", "closing", "x", "u", "z", "B",
-               "push", "kept", "met", "x_bounce")  # fmt: skip
+OF_CONTACTS = ("bodies", "key", "kind", "under", "group", "chosen", "J", "moved", "own",
+               "own_held", "gap", "mu", "rim", "e", "bias", "r", "left", "collides", "closing",
+               "x", "u", "z", "B", "push", "kept", "met", "x_bounce")  # fmt: skip
 
 
 def _integer() -> Scalar[int]:
@@ -54,7 +55,7 @@ class StepArrays(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(
-            ("integer", "key", "kind", "group", "chosen", "collides", "declared_gap",
+            ("integer", "key", "kind", "under", "group", "chosen", "collides", "declared_gap",
              "declared_mode", "declared_kind", "declared_turns", "declared_law", "load_row",
              "load_count", "load_pushes", "held",
              "row_start", "row_body", "row_place", "used", "place", "parent", "queue", "order",
@@ -76,7 +77,8 @@ class StepArrays(Arrays):
 
     # of the step
     contact_count = _integer()
-    touch_count = _integer()  # the first ones, of shapes
+    touch_count = _integer()  # the first ones, of shapes; behind them what resists their rolling
+    first_declared = _integer()
     stage = _integer()  # of a step that waits for room: 0, or FREE or MOVED (step.py)
     is_solved = _integer()  # 1: there were contacts in the last step
     met_count = _integer()
@@ -140,6 +142,7 @@ class StepArrays(Arrays):
     bodies: Integers  # (c, 2) i and j, ground 0
     key: Integers  # a number that a contact keeps
     kind: Integers  # CONE, ALONE or WHOLE
+    under: Integers  # the contact whose rolling it resists, or -1
     group: Integers  # the least body of those that contacts connect
     chosen: Integers  # contacts of a group
     collides: Integers  # what it does; the part of the step at which it closes
@@ -292,7 +295,7 @@ def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
     widths = {"bodies": 2, "J": 36, "moved": 36, "own": 9, "own_held": 9, "B": 9, "met": MET,
               **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
-    whole = ("bodies", "key", "kind", "group", "chosen", "collides")
+    whole = ("bodies", "key", "kind", "under", "group", "chosen", "collides")
     return {
         name: np.zeros((room, widths[name]) if name in widths else room,
                        dtype=np.int64 if name in whole else float)
@@ -364,7 +367,8 @@ def all_room(s: StepArrays) -> StepArrays:
     s.bit_size = n * (n // 32 + 1)
     s.entry_count = min(n * (n - 1) // 2, MOST_ENTRIES * n)
     s.matrix_size = 36 * (n + 2 * s.entry_count)
-    s.held_count = min(s.shapes.point_count + len(s.declared_gap), MOST_HELD) if len(s.y) else 0
+    held = (1 + s.shapes.resistance_count) * s.shapes.point_count + len(s.declared_gap)
+    s.held_count = min(held, MOST_HELD) if len(s.y) else 0
     found = grown(s)
     found.shapes.pair_count = found.shapes.point_count = 0
     found.entry_count = found.held_count = 0
@@ -375,7 +379,8 @@ def all_room(s: StepArrays) -> StepArrays:
 def grown(s: StepArrays) -> StepArrays:
     """The same arrays with the room that a step has asked for."""
     new: dict[str, Any] = {"shapes": with_room(s.shapes)}
-    room = max(s.contact_count, s.shapes.point_count + len(s.declared_gap))
+    per_point = 1 + s.shapes.resistance_count
+    room = max(s.contact_count, per_point * s.shapes.point_count + len(s.declared_gap))
     if room > len(s.key):
         new |= _of_contacts(room + room // 4)
         new["met"][: s.met_count] = s.met[: s.met_count]

@@ -17,14 +17,14 @@ from dap3d_core.formulations.contacts.equations import (
     ROW,
     STATE,
 )
-from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
+from dap3d_core.integrators.moreau.arrays import ALONE, CONE, StepArrays
 from dap3d_core.interface.contacts.rows import FAR_APART, SLIDES, STEPPED
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled
 
-#: Of keys of declared contacts, which are beyond those of shapes.
-DECLARED = 2**52
+#: Of keys of what resists rolling and spinning, behind those of shapes, and of declared contacts.
+ROLLS, SPINS, DECLARED = 2**50, 2**51, 2**52
 #: Points of a pair of shapes that keys tell apart.
 POINTS = 256
 #: The least ratio of an ellipse of friction.
@@ -40,7 +40,7 @@ def find_contacts(
     """Find the contacts at an integrated state y; False without room.
 
     Shapes are nearer than the margins of bodies, declared contacts than ``most``; friction of
-    joints is among them where that is FAR_APART.
+    joints, and of what rolls, is among them where that is FAR_APART.
     """
     place_poses(y, s)
     s.contact_count = s.touch_count = 0
@@ -48,14 +48,19 @@ def find_contacts(
         if not find_touches(s.shapes, s.poses, s.margin):
             return False
         s.touch_count = s.shapes.point_count
-    s.contact_count = s.touch_count + s.declared_gap.size
+    resistances = s.shapes.resistance_count
+    s.contact_count = (1 + resistances) * s.touch_count + s.declared_gap.size
     if s.contact_count > s.key.size:
         return False
+    s.contact_count = s.touch_count
     for c in range(s.touch_count):
         put_touch(c, s)
+    if resistances > 0 and most >= FAR_APART:
+        for c in range(s.touch_count):
+            put_resistances(c, s)
+    s.first_declared = s.contact_count
     if s.declared_gap.size > 0:
         evaluate_rows(t, y, s, system, loops)
-        s.contact_count = s.touch_count
         for k in range(s.declared_gap.size):
             if s.declared_kind[k] != CONE:
                 near = most >= FAR_APART
@@ -112,7 +117,7 @@ def put_touch(c: int, s: StepArrays) -> None:
     a, b = shapes.body[i], shapes.body[j]
     s.bodies[c, 0], s.bodies[c, 1] = a, b
     s.key[c] = (i * shapes.kind.size + j) * POINTS + which[2]
-    s.gap[c], s.kind[c] = found[6], CONE
+    s.gap[c], s.kind[c], s.under[c] = found[6], CONE, -1
     first, second = shapes.material[i], shapes.material[j]
     s.mu[c], s.e[c] = shapes.mu[first, second], shapes.e[first, second]
     put_frame(found[3], found[4], found[5], J)
@@ -124,6 +129,44 @@ def put_touch(c: int, s: StepArrays) -> None:
             J[k], J[k + 1], J[k + 2] = sign * x, sign * y, sign * z
             J[k + 3], J[k + 4] = sign * (q * z - w * y), sign * (w * x - p * z)
             J[k + 5] = sign * (p * y - q * x)
+
+
+@compiled
+def put_resistances(c: int, s: StepArrays) -> None:
+    """Make contacts of what resists that shapes roll and spin where they touch, contact c."""
+    shapes, which = s.shapes, s.shapes.which[c]
+    i, j = shapes.material[which[0]], shapes.material[which[1]]
+    if shapes.mu_roll.size > 0 and shapes.mu_roll[i, j] > 0.0:
+        put_resistance(c, ROLLS, s)
+        put_turning(c, 1, shapes.mu_roll[i, j], 1, s)
+        put_turning(c, 2, shapes.mu_roll[i, j], 2, s)
+    if shapes.mu_spin.size > 0 and shapes.mu_spin[i, j] > 0.0:
+        put_resistance(c, SPINS, s)
+        put_turning(c, 0, shapes.mu_spin[i, j], 1, s)
+
+
+@compiled
+def put_resistance(c: int, key: int, s: StepArrays) -> None:
+    """Append friction as large as what contact c pushes with, its rows still empty."""
+    d = s.contact_count
+    s.contact_count = d + 1
+    s.bodies[d, 0], s.bodies[d, 1] = s.bodies[c, 0], s.bodies[c, 1]
+    s.key[d], s.kind[d], s.under[d] = key + s.key[c], ALONE, c
+    s.gap[d] = s.mu[d] = s.e[d] = 0.0
+    for k in range(36):
+        s.J[d, k] = 0.0
+
+
+@compiled
+def put_turning(c: int, along: int, arm: float, row: int, s: StepArrays) -> None:
+    """Put turning along a row of contact c into a row of the last one, times ``arm``, m.
+
+    Its velocities are in m/s then, and its impulses, moments over ``arm``, in N s.
+    """
+    d = s.contact_count - 1
+    for k in range(3):
+        axis = arm * s.J[c, 12 * along + k]
+        s.J[d, 12 * row + 3 + k], s.J[d, 12 * row + 9 + k] = axis, -axis
 
 
 @compiled
@@ -169,7 +212,7 @@ def find_grips(t: float, s: StepArrays, system: System, loops: Any) -> None:
 
     They are the friction that a normal force of one has at a slip along either tangent.
     """
-    for c in range(s.touch_count, s.contact_count):
+    for c in range(s.first_declared, s.contact_count):
         k = s.key[c] - DECLARED
         if s.declared_law[k] != 0:
             _, u1, u2 = velocity_of(s, c, s.before)
@@ -233,7 +276,7 @@ def put_declared(k: int, s: StepArrays, system: System) -> None:
     c = s.contact_count
     s.contact_count = c + 1
     s.bodies[c, 0], s.bodies[c, 1] = s.declared_bodies[k, 0], s.declared_bodies[k, 1]
-    s.key[c], s.gap[c], s.kind[c] = DECLARED + k, 0.0, s.declared_kind[k]
+    s.key[c], s.gap[c], s.kind[c], s.under[c] = DECLARED + k, 0.0, s.declared_kind[k], -1
     s.mu[c], s.e[c], s.ratio[k] = 0.0, s.declared_e[k], 1.0
     if s.kind[c] == CONE:
         s.gap[c], s.mu[c] = system.residual[s.declared_gap[k]], s.declared_mu[k]

@@ -30,6 +30,8 @@ class CollisionShapes:
         material: (m,) index.
         bits: (m, 2) groups that each is in, and that it meets.
         mu, e: (materials, materials) coefficients of pairs.
+        mu_roll, mu_spin: (materials, materials) moments against rolling and spinning over the force
+            that presses, m; (0, 0) where all are zero.
         apart: (k,) i (n + 1) + j, i < j, ascending, of bodies that do not meet.
     """
 
@@ -44,8 +46,15 @@ class CollisionShapes:
     material: "Integers"
     bits: "Integers"
     mu: "Floats"
+    mu_roll: "Floats"
+    mu_spin: "Floats"
     e: "Floats"
     apart: "Integers"
+
+    @property
+    def resistance_count(self) -> int:
+        """How many of rolling and spinning are resisted anywhere."""
+        return (self.mu_roll.size > 0) + (self.mu_spin.size > 0)
 
     @property
     def reach(self) -> "Floats":

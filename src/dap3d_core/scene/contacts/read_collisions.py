@@ -18,7 +18,8 @@ from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.shapes import Shape, height_field, mesh_file
 from dap3d_core.scene.validate.validated_scene import Instance
 
-COEFFICIENTS = {"mu": None, "e": 1.0}
+#: Coefficients of pairs of materials, and the most that each may be.
+COEFFICIENTS = {"mu": None, "e": 1.0, "mu_roll": None, "mu_spin": None}
 
 
 def read_collisions(
@@ -45,7 +46,7 @@ def read_collisions(
     apart |= _excluded(report, given.exclude, index)
     parts = [(s, part) for s in meeting for part in _parts(report, s)]
     meeting = [s for s, _ in parts]
-    material, mu, e = _materials(report, meeting, given.material)
+    material, coefficients = _materials(report, meeting, given.material)
     width = len(index)
     keys = sorted(i * width + j for i, j in apart)
     at, p, size = (np.array([part[k] for _, part in parts], dtype=float) for k in range(3))
@@ -55,9 +56,9 @@ def read_collisions(
         names=tuple(s.name for s in meeting),
         kind=np.array([KINDS[s.type] for s in meeting]), body=np.array([s.body for s in meeting]),
         at=at, p=p, size=size, corners=np.column_stack([np.cumsum(counts) - counts, counts]),
-        vertices=np.concatenate(hulls), material=material, mu=mu, e=e,
+        vertices=np.concatenate(hulls), material=material,
         bits=np.array([[s.values["group"], s.values["meets"]] for s in meeting]),
-        apart=np.array(keys, dtype=np.int64),
+        apart=np.array(keys, dtype=np.int64), **coefficients,
     )  # fmt: skip
 
 
@@ -95,8 +96,8 @@ def _excluded(report: Collector, pairs: Any, index: Mapping[str, int]) -> set[tu
 
 def _materials(
     report: Collector, shapes: Sequence[Shape], usual: Any
-) -> tuple[Integers, Floats, Floats]:
-    """Index of the material of each shape, and mu and e of all pairs of materials."""
+) -> tuple[Integers, dict[str, Floats]]:
+    """Index of the material of each shape, and coefficients of all pairs of materials, by name."""
     materials = report.scene.materials
     used: dict[str, int] = {}
     index = []
@@ -108,16 +109,19 @@ def _materials(
             words = missing_words(report, "material", name, materials)
             report.add((*key, "material"), name, *words)
         index.append(used.setdefault(name, len(used)))
-    tables = np.zeros((2, len(used), len(used)))
+    tables = np.zeros((len(COEFFICIENTS), len(used), len(used)))
     for a, b in combinations_with_replacement(used, 2):
         pair = _pair(report, materials.get(a, Material(a)), materials.get(b, Material(b)))
         i, j = used[a], used[b]
         tables[:, i, j] = tables[:, j, i] = pair
-    return np.array(index), tables[0], tables[1]
+    found = dict(zip(COEFFICIENTS, tables, strict=True))
+    for name in ("mu_roll", "mu_spin"):
+        found[name] = found[name] if found[name].any() else np.zeros((0, 0))
+    return np.array(index), found
 
 
 def _pair(report: Collector, a: Material, b: Material) -> list[float]:
-    """Mu and e of a pair of materials: as declared, or else their geometric means."""
+    """Coefficients of a pair of materials: as declared, or else their geometric means."""
     declared: dict[str, Any] = {}
     for one, other in ((a, b), (b, a)):
         tables, key = one.with_ or {}, ("materials", one.name, "with")

@@ -21,6 +21,8 @@ class Material:
 
     name: str
     mu: Any = attrs.field(default=None, converter=plain)
+    mu_roll: Any = attrs.field(default=None, converter=plain)
+    mu_spin: Any = attrs.field(default=None, converter=plain)
     mu_s: Any = attrs.field(default=None, converter=plain)
     e: Any = attrs.field(default=None, converter=plain)
     law: Any = attrs.field(default=None, converter=plain)
