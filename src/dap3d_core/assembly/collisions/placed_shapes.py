@@ -41,8 +41,6 @@ class PlacedShapes(Arrays):
     pair_count = Scalar[int]("integer")
     point_count = Scalar[int]("integer")  # where it is beyond the room, the points are not all
 
-    resistance_count = Scalar[int]("integer")  # as of CollisionShapes
-
     integer: Integers
     kind: Integers  # those of the model, as in CollisionShapes
     body: Integers
@@ -93,10 +91,10 @@ def placed_shapes(shapes: CollisionShapes | None) -> PlacedShapes:
     whole: dict[str, Any] = {
         name: np.zeros(len(solids), dtype=np.int64) for name in ("small", "large", "following")
     }
-    placed = PlacedShapes(
+    return PlacedShapes(
         **given,
         **whole,
-        integer=np.zeros(3, dtype=np.int64),
+        integer=np.zeros(2, dtype=np.int64),
         local=np.ascontiguousarray(rotation(shapes.p).reshape(-1, 9)),
         reach=np.ascontiguousarray(shapes.reach, dtype=float),
         solids=solids,
@@ -113,8 +111,6 @@ def placed_shapes(shapes: CollisionShapes | None) -> PlacedShapes:
         scratch=np.zeros((CORNERS + 2, 3)),
         work=np.zeros((ROWS, 3)),
     )
-    placed.resistance_count = shapes.resistance_count
-    return placed
 
 
 def with_room(s: PlacedShapes) -> PlacedShapes:

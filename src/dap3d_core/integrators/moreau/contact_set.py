@@ -48,17 +48,12 @@ def find_contacts(
         if not find_touches(s.shapes, s.poses, s.margin):
             return False
         s.touch_count = s.shapes.point_count
-    resistances = s.shapes.resistance_count
-    s.contact_count = (1 + resistances) * s.touch_count + s.declared_gap.size
+    s.contact_count = (1 + s.resistance_count) * (s.touch_count + s.declared_gap.size)
     if s.contact_count > s.key.size:
         return False
     s.contact_count = s.touch_count
     for c in range(s.touch_count):
         put_touch(c, s)
-    if resistances > 0 and most >= FAR_APART:
-        for c in range(s.touch_count):
-            put_resistances(c, s)
-    s.first_declared = s.contact_count
     if s.declared_gap.size > 0:
         evaluate_rows(t, y, s, system, loops)
         for k in range(s.declared_gap.size):
@@ -68,6 +63,10 @@ def find_contacts(
                 near = system.residual[s.declared_gap[k]] < most
             if near:
                 put_declared(k, s, system)
+    s.law_count = s.contact_count
+    if s.resistance_count > 0 and most >= FAR_APART:
+        for c in range(s.law_count):
+            put_resistances(c, s)
     return True
 
 
@@ -133,16 +132,22 @@ def put_touch(c: int, s: StepArrays) -> None:
 
 @compiled
 def put_resistances(c: int, s: StepArrays) -> None:
-    """Make contacts of what resists that shapes roll and spin where they touch, contact c."""
-    shapes, which = s.shapes, s.shapes.which[c]
-    i, j = shapes.material[which[0]], shapes.material[which[1]]
-    if shapes.mu_roll.size > 0 and shapes.mu_roll[i, j] > 0.0:
+    """Append contacts of what resists rolling and spinning at contact c."""
+    shapes, roll, spin = s.shapes, 0.0, 0.0
+    if c >= s.touch_count:
+        k = s.key[c] - DECLARED
+        roll, spin = s.declared_mu_roll[k], s.declared_mu_spin[k]
+    else:
+        i, j = shapes.material[shapes.which[c, 0]], shapes.material[shapes.which[c, 1]]
+        roll = shapes.mu_roll[i, j] if shapes.mu_roll.size > 0 else 0.0
+        spin = shapes.mu_spin[i, j] if shapes.mu_spin.size > 0 else 0.0
+    if roll > 0.0:
         put_resistance(c, ROLLS, s)
-        put_turning(c, 1, shapes.mu_roll[i, j], 1, s)
-        put_turning(c, 2, shapes.mu_roll[i, j], 2, s)
-    if shapes.mu_spin.size > 0 and shapes.mu_spin[i, j] > 0.0:
+        put_turning(c, 1, roll, 1, s)
+        put_turning(c, 2, roll, 2, s)
+    if spin > 0.0:
         put_resistance(c, SPINS, s)
-        put_turning(c, 0, shapes.mu_spin[i, j], 1, s)
+        put_turning(c, 0, spin, 1, s)
 
 
 @compiled
@@ -163,9 +168,10 @@ def put_turning(c: int, along: int, arm: float, row: int, s: StepArrays) -> None
 
     Its velocities are in m/s then, and its impulses, moments over ``arm``, in N s.
     """
-    d = s.contact_count - 1
+    d, of = s.contact_count - 1, 12 * along
+    side, sign = (0, 1.0) if s.bodies[c, 0] > 0 else (6, -1.0)
     for k in range(3):
-        axis = arm * s.J[c, 12 * along + k]
+        axis = sign * arm * s.J[c, of + side + k]
         s.J[d, 12 * row + 3 + k], s.J[d, 12 * row + 9 + k] = axis, -axis
 
 
@@ -212,7 +218,7 @@ def find_grips(t: float, s: StepArrays, system: System, loops: Any) -> None:
 
     They are the friction that a normal force of one has at a slip along either tangent.
     """
-    for c in range(s.first_declared, s.contact_count):
+    for c in range(s.touch_count, s.law_count):
         k = s.key[c] - DECLARED
         if s.declared_law[k] != 0:
             _, u1, u2 = velocity_of(s, c, s.before)

@@ -52,7 +52,7 @@ def recall(work: Any, s: StepArrays) -> None:
                 s.x[c, r] += J[12 * r + k] * memory[row, 1 + k]
         if s.kind[c] == CONE:
             s.x[c, 0] = max(s.x[c, 0], 0.0)
-        if c >= s.first_declared:
+        if c >= s.touch_count and c < s.law_count:
             u0, u1, u2 = velocity_of(s, c, s.before)
             u0 = u0 if s.kind[c] == WHOLE else 0.0
             rests = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) <= STILL
@@ -78,7 +78,7 @@ def put_grip(s: StepArrays, c: int, holds: bool) -> None:
 def let_slip(s: StepArrays) -> bool:
     """Let contacts slide that no longer stick; True where less friction holds them then."""
     found = False
-    for c in range(s.first_declared, s.contact_count):
+    for c in range(s.touch_count, s.law_count):
         k = s.key[c] - DECLARED
         if s.held[k] != 0 and mode_of(s, c) == SLIDES:
             put_grip(s, c, False)
@@ -93,7 +93,7 @@ def remember(work: Any, s: StepArrays) -> None:
     for c in range(s.contact_count):
         if (s.x[c, 0] > 0.0 or s.kind[c] != CONE) and count < memory.shape[0]:
             memory[count, 0] = s.key[c]
-            memory[count, 4] = SLIDES if c < s.first_declared else mode_of(s, c)
+            memory[count, 4] = SLIDES if c < s.touch_count else mode_of(s, c)
             for k in range(3):
                 total = 0.0
                 for r in range(3):
@@ -122,7 +122,7 @@ def keep_for_reports(s: StepArrays) -> None:
     """Keep what contacts and joints have pushed with in this step."""
     for k in range(s.y.size):
         s.joint_y[k] = s.y[k]
-    for c in range(s.first_declared, s.contact_count):
+    for c in range(s.touch_count, s.law_count):
         d, x, J = s.key[c] - DECLARED, s.x[c], s.J[c]
         kept, sign = s.declared_x[d], -1.0 if s.bodies[c, 0] > 0 else 1.0
         axis = J[3 * s.declared_turns[d] + (0 if sign < 0.0 else 6) :]

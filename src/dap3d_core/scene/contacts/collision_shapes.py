@@ -52,11 +52,6 @@ class CollisionShapes:
     apart: "Integers"
 
     @property
-    def resistance_count(self) -> int:
-        """How many of rolling and spinning are resisted anywhere."""
-        return (self.mu_roll.size > 0) + (self.mu_spin.size > 0)
-
-    @property
     def reach(self) -> "Floats":
         """(m,) radius of a ball about the centre of each that holds it, m; planes have none."""
         from numpy import hypot, linalg, select
