@@ -6,7 +6,7 @@ import pytest
 import dap3d_core as dap
 
 G, R, M = 9.81, 0.1, 2.0
-I = 0.4 * M * R * R  # noqa: E741
+I = 0.4 * M * R * R
 #: Inertia of rolling over m R^2.
 ROLLS = 1.4
 
@@ -84,10 +84,14 @@ def test_a_cart_on_wheels_slows_down_by_what_its_wheels_resist():
     scene.add_body("cart", mass=5.0, Jp=[0.1] * 3, r=[0.3, 0.0, 0.3], r_dot=[v, 0.0, 0.0])
     for k in range(4):
         x, y = (-0.5, 0.5)[k % 2], (-0.3, 0.3)[k // 2]
-        scene.add_body(f"wheel{k}", mass=M, Jp=[I] * 3, r=[x, y, R], r_dot=[v, 0, 0], w=[0, v / R, 0])
+        scene.add_body(
+            f"wheel{k}", mass=M, Jp=[I] * 3, r=[x, y, R], r_dot=[v, 0, 0], w=[0, v / R, 0]
+        )
         scene.add_shape("sphere", body=f"wheel{k}", radius=R, collides=True)
         scene.add_point(f"hub{k}", body="cart", sPp=[x - 0.3, y, R - 0.3])
-        scene.add_joint("rev", f"axle{k}", P_i=f"wheel{k}.O", P_j=f"hub{k}", a_i=f"wheel{k}.y", a_j="cart.y")
+        scene.add_joint(
+            "rev", f"axle{k}", P_i=f"wheel{k}.O", P_j=f"hub{k}", a_i=f"wheel{k}.y", a_j="cart.y"
+        )
     scene.add_shape("plane", body="ground", collides=True)
     scene.add_material("rubber", mu=0.8, mu_roll=mu_roll)
     scene.add_collisions(material="rubber")

@@ -32,8 +32,8 @@ class PlacedShapes(Arrays):
         ),
         **dict.fromkeys(("corners", "bits", "cells", "pairs", "which"), INTEGER_MATRIX),
         **dict.fromkeys(
-            ("at", "local", "size", "vertices", "mu", "mu_roll", "mu_spin", "e", "centre", "axes", "found", "scratch",
-             "work"),
+            ("at", "local", "size", "vertices", "mu", "mu_roll", "mu_spin", "e", "centre", "axes",
+             "found", "scratch", "work"),
             MATRIX,
         ),
     }  # fmt: skip
@@ -81,7 +81,7 @@ def placed_shapes(shapes: CollisionShapes | None) -> PlacedShapes:
         none, zero, of_two = np.zeros(0, dtype=np.int64), np.zeros((0, 3)), np.zeros((0, 2))
         shapes = CollisionShapes(
             (), none, none, zero, np.zeros((0, 4)), zero, of_two.astype(np.int64), zero, none,
-            of_two.astype(np.int64), *np.zeros((4, 0, 0)), none,
+            of_two.astype(np.int64), np.zeros((0, 0)), np.zeros((0, 0)), none,
         )  # fmt: skip
     m = len(shapes.kind)
     solids = np.flatnonzero(shapes.kind != PLANE)

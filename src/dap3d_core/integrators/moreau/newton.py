@@ -16,8 +16,6 @@ taken back where rounds no longer help.
 
 import math
 
-import numpy as np
-
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
 from dap3d_core.integrators.moreau.dense import solve_blocks, solve_square
@@ -113,30 +111,6 @@ def rim_of(s: StepArrays, c: int, x: Floats, y: Floats) -> float:
 def bound_of(s: StepArrays, c: int, x: Floats, y: Floats) -> float:
     """The most friction of contact c, N s; arguments as of ``rim_of``."""
     return s.mu[c] * max(x[c, 0], 0.0) if s.kind[c] == CONE else rim_of(s, c, x, y)
-
-
-def project(z: Floats, mu: Floats) -> Floats:
-    """(m, 3) impulses next to z (m, 3) that Coulomb's law allows, given the normal ones."""
-    found = np.zeros_like(z)
-    for one, k, out in zip(z, mu, found, strict=True):
-        put_projected(one, k * max(0.0, one[0]), CONE, out)
-    return found
-
-
-def slopes(z: Floats, mu: Floats) -> Floats:
-    """(m, 3, 3) derivatives of ``project``."""
-    found = np.zeros((len(mu), 9))
-    for one, k, out in zip(z, mu, found, strict=True):
-        put_slopes(one, k, k * max(0.0, one[0]), CONE, out)
-    return found.reshape(-1, 3, 3)
-
-
-def distance(x: Floats, u: Floats, mu: Floats, r: Floats) -> Floats:
-    """(m, 3) what impulses x miss Coulomb's law by at velocities u, both (m, 3)."""
-    found = np.zeros_like(x)
-    for one, v, k, m, out in zip(x, u, mu, r, found, strict=True):
-        put_missed(one, v, k * max(0.0, one[0]), CONE, m, out)
-    return found
 
 
 # ------------------------------------------------------------------ velocities and residuals

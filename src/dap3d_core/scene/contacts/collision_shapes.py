@@ -15,6 +15,12 @@ KINDS = {
 }  # fmt: skip
 
 
+def _no_pairs() -> "Floats":
+    from numpy import zeros
+
+    return zeros((0, 0))
+
+
 @attrs.frozen(eq=False)
 class CollisionShapes:
     """Shapes that collide, m of them, in the order of the scene; prisms, of a height field.
@@ -30,9 +36,9 @@ class CollisionShapes:
         material: (m,) index.
         bits: (m, 2) groups that each is in, and that it meets.
         mu, e: (materials, materials) coefficients of pairs.
+        apart: (k,) i (n + 1) + j, i < j, ascending, of bodies that do not meet.
         mu_roll, mu_spin: (materials, materials) moments against rolling and spinning over the force
             that presses, m; (0, 0) where all are zero.
-        apart: (k,) i (n + 1) + j, i < j, ascending, of bodies that do not meet.
     """
 
     names: tuple[str, ...]
@@ -46,10 +52,10 @@ class CollisionShapes:
     material: "Integers"
     bits: "Integers"
     mu: "Floats"
-    mu_roll: "Floats"
-    mu_spin: "Floats"
     e: "Floats"
     apart: "Integers"
+    mu_roll: "Floats" = attrs.field(factory=_no_pairs)
+    mu_spin: "Floats" = attrs.field(factory=_no_pairs)
 
     @property
     def reach(self) -> "Floats":

@@ -114,10 +114,8 @@ def _materials(
         pair = _pair(report, materials.get(a, Material(a)), materials.get(b, Material(b)))
         i, j = used[a], used[b]
         tables[:, i, j] = tables[:, j, i] = pair
-    found = dict(zip(COEFFICIENTS, tables, strict=True))
-    for name in ("mu_roll", "mu_spin"):
-        found[name] = found[name] if found[name].any() else np.zeros((0, 0))
-    return np.array(index), found
+    found = zip(COEFFICIENTS, tables, strict=True)
+    return np.array(index), {n: table for n, table in found if n in ("mu", "e") or table.any()}
 
 
 def _pair(report: Collector, a: Material, b: Material) -> list[float]:
