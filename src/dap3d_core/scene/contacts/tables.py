@@ -14,9 +14,10 @@ class Material:
     Attributes:
         name: its name in the scene.
         mu, mu_s: coefficients of friction of sliding and of sticking.
+        mu_roll, mu_spin: moments against rolling and spinning over the force that presses, m.
         e, law: coefficient of restitution, and of whose law of impact.
         with_: of shapes that collide: name of another material -> fields of the pair (``with`` in
-            scene files). Of pairs that are not named mu and e are geometric means.
+            scene files). Of pairs that are not named coefficients are geometric means.
     """
 
     name: str
@@ -55,7 +56,7 @@ class ContactTables:
 
         Args:
             name: without dots, not used by another material.
-            fields: mu, mu_s, e, law, with_, as in ``Material``.
+            fields: mu, mu_s, mu_roll, mu_spin, e, law, with_, as in ``Material``.
 
         Raises:
             SceneError: the name is taken or illegal, or a key is unknown.
