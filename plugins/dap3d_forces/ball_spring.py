@@ -32,7 +32,6 @@ class BallSpring(Force):
     """
 
     keyword = "sph_sd"
-    body_axes = ()  # the pose to each other alone
     symbol = "ball"
     body_i: Body = body(doc="body from which the turn is measured")
     body_j: Body = body(doc="body that turns")
