@@ -1,6 +1,6 @@
 """Collects mistakes and notes of the check of a scene, and locates them in its file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,20 @@ class Collector(MistakeList):
                 value, what = MISSING, f"is required; it {what.removesuffix(', not nothing')}"
             self.add(key, value, what, result.nearest, result.remedy)
         return result
+
+    def add_missing_type(self, key: Key, fields: Mapping[str, Any], what: str) -> None:
+        """Report that an element has no type; or the key that is its misspelling, as ``typ``.
+
+        Args:
+            key: of the element.
+            fields: as written.
+            what: that it is required, and what it may be.
+        """
+        near = [field for field in fields if self.nearest(field, ("type",))]
+        if near:
+            self.add((*key, near[0]), fields[near[0]], f"unknown key; type {what}", "type")
+        else:
+            self.add((*key, "type"), MISSING, what)
 
     def note(self, text: str, kind: str = "") -> None:
         """Append a note; of one kind only the first few are written out."""
