@@ -111,7 +111,6 @@ class _Part:
         tables = (getattr(part, table) for table in NAMED if table != "inputs")
         self.names = {n: f"{name}/{n}" for table in tables for n in table}
         self.words = {n: f"{name}_{n}" for n in (*part.inputs, *part.outputs)}
-        self.parameters = {n: f"{name}_{n}" for n in part.parameters}
         self._registry = load_registry()
         self._axes_of_ground: dict[str, None] = {}
         self._left_out: list[str] = []
@@ -142,9 +141,9 @@ class _Part:
         if scene.folder and self.part.folder:
             self._find_meshes(scene, os.path.relpath(self.part.folder, scene.folder))
         if self.part.collisions is not None and (pairs := self.part.collisions.exclude):
-            scene.collisions = scene.collisions or Collisions()
-            scene.add_collisions(scene.collisions.bodies, self._value(pairs, is_name=True),
-                                 scene.collisions.material)  # fmt: skip
+            whole, pairs = scene.collisions or Collisions(), self._value(pairs, is_name=True)
+            scene.collisions = whole
+            scene.add_collisions(whole.bodies, pairs, whole.material)
         file = self.part.path
         files = {f"{self.name}/{n}": other for n, other in self.part.included.items()}
         scene.included |= files | ({self.name: file} if file else {})
@@ -159,8 +158,8 @@ class _Part:
     def _entries(self, table: str, mistakes: MistakeList) -> dict[str, Any]:
         if table == "parameters":
             values = self.part.parameters
-            own = {n: self._expression(v, self.parameters) for n, v in values.items()}
-            return {self.parameters[n]: v for n, v in (own | self.given).items()}
+            own = {n: self._value(v) for n, v in values.items()}
+            return {f"{self.name}_{n}": v for n, v in (own | self.given).items()}
         if table == "outputs":
             outputs = self.part.outputs
             return {self.words[n]: self._output(value) for n, value in outputs.items()}
@@ -199,7 +198,7 @@ class _Part:
         if table == "forces" and self._acts_on_all(type_info, entry.fields):
             return None
         fields = {k: self._output(v) if table == "joints" and k == ACTIVE else
-                  self._field(v, is_name=_is_name(table, k, specs.get(k)))
+                  self._field(table, k, v, specs.get(k))
                   for k, v in entry.fields.items()}  # fmt: skip
         if table == "shapes":
             self._shape(entry.type, fields, entry.fields.get("body"))
@@ -359,11 +358,18 @@ class _Part:
         values = [x for v in fields.values() for x in (v if type(v) is tuple else (v,))]
         return not any(type(x) is str and (self._name(x) != x or x == GROUND) for x in values)
 
-    def _field(self, value: Any, *, is_name: bool) -> Any:
-        """The value of a field; an input is a word, unless it has the name of a part as well."""
-        is_input = is_name and type(value) is str and value in self.part.inputs
-        if is_input and value not in self.part.functions:
+    def _field(self, table: str, field: str, value: Any, spec: FieldSpec | None) -> Any:
+        """The value of a field of an element, which may be a name, or an input: a word."""
+        if table == "shapes":
+            return self._value(value, is_name=field in NAMES)
+        is_input = type(value) is str and value in self.part.inputs
+        if spec is None:  # of no type that is known here
+            is_input = is_input and value not in self.names
+        elif spec.kind != "input":
+            is_input = is_input and bool(spec.by_name) and value not in self.part.functions
+        if is_input:
             return self.words[value]
+        is_name = spec is None or spec.kind in REFERENCES or bool(spec.by_name)
         return self._value(value, is_name=is_name)
 
     def _value(self, value: Any, *, is_name: bool = False) -> Any:
@@ -373,14 +379,13 @@ class _Part:
         if isinstance(value, dict):
             return {key: self._value(x) for key, x in value.items()}
         if is_expression(value):
-            return self._expression(value, self.parameters)
+            return _NAMES.sub(lambda match: self._word(match[0]), value)
         return self._name(value) if is_name and type(value) is str else value
 
-    def _expression(self, text: Any, words: Mapping[str, str]) -> Any:
-        """An expression with other names of its parameters, inputs and outputs."""
-        if type(text) is not str:
-            return text
-        return _NAMES.sub(lambda match: words.get(match[0], match[0]), text)
+    def _word(self, written: str) -> str:
+        """The new word for one of an expression; functions, constants and others stay."""
+        word = written.strip("'\"")
+        return written if fault_of_word(word) else f"{self.name}_{word}"
 
     def _output(self, output: Any) -> Any:
         if isinstance(output, dict):
@@ -393,7 +398,7 @@ class _Part:
             if head in self.words:
                 return self.words[head] + dot + rest
             if not dot:
-                return match[0] if head in SYSTEM_WORDS else self.parameters.get(head, match[0])
+                return head if head in SYSTEM_WORDS else self._word(match[0])
             owner = head.partition("#")[0]  # of a contact at several points, or a limit
             owners = (owner, *(owner.removesuffix(end) for end in LIMIT_ENDS))
             is_part = any(name in self.names for name in owners)
@@ -405,10 +410,3 @@ class _Part:
         if len(key) > 1 and key[0] in NAMED:
             key = (key[0], f"{self.name}/{key[1]}", *key[2:])
         return key, attrs.evolve(mistake, key=dotted(key))
-
-
-def _is_name(table: str, field: str, spec: FieldSpec | None) -> bool:
-    """Whether a field of an element holds names; of one that no type declares it may."""
-    if table == "shapes":
-        return field in NAMES
-    return spec is None or spec.kind in REFERENCES or bool(spec.by_name)

@@ -101,7 +101,8 @@ class ContactTables:
     ) -> None:
         """Let shapes with ``collides=True`` meet; arguments as of ``Collisions``.
 
-        Without it all of them do.
+        Without it all of them do. Pairs that were excluded before, as by sub-assemblies, remain.
         """
         scene: Any = self
-        scene.collisions = Collisions(bodies, exclude, material)
+        before = scene.collisions.exclude if scene.collisions else ()
+        scene.collisions = Collisions(bodies, (*before, *exclude), material)
