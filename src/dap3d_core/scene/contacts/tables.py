@@ -47,7 +47,7 @@ class Materials:
     pairs: Mapping[tuple[str, ...], Mapping[str, float]] = attrs.Factory(dict)
 
     def pair(self, a: str, b: str) -> list[float]:
-        """Coefficients of two materials, as OF_PAIRS: those of the pair, or else their geometric means."""
+        """Those OF_PAIRS for two materials: of the pair, or else geometric means."""
         declared, found = self.pairs.get(tuple(sorted((a, b))), {}), []
         for name in OF_PAIRS:
             own = [getattr(self.by_name.get(m), name, None) or 0.0 for m in (a, b)]
