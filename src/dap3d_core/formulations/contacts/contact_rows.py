@@ -69,7 +69,7 @@ class ContactTable:
         self._loops = []
         places = {(s.element, s.name): s.first for s in model.element_states if s.kind == "joint"}
         for group in model.contacts:
-            which, layout = group.members - first, group.type_info.layout
+            which = group.members - first
             type_: Any = group.type_info.type
             self.turns[which], s.alone[which] = type_.at is None, type_.is_friction_alone()
             s.holds[which] = type_.holds
@@ -81,7 +81,7 @@ class ContactTable:
                 s.load_pushes[which] = type_.pushes
             self.movable[which] &= not type_.is_smooth
             for name in ("mu", "mu_s", "e"):
-                getattr(s, name)[which] = group.numbers[:, layout.numbers[name][0]]
+                getattr(s, name)[which] = group.number(name)
             self.mode[which] = [places[self.names[k], "mode"] for k in which]
             q = next(q for q, (kind, g) in enumerate(evaluator.loop_groups)
                      if g is group and kind == "switch")  # fmt: skip
