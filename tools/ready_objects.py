@@ -99,6 +99,10 @@ def gathered() -> dict[str, Any]:
                 # some do not suit a scene
                 with contextlib.suppress(dap.SceneError, dap.SimulationError):
                     dap.simulate(scene, t_end=2e-3, dt=1e-3, **options)
+    ball = dap.Scene(name="ball")  # what impacts need
+    ball.add_body("ball", mass=1.0, Jp=[0.1] * 3, r=[0.0, 0.0, 0.1], r_dot=[0.0, 0.0, -1.0])
+    ball.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1, e=0.5)
+    dap.simulate(ball, t_end=2e-3, dt=1e-3)
     return {name: unit for name, unit in units.collected.items() if "@llvm.x86" not in unit[0]}
 
 

@@ -121,34 +121,37 @@ class ContactArrays(Arrays):
     direction: Floats  # (3,)
 
 
-def contact_arrays(m: int, rows: int, loads: int) -> ContactArrays:
-    """Arrays of m contacts, beside so many rows of joints, with so many loads."""
+def contact_arrays(m: int, rows: int, loads: int, given: dict[str, Floats]) -> ContactArrays:
+    """Arrays of m contacts, beside so many rows of joints, with so many loads.
+
+    given: arrays of coefficients.
+    """
     n = 3 * m
     whole = ("newton", "alone", "load_row", "load_count", "load_pushes", "touching", "begins",
              "leaves", "jams", "closed", "group", "kept", "gone", "slides", "slipping",
              "mine", "before", "along_with")  # fmt: skip
-    return ContactArrays(
-        cone=cone_of(m),
-        integer=np.zeros(len(ContactArrays.indices("integer")), dtype=np.int64),
-        real=np.zeros(len(ContactArrays.indices("real"))),
+    arrays: dict[str, Any] = {
         **{name: np.zeros(m, dtype=np.int64) for name in whole},
-        **{name: np.zeros(m) for name in (
-            "mu", "mu_s", "e", "gapless", "load", "mode", "sizes")},
-        **{name: np.ones(m) for name in ("ratio", "ratio_s")},
+        **{name: np.zeros(m) for name in ("load", "mode", "sizes")},
         **{name: np.zeros((m, 3)) for name in (
             "slip", "begin_way", "along", "way", "near", "force")},
         **{name: np.zeros(n) for name in ("free", "inner", "rates", "x")},
         **{name: np.zeros((n, n)) for name in ("W", "B")},
         **{name: np.zeros(n, dtype=np.int64) for name in ("rows", "order")},
+        **{name: np.zeros(loads) for name in ("loads", "given")},
+        **{name: np.zeros((loads + 1, loads)) for name in ("taken", "rests")},
+    }  # fmt: skip
+    return ContactArrays(
+        **given,
+        **arrays,
+        cone=cone_of(m),
+        integer=np.zeros(len(ContactArrays.indices("integer")), dtype=np.int64),
+        real=np.zeros(len(ContactArrays.indices("real"))),
         holds=np.ones((m, 3), dtype=np.int64),
         feels=np.zeros((m, m), dtype=np.int64),
         direction=np.zeros(3),
         frames=np.zeros((m, 3, 3)),
         lam_free=np.zeros(rows),
         reaction=np.zeros((rows, n)),
-        loads=np.zeros(loads),
-        given=np.zeros(loads),
-        taken=np.zeros((loads + 1, loads)),
-        rests=np.zeros((loads + 1, loads)),
         w=np.zeros((3, n)),
-    )  # fmt: skip
+    )

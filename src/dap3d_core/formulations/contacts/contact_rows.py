@@ -39,7 +39,7 @@ class ContactTable:
         names: of each point of contact.
         mu, mu_s, e: (m,) coefficients of friction, along the first tangent, and restitution.
         ratio, ratio_s: (m,) the same along the second tangent, as parts of them: 1 but in ellipses.
-        arrays: of compiled code; it has these numbers.
+        newton: (m,) True where the law of impact is Newton's.
         turns: (m,) 1 of those whose gap or slip is an angle, 0 of others.
         movable: (m,) True of those that a scene may have moved until they touch.
         alone: (m,) True of friction without a gap: of joints.
@@ -56,14 +56,13 @@ class ContactTable:
         first = len(model.joint_names) - self.count
         self.names = model.contact_names
         self.turns = np.zeros(self.count)
+        self.alone = np.zeros(self.count, dtype=bool)
+        self.holds = np.ones((self.count, 3), dtype=bool)
         self.loads: dict[int, tuple[Integers, bool]] = {}
-        loads = sum(group.count for group in model.contacts if group.loaded is not None)
-        self.arrays = s = contact_arrays(self.count, model.joint_row_count, loads)
-        s.length = model.length
-        s.newton[:] = [law == "newton" for law in model.contact_laws]
-        self.mu, self.mu_s, self.e, self.ratio, self.ratio_s = s.mu, s.mu_s, s.e, s.ratio, s.ratio_s
-        self.gapless = s.gapless
+        self.newton = np.array([law == "newton" for law in model.contact_laws], dtype=bool)
+        self.numbers = {name: np.zeros(self.count) for name in ("mu", "mu_s", "e")}
         self.movable = np.array(["#" not in name for name in self.names], dtype=bool)
+        self.ratio, self.ratio_s = np.ones((2, self.count))
         self.mode = np.zeros(self.count, dtype=np.int64)
         self.switches: Integers = np.zeros((self.count, 2), dtype=np.int64)
         self._loops = []
@@ -71,31 +70,42 @@ class ContactTable:
         for group in model.contacts:
             which = group.members - first
             type_: Any = group.type_info.type
-            self.turns[which], s.alone[which] = type_.at is None, type_.is_friction_alone()
-            s.holds[which] = type_.holds
+            self.turns[which], self.alone[which] = type_.at is None, type_.is_friction_alone()
+            self.holds[which] = type_.holds
             if group.loaded is not None:
                 starts = model.joint_start[group.loaded][:, None] + type_.load
                 self.loads |= {int(c): (rows, type_.pushes)
                                for c, rows in zip(which, starts, strict=True)}  # fmt: skip
-                s.load_row[which], s.load_count[which] = starts[:, 0], starts.shape[1]
-                s.load_pushes[which] = type_.pushes
             self.movable[which] &= not type_.is_smooth
-            for name in ("mu", "mu_s", "e"):
-                getattr(s, name)[which] = group.number(name)
+            for name, values in self.numbers.items():
+                values[which] = group.number(name)
             self.mode[which] = [places[self.names[k], "mode"] for k in which]
             q = next(q for q, (kind, g) in enumerate(evaluator.loop_groups)
                      if g is group and kind == "switch")  # fmt: skip
             loop = loop_list([compiled_loop(group.type_info, "tension")])
             width = WIDTH + LAW_WIDTH * (type_.grip is not None)
             self._loops.append((loop, evaluator.system.groups[q], which, width))
-        self.alone, self.holds = s.alone != 0, s.holds != 0
-        self.gapless[:] = self.alone & self.holds[:, 0]
+        self.gapless = (self.alone & self.holds[:, 0]).astype(float)
         self.way: Integers = self.mode[:, None] + np.arange(1, 4)
         self.near: Integers = self.mode[:, None] + np.arange(4, 7)
+        self.mu, self.mu_s, self.e = (self.numbers[n] for n in ("mu", "mu_s", "e"))
         for k, switch in enumerate(evaluator.switches):
             if switch.is_contact:
                 place = int(switch.group.members[switch.place]) - first
                 self.switches[place, switch.part] = k
+
+    @cached_property
+    def arrays(self) -> ContactArrays:
+        """Those of compiled code, with the coefficients of the table."""
+        names = ("mu", "mu_s", "e", "ratio", "ratio_s", "gapless")
+        given = {name: getattr(self, name) for name in names}
+        model = self.evaluator.model
+        s = contact_arrays(self.count, model.joint_row_count, len(self.loads), given)
+        s.newton[:], s.alone[:], s.holds[:] = self.newton, self.alone, self.holds
+        for c, (rows, pushes) in self.loads.items():
+            s.load_row[c], s.load_count[c], s.load_pushes[c] = rows[0], len(rows), pushes
+        s.length = model.length
+        return s
 
     def across(self, c: int) -> slice:
         """The rows of slip of a contact."""

@@ -167,7 +167,25 @@ NOT_CALLED = {
         "formulations.jumps.multipliers": "rotate seek_active",
         "formulations.jumps.rounds": "kick has_crossed stop",
         "formulations.jumps.held_joints": "place_alone solve_free",
-        "formulations.contacts.cone": "residual_of shorten sweep",
+        "formulations.contacts.cone": (
+            "solve_cone stretch come_nearer residual_of sweep newton shorten largest_residual"
+        ),
+        "formulations.contacts.forces": (
+            "still_speed size_across put_across against put_slip_against put_matrix put_plain "
+            "add_sliding solve_forces put_sliding_force put_sizes largest_entry begin_to_move "
+            "clear_rounding"
+        ),
+        "formulations.contacts.impulses": "begin_problem put_impulses stop_slip",
+        "formulations.contacts.loads": "find_modes put_loaded put_loads remember extrapolate",
+        "formulations.contacts.modes": (
+            "put_closed clear_mode next_group sort close_group put_modes all_stay let_leave "
+            "put_returning put_found put_one nearly_jams"
+        ),
+        "formulations.contacts.sharing": (
+            "do_share put_own_rows part_of_cones hold_inside are_held_within leave_to_others "
+            "factor_rows freedom_of"
+        ),
+        "linear.least_squares": "factor_least longest_column reflect fold solve_least",
         "formulations.contacts.equations": (
             "accelerate add_columns add_friction column force_of force_of_one has_settled "
             "inverse invert_responses is_given is_sliding mode_of pressing row_of find_rates "
