@@ -121,7 +121,7 @@ class ContactArrays(Arrays):
     direction: Floats  # (3,)
 
 
-def contact_arrays(m: int, rows: int, loads: int, given: dict[str, Floats]) -> ContactArrays:
+def contact_arrays(m: int, rows: int, loads: int, given: dict[str, Any]) -> ContactArrays:
     """Arrays of m contacts, beside so many rows of joints, with so many loads.
 
     given: arrays of coefficients.
