@@ -201,11 +201,10 @@ class _Part:
                   self._field(table, k, v, specs.get(k))
                   for k, v in entry.fields.items()}  # fmt: skip
         if table == "shapes":
-            self._shape(entry.type, fields, entry.fields.get("body"))
+            self._shape(entry.type, fields)
         elif type_info and self.place.is_moved:
-            if what := self._refusal(type_info, entry.fields):
-                remedy = "give the sub-assembly a body in place of ground, held by a joint weld"
-                mistakes.add((table, name), MISSING, what, remedy=remedy)
+            if refusal := self._refusal(type_info, entry.fields):
+                mistakes.add((table, name), MISSING, refusal.what, remedy=refusal.remedy)
             self._write_out(specs, entry.fields, fields)
         return Element(name, entry.type, fields)
 
@@ -246,20 +245,20 @@ class _Part:
         mistakes.add(("bodies", body.name), MISSING, what)
         return None
 
-    def _shape(self, type_: Any, fields: dict[str, Any], body: Any) -> None:
+    def _shape(self, type_: Any, fields: dict[str, Any]) -> None:
         """Give a shape what [collisions] of the part says; bring one of ground to its place."""
-        known, put, collisions = (
-            SHAPES.get(type_, {"at": None, "p": None}),
-            self.place,
-            self.part.collisions,
-        )
+        put, collisions = self.place, self.part.collisions
         if fields.get("collides") is True and collisions is not None:
             if collisions.material is not None:
                 fields.setdefault("material", self._value(collisions.material, is_name=True))
-            if type(collisions.bodies) is tuple and body not in collisions.bodies:
+            bodies = self._value(collisions.bodies, is_name=True)
+            if type(bodies) is tuple and fields.get("body") not in bodies:
                 fields["collides"] = False
-        if body != GROUND or not put.is_moved:
+        if type(file := fields.get("file")) is str and file in self.part.files:
+            fields["file"] = f"{self.name}/{file}"
+        if fields.get("body") != GROUND or not put.is_moved or type(type_) is not str:
             return
+        known = SHAPES.get(type_, {"at": None, "p": None})
         if "at" in known:
             fields["at"] = put.position(fields.get("at", ZERO))
         if type(fields.get("points")) is tuple:
@@ -271,21 +270,23 @@ class _Part:
         if "p" in known and not isinstance(p := put.orientation(fields), Fault):
             fields["p"] = p
 
-    def _refusal(self, type_info: TypeInfo, given: Mapping[str, Any]) -> str:
-        """Why an element cannot follow where its ground is moved; "" where it can."""
+    def _refusal(self, type_info: TypeInfo, given: Mapping[str, Any]) -> Fault | None:
+        """Why an element cannot follow where its ground is moved; None where it can."""
         along: Any = type_info.type.ground_axes
         named = str(given.get(along, f"{GROUND}.{along}"))
         vector = self.part.vectors.get(named)
         d = vector.sp if vector else AXES.get(named.rpartition(".")[2], ZERO)
         turned = along in AXES and self.place.direction(d) != d
         if along and (along is True or turned or self.place.moves_along(d)):
-            return (
+            what = (
                 "measures from the ground of the whole scene, and does not follow the sub-assembly"
             )
+            return Fault(what, "take a type that measures from a point of ground")
         slots = type_info.axis_slots if self.place.is_turned else ()
         if any(self._is_on_ground(specs_of(type_info.type), given, slot) for slot in slots):
-            return "lies by the axes of ground, which are not turned with the sub-assembly"
-        return ""
+            what = "lies by the axes of ground, which are not turned with the sub-assembly"
+            return Fault(what, "name a body in place of ground, held there by a joint weld")
+        return None
 
     def _write_out(
         self, specs: Mapping[str, FieldSpec], given: Mapping[str, Any], fields: dict[str, Any]
@@ -334,10 +335,9 @@ class _Part:
         """Name the files of meshes as seen from the folder of the other scene."""
         for old in self.part.shapes:
             fields = scene.shapes[self.names[old]].fields
-            if fields.get("file") in self.part.files:
-                fields["file"] = f"{self.name}/{fields['file']}"
-            elif way != "." and type(fields.get("file")) is str:
-                fields["file"] = f"{way.replace(os.sep, '/')}/{fields['file']}"
+            file = fields.get("file")
+            if way != "." and type(file) is str and file not in scene.files:
+                fields["file"] = f"{way.replace(os.sep, '/')}/{file}"
 
     def _name(self, name: str) -> str:
         """The new name of a body, point, vector or element, or of an axis of one of them."""

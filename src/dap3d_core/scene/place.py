@@ -65,7 +65,7 @@ class Place:
     def moves_along(self, d: Any) -> bool:
         """True if it is moved along a vector of its own ground, or may be."""
         v = self.direction(d)
-        if not all(type(x) in (float, int) for x in v):
+        if type(v) is not tuple or not all(type(x) in (float, int) for x in v):
             return any(x != 0.0 for x in self.r)
         shift = _sum(list(zip(v, self.r, strict=True)))
         return is_expression(shift) or abs(shift) > SHIFT_ROUNDING
