@@ -7,6 +7,7 @@ scene as a whole (its settings, forces such as gravity that act on all bodies) i
 import os
 import re
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import attrs
@@ -15,7 +16,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
-from dap3d_core.registry import UnknownTypeError, load_registry
+from dap3d_core.registry import Registry, UnknownTypeError, load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.contacts.tables import Collisions, Material
@@ -111,9 +112,12 @@ class _Part:
         tables = (getattr(part, table) for table in NAMED if table != "inputs")
         self.names = {n: f"{name}/{n}" for table in tables for n in table}
         self.words = {n: f"{name}_{n}" for n in (*part.inputs, *part.outputs)}
-        self._registry = load_registry()
         self._axes_of_ground: dict[str, None] = {}
         self._left_out: list[str] = []
+
+    @cached_property
+    def _registry(self) -> Registry:
+        return load_registry()
 
     def add_to(self, scene: Scene, mistakes: MistakeList) -> None:
         """Add all to a scene; names that are taken are mistakes."""
