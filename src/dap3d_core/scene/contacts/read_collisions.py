@@ -9,7 +9,7 @@ import numpy as np
 from dap3d_core.interface.formats.frames import from_quaternion
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.scene.contacts.collision_shapes import KINDS, CollisionShapes
-from dap3d_core.scene.contacts.tables import Collisions, Materials
+from dap3d_core.scene.contacts.tables import OF_PAIRS, Collisions, Materials
 from dap3d_core.scene.errors import Key
 from dap3d_core.scene.files.read_mesh import read_mesh
 from dap3d_core.scene.validate.coerce_values import Fault
@@ -45,7 +45,7 @@ def read_collisions(
     apart |= _excluded(report, given.exclude, index)
     parts = [(s, part) for s in meeting for part in _parts(report, s)]
     meeting = [s for s, _ in parts]
-    material, mu, e = _materials(report, meeting, given.material, materials)
+    material, coefficients = _materials(report, meeting, given.material, materials)
     width = len(index)
     keys = sorted(i * width + j for i, j in apart)
     at, p, size = (np.array([part[k] for _, part in parts], dtype=float) for k in range(3))
@@ -55,9 +55,9 @@ def read_collisions(
         names=tuple(s.name for s in meeting),
         kind=np.array([KINDS[s.type] for s in meeting]), body=np.array([s.body for s in meeting]),
         at=at, p=p, size=size, corners=np.column_stack([np.cumsum(counts) - counts, counts]),
-        vertices=np.concatenate(hulls), material=material, mu=mu, e=e,
+        vertices=np.concatenate(hulls), material=material,
         bits=np.array([[s.values["group"], s.values["meets"]] for s in meeting]),
-        apart=np.array(keys, dtype=np.int64),
+        apart=np.array(keys, dtype=np.int64), **coefficients,
     )  # fmt: skip
 
 
@@ -95,8 +95,8 @@ def _excluded(report: Collector, pairs: Any, index: Mapping[str, int]) -> set[tu
 
 def _materials(
     report: Collector, shapes: Sequence[Shape], usual: Any, materials: Materials
-) -> tuple[Integers, Floats, Floats]:
-    """Index of the material of each shape, and mu and e of all pairs of materials."""
+) -> tuple[Integers, dict[str, Floats]]:
+    """Index of the material of each shape, and coefficients of all pairs of materials, by name."""
     known = materials.by_name
     used: dict[str, int] = {}
     index = []
@@ -112,11 +112,12 @@ def _materials(
         if (mu_s := known[name].mu_s) is not None and mu_s != known[name].mu:
             report.note(f"materials.{name}.mu_s is of declared contacts alone: shapes that collide "
                         "stick and slide by mu")  # fmt: skip
-    tables = np.zeros((2, len(used), len(used)))
+    tables = np.zeros((len(OF_PAIRS), len(used), len(used)))
     for a, b in combinations_with_replacement(used, 2):
         i, j = used[a], used[b]
         tables[:, i, j] = tables[:, j, i] = materials.pair(a, b)
-    return np.array(index), tables[0], tables[1]
+    found = zip(OF_PAIRS, tables, strict=True)
+    return np.array(index), {n: table for n, table in found if n in ("mu", "e") or table.any()}
 
 
 def _parts(report: Collector, shape: Shape) -> list[tuple[Any, Any, Any, Floats]]:

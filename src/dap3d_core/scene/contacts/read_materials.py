@@ -11,7 +11,9 @@ from dap3d_core.scene.validate.geometry import missing_words
 from dap3d_core.scene.validate.mistake_collector import Collector
 
 #: Coefficients of materials, and the largest value of each.
-LARGEST: Mapping[str, float | None] = {"mu": None, "mu_s": None, "e": 1.0}
+LARGEST: Mapping[str, float | None] = {
+    "mu": None, "mu_s": None, "mu_roll": None, "mu_spin": None, "e": 1.0,
+}  # fmt: skip
 
 
 def read_materials(report: Collector) -> Materials:

@@ -8,7 +8,7 @@ import attrs
 from dap3d_core.scene.coerce import plain
 
 #: Coefficients that a pair of materials may have.
-OF_PAIRS = ("mu", "e")
+OF_PAIRS = ("mu", "e", "mu_roll", "mu_spin")
 
 
 @attrs.define
@@ -18,13 +18,16 @@ class Material:
     Attributes:
         name: its name in the scene.
         mu, mu_s: coefficients of friction of sliding and of sticking.
+        mu_roll, mu_spin: moments against rolling and spinning over the force that presses, m.
         e, law: coefficient of restitution, and of whose law of impact.
         with_: of shapes that collide: name of another material -> fields of the pair (``with`` in
-            scene files). Of pairs that are not named mu and e are geometric means.
+            scene files). Of pairs that are not named coefficients are geometric means.
     """
 
     name: str
     mu: Any = attrs.field(default=None, converter=plain)
+    mu_roll: Any = attrs.field(default=None, converter=plain)
+    mu_spin: Any = attrs.field(default=None, converter=plain)
     mu_s: Any = attrs.field(default=None, converter=plain)
     e: Any = attrs.field(default=None, converter=plain)
     law: Any = attrs.field(default=None, converter=plain)
@@ -44,7 +47,7 @@ class Materials:
     pairs: Mapping[tuple[str, ...], Mapping[str, float]] = attrs.Factory(dict)
 
     def pair(self, a: str, b: str) -> list[float]:
-        """Mu and e of two materials: those of the pair, or else their geometric means."""
+        """Those OF_PAIRS for two materials: of the pair, or else geometric means."""
         declared, found = self.pairs.get(tuple(sorted((a, b))), {}), []
         for name in OF_PAIRS:
             own = [getattr(self.by_name.get(m), name, None) or 0.0 for m in (a, b)]
@@ -79,7 +82,7 @@ class ContactTables:
 
         Args:
             name: without dots, not used by another material.
-            fields: mu, mu_s, e, law, with_, as in ``Material``.
+            fields: mu, mu_s, mu_roll, mu_spin, e, law, with_, as in ``Material``.
 
         Raises:
             SceneError: the name is taken or illegal, or a key is unknown.
