@@ -320,7 +320,12 @@ class _Part:
     def _is_on_ground(
         self, specs: Mapping[str, FieldSpec], given: Mapping[str, Any], slot: str
     ) -> bool:
-        """Whether a body of an element is ground, by what it names there, or by default."""
+        """Whether a body of an element is ground, by what it names there, or by default.
+
+        slot: or a list of bodies.
+        """
+        if type(given.get(slot)) is tuple:
+            return GROUND in given[slot]
         ends = [self.part.vectors2[v] for v in given.values()
                 if isinstance(v, str) and v in self.part.vectors2]  # fmt: skip
         values = {f"P_{slot}": getattr(end, f"P_{slot}", None) for end in ends} | dict(given)
