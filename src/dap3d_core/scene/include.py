@@ -234,19 +234,22 @@ class _Part:
                 if p is not None:
                     entry.p, entry.rpy, entry.axis_angle = p, None, None
                 if entry.p_0 is not None:
-                    entry.p_0 = self._turned(mistakes, entry, {"p": entry.p_0})
+                    entry.p_0 = self._turned(mistakes, entry, {"p": entry.p_0}) or entry.p_0
         elif table == "points" and entry.body == GROUND:
             entry.sPp = place.position(entry.sPp)
         elif table == "vectors" and entry.body == GROUND:
             entry.sp = place.direction(entry.sp)
 
     def _turned(self, mistakes: MistakeList, body: Any, given: Mapping[str, Any]) -> Any:
-        """Euler parameters of a body turned with the place; None where a mistake is reported."""
+        """Euler parameters of a body turned with the place; None of what the check refuses."""
         p = self.place.orientation(given)
         if not isinstance(p, Fault):
             return p
-        what = f"is turned with the sub-assembly, which needs numbers, p or rpy: {p.what}"
-        mistakes.add(("bodies", body.name), MISSING, what)
+        written = given.get("axis_angle")
+        if type(written) is tuple and any(map(is_expression, written)):
+            what = "is turned with the sub-assembly, and has expressions"
+            key = ("bodies", body.name, "axis_angle")
+            mistakes.add(key, written, what, remedy="give p or rpy, or numbers")
         return None
 
     def _shape(self, type_: Any, fields: dict[str, Any]) -> None:

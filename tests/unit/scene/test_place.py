@@ -126,12 +126,22 @@ def test_orientations_with_expressions_are_turned(tmp_path):
         np.testing.assert_allclose(p, expected, atol=1e-15)
     np.testing.assert_allclose(scene.animation.points[0].sPp, [1.0, 0.4, 0.0], atol=1e-15)
     part = parse('[bodies.b]\naxis_angle = [0, 0, 1, "= a"]\n')
-    with pytest.raises(dap.SceneError, match=r"bodies.x/b.*needs numbers, p or rpy"):
+    with pytest.raises(dap.SceneError, match=r"x/b.axis_angle.*has expressions\n.*give p or rpy"):
         dap.include(dap.Scene(), "x", part, {"rpy": [0.0, 0.0, 1.0]})
+
+
+def test_a_wrong_orientation_is_reported_once():
+    """By the check of the scene, at its own key."""
+    part, scene = parse('[bodies.b]\np = "x"\np_0 = [1]\n'), dap.Scene()
+    dap.include(scene, "x", part, {"rpy": [0.0, 0.0, 1.0]})
+    with pytest.raises(dap.SceneError) as caught:
+        dap.compile(scene)
+    assert {m.key for m in caught.value.mistakes} == {"bodies.x/b.p", "bodies.x/b.p_0"}
 
 
 @pytest.mark.parametrize("r", ["[0, 0, nan]", "[0, 0, 1e200]", '[0, 0, "1"]', "[0, 0]", "1"])
 def test_a_wrong_place_is_reported_as_such(tmp_path, r):
     scenes(tmp_path, FALLS, scene=f'[include.a]\nfile = "part.toml"\nat = {{r = {r}}}\n')
-    with pytest.raises(dap.SceneError, match=r"scene.toml:3: include.a.at.r = .*3 numbers"):
+    with pytest.raises(dap.SceneError, match=r"scene.toml:3: include.a.at.r = .*3 numbers") as it:
         dap.compile(tmp_path)
+    assert len(it.value.mistakes) == 1
