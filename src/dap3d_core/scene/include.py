@@ -174,8 +174,6 @@ class _Part:
                 entries[name] = self._other(mistakes, table, name, entry)
             elif (element := self._element(mistakes, table, name, entry)) is not None:
                 entries[name] = element
-            else:
-                self._left_out.append(old)
         return entries
 
     def _other(self, mistakes: MistakeList, table: str, name: str, entry: Any) -> Any:
@@ -200,6 +198,8 @@ class _Part:
         type_info = self._type_of(table, entry.type)
         specs = specs_of(type_info.type) if type_info else {}
         if table == "forces" and self._acts_on_all(type_info, entry.fields):
+            unknown = "" if type_info else f" (its type {entry.type!r} is not installed)"
+            self._left_out.append(f"{entry.name}{unknown}")
             return None
         fields = {k: self._output(v) if table == "joints" and k == ACTIVE else
                   self._field(table, k, v, specs.get(k))

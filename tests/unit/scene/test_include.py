@@ -531,6 +531,18 @@ def test_words_that_are_no_names_stay():
     assert scene.files == {scene.shapes["x/t"].fields["file"]: Path("elsewhere.stl")}
 
 
+def test_forces_on_all_bodies_stay_out_whatever_they_name():
+    """By what their type does; a type that is not installed is named in the note."""
+    part = parse("[bodies.b]\n[functions.b]\n")
+    part.add_force("weight", "g", of="b")
+    part.add_force("wieght", "w")
+    part.add_force("drag", "x", body_i="b")
+    scene = dap.Scene()
+    dap.include(scene, "a", part)
+    assert list(scene.forces) == ["a/x"]
+    assert scene.notes[0].startswith("a: g, w (its type 'wieght' is not installed) left out")
+
+
 def test_bodies_of_two_parts_touch():
     """A ball of one part is pushed into that of another: by equal masses and e = 1 it stops.
     Both contacts with the floors are those of the parts; exact but for rounding of the event."""
