@@ -123,8 +123,8 @@ def _write(
     if target.suffix.lower() == ".nc":
         found.save(target, quantities, force=force)
         return
+    from dap3d_core.plot.figure import SensitivityPicture
     from dap3d_core.plot.figure_file import save_figure
-    from dap3d_core.plot.sensitivities import SensitivityPicture
     from dap3d_core.plot.style import WIDTH
 
     picture = SensitivityPicture(found, quantities)
