@@ -51,7 +51,6 @@ if TYPE_CHECKING:
         | xarray.Dataset
     )  # fmt: skip
 
-
 #: Backends that matplotlib falls back on where it cannot open windows.
 FILE_BACKENDS = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
 #: Dots an inch of a figure of a script, and of a window, which shows it larger than paper does.
