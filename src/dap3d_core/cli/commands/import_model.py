@@ -73,7 +73,6 @@ def import_model(
     arguments: tuple[str, ...],
     stub: bool,
     force: bool,
-    as_json: bool,
 ) -> int:
     """Make a scene of a model of another program.
 
@@ -104,11 +103,10 @@ def import_model(
     if not isinstance(report, ImportReport):
         from dap3d_core.cli.commands.import_matlab import write_folder
 
-        return write_folder(scene, report, folder / "scene.toml", force=force, stub=stub,
-                            as_json=as_json)  # fmt: skip
+        return write_folder(scene, report, folder / "scene.toml", force=force, stub=stub)
     target = _save(scene, report, folder, Path(file), force=force)
     data = {"scene": target} | _as_data(report)
-    show_data(data, lambda console: _show(console, scene, report, target), as_json=as_json)
+    show_data(data, lambda console: _show(console, scene, report, target))
     return DONE
 
 

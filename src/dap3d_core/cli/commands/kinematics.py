@@ -37,8 +37,6 @@ def kinematics(
     strict: bool,
     force: bool,
     allow_code: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Find the motion of a MODEL whose drivers fix every freedom, and write it as a result.
 
@@ -67,5 +65,5 @@ def kinematics(
         )  # fmt: skip
 
     outcome = execute_scene(ctx, scene, find, {"over": "--over", "t_end": "--t-end", "dt": "--dt"},
-                            allow_code=allow_code, quiet=quiet)  # fmt: skip
-    return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
+                            allow_code=allow_code)  # fmt: skip
+    return report_run(outcome, model, target, strict=strict)
