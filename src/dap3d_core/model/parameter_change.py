@@ -9,7 +9,7 @@ import numpy as np
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers
 from dap3d_core.model.model import Model, ReferencePoses
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import did_you_mean
 from dap3d_core.scene import ValidatedScene
 from dap3d_core.scene.validate.coerce_values import (
     Fault,
@@ -57,8 +57,7 @@ def _value(force: str, specs: Mapping[str, FieldSpec], name: str, value: Any) ->
     kinds = ("number", "numbers", "vec3", "matrix", "square")
     numeric = [n for n, s in specs.items() if s.kind in kinds]
     if name not in numeric:
-        near = nearest(name, numeric)
-        hint = f"did you mean {near!r}?" if near else f"it has {', '.join(numeric) or 'none'}"
+        hint = did_you_mean(name, numeric, otherwise=f"it has {', '.join(numeric) or 'none'}")
         raise ValueError(f"force {force} has no numbers under the name {name!r}; {hint}")
     spec = specs[name]
     found: Any

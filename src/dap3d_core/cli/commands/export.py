@@ -124,12 +124,11 @@ def _export_model(model: str, kind: str, output: str | None, *, strict: bool, fo
     from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.cli.framework.paths import writable
     from dap3d_core.registry.extensions import extensions
-    from dap3d_core.registry.suggestions import nearest
+    from dap3d_core.registry.suggestions import did_you_mean
 
     formats = extensions("exporter")
     if kind not in formats.keywords:
-        near = nearest(kind, known := [*formats.keywords, "c", "fmu"])
-        hint = f"did you mean {near!r}? " if near else ""
+        hint = did_you_mean(kind, known := [*formats.keywords, "c", "fmu"], "{} ")
         raise Refused(f"--format {kind}: unknown; {hint}formats: {', '.join(known)}")
     scene = dap.load(model)
     target = Path(output or _name_of(model) + formats.load(kind).suffix)

@@ -12,7 +12,7 @@ from dap3d_core.interface.formats.frames import Frame
 from dap3d_core.interface.formats.joint_motion import reversed_joint
 from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import did_you_mean
 
 #: Mass and inertia of a wheel that couples joints, over the least of what they move. With less,
 #: methods that allow for dependent rows (lsq, joint) take the rows of two followers for one.
@@ -190,11 +190,10 @@ def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
     for coupling in model.couplings:
         others = model.joints.keys() - {coupling.joint}
         if coupling.joint not in model.joints or coupling.other not in others:
-            near = nearest(coupling.other, others)
             what = (
                 f"{coupling.joint!r} follows {coupling.other!r}: should be two joints of the file"
             )
-            raise FormatError(what, coupling.place, f"did you mean {near!r}?" if near else "")
+            raise FormatError(what, coupling.place, did_you_mean(coupling.other, others))
         one, other = model.joints[coupling.joint], model.joints[coupling.other]
         if one.kind == other.kind == "fixed":
             continue
