@@ -86,19 +86,14 @@ def _of_force(
         (new,) = grouping.groups([attrs.evolve(force, values=given)], [place])
     except ValueError as error:  # PrepareError: the type's own words
         raise ValueError(f"force {force.name}: {error}") from error
-    if not _same_tables(old, new):
+    pairs = zip(old.tables, new.tables, strict=True)
+    if not all(np.array_equal(a, b) for (*_, a), (*_, b) in pairs):
         raise ValueError(f"force {force.name}: this would change a table, which cannot be done")
     # what is the same stays: turns that were counted, places of tables, numbers changed before,
     # those of joints that it reads, which stand behind its own
     behind = [(0, 0), (0, group.numbers.shape[1] - new.numbers.shape[1])]
     where = np.pad(old.numbers != new.numbers, behind)
     return Change(group, places, where, np.pad(new.numbers, behind))
-
-
-def _same_tables(old: Group, new: Group) -> bool:
-    return all(
-        np.array_equal(a, b) for (*_, a), (*_, b) in zip(old.tables, new.tables, strict=True)
-    )
 
 
 def _of_friction(model: Model, name: str, place: int, values: Mapping[str, Any]) -> Change:
