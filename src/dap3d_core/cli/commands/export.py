@@ -83,8 +83,9 @@ def export(
             raise Refused(f"{words.get(name, f'--{name}')} is of formats c and fmu")
     if kind is not None and kind not in result_exporters():
         return _export_model(result, kind, output, strict=strict, force=force)
-    return _export_result(result, kind, output, fps=fps, model=model, allow_code=allow_code,
-                          force=force)  # fmt: skip
+    return _export_result(
+        result, kind, output, fps=fps, model=model, allow_code=allow_code, force=force
+    )
 
 
 def _export_result(
@@ -114,7 +115,7 @@ def _export_result(
         stderr().say(f"interrupted; {target} was not written", "bold red")
         return INTERRUPTED
     data = {"format": made.format, "instants": made.instants}
-    show_written(target, count(made.instants, "instant"), data, made.notes)  # fmt: skip
+    show_written(target, count(made.instants, "instant"), data, made.notes)
     return DONE
 
 

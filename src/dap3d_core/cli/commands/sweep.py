@@ -94,7 +94,7 @@ def sweep(
             dataset = _sweep(ctx, scene, target, scheduler, progress, given)
         except (Exception, KeyboardInterrupt) as error:
             dataset, code, reason = partial_result(ctx, error)
-    return _report(ctx, dataset, target, progress, code, reason, strict=strict)  # fmt: skip
+    return _report(ctx, dataset, target, progress, code, reason, strict=strict)
 
 
 def _complete(ctx: click.Context, given: dict[str, Any], scheduler: str | None) -> None:
