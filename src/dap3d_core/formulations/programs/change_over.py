@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 #: Seconds in general code from which on a program is looked for in the cache folder, and made.
 LOAD_AFTER, MAKE_AFTER = 0.02, 0.25
+#: Those from which on the process that compiles them starts, to be there when one is written.
+START_AFTER = 0.15
 #: Whether another process compiles programs where it can, so that the run goes on.
 BESIDE = True
 #: Bodies of a scene at most: the program of a larger one would be too long.
@@ -44,6 +46,7 @@ class Record:
     Attributes:
         programs: as ``load_programs`` returns them; empty as long as there are none.
         reason: why there are none and will be none; "" while there may be.
+        is_due: True if they are to be made, or made anew: those that there are run until then.
         is_requested: True if they are being compiled by another process.
         takes_all_ways: True if projections do (ways.py).
         first: where the first ones were made here, if projections alone have failed since.
@@ -52,6 +55,7 @@ class Record:
 
     programs: dict[int, Any] = attrs.field(factory=dict)
     reason: str = ""
+    is_due: bool = True
     is_requested: bool = False
     takes_all_ways: bool = False
     first: "tuple[float, Floats] | None" = None
@@ -153,6 +157,7 @@ class ChangeOver:
             most *= projections if k == PROJECT else rhs
             if program.failures() - before > 1 + most:
                 _give_up(record, program, k, start())
+                break
 
     def _modes(self, start: "Start") -> Any:
         """A rough description of the scene, with the modes of its contacts."""
@@ -180,14 +185,15 @@ class ChangeOver:
             of = start()[1].size, self._constants + repr(modes).encode(), self._varied
             name = self._names[modes] = scene_program.name_of(self._evaluator, *of)
         record = _records.get(name)
-        if record is not None and record.programs:
-            return record
+        if record is not None and not record.is_due:
+            return record if record.programs else None
         with _making:
             record = _records.setdefault(name, Record())
-            if not (record.programs or record.reason):
+            if record.is_due:
                 try:
                     self._make(record, name, modes, start)
                 except Exception as error:  # the general code runs on, whatever it was
+                    record.is_due = False
                     record.reason = f"{type(error).__name__}: {error}"
         return record if record.programs else None
 
@@ -200,7 +206,10 @@ class ChangeOver:
             path.unlink(missing_ok=True)
         stored = None if path is None else objects.read_object(path)
         if stored is None:
-            if record.is_requested or _spent.get(modes, 0.0) < MAKE_AFTER:
+            spent = _spent.get(modes, 0.0)
+            if record.is_requested or spent < MAKE_AFTER:
+                if spent > START_AFTER and BESIDE and path is not None:
+                    optimiser.start()
                 return
             place, others = record.first or record.anew or start(), None
             if record.anew is None:
@@ -216,6 +225,7 @@ class ChangeOver:
             stored = written, objects.optimised(text, written, path)
         record.takes_all_ways = scene_program.ALL_WAYS in stored[0]
         record.programs = scene_program.load_programs(evaluator, name, *stored)
+        record.is_due = False
 
 
 def _give_up(record: Record, program: Any, k: int, place: "tuple[float, Floats]") -> None:
@@ -230,14 +240,13 @@ def _give_up(record: Record, program: Any, k: int, place: "tuple[float, Floats]"
         if record.programs.get(k) is not program:  # another thread was faster
             return
         others = {q: one for q, one in record.programs.items() if q != k}
+        if k == PROJECT:
+            from dap3d_core.formulations.programs.scene_program import BEHIND
+
+            others[PROJECT] = others.pop(BEHIND)
+        record.programs = {} if k == RHS else others
         if record.anew is None:
-            record.programs, record.anew, record.is_requested = {}, place, False
+            record.anew, record.is_due, record.is_requested = place, True, False
             record.first = record.first if k == PROJECT else None
         elif k == RHS:
-            record.programs, record.reason = {}, "guards fail: branches depend on the motion"
-        else:
-            if k == PROJECT:
-                from dap3d_core.formulations.programs.scene_program import BEHIND
-
-                others[PROJECT] = others.pop(BEHIND)
-            record.programs = others
+            record.is_due, record.reason = False, "guards fail: branches depend on the motion"
