@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from dap3d_core.formulations import PROJECT, RHS, WATCH
+from dap3d_core.formulations import PROJECT, REPORT, RHS, WATCH
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.background import optimiser
 from dap3d_core.kernels.runtime.cache import jit_is_on
@@ -34,7 +34,9 @@ BESIDE = True
 MOST_BODIES = 64
 #: Programs whose guards fail more often are given up: by the function, as parts of the right-hand
 #: sides, or projections, of the call.
-MOST_FAILURES = {WATCH: 0.5, PROJECT: 0.5, RHS: 0.05}
+MOST_FAILURES = {WATCH: 0.5, PROJECT: 0.5, REPORT: 0.5, RHS: 0.05}
+#: Reports for each right-hand side from which on they have a program.
+LEAST_REPORTS = 0.02
 #: At most, where projections take one way: made anew they take all.
 MOST_OF_ONE_WAY = 0.2
 
@@ -62,8 +64,10 @@ class Record:
     anew: "tuple[float, Floats] | None" = None
 
 
-#: Seconds that general code has taken, by a rough description of the scene; records by identity.
+#: Seconds that general code has taken, by a rough description of the scene, and whether it reported
+#: often; records by identity.
 _spent: dict[Any, float] = {}
+_reported: dict[Any, bool] = {}
 _records: dict[str, Record] = {}
 #: Held while a program is made, as several threads may need it at once.
 _making = threading.Lock()
@@ -88,6 +92,8 @@ class ChangeOver:
         sizes = model.body_count, model.row_count, len(evaluator.loop_groups)
         self._key = evaluator.method, *sizes, count
         takes_one = not model.breaks and (varied is None or not model.contact_count)
+        #: Contacts are read where a report has placed them; programs of reports leave nothing.
+        self._takes_reports = count == 1 and not model.contact_count
         self._is_open = jit_is_on() and takes_one and 0 < model.body_count <= MOST_BODIES
 
     def during(self, integration: Any, run: "Callable[[], object]") -> None:
@@ -97,8 +103,8 @@ class ChangeOver:
         """
         work = integration.work
 
-        def counts() -> tuple[int, int]:
-            return work.rhs_count, work.projection_count
+        def counts() -> tuple[int, int, int]:
+            return work.rhs_count, work.projection_count, work.report_count
 
         def start() -> "tuple[float, Floats]":
             state, of_elements = integration.trial, slice(-1 - self._evaluator.states.size, -1)
@@ -115,7 +121,7 @@ class ChangeOver:
         run: "Callable[[], object]",
         addresses: "Integers",
         start: "Start",
-        counts: "Callable[[], tuple[int, int]]",
+        counts: "Callable[[], tuple[int, int, int]]",
         *,
         needs_programs: bool = False,
     ) -> None:
@@ -127,7 +133,7 @@ class ChangeOver:
             run: the call.
             addresses: of the functions that it calls.
             start: gives a time, and a state as projections are given, where these are needed.
-            counts: right-hand sides and projections so far.
+            counts: right-hand sides, projections and reports so far.
             needs_programs: do not make it without them.
         """
         modes = self._modes(start)
@@ -140,6 +146,7 @@ class ChangeOver:
             clock = time.perf_counter()
             run()
             _spent[modes] = _spent.get(modes, 0.0) + time.perf_counter() - clock
+            _reported[modes] = counts()[REPORT] >= LEAST_REPORTS * counts()[RHS]
             return
         general, done = addresses.copy(), counts()
         replaced = [(k, programs[k]) for k in MOST_FAILURES if k in programs]
@@ -150,14 +157,16 @@ class ChangeOver:
             run()
         finally:
             addresses[:] = general
-        rhs, projections = (after - before for after, before in zip(counts(), done, strict=True))
+        called = [after - before for after, before in zip(counts(), done, strict=True)]
+        is_first = record.anew is None
         for (k, program), before in zip(replaced, failures, strict=True):
             is_final = record.takes_all_ways or record.anew is not None
             most = MOST_FAILURES[k] if is_final else min(MOST_FAILURES[k], MOST_OF_ONE_WAY)
-            most *= projections if k == PROJECT else rhs
+            most *= called[RHS if k == WATCH else k]
             if program.failures() - before > 1 + most:
                 _give_up(record, program, k, start())
-                break
+                if is_first:
+                    break
 
     def _modes(self, start: "Start") -> Any:
         """A rough description of the scene, with the modes of its contacts."""
@@ -183,7 +192,10 @@ class ChangeOver:
         name = self._names.get(modes)
         if name is None:
             of = start()[1].size, self._constants + repr(modes).encode(), self._varied
-            name = self._names[modes] = scene_program.name_of(self._evaluator, *of)
+            name = scene_program.name_of(self._evaluator, *of)
+            if self._takes_reports and _reported.get(modes, False):
+                name += scene_program.REPORTS
+            self._names[modes] = name
         record = _records.get(name)
         if record is not None and not record.is_due:
             return record if record.programs else None
@@ -243,7 +255,7 @@ def _give_up(record: Record, program: Any, k: int, place: "tuple[float, Floats]"
         if k == PROJECT:
             from dap3d_core.formulations.programs.scene_program import BEHIND
 
-            others[PROJECT] = others.pop(BEHIND)
+            others[PROJECT] = others.pop(BEHIND, program)
         record.programs = {} if k == RHS else others
         if record.anew is None:
             record.anew, record.is_due, record.is_requested = place, True, False
