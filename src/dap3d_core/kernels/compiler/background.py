@@ -61,7 +61,7 @@ class Optimiser:
         return self._process is not None and self._process.poll() is not None
 
     def start(self) -> bool:
-        """Start the second process, which takes 0.2 s, unless it runs; False where there is none."""
+        """Start the second process, which takes 0.2 s, unless it runs; False if there is none."""
         if core_count() < 2 or self._has_ended():
             return False
         if self._process is None:

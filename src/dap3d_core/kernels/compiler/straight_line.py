@@ -111,7 +111,7 @@ class StraightLine(Tracer):
         return result
 
     def _of_floats(self, kind: type, a: t.Value, b: t.Value) -> t.Value:
-        """An operation of two floats by their words without signs: most of a trace is spent here."""
+        """An operation of two floats by their words without signs; most of a trace is this."""
         if a.constant is not None and b.constant is not None:
             return super().operation(None, kind(), a, b)
         (a, of_a), (b, of_b) = _unsigned(kind, a), _unsigned(kind, b)
@@ -208,8 +208,9 @@ def _unsigned(kind: type, value: t.Value) -> tuple[t.Value, bool]:
     if value.constant is None:
         word = value.words[0]
         return (t.Value(t.FLOAT, (word[1:],)), True) if word[0] == "-" else (value, False)
-    is_factor = kind is ast.Mult or kind is ast.Div
-    return (t.constant(-value.constant), True) if is_factor and value.constant < 0 else (value, False)
+    if value.constant < 0 and (kind is ast.Mult or kind is ast.Div):
+        return t.constant(-value.constant), True
+    return value, False
 
 
 def _folded(kind: type, a: t.Value, b: t.Value) -> t.Value | None:
