@@ -42,8 +42,8 @@ BEHIND = -1
 ALL_WAYS = -2
 #: End of the names of programs among which there is one of reports.
 REPORTS = "-r"
-#: Instructions of a program, and of that of reports, at most: larger scenes gain less, and take long
-#: to compile.
+#: Instructions of a program, and of that of reports, at most: larger scenes gain less, and take
+#: long to compile.
 MOST_INSTRUCTIONS, MOST_OF_REPORT = 22_000, 10_000
 #: Guards of a report at most: where rows depend on each other it decides many ranks.
 MOST_GUARDS = 150
