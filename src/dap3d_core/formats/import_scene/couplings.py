@@ -1,11 +1,15 @@
 """Coordinates of joints that turn together: rotors, mimic joints, gearboxes, equalities."""
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
+from dap3d_core.formats.import_scene.actuators import line_of
 from dap3d_core.formats.import_scene.joints import from_ground, named_ends
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder
-from dap3d_core.formats.import_scene.start import couples
-from dap3d_core.interface.formats.articulation import Articulation, Joint
+from dap3d_core.formats.import_scene.start import AGREE, couples
+from dap3d_core.interface.formats.articulation import Articulation, Joint, Tendon
 from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.registry.suggestions import nearest
 
@@ -30,13 +34,18 @@ def wheel_of(builder: SceneBuilder, joint: Joint, mass: float, inertia: float) -
         scene_name = builder.names.scene_names["joints", joint.name]
         wheel = builder.names.free("bodies", f"{scene_name}_rotor")
         builder.names.scene_names[key] = wheel
-        rate = (*joint.rate, 0.0)[0]
-        builder.scene.add_body(wheel, mass=mass, Jp=(inertia,) * 3,
-                               w=(0.0, 0.0, rate) if rate else None)  # fmt: skip
-        bearing = builder.names.free("joints", f"{wheel}_bearing")
-        builder.scene.add_joint("rev", bearing, P_i=f"{wheel}.O", P_j="ground.O",
-                                a_i=f"{wheel}.z", a_j="ground.z")  # fmt: skip
+        _add_wheel(builder, wheel, mass, inertia, (*joint.rate, 0.0)[0])
     return wheel
+
+
+def _add_wheel(
+    builder: SceneBuilder, wheel: str, mass: float, inertia: float, rate: float = 0.0
+) -> None:
+    builder.scene.add_body(wheel, mass=mass, Jp=(inertia,) * 3,
+                           w=(0.0, 0.0, rate) if rate else None)  # fmt: skip
+    bearing = builder.names.free("joints", f"{wheel}_bearing")
+    builder.scene.add_joint("rev", bearing, P_i=f"{wheel}.O", P_j="ground.O",
+                            a_i=f"{wheel}.z", a_j="ground.z")  # fmt: skip
 
 
 def follow(builder: SceneBuilder, joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
@@ -83,6 +92,56 @@ def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
             builder.remarks.translate(coupling.place, text)
             follow(builder, other, wheel, 1.0, "rotor")
         follow(builder, one, wheel, coupling.ratio, "coupling")
+
+
+def add_held(builder: SceneBuilder, model: Articulation) -> None:
+    """Add links between two points, and sums of coordinates that stay as they are."""
+    for tendon in model.held:
+        keyword, fields = line_of(builder, model, tendon) or ("", {})
+        if keyword == "ptp":
+            name = builder.names.free("joints", tendon.name)
+            ends = dict(zip(("P_i", "P_j"), fields["points"], strict=True))
+            builder.scene.add_joint("sph-sph", name, **ends, length=tendon.rest)
+        elif keyword and len(fields["movers"]) > 1:
+            _hold_sum(builder, model, tendon, fields)
+        else:
+            text = "an equality of a tendon that moves with one joint at most"
+            builder.remarks.leave_out(tendon.place, text, motion=True)
+
+
+def _hold_sum(
+    builder: SceneBuilder, model: Articulation, tendon: Tendon, fields: Mapping[str, Any]
+) -> None:
+    """Hold a sum: each wheel turns by a term, or by the sum up to there, and ground by the whole."""
+    joints = [model.joints[name] for name, _ in tendon.terms if model.joints[name].kind != "fixed"]
+    at_start = sum(c * (*model.joints[name].position, 0.0)[0] for name, c in tendon.terms)
+    if abs(at_start - (tendon.rest or 0.0)) > AGREE:
+        text = "an equality of a tendon holds the length that it has where the scene starts"
+        builder.remarks.translate(tendon.place, text, motion=True)
+    text = "sums of joints are held by wheels on ground, with a millionth of the inertia"
+    builder.remarks.translate(tendon.place, text)
+    size, names = _light(builder, *joints), builder.names
+    scale = max(abs(c) for c in fields["coefs"])
+    columns = [fields[key] for key in ("movers", "axes", "coefs", "slides")]
+    total, count = "ground", len(fields["movers"])
+    for k, (mover, axis, coef, slides) in enumerate(zip(*columns, strict=True), 1):
+        wheel = names.free("bodies", f"{tendon.name}_term{k}")
+        _add_wheel(builder, wheel, *size)
+        builder.scene.add_joint(
+            "follow", names.free("joints", f"{wheel}_follows"), body_i=mover, a_j=axis,
+            a_k=f"{wheel}.z", ratio=scale / coef, along=True if slides else None,
+        )  # fmt: skip
+        if k == 1:
+            total = wheel
+            continue
+        before, total = total, "ground"
+        if k < count:
+            total = names.free("bodies", f"{tendon.name}_sum{k}")
+            _add_wheel(builder, total, *size)
+        builder.scene.add_joint(
+            "follow", names.free("joints", f"{tendon.name}_sum{k}"), body_i=total,
+            a_j=f"{before}.z", a_k=f"{wheel}.z",
+        )  # fmt: skip
 
 
 def _light(builder: SceneBuilder, *joints: Joint) -> tuple[float, float]:

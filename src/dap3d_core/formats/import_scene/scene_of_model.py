@@ -8,7 +8,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formats.import_scene.actuators import add_actuators, add_tendons
-from dap3d_core.formats.import_scene.couplings import add_couplings, add_rotor
+from dap3d_core.formats.import_scene.couplings import add_couplings, add_held, add_rotor
 from dap3d_core.formats.import_scene.joints import add_joint, from_ground, named_ends
 from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.rigid_groups import (
@@ -153,6 +153,7 @@ def _add_joints(builder: SceneBuilder, model: Articulation) -> None:
             add_joint(builder, joint)
         _add_joint_forces(builder, joint)
     add_couplings(builder, model)
+    add_held(builder, model)
     add_actuators(builder, model)
     add_tendons(builder, model)
 
