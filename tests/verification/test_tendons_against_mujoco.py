@@ -98,7 +98,8 @@ def test_a_muscle_without_lengthrange(tmp_path):
     path = tmp_path / "a.xml"
     joints = MODEL.replace('axis="0 1 0"', 'axis="0 1 0" range="0.1 0.9" damping="1"')
     path.write_text(joints.format(
-        tendons='<fixed name="f"><joint joint="p" coef="0.7"/><joint joint="q" coef="-1.2"/></fixed>',
+        tendons='<fixed name="f"><joint joint="p" coef="0.7"/>'
+        '<joint joint="q" coef="-1.2"/></fixed>',
         actuators='<muscle tendon="f" gear="2" force="30"/>',
     ))  # fmt: skip
     scene, report = dap.import_model(path)

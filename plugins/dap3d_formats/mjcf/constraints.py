@@ -130,7 +130,7 @@ def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:
         reader.model.held.append(attrs.evolve(found[0], name=name, rest=length, place=place))
         return
     if any(line.points for line in found) or (len(found) == 2 and any(higher)):
-        text = "an equality of tendons over more than two points, of two that are not fixed, or with"
+        text = "an equality of tendons over more than two points, of two not fixed, or with"
         remarks.leave_out(place, f"{text} a polynomial of a higher degree", motion=True)
         return
     factors: dict[str, float] = {}

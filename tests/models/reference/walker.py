@@ -1,4 +1,4 @@
-"""Reference for the model `walker`: what a periodic walk must give, whatever happens in a period."""
+"""Reference for the model `walker`: what a periodic walk gives, whatever happens in a period."""
 
 import numpy as np
 from rigid import Array

@@ -112,7 +112,7 @@ def add_held(builder: SceneBuilder, model: Articulation) -> None:
 def _hold_sum(
     builder: SceneBuilder, model: Articulation, tendon: Tendon, fields: Mapping[str, Any]
 ) -> None:
-    """Hold a sum: each wheel turns by a term, or by the sum up to there, and ground by the whole."""
+    """Hold a sum: wheels turn by a term, or by the sum up to there, and ground by the whole."""
     joints = [model.joints[name] for name, _ in tendon.terms if model.joints[name].kind != "fixed"]
     at_start = sum(c * (*model.joints[name].position, 0.0)[0] for name, c in tendon.terms)
     if abs(at_start - (tendon.rest or 0.0)) > AGREE:
