@@ -4,37 +4,39 @@
 # mypy: disable-error-code="no-any-return"
 
 from dap3d_core.kernels.array_types import Floats, Integers
-from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled
 
 
 @compiled
-def solve_dense(K: Floats, x: Floats) -> None:
-    """Overwrite x (n,) with K^-1 x, and K (n, n) with its factors; rows are exchanged."""
-    solve_square(pointer(K), x, x.size)
-
-
-@compiled
-def solve_square(K: Floats, x: Floats, n: int) -> None:
-    """The same of a flat matrix, and the first n of x."""
+def factor_square(K: Floats, exchanged: Integers, n: int) -> None:
+    """Overwrite a flat matrix K (n n,) with its factors; exchanged: (n,) row taken for each."""
     for c in range(n):
         best = c
         for r in range(c + 1, n):
             if abs(K[n * r + c]) > abs(K[n * best + c]):
                 best = r
-        pivot = K[n * c + c : n * c + n]
+        exchanged[c], pivot = best, K[n * c + c : n * c + n]
         if best != c:
             other = K[n * best + c : n * best + n]
             for k in range(pivot.size):
                 pivot[k], other[k] = other[k], pivot[k]
-            x[c], x[best] = x[best], x[c]
         for r in range(c + 1, n):
             row = K[n * r + c : n * r + n]
             if row[0] != 0.0:
                 s = row[0] / pivot[0]
+                row[0] = s
                 for k in range(1, row.size):
                     row[k] -= s * pivot[k]
-                x[r] -= s * x[c]
+
+
+@compiled
+def solve_square(K: Floats, exchanged: Integers, x: Floats, n: int) -> None:
+    """Overwrite the first n of x with K^-1 x, by what ``factor_square`` has left."""
+    for c in range(n):
+        best = exchanged[c]
+        x[c], x[best] = x[best], x[c]
+        for r in range(c + 1, n):
+            x[r] -= K[n * r + c] * x[c]
     for c in range(n - 1, -1, -1):
         s = x[c]
         for k in range(c + 1, n):
@@ -43,16 +45,15 @@ def solve_square(K: Floats, x: Floats, n: int) -> None:
 
 
 @compiled
-def solve_blocks(
-    K: Floats, x: Floats, n: int, start: Integers, entries: Integers, at: Integers, scratch: Floats
+def factor_blocks(
+    K: Floats, n: int, start: Integers, entries: Integers, at: Integers, scratch: Floats
 ) -> None:
-    """Overwrite x (6 n,) with K^-1 x, and K with its factors, by blocks of 6 x 6.
+    """Overwrite K with its factors, by blocks of 6 x 6.
 
     Rows are exchanged within blocks alone, so that what is zero stays so.
 
     Args:
         K: n blocks of the diagonal, and for each entry its block below the diagonal and that above.
-        x: as above.
         n: columns of blocks.
         start, entries: those of column a below the diagonal are in the rows
             ``entries[start[a] : start[a + 1]]``, all that elimination fills.
@@ -74,6 +75,13 @@ def solve_blocks(
                     to = n + 2 * at[entries[f]]
                     take(K[36 * (n + 2 * f) :], high, K[36 * to :])
                     take(low, K[36 * (n + 2 * f + 1) :], K[36 * (to + 1) :])
+
+
+@compiled
+def solve_blocks(
+    K: Floats, x: Floats, n: int, start: Integers, entries: Integers, scratch: Floats
+) -> None:
+    """Overwrite x (6 n,) with K^-1 x, by what ``factor_blocks`` has left; the others as there."""
     for a in range(n):
         for e in range(start[a], start[a + 1]):
             take_from(K[36 * (n + 2 * e) :], x[6 * a :], x[6 * entries[e] :])

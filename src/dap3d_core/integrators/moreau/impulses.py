@@ -9,6 +9,7 @@ from typing import Any
 from dap3d_core.integrators.moreau.arrays import CONE, MET, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
 from dap3d_core.integrators.moreau.newton import bound_of
+from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -32,6 +33,8 @@ def slot_of(memory: Any, slots: Integers, key: int) -> int:
 def recall(work: Any, s: StepArrays) -> None:
     """Take the impulses of the last step in the frames of the contacts, zero of new ones.
 
+    Those of joints as well.
+
     Those that are declared stick or slide as they did, new ones by their slip.
     """
     memory, slots, count = work.memory, s.slots, 0
@@ -42,6 +45,7 @@ def recall(work: Any, s: StepArrays) -> None:
         if slots[at] < 0:
             slots[at] = count
         count += 1
+    copy(s.y, work.pulls)
     for c in range(s.contact_count):
         row, J = slots[slot_of(memory, slots, s.key[c])], s.J[c]
         for r in range(3):
@@ -90,6 +94,7 @@ def let_slip(s: StepArrays) -> bool:
 def remember(work: Any, s: StepArrays) -> None:
     """Keep the impulses of contacts that push, and of friction of joints."""
     memory, count = work.memory, 0
+    copy(work.pulls, s.y)
     for c in range(s.contact_count):
         if (s.x[c, 0] > 0.0 or s.kind[c] != CONE) and count < memory.shape[0]:
             memory[count, 0] = s.key[c]

@@ -61,6 +61,7 @@ class MoreauState(IntegrationState):
     overlap_key = _measure()  # of that contact
 
     memory: Floats  # (room, 5) key of a contact, or -1, its impulse, N s, and its mode
+    pulls: Floats  # impulses of joints, N s, besides those of motion without contacts
     pushed: Floats  # (n + 1, 6) accelerations by contacts, global axes; 1 in the first item if any
     measures: Floats  # scalars
 
@@ -92,6 +93,7 @@ class MoreauIntegration(Integration):
         pushed = np.zeros((model.body_count + 1, 6))
         return {
             "memory": memory,
+            "pulls": np.zeros(model.joint_row_count),
             "pushed": pushed,
             "measures": np.zeros(len(MoreauState.indices("measures"))),
         }

@@ -18,8 +18,14 @@ import math
 
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
-from dap3d_core.integrators.moreau.dense import solve_blocks, solve_square
+from dap3d_core.integrators.moreau.dense import (
+    factor_blocks,
+    factor_square,
+    solve_blocks,
+    solve_square,
+)
 from dap3d_core.integrators.moreau.groups import block_at
+from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -30,6 +36,10 @@ WEIGHT, LESS, LEAST = 1e5, 1e-2, 1.0
 HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
+#: Of velocities, by which a round is not solved better.
+ROUNDING = 1e-15
+#: Changes of slopes, over weights, that factors are kept with.
+REUSED = 1e-2
 TINY = 1e-300
 #: Unknowns up to which the matrix of a pass is a square; that of more has blocks.
 SMALL = 60
@@ -226,7 +236,7 @@ def residual_of(s: StepArrays, v: Floats, left: float) -> float:
 def newton(s: StepArrays, tolerance: float) -> float:
     """Improve the impulses x and y of a group; the residual."""
     put_velocities(s, s.v)
-    left, weight = residual_of(s, s.v, 0.0), WEIGHT
+    left, weight, s.factored = residual_of(s, s.v, 0.0), WEIGHT, 0.0
     for _ in range(ROUNDS):
         if left <= tolerance:
             break
@@ -235,13 +245,12 @@ def newton(s: StepArrays, tolerance: float) -> float:
         new = residual_after(s)
         if new > HELPS * left:
             weight *= LESS
-        if new < left:
-            left = new
-        else:
+        if new >= left:
             exchange(s)
-            if weight < LEAST:
-                break
             put_velocities(s, s.v)
+        left = min(left, new)
+        if weight < LEAST:
+            break
     return left
 
 
@@ -325,29 +334,44 @@ def product_of(x: Floats, y: Floats, m: float, spin: Floats) -> float:
 @compiled
 def solve_round(s: StepArrays, weight: float, tolerance: float) -> None:
     """Bring v to where it solves the equations of a round; impulses there in push and pull."""
-    size, rubs = TINY, False
+    rubs = is_far = False
     for q in range(s.chosen_count):
         rubs |= s.kind[s.chosen[q]] != CONE
-    for q in range(s.used_count):
-        b = s.used[q]
-        x = s.free[b]
-        if rubs:  # friction of joints may be little beside the momentum of its bodies
-            x = s.change
-            for k in range(6):
-                x[k] = s.free[b, k] - s.v[b, k]
-        size += product_of(x, x, s.mass[b], s.spin[b])
     merit = put_rest(s, s.v, weight, s.rest)
     for _ in range(PASSES):
-        if merit <= tolerance * tolerance * size:
+        if merit <= aim_of(s, weight, tolerance, rubs):
             return
         better = try_pass(s, weight, merit, 1.0)
         if better < 0.0:
             put_rest(s, s.v, weight, s.rest)
             better = try_pass(s, weight, merit, 0.0)
         if better < 0.0:
-            put_rest(s, s.v, weight, s.rest)
-            return
+            if is_far:
+                put_rest(s, s.v, weight, s.rest)
+                return
+            is_far = True
+            for q in range(s.used_count):
+                copy(s.v[s.used[q]], s.free[s.used[q]])
+            better = put_rest(s, s.v, weight, s.rest)
         merit = better
+
+
+@compiled
+def aim_of(s: StepArrays, weight: float, tolerance: float, rubs: bool) -> float:
+    """The merit at which a round is solved: of a tolerance, or of rounding.
+
+    rubs: friction of joints may be little beside the momentum of its bodies, which is left out.
+    """
+    size, moves = TINY, 0.0
+    for q in range(s.used_count):
+        b, x = s.used[q], s.change
+        for k in range(6):
+            x[k] = s.free[b, k] - s.v[b, k]
+        size += product_of(x, x, s.mass[b], s.spin[b])
+        moves += product_of(s.v[b], s.v[b], s.mass[b], s.spin[b])
+        if not rubs:
+            size += product_of(s.free[b], s.free[b], s.mass[b], s.spin[b])
+    return max(tolerance * tolerance * size, (ROUNDING * weight) ** 2 * moves)
 
 
 @compiled
@@ -359,14 +383,19 @@ def try_pass(s: StepArrays, weight: float, merit: float, feels: float) -> float:
     for q in range(s.chosen_count):
         c = s.chosen[q]
         put_slopes(s.z[c], feels * s.mu[c], s.rim[c], s.kind[c], s.B[c])
-    assemble(s, weight, feels)
+    if not is_factored(s, weight, feels):
+        assemble(s, weight, feels)
+        if s.width == 6 * s.used_count:
+            factor_square(s.K, s.exchanged, s.width)
+        else:
+            factor_blocks(s.K, s.used_count, s.entry_start, s.entries, s.parent, s.turned)
     for q in range(s.used_count):
         for k in range(6):
             s.change[6 * q + k] = -s.rest[s.used[q], k]
     if s.width == 6 * s.used_count:
-        solve_square(s.K, s.change, s.width)
+        solve_square(s.K, s.exchanged, s.change, s.width)
     else:
-        solve_blocks(s.K, s.change, s.used_count, s.entry_start, s.entries, s.parent, s.turned)
+        solve_blocks(s.K, s.change, s.used_count, s.entry_start, s.entries, s.turned)
     part = 1.0
     for _ in range(CUTS):
         for q in range(s.used_count):
@@ -382,6 +411,31 @@ def try_pass(s: StepArrays, weight: float, merit: float, feels: float) -> float:
             return found
         part *= 0.5
     return -1.0
+
+
+@compiled
+def is_factored(s: StepArrays, weight: float, feels: float) -> bool:
+    """True if factors are those of slopes as now, near enough; else they will be."""
+    same = s.factored == weight
+    for q in range(s.chosen_count):
+        c = s.chosen[q]
+        B, old = s.B[c], s.B_factored[c]
+        same = same and (s.kind[c] == CONE or not slides(s, c))
+        for k in range(9):
+            same = same and abs(B[k] - old[k]) * weight <= REUSED
+    if same:
+        return True
+    s.factored = weight if feels > 0.0 else 0.0
+    for q in range(s.chosen_count):
+        for k in range(9):
+            s.B_factored[s.chosen[q], k] = s.B[s.chosen[q], k]
+    return False
+
+
+@compiled
+def slides(s: StepArrays, c: int) -> bool:
+    """True if friction that is not of a cone is at its bound."""
+    return s.rim[c] < slip_size(s.z[c], s.kind[c])
 
 
 @compiled

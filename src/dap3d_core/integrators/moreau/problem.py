@@ -101,15 +101,13 @@ def solve(s: StepArrays, tolerance: float) -> bool:
 
     Args:
         s: with velocities ``free`` that fit the joints; ``bias`` is added to normal velocities,
-            which are not to become negative then; ``x`` is tried first.
+            which are not to become negative then; ``x``, ``y`` are tried first.
         tolerance: of the residual, a part of the largest impulse.
     """
     few, joined = s.contact_count <= FEW, s.y.size > 0
     for b in range(s.v.shape[0]):
         for k in range(6):
             s.v[b, k] = s.trial[b, k] = s.free[b, k]
-    for k in range(s.y.size):
-        s.y[k] = 0.0
     choose(s, -1)
     if few or joined:
         if not lay_out(s):

@@ -377,6 +377,8 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         for c in range(s.contact_count):
             s.bias[c], s.mu[c] = s.gap[c], 0.0
             s.x[c, 0] = s.x[c, 1] = s.x[c, 2] = 0.0
+        for k in range(s.y.size):
+            s.y[k] = 0.0
         if not solve(s, NEAR):
             return False
         for b in range(1, s.v.shape[0]):
