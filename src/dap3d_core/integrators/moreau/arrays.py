@@ -65,9 +65,9 @@ class StepArrays(Arrays):
         ),
         **dict.fromkeys(("bodies", "declared_bodies", "declared_place"), INTEGER_MATRIX),
         **dict.fromkeys(
-            ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "trial",
-             "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z", "B",
-             "B_factored", "push",
+            ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "delta",
+             "trial", "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z",
+             "B", "B_factored", "push",
              "kept", "met", "D", "declared_x", "log", "values", "vectors", "crossed", "answer",
              "felt", "bounce", "v_bounce", "x_bounce",
              "carried"),
@@ -124,6 +124,7 @@ class StepArrays(Arrays):
     before: Floats  # (n + 1, 6) velocities at the start, without contacts, with them; scratch
     free: Floats
     v: Floats
+    delta: Floats  # what it changes by within a round
     trial: Floats
     rest: Floats
     trial_rest: Floats
@@ -198,6 +199,7 @@ class StepArrays(Arrays):
     D: Floats  # (entries, 6)
     s: Floats  # masses that they feel
     y: Floats  # impulses; tried, kept, and of the last step; those of motion without contacts
+    lead: Floats  # D v at the begin of a round, less that of motion without contacts, m/s
     pull: Floats
     y_kept: Floats
     y_bounce: Floats
@@ -233,7 +235,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     layout = model.row_layout
     scratch: dict[str, Any] = {
         **{name: np.zeros(k) for name in (
-            "s", "y", "pull", "y_kept", "y_bounce", "joint_y", "y_free")},
+            "s", "y", "lead", "pull", "y_kept", "y_bounce", "joint_y", "y_free")},
         **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
     }  # fmt: skip
     arrays = StepArrays(
@@ -280,7 +282,7 @@ def _of_bodies(model: Model) -> dict[str, Any]:
     found: dict[str, Any] = {
         **{name: np.zeros((n + 1, 9)) for name in ("Jp", "Jp_inverse", "spin", "spin_inverse")},
         **{name: np.zeros((n + 1, 6)) for name in (
-            "before", "free", "v", "trial", "rest", "trial_rest", "end", "v_bounce")},
+            "before", "free", "v", "delta", "trial", "rest", "trial_rest", "end", "v_bounce")},
         "bounce": np.zeros((n + 1, 5)),
         "carried": np.zeros((n + 1, 2)),
         **{name: np.zeros(n + 1) for name in (
@@ -302,7 +304,8 @@ def _of_bodies(model: Model) -> dict[str, Any]:
 
 def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
-    widths = {"bodies": 2, "J": 36, "moved": 36, "own": 9, "own_held": 9, "B": 9, "B_factored": 9, "met": MET,
+    widths = {"bodies": 2, "J": 36, "moved": 36, "met": MET,
+              **dict.fromkeys(("own", "own_held", "B", "B_factored"), 9),
               **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
     whole = ("bodies", "key", "kind", "under", "group", "chosen", "collides")
     return {

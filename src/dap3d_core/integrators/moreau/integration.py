@@ -117,9 +117,10 @@ class MoreauIntegration(Integration):
             if arrays.log_count:
                 self._contact_rows.append(arrays.log[: arrays.log_count].copy())
                 arrays.log_count = 0
-            if not waits and not arrays.stage:
+            if arrays.stage or 2 * arrays.met_count > len(arrays.log):
+                self._arrays = grown(arrays)
+            elif not waits:
                 return
-            self._arrays = grown(arrays)
 
     def state_within(self, t: float) -> Floats | None:
         """As ``Integration.state_within``, linear."""

@@ -25,7 +25,6 @@ from dap3d_core.integrators.moreau.dense import (
     solve_square,
 )
 from dap3d_core.integrators.moreau.groups import block_at
-from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -36,7 +35,7 @@ WEIGHT, LESS, LEAST = 1e5, 1e-2, 1.0
 HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
-#: Of velocities, by which a round is not solved better.
+#: The best to which a round is solved.
 ROUNDING = 1e-15
 #: Changes of slopes, over weights, that factors are kept with.
 REUSED = 1e-2
@@ -282,29 +281,44 @@ def exchange(s: StepArrays) -> None:
 
 
 @compiled
-def put_rest(s: StepArrays, v: Floats, weight: float, R: Floats) -> float:
-    """Put what velocities v leave of the equations of a round; its square in M^-1.
+def begin_round(s: StepArrays) -> None:
+    """Take the velocities v as those that a round counts its changes from."""
+    for q in range(s.used_count):
+        for k in range(6):
+            s.delta[s.used[q], k] = 0.0
+    for q in range(s.chosen_count):
+        u = s.u[s.chosen[q]]
+        u[0], u[1], u[2] = velocity_of(s, s.chosen[q], s.v)
+        u[0] += s.bias[s.chosen[q]]
+    for k in range(s.y.size):
+        s.lead[k] = speed_of(s, k, s.v) - speed_of(s, k, s.free)
 
-    ``push`` and ``pull`` become the impulses there, z what is projected.
+
+@compiled
+def put_rest(s: StepArrays, delta: Floats, weight: float, R: Floats) -> float:
+    """Put what velocities v + delta leave of the equations of a round; its square in M^-1.
+
+    ``push`` and ``pull`` become the impulses there, z what is projected. Weights multiply the
+    rounding of delta, and not that of v.
     """
     for k in range(s.y.size):
-        speed = speed_of(s, k, v) - speed_of(s, k, s.free)
-        s.pull[k] = s.y[k] - weight * s.s[k] * speed
+        s.pull[k] = s.y[k] - weight * s.s[k] * (s.lead[k] + speed_of(s, k, delta))
     clear(s, R)
     add_pull(s, s.pull, R)
     for q in range(s.used_count):
-        b = s.used[q]
+        b, x = s.used[q], s.turned
         row, spin, m = R[b], s.spin[b], s.mass[b]
-        d, e, f = v[b, 3] - s.free[b, 3], v[b, 4] - s.free[b, 4], v[b, 5] - s.free[b, 5]
+        for k in range(6):
+            x[k] = (s.v[b, k] - s.free[b, k]) + delta[b, k]
         for k in range(3):
-            row[k] = m * (v[b, k] - s.free[b, k]) - row[k]
-            row[3 + k] = spin[3 * k] * d + spin[3 * k + 1] * e + spin[3 * k + 2] * f - row[3 + k]
+            turn = spin[3 * k] * x[3] + spin[3 * k + 1] * x[4] + spin[3 * k + 2] * x[5]
+            row[k], row[3 + k] = m * x[k] - row[k], turn - row[3 + k]
     for q in range(s.chosen_count):
         c = s.chosen[q]
-        u0, u1, u2 = velocity_of(s, c, v)
+        u0, u1, u2 = velocity_of(s, c, delta)
         part, z, J = weight * s.r[c], s.z[c], s.J[c]
-        z[0] = s.x[c, 0] - part * (u0 + s.bias[c])
-        z[1], z[2] = s.x[c, 1] - part * u1, s.x[c, 2] - part * u2
+        z[0], z[1] = s.x[c, 0] - part * (s.u[c, 0] + u0), s.x[c, 1] - part * (s.u[c, 1] + u1)
+        z[2] = s.x[c, 2] - part * (s.u[c, 2] + u2)
         s.push[c, 0] = z[0]
         s.rim[c] = bound_of(s, c, s.push, s.pull)
         put_projected(z, s.rim[c], s.kind[c], s.push[c])
@@ -337,41 +351,45 @@ def solve_round(s: StepArrays, weight: float, tolerance: float) -> None:
     rubs = is_far = False
     for q in range(s.chosen_count):
         rubs |= s.kind[s.chosen[q]] != CONE
-    merit = put_rest(s, s.v, weight, s.rest)
+    begin_round(s)
+    merit = put_rest(s, s.delta, weight, s.rest)
     for _ in range(PASSES):
-        if merit <= aim_of(s, weight, tolerance, rubs):
-            return
+        if merit <= aim_of(s, tolerance, rubs):
+            break
         better = try_pass(s, weight, merit, 1.0)
         if better < 0.0:
-            put_rest(s, s.v, weight, s.rest)
+            put_rest(s, s.delta, weight, s.rest)
             better = try_pass(s, weight, merit, 0.0)
+        if better < 0.0 and is_far:
+            put_rest(s, s.delta, weight, s.rest)
+            break
         if better < 0.0:
-            if is_far:
-                put_rest(s, s.v, weight, s.rest)
-                return
             is_far = True
             for q in range(s.used_count):
-                copy(s.v[s.used[q]], s.free[s.used[q]])
-            better = put_rest(s, s.v, weight, s.rest)
+                for k in range(6):
+                    s.delta[s.used[q], k] = s.free[s.used[q], k] - s.v[s.used[q], k]
+            better = put_rest(s, s.delta, weight, s.rest)
         merit = better
+    for q in range(s.used_count):
+        for k in range(6):
+            s.v[s.used[q], k] += s.delta[s.used[q], k]
 
 
 @compiled
-def aim_of(s: StepArrays, weight: float, tolerance: float, rubs: bool) -> float:
-    """The merit at which a round is solved: of a tolerance, or of rounding.
+def aim_of(s: StepArrays, tolerance: float, rubs: bool) -> float:
+    """The merit at which a round is solved.
 
     rubs: friction of joints may be little beside the momentum of its bodies, which is left out.
     """
-    size, moves = TINY, 0.0
+    size = TINY
     for q in range(s.used_count):
         b, x = s.used[q], s.change
         for k in range(6):
-            x[k] = s.free[b, k] - s.v[b, k]
+            x[k] = s.free[b, k] - s.v[b, k] - s.delta[b, k]
         size += product_of(x, x, s.mass[b], s.spin[b])
-        moves += product_of(s.v[b], s.v[b], s.mass[b], s.spin[b])
         if not rubs:
             size += product_of(s.free[b], s.free[b], s.mass[b], s.spin[b])
-    return max(tolerance * tolerance * size, (ROUNDING * weight) ** 2 * moves)
+    return max(tolerance, ROUNDING) ** 2 * size
 
 
 @compiled
@@ -401,13 +419,13 @@ def try_pass(s: StepArrays, weight: float, merit: float, feels: float) -> float:
         for q in range(s.used_count):
             b = s.used[q]
             for k in range(6):
-                s.trial[b, k] = s.v[b, k] + part * s.change[6 * q + k]
+                s.trial[b, k] = s.delta[b, k] + part * s.change[6 * q + k]
         found = put_rest(s, s.trial, weight, s.trial_rest)
         if found < (1.0 - 0.1 * part) * merit:
             for q in range(s.used_count):
                 b = s.used[q]
                 for k in range(6):
-                    s.v[b, k], s.rest[b, k] = s.trial[b, k], s.trial_rest[b, k]
+                    s.delta[b, k], s.rest[b, k] = s.trial[b, k], s.trial_rest[b, k]
             return found
         part *= 0.5
     return -1.0

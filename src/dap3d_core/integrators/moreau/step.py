@@ -252,7 +252,9 @@ def put_bias(s: StepArrays) -> bool:
         for k in range(3):
             fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
     for c in range(s.contact_count):
-        s.collides[c], s.bias[c] = 0, max(s.gap[c], 0.0) / s.h
+        s.collides[c], s.bias[c] = 0, 0.0
+        if s.gap[c] > OVERLAP * s.length:  # redundant contacts would disagree by less
+            s.bias[c] = s.gap[c] / s.h
         if s.kind[c] != CONE:
             continue
         approach, _, _ = velocity_of(s, c, s.before)
