@@ -45,7 +45,8 @@ def _show_run(file: str, as_json: bool) -> None:
     summary = result.summary
     names = {
         "body_names": summary.body_names,
-        "joint_names": summary.joint_names,
+        "joint_names": list(summary.joint_index),
+        "contact_names": result.contact_names,
         "point_names": summary.point_names,
     }
     if as_json:
@@ -59,7 +60,8 @@ def _show_run(file: str, as_json: bool) -> None:
         [
             ("file", f"{file}, {size(byte_count)}"),
             ("bodies", some(summary.body_names, 12)),
-            ("joints", some(summary.joint_names, 12)),
+            ("joints", some(tuple(summary.joint_index), 12)),
+            ("contacts", some(result.contact_names, 12)),
             ("points", some(summary.point_names, 12)),
             *run_pairs(data),
             ("settings", ", ".join(settings)),
