@@ -155,6 +155,10 @@ REFUSED = [
     (("run", "fall.toml", "-o", R), "--force overwrites it"),
     (("run", "fall.toml", "-o", "fall.toml", "--force"), "is the input file"),
     (("run", "fall.toml", "-o", "x" * 300), "File name too long"),
+    *(((c, "fall.toml", "-o", "x.csv"), "name a .nc file with -o; dap3d post")
+      for c in ("run", "kinematics")),
+    ((*SWEEP, *VARY, *KEEP, "-o", "x"), "name a .nc file"),
+    (("equilibrium", "fall.toml", "-o", "x.csv"), "name a .toml file"),
     # results
     *(((c, "nothing.nc"), "there is no such file") for c in ("info", "post", "plot", "view")),
     *(((c, "empty.nc"), "the file is empty") for c in OF_RESULTS),
@@ -404,3 +408,20 @@ def test_an_exploding_run_ends_with_3_and_names_the_first_offender(call, folder,
     assert result.status == "stopped"
     assert all(np.all(np.isfinite(a)) for a in (result.u, result.v_dot, result.work))
     assert result.t[-1] < 0.08
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("run", "fall.toml"), ("post", R), ("post", R, "--format", "csv"), ("plot", R, "stone.r.z"),
+     ("export", R, "--format", "mat"), ("export", "fall.toml", "--format", "urdf"), ("view", R),
+     ("export", "fall.toml", "--format", "fmu"), ("export", "fall.toml", "--format", "c"),
+     ("animate", R), (*SWEEP, *VARY, *KEEP), ("report", "fall.toml"),
+     ("modes", "fall.toml", "--mode", "1"), ("sensitivities", "fall.toml", *VARY, "stone.r.z")],
+    ids=lambda words: "-".join(words[:1]),
+)  # fmt: skip
+def test_no_output_takes_the_place_of_a_scene(call, folder, words):
+    """Not with --force either: a command overwrites files of the kind that it writes."""
+    shutil.copy(folder / "fall.toml", folder / "other.toml")
+    code, _, err = call(*words, "-o", "other.toml", "--force")
+    assert code == 2, err
+    assert (folder / "other.toml").read_text() == SCENE
