@@ -35,7 +35,7 @@ def _show_sweep(file: str, as_json: bool) -> None:
 
 
 def _show_run(file: str, as_json: bool) -> None:
-    from dap3d_core.cli.console.console import print_json, scene_name, size, stdout
+    from dap3d_core.cli.console.console import count, print_json, scene_name, size, stdout
     from dap3d_core.cli.console.run_summary import run_data, run_pairs, show_details
     from dap3d_core.cli.framework.paths import open_result
     from dap3d_core.registry.suggestions import some
@@ -47,6 +47,8 @@ def _show_run(file: str, as_json: bool) -> None:
         "body_names": summary.body_names,
         "joint_names": list(summary.joint_index),
         "contact_names": result.contact_names,
+        "shape_names": result.record.contacts.names,
+        "shape_contacts": len(result.record.contacts),
         "point_names": summary.point_names,
     }
     if as_json:
@@ -54,7 +56,9 @@ def _show_run(file: str, as_json: bool) -> None:
         print_json({**about, **data, **names, "scene_text": result.scene_text})
         return
     console = stdout()
-    settings = (f"{k} {_short(v)}" for k, v in result.settings.items() if v is not None)
+    settings = (f"{k} {_short(v)}" for k, v in result.settings.items()
+                if v is not None and k != "stepping")  # fmt: skip
+    shapes = result.record.contacts
     console.title(f"{scene_name(data['scene'])}: {data['status']}")
     console.facts(
         [
@@ -62,6 +66,8 @@ def _show_run(file: str, as_json: bool) -> None:
             ("bodies", some(summary.body_names, 12)),
             ("joints", some(tuple(summary.joint_index), 12)),
             ("contacts", some(result.contact_names, 12)),
+            ("shapes", some(shapes.names, 12)),
+            ("met", f"at {count(len(shapes), 'point')} at reported instants" * bool(shapes.names)),
             ("points", some(summary.point_names, 12)),
             *run_pairs(data),
             ("settings", ", ".join(settings)),
@@ -74,4 +80,6 @@ def _show_run(file: str, as_json: bool) -> None:
 def _short(value: object) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
+    if isinstance(value, dict):  # tolerances by quantity
+        return f"({', '.join(f'{k} {_short(v)}' for k, v in value.items())})"
     return f"{value:g}" if isinstance(value, float) else str(value)

@@ -100,3 +100,23 @@ def test_commands_take_results_whose_rows_are_those_of_contacts_alone(tmp_path, 
     text = capfd.readouterr().out
     assert "joints" not in text
     assert "contacts     floor" in text
+
+
+def test_info_names_shapes_that_meet(tmp_path, capfd, monkeypatch):
+    """With the number of rows of their table; tolerances by quantity are words, no code."""
+    monkeypatch.setenv("COLUMNS", "60")
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=2.0, Jp=[8e-7] * 3, r=[0.0, 0.0, 0.001])
+    scene.add_shape("sphere", "marble", body="ball", radius=0.001, collides=True)
+    scene.add_shape("plane", "ground_plane", body="ground", collides=True)
+    scene.add_force("weight", "weight")
+    scene.add_material("wood", mu=0.3)
+    scene.add_collisions(material="wood")
+    file = str(tmp_path / "ball.nc")
+    dap.simulate(scene, t_end=0.02, dt=0.01, contact_step=1e-3).save(file)
+    assert main(["info", file]) == 0
+    text = capfd.readouterr().out
+    assert "shapes       marble, ground_plane" in text
+    assert "met          at 2 points at reported instants" in text
+    assert "{" not in text
+    assert max(map(len, text.splitlines())) <= 60
