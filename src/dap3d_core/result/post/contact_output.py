@@ -83,8 +83,11 @@ def contact_outputs(evaluator: "Evaluator", arrays: "Arrays") -> dict[str, Conta
                 evaluator.begin_turns(float(time), u[k], arrays.angles[k])
             values[k] = table.outputs(float(time), u[k], arrays.Lam[k])
         evaluator.states = before
-    modes: Any = states[:, table.mode]  # unknown at an instant of which the poses are known alone
-    modes = modes.astype(np.int64) if np.isfinite(modes).all() else modes
+    modes: Any = states[:, table.mode]
+    unknown = ~np.isfinite(modes)  # at an instant of which the state of bodies is known alone
+    for part in (rows.NORMAL, rows.FRICTION, rows.FORCE):
+        values[unknown, part] = np.nan
+    modes = modes if unknown.any() else modes.astype(np.int64)
     return {
         name: ContactOutput(
             gap=values[:, k, rows.GAP], normal_force=values[:, k, rows.NORMAL],

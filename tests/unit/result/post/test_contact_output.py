@@ -102,6 +102,19 @@ def test_commands_take_results_whose_rows_are_those_of_contacts_alone(tmp_path, 
     assert "contacts     floor" in text
 
 
+def test_forces_are_unknown_where_velocities_jump(result):
+    """Curves end before an impact and begin behind it: the state there is known, forces are not."""
+    from dap3d_core.result.post.smooth_parts import smooth_parts
+
+    before, behind = smooth_parts(result)
+    for part, place in ((before, -1), (behind, 0)):
+        for name in ("floor", "rub", "axle_upper"):
+            contact = part.contact(name)
+            assert np.isnan([contact.normal_force[place], *contact.friction[place]]).all()
+            assert np.isfinite(contact.slip[place]).all()
+        assert np.isfinite(part.contact("floor").normal_force).sum() == len(part.t) - 1
+
+
 def test_info_names_shapes_that_meet(tmp_path, capfd, monkeypatch):
     """With the number of rows of their table; tolerances by quantity are words, no code."""
     monkeypatch.setenv("COLUMNS", "60")
@@ -120,3 +133,15 @@ def test_info_names_shapes_that_meet(tmp_path, capfd, monkeypatch):
     assert "met          at 2 points at reported instants" in text
     assert "{" not in text
     assert max(map(len, text.splitlines())) <= 60
+
+
+def test_check_and_describe_name_contacts(tmp_path, capfd):
+    """Each once, however many points it has, apart from joints."""
+    scene = dap.Scene(name="box")
+    scene.add_body("box", mass=2.0, Jp=[0.01] * 3, r=[0.0, 0.0, 0.1])
+    scene.add_contact("box_plane", "floor", P_i="box.O", size=[0.2, 0.2, 0.2], mu=0.3)
+    file = tmp_path / "box.toml"
+    scene.save(file)
+    for command, text in (("check", "1 box_plane"), ("describe", "floor (box_plane)")):
+        assert main([command, str(file)]) == 0
+        assert f"contacts  {text}" in capfd.readouterr().out.replace("   ", "  ")
