@@ -117,7 +117,7 @@ def _row(name, method, t_end):
     repeat_projection(functions, 0, y0, y0.copy(), y0.copy(), *others)
     repeat_sums(integration.work, 1), repeat_error(integration.work, 1)
     wait_for_good_code()
-    change.call(take, functions.addresses, lambda: (0.0, y0), lambda: (10**9, 10**9))
+    change.call(take, functions.addresses, lambda: (0.0, y0), lambda: (10**9,) * 3)
     work = integration.work
     parts["sums"] = steps * _least(lambda: repeat_sums(work, CALLS), CALLS)
     parts["error_norm"] = steps * _least(lambda: repeat_error(work, CALLS), CALLS)

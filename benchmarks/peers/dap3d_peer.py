@@ -81,7 +81,8 @@ class Model:
 
     def take_programs(self):
         """Let runs take programs of the scene, as those of ``dap.simulate`` after a while."""
-        y0, evaluator, name = self.problem[3], self.evaluator, f"peer_{id(self)}"
+        y0, evaluator = self.problem[3], self.evaluator
+        name = f"peer_{id(self)}{scene_program.REPORTS}"
         text, written = scene_program.write_programs(evaluator, name, 0.0, off_constraints(y0))
         code = objects.optimised(text, written, None)
         for k, program in scene_program.load_programs(evaluator, name, written, code).items():

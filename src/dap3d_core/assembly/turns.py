@@ -17,7 +17,7 @@ from dap3d_core.assembly.arrays import Floats, System, coordinate_offset, veloci
 from dap3d_core.assembly.metric import in_body_axes
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
 from dap3d_core.kernels.runtime.loop_support import TURN, P, R, V, W
-from dap3d_core.kernels.scalar_math import atan2
+from dap3d_core.kernels.scalar_math import atan2, where
 from dap3d_core.kernels.vectors import add, cross, dot, scale, sub
 
 #: Columns of ``System.turns``, an angle in each row: index in y of the coordinate that is the
@@ -292,7 +292,7 @@ def report_turns(t: float, y: Floats, out: Floats, system: System) -> None:
     for k in range(turns.shape[0]):
         s, i = system.par[turns[k, STATE] :], turns[k, COORDINATE]
         if 0 <= i < y.shape[0]:
-            out[k] = y[i] + (s[OFFSET_BEFORE] if t < s[TIME] else s[OFFSET])
+            out[k] = y[i] + where(t < s[TIME], s[OFFSET_BEFORE], s[OFFSET])
         else:
             measure(t, y[:0], system, k)
             out[k] = near(s[NEXT], expected_angle(t, s))
@@ -303,9 +303,9 @@ def report_turns(t: float, y: Floats, out: Floats, system: System) -> None:
 def expected_angle(t: float, s: Floats) -> float:
     """Angle by those at both ends of the last step and their rates; s: the state of the angle."""
     h, left = s[TIME] - s[TIME_BEFORE], t - s[TIME]
-    if left >= 0.0 or h <= 0.0:
-        return s[ANGLE] + s[RATE] * left
-    x, rise = 1.0 + left / h, s[ANGLE] - s[ANGLE_BEFORE]
+    is_beyond = (left >= 0.0) | (h <= 0.0)
+    x, rise = 1.0 + left / where(is_beyond, 1.0, h), s[ANGLE] - s[ANGLE_BEFORE]
     ahead, behind = h * s[RATE_BEFORE], h * s[RATE]
     bend = 3.0 * rise - 2.0 * ahead - behind + x * (ahead + behind - 2.0 * rise)
-    return s[ANGLE_BEFORE] + x * (ahead + x * bend)
+    within = s[ANGLE_BEFORE] + x * (ahead + x * bend)
+    return where(is_beyond, s[ANGLE] + s[RATE] * left, within)

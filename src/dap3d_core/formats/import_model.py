@@ -25,7 +25,7 @@ from dap3d_core.interface.formats.articulation import KINDS
 from dap3d_core.registry import Registry, load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.registry.extensions import extensions
-from dap3d_core.registry.suggestions import nearest, some
+from dap3d_core.registry.suggestions import did_you_mean, some
 from dap3d_core.scene import Scene, SceneError, check
 from dap3d_core.scene.errors import MISSING, Mistake
 
@@ -295,8 +295,7 @@ def _require_file(file: Path) -> None:
         names = f", such as {', '.join(models[:5])}" if models else ""
         raise FormatError(f"{file} is a folder", remedy=f"name a file in it{names}")
     if not os.path.exists(file):
-        near = nearest(file.name, _names_in(file.parent))
-        hint = f"; did you mean {near!r}?" if near else ""
+        hint = did_you_mean(file.name, _names_in(file.parent), "; {}")
         raise FormatError(f"there is no file {file}{hint}")
 
 
@@ -356,8 +355,8 @@ def _coordinates(
     quaternions = {"ball": 1, "free": 1} if positions else {}
     for name, value in _named(f"{what}s", given).items():
         if name not in model.joints:
-            near = nearest(name, model.joints)
-            remedy = f"did you mean {near!r}?" if near else f"it has {some([*model.joints], 8)}"
+            has = f"it has {some([*model.joints], 8)}"
+            remedy = did_you_mean(name, model.joints, otherwise=has)
             raise FormatError(f"{what} of {name}: there is no such joint in the file", None, remedy)
         try:
             array = np.ravel(value)

@@ -25,6 +25,7 @@ from dap3d_core.formulations.common.constraints import (
 )
 from dap3d_core.formulations.common.projection import project_onto
 from dap3d_core.kernels.runtime.cache import compiled, compiled_into
+from dap3d_core.kernels.scalar_math import where
 from dap3d_core.linear.ldlt.factor import have_pivots
 
 #: What is left of the rows, as a part of the largest acceleration, from which on it is solved for.
@@ -62,7 +63,8 @@ def refine(system: System, out: Floats) -> None:
     n, length = system.metric.shape[0] - 1, system.settings[LENGTH]
     size = length
     for k in range(6 * n):
-        size = max(size, abs(out[k]) * (1.0 if k % 6 < 3 else length))
+        part = abs(out[k]) * (1.0 if k % 6 < 3 else length)
+        size = where(part > size, part, size)
     if not acceleration_residual(system) > ROUGH * size:
         return
     settle_rows(system)

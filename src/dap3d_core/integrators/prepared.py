@@ -1,7 +1,7 @@
 """Runs from one start again and again: arrays put back, one compiled call.
 
 What a run costs beside its steps, some 80 us to check arguments and allocate, is more than the
-integration of a small scene; here it is 2 us. The points of a study are run so in compiled code
+integration of a small scene; here it is 1 us. The points of a study are run so in compiled code
 (study/batch/driver.py).
 """
 
@@ -41,8 +41,10 @@ class PreparedRun:
             arrays = [work.real, work.integer, work.switches, work.tolerance, work.lengths]
         if work.calls_accepted:  # the turns that are counted
             arrays.append(integration._arguments[1].par)
-        self._arrays = [(array, array.copy()) for array in arrays if array.size]
-        self._first: Floats = work.state[Y].copy()
+        arrays = [*(array.reshape(-1) for array in arrays if array.size), work.state[Y]]
+        #: Views of the arrays, which are copied in half the time of arrays, and of their copies.
+        self._views = [(array.data, array.copy().data) for array in arrays]
+        self._integers, self._status = work.integer.data, type(work).indices("integer")["status"]
         self._call: Any = integration.prepared() if jit_is_on() else integration._call_compiled
 
     def run(self, y0: Floats | None = None) -> bool:
@@ -50,9 +52,9 @@ class PreparedRun:
 
         Otherwise ``integration.status`` says why not.
         """
-        work = self.integration.work
-        for array, first in self._arrays:
-            array[...] = first
-        work.state[Y] = self._first if y0 is None else y0
+        for view, first in self._views:
+            view[:] = first
+        if y0 is not None:
+            self.integration.work.state[Y] = y0
         self._call(ALL)
-        return bool(work.status == FINISHED)
+        return bool(self._integers[self._status] == FINISHED)

@@ -9,7 +9,7 @@ import numpy as np
 from dap3d_core.interface.fields import FieldSpec, specs_of
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers
 from dap3d_core.model.model import Model, ReferencePoses
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import did_you_mean
 from dap3d_core.scene import ValidatedScene
 from dap3d_core.scene.validate.coerce_values import (
     Fault,
@@ -57,8 +57,7 @@ def _value(force: str, specs: Mapping[str, FieldSpec], name: str, value: Any) ->
     kinds = ("number", "numbers", "vec3", "matrix", "square")
     numeric = [n for n, s in specs.items() if s.kind in kinds]
     if name not in numeric:
-        near = nearest(name, numeric)
-        hint = f"did you mean {near!r}?" if near else f"it has {', '.join(numeric) or 'none'}"
+        hint = did_you_mean(name, numeric, otherwise=f"it has {', '.join(numeric) or 'none'}")
         raise ValueError(f"force {force} has no numbers under the name {name!r}; {hint}")
     spec = specs[name]
     found: Any
@@ -87,19 +86,14 @@ def _of_force(
         (new,) = grouping.groups([attrs.evolve(force, values=given)], [place])
     except ValueError as error:  # PrepareError: the type's own words
         raise ValueError(f"force {force.name}: {error}") from error
-    if not _same_tables(old, new):
+    pairs = zip(old.tables, new.tables, strict=True)
+    if not all(np.array_equal(a, b) for (*_, a), (*_, b) in pairs):
         raise ValueError(f"force {force.name}: this would change a table, which cannot be done")
     # what is the same stays: turns that were counted, places of tables, numbers changed before,
     # those of joints that it reads, which stand behind its own
     behind = [(0, 0), (0, group.numbers.shape[1] - new.numbers.shape[1])]
     where = np.pad(old.numbers != new.numbers, behind)
     return Change(group, places, where, np.pad(new.numbers, behind))
-
-
-def _same_tables(old: Group, new: Group) -> bool:
-    return all(
-        np.array_equal(a, b) for (*_, a), (*_, b) in zip(old.tables, new.tables, strict=True)
-    )
 
 
 def _of_friction(model: Model, name: str, place: int, values: Mapping[str, Any]) -> Change:

@@ -2,8 +2,6 @@
 
 import os
 import sys
-from types import ModuleType
-from typing import Any
 
 
 def _import_matplotlib() -> None:
@@ -41,15 +39,8 @@ from dap3d_core.plot.figure import plot, save_plot, show_plot  # noqa: E402
 from dap3d_core.plot.figure_file import FORMATS  # noqa: E402
 from dap3d_core.plot.film.animation import Film, animate  # noqa: E402
 from dap3d_core.plot.style import WIDTH  # noqa: E402
+from dap3d_core.registry.arguments import make_callable  # noqa: E402
 
 __all__ = ["FORMATS", "WIDTH", "Film", "animate", "plot", "save_plot", "show_plot"]
 
-
-class _CallableModule(ModuleType):
-    """Lets ``dap3d_core.plot(...)`` plot whether or not this module of the same name is loaded."""
-
-    def __call__(self, *arguments: Any, **options: Any) -> Any:
-        return plot(*arguments, **options)
-
-
-sys.modules[__name__].__class__ = _CallableModule
+make_callable(__name__, plot)

@@ -44,6 +44,7 @@ if TYPE_CHECKING:
     from dap3d_core.simulation.linearization.linearization import Linearization
     from dap3d_core.study.equilibrium_path import EquilibriumPath
     from dap3d_core.study.modes_over import ModesOver
+    from dap3d_core.study.sensitivities.sensitivities import Sensitivities
 
     Drawable = (
         Result | Mapping[str, Result] | Fit | Linearization | ModesOver | EquilibriumPath
@@ -365,6 +366,8 @@ def _runs(path: "EquilibriumPath") -> Iterator[tuple[bool, slice]]:
 class FitPicture(Picture):
     """Outputs of a fit, each with its residuals below."""
 
+    refusal = "a fit is drawn over time, on a figure of its own: leave x, ax out"
+
     fit: Fit
     outputs: list[str]
 
@@ -380,10 +383,6 @@ class FitPicture(Picture):
     def height(self) -> float:
         """A suitable height of the figure, inches."""
         return 0.6 + (CURVE_HEIGHT + RESIDUAL_HEIGHT) * len(self.outputs)
-
-    def draw_on(self, ax: Axes) -> Axes:
-        """Refuse: a fit has two panels or more."""
-        raise ValueError("a fit is drawn over time, on a figure of its own: leave x, ax out")
 
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw on an empty figure; returns the axes."""
@@ -423,3 +422,42 @@ class FitPicture(Picture):
         if (reach > 0.0).any():
             limit = 1.15 * np.nanmax(reach)
             below.set_ylim(-limit, limit)
+
+
+class SensitivityPicture(Picture):
+    """For each quantity its elasticities at the end, and p dq/dp over time.
+
+    Attributes:
+        sensitivities: of the run.
+        quantities: scalar ones, by name.
+    """
+
+    refusal = "sensitivities have several panels: leave ax out"
+
+    def __init__(self, sensitivities: "Sensitivities", quantities: tuple[str, ...]) -> None:
+        self.sensitivities, self.quantities = sensitivities, quantities
+
+    @property
+    def height(self) -> float:
+        """A suitable height of the figure, inches."""
+        return PANEL_HEIGHT * len(self.quantities)
+
+    def draw(self, figure: Figure) -> list[Axes]:
+        """Draw on an empty figure."""
+        found = self.sensitivities
+        panels = figure.subplots(len(self.quantities), 2, squeeze=False)
+        for (bars, curves), quantity in zip(panels, self.quantities, strict=True):
+            elasticities = np.nan_to_num(found.elasticities(quantity), posinf=0.0, neginf=0.0)
+            colors = [PALETTE[k % len(PALETTE)] for k in range(len(found.names))]
+            bars.barh(list(found.names), elasticities, color=colors)
+            bars.invert_yaxis()
+            bars.axvline(0.0, color="0.5", linewidth=0.8)
+            bars.set_xlabel(f"% of {quantity} by 1 %", fontsize=LETTERS)
+            for k, curve in enumerate((found.of(quantity) * found.values).T):
+                curves.plot(found.result.t, curve, color=colors[k], linewidth=1.2)
+            curves.set_xlabel("t [s]", fontsize=LETTERS)
+            curves.set_ylabel(f"p d {quantity} / dp", fontsize=LETTERS)
+        axes = [one for row in panels for one in row]
+        for one in axes:
+            style_axes(one)
+        return axes

@@ -196,6 +196,8 @@ class BodePicture(Picture):
         inputs, outputs: their names.
     """
 
+    refusal = "a frequency response has two panels, gain and phase: leave ax out"
+
     def __init__(
         self,
         frequencies: Floats,
@@ -239,7 +241,3 @@ class BodePicture(Picture):
             style_axes(axes)
         gain.legend(fontsize=LETTERS, frameon=False)
         return [gain, phase]
-
-    def draw_on(self, ax: Axes) -> Axes:
-        """Refuse: there are two panels."""
-        raise ValueError("a frequency response has two panels, gain and phase: leave ax out")

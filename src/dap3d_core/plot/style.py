@@ -3,7 +3,7 @@
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -31,27 +31,25 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 class Picture(ABC):
     """Content of a figure."""
 
-    @property
-    @abstractmethod
-    def height(self) -> float:
-        """A suitable height of the figure, inches."""
-
-    @abstractmethod
-    def draw(self, figure: Figure) -> list[Axes]:
-        """Draw on an empty figure; returns the axes, without those of colour bars."""
-
-    @abstractmethod
-    def draw_on(self, ax: Axes) -> Axes:
-        """Draw on axes of the user; a ValueError where the picture has several panels."""
-
-
-class OnePanel(Picture):
-    """A picture of one panel, which is drawn on axes."""
+    #: The message of those that are never drawn on axes of the user.
+    refusal: ClassVar[str] = ""
 
     @property
     def height(self) -> float:
         """A suitable height of the figure, inches."""
         return HEIGHT
+
+    @abstractmethod
+    def draw(self, figure: Figure) -> list[Axes]:
+        """Draw on an empty figure; returns the axes, without those of colour bars."""
+
+    def draw_on(self, ax: Axes) -> Axes:
+        """Draw on axes of the user; a ValueError where the picture has several panels."""
+        raise ValueError(self.refusal)
+
+
+class OnePanel(Picture):
+    """A picture of one panel, which is drawn on axes."""
 
     def draw(self, figure: Figure) -> list[Axes]:
         """Draw on an empty figure; returns its axes."""

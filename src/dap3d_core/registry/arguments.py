@@ -9,7 +9,7 @@ from contextlib import suppress
 from functools import wraps
 from numbers import Integral, Real
 from pathlib import Path
-from types import NoneType, UnionType
+from types import ModuleType, NoneType, UnionType
 from typing import Any, TypeVar, Union, Unpack, get_args, get_origin, get_type_hints
 
 from dap3d_core.registry.suggestions import nearest
@@ -33,6 +33,15 @@ _NOUNS: dict[Any, str] = {
 SETTINGS = frozenset(get_type_hints(RunSettings)) | {"start"}
 #: Functions that make an object of a class from a name or a path.
 _READERS = {"Result": "dap.open", "Scene": "dap.load", "CompiledModel": "dap.compile"}
+
+
+def make_callable(module: str, function: Callable[..., Any]) -> None:
+    """Let a module be called as the function of its name: ``dap3d_core`` has one name for both."""
+
+    def call(_: ModuleType, *arguments: Any, **options: Any) -> Any:
+        return function(*arguments, **options)
+
+    sys.modules[module].__class__ = type("CallableModule", (ModuleType,), {"__call__": call})
 
 
 def checked(function: Function) -> Function:

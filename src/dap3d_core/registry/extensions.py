@@ -13,7 +13,7 @@ from dap3d_core.registry.discovery import Source, discover
 from dap3d_core.registry.guard import guard, within
 from dap3d_core.registry.loading import hooks_of
 from dap3d_core.registry.registry import LOAD_LIMIT, PluginInfo, collision, info_of
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import did_you_mean
 
 #: Module of each kind's hook and base class, and the name of the class.
 _BASES = {
@@ -65,8 +65,7 @@ class Extensions:
         """
         sources = self.sources.get(keyword, [])
         if not sources:
-            near = nearest(keyword, self.keywords)
-            hint = f"; did you mean {near!r}?" if near else ""
+            hint = did_you_mean(keyword, self.keywords, "; {}")
             known = ", ".join(self.keywords) or "none"
             raise PluginError(f"there is no {self.kind} {keyword!r}{hint} (installed: {known})")
         if len(sources) > 1:

@@ -73,6 +73,14 @@ def nearest(word: Any, allowed: Collection[str]) -> str:
     return words.word_of[near[0]] if near else ""
 
 
+def did_you_mean(
+    word: Any, allowed: Collection[str], form: str = "{}", *, otherwise: str = ""
+) -> str:
+    """The question after the nearest allowed word, in a form such as "; {}", or ``otherwise``."""
+    near = nearest(word, allowed)
+    return form.format(f"did you mean {near!r}?") if near else otherwise
+
+
 def some(names: Sequence[str], most: int) -> str:
     """The first of several names, and the number of the others."""
     more = f" and {len(names) - most} more" if len(names) > most else ""

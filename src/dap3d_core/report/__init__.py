@@ -1,9 +1,6 @@
 """Work-precision reports: speed against error of every method and integrator on a scene."""
 
-import sys
-from types import ModuleType
-from typing import Any
-
+from dap3d_core.registry.arguments import make_callable
 from dap3d_core.report.measurement import Failed, MeasuredRun, RejectedSetting
 from dap3d_core.report.reference import Reference
 from dap3d_core.report.report import Recommendation, Report
@@ -21,12 +18,4 @@ __all__ = [
     "report",
 ]
 
-
-class _CallableModule(ModuleType):
-    """Makes ``dap3d_core.report(...)`` callable once this module is loaded."""
-
-    def __call__(self, *arguments: Any, **options: Any) -> Report:
-        return report(*arguments, **options)
-
-
-sys.modules[__name__].__class__ = _CallableModule
+make_callable(__name__, report)

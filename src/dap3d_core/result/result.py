@@ -24,7 +24,7 @@ from dap3d_core.result.post.force_output import ForceOutput, force_output, react
 from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of
 from dap3d_core.result.post.ledger import Entry, ledger_of
 from dap3d_core.result.post.point_motion import Energy, kinetic_energy
-from dap3d_core.result.post.reactions import Reaction, jacobians
+from dap3d_core.result.post.reactions import Instants, Reaction, jacobians
 from dap3d_core.result.quantities.catalogue import MOTION, Quantity
 from dap3d_core.result.quantities.lookup import find
 from dap3d_core.scene import SceneError
@@ -362,10 +362,7 @@ class Result(ResultDisplay, ResultContacts):
         index = self.summary.joint_index
         missing = {index[name]: name for name in names if name not in self._reactions}
         if missing:
-            evaluator, angles = self.evaluator, self._angles()
-            by_joint = reactions_of(
-                evaluator, self.t, self.u, self.Lam, missing, angles, self._states(), self.inputs
-            )
+            by_joint = reactions_of(self.evaluator, self._instants, missing)
             self._reactions |= {missing[joint]: actions for joint, actions in by_joint.items()}
 
     # ------------------------------------------------------------------ forces
@@ -399,24 +396,22 @@ class Result(ResultDisplay, ResultContacts):
                 "be evaluated again with those of the scene"
             )
         if name not in self._forces:
-            index = self.model.force_names.index(name)
-            actuation = self.record.actuation.get(name)
+            found = self.record.actuation.get(name)
+            actuation = None if found is None else np.array(found)
             self._forces[name] = force_output(
-                self.evaluator, self.t, self.u, self.v_dot, name, index, self.Lam, self._angles(),
-                None if actuation is None else np.array(actuation), self._states(), self.inputs,
-            )  # fmt: skip
+                self.evaluator, self._instants, self.v_dot, name, actuation
+            )
         return self._forces[name]
 
-    def _angles(self) -> Floats | None:
-        """(nt, k) angles with counted turns; None if an older file lacks them."""
-        if self.summary.angle_count in (self.model.own_angle_count, self.model.angle_count):
-            return self.arrays.angles
-        self.note(NO_TURNS)
-        return None
-
-    def _states(self) -> Floats | None:
-        """(nt, s) states of elements; None of a scene without any."""
-        return self.arrays.states if self.summary.state_names else None
+    @cached_property
+    def _instants(self) -> Instants:
+        """The instants, for elements; an older file lacks the angles, whose turns are counted."""
+        angles: Floats | None = self.arrays.angles
+        if self.summary.angle_count not in (self.model.own_angle_count, self.model.angle_count):
+            self.note(NO_TURNS)
+            angles = None
+        states = self.arrays.states if self.summary.state_names else None
+        return Instants(self.t, self.u, self.Lam, angles, states, self.inputs)
 
     # ------------------------------------------------------------------ system
 

@@ -7,6 +7,7 @@ scene as a whole (its settings, forces such as gravity that act on all bodies) i
 import os
 import re
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
 import attrs
@@ -15,7 +16,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
 from dap3d_core.interface.types import acts_on_all
-from dap3d_core.registry import UnknownTypeError, load_registry
+from dap3d_core.registry import Registry, UnknownTypeError, load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.contacts.tables import Collisions, Material
@@ -111,9 +112,12 @@ class _Part:
         tables = (getattr(part, table) for table in NAMED if table != "inputs")
         self.names = {n: f"{name}/{n}" for table in tables for n in table}
         self.words = {n: f"{name}_{n}" for n in (*part.inputs, *part.outputs)}
-        self._registry = load_registry()
         self._axes_of_ground: dict[str, None] = {}
         self._left_out: list[str] = []
+
+    @cached_property
+    def _registry(self) -> Registry:
+        return load_registry()
 
     def add_to(self, scene: Scene, mistakes: MistakeList) -> None:
         """Add all to a scene; names that are taken are mistakes."""
@@ -170,8 +174,6 @@ class _Part:
                 entries[name] = self._other(mistakes, table, name, entry)
             elif (element := self._element(mistakes, table, name, entry)) is not None:
                 entries[name] = element
-            else:
-                self._left_out.append(old)
         return entries
 
     def _other(self, mistakes: MistakeList, table: str, name: str, entry: Any) -> Any:
@@ -196,16 +198,17 @@ class _Part:
         type_info = self._type_of(table, entry.type)
         specs = specs_of(type_info.type) if type_info else {}
         if table == "forces" and self._acts_on_all(type_info, entry.fields):
+            unknown = "" if type_info else f" (its type {entry.type!r} is not installed)"
+            self._left_out.append(f"{entry.name}{unknown}")
             return None
         fields = {k: self._output(v) if table == "joints" and k == ACTIVE else
                   self._field(table, k, v, specs.get(k))
                   for k, v in entry.fields.items()}  # fmt: skip
         if table == "shapes":
-            self._shape(entry.type, fields, entry.fields.get("body"))
+            self._shape(entry.type, fields)
         elif type_info and self.place.is_moved:
-            if what := self._refusal(type_info, entry.fields):
-                remedy = "give the sub-assembly a body in place of ground, held by a joint weld"
-                mistakes.add((table, name), MISSING, what, remedy=remedy)
+            if refusal := self._refusal(type_info, entry.fields):
+                mistakes.add((table, name), MISSING, refusal.what, remedy=refusal.remedy)
             self._write_out(specs, entry.fields, fields)
         return Element(name, entry.type, fields)
 
@@ -231,35 +234,38 @@ class _Part:
                 if p is not None:
                     entry.p, entry.rpy, entry.axis_angle = p, None, None
                 if entry.p_0 is not None:
-                    entry.p_0 = self._turned(mistakes, entry, {"p": entry.p_0})
+                    entry.p_0 = self._turned(mistakes, entry, {"p": entry.p_0}) or entry.p_0
         elif table == "points" and entry.body == GROUND:
             entry.sPp = place.position(entry.sPp)
         elif table == "vectors" and entry.body == GROUND:
             entry.sp = place.direction(entry.sp)
 
     def _turned(self, mistakes: MistakeList, body: Any, given: Mapping[str, Any]) -> Any:
-        """Euler parameters of a body turned with the place; None where a mistake is reported."""
+        """Euler parameters of a body turned with the place; None of what the check refuses."""
         p = self.place.orientation(given)
         if not isinstance(p, Fault):
             return p
-        what = f"is turned with the sub-assembly, which needs numbers, p or rpy: {p.what}"
-        mistakes.add(("bodies", body.name), MISSING, what)
+        written = given.get("axis_angle")
+        if type(written) is tuple and any(map(is_expression, written)):
+            what = "is turned with the sub-assembly, and has expressions"
+            key = ("bodies", body.name, "axis_angle")
+            mistakes.add(key, written, what, remedy="give p or rpy, or numbers")
         return None
 
-    def _shape(self, type_: Any, fields: dict[str, Any], body: Any) -> None:
+    def _shape(self, type_: Any, fields: dict[str, Any]) -> None:
         """Give a shape what [collisions] of the part says; bring one of ground to its place."""
-        known, put, collisions = (
-            SHAPES.get(type_, {"at": None, "p": None}),
-            self.place,
-            self.part.collisions,
-        )
+        put, collisions = self.place, self.part.collisions
         if fields.get("collides") is True and collisions is not None:
             if collisions.material is not None:
                 fields.setdefault("material", self._value(collisions.material, is_name=True))
-            if type(collisions.bodies) is tuple and body not in collisions.bodies:
+            bodies = self._value(collisions.bodies, is_name=True)
+            if type(bodies) is tuple and fields.get("body") not in bodies:
                 fields["collides"] = False
-        if body != GROUND or not put.is_moved:
+        if type(file := fields.get("file")) is str and file in self.part.files:
+            fields["file"] = f"{self.name}/{file}"
+        if fields.get("body") != GROUND or not put.is_moved or type(type_) is not str:
             return
+        known = SHAPES.get(type_, {"at": None, "p": None})
         if "at" in known:
             fields["at"] = put.position(fields.get("at", ZERO))
         if type(fields.get("points")) is tuple:
@@ -271,21 +277,23 @@ class _Part:
         if "p" in known and not isinstance(p := put.orientation(fields), Fault):
             fields["p"] = p
 
-    def _refusal(self, type_info: TypeInfo, given: Mapping[str, Any]) -> str:
-        """Why an element cannot follow where its ground is moved; "" where it can."""
+    def _refusal(self, type_info: TypeInfo, given: Mapping[str, Any]) -> Fault | None:
+        """Why an element cannot follow where its ground is moved; None where it can."""
         along: Any = type_info.type.ground_axes
         named = str(given.get(along, f"{GROUND}.{along}"))
         vector = self.part.vectors.get(named)
         d = vector.sp if vector else AXES.get(named.rpartition(".")[2], ZERO)
         turned = along in AXES and self.place.direction(d) != d
         if along and (along is True or turned or self.place.moves_along(d)):
-            return (
+            what = (
                 "measures from the ground of the whole scene, and does not follow the sub-assembly"
             )
+            return Fault(what, "take a type that measures from a point of ground")
         slots = type_info.axis_slots if self.place.is_turned else ()
         if any(self._is_on_ground(specs_of(type_info.type), given, slot) for slot in slots):
-            return "lies by the axes of ground, which are not turned with the sub-assembly"
-        return ""
+            what = "lies by the axes of ground, which are not turned with the sub-assembly"
+            return Fault(what, "name a body in place of ground, held there by a joint weld")
+        return None
 
     def _write_out(
         self, specs: Mapping[str, FieldSpec], given: Mapping[str, Any], fields: dict[str, Any]
@@ -315,7 +323,12 @@ class _Part:
     def _is_on_ground(
         self, specs: Mapping[str, FieldSpec], given: Mapping[str, Any], slot: str
     ) -> bool:
-        """Whether a body of an element is ground, by what it names there, or by default."""
+        """Whether a body of an element is ground, by what it names there, or by default.
+
+        slot: or a list of bodies.
+        """
+        if type(given.get(slot)) is tuple:
+            return GROUND in given[slot]
         ends = [self.part.vectors2[v] for v in given.values()
                 if isinstance(v, str) and v in self.part.vectors2]  # fmt: skip
         values = {f"P_{slot}": getattr(end, f"P_{slot}", None) for end in ends} | dict(given)
@@ -334,10 +347,9 @@ class _Part:
         """Name the files of meshes as seen from the folder of the other scene."""
         for old in self.part.shapes:
             fields = scene.shapes[self.names[old]].fields
-            if fields.get("file") in self.part.files:
-                fields["file"] = f"{self.name}/{fields['file']}"
-            elif way != "." and type(fields.get("file")) is str:
-                fields["file"] = f"{way.replace(os.sep, '/')}/{fields['file']}"
+            file = fields.get("file")
+            if way != "." and type(file) is str and file not in scene.files:
+                fields["file"] = f"{way.replace(os.sep, '/')}/{file}"
 
     def _name(self, name: str) -> str:
         """The new name of a body, point, vector or element, or of an axis of one of them."""

@@ -65,7 +65,7 @@ class Place:
     def moves_along(self, d: Any) -> bool:
         """True if it is moved along a vector of its own ground, or may be."""
         v = self.direction(d)
-        if not all(type(x) in (float, int) for x in v):
+        if type(v) is not tuple or not all(type(x) in (float, int) for x in v):
             return any(x != 0.0 for x in self.r)
         shift = _sum(list(zip(v, self.r, strict=True)))
         return is_expression(shift) or abs(shift) > SHIFT_ROUNDING
@@ -94,10 +94,10 @@ def read_place(mistakes: MistakeList, key: Key, at: Any) -> Place | None:
     if len(words) > 1:
         mistakes.add(key, MISSING, f"give one of {' and '.join(words)}")
     r = at.get("r", ZERO)
-    if type(r) is not tuple or len(r) != 3 or not all(map(_is_number, r)):
-        numbers = numbers_of(r, 3)
-        what = numbers.what if isinstance(numbers, Fault) else "should be a list of 3 numbers"
-        mistakes.add((*key, "r"), r, what)
+    written = r if type(r) is tuple else (r,)
+    numbers = numbers_of(tuple(0.0 if is_expression(x) else x for x in written), 3)
+    if isinstance(numbers, Fault):
+        mistakes.add((*key, "r"), r, numbers.what, numbers.nearest, numbers.remedy)
         r = ZERO
     p = ORIENTATIONS[words[0]](at[words[0]]) if words else NO_TURN
     if isinstance(p, Fault):

@@ -2,7 +2,6 @@
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from dap3d_core.formulations import FORMULATIONS
 from dap3d_core.formulations.evaluator import Evaluator
@@ -170,22 +169,13 @@ def _left_out(checked: ValidatedScene, model: Model) -> list[str]:
             result.append(f"{title}: the scene has none, so no code for them was loaded")
     if model.forces and not any(g.type_info.type.keyword == "weight" for g in model.forces):
         result.append("weight: no force of this type, so there is no gravity")
-    for word, declared in _declared(scene).items():
-        unused = [name for name in declared if name not in _used(scene)]
+    for word in ("points", "vectors", "vectors2", "functions"):
+        unused = [name for name in getattr(scene, word) if name not in _used(scene)]
         if unused:
             result.append(f"{word} that nothing uses: {some(unused, MOST_NAMES)}")
     if checked.animation_count:
         result.append(f"animation points: {checked.animation_count}, not part of the analysis")
     return result
-
-
-def _declared(scene: Scene) -> dict[str, Any]:
-    return {
-        "points": scene.points,
-        "vectors": scene.vectors,
-        "vectors2": scene.vectors2,
-        "functions": scene.functions,
-    }
 
 
 def _used(scene: Scene) -> Counter[str]:

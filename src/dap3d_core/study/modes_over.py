@@ -13,10 +13,10 @@ from dap3d_core.registry import load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene import Scene, check, load
 from dap3d_core.simulation import SimulationError
+from dap3d_core.simulation.linearization.eigenvalues import Complex
 from dap3d_core.simulation.linearization.linearization import (
     MANY_BODIES,
     REAL_PART_ROUNDING,
-    Complex,
     Linearization,
     linearize,
 )

@@ -212,17 +212,14 @@ def _of_force(subject: SampledType) -> list[Check]:
         energy = f"its energy is declared to be that of the wrench only {subject.type.energy_where}"
     if "wrench" not in subject.kernels.names():
         ground = "it has no wrench, and acts by its jumps alone"
-    return [
+    checks = [
         Check("energy", subject, energy, forces.potential),
         Check("frame", subject, ground, forces.frame),
         Check("action and reaction", subject, ground, forces.balance),
-        *(
-            [Check("unloaded", subject, "", forces.unloaded)]
-            if joints_read(subject.type_info)
-            else ()
-        ),
-        *_of_jumps(subject),
     ]
+    if joints_read(subject.type_info):
+        checks.append(Check("unloaded", subject, "", forces.unloaded))
+    return checks + _of_jumps(subject)
 
 
 def _of_jumps(subject: SampledType) -> list[Check]:
@@ -239,15 +236,11 @@ def _of_jumps(subject: SampledType) -> list[Check]:
         gives = "the check restitution sees energy created"
     energy = Check("impulse energy", subject, gives, jumps.energy)
     if not jumps.has_rows(subject):
+        frame, balance = (partial(run, kernel="impulse") for run in (forces.frame, forces.balance))
         return [
             energy,
-            *(
-                Check(name, subject, ground, partial(run, kernel="impulse"))
-                for name, run in (
-                    ("jump frame", forces.frame),
-                    ("impulse and reaction", forces.balance),
-                )
-            ),
+            Check("jump frame", subject, ground, frame),
+            Check("impulse and reaction", subject, ground, balance),
         ]
     checks = [
         energy,

@@ -1,12 +1,14 @@
 """Sub-assemblies: names, places, parameters, and mistakes at their lines."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 import dap3d_core as dap
+from dap3d_core.scene import check as checked
 from dap3d_core.scene import parse
 
 LEG = """
@@ -371,3 +373,187 @@ def test_points_that_are_left_out_are_those_of_the_part():
     fields = scene.joints["a/planet_and_ring"].fields
     assert fields["P_j"] == "a/ground O"
     assert "P_i" not in fields, "that is the hinge's"
+
+
+ARM = """
+[parameters]
+L = 0.5
+T = 0.2
+
+[inputs.u]
+value = 0.0
+
+[bodies.rod]
+mass = 1.0
+Jp = [0.1, 0.1, 0.01]
+r = [0.0, 0.0, "= -L"]
+
+[points.top]
+body = "rod"
+sPp = [0.0, 0.0, "= L"]
+
+[joints.hinge]
+type = "rev"
+P_i = "top"
+P_j = "ground.O"
+a_i = "rod.y"
+a_j = "ground.y"
+upper = 0.3
+
+[joints.hold]
+type = "weld"
+body_i = "rod"
+body_j = "ground"
+active = "t < T"
+
+[forces.push]
+type = "n"
+body_i = "rod"
+n = [0.0, 2.0, 0.0]
+input = "u"
+
+[outputs]
+height = "L * rod.r.z + mod(t, 1) * 0"
+gap = "hinge_upper.gap"
+turn = {value = "hinge.angle / L", unit = "rad"}
+"""
+
+
+def test_words_of_expressions_are_those_of_the_part(tmp_path):
+    """Its parameters in outputs and conditions, though the whole has others of the same names."""
+    (tmp_path / "arm.toml").write_text(ARM)
+    (tmp_path / "scene.toml").write_text(
+        '[parameters]\nL = 7.0\nT = 9.0\n[include.a]\nfile = "arm.toml"\n'
+        "[simulation]\nt_end = 0.4\ndt = 0.1\n"
+    )
+    run = dap.start(tmp_path)
+    run.step(0.4, inputs={"a_u": 1.0})
+    result = run.result()
+    angle = result.quantity("a/hinge.angle").values
+    np.testing.assert_allclose(result.quantity("a_height").values, 0.5 * result.r[:, 0, 2])
+    np.testing.assert_allclose(result.quantity("a_turn").values, 2.0 * angle)
+    np.testing.assert_allclose(result.quantity("a_gap").values, 0.3 - angle)
+    assert angle[-1] > 0.0
+    (event,) = result.events
+    assert (event.name, event.kind) == ("a/hold", "break")
+    assert event.t == pytest.approx(0.2)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place"),
+    [
+        ("L = 0.5", 'L = "= M"', r"arm.toml:3: parameters.a_L.*no parameter 'a_M'"),
+        ("L * rod.r.z", "M * rod.r.z", r"arm.toml:39: outputs.a_height.*no quantity 'a_M'"),
+        ("value = 0.0", 'value = "no"', r"arm.toml:7: inputs.a_u.value"),
+        ("t < T", "t < M", r"arm.toml:30: joints.a/hold.active.*no quantity 'a_M'"),
+    ],
+)
+def test_a_part_knows_no_words_of_the_whole(tmp_path, old, new, place):
+    """They are mistakes, at their lines in the file of the part."""
+    (tmp_path / "arm.toml").write_text(ARM.replace(old, new))
+    (tmp_path / "scene.toml").write_text('[parameters]\nM = 1.0\n[include.a]\nfile = "arm.toml"\n')
+    with pytest.raises(dap.SceneError, match=place):
+        dap.compile(tmp_path)
+
+
+def test_wrong_parameters_are_reported_where_they_are_given(tmp_path):
+    (tmp_path / "arm.toml").write_text(ARM)
+    (tmp_path / "scene.toml").write_text(
+        '[include.a]\nfile = "arm.toml"\nparameters = {L = "long"}\n'
+    )
+    with pytest.raises(dap.SceneError, match=r"scene.toml:3: parameters.a_L"):
+        dap.compile(tmp_path)
+
+
+PILE = """
+[shapes.floor]
+type = "plane"
+body = "ground"
+collides = true
+
+[materials.ice]
+mu = 0.4
+
+[materials.ice.with.steel]
+mu = "= m"
+
+[materials.steel]
+mu = 0.4
+
+[parameters]
+m = 0.1
+
+[collisions]
+bodies = ["a", "b", "ground"]
+exclude = [["a", "b"]]
+material = "ice"
+"""
+
+
+def test_collisions_of_parts_hold_in_the_whole():
+    """Pairs that do not meet, bodies that do, the material of shapes, tables of pairs."""
+    part = parse(PILE)
+    for k, name in enumerate("abc"):
+        part.add_body(name, mass=1.0, Jp=[1.0, 1.0, 1.0], r=[5.0 * k, 0.0, 1.0])
+        part.add_shape("sphere", name, body=name, radius=0.1, collides=True)
+    part.shapes["b"].fields["material"] = "steel"
+    scene = dap.Scene()
+    dap.include(scene, "x", part)
+    scene.add_collisions(exclude=[["x/a", "ground"]])
+    dap.include(scene, "y", part)
+    found = checked(scene, dap.load_registry()).collisions
+    assert found.names == ("x/floor", "x/a", "x/b", "y/floor", "y/a", "y/b")
+    x, y = ({name: k for k, name in enumerate("0abc", 3 * n)} for n in (0, 1))
+    width = 1 + len(scene.bodies)
+    pairs = {(0, x["a"]), (x["a"], x["b"]), (y["a"], y["b"])}
+    assert set(found.apart.tolist()) == {i * width + j for i, j in pairs}
+    pair = found.mu[found.material[1], found.material[2]]
+    assert pair == found.mu[found.material[4], found.material[5]] == 0.1
+    assert parse(scene.to_toml()) == scene
+
+
+def test_words_that_are_no_names_stay():
+    """Choices, colours and files that have the name of a body of the part."""
+    part = parse(
+        '[bodies.wheel]\ncolor = "z"\n[bodies.z]\n[bodies.newton]\n'
+        '[joints.roll]\ntype = "disk"\nbody_i = "wheel"\nslip = "z"\n'
+        '[contacts.c]\ntype = "ball_plane"\nP_i = "newton.O"\nradius = 0.1\nlaw = "newton"\n'
+        '[shapes.s]\ntype = "mesh"\nbody = "z"\nfile = "wheel.stl"\n'
+        '[shapes.t]\ntype = "mesh"\nbody = "z"\nfile = "made.stl"\n'
+    )
+    part.files["made.stl"] = Path("elsewhere.stl")
+    scene = dap.Scene()
+    dap.include(scene, "x", part, {"r": [1.0, 0.0, 0.0]})
+    assert scene.bodies["x/wheel"].color == "z"
+    assert scene.joints["x/roll"].fields == {"body_i": "x/wheel", "slip": "z"}
+    assert scene.contacts["x/c"].fields["law"] == "newton"
+    assert scene.shapes["x/s"].fields == {"body": "x/z", "file": "wheel.stl"}
+    assert scene.files == {scene.shapes["x/t"].fields["file"]: Path("elsewhere.stl")}
+
+
+def test_forces_on_all_bodies_stay_out_whatever_they_name():
+    """By what their type does; a type that is not installed is named in the note."""
+    part = parse("[bodies.b]\n[functions.b]\n")
+    part.add_force("weight", "g", of="b")
+    part.add_force("wieght", "w")
+    part.add_force("drag", "x", body_i="b")
+    scene = dap.Scene()
+    dap.include(scene, "a", part)
+    assert list(scene.forces) == ["a/x"]
+    assert scene.notes[0].startswith("a: g, w (its type 'wieght' is not installed) left out")
+
+
+def test_bodies_of_two_parts_touch():
+    """A ball of one part is pushed into that of another: by equal masses and e = 1 it stops.
+    Both contacts with the floors are those of the parts; exact but for rounding of the event."""
+    ball, scene = dap.Scene(), dap.Scene()
+    ball.add_body("ball", mass=1.0, Jp=[0.01, 0.01, 0.01], r=[0.0, 0.0, 0.1])
+    ball.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1)
+    for name, x in (("a", 0.0), ("b", 0.5)):
+        dap.include(scene, name, ball, {"r": [x, 0.0, 0.3]})
+    scene.bodies["a/ball"].r_dot = (1.0, 0.0, 0.0)
+    scene.add_contact("ball_ball", "both", P_i="a/ball.O", radius_i=0.1, P_j="b/ball.O",
+                      radius_j=0.1, e=1.0)  # fmt: skip
+    scene.add_force("weight")
+    result = dap.simulate(scene, t_end=0.5, dt=0.1)
+    np.testing.assert_allclose(result.r[-1], [[0.3, 0.0, 0.4], [0.7, 0.0, 0.4]], atol=1e-9)

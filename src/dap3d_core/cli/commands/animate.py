@@ -38,8 +38,6 @@ def animate(
     size: str | None,
     fit: bool,
     force: bool,
-    as_json: bool,
-    quiet: bool,
     **given: Any,
 ) -> int:
     """Draw the motion of a RESULT as a stick figure: a GIF, an MP4 or a snapshot.
@@ -68,10 +66,7 @@ def animate(
         options["size"] = _size(size)
     writable(target, force=force, sources=(Path(result),))
     try:
-        with (
-            counting("frame", quiet=quiet or as_json) as progress,
-            refusing(ValueError, ResultError),
-        ):
+        with counting("frame") as progress, refusing(ValueError, ResultError):
             film = draw(opened, target, progress=progress, fit=fit, force=force, **options)
     except KeyboardInterrupt:
         stderr().say(f"interrupted; {target} was not written", "bold red")
@@ -82,7 +77,7 @@ def animate(
         contents += f" at {film.fps:g} a second, {film.speed:g} x real time"
     data = {"frames": film.frames, "fps": film.fps, "speed": film.speed, "width": width,
             "height": height}  # fmt: skip
-    show_written(target, contents, data, film.notes, as_json=as_json, quiet=quiet)
+    show_written(target, contents, data, film.notes)
     return DONE
 
 

@@ -23,9 +23,7 @@ VIOLATION_ROUNDING = 1e-10
     options.ALLOW_CODE,
     options.JSON,
 )
-def check(
-    model: str, *, method: str | None, correct_metric: str | None, allow_code: bool, as_json: bool
-) -> int:
+def check(model: str, *, method: str | None, correct_metric: str | None, allow_code: bool) -> int:
     """Validate a MODEL; count its rows, rank and degrees of freedom.
 
     All mistakes are reported at once, each with file, line, key, what is allowed and the nearest
@@ -38,14 +36,14 @@ def check(
     from dap3d_core.cli.console.console import show_data
     from dap3d_core.cli.console.progress import ProgressBar
 
-    with ProgressBar(quiet=as_json) as progress:
+    with ProgressBar() as progress:
         with refusing(dap.SimulationError):  # a method that does not fit the scene
             compiled = dap.compile(
                 model, method=method, allow_code=allow_code, announce=progress.announce
             )
         progress.start()
         data = _data(compiled, correct_metric)
-    show_data(data, lambda console: _show(console, compiled, data), as_json=as_json)
+    show_data(data, lambda console: _show(console, compiled, data))
     return REFUSED if data["mistakes"] else DONE
 
 
@@ -185,7 +183,6 @@ def _violation(violation: dict[str, float], compiled: "CompiledModel") -> str:
 
 
 def _show_redundancy(console: "Terminal", data: dict[str, Any]) -> None:
-
     text = f"redundant constraints: {data['redundant']} of {data['rows']} rows repeat other rows"
     console.say(text, "yellow")
     about = list(data["about"])

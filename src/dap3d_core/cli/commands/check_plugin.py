@@ -12,6 +12,7 @@ import click
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, FAILED, Refused
+from dap3d_core.cli.process.streams import is_quiet, prints_json
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
@@ -42,8 +43,6 @@ def check_plugin(
     poses: int,
     seed: int,
     allow_code: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Check the formulas of types of joints, forces and functions.
 
@@ -70,18 +69,18 @@ def check_plugin(
     for kind, keyword in types:
         report = check_named(registry, kind, keyword, poses=poses, seed=seed)
         reports.append(report)
-        if not as_json and not (quiet and report.ok):
-            _show(console, report, quiet=quiet)
+        if not prints_json() and not (is_quiet() and report.ok):
+            _show(console, report)
     wrong = any(not report.ok for report in reports)
     total = count(len(reports), "type")
-    if as_json:
+    if prints_json():
         data = [{**attrs.asdict(report), "ok": report.ok} for report in reports]
         print_json({"ok": not wrong, "seed": seed, "poses": poses, "types": data})
     elif wrong:
         for verdict, number in Counter(map(_verdict, reports)).items():
             if verdict:
                 console.say(verdict.format(f"{number} of {total}"), "bold red")
-    elif not quiet:
+    elif not is_quiet():
         console.say(f"{total} checked: nothing is wrong", "green")
     return FAILED if wrong else DONE
 
@@ -161,12 +160,12 @@ def _types_of(registry: "Registry", name: str) -> Iterator[tuple[str, str]]:
         )
 
 
-def _show(console: "Terminal", report: "Report", *, quiet: bool) -> None:
+def _show(console: "Terminal", report: "Report") -> None:
     from rich.text import Text
 
     article = "an" if report.kind[:1] in "aeiou" else "a"
     console.title(f"{report.keyword}, {article} {report.kind}")
-    if not quiet:
+    if not is_quiet():
         console.say(report.title, indent=2, whole=True)
         rows: list[tuple[str | Text, ...]] = []
         for o in report.outcomes:
@@ -178,5 +177,5 @@ def _show(console: "Terminal", report: "Report", *, quiet: bool) -> None:
         console.items(map(str, report.motions))
     findings = (f"{f'with {f.variant}: ' if f.variant else ''}{f}" for f in report.findings)
     console.items(dict.fromkeys(findings), "red")
-    if not quiet:
+    if not is_quiet():
         console.print()

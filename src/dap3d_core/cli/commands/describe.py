@@ -10,6 +10,7 @@ import click
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, Refused
+from dap3d_core.cli.process.streams import prints_json
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     options.ALLOW_CODE,
     options.JSON,
 )
-def describe(keyword: str, *, names: bool, source: bool, allow_code: bool, as_json: bool) -> int:
+def describe(keyword: str, *, names: bool, source: bool, allow_code: bool) -> int:
     """Explain the type with a KEYWORD: equations, fields, units, defaults, an example.
 
     A keyword may belong to a joint, a force and a function; all of them are shown. Names of other
@@ -47,13 +48,13 @@ def describe(keyword: str, *, names: bool, source: bool, allow_code: bool, as_js
         if names:
             raise Refused(f"--names is of types, and {keyword} is a model; give a keyword")
         model = model_data(keyword, allow_code=allow_code, source=source)
-        if as_json:
+        if prints_json():
             print_json({"model": model})
         else:
             show_model(stdout(), model)
         return DONE
     types = [type_data(registry, kind, word) for kind, word in _types(registry, keyword)]
-    if as_json:
+    if prints_json():
         print_json({"types": types})
         return DONE
     console = stdout()
@@ -229,7 +230,6 @@ def _bounds(bounds: Mapping[str, float | None]) -> list[str]:
 
 
 def _show(console: "Terminal", data: dict[str, Any], *, names: bool) -> None:
-
     console.title(f"{data['keyword']}, a {data['kind']}")
     console.prose(data["doc"].replace("``", ""))
     if not console.wraps:

@@ -46,11 +46,6 @@ def example_of(type_info: "TypeInfo", registry: "Registry") -> str:
     return scene.text()
 
 
-def _arguments(function: "TypeInfo") -> int:
-    """How many arguments a function type takes."""
-    return function.type.arguments  # type: ignore[attr-defined]
-
-
 def _has_friction(type_info: "TypeInfo") -> bool:
     """True for a joint with friction that needs no optional field."""
     from dap3d_core.interface.codegen.kernel_arguments import parameters
@@ -136,7 +131,9 @@ class _Example:
         """Add a function for a field, unless there is one of the name."""
         if f"function.{name}" not in self.elements:
             count = spec.arguments
-            self.add(self.first("function", lambda f: _arguments(f) == count), name)
+            self.add(
+                self.first("function", lambda f: getattr(f.type, "arguments", 1) == count), name
+            )
 
     def _values(
         self, name: str, spec: Any, owners: dict[str, str], motor: str

@@ -58,8 +58,6 @@ def equilibrium(
     start_file: str | None,
     force: bool,
     allow_code: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Find the static equilibrium in which a MODEL comes to rest, and say whether it is stable.
 
@@ -90,14 +88,13 @@ def equilibrium(
     start, source = (None, None) if start_file is None else open_state(start_file)
     target = _target(output, over, (scene.path, source), force=force)
     if over is not None:
-        return follow(scene, over, quantities, start, target, force=force, allow_code=allow_code,
-                      as_json=as_json, quiet=quiet)  # fmt: skip
-    found = _found(scene, start, allow_code=allow_code, quiet=quiet or as_json)
+        return follow(scene, over, quantities, start, target, force=force, allow_code=allow_code)
+    found = _found(scene, start, allow_code=allow_code)
     rest = None if target is None else found.scene()
     if target is not None and rest is not None:
         write_text(target, rest.to_toml())
     data = _data(found, model, rest.notes if rest is not None else []) | {"file": target}
-    show_data(data, lambda console: _show(console, data, target), as_json=as_json, quiet=quiet)
+    show_data(data, lambda console: _show(console, data, target))
     return DONE
 
 
@@ -124,12 +121,12 @@ def _target(
     return writable(Path(output), force=force, sources=sources, kinds=SCENES)
 
 
-def _found(scene: "Scene", start: Any, *, allow_code: bool, quiet: bool) -> "Equilibrium":
+def _found(scene: "Scene", start: Any, *, allow_code: bool) -> "Equilibrium":
     """The equilibrium; mistakes of a start are those of --from."""
     import dap3d_core as dap
     from dap3d_core.cli.console.progress import PreparationProgress
 
-    with PreparationProgress(quiet=quiet) as progress:
+    with PreparationProgress() as progress:
         try:
             return dap.equilibrium(
                 scene, start=start, allow_code=allow_code, announce=progress.announce
@@ -226,8 +223,6 @@ def follow(
     *,
     force: bool,
     allow_code: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Follow the equilibrium over what --over names, and report the path; the exit code.
 
@@ -241,10 +236,7 @@ def follow(
     from dap3d_core.cli.console.progress import PreparationProgress
     from dap3d_core.result import UnknownNameError
 
-    with (
-        PreparationProgress(quiet=quiet or as_json) as progress,
-        options.over_values(over) as (name, values),
-    ):
+    with PreparationProgress() as progress, options.over_values(over) as (name, values):
         path = dap.equilibrium_path(scene, name, values, start=start, allow_code=allow_code,
                                     announce=progress.announce)  # fmt: skip
     with refusing(UnknownNameError):
@@ -254,8 +246,7 @@ def follow(
         from dap3d_core.plot import save_plot
 
         save_plot(path, names, target, force=force)
-    show_data(data, lambda console: _show_path(console, scene.name, path, names), target,
-              as_json=as_json, quiet=quiet)  # fmt: skip
+    show_data(data, lambda console: _show_path(console, scene.name, path, names), target)
     return DONE if path.end in ("reached", "returned") else PARTIAL
 
 

@@ -10,6 +10,7 @@ import click
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, INTERRUPTED, Refused, refusing
+from dap3d_core.cli.process.streams import prints_json
 
 #: Options of the formats c and fmu alone, by parameter.
 NATIVE_OPTIONS = {
@@ -51,8 +52,6 @@ def export(
     allow_code: bool,
     strict: bool,
     force: bool,
-    as_json: bool,
-    quiet: bool,
     **of_native: Any,
 ) -> int:
     """Write a RESULT, or a MODEL, to a file of another program.
@@ -77,20 +76,21 @@ def export(
 
     if kind in ("c", "fmu") or (kind is None and str(output or "").endswith(".fmu")):
         return _export_native(result, kind, output, strict=strict, force=force,
-                              allow_code=allow_code, as_json=as_json, **of_native)  # fmt: skip
+                              allow_code=allow_code, **of_native)  # fmt: skip
     words = {"quantities": "--quantity", "parameters": "--parameter", "platforms": "--platform"}
     for name, value in of_native.items():
         if value:
             raise Refused(f"{words.get(name, f'--{name}')} is of formats c and fmu")
     if kind is not None and kind not in result_exporters():
-        return _export_model(result, kind, output, strict=strict, force=force, as_json=as_json)
-    return _export_result(result, kind, output, fps=fps, model=model, allow_code=allow_code,
-                          force=force, as_json=as_json, quiet=quiet)  # fmt: skip
+        return _export_model(result, kind, output, strict=strict, force=force)
+    return _export_result(
+        result, kind, output, fps=fps, model=model, allow_code=allow_code, force=force
+    )
 
 
 def _export_result(
     result: str, kind: str | None, output: str | None, *, fps: float | None, model: str | None,
-    allow_code: bool, force: bool, as_json: bool, quiet: bool,
+    allow_code: bool, force: bool,
 ) -> int:  # fmt: skip
     """Write a result by an exporter of a plugin."""
     from dap3d_core import export as write
@@ -116,35 +116,28 @@ def _export_result(
         ),
     )
     try:
-        with (
-            counting("part", quiet=quiet or as_json) as progress,
-            refusing(ValueError, ResultError),
-        ):
+        with counting("part") as progress, refusing(ValueError, ResultError):
             made = write(opened, target, format=kind, fps=fps, model=model, progress=progress,
                          force=force)  # fmt: skip
     except KeyboardInterrupt:
         stderr().say(f"interrupted; {target} was not written", "bold red")
         return INTERRUPTED
     data = {"format": made.format, "instants": made.instants}
-    show_written(target, count(made.instants, "instant"), data, made.notes, as_json=as_json,
-                 quiet=quiet)  # fmt: skip
+    show_written(target, count(made.instants, "instant"), data, made.notes)
     return DONE
 
 
-def _export_model(
-    model: str, kind: str, output: str | None, *, strict: bool, force: bool, as_json: bool
-) -> int:
+def _export_model(model: str, kind: str, output: str | None, *, strict: bool, force: bool) -> int:
     """Write a model by an exporter of a plugin."""
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.cli.framework.paths import writable
     from dap3d_core.registry.extensions import extensions
-    from dap3d_core.registry.suggestions import nearest
+    from dap3d_core.registry.suggestions import did_you_mean
 
     formats = extensions("exporter")
     if kind not in formats.keywords:
-        near = nearest(kind, known := [*formats.keywords, "c", "fmu"])
-        hint = f"did you mean {near!r}? " if near else ""
+        hint = did_you_mean(kind, known := [*formats.keywords, "c", "fmu"], "{} ")
         raise Refused(f"--format {kind}: unknown; {hint}formats: {', '.join(known)}")
     scene = dap.load(model)
     suffix = formats.load(kind).suffix
@@ -157,7 +150,7 @@ def _export_model(
     remarks = {
         key: [one.text for one in getattr(report, key)] for key in ("translated", "left_out")
     }
-    if as_json:
+    if prints_json():
         print_json({"file": target, "format": kind} | remarks)
         return DONE
     console = stdout()
@@ -183,7 +176,6 @@ def _export_native(
     strict: bool,
     force: bool,
     allow_code: bool,
-    as_json: bool,
 ) -> int:
     """Write a model as a C library or an FMU."""
     import dap3d_core as dap
@@ -210,7 +202,7 @@ def _export_native(
         "file": str(target), "format": kind, "platforms": made.platforms, "inputs": made.inputs,
         "parameters": made.parameters, "outputs": made.outputs, "left_out": made.left_out,
     }  # fmt: skip
-    if as_json:
+    if prints_json():
         print_json(data)
         return DONE
     console = stdout()

@@ -36,7 +36,7 @@ TABLES = (
     options.JSON,
     saves=True,
 )  # fmt: skip
-def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json: bool) -> int:
+def import_matlab(folder: str, *, output: str, force: bool, stub: bool) -> int:
     """Make a scene of a model of the MATLAB program DAP3D, as ``dap3d import FOLDER`` does.
 
     FOLDER holds the files of the model: inBodies.m, inPoints.m, inVectors1.m, inVectors2.m,
@@ -52,12 +52,10 @@ def import_matlab(folder: str, *, output: str, force: bool, stub: bool, as_json:
     scene, report = dap.import_matlab(folder)
     path = Path(output)
     path = path / "scene.toml" if path.is_dir() else path
-    return write_folder(scene, report, path, force=force, stub=stub, as_json=as_json)
+    return write_folder(scene, report, path, force=force, stub=stub)
 
 
-def write_folder(
-    scene: "Scene", report: Any, path: Path, *, force: bool, stub: bool, as_json: bool
-) -> int:
+def write_folder(scene: "Scene", report: Any, path: Path, *, force: bool, stub: bool) -> int:
     """Write the scene of a folder, a plugin.py to be filled in, and the report."""
     import attrs
 
@@ -74,8 +72,7 @@ def write_folder(
         write_text(plugin, report.stub)
     holds = {table: len(getattr(scene, table)) for table, _, _ in TABLES}
     data = {"scene": target, "plugin": plugin, "holds": holds, **attrs.asdict(report)}
-    show_data(data, lambda console: _show(console, scene, report, target, plugin, stub=stub),
-              as_json=as_json)  # fmt: skip
+    show_data(data, lambda console: _show(console, scene, report, target, plugin, stub=stub))
     return DONE
 
 
@@ -110,7 +107,6 @@ def _show(
 
 
 def _show_user_force(console: "Terminal", report: Any, plugin: Path | None) -> None:
-
     console.title("user_force.m (not translated)")
     console.say(report.user_force.strip("\n"), indent=4, whole=True)
     if plugin is not None:

@@ -59,21 +59,12 @@ def import_model(
     output: str | None,
     kind: str | None,
     packages: tuple[str, ...],
-    root: str | None,
-    key: str | None,
     positions: tuple[str, ...],
-    limits: str,
-    contacts: bool,
-    free_base: bool,
-    keep_fixed: bool,
-    balance_inertia: bool,
     no_shapes: bool,
-    strict: bool,
-    allow_code: bool,
     arguments: tuple[str, ...],
     stub: bool,
     force: bool,
-    as_json: bool,
+    **given: Any,
 ) -> int:
     """Make a scene of a model of another program.
 
@@ -92,10 +83,8 @@ def import_model(
     from dap3d_core.formats.import_model import ImportReport
 
     scene, report = dap.import_model(
-        file, format=kind, packages=_pairs("--package", packages), root=root, free_base=free_base,
-        keep_fixed=keep_fixed, balance_inertia=balance_inertia, limits=limits,
-        contacts=contacts, shapes=not no_shapes, strict=strict, allow_code=allow_code,
-        arguments=_pairs("--arg", arguments, ":="), key=key, positions=_numbers(positions),
+        file, format=kind, packages=_pairs("--package", packages), shapes=not no_shapes,
+        arguments=_pairs("--arg", arguments, ":="), positions=_numbers(positions), **given,
     )  # fmt: skip
     folder = Path(output or Path(file).resolve().stem)
     if folder.is_file():
@@ -104,11 +93,10 @@ def import_model(
     if not isinstance(report, ImportReport):
         from dap3d_core.cli.commands.import_matlab import write_folder
 
-        return write_folder(scene, report, folder / "scene.toml", force=force, stub=stub,
-                            as_json=as_json)  # fmt: skip
+        return write_folder(scene, report, folder / "scene.toml", force=force, stub=stub)
     target = _save(scene, report, folder, Path(file), force=force)
     data = {"scene": target} | _as_data(report)
-    show_data(data, lambda console: _show(console, scene, report, target), as_json=as_json)
+    show_data(data, lambda console: _show(console, scene, report, target))
     return DONE
 
 

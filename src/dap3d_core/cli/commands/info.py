@@ -5,19 +5,20 @@ from pathlib import Path
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, refusing
+from dap3d_core.cli.process.streams import prints_json
 
 
 @command("Describe a result file.", options.RESULT, options.JSON)
-def info(result: str, *, as_json: bool) -> int:
+def info(result: str) -> int:
     """Describe a RESULT file, or that of a sweep: its contents, and how the run ended."""
     from dap3d_core.study.sweep.dataset import is_sweep
 
     show = _show_sweep if is_sweep(result) else _show_run
-    show(result, as_json)
+    show(result)
     return DONE
 
 
-def _show_sweep(file: str, as_json: bool) -> None:
+def _show_sweep(file: str) -> None:
     import dap3d_core as dap
     from dap3d_core.cli.console.console import print_json, size, stdout
     from dap3d_core.cli.console.sweep_tables import show_failing, show_sweep, sweep_data
@@ -27,14 +28,14 @@ def _show_sweep(file: str, as_json: bool) -> None:
         data = sweep_data(dataset)
         text = dataset.attrs["scene"]
     byte_count = Path(file).stat().st_size
-    if as_json:
+    if prints_json():
         print_json({"file": file, "size_bytes": byte_count, **data, "scene_text": text})
         return
     show_sweep(stdout(), data, f"{file}, {size(byte_count)}")
     show_failing(stdout(), data, "--json has them")
 
 
-def _show_run(file: str, as_json: bool) -> None:
+def _show_run(file: str) -> None:
     from dap3d_core.cli.console.console import count, print_json, scene_name, size, stdout
     from dap3d_core.cli.console.run_summary import run_data, run_pairs, show_details
     from dap3d_core.cli.framework.paths import open_result
@@ -51,7 +52,7 @@ def _show_run(file: str, as_json: bool) -> None:
         "shape_contacts": len(result.record.contacts),
         "point_names": summary.point_names,
     }
-    if as_json:
+    if prints_json():
         about = {"file": file, "size_bytes": byte_count}
         print_json({**about, **data, **names, "scene_text": result.scene_text})
         return

@@ -36,8 +36,6 @@ def inverse(
     strict: bool,
     force: bool,
     allow_code: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Find the forces of actuators that produce a MOTION of a MODEL, and write them as a result.
 
@@ -66,5 +64,5 @@ def inverse(
         )
 
     outcome = execute_scene(ctx, scene, find, {"actuators": "--actuators", "motion": "MOTION"},
-                            allow_code=allow_code, quiet=quiet)  # fmt: skip
-    return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
+                            allow_code=allow_code)  # fmt: skip
+    return report_run(outcome, model, target, strict=strict)

@@ -1,6 +1,6 @@
 """``dap3d kinematics``: the motion that drivers prescribe, and the forces that it takes."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -31,14 +31,10 @@ def kinematics(
     model: str,
     *,
     output: str | None,
-    t_end: float | None,
-    dt: float | None,
-    over: str | None,
     strict: bool,
     force: bool,
     allow_code: bool,
-    as_json: bool,
-    quiet: bool,
+    **given: Any,
 ) -> int:
     """Find the motion of a MODEL whose drivers fix every freedom, and write it as a result.
 
@@ -58,14 +54,14 @@ def kinematics(
     scene = dap.load(model)
     target = named_after(model, output, "-kinematics")
     writable(target, force=force, sources=(scene.path,), kinds=RESULTS)
-    options.check_settings(scene, {**dict.fromkeys(options.SETTINGS), "t_end": t_end, "dt": dt})
+    options.check_settings(scene, dict.fromkeys(options.SETTINGS) | given)
 
     def find(compiled: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":
         return dap.kinematics(
-            compiled, t_end=t_end, dt=dt, over=over, progress=progress_of(watch),
-            allow_code=allow_code, announce=announce, output=target, force=force,
+            compiled, progress=progress_of(watch), allow_code=allow_code, announce=announce,
+            output=target, force=force, **given,
         )  # fmt: skip
 
     outcome = execute_scene(ctx, scene, find, {"over": "--over", "t_end": "--t-end", "dt": "--dt"},
-                            allow_code=allow_code, quiet=quiet)  # fmt: skip
-    return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
+                            allow_code=allow_code)  # fmt: skip
+    return report_run(outcome, model, target, strict=strict)

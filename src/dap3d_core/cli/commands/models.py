@@ -7,16 +7,17 @@ from typing import Any
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE
+from dap3d_core.cli.process.streams import prints_json
 
 
 @command("List the shipped models.", options.JSON)
-def models(*, as_json: bool) -> int:
+def models() -> int:
     """List the shipped models."""
     from dap3d_core.cli.console.console import print_json, stdout
     from dap3d_core.scene import shipped_models
 
     data = {name: _data(folder) for name, folder in shipped_models().items()}
-    if as_json:
+    if prints_json():
         print_json({"models": data})
         return DONE
     console = stdout()

@@ -63,7 +63,6 @@ def modes(
     output: str | None,
     force: bool,
     allow_code: bool,
-    as_json: bool,
 ) -> int:
     """Linearise a MODEL about a state, and list its modes, the lowest first.
 
@@ -93,7 +92,7 @@ def modes(
     if over is not None:
         if not (start is None and output is None):
             raise Refused("--over does not go with --from, --mode and -o: it is about many starts")
-        return _over(scene, over, time, number, plot, locus, force, allow_code, as_json)
+        return _over(scene, over, time, number, plot, locus, force, allow_code)
     at, t = state_of(start, allow_code) if start else (None, time or 0.0)
     with refusing(dap.SimulationError):
         found = dap.linearize(scene, at=at, t=t, modes=number, allow_code=allow_code)
@@ -103,13 +102,13 @@ def modes(
         with refusing(IndexError):
             found.motion((mode or 1) - 1).save(output, force=force)
     total = len(found.mode_eigenvalues)
-    show_data(data, lambda console: _show(console, data, total), *targets, as_json=as_json)
+    show_data(data, lambda console: _show(console, data, total), *targets)
     return DONE
 
 
 def _over(
     scene: "Scene", over: str, time: float | None, number: int | None, plot: str | None,
-    locus: bool, force: bool, allow_code: bool, as_json: bool,
+    locus: bool, force: bool, allow_code: bool,
 ) -> int:  # fmt: skip
     """Follow the modes over a parameter, and report them."""
     from dap3d_core.cli.console.console import show_data
@@ -117,7 +116,7 @@ def _over(
     found = find_modes_over(scene, over, time, number or LISTED, allow_code=allow_code)
     _draw(found, ["eigenvalues" if locus else "frequencies"], plot, force=force)
     data = data_of(scene.name, found)
-    show_data(data, lambda console: show(console, scene.name, found), plot, as_json=as_json)
+    show_data(data, lambda console: show(console, scene.name, found), plot)
     return DONE
 
 

@@ -16,6 +16,7 @@ import click
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, Refused
+from dap3d_core.cli.process.streams import prints_json
 from dap3d_core.interface.hooks import EXTENSIONS, GROUPS
 
 #: Keywords after which a distribution and a module can be named.
@@ -41,9 +42,7 @@ OWN = "dap3d_core"
     options.JSON,
     saves=True,
 )  # fmt: skip
-def new_plugin(
-    name: str, *, kind: str, output: str | None, author: str | None, force: bool, as_json: bool
-) -> int:
+def new_plugin(name: str, *, kind: str, output: str | None, author: str | None, force: bool) -> int:
     """Write a package that brings a type of a joint, a force, a function or a contact.
 
     Or an integrator, an importer or exporter of models, a kind of shape: --kind says which.
@@ -65,7 +64,7 @@ def new_plugin(
     _write(folder, texts)
     commands = [f"cd {shlex.quote(str(folder))}", 'pip install -e ".[test]"',
                 f"dap3d check-plugin {name}", about["command"], "pytest"]  # fmt: skip
-    if as_json:
+    if prints_json():
         print_json({"keyword": name, "kind": kind, "folder": folder, "files": list(texts),
                     "module": names["module"], "next": commands})  # fmt: skip
         return DONE

@@ -49,8 +49,6 @@ def plot(
     width: float | None,
     height: float | None,
     force: bool,
-    as_json: bool,
-    quiet: bool,
     **types: Any,
 ) -> int:
     """Draw quantities of a RESULT, or outputs of a sweep: by default energies or all outputs.
@@ -95,7 +93,7 @@ def plot(
     if target is not None:
         about = {"results": files, "quantities": names} | _drawn(data, axes)
         notes = [note for note in _notes_of(data) if note not in earlier]
-        show_written(target, ", ".join(names), about, notes, as_json=as_json, quiet=quiet)
+        show_written(target, ", ".join(names), about, notes)
     return DONE
 
 

@@ -7,6 +7,7 @@ import click
 from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command
 from dap3d_core.cli.process.exit_codes import DONE, FAILED, Refused
+from dap3d_core.cli.process.streams import prints_json
 
 if TYPE_CHECKING:
     from dap3d_core.registry import PluginInfo
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     click.option("--test", is_flag=True, help="Check formulas, and run the tests of packages."),
     options.JSON,
 )  # fmt: skip
-def plugins(*, no_compile: bool, limit: float | None, test: bool, as_json: bool) -> int:
+def plugins(*, no_compile: bool, limit: float | None, test: bool) -> int:
     """List the types of joints, forces and functions that are installed, and what else packages
     bring: importers, exporters, integrators and shapes.
 
@@ -42,12 +43,12 @@ def plugins(*, no_compile: bool, limit: float | None, test: bool, as_json: bool)
     if test:
         if no_compile or limit is not None:
             raise Refused("--no-compile and --limit are of the list; leave them out with --test")
-        return _test(as_json=as_json)
+        return _test()
     registry = dap.load_registry()
     limit_s = limit or LOAD_LIMIT
     types = registry.listing(compiling=not no_compile, limit_s=limit_s)
     types += extension_listing(limit_s)
-    if as_json:
+    if prints_json():
         print_json({"types": [attrs.asdict(t) for t in types], "notes": registry.notes})
         return DONE
     console = stdout()
@@ -59,7 +60,7 @@ def plugins(*, no_compile: bool, limit: float | None, test: bool, as_json: bool)
     return DONE
 
 
-def _test(*, as_json: bool) -> int:
+def _test() -> int:
     """Check and test all that is installed; prints each package as it is done."""
     import attrs
 
@@ -70,7 +71,7 @@ def _test(*, as_json: bool) -> int:
     console, reports = stdout(), []
     for report in check_packages(dap.load_registry(), stderr().say):
         reports.append(report)
-        if as_json:
+        if prints_json():
             continue
         console.title(f"{report.name} {report.version}".strip())
         wrong = [t for t in report.types if not t.ok]
@@ -86,7 +87,7 @@ def _test(*, as_json: bool) -> int:
         for line in tests.output.splitlines():
             console.say(line, indent=4, whole=True)
     good = all(report.ok for report in reports)
-    if as_json:
+    if prints_json():
         data = [
             {**attrs.asdict(report), "ok": report.ok,
              "types": [{**attrs.asdict(one), "ok": one.ok} for one in report.types]}

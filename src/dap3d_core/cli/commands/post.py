@@ -43,7 +43,6 @@ def post(
     model: str | None,
     allow_code: bool,
     force: bool,
-    as_json: bool,
 ) -> int:
     """Compute the arrays of the manual's post-processor from a RESULT.
 
@@ -87,7 +86,7 @@ def post(
     instants = len(opened.t)
     contents = f"{instants} instants, {len(arrays)} {'columns' if kind == 'csv' else 'arrays'}"
     data = {"format": kind, "instants": instants, "arrays": arrays}
-    show_written(target, contents, data, notes, as_json=as_json)
+    show_written(target, contents, data, notes)
     return DONE
 
 

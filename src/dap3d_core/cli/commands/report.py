@@ -53,7 +53,6 @@ def report(
     csv_file: str | None,
     output: str | None,
     force: bool,
-    as_json: bool,
     **given: Any,
 ) -> int:
     """Measure speed against error of every method and integrator that fits a MODEL.
@@ -76,14 +75,14 @@ def report(
     scene = dap.load(model)
     files = {"picture": picture, "csv": csv_file, "json": output}
     targets = _targets(files, scene.path, force=force)
-    measured, code = _measure(ctx, scene, given, quiet=as_json)
+    measured, code = _measure(ctx, scene, given)
     written = _write(measured, targets, force=force)
 
     def show(console: "Terminal") -> None:
         with_target = given["target_error"] is not None
         show_report(console, measured, _run_command(model, given), with_target=with_target)
 
-    show_data({"model": model, **measured.to_dict()}, show, *written, as_json=as_json)
+    show_data({"model": model, **measured.to_dict()}, show, *written)
     if code != exit_codes.DONE:
         stderr().say("ended early; what was measured until then is above", "bold red")
     return code
@@ -111,16 +110,14 @@ def _targets(
     return targets
 
 
-def _measure(
-    ctx: click.Context, scene: "Scene", given: dict[str, Any], *, quiet: bool
-) -> tuple["Report", int]:
+def _measure(ctx: click.Context, scene: "Scene", given: dict[str, Any]) -> tuple["Report", int]:
     """The report and an exit code; a report that ends early has what was measured."""
     import dap3d_core as dap
     from dap3d_core.cli.console.report_tables import ReportProgress
     from dap3d_core.result import Computed
 
     settings: dict[str, Any] = {name: None if v == () else v for name, v in given.items()}
-    with ReportProgress(quiet=quiet) as progress, refusing(ValueError):
+    with ReportProgress() as progress, refusing(ValueError):
         try:
             work = signals_of(ctx).interruptible(progress.work)
             measured = dap.report(scene, progress=work, announce=progress.announce, **settings)

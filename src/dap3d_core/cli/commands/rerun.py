@@ -8,6 +8,7 @@ from dap3d_core.cli.framework import options
 from dap3d_core.cli.framework.command import command, signals_of
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import refusing
+from dap3d_core.cli.process.streams import is_quiet, prints_json
 
 if TYPE_CHECKING:
     from dap3d_core.simulation.rerun import Reproduction
@@ -24,8 +25,6 @@ def rerun(
     model: str | None,
     *,
     allow_code: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Repeat the run of a RESULT and compare, bit for bit.
 
@@ -39,23 +38,23 @@ def rerun(
     from dap3d_core.result import ResultError
 
     first = open_result(result)
-    with ProgressBar(quiet=quiet) as progress, refusing(ResultError):
+    with ProgressBar(quiet=is_quiet()) as progress, refusing(ResultError):
         watch = signals_of(ctx).interruptible(progress.advance)
         repetition = dap.rerun(
             first, model=model, allow_code=allow_code, watch=watch, announce=progress.announce
         )
     code = exit_codes.DONE if repetition.equal else exit_codes.FAILED
-    if as_json:
+    if prints_json():
         data = {name: getattr(repetition, name) for name in ("equal", "instants", "differences")}
         versions = {n: {"result": a, "here": b} for n, (a, b) in repetition.versions.items()}
         about = {"types": repetition.types, "versions": versions, "exit_code": code}
         print_json({"file": result, **data, **about})
     else:
-        _show(repetition, result, quiet=quiet)
+        _show(repetition, result)
     return code
 
 
-def _show(repetition: "Reproduction", result: str, *, quiet: bool) -> None:
+def _show(repetition: "Reproduction", result: str) -> None:
     from dap3d_core.cli.console.console import stderr, stdout
 
     compared = f"{repetition.instants:,} instants compared"
@@ -63,7 +62,7 @@ def _show(repetition: "Reproduction", result: str, *, quiet: bool) -> None:
     if not repetition.equal:
         console.say(f"{result}: repeated, not equal; {compared}", "bold red")
         console.items([f"{n}: differs by up to {x:.3g}" for n, x in repetition.differences.items()])
-    elif not quiet:
+    elif not is_quiet():
         stdout().say(f"{result}: repeated, equal bit for bit; {compared}", "green")
     if repetition.types:
         console.say(f"the formulas of {', '.join(repetition.types)} have changed since")

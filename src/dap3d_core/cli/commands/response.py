@@ -12,7 +12,7 @@ from dap3d_core.cli.process.exit_codes import DONE, Refused, refusing
 if TYPE_CHECKING:
     from dap3d_core.cli.console.console import Terminal
     from dap3d_core.kernels.array_types import Floats
-    from dap3d_core.simulation.linearization.frequency_response import Complex
+    from dap3d_core.simulation.linearization.eigenvalues import Complex
     from dap3d_core.simulation.linearization.linearization import Linearization
 
 #: Frequencies by default, evenly spaced by their logarithms; more stand about each mode.
@@ -54,7 +54,6 @@ def response(
     target: str | None,
     force: bool,
     allow_code: bool,
-    as_json: bool,
 ) -> int:
     """Linearise a MODEL about a state, and list the peaks of its frequency responses.
 
@@ -89,7 +88,7 @@ def response(
         picture = BodePicture(frequencies, found, inputs, outputs)
         save_figure(picture.draw, Path(target), (WIDTH, picture.height), 200.0, force=force)
     data = _data(scene.name, lin, frequencies, found)
-    show_data(data, lambda console: _show(console, data), target, as_json=as_json)
+    show_data(data, lambda console: _show(console, data), target)
     return DONE
 
 

@@ -38,8 +38,6 @@ def resume(
     allow_code: bool,
     strict: bool,
     force: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Continue a run from its CHECKPOINT.
 
@@ -69,6 +67,6 @@ def resume(
         with refusing(CheckpointError):  # a fault of the file that shows as it is restored
             return resumed[0].execute(output, force=force, checkpoint=every, watch=watch)
 
-    outcome = execute(ctx, prepare, run, quiet=quiet)
+    outcome = execute(ctx, prepare, run)
     target = Path(output) if output is not None else resumed[0].output
-    return report_run(outcome, checkpoint, target, strict=strict, as_json=as_json, quiet=quiet)
+    return report_run(outcome, checkpoint, target, strict=strict)

@@ -47,8 +47,6 @@ def run(
     strict: bool,
     force: bool,
     allow_code: bool,
-    as_json: bool,
-    quiet: bool,
     **given: Any,
 ) -> int:
     """Simulate a MODEL and write its result.
@@ -82,8 +80,8 @@ def run(
         )
 
     outcome = execute_scene(ctx, scene, simulate, names, method=given["method"],
-                            allow_code=allow_code, quiet=quiet)  # fmt: skip
-    return report_run(outcome, model, target, strict=strict, as_json=as_json, quiet=quiet)
+                            allow_code=allow_code)  # fmt: skip
+    return report_run(outcome, model, target, strict=strict)
 
 
 def _start(

@@ -38,7 +38,6 @@ def sensitivities(
     output: str | None,
     force: bool,
     allow_code: bool,
-    as_json: bool,
     **settings: Any,
 ) -> int:
     """Simulate a MODEL, and list exact derivatives at the end of the run by parameters.
@@ -64,7 +63,7 @@ def sensitivities(
         data = _data(scene.name, found, quantities)
     if output is not None:
         _write(found, quantities, Path(output), force=force)
-    show_data(data, lambda console: _show(console, data), output, as_json=as_json)
+    show_data(data, lambda console: _show(console, data), output)
     return DONE
 
 
@@ -123,8 +122,8 @@ def _write(
     if target.suffix.lower() == ".nc":
         found.save(target, quantities, force=force)
         return
+    from dap3d_core.plot.figure import SensitivityPicture
     from dap3d_core.plot.figure_file import save_figure
-    from dap3d_core.plot.sensitivities import SensitivityPicture
     from dap3d_core.plot.style import WIDTH
 
     picture = SensitivityPicture(found, quantities)

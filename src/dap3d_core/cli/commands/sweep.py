@@ -10,6 +10,7 @@ from dap3d_core.cli.framework import completion, options
 from dap3d_core.cli.framework.command import command, signals_of
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import Refused
+from dap3d_core.cli.process.streams import is_quiet, prints_json
 
 if TYPE_CHECKING:
     import xarray
@@ -64,8 +65,6 @@ def sweep(
     output: str | None,
     scheduler: str | None,
     strict: bool,
-    as_json: bool,
-    quiet: bool,
     **given: Any,
 ) -> int:
     """Run a MODEL at many combinations of its parameters and store some outputs of each run.
@@ -90,13 +89,12 @@ def sweep(
     target = named_after(model, output, "-sweep")
     writable(target, force=given["force"], sources=(scene.path,), kinds=RESULTS)
     code, reason = exit_codes.DONE, ""
-    with PointsProgress(quiet=quiet) as progress:
+    with PointsProgress(quiet=is_quiet()) as progress:
         try:
             dataset = _sweep(ctx, scene, target, scheduler, progress, given)
         except (Exception, KeyboardInterrupt) as error:
             dataset, code, reason = partial_result(ctx, error)
-    return _report(ctx, dataset, target, progress, code, reason, strict=strict, as_json=as_json,
-                   quiet=quiet)  # fmt: skip
+    return _report(ctx, dataset, target, progress, code, reason, strict=strict)
 
 
 def _complete(ctx: click.Context, given: dict[str, Any], scheduler: str | None) -> None:
@@ -170,8 +168,6 @@ def _report(
     reason: str,
     *,
     strict: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Report a sweep; returns the exit code."""
     from dap3d_core.cli.console.console import print_json, stderr, stdout
@@ -186,10 +182,10 @@ def _report(
     elif not reason and strict and data["stopped"] + data["failed"]:
         code = exit_codes.FAILED
     console = stderr()
-    if as_json:
+    if prints_json():
         print_json({"file": str(file), **data, "reason": reason, "exit_code": code})
     else:
-        if not quiet:
+        if not is_quiet():
             show_sweep(stdout(), data, str(file))
         show_failing(console, data, f"dap3d info {shlex.quote(str(file))} --json has them")
     if reason:

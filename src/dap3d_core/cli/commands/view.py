@@ -38,8 +38,6 @@ def view(
     opens: bool,
     play: bool,
     force: bool,
-    as_json: bool,
-    quiet: bool,
 ) -> int:
     """Make a page of a RESULT or a sweep: the moving scene, plots, the ledger, settings.
 
@@ -66,7 +64,7 @@ def view(
         raise Refused(f"cannot write {target}: a page is a .html file")
     check_target = partial(writable, target, force=force, sources=(Path(result),))
     data = _data(result, quantities, check_target, model=model, allow_code=allow_code)
-    with PointsProgress(quiet=quiet or as_json) as progress, refusing(UnknownNameError, ValueError):
+    with PointsProgress() as progress, refusing(UnknownNameError, ValueError):
         count = signals_of(ctx).interruptible(progress.count)
         page = make_view(data, *quantities, fps=fps, play=play, model=model, allow_code=allow_code,
                          progress=count, announce=progress.announce)  # fmt: skip
@@ -77,7 +75,7 @@ def view(
         about["points"] = len(page.data["sweep"]["points"])
         contents = f"{about['points']} points"
     notes = page.data["about"]["view_notes"]
-    show_written(target, contents, about, notes, as_json=as_json, quiet=quiet)
+    show_written(target, contents, about, notes)
     if opens:
         _open(target)
     return DONE

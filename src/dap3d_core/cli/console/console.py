@@ -17,7 +17,13 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from dap3d_core.cli.process.streams import json_stream, leave_stderr, leave_stdout
+from dap3d_core.cli.process.streams import (
+    is_quiet,
+    json_stream,
+    leave_stderr,
+    leave_stdout,
+    prints_json,
+)
 
 #: Bits of an integer; Python refuses to write more than some 14000 of them in decimal digits.
 LONGEST_INTEGER = 4096
@@ -204,16 +210,13 @@ def show_written(
     contents: str,
     data: Mapping[str, Any],
     notes: Sequence[str] = (),
-    *,
-    as_json: bool,
-    quiet: bool = False,
 ) -> None:
     """Report a file that was written: its contents in words, or the same as JSON data."""
     byte_count = target.stat().st_size
-    if as_json:
+    if prints_json():
         about = {"file": str(target), "size_bytes": byte_count}
         print_json({**about, **data, "notes": list(notes)})
-    elif not quiet:
+    elif not is_quiet():
         stderr().items(notes)
         stdout().say(f"{target} written ({size(byte_count)}): {contents}", whole=True)
 
@@ -222,13 +225,11 @@ def show_data(
     data: Any,
     show: Callable[[Terminal], None],
     *written: str | Path | None,
-    as_json: bool,
-    quiet: bool = False,
 ) -> None:
     """Print data as JSON, or what ``show`` prints of it and the files that were written."""
-    if as_json:
+    if prints_json():
         print_json(data)
-    elif not quiet:
+    elif not is_quiet():
         console = stdout()
         show(console)
         for target in filter(None, written):

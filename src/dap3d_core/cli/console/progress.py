@@ -19,6 +19,7 @@ from rich.progress import (
 from rich.text import Text
 
 from dap3d_core.cli.console.console import Terminal, clean, seconds, stderr
+from dap3d_core.cli.process.streams import is_quiet, prints_json
 
 if TYPE_CHECKING:
     from dap3d_core.simulation import RunProgress
@@ -55,16 +56,19 @@ class _Waiting:
 
 
 class PreparationProgress:
-    """Context manager that shows on stderr the preparation of a model."""
+    """Context manager that shows on stderr the preparation of a model.
 
-    def __init__(self, *, quiet: bool) -> None:
+    ``quiet``: shows nothing, as by default with --quiet and --json.
+    """
+
+    def __init__(self, *, quiet: bool | None = None) -> None:
         self._console: Terminal = stderr()
-        self._quiet = quiet
+        self._quiet = is_quiet() or prints_json() if quiet is None else quiet
         self._task: Any = None
         self._announced = False
         self._waiting: _Waiting | None = None
         self._next_line = FIRST_LINE
-        self._bar = None if quiet or not _is_live(self._console) else self._make_bar()
+        self._bar = None if self._quiet or not _is_live(self._console) else self._make_bar()
 
     def _make_bar(self) -> Progress:
         """The line on a terminal: a description in words."""
@@ -126,10 +130,8 @@ class PreparationProgress:
 class ProgressBar(PreparationProgress):
     """Shows the progress of a run."""
 
-    def __init__(self, *, quiet: bool) -> None:
-        super().__init__(quiet=quiet)
-        self._begin: tuple[float, float] | None = None
-        self._reached = 0.0
+    _begin: tuple[float, float] | None = None
+    _reached = 0.0
 
     def advance(self, run: "RunProgress") -> None:
         """Show a snapshot of the run."""
@@ -154,10 +156,8 @@ class PointsProgress(PreparationProgress):
         elapsed: time for them in s.
     """
 
-    def __init__(self, *, quiet: bool) -> None:
-        super().__init__(quiet=quiet)
-        self._begin: tuple[float, int] | None = None
-        self.ran, self.elapsed = 0, 0.0
+    _begin: tuple[float, int] | None = None
+    ran, elapsed = 0, 0.0
 
     def count(self, done: int, total: int) -> None:
         """Show the number of points that are done."""
@@ -236,10 +236,10 @@ def _left(amount: float, rate: float) -> str:
 
 
 @contextmanager
-def counting(word: str, *, quiet: bool) -> Iterator[Callable[[int, int], None]]:
+def counting(word: str) -> Iterator[Callable[[int, int], None]]:
     """A bar on a terminal, unless quiet; yields a function of the number done and the total."""
     console = stderr()
-    if quiet or not _is_live(console):
+    if is_quiet() or prints_json() or not _is_live(console):
         yield lambda done, total: None
         return
     with bar_of(console) as bar:

@@ -23,8 +23,8 @@ PAUSE = 5.0
 class ReportProgress(ProgressBar):
     """Shows the progress of a report on stderr."""
 
-    def __init__(self, *, quiet: bool) -> None:
-        super().__init__(quiet=quiet)
+    def __init__(self) -> None:
+        super().__init__()
         self._last_line = time.monotonic()
         self._pause = PAUSE
 

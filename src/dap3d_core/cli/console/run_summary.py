@@ -23,6 +23,7 @@ from dap3d_core.cli.console.console import (
     stdout,
 )
 from dap3d_core.cli.process import exit_codes
+from dap3d_core.cli.process.streams import is_quiet, prints_json
 
 if TYPE_CHECKING:
     import numpy as np
@@ -158,9 +159,7 @@ def _correction(outcome: RunOutcome) -> dict[str, Any] | None:
     return correction_data(result.summary.body_names, outcome.compiled.model.u0, first)
 
 
-def report_run(
-    outcome: RunOutcome, model: str, target: Path, *, strict: bool, as_json: bool, quiet: bool
-) -> int:
+def report_run(outcome: RunOutcome, model: str, target: Path, *, strict: bool) -> int:
     """Report a run that was saved; returns the exit code."""
     from dap3d_core.result.note import warnings_of
 
@@ -171,14 +170,14 @@ def report_run(
     warnings = list(warnings_of(_split_notes(data)[1]))
     if strict and code == exit_codes.DONE and (violations or warnings):
         code = exit_codes.FAILED
-    if as_json:
+    if prints_json():
         about = {"model": model, "file": str(target), **data, "initial": initial}
         checkpoint = str(outcome.checkpoint) if outcome.checkpoint else None
         end = {"reason": outcome.reason, "checkpoint": checkpoint, "exit_code": code}
         print_json(about | end)
-    elif not quiet:
+    elif not is_quiet():
         _show_run(outcome, data, initial, target)
-    if quiet and not as_json:
+    if is_quiet() and not prints_json():
         stderr().items(violations, "red")
     if outcome.reason:
         _show_early_end(outcome, target)

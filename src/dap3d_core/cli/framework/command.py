@@ -8,7 +8,7 @@ import click
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.memory import check_memory
 from dap3d_core.cli.process.signals import SignalHandler
-from dap3d_core.cli.process.streams import stdout_fault
+from dap3d_core.cli.process.streams import prints_json, stdout_fault
 
 #: Decorator that adds an option or an argument to a function.
 Option = Callable[[Callable[..., Any]], Any]
@@ -88,6 +88,8 @@ class Command(click.Command):
         """Run the command; what it raises is reported and becomes an exit code."""
         debug = ctx.params.pop("debug") or bool(ctx.find_root().params.get("debug"))
         ctx.meta["dap3d.debug"] = debug
+        for name in ("as_json", "quiet"):
+            ctx.meta[f"dap3d.{name}"] = ctx.params.pop(name, False)
         try:
             with SignalHandler() as signals:
                 ctx.meta["dap3d.signals"] = signals
@@ -98,7 +100,7 @@ class Command(click.Command):
         except (Exception, KeyboardInterrupt) as error:
             from dap3d_core.cli.framework.error_messages import report_error
 
-            ctx.exit(report_error(error, debug=debug, as_json=bool(ctx.params.get("as_json"))))
+            ctx.exit(report_error(error, debug=debug, as_json=prints_json()))
 
     def _report_lost_output(self, ctx: click.Context, code: int) -> int:
         """The exit code of a finished command, after a message if its output was lost."""

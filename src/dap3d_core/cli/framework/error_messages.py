@@ -131,8 +131,7 @@ def _is_unexpected(error: BaseException) -> bool:
 def type_hint(name: str, names: list[str]) -> str:
     """The end of a message about an unknown type: how to install it, or the nearest name."""
     from dap3d_core.registry.discovery import not_yet_installed
-    from dap3d_core.registry.suggestions import nearest
+    from dap3d_core.registry.suggestions import did_you_mean
 
-    near = nearest(name, names)
-    hint = not_yet_installed(name) or (f"did you mean {near!r}?" if near else "")
+    hint = not_yet_installed(name) or did_you_mean(name, names)
     return f"; {hint}" if hint else ""

@@ -8,6 +8,7 @@ import click
 from dap3d_core.cli.framework.command import signals_of
 from dap3d_core.cli.process import exit_codes
 from dap3d_core.cli.process.exit_codes import Terminated, refusing
+from dap3d_core.cli.process.streams import is_quiet
 
 if TYPE_CHECKING:
     from dap3d_core.cli.console.run_summary import RunOutcome
@@ -26,7 +27,6 @@ def execute_scene(
     options_of: Mapping[str, str],
     *,
     allow_code: bool,
-    quiet: bool,
     method: str | None = "auto",
 ) -> "RunOutcome":
     """Compile a scene and run it, as ``execute``.
@@ -46,7 +46,7 @@ def execute_scene(
         except dap.SceneError as error:
             raise in_options(error, options_of) from error
 
-    return execute(ctx, prepare, named, quiet=quiet)
+    return execute(ctx, prepare, named)
 
 
 def progress_of(watch: "Watch") -> Callable[[float, float], None]:
@@ -60,8 +60,6 @@ def execute(
     ctx: click.Context,
     prepare: "Callable[[Announce], CompiledModel]",
     run: "Callable[[CompiledModel, Announce, Watch], Result]",
-    *,
-    quiet: bool,
 ) -> "RunOutcome":
     """Compile a model and run it; a run that ends early returns what it computed."""
     import dap3d_core as dap
@@ -69,7 +67,7 @@ def execute(
     from dap3d_core.cli.console.run_summary import RunOutcome
     from dap3d_core.result import Computed
 
-    with ProgressBar(quiet=quiet) as progress:
+    with ProgressBar(quiet=is_quiet()) as progress:
         with refusing(dap.SimulationError):  # a method that does not fit the scene
             compiled = prepare(progress.announce)
         progress.start()

@@ -6,10 +6,27 @@ import sys
 from collections.abc import Iterator
 from typing import TextIO
 
+import click
+
 #: Stdout while it is reserved for JSON.
 _json_stdout: TextIO | None = None
 #: Why stdout cannot be written, such as a full disk; None as long as it can.
 _fault: OSError | None = None
+
+
+def prints_json() -> bool:
+    """True if the running command prints one JSON object: --json."""
+    return _flag("as_json")
+
+
+def is_quiet() -> bool:
+    """True if the running command prints errors and warnings only: --quiet."""
+    return _flag("quiet")
+
+
+def _flag(name: str) -> bool:
+    ctx = click.get_current_context(silent=True)
+    return ctx is not None and bool(ctx.meta.get(f"dap3d.{name}"))
 
 
 def prepare_streams() -> None:

@@ -8,8 +8,13 @@ import attrs
 import numpy as np
 
 from dap3d_core.formats.import_scene.actuators import add_actuators, add_tendons
-from dap3d_core.formats.import_scene.couplings import add_couplings, add_rotor
-from dap3d_core.formats.import_scene.joints import add_joint, from_ground, named_ends
+from dap3d_core.formats.import_scene.joints import (
+    add_couplings,
+    add_joint,
+    add_rotor,
+    from_ground,
+    named_ends,
+)
 from dap3d_core.formats.import_scene.names import Names
 from dap3d_core.formats.import_scene.rigid_groups import (
     STAND_IN,

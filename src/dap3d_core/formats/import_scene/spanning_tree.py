@@ -14,7 +14,7 @@ from dap3d_core.interface.formats.joint_motion import (
 )
 from dap3d_core.interface.formats.remarks import FormatError
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import did_you_mean
 
 
 @attrs.frozen(eq=False)
@@ -123,8 +123,7 @@ def _children(placing: Mapping[str, Joint]) -> dict[str, list[str]]:
 def _check(model: Articulation, joint: Joint) -> None:
     for end in (joint.parent, joint.child):
         if end != WORLD and end not in model.links:
-            near = nearest(end, model.links)
-            hint = f"; did you mean {near!r}?" if near else ""
+            hint = did_you_mean(end, model.links, "; {}")
             raise FormatError(f"joint {joint.name}: there is no link {end!r}{hint}", joint.place)
     if joint.parent == joint.child:
         what = f"joint {joint.name}: parent and child are the same link, {joint.child}"

@@ -5,6 +5,8 @@ whose rows D^ give D^^T lambda = a^ - g^, six equations in scaled coordinates fo
 unknowns. What it does to the parent is taken from that one's, and so on.
 """
 
+import numpy as np
+
 from dap3d_core.assembly.arrays import Floats, System
 from dap3d_core.assembly.metric import in_body_axes, scaled
 from dap3d_core.formulations.joint.node_layout import (
@@ -76,7 +78,7 @@ def factor_products(D: Floats, block: int, rows: int, work: Floats) -> None:
                 s += D[block + 6 * r + c] * D[block + 6 * e + c]
             for c in range(e):
                 s -= work[6 * r + c] * work[6 * e + c]
-            work[6 * r + e] = s * work[6 * e + e] if e < r else 1.0 / s**0.5
+            work[6 * r + e] = s * work[6 * e + e] if e < r else 1.0 / np.sqrt(s)
 
 
 @compiled_into

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import attrs
 
-from dap3d_core.formulations import PROJECT, RHS, WATCH
+from dap3d_core.formulations import PROJECT, REPORT, RHS, WATCH
 from dap3d_core.kernels.compiler import objects
 from dap3d_core.kernels.compiler.background import optimiser
 from dap3d_core.kernels.runtime.cache import jit_is_on
@@ -26,13 +26,17 @@ if TYPE_CHECKING:
 
 #: Seconds in general code from which on a program is looked for in the cache folder, and made.
 LOAD_AFTER, MAKE_AFTER = 0.02, 0.25
+#: Those from which on the process that compiles them starts, to be there when one is written.
+START_AFTER = 0.15
 #: Whether another process compiles programs where it can, so that the run goes on.
 BESIDE = True
 #: Bodies of a scene at most: the program of a larger one would be too long.
 MOST_BODIES = 64
 #: Programs whose guards fail more often are given up: by the function, as parts of the right-hand
 #: sides, or projections, of the call.
-MOST_FAILURES = {WATCH: 0.5, PROJECT: 0.5, RHS: 0.05}
+MOST_FAILURES = {WATCH: 0.5, PROJECT: 0.5, REPORT: 0.5, RHS: 0.05}
+#: Reports for each right-hand side from which on they have a program.
+LEAST_REPORTS = 0.02
 #: At most, where projections take one way: made anew they take all.
 MOST_OF_ONE_WAY = 0.2
 
@@ -44,6 +48,7 @@ class Record:
     Attributes:
         programs: as ``load_programs`` returns them; empty as long as there are none.
         reason: why there are none and will be none; "" while there may be.
+        is_due: True if they are to be made, or made anew: those that there are run until then.
         is_requested: True if they are being compiled by another process.
         takes_all_ways: True if projections do (ways.py).
         first: where the first ones were made here, if projections alone have failed since.
@@ -52,14 +57,17 @@ class Record:
 
     programs: dict[int, Any] = attrs.field(factory=dict)
     reason: str = ""
+    is_due: bool = True
     is_requested: bool = False
     takes_all_ways: bool = False
     first: "tuple[float, Floats] | None" = None
     anew: "tuple[float, Floats] | None" = None
 
 
-#: Seconds that general code has taken, by a rough description of the scene; records by identity.
+#: Seconds that general code has taken, by a rough description of the scene, and whether it reported
+#: often; records by identity.
 _spent: dict[Any, float] = {}
+_reported: dict[Any, bool] = {}
 _records: dict[str, Record] = {}
 #: Held while a program is made, as several threads may need it at once.
 _making = threading.Lock()
@@ -84,6 +92,8 @@ class ChangeOver:
         sizes = model.body_count, model.row_count, len(evaluator.loop_groups)
         self._key = evaluator.method, *sizes, count
         takes_one = not model.breaks and (varied is None or not model.contact_count)
+        #: Contacts are read where a report has placed them; programs of reports leave nothing.
+        self._takes_reports = count == 1 and not model.contact_count
         self._is_open = jit_is_on() and takes_one and 0 < model.body_count <= MOST_BODIES
 
     def during(self, integration: Any, run: "Callable[[], object]") -> None:
@@ -93,8 +103,8 @@ class ChangeOver:
         """
         work = integration.work
 
-        def counts() -> tuple[int, int]:
-            return work.rhs_count, work.projection_count
+        def counts() -> tuple[int, int, int]:
+            return work.rhs_count, work.projection_count, work.report_count
 
         def start() -> "tuple[float, Floats]":
             state, of_elements = integration.trial, slice(-1 - self._evaluator.states.size, -1)
@@ -111,7 +121,7 @@ class ChangeOver:
         run: "Callable[[], object]",
         addresses: "Integers",
         start: "Start",
-        counts: "Callable[[], tuple[int, int]]",
+        counts: "Callable[[], tuple[int, int, int]]",
         *,
         needs_programs: bool = False,
     ) -> None:
@@ -123,7 +133,7 @@ class ChangeOver:
             run: the call.
             addresses: of the functions that it calls.
             start: gives a time, and a state as projections are given, where these are needed.
-            counts: right-hand sides and projections so far.
+            counts: right-hand sides, projections and reports so far.
             needs_programs: do not make it without them.
         """
         modes = self._modes(start)
@@ -136,6 +146,7 @@ class ChangeOver:
             clock = time.perf_counter()
             run()
             _spent[modes] = _spent.get(modes, 0.0) + time.perf_counter() - clock
+            _reported[modes] = counts()[REPORT] >= LEAST_REPORTS * counts()[RHS]
             return
         general, done = addresses.copy(), counts()
         replaced = [(k, programs[k]) for k in MOST_FAILURES if k in programs]
@@ -146,13 +157,16 @@ class ChangeOver:
             run()
         finally:
             addresses[:] = general
-        rhs, projections = (after - before for after, before in zip(counts(), done, strict=True))
+        called = [after - before for after, before in zip(counts(), done, strict=True)]
+        is_first = record.anew is None
         for (k, program), before in zip(replaced, failures, strict=True):
             is_final = record.takes_all_ways or record.anew is not None
             most = MOST_FAILURES[k] if is_final else min(MOST_FAILURES[k], MOST_OF_ONE_WAY)
-            most *= projections if k == PROJECT else rhs
+            most *= called[RHS if k == WATCH else k]
             if program.failures() - before > 1 + most:
                 _give_up(record, program, k, start())
+                if is_first:
+                    break
 
     def _modes(self, start: "Start") -> Any:
         """A rough description of the scene, with the modes of its contacts."""
@@ -178,16 +192,20 @@ class ChangeOver:
         name = self._names.get(modes)
         if name is None:
             of = start()[1].size, self._constants + repr(modes).encode(), self._varied
-            name = self._names[modes] = scene_program.name_of(self._evaluator, *of)
+            name = scene_program.name_of(self._evaluator, *of)
+            if self._takes_reports and _reported.get(modes, False):
+                name += scene_program.REPORTS
+            self._names[modes] = name
         record = _records.get(name)
-        if record is not None and record.programs:
-            return record
+        if record is not None and not record.is_due:
+            return record if record.programs else None
         with _making:
             record = _records.setdefault(name, Record())
-            if not (record.programs or record.reason):
+            if record.is_due:
                 try:
                     self._make(record, name, modes, start)
                 except Exception as error:  # the general code runs on, whatever it was
+                    record.is_due = False
                     record.reason = f"{type(error).__name__}: {error}"
         return record if record.programs else None
 
@@ -200,7 +218,10 @@ class ChangeOver:
             path.unlink(missing_ok=True)
         stored = None if path is None else objects.read_object(path)
         if stored is None:
-            if record.is_requested or _spent.get(modes, 0.0) < MAKE_AFTER:
+            spent = _spent.get(modes, 0.0)
+            if record.is_requested or spent < MAKE_AFTER:
+                if spent > START_AFTER and BESIDE and path is not None:
+                    optimiser.start()
                 return
             place, others = record.first or record.anew or start(), None
             if record.anew is None:
@@ -216,6 +237,7 @@ class ChangeOver:
             stored = written, objects.optimised(text, written, path)
         record.takes_all_ways = scene_program.ALL_WAYS in stored[0]
         record.programs = scene_program.load_programs(evaluator, name, *stored)
+        record.is_due = False
 
 
 def _give_up(record: Record, program: Any, k: int, place: "tuple[float, Floats]") -> None:
@@ -230,14 +252,13 @@ def _give_up(record: Record, program: Any, k: int, place: "tuple[float, Floats]"
         if record.programs.get(k) is not program:  # another thread was faster
             return
         others = {q: one for q, one in record.programs.items() if q != k}
+        if k == PROJECT:
+            from dap3d_core.formulations.programs.scene_program import BEHIND
+
+            others[PROJECT] = others.pop(BEHIND, program)
+        record.programs = {} if k == RHS else others
         if record.anew is None:
-            record.programs, record.anew, record.is_requested = {}, place, False
+            record.anew, record.is_due, record.is_requested = place, True, False
             record.first = record.first if k == PROJECT else None
         elif k == RHS:
-            record.programs, record.reason = {}, "guards fail: branches depend on the motion"
-        else:
-            if k == PROJECT:
-                from dap3d_core.formulations.programs.scene_program import BEHIND
-
-                others[PROJECT] = others.pop(BEHIND)
-            record.programs = others
+            record.is_due, record.reason = False, "guards fail: branches depend on the motion"

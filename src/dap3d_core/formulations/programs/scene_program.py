@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dap3d_core.assembly.arrays import Floats, Integers
-from dap3d_core.formulations import OUTCOMES, PROJECT, RHS, WATCH
+from dap3d_core.formulations import OUTCOMES, PROJECT, REPORT, RHS, WATCH
 from dap3d_core.formulations.evaluator import IGNORE_FLOAT_ERRORS, Evaluator
 from dap3d_core.formulations.programs.symbolic_arrays import (
     SymbolicSystem,
@@ -40,8 +40,13 @@ from dap3d_core.kernels.runtime.source_digest import origin
 BEHIND = -1
 #: Among the indices of what was written: projections take all ways (ways.py).
 ALL_WAYS = -2
-#: Instructions of a program at most: larger scenes gain less, and take long to compile.
-MOST_INSTRUCTIONS = 22_000
+#: End of the names of programs among which there is one of reports.
+REPORTS = "-r"
+#: Instructions of a program, and of that of reports, at most: larger scenes gain less, and take
+#: long to compile.
+MOST_INSTRUCTIONS, MOST_OF_REPORT = 22_000, 10_000
+#: Guards of a report at most: where rows depend on each other it decides many ranks.
+MOST_GUARDS = 150
 ARGUMENTS = "double %t, ptr %y, i64 %y.1, ptr %out, i64 %out.1, ptr %system, ptr %loops"
 
 _PROGRAM = """
@@ -124,6 +129,10 @@ def results(evaluator: Evaluator, k: int, t_now: Any, y: Any, outcome: Any, stru
             values = np.zeros(len(evaluator.switches), dtype=object)
             function(WATCH)(t_now, y, values, struct, loops)
             return values
+        if k == REPORT:
+            values = np.zeros(evaluator.report_size, dtype=object)
+            function(REPORT)(t_now, y, values, struct, loops)
+            return values
         rates = np.zeros(y.size, dtype=object)
         function(RHS)(t_now, y, rates, struct, loops)
         if k == RHS:
@@ -153,13 +162,14 @@ def write_program(
         names: of the program, its ``counter``, and the ``general`` function.
         head: the first block of its code.
         varied: as of ``constants``.
-        tracer: records the program; left out, one of at most ``MOST_INSTRUCTIONS``.
+        tracer: records the program; left out, one of as many instructions as it may have.
         others: of a projection, as of ``merged`` (ways.py).
 
     Raises:
-        TraceError: the program would be too long.
+        TraceError: the program would be too long, or have too many guards.
     """
-    tracer = tracer or StraightLine(MOST_INSTRUCTIONS)
+    most = MOST_OF_REPORT if k == REPORT else MOST_INSTRUCTIONS
+    tracer = tracer or StraightLine(most)
     first = np.array([1.0, *np.zeros(OUTCOMES - 1 + evaluator.length_count)])
 
     def trace(state: Floats) -> tuple[Results, Any]:
@@ -177,6 +187,8 @@ def write_program(
         return Results([(base, place) for base, place, _ in stores], [x for *_, x in stores]), y
 
     found, guard = merged(evaluator, tracer, trace, state, others if k == PROJECT else None)
+    if k == REPORT and len(tracer.guards) > MOST_GUARDS:
+        raise TraceError(f"takes more than {MOST_GUARDS} guards")
     body = tracer.taken_lines()
     for (base, place), x in zip(found.places, found.numbers, strict=True):
         tracer.store(base(), place, x)
@@ -272,7 +284,7 @@ def write_programs(
 
     Args:
         evaluator: of the scene, as a run begins.
-        name: of the programs.
+        name: of the programs; reports are among them where it ends in ``REPORTS``.
         time, state: where branches are decided.
         varied: as of ``constants``.
         others: of projections, as of ``merged`` (ways.py), unless that were too long.
@@ -282,7 +294,7 @@ def write_programs(
         TypeError, ValueError, ArithmeticError: the scene has none; says why.
     """
     entries = evaluator.functions.entries
-    found, general = programmed(evaluator), {}
+    found, general = [*programmed(evaluator), *([REPORT] * name.endswith(REPORTS))], {}
     texts, needs, written = list[str](), dict[str, str](), list[int]()
     for k in found:
         general[k] = _named(entries[k])
@@ -326,7 +338,7 @@ def load_programs(
     evaluator: Evaluator, name: str, written: list[int], code: bytes
 ) -> dict[int, Program]:
     """Programs from their object code, by the indices that were written."""
-    for k in programmed(evaluator):
+    for k in (*programmed(evaluator), REPORT):
         _named(evaluator.functions.entries[k])
     written = [k for k in written if k != ALL_WAYS]
     symbols = [symbols_of(name, k) for k in written]

@@ -78,14 +78,14 @@ class TypeInfo:
 
     @property
     def axis_slots(self) -> tuple[str, ...]:
-        """Slots whose body's axes it uses: as declared, or those whose A or p its kernels name."""
+        """Slots, and lists of bodies, whose axes it uses: as declared, or as its kernels name."""
         if self.type.body_axes is not None:
             return self.type.body_axes
-        types = (self, *(type_info for _, type_info in self.variants))
-        kernels = [kernel for t in types for kernel in t.kernels.values()]
-        kernels += [k for t in types for n in t.type.declared if (k := getattr(t.type, n, None))]
+        types = (self.type, *(type_info.type for _, type_info in self.variants))
+        kernels = [kernel for type_ in types for kernel in type_.kernels().values()]
         named = {name for kernel in kernels for name in parameters(kernel)}
-        return tuple(s for s in self.layout.slots if {f"A_{s}", f"p_{s}"} & named)
+        lists = [name for name, spec in specs_of(self.type).items() if spec.kind == "bodies"]
+        return tuple(s for s in (*self.layout.slots, *lists) if {f"A_{s}", f"p_{s}"} & named)
 
     def chosen(self, values: Mapping[str, Any], named: Mapping[str, str] = NONE) -> "TypeInfo":
         """The variant for the values of an instance's fields; itself where none fits.

@@ -46,13 +46,12 @@ class Optimiser:
 
     def request(self, text: str, results: list[Any], path: Path) -> bool:
         """Let the second process write optimised code of LLVM IR; False where there is none."""
-        if core_count() < 2 or self._has_ended():
+        if not self.start():
             return False
         source = path.with_name(f"{path.stem}.{os.getpid()}.ll")
         if not write_file(source, objects.encoded(results, text.encode())):
             return False
         with contextlib.suppress(OSError, ValueError):
-            self._start()
             self._process.stdin.write(f"{source}\t{path}\n".encode())
             self._process.stdin.flush()
             return True
@@ -61,13 +60,18 @@ class Optimiser:
     def _has_ended(self) -> bool:
         return self._process is not None and self._process.poll() is not None
 
-    def _start(self) -> None:
+    def start(self) -> bool:
+        """Start the second process, which takes 0.2 s, unless it runs; False if there is none."""
+        if core_count() < 2 or self._has_ended():
+            return False
         if self._process is None:
-            self._process = subprocess.Popen(
-                [sys.executable, "-P", "-m", __name__], stdin=subprocess.PIPE,
-                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
-            )  # fmt: skip
-            atexit.register(self._detach)
+            with contextlib.suppress(OSError):
+                self._process = subprocess.Popen(
+                    [sys.executable, "-P", "-m", __name__], stdin=subprocess.PIPE,
+                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, start_new_session=True,
+                )  # fmt: skip
+                atexit.register(self._detach)
+        return self._process is not None
 
     def _detach(self) -> None:
         """Let the second process finish its input after this process has ended."""

@@ -28,8 +28,11 @@ STRAY_AGE = 3600.0
 CLEAN_EVERY = 50
 #: Bytes that LLVM takes besides the text or the code.
 ROOM = 32 * 2**20
-#: Optimisation levels.
+#: Optimisation levels; that of code generation for modules with a block of so many instructions. At
+#: higher ones it asks of each two accesses to memory whether they overlap, which takes a time that
+#: grows with the square of the block, and makes programs of scenes no faster.
 UNOPTIMISED, OPTIMISED = 0, 3
+OF_LONG_BLOCKS, LONG_BLOCK = 1, 1000
 #: Of code that is loaded into this process, and that is linked: relocation and code model.
 RELOCATION, CODE_MODEL = ("static", "pic"), ("jitdefault", "small")
 _lock = threading.RLock()
@@ -137,7 +140,9 @@ def compile_ir(
     """
     _check_room(4 * len(text))
     llvm, target = _llvm(), target or processor()
-    machine = _target_machine(level, target, is_linked=is_linked)
+    has_long_block = max(block.count("\n") for block in text.split(":\n")) > LONG_BLOCK
+    generation = min(level, OF_LONG_BLOCKS) if has_long_block else level
+    machine = _target_machine(generation, target, is_linked=is_linked)
     module = llvm.parse_assembly(text)
     module.triple, module.data_layout = target.triple, str(machine.target_data)
     module.verify()

@@ -99,43 +99,48 @@ class StraightLine(Tracer):
 
     def operation(self, node: Any, op: ast.operator, a: t.Value, b: t.Value) -> t.Value:
         """As of ``Writer``, but for zeros, ones and signs; a + b is b + a."""
-        folded = _folded(op, a, b)
+        kind = type(op)
+        folded = _folded(kind, a, b)
         if folded is not None:
             return self.negative(node, b) if folded is NEGATIVE else folded
-        signed = self._signed(node, op, a, b)
-        if signed is not None:
-            return signed
-        if isinstance(op, (ast.Add, ast.Mult)) and a.words > b.words:
-            a, b = b, a
+        if kind in OF_FLOATS and t.FLOAT in (a.type, b.type):
+            return self._of_floats(kind, self.cast(node, a, t.FLOAT), self.cast(node, b, t.FLOAT))
         result = super().operation(node, op, a, b)
         if result.constant is None:
-            number = OPERATORS[type(op)][0]
-            x, y = self.number(a), self.number(b)
-            self.at(result, number(np.float64(x) if result.type == t.FLOAT else x, y))
+            self.at(result, OPERATORS[kind][0](self.number(a), self.number(b)))
         return result
 
-    def _signed(self, node: Any, op: ast.operator, a: t.Value, b: t.Value) -> t.Value | None:
-        """The result by operands without their signs; None where they have none."""
+    def _of_floats(self, kind: type, a: t.Value, b: t.Value) -> t.Value:
+        """An operation of two floats by their words without signs; most of a trace is this."""
         if a.constant is not None and b.constant is not None:
-            return None
-        x, y = self._without_sign(op, a), self._without_sign(op, b)
-        if isinstance(op, ast.Add) and (x or y):
-            return self.operation(node, ast.Sub(), *((a, y) if y else (b, x)))
-        if isinstance(op, ast.Sub) and y:
-            return self.operation(node, ast.Add(), a, y)
-        if isinstance(op, (ast.Sub, ast.Mult, ast.Div)) and (x or y):
-            result = self.operation(node, ast.Add() if isinstance(op, ast.Sub) else op,
-                                    x or a, y or b)  # fmt: skip
-            return result if x and y else self.negative(node, result)
-        return None
+            return super().operation(None, kind(), a, b)
+        (a, of_a), (b, of_b) = _unsigned(kind, a), _unsigned(kind, b)
+        is_negative = of_a
+        if kind is ast.Mult or kind is ast.Div:
+            is_negative = of_a != of_b
+        elif of_a and of_b:
+            if kind is ast.Sub:
+                is_negative, a, b = False, b, a
+        elif of_a or of_b:
+            if kind is ast.Add:
+                is_negative, kind = False, ast.Sub
+                a, b = (b, a) if of_a else (a, b)
+            else:
+                kind = ast.Add
+        result = _folded(kind, a, b)
+        if result is None:
+            result = self._instruction(kind, a, b)
+        return self.negative(None, result) if is_negative else result
 
-    def _without_sign(self, op: ast.operator, value: t.Value) -> t.Value | None:
-        """What a number is the negative of; of constants, where it is a factor."""
-        if value.constant is None:
-            negative = value.word.startswith("-")
-            return value._replace(words=(value.word[1:],)) if negative else None
-        is_factor = isinstance(op, (ast.Mult, ast.Div))
-        return t.constant(-value.constant) if is_factor and value.constant < 0 else None
+    def _instruction(self, kind: type, a: t.Value, b: t.Value) -> t.Value:
+        """The instruction of an operation of two floats, and its number at this state."""
+        if a.words > b.words and (kind is ast.Add or kind is ast.Mult):
+            a, b = b, a
+        python, instruction = OF_FLOATS[kind]
+        name = self.new(f"{instruction} {a.words[0]}, {b.words[0]}")
+        x, y = self.number(a), self.number(b)
+        self._numbers[name] = python(np.float64(x) if y == 0.0 else x, y)
+        return t.Value(t.FLOAT, (name,))
 
     def negative(self, node: Any, value: t.Value) -> t.Value:
         """As of ``Writer``, by the sign of the word: most are sums and products in the end."""
@@ -191,27 +196,42 @@ NUMBERS: dict[str, Callable[..., float]] = {
     "ceil": lambda x: float(math.ceil(x)),
 }  # fmt: skip
 NEGATIVE = t.Value(t.NOTHING)
+#: Of an operation of floats: that of Python, and its instruction.
+OF_FLOATS = {
+    kind: (OPERATORS[kind][0], OPERATORS[kind][1][t.FLOAT])
+    for kind in (ast.Add, ast.Sub, ast.Mult, ast.Div)
+}
 
 
-def _folded(op: ast.operator, a: t.Value, b: t.Value) -> t.Value | None:
+def _unsigned(kind: type, value: t.Value) -> tuple[t.Value, bool]:
+    """What a number is the negative of, of constants where it is a factor; whether it is one."""
+    if value.constant is None:
+        word = value.words[0]
+        return (t.Value(t.FLOAT, (word[1:],)), True) if word[0] == "-" else (value, False)
+    if value.constant < 0 and (kind is ast.Mult or kind is ast.Div):
+        return t.constant(-value.constant), True
+    return value, False
+
+
+def _folded(kind: type, a: t.Value, b: t.Value) -> t.Value | None:
     """The result where one operand is zero or one; NEGATIVE: -b; None: it is none of these."""
     if (a.constant is None) == (b.constant is None):
-        same = isinstance(op, ast.Sub) and a.constant is None and a.words == b.words
+        same = kind is ast.Sub and a.constant is None and a.words == b.words
         return t.constant(0.0) if same else None
-    if isinstance(op, ast.Add):
+    if kind is ast.Add:
         return b if a.constant in _ZERO else a if b.constant in _ZERO else None
-    if isinstance(op, ast.Sub):
+    if kind is ast.Sub:
         if b.constant is not None:
             return a if b.constant in _ZERO else None
         return NEGATIVE if a.constant in _ZERO else None
-    if isinstance(op, ast.Mult):
+    if kind is ast.Mult:
         for x, y in ((a, b), (b, a)):
             if x.constant in _ZERO and x.constant is not None:
                 return t.constant(0.0)
             if x.constant == 1.0 and y.type == t.FLOAT:
                 return y
         return None
-    if isinstance(op, ast.Div):
+    if kind is ast.Div:
         if a.constant is not None and a.constant in _ZERO:
             return t.constant(0.0)
         return a if b.constant == 1.0 and a.type == t.FLOAT else None

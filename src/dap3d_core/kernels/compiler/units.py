@@ -160,7 +160,9 @@ class Entry:
     def prepared(self, *arguments: Any) -> Callable[..., Any]:
         """The function with its first arguments, to be called with the scalars that follow them."""
         words = _words_of(self.signature.arguments[: len(arguments)])
-        call = functools.partial(self._run, *words(*arguments))
+        self._bind()
+        is_final = self.unit.is_optimised and not background.optimiser.units
+        call = functools.partial(self._function if is_final else self._run, *words(*arguments))
         vars(call)["arguments"] = arguments  # which their words do not keep alive
         return call
 

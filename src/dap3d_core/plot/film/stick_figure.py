@@ -16,7 +16,8 @@ from dap3d_core.plot.film.projection import Camera
 from dap3d_core.plot.style import MARKERS, PALETTE
 from dap3d_core.result import Result
 from dap3d_core.result.post.smooth_parts import cubic
-from dap3d_core.scene import Scene, SceneError, load, parse
+from dap3d_core.scene import Scene
+from dap3d_core.view.scene3d.scene_data import scene_of
 from dap3d_core.view.scene3d.shapes import GROUND_COLOR, parts_of, scene_shapes
 
 #: Usual names of colours -> the shade of that hue in which colour-blind readers can tell it apart.
@@ -122,9 +123,7 @@ def sticks_of(
         still: for one picture, which may take longer than each of many.
     """
     summary = result.summary
-    scene = _scene(result.scene_text)
-    if model is not None:
-        scene.path = load(model).path
+    scene = scene_of(result, model)
     n = summary.body_count
     body = [*range(1, n + 1), *(int(b) for b in summary.point_body)]
     local = [*np.zeros((n, 3)), *summary.point_local]
@@ -163,14 +162,6 @@ def sticks_of(
         shapes=shapes,
         limits=_limits(scene.animation.limits),
     )
-
-
-def _scene(scene_text: str) -> Scene:
-    """The scene, whatever is wrong in it; an empty one where a result has none that can be read."""
-    try:
-        return parse(scene_text).resolved()
-    except SceneError:
-        return Scene()
 
 
 def _limits(given: Any) -> Floats | None:
@@ -230,7 +221,7 @@ def _colors(
     """
     found = []
     for name in names:
-        given: Any = scene.bodies[name].color if name in scene.bodies else None
+        given: Any = scene.bodies[name].color
         shade = SHADES.get(str(given).removeprefix("tab:"), given)
         found.append(shade if is_color_like(shade) else "")
     if len(names) <= len(PALETTE):

@@ -13,6 +13,7 @@ from dap3d_core.result.errors import UnknownNameError
 from dap3d_core.result.post.point_motion import motion_of
 from dap3d_core.result.post.reactions import (
     InstanceParameters,
+    Instants,
     Reaction,
     actions_of,
     place_at,
@@ -46,83 +47,64 @@ class ForceOutput:
 @np.errstate(all="ignore")  # as compiled code does
 def force_output(
     evaluator: "Evaluator",
-    t: Floats,
-    u: Floats,
+    at: Instants,
     v_dot: Floats,
     name: str,
-    element: int,
-    Lam: Floats,
-    angles: Floats | None,
     actuation: Floats | None = None,
-    states: Floats | None = None,
-    inputs: Floats | None = None,
 ) -> ForceOutput:
-    """Evaluates a force element.
+    """Evaluates a force element; unknown angles are counted from one instant to the next.
 
     Args:
         evaluator: evaluates the model.
-        t: (nt,) s.
-        u, v_dot: (nt, 13 n) states, (nt, 6 n) accelerations.
-        name: its name, for the error.
-        element: its index among the forces of the model.
-        Lam: (nt, m) multipliers, m rows in the order of the model.
-        angles: (nt, k) angles as in ``Arrays``; None to count them from one instant to the next.
-        states: (nt, s) states of elements; None for their initial values.
+        at: where.
+        v_dot: (nt, 6 n) accelerations.
+        name: of the element.
         actuation: (nt,) what takes the place of the field that its type ``actuates``; the element
             has no potential then.
-        inputs: (nt, k) inputs; None for those that the evaluator has.
 
     Raises:
         UnknownNameError: the element acts on every body or in a joint.
     """
-    group, index = group_of(evaluator, name, element)
+    group, index = group_of(evaluator, name, evaluator.model.force_names.index(name))
     loops, bodies = ForceLoops(evaluator, group, index), group.bodies[index]
     force, energy = np.zeros_like(evaluator.system.force), np.zeros(1)
     out, potential, tensions = (
-        np.zeros((len(t), *shape)) for shape in ((len(bodies), 6), (), (loops.tension_count,))
+        np.zeros((len(at.t), *shape)) for shape in ((len(bodies), 6), (), (loops.tension_count,))
     )
     minus_lambda = np.zeros_like(evaluator.system.multipliers)
-    for k, time in place_at(evaluator, t, u, states, inputs):
-        if angles is None:
+    for k, time in place_at(evaluator, at):
+        if at.angles is None:
             loops.call("angle", time, force, np.ones(1))  # which keeps what it finds
         else:
-            loops.parameters.set_angles(angles[k])
+            loops.parameters.set_angles(at.angles[k])
         if actuation is not None:
             loops.parameters.scale_field(group, loops.actuated, actuation[k])
         force[:] = energy[:] = 0.0
         if group.read:
-            minus_lambda[evaluator.system.row] = -Lam[k]
+            minus_lambda[evaluator.system.row] = -at.Lam[k]
         loops.call(loops.law, time, force, minus_lambda)
         loops.call("energy", time, energy)
         out[k], potential[k] = force.reshape(-1, 6)[bodies], energy[0]
         loops.call("tension", time, tensions[k], np.zeros(1))  # from place 0 on
-    on = actions_of(evaluator.model, u, group, index, out)
+    on = actions_of(evaluator.model, at.u, group, index, out)
     potentials = potential if loops.has("energy") and actuation is None else None
     output = ForceOutput(on, potentials, tension=loops.own_tension(tensions))
     if any(spec.kind == "vector2" for spec in specs_of(group.type_info.type).values()):
-        length, rate, tension = _along(group, index, u, v_dot, on["i"].force)
+        length, rate, tension = _along(group, index, at.u, v_dot, on["i"].force)
         return attrs.evolve(output, length=length, length_rate=rate, tension=tension)
     return output
 
 
 def reactions_of(
-    evaluator: "Evaluator",
-    t: Floats,
-    u: Floats,
-    Lam: Floats,
-    joints: Collection[int],
-    angles: Floats | None = None,
-    states: Floats | None = None,
-    inputs: Floats | None = None,
+    evaluator: "Evaluator", at: Instants, joints: Collection[int]
 ) -> dict[int, dict[str, Reaction]]:
     """As ``reactions``, with the forces that joints bring."""
-    found = reactions(evaluator, t, u, Lam, joints, angles, states, inputs)
+    found = reactions(evaluator, at, joints)
     model = evaluator.model
     for joint, actions in found.items():
         if name := model.brought_forces.get(model.joint_names[joint]):
-            rates, place = np.zeros((len(t), 6 * model.body_count)), model.force_names.index(name)
-            output = force_output(evaluator, t, u, rates, name, place, Lam, angles, states=states,
-                                  inputs=inputs)  # fmt: skip
+            rates = np.zeros((len(at.t), 6 * model.body_count))
+            output = force_output(evaluator, at, rates, name)
             for slot, more in output.on.items():
                 force, moment = actions[slot].force + more.force, actions[slot].moment + more.moment
                 actions[slot] = attrs.evolve(actions[slot], force=force, moment=moment)

@@ -15,6 +15,7 @@ from dap3d_core.model.state_layout import split
 if TYPE_CHECKING:
     from dap3d_core.formulations.constraint_rows import ConstraintRows
     from dap3d_core.formulations.evaluator import Evaluator
+    from dap3d_core.result.arrays import Arrays
 
 #: With more constraint rows than this the Jacobian is a list of sparse arrays.
 DENSE_ROWS = 1000
@@ -60,6 +61,25 @@ class Reaction:
         return self.moment - np.cross(to_global(self.p, self.local), self.force)
 
 
+@attrs.frozen(eq=False)
+class Instants:
+    """Reported states at which elements are evaluated.
+
+    Attributes:
+        t, u, Lam: (nt,) s, (nt, 13 n) states, (nt, m) multipliers in the order of the model's rows.
+        angles: (nt, k) as in ``Arrays``; None if unknown.
+        states: (nt, s) of elements; None for their initial values.
+        inputs: (nt, k); None for those that the evaluator has.
+    """
+
+    t: Floats
+    u: Floats
+    Lam: Floats
+    angles: Floats | None = None
+    states: Floats | None = None
+    inputs: Floats | None = None
+
+
 def rows_at(
     evaluator: "Evaluator", t: Floats, u: Floats, inputs: Floats
 ) -> Iterator["ConstraintRows"]:
@@ -93,63 +113,40 @@ def jacobians(evaluator: "Evaluator", t: Floats, u: Floats, inputs: Floats) -> A
 
 @np.errstate(all="ignore")  # as compiled code does
 def reactions(
-    evaluator: "Evaluator",
-    t: Floats,
-    u: Floats,
-    Lam: Floats,
-    joints: Collection[int],
-    angles: Floats | None = None,
-    states: Floats | None = None,
-    inputs: Floats | None = None,
+    evaluator: "Evaluator", at: Instants, joints: Collection[int]
 ) -> dict[int, dict[str, Reaction]]:
-    """Reactions of joints on each of their bodies: D_slot^T lambda.
-
-    Args:
-        evaluator: evaluates the model.
-        t: (nt,) s.
-        u: (nt, 13 n) states.
-        Lam: (nt, m) multipliers, m rows in the order of the model.
-        joints: indices of the joints in the model.
-        angles: (nt, k) angles as in ``Arrays``; None if unknown.
-        states: (nt, s) states of elements; None for their initial values.
-        inputs: (nt, k) inputs; None for those that the evaluator has.
+    """Reactions of joints, by their indices, on each of their bodies: D_slot^T lambda.
 
     Returns:
         For each joint a reaction for each slot, by its letter.
     """
     loops = _joint_loops(evaluator, np.array(list(joints), dtype=np.int64))
-    wrenches = [np.empty((len(t), *loop.shape)) for loop in loops]
-    for k, time in place_at(evaluator, t, u, states, inputs):
+    wrenches = [np.empty((len(at.t), *loop.shape)) for loop in loops]
+    for k, time in place_at(evaluator, at):
         for loop, out in zip(loops, wrenches, strict=True):
-            if angles is not None:
-                loop.parameters.set_angles(angles[k])
-            out[k] = loop.wrenches(time, Lam[k])
+            if at.angles is not None:
+                loop.parameters.set_angles(at.angles[k])
+            out[k] = loop.wrenches(time, at.Lam[k])
     return {
-        int(joint): actions_of(evaluator.model, u, loop.group, index, out[:, n])
+        int(joint): actions_of(evaluator.model, at.u, loop.group, index, out[:, n])
         for loop, out in zip(loops, wrenches, strict=True)
         for n, (joint, index) in enumerate(zip(loop.joints, loop.indices, strict=True))
     }
 
 
-def place_at(
-    evaluator: "Evaluator",
-    t: Floats,
-    u: Floats,
-    states: Floats | None = None,
-    inputs: Floats | None = None,
-) -> Iterator[tuple[int, float]]:
+def place_at(evaluator: "Evaluator", at: "Instants | Arrays") -> Iterator[tuple[int, float]]:
     """Sets bodies, states, functions and inputs to each instant; yields its index and time."""
     from dap3d_core.assembly.arrays import VALUE
     from dap3d_core.assembly.evaluate import call_kinds, place_bodies
 
     s = evaluator.system
     with evaluator.held_inputs():
-        for k, y in enumerate(evaluator.integrated(u) if len(t) else ()):
-            time = float(t[k])
-            if inputs is not None:
-                evaluator.set_inputs(inputs[k])
+        for k, y in enumerate(evaluator.integrated(at.u) if len(at.t) else ()):
+            time = float(at.t[k])
+            if at.inputs is not None:
+                evaluator.set_inputs(at.inputs[k])
             place_bodies(y, s.body, s.metric)
-            s.states[:] = evaluator.states if states is None else states[k]
+            s.states[:] = evaluator.states if at.states is None else at.states[k]
             call_kinds(VALUE, VALUE, time, s, evaluator.loops, s.force, s.force, s.force)
             yield k, time
 

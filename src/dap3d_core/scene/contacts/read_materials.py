@@ -51,11 +51,11 @@ def _material(report: Collector, material: Material) -> Material:
 def _read_pair(report: Collector, key: Key, table: Any, pair: dict[str, float]) -> None:
     """Add a table [materials.NAME.with.OTHER] to what the pair has, as one or the other gave it."""
     name, other = str(key[1]), str(key[3])
-    if other not in report.scene.materials:
-        report.add(key, table, *missing_words(report, "material", other, report.scene.materials))
     if not isinstance(table, Mapping):
         report.add(key, table, "should be a table of the pair, such as {mu = 0.3}")
         return
+    if other not in report.scene.materials:
+        report.add(key, table, *missing_words(report, "material", other, report.scene.materials))
     report.add_unknown_keys(key, dict(table), OF_PAIRS)
     for word in OF_PAIRS:
         value = _coefficient(report, (*key, word), table.get(word))

@@ -108,4 +108,5 @@ class ContactTables:
         """
         scene: Any = self
         before = scene.collisions.exclude if scene.collisions else ()
-        scene.collisions = Collisions(bodies, (*before, *exclude), material)
+        pairs = [x if type(x) is tuple else (x,) for x in map(plain, (before, exclude))]
+        scene.collisions = Collisions(bodies, (*pairs[0], *pairs[1]), material)

@@ -54,7 +54,8 @@ def read_bodies(report: Collector) -> Bodies:
     """The bodies of a scene as arrays; mistakes are reported."""
     table = report.scene.bodies
     bodies, names = list(table.values()), tuple(table)
-    if not bodies and not any(key == ("bodies",) for key, _ in report.mistakes):
+    missing = any(key == ("bodies",) or key[:1] == ("include",) for key, _ in report.mistakes)
+    if not bodies and not missing:
         report.add(("bodies",), MISSING, "no bodies: a scene needs at least one, [bodies.NAME]")
     for field, default in (("mass", "1.0 kg"), ("Jp", "[1.0, 1.0, 1.0] kg m^2")):
         for name, body in table.items():

@@ -32,8 +32,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
             installed.
 
     Raises:
-        SceneError: holds all mistakes, each with file, line, key, value, fault, nearest right
-            spelling and remedy.
+        SceneError: all mistakes, located, with the nearest right spelling and the remedy.
     """
     # numpy is imported here: a command that checks nothing does not wait for it.
     from dap3d_core.scene.validate.bodies import read_bodies

@@ -7,7 +7,7 @@ import numpy as np
 
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.integrators.stepping.hold import quick_view
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import did_you_mean
 from dap3d_core.scene.coerce import plain
 from dap3d_core.scene.validate.coerce_values import LARGEST
 
@@ -79,7 +79,5 @@ class HeldInputs:
         self._evaluator.set_inputs(values)
 
     def _unknown(self, name: Any) -> str:
-        near = nearest(name, self._index) if isinstance(name, str) else ""
-        listed = ", ".join(self._index) or "none"
-        hint = f"did you mean {near!r}?" if near else f"inputs of the scene: {listed}"
-        return f"there is no input {name!r}; {hint}"
+        known = f"inputs of the scene: {', '.join(self._index) or 'none'}"
+        return f"there is no input {name!r}; {did_you_mean(name, self._index, otherwise=known)}"

@@ -13,7 +13,7 @@ from dap3d_core.registry.arguments import checked
 from dap3d_core.result import information
 from dap3d_core.result.errors import unknown
 from dap3d_core.result.post.force_output import reactions_of
-from dap3d_core.result.post.reactions import Reaction
+from dap3d_core.result.post.reactions import Instants, Reaction
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.equilibrium.rest import EquilibriumSolution, find_rest
@@ -103,10 +103,9 @@ class Equilibrium:
         if joint not in names:
             raise unknown("joint", joint, names)
         k = names.index(joint)
-        found = reactions_of(
-            self.compiled.evaluator, np.zeros(1), self.u[None], self.Lam[None], [k],
-            self.angles[None], self.states[None],
-        )[k]  # fmt: skip
+        at = Instants(np.zeros(1), self.u[None], self.Lam[None], self.angles[None],
+                      self.states[None])  # fmt: skip
+        found = reactions_of(self.compiled.evaluator, at, [k])[k]
         return {
             slot: attrs.evolve(r, force=r.force[0], moment=r.moment[0], p=r.p[0])
             for slot, r in found.items()

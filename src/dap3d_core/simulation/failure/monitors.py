@@ -179,8 +179,7 @@ def _parts_of_whole(
     loops, size = ForceLoops(evaluator, group, k), np.zeros((len(arrays), 2))
     force = np.zeros_like(evaluator.system.force)
     minus_lambda = np.zeros_like(evaluator.system.multipliers)
-    places = place_at(evaluator, arrays.t, arrays.u, arrays.states, arrays.inputs)
-    for n, time in places:
+    for n, time in place_at(evaluator, arrays):
         minus_lambda[evaluator.system.row] = -arrays.Lam[n]
         for c, value in enumerate((limit, WHOLE * limit)):
             loops.parameters.scale_field(group, field, value)

@@ -3,11 +3,11 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from dap3d_core.kernels.array_types import Floats
+from dap3d_core.simulation.linearization.eigenvalues import Complex
 
-Complex = NDArray[np.complex128]
 #: Range of frequencies by default: below the lowest mode and above the highest, and without modes.
 BELOW, ABOVE, WITHOUT = 0.1, 10.0, (0.1, 100.0)
 #: Modes slower than this part of the fastest are drifts, and say nothing about a range.

@@ -6,7 +6,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.linear.rank.rank import Dependency
@@ -15,17 +14,20 @@ from dap3d_core.result import Result, information
 from dap3d_core.scene import Scene
 from dap3d_core.simulation.compiled_model import CompiledModel
 from dap3d_core.simulation.errors import SimulationError
-from dap3d_core.simulation.linearization.eigenvalues import Eigenvalues, eigenvalues_of, order_of
+from dap3d_core.simulation.linearization.eigenvalues import (
+    Complex,
+    Eigenvalues,
+    eigenvalues_of,
+    order_of,
+)
 from dap3d_core.simulation.linearization.frequency_response import response
 from dap3d_core.simulation.linearization.inputs import inputs_of
 from dap3d_core.simulation.linearization.mode_motion import mode_motion
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint, operating_point
-from dap3d_core.simulation.linearization.outputs import Outputs, output_derivatives
+from dap3d_core.simulation.linearization.outputs import output_derivatives
 from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
 from dap3d_core.simulation.linearization.state_space import DriverRows, StateSpace, state_space
 from dap3d_core.simulation.linearization.steady_motion import independent_rows
-
-Complex = NDArray[np.complex128]
 
 #: Bodies beyond which only the lowest modes are computed unless more are requested.
 MANY_BODIES = 150
@@ -99,7 +101,7 @@ class Linearization:
         return state_space(point.equations, rank, point.position_rank, drivers)
 
     @cached_property
-    def _outputs(self) -> Outputs:
+    def _outputs(self) -> tuple[Floats, Floats]:
         return output_derivatives(self._point, self._space, self._inputs, self.outputs)
 
     @property
@@ -118,12 +120,12 @@ class Linearization:
     @property
     def C(self) -> Floats:
         """(outputs, states) output matrix: change of outputs = C z + D inputs."""
-        return self._outputs.C if self.outputs else np.zeros((0, self.state_count))
+        return self._outputs[0] if self.outputs else np.zeros((0, self.state_count))
 
     @property
     def D(self) -> Floats:
         """(outputs, inputs) feedthrough matrix."""
-        return self._outputs.D if self.outputs else np.zeros((0, len(self.inputs)))
+        return self._outputs[1] if self.outputs else np.zeros((0, len(self.inputs)))
 
     @checked
     def frequency_response(

@@ -3,16 +3,14 @@
 from contextlib import suppress
 
 import numpy as np
-from numpy.typing import NDArray
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.model.state_layout import join, split, velocities_of
 from dap3d_core.result import Result, RunMetadata, information
 from dap3d_core.simulation.errors import AssemblyError
 from dap3d_core.simulation.initial.assemble import correct_initial
+from dap3d_core.simulation.linearization.eigenvalues import Complex
 from dap3d_core.simulation.linearization.operating_point import OperatingPoint
-
-Complex = NDArray[np.complex128]
 
 #: Largest rotation of a body that is shown, rad.
 MOST_TURN = 0.5

@@ -7,7 +7,6 @@ multipliers follow the linear equations there, so that what is differentiated is
 
 from collections.abc import Sequence
 
-import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
@@ -27,22 +26,10 @@ STEP = 2e-3
 LEAST = 1e-3
 
 
-@attrs.frozen(eq=False)
-class Outputs:
-    """Derivatives of outputs.
-
-    Attributes:
-        C: (outputs, states), D: (outputs, inputs).
-    """
-
-    C: Floats
-    D: Floats
-
-
 def output_derivatives(
     point: OperatingPoint, space: StateSpace, inputs: Inputs, names: Sequence[str]
-) -> Outputs:
-    """Derivatives of quantities by states and inputs.
+) -> tuple[Floats, Floats]:
+    """Derivatives of quantities: C (outputs, states) and D (outputs, inputs).
 
     Raises:
         UnknownNameError: there is no such quantity, or it is a vector; names the nearest.
@@ -81,7 +68,7 @@ def output_derivatives(
             raise UnknownNameError(f"output {name!r} has no value at this state")
         values = quantity.values[:-1].reshape(-1, len(ABSCISSAE))
         matrix[k] = (values - quantity.values[-1]) @ WEIGHTS / steps
-    return Outputs(matrix[:, :states], matrix[:, states:])
+    return matrix[:, :states], matrix[:, states:]
 
 
 def _step(point: OperatingPoint, *direction: Floats) -> float:

@@ -20,7 +20,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.kernels.array_types import Floats
-from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations
+from dap3d_core.simulation.linearization.scaled_equations import ScaledEquations, ScaledStates
 
 
 @attrs.frozen(eq=False, kw_only=True)
@@ -90,7 +90,7 @@ def state_space(
     holonomic = rows if np.all(position) else _Rows(D[position], position_rank)
     Q = _extended(N, holonomic.null)
     moved = holonomic.pseudoinverse(nu[1][position])
-    own = _Own.of(equations, len(U), len(D))
+    own = _Own.of_equations(equations, len(U), len(D))
     shifted = -holonomic.pseudoinverse(own.position[position])
     x = np.hstack([Q, moved, np.zeros((len(U), N.shape[1] + count)), shifted])
     driven, followed = rows.pseudoinverse(nu[1]), -rows.pseudoinverse(own.velocity)
@@ -136,17 +136,8 @@ def _size(K: Floats, C: Floats, S: Floats, by_states: Floats) -> float:
     return float(max(largest))
 
 
-@attrs.frozen(eq=False, kw_only=True)
-class _Own:
-    """The matrices of ``ScaledStates``, dense; without columns where there are no states."""
-
-    by_displacement: Floats
-    by_velocity: Floats
-    by_states: Floats
-    force: Floats
-    position: Floats
-    velocity: Floats
-    acceleration: Floats
+class _Own(ScaledStates):
+    """The same, dense; without columns where there are no states."""
 
     @property
     def count(self) -> int:
@@ -159,7 +150,7 @@ class _Own:
         return self.by_displacement @ x + self.by_velocity @ v + own
 
     @classmethod
-    def of(cls, equations: ScaledEquations, six: int, rows: int) -> "_Own":
+    def of_equations(cls, equations: ScaledEquations, six: int, rows: int) -> "_Own":
         """Of equations of ``six`` displacements and so many rows."""
         names = [field.name for field in attrs.fields(cls)]
         if equations.states is not None:

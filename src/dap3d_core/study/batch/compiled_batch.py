@@ -240,9 +240,10 @@ class CompiledBatch:
                 else:
                     call()
 
-        def counts() -> tuple[int, int]:
-            ended = diagnostics[:, [driver.CALLS, driver.TAKEN]].sum(axis=0)
-            return int(ended[0]) + work.rhs_count, int(ended[1]) + work.step_count
+        def counts() -> tuple[int, int, int]:
+            columns = driver.CALLS, driver.TAKEN, driver.ROWS
+            calls, steps, reports = diagnostics[:, columns].sum(axis=0).astype(int).tolist()
+            return calls + work.rhs_count, steps + work.step_count, reports + work.report_count
 
         if start != driver.CORRECT_ONLY and self.takes_lanes and self._is_long(count):
             from dap3d_core.formulations.programs.scene_program import reads_rates

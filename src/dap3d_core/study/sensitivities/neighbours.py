@@ -1,7 +1,8 @@
 """Runs at their starts with other values of one parameter: differences of what Python computes.
 
 Models are made and starts are corrected in Python. Nothing of that is integrated, so that its
-derivatives come from differences of sixth order, whose error is near rounding.
+derivatives come from differences of sixth order, whose error is near rounding. Where a parameter is
+copied (study/batch), as those of forces, masses and initial states, they are known to rounding.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -22,6 +23,9 @@ from dap3d_core.simulation.initial_state import InitialState
 from dap3d_core.simulation.run import Run
 from dap3d_core.simulation.run_state import Callbacks
 from dap3d_core.simulation.settings import settings_of
+from dap3d_core.study.batch.compiled_batch import Starts, arrays_of_numbers
+from dap3d_core.study.batch.parameter_map import NotCopiedError, ParameterMap
+from dap3d_core.study.batch.slopes import COPIES, starts_with_slopes
 from dap3d_core.study.differences import (
     OFFSETS,
     change_along,
@@ -31,7 +35,6 @@ from dap3d_core.study.differences import (
     weights_of,
 )
 from dap3d_core.study.parameters import SceneParameter, all_parameters, with_values
-from dap3d_core.study.sensitivities.copies import copied_slopes
 
 #: Steps of differences, over the size of the parameter: rounding over the step is near 1e-13, and
 #: what the sixth power of the step leaves of 1/sqrt(mass) below that. Others are for starts that
@@ -142,7 +145,9 @@ def neighbours_of(
         SceneError: the parameter has no value, or is a whole number.
         SimulationError: the scene cannot be run near its value, or has another structure there.
     """
-    _check(parameter)
+    if parameter.value is None:
+        what = "the scene leaves this number to its type; give it a value"
+        raise SceneError([Mistake("by", parameter.name, what)])
     size = _size(compiled, parameter)
     copied = copied_slopes(base, parameter, size)
     found = Neighbours(parameter, copied, partial(_made, compiled, parameter, size, given, base))
@@ -182,12 +187,6 @@ def _made(
         f"there is no derivative by {parameter.name} at {value:g}: with values near it, the scene "
         f"cannot be run as here: {why}"
     )
-
-
-def _check(parameter: SceneParameter) -> None:
-    if parameter.value is None:
-        what = "the scene leaves this number to its type; give it a value"
-        raise SceneError([Mistake("by", parameter.name, what)])
 
 
 def _size(compiled: CompiledModel, parameter: SceneParameter) -> float:
@@ -252,3 +251,49 @@ def total_derivative(
             total = total + differences(lambda e: function(base, x + e * along), step)  # noqa: B023
         found.append(total)
     return np.stack(found, axis=-1)
+
+
+def copied_slopes(
+    run: Run, parameter: SceneParameter, size: float
+) -> tuple[list[Floats], Floats] | None:
+    """Derivatives of arrays, flat, as of ``arrays_of_numbers``, and (n,) of the state at the start.
+
+    No model is made at other values. None where the parameter is not copied, or where joints may
+    move with it at the start.
+
+    Args:
+        run: at its start.
+        parameter, size: of its scene, and its size.
+    """
+    evaluator, model = run.evaluator, run.evaluator.model
+    coordinates, is_plain = evaluator.coordinates, run.present.takes_programs and not model.breaks
+    is_plain &= run.settings.start == "scene" and run.start is None
+    if not is_plain or any(switch.jumps for switch in evaluator.switches):
+        return None
+    try:
+        if parameter.table not in ("bodies", "points", "forces"):
+            return None
+        by_map = ParameterMap(run.compiled.checked, evaluator, (parameter,))
+    except NotCopiedError:
+        return None
+    if by_map.moves_start and (model.row_count or not coordinates.are_of_bodies):
+        return None
+
+    def starts(values: Floats) -> Starts:
+        table, _ = by_map.table(values, is_checked=False)
+        if coordinates.are_of_bodies:
+            y0 = by_map.states(values, model.u0)
+            by_map.set_states(y0, values)
+        else:
+            y0 = np.zeros((len(values), coordinates.size + 1))
+        return Starts(table, by_map.places, y0, 0)
+
+    x = np.array([parameter.value])
+    found = starts_with_slopes(starts, x, np.array([size]), *COPIES)
+    if found is None:
+        return None
+    _, of_numbers, of_state = found
+    ends = np.cumsum([array.size for array in arrays_of_numbers(evaluator)])
+    slopes = np.zeros(ends[-1])
+    slopes[by_map.places] = of_numbers[:, 0]
+    return np.split(slopes, ends[:-1]), of_state[:, 0]

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.registry.arguments import checked
-from dap3d_core.registry.suggestions import nearest
+from dap3d_core.registry.suggestions import did_you_mean, nearest
 from dap3d_core.result import Result, ResultError, UnknownNameError, find
 from dap3d_core.scene import Mistake, Scene, SceneError
 from dap3d_core.simulation import CompiledModel, simulate
@@ -184,8 +184,7 @@ def objective(
     known = [name for name in inspect.signature(sensitivities).parameters if name not in OWN]
     for name in settings:
         if name not in known:
-            near = nearest(name, known)
-            hint = f"did you mean {near!r}? " if near else ""
+            hint = did_you_mean(name, known, "{} ")
             raise TypeError(f"objective takes no {name}; {hint}settings: {', '.join(known)}")
     if not names:
         raise no_names()

@@ -1,6 +1,7 @@
 """Checks of functions, of states of elements, and of normals and grips of contacts."""
 
 import random
+from collections.abc import Mapping
 
 import attrs
 import numpy as np
@@ -28,10 +29,11 @@ _WRONG = (
     "{f} is wrong by {x.error:.3g} at x = {at:.6g}: it is {x.is_:.6g} and should be "
     "{x.should:.6g}, the derivative of {g} ({way})"
 )
-NAMES = ("f", "f'", "f''", "f'''")
-#: Of a function of two arguments: names, and of each argument (derivative, of which).
-PARTIALS = ("f", "f_x", "f_y", "f_xx", "f_xy", "f_yy")
-PARTIAL = {"x": ((1, 0), (3, 1), (4, 2)), "y": ((2, 0), (4, 1), (5, 2))}
+#: Names of what functions of one argument, of two return; of each argument (derivative, of which).
+NAMES: tuple[str, ...] = ("f", "f'", "f''", "f'''")
+CHAIN: Mapping[str, tuple[tuple[int, int], ...]] = {"x": ((1, 0), (2, 1), (3, 2))}
+NAMES_OF_TWO = ("f", "f_x", "f_y", "f_xx", "f_xy", "f_yy")
+CHAIN_OF_TWO = {"x": ((1, 0), (3, 1), (4, 2)), "y": ((2, 0), (4, 1), (5, 2))}
 _WRONG_OF_TWO = (
     "{f} is wrong by {x.error:.3g} at x = {at:.6g}, y = {and_at:.6g}: it is {x.is_:.6g} and should "
     "be {x.should:.6g}, the derivative of {g} by {by} ({way})"
@@ -93,52 +95,33 @@ def _unread(subject: SampledType) -> list[str]:
 
 
 def derivatives(subject: SampledType) -> CheckOutcome:
-    """Each number that ``value`` returns is the derivative of the previous one."""
-    if subject.type.arguments > 1:
-        return _partial_derivatives(subject)
+    """Numbers that ``value`` returns are derivatives of others; f_xy is that of f_x and of f_y."""
     what = "f', f'' and f''' against derivatives of f, f' and f''"
-    c = Comparison("derivatives", subject, "value", what)
-    for k, sample in enumerate(subject.samples):
-        rng = random.Random(f"{subject.seed} {k}")
-        for _ in range(ARGUMENTS):
-            x = rng.uniform(-0.5, 2.5)
-            here = attrs.evolve(sample, state=attrs.evolve(sample.state, t=x))
-            value = here.value("value")
-            if not np.isfinite(value).all():
-                continue
-            for rate in rates(here, "value", Direction.in_time(), c):
-                scale = float(np.max(np.abs([value[1:], rate.value[:3]])))
-                for k in (1, 2, 3):
-                    words = {"f": NAMES[k], "g": NAMES[k - 1], "at": x, "way": rate.way}
-                    bound = None if rate.bound is None else rate.bound[k - 1 : k]
-                    c.compare(here, value[k : k + 1], rate.value[k - 1 : k], _WRONG, words=words,
-                              tolerance=rate.tolerance, bound=bound, scale=scale,
-                              rows=[k])  # fmt: skip
-    return c.outcome()
-
-
-def _partial_derivatives(subject: SampledType) -> CheckOutcome:
-    """The same of a function of two arguments; f_xy is the derivative of f_x and that of f_y."""
-    what = "partial derivatives against derivatives of f, f_x and f_y"
+    names, partial, text, of_two = NAMES, CHAIN, _WRONG, subject.type.arguments > 1
+    if of_two:
+        what = "partial derivatives against derivatives of f, f_x and f_y"
+        names, partial, text = NAMES_OF_TWO, CHAIN_OF_TWO, _WRONG_OF_TWO
     c = Comparison("derivatives", subject, "value", what)
     along = {"x": Direction.in_time(), "y": Direction.of_unknown(0, 1)}
     for k, sample in enumerate(subject.samples):
         rng = random.Random(f"{subject.seed} {k}")
         for _ in range(ARGUMENTS):
-            x, y = rng.uniform(-0.5, 2.5), rng.uniform(-0.5, 2.5)
-            state = attrs.evolve(sample.state, t=x, unknowns=np.array([[y, 0.0]]))
+            x, y = rng.uniform(-0.5, 2.5), rng.uniform(-0.5, 2.5) if of_two else 0.0
+            state = attrs.evolve(sample.state, t=x)
+            if of_two:
+                state = attrs.evolve(state, unknowns=np.array([[y, 0.0]]))
             here = attrs.evolve(sample, state=state)
             value = here.value("value")
             if not np.isfinite(value).all():
                 continue
-            for by, pairs in PARTIAL.items():
+            for by, pairs in partial.items():
                 for rate in rates(here, "value", along[by], c):
                     scale = float(np.max(np.abs([value[1:4], rate.value[:3]])))
                     for k, of in pairs:
-                        words = {"f": PARTIALS[k], "g": PARTIALS[of], "at": x, "and_at": y,
-                                 "by": by, "way": rate.way}  # fmt: skip
+                        words = {"f": names[k], "g": names[of], "at": x, "and_at": y, "by": by,
+                                 "way": rate.way}  # fmt: skip
                         bound = None if rate.bound is None else rate.bound[of : of + 1]
-                        c.compare(here, value[k : k + 1], rate.value[of : of + 1], _WRONG_OF_TWO,
+                        c.compare(here, value[k : k + 1], rate.value[of : of + 1], text,
                                   words=words, tolerance=rate.tolerance, bound=bound, scale=scale,
                                   rows=[k])  # fmt: skip
     return c.outcome()

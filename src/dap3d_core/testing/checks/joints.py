@@ -1,7 +1,5 @@
 """Checks of a joint: J, nu and gamma against derivatives, reactions, rank, rigid motions."""
 
-from typing import Any
-
 import numpy as np
 
 from dap3d_core.interface.element_states import unknown_names
@@ -165,7 +163,8 @@ def acceleration_side(subject: SampledType) -> CheckOutcome:
         for turning in J_dot:
             pushing = next((r for r in nu_dot if r.way == turning.way), nu_dot[-1])
             terms = np.einsum("srk,sk->r", turning.value, v)
-            terms[position] += _turning_of_unknowns(sample, along)
+            if len(sample.state.unknowns):
+                terms[position] += sample.rate("G", along) @ sample.state.unknowns[:, 1]
             bound = None
             if turning.bound is not None:
                 bound = np.einsum("srk,sk->r", turning.bound, np.abs(v))
@@ -185,18 +184,6 @@ def acceleration_side(subject: SampledType) -> CheckOutcome:
                           words={"order": order, "form": form},
                           tolerance=DIFFERENCE_TOLERANCE, bound=bound)  # fmt: skip
     return c.outcome()
-
-
-def _turning_of_unknowns(sample: Sample, along: Direction) -> Floats:
-    """(position rows,) dG/dt, times the rates of the unknowns."""
-    type_: Any = sample.kernels.type_info.type
-    if not len(sample.state.unknowns):
-        return np.zeros(len(type_.position_rows()))
-    try:
-        slope = sample.slope("G", along)
-    except Exception:  # of a kernel that takes floats alone
-        slope = sample.difference("G", along)[0]
-    return slope @ sample.state.unknowns[:, 1]
 
 
 def _forms(subject: SampledType) -> list[tuple[str, tuple[int, ...]]]:

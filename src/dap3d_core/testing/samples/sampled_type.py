@@ -69,6 +69,13 @@ class Sample:
         """Its derivative by complex step; a kernel may raise on complex numbers."""
         return self.kernels.slope(name, self.element, self.state, along)
 
+    def rate(self, name: str, along: Direction) -> Floats:
+        """Its derivative by complex step, or by differences where a kernel takes floats alone."""
+        try:
+            return self.slope(name, along)
+        except Exception:
+            return self.difference(name, along)[0]
+
     def difference(self, name: str, along: Direction) -> tuple[Floats, Floats]:
         """Its derivative by sixth-order central differences, and an error bound.
 
@@ -79,14 +86,7 @@ class Sample:
 
     def bend(self, along: Direction) -> tuple[Floats, Floats]:
         """The second derivative of C along a direction, and an error bound."""
-
-        def slope(state: State) -> Floats:
-            try:
-                return self.kernels.slope("C", self.element, state, along)
-            except Exception:  # of a kernel that takes floats alone
-                return attrs.evolve(self, state=state).difference("C", along)[0]
-
-        return self.difference_of(slope, along)
+        return self.difference_of(lambda s: attrs.evolve(self, state=s).rate("C", along), along)
 
     def difference_of(
         self, value: Callable[[State], Floats], along: Direction
@@ -314,14 +314,8 @@ def own_values(type_info: TypeInfo) -> dict[str, Any] | None:
 def position_jacobian(sample: Sample, state: State | None = None) -> Floats:
     """dC/dq (position rows, slots, 6) by complex step, or by differences where that fails."""
     here = sample if state is None else attrs.evolve(sample, state=state)
-    columns = []
-    for slot in range(len(here.kernels.type_info.layout.slots)):
-        for component in range(6):
-            along = Direction.of(slot, component)
-            try:
-                columns.append(here.slope("C", along))
-            except Exception:
-                columns.append(here.difference("C", along)[0])
+    slots = len(here.kernels.type_info.layout.slots)
+    columns = [here.rate("C", Direction.of(slot, k)) for slot in range(slots) for k in range(6)]
     return np.stack(columns, axis=-1).reshape(len(columns[0]), -1, 6)
 
 
@@ -330,14 +324,8 @@ def gradient(sample: Sample, state: State | None = None) -> Floats:
     here = sample if state is None else attrs.evolve(sample, state=state)
     type_: Any = here.kernels.type_info.type
     count = len(here.state.unknowns)
-    columns = [np.zeros((len(type_.position_rows()), 0))]
-    for k in range(count):
-        along = Direction.of_unknown(k, count)
-        try:
-            columns.append(here.slope("C", along)[:, None])
-        except Exception:
-            columns.append(here.difference("C", along)[0][:, None])
-    return np.hstack(columns)
+    columns = [here.rate("C", Direction.of_unknown(k, count)) for k in range(count)]
+    return np.stack(columns, axis=1) if count else np.zeros((len(type_.position_rows()), 0))
 
 
 def gradient_of_rows(sample: Sample, state: State | None = None) -> Floats:
@@ -368,9 +356,10 @@ def assembled(sample: Sample) -> Sample | None:
             G = gradient(sample, state)
             step = -np.linalg.lstsq(np.hstack([C_q, G]), C, rcond=1e-10)[0]
             step *= min(1.0, 0.7 / max(float(np.max(np.abs(step))), 1e-300))
-            whole = np.zeros((slots, 6))
-            whole[free] = step[: C_q.shape[1]].reshape(-1, 6)
-            along = attrs.evolve(_direction(whole), unknowns=tuple(step[C_q.shape[1] :].tolist()))
+            bodies, unknowns = np.split(step, [C_q.shape[1]])
+            whole = np.zeros((BODIES, 6))
+            whole[1 + np.array(free)] = bodies.reshape(-1, 6)
+            along = Direction(whole[:, :3], whole[:, 3:], unknowns=tuple(unknowns.tolist()))
             state = state.moved(along, 1.0)
         else:
             if "C" in kernels.names():
@@ -379,11 +368,11 @@ def assembled(sample: Sample) -> Sample | None:
         nu = sample.value("nu", state) if "nu" in kernels.names() else np.zeros(J.shape[1])
         x = np.hstack([state.v, state.w])[1 : slots + 1]
         flat = J[free].transpose(1, 0, 2).reshape(J.shape[1], -1)
-        flat, bodies = np.hstack([flat, gradient_of_rows(sample, state)]), 6 * len(free)
+        flat, count = np.hstack([flat, gradient_of_rows(sample, state)]), 6 * len(free)
         v = np.concatenate([x[free].ravel(), state.unknowns[:, 1]])
         v -= np.linalg.lstsq(flat, flat @ v - nu, rcond=1e-10)[0]
-        x[free] = v[:bodies].reshape(-1, 6)
-        unknowns = np.column_stack([state.unknowns[:, 0], v[bodies:]])
+        x[free] = v[:count].reshape(-1, 6)
+        unknowns = np.column_stack([state.unknowns[:, 0], v[count:]])
         moving = attrs.evolve(state.with_velocity(x), unknowns=unknowns)
         result = attrs.evolve(sample, state=moving)
         return result if result.is_good else None
@@ -397,12 +386,6 @@ def _is_singular(sample: Sample) -> bool:
     rows = np.hstack([J.transpose(1, 0, 2).reshape(J.shape[1], -1), gradient_of_rows(sample)])
     values = np.linalg.svd(rows, compute_uv=False)
     return bool(values[-1] < SINGULAR * values[0])
-
-
-def _direction(x: Floats) -> Direction:
-    move, turn = np.zeros((BODIES, 3)), np.zeros((BODIES, 3))
-    move[1 : len(x) + 1], turn[1 : len(x) + 1] = x[:, :3], x[:, 3:]
-    return Direction(move, turn)
 
 
 __all__ = ["Sample", "SampledType", "UndefinedError", "assembled", "own_values", "sampled_types"]

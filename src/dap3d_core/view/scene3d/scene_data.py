@@ -30,10 +30,8 @@ from dap3d_core.view.scene3d.primitives import (
     turned_to,
 )
 from dap3d_core.view.scene3d.sampled_motion import Extent, Motion, stage
-from dap3d_core.view.scene3d.shapes import Mesh, SceneShapes, scene_shapes
+from dap3d_core.view.scene3d.shapes import GROUND_COLOR, Mesh, SceneShapes, scene_shapes
 
-#: The colour of what belongs to ground.
-GROUND = "#9aa3ad"
 #: The longest semi-axis of a body without points, as a part of the scene's size: nothing is hidden.
 MODEST = 0.03
 #: Points this near, relative to the largest coordinate, are one.
@@ -153,7 +151,7 @@ def _bodies(
             marks += links(k, points[k], unit, hues[k - 1], name, ends=ends)
     if 0 not in shaped:
         marks += [
-            Mark("bodies", "box", 0, at, (4.5 * unit,) * 3, color=GROUND, owner="ground")
+            Mark("bodies", "box", 0, at, (4.5 * unit,) * 3, color=GROUND_COLOR, owner="ground")
             for at in [*points[0], ORIGIN]
             if (0, at) in joined
         ]

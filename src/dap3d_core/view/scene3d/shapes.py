@@ -27,7 +27,7 @@ MOST_IN_ALL = 1_000_000
 #: A shape that reaches farther from the origin of its body is not drawn, m: graphics hardware
 #: computes lengths in single precision, in which larger ones overflow.
 FARTHEST = 1e15
-#: Ground's shapes where they name no colour.
+#: The colour of ground's marks, and of its shapes where they name none.
 GROUND_COLOR = "#9aa3ad"
 
 

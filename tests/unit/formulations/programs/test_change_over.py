@@ -5,7 +5,7 @@ import pytest
 from support.plain import jit_is_on
 
 import dap3d_core as dap
-from dap3d_core.formulations import PROJECT, RHS, WATCH
+from dap3d_core.formulations import PROJECT, REPORT, RHS, WATCH
 from dap3d_core.formulations.programs import change_over, scene_program
 from dap3d_core.formulations.programs.change_over import ChangeOver
 from dap3d_core.formulations.programs.scene_program import BEHIND
@@ -23,6 +23,7 @@ def at_once(monkeypatch):
     monkeypatch.setattr(change_over, "BESIDE", False)
     monkeypatch.setattr(change_over, "_records", {})
     monkeypatch.setattr(change_over, "_spent", {})
+    monkeypatch.setattr(change_over, "_reported", {})
     monkeypatch.setattr(scene_program, "is_optimised", lambda evaluator: True)
     return change_over._records
 
@@ -41,9 +42,8 @@ def assert_same(one, other):
 
 
 def programs(records):
-    """The programs of the only scene."""
-    [record] = records.values()
-    return record.programs
+    """The programs made last."""
+    return list(records.values())[-1].programs
 
 
 @pytest.mark.every(3)
@@ -57,7 +57,20 @@ def test_bits_are_those_of_general_code(model, method, at_once):
         assert_same(result, general(model, method=method))
     found = programs(at_once)
     assert found[RHS].failures() == 0
-    assert set(found) in ({RHS}, {RHS, PROJECT, BEHIND})
+    assert set(found) - {REPORT} in ({RHS}, {RHS, PROJECT, BEHIND})
+
+
+@pytest.mark.every(2)
+@pytest.mark.parametrize(("model", "method"), [("pen1", "joint"), ("fourbar3", "standard"),
+                         ("bodies2", "unconstrained")])  # fmt: skip
+def test_many_reports_have_a_program(model, method, at_once):
+    """Of the bits of general code; few of them have none."""
+    for dt, has_program in ((1e-3, True), (0.3, False)):
+        expected = general(model, method=method, dt=dt)
+        assert_same(dap.simulate(model, method=method, dt=dt, **SETTINGS), expected)
+        found = programs(at_once)
+        assert (REPORT in found) == has_program
+        assert not has_program or found[REPORT].failures() == 0
 
 
 def test_switches_have_programs(at_once):
@@ -133,7 +146,7 @@ def test_a_call_that_needs_programs_is_not_made_without_them(record, monkeypatch
     monkeypatch.setattr(ChangeOver, "_record_of", lambda self, modes, start: record)
     calls, addresses = [], np.zeros(2, dtype=np.int64)
     call = ChangeOver(dap.compile("pen1").evaluator).call
-    given = addresses, lambda: (0.0, np.zeros(0)), lambda: (0, 0)
+    given = addresses, lambda: (0.0, np.zeros(0)), lambda: (0, 0, 0)
     call(lambda: calls.append("needed"), *given, needs_programs=True)
     call(lambda: calls.append("not needed"), *given)
     assert calls == ["not needed"]
@@ -173,10 +186,11 @@ def test_numbers_that_change_in_a_run_stop_the_program(at_once):
 
 def test_a_program_whose_guards_fail_is_given_up(at_once, monkeypatch):
     """General code runs from there on, with the same bits."""
-    monkeypatch.setattr(change_over, "MOST_FAILURES", {RHS: -2.0, PROJECT: -2.0, WATCH: -2.0})
-    for _ in range(2):  # the first time they are made anew
+    most = dict.fromkeys((WATCH, PROJECT, REPORT, RHS), -2.0)
+    monkeypatch.setattr(change_over, "MOST_FAILURES", most)
+    for _ in range(4):  # the first time they are made anew
         assert_same(dap.simulate("pen1", **SETTINGS), general("pen1"))
-    [record] = at_once.values()
+    record = list(at_once.values())[-1]
     assert record.anew is not None
     assert "guards" in record.reason
     assert not record.programs
@@ -205,5 +219,6 @@ def test_short_runs_make_none(monkeypatch):
     """Nothing is even looked for before general code has taken a while."""
     monkeypatch.setattr(change_over, "_records", {})
     monkeypatch.setattr(change_over, "_spent", {})
+    monkeypatch.setattr(change_over, "_reported", {})
     dap.simulate("pen1", t_end=0.1)
     assert change_over._records == {}

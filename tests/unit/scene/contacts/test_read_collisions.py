@@ -103,3 +103,11 @@ def test_a_mesh_collides_as_its_hull(tmp_path):
     expected = [[0.1, 0, -0.06], [0.1, 0, 0], [0.1, 0.12, 0], [0.16, 0, 0]]
     assert np.array(sorted(hull.round(9).tolist())) == pytest.approx(np.array(expected), abs=1e-15)
     assert found.size[k] == pytest.approx([0.03, 0.06, 0.03], abs=1e-15)
+
+
+@pytest.mark.parametrize("exclude", ["ab", 3, ["a", "b"]])
+def test_what_is_no_list_of_pairs_is_refused(exclude):
+    scene = two_boxes()
+    scene.add_collisions(exclude=exclude)
+    with pytest.raises(dap.SceneError, match=r"collisions.exclude.1 = .*a list of pairs of bodies"):
+        read(scene)

@@ -6,7 +6,7 @@ from support.plain import long_in_plain_python
 from support.process import REPOSITORY
 
 import dap3d_core as dap
-from dap3d_core.formats.import_scene.couplings import LIGHT
+from dap3d_core.formats.import_scene.joints import LIGHT
 
 #: Moments of inertia of two wheels, the armature of the second, and the moment on the first.
 I_1, I_2, ARMATURE, MOMENT = 0.3, 0.5, 0.2, 1.5
