@@ -267,14 +267,6 @@ def test_a_keyword_with_its_package_names_one_of_two(install):
         registry.get("force", "dap3d-push:shove")
 
 
-def test_a_name_that_shadows_a_standard_type_is_a_collision(install):
-    install("dap3d-mine", GOOD.replace('"push"', '"weight"'), "weight")
-    said = message(keyword="weight")
-    assert "dap3d-mine" in said
-    assert "give the one of dap3d-mine another keyword" in said
-    assert said.endswith("with DAP3D_BLOCK=dap3d:weight or DAP3D_BLOCK=dap3d-mine:weight")
-
-
 @pytest.mark.parametrize("left_out", ["dap3d", "DAP3D_mine"])
 def test_the_advice_on_a_collision_works_and_costs_no_other_type(install, monkeypatch, left_out):
     """Either of the two types may be left out; all others of its distribution stay."""
