@@ -173,7 +173,7 @@ REFUSED = [
     *((("modes", "pen1", "--t", t), "--t") for t in ("inf", "-inf", "nan", "1e999", "x")),
     ((*RESPONSE, "--from", "3", "--to", "1"), "give --from below --to"),
     ((*RESPONSE, "--output", "stone.r.q"), "stone.r has x, y, z"),
-    ((*RESPONSE, "--input", "gravity.gravit"), "did you mean 'gravity.gravity'"),
+    ((*RESPONSE, "--input", "gravity.gravit"), "did you mean 'gravity'"),
     ((*RESPONSE, "-o", "bode.docx"), ".png"),
     ((*RESPONSE, "-n", "1"), "is not in the range"),
     # starts
