@@ -75,6 +75,11 @@ def test_several_runs_are_told_apart_by_their_folders(dap3d, runs):
     assert "named twice" in again.stderr
 
 
+def test_a_window_that_cannot_be_opened_is_told(refuse, dap3d, runs, monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    assert "cannot open a window" in refuse("plot", "pen1.nc", "cone.r.z", "--show")
+
+
 @pytest.mark.slow
 def test_no_colour_when_asked(dap3d):
     _, shown = in_terminal(dap3d, 80, "models", "--no-color")

@@ -390,6 +390,16 @@ def test_a_model_file_that_changed_is_another_module(tmp_path):
     assert other(body_i="a").k == 2.0
 
 
+@pytest.mark.parametrize("case", ["import error", "exit", "no version", "hook takes an argument"])
+def test_a_broken_model_file_is_named(tmp_path, case):
+    text, words = BROKEN[case]
+    file = write(tmp_path, text)
+    with pytest.raises(PluginError) as caught:
+        dap.load_registry().with_file(file)
+    for word in [str(file), "Repair the file", *words]:
+        assert word.replace("_module.py", "plugin.py") in str(caught.value)
+
+
 def test_a_model_file_without_types_or_missing_is_refused(tmp_path):
     with pytest.raises(PluginError, match="brings no type"):
         dap.load_registry().with_file(write(tmp_path, "interface_version = 1\n"))

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 
+import numpy as np
 import pytest
 from support.command_line import dap3d
 from support.falling import SCENE
@@ -413,3 +414,45 @@ def test_a_reader_that_leaves_does_not_spoil_the_run(folder):
 
 
 # ------------------------------------------------------------------ what other programs do quietly
+
+EXPLODING = """
+[bodies.rocket]
+mass = 1.0
+Jp = [1.0, 1.0, 1.0]
+r = [1.0, 0.0, 0.0]
+
+[points.tip]
+body = "ground"
+sPp = [0.0, 0.0, 0.0]
+
+[forces.repelling]
+type = "ptp"
+P_i = "rocket.O"
+P_j = "tip"
+k = -1e8
+l0 = 0.0
+
+[simulation]
+t_end = 1.0
+dt = 0.01
+integrator = "{}"
+{}
+"""
+
+
+@pytest.mark.parametrize(
+    ("integrator", "step"), [("dopri5", ""), ("dop853", "step = 0.005")], ids=["adaptive", "fixed"]
+)
+def test_an_exploding_run_ends_with_3_and_names_the_first_offender(call, folder, integrator, step):
+    """x grows as exp(10^4 t), beyond all numbers at 0.07 s. SciPy's LSODA and Exudyn's explicit
+    solvers report success with a NaN state; MuJoCo puts the state back and exits with 0."""
+    (folder / "exploding.toml").write_text(EXPLODING.format(integrator, step))
+    code, out, err = call("run", "exploding.toml", *QUIET, "--json")
+    assert code == 3, err
+    found = json.loads(out)
+    assert (found["status"], found["exit_code"]) == ("stopped", 3)
+    assert "repelling" in found["reason"] or "rocket" in found["reason"], found["reason"]
+    result = dap.open(folder / "new.nc")
+    assert result.status == "stopped"
+    assert all(np.all(np.isfinite(a)) for a in (result.u, result.v_dot, result.work))
+    assert result.t[-1] < 0.08
