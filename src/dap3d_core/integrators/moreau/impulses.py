@@ -15,7 +15,8 @@ from dap3d_core.kernels.runtime.cache import compiled
 
 #: A contact whose friction is on its cone to this part slides.
 ON_CONE = 1e-6
-#: Modes, and the slip of what sticks at the start, m/s (interface/contacts/rows.py).
+#: Modes, and the slip of what sticks at the start, m/s of a scene of ordinary size, or rad/s
+#: (interface/contacts/rows.py).
 OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0
 STILL = 1e-8
 
@@ -59,7 +60,8 @@ def recall(work: Any, s: StepArrays) -> None:
         if c >= s.touch_count and c < s.law_count:
             u0, u1, u2 = velocity_of(s, c, s.before)
             u0 = u0 if s.kind[c] == WHOLE else 0.0
-            rests = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) <= STILL
+            still = STILL if s.declared_turns[s.key[c] - DECLARED] != 0 else STILL * s.length
+            rests = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) <= still
             put_grip(s, c, rests if row < 0 else memory[row, 4] == STICKS)
 
 
