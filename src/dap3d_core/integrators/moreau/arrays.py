@@ -252,7 +252,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         changed=np.zeros(size),
         slots=np.zeros(2 * remembered + 1, dtype=np.int64),
         K=np.zeros(min(6 * n, dense_size) ** 2),
-        exchanged=np.zeros(dense_size, dtype=np.int64),
+        exchanged=np.zeros(max(dense_size, 6), dtype=np.int64),
         change=np.zeros(6 * n),
         turned=np.zeros(36),
         log=np.zeros((LOG_ROOM, MET)),

@@ -18,13 +18,14 @@ import math
 
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
-from dap3d_core.integrators.moreau.dense import (
+from dap3d_core.integrators.moreau.matrix import (
+    assemble,
     factor_blocks,
     factor_square,
+    is_factored,
     solve_blocks,
     solve_square,
 )
-from dap3d_core.integrators.moreau.groups import block_at
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -37,8 +38,6 @@ HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
 INNER = 1e-2
 #: The best to which a round is solved.
 ROUNDING = 1e-15
-#: Changes of slopes, over weights, that factors are kept with.
-REUSED = 1e-2
 TINY = 1e-300
 #: Unknowns up to which the matrix of a pass is a square; that of more has blocks.
 SMALL = 60
@@ -429,140 +428,3 @@ def try_pass(s: StepArrays, weight: float, merit: float, feels: float) -> float:
             return found
         part *= 0.5
     return -1.0
-
-
-@compiled
-def is_factored(s: StepArrays, weight: float, feels: float) -> bool:
-    """True if factors are those of slopes as now, near enough; else they will be."""
-    same = s.factored == weight
-    for q in range(s.chosen_count):
-        c = s.chosen[q]
-        B, old = s.B[c], s.B_factored[c]
-        same = same and (s.kind[c] == CONE or not slides(s, c))
-        for k in range(9):
-            same = same and abs(B[k] - old[k]) * weight <= REUSED
-    if same:
-        return True
-    s.factored = weight if feels > 0.0 else 0.0
-    for q in range(s.chosen_count):
-        for k in range(9):
-            s.B_factored[s.chosen[q], k] = s.B[s.chosen[q], k]
-    return False
-
-
-@compiled
-def slides(s: StepArrays, c: int) -> bool:
-    """True if friction that is not of a cone is at its bound."""
-    return s.rim[c] < slip_size(s.z[c], s.kind[c])
-
-
-@compiled
-def assemble(s: StepArrays, weight: float, feels: float) -> None:
-    """Put the matrix of a Newton pass, M + J^T weight r B J + D^T weight s D.
-
-    feels: as of ``try_pass``.
-    """
-    K = s.K
-    for k in range(s.matrix_size):
-        K[k] = 0.0
-    for q in range(s.used_count):
-        spin, m = s.spin[s.used[q]], s.mass[s.used[q]]
-        start = block_at(s, q, q)
-        for i in range(3):
-            K[start + i * s.width + i] = m
-            at = start + (3 + i) * s.width + 3
-            K[at], K[at + 1], K[at + 2] = spin[3 * i], spin[3 * i + 1], spin[3 * i + 2]
-    for q in range(s.chosen_count):
-        c = s.chosen[q]
-        for side in range(2):
-            first = s.place[s.bodies[c, side]]
-            if first >= 0:
-                turned = s.turned
-                put_turned(s.B[c], weight * s.r[c], s.J[c], 6 * side, turned)
-                for other in range(2):
-                    row = s.place[s.bodies[c, other]]
-                    if row >= 0:
-                        add_contact(s, block_at(s, row, first), s.J[c], 6 * other, turned)
-        if s.under[c] >= 0 and feels > 0.0:
-            add_pressed(s, c, weight)
-        elif s.kind[c] != CONE and feels > 0.0:
-            add_load(s, c, weight)
-    for k in range(s.y.size):
-        for p in range(s.row_start[k], s.row_start[k + 1]):
-            for q in range(s.row_start[k], s.row_start[k + 1]):
-                start = block_at(s, s.place[s.row_body[p]], s.place[s.row_body[q]])
-                for i in range(6):
-                    at = start + i * s.width
-                    part = weight * s.s[k] * s.D[p, i]
-                    for j in range(6):
-                        K[at + j] += part * s.D[q, j]
-
-
-@compiled
-def add_load(s: StepArrays, c: int, weight: float) -> None:
-    """Add to K that friction of a joint which slides grows with the joint's load."""
-    k, z = s.key[c] - DECLARED, s.z[c]
-    first, whole = s.load_row[k], z[0] if s.kind[c] == WHOLE else 0.0
-    size, rim = math.sqrt(whole * whole + z[1] * z[1] + z[2] * z[2]), s.rim[c]
-    if not 0.0 < rim < size:
-        return
-    for q in range(first, first + s.load_count[k]):
-        load = s.y_free[q] + s.pull[q]
-        if load < 0.0 and s.load_pushes[k] != 0:
-            continue
-        part = s.grip[k] * s.grip[k] * load / (rim * size) * weight * s.s[q]
-        for p in range(s.row_start[q], s.row_start[q + 1]):
-            for side in range(2):
-                b, rows = s.bodies[c, side], s.J[c]
-                if b == 0:
-                    continue
-                J = rows[6 * side :]
-                start = block_at(s, s.place[b], s.place[s.row_body[p]])
-                for i in range(6):
-                    along = part * (whole * J[i] + z[1] * J[12 + i] + z[2] * J[24 + i])
-                    at = start + i * s.width
-                    for j in range(6):
-                        s.K[at + j] += along * s.D[p, j]
-
-
-@compiled
-def add_pressed(s: StepArrays, c: int, weight: float) -> None:
-    """Add to K that what resists rolling grows with what presses, where it yields."""
-    u, z, J = s.under[c], s.z[c], s.J[c]
-    size = math.sqrt(z[1] * z[1] + z[2] * z[2])
-    if not 0.0 < s.rim[c] < size:
-        return
-    part = weight * s.r[u] / size
-    for side in range(2):
-        row = s.place[s.bodies[c, side]]
-        for other in range(2 if row >= 0 else 0):
-            column = s.place[s.bodies[u, other]]
-            if column < 0:
-                continue
-            start, normal = block_at(s, row, column), s.J[u]
-            for i in range(3, 6):
-                k, at = 6 * side + i, start + i * s.width
-                along = part * (z[1] * J[12 + k] + z[2] * J[24 + k])
-                for j in range(6):
-                    s.K[at + j] += along * normal[6 * other + j]
-
-
-@compiled
-def put_turned(B: Floats, weight: float, J: Floats, side: int, out: Floats) -> None:
-    """Put weight B J of the columns of one body, (18,)."""
-    for k in range(6):
-        a, b, c = weight * J[side + k], weight * J[12 + side + k], weight * J[24 + side + k]
-        out[k] = B[0] * a + B[1] * b + B[2] * c
-        out[6 + k] = B[3] * a + B[4] * b + B[5] * c
-        out[12 + k] = B[6] * a + B[7] * b + B[8] * c
-
-
-@compiled
-def add_contact(s: StepArrays, start: int, J: Floats, side: int, turned: Floats) -> None:
-    """Add J^T of one body times ``turned`` of another one to their block of K."""
-    K = s.K
-    for i in range(6):
-        a, b, c = J[side + i], J[12 + side + i], J[24 + side + i]
-        at = start + i * s.width
-        for k in range(6):
-            K[at + k] += a * turned[k] + b * turned[6 + k] + c * turned[12 + k]
