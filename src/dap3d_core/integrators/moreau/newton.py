@@ -30,8 +30,9 @@ WEIGHT, LESS, LEAST = 1e5, 1e-2, 1.0
 #: A round helps where it leaves less than this part of the residual. Rounds, Newton passes of one,
 #: and halvings of a pass at most.
 HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
-#: Part of the tolerance to which a round is solved.
-INNER = 1e-2
+#: Part of the tolerance to which a round is solved; rounding of its equations is this times the
+#: weight and the momentum, and a residual from which a round that does not help is the last.
+INNER, ROUNDING, SETTLED = 1e-2, 4e-16, 2e-14
 TINY = 1e-300
 #: Unknowns up to which the matrix of a pass is a square; that of more has blocks.
 SMALL = 60
@@ -257,15 +258,16 @@ def newton(s: StepArrays, tolerance: float) -> float:
         solve_round(s, weight, INNER * max(0.1 * tolerance, min(left, 1e-3)))
         exchange(s)
         new = residual_after(s)
-        if new > HELPS * left:
-            weight *= LESS
-        if new < left:
+        helps, better = new <= HELPS * left, new < left
+        if better:
             left = new
         else:
             exchange(s)
-            if weight < LEAST:
-                break
             put_velocities(s, s.v)
+        if not helps:
+            weight *= LESS
+            if left <= SETTLED or not (better or weight >= LEAST):
+                break
     return left
 
 
@@ -348,20 +350,12 @@ def product_of(x: Floats, y: Floats, m: float, spin: Floats) -> float:
 @compiled
 def solve_round(s: StepArrays, weight: float, tolerance: float) -> None:
     """Bring v to where it solves the equations of a round; impulses there in push and pull."""
-    size, rubs = TINY, False
+    rubs = False
     for q in range(s.chosen_count):
         rubs |= s.kind[s.chosen[q]] != CONE
-    for q in range(s.used_count):
-        b = s.used[q]
-        x = s.free[b]
-        if rubs:  # friction of joints may be little beside the momentum of its bodies
-            x = s.change
-            for k in range(6):
-                x[k] = s.free[b, k] - s.v[b, k]
-        size += product_of(x, x, s.mass[b], s.spin[b])
     merit = put_rest(s, s.v, weight, s.rest)
     for _ in range(PASSES):
-        if merit <= tolerance * tolerance * size:
+        if merit <= least_merit(s, weight, tolerance, rubs):
             return
         better = try_pass(s, weight, merit, 1.0)
         if better < 0.0:
@@ -371,6 +365,24 @@ def solve_round(s: StepArrays, weight: float, tolerance: float) -> None:
             put_rest(s, s.v, weight, s.rest)
             return
         merit = better
+
+
+@compiled
+def least_merit(s: StepArrays, weight: float, tolerance: float, rubs: bool) -> float:
+    """The merit at which a round is solved: a part of what moves, or rounding."""
+    size, changed = 0.0, TINY
+    for q in range(s.used_count):
+        b = s.used[q]
+        v, free, change = s.v[b], s.free[b], s.change
+        for k in range(6):
+            change[k] = free[k] - v[k]
+        size += product_of(free, free, s.mass[b], s.spin[b])
+        size += product_of(v, v, s.mass[b], s.spin[b])
+        changed += product_of(change, change, s.mass[b], s.spin[b])
+    rounding = ROUNDING * weight
+    # friction of joints may be little beside the momentum of its bodies
+    part = tolerance * tolerance * (changed if rubs else size)
+    return max(part, rounding * rounding * size)
 
 
 @compiled
