@@ -16,6 +16,7 @@ class BoxPlane(Contact):
     """
 
     keyword, points = "box_plane", 8
+    body_axes = ("i",)
     P_i: Point = point(doc="centre of the box")
     size: tuple = vec3(unit="m", doc="lengths of its edges, along the axes of the body")
     P_j: Point = point("ground.O", doc="point of the plane")

@@ -44,6 +44,7 @@ class Bushing(Force):
     """
 
     keyword = "bushing"
+    body_axes = ("i",)
     synonyms = ("mount",)
     symbol = "ball"
     P_i: Point = point(doc="where it is fastened, on body i")

@@ -40,6 +40,7 @@ class RotationStop(Force):
     """
 
     keyword = "rot_stop"
+    body_axes = ()  # moments of inertia alone
     symbol = "ring"
     example: ClassVar[Mapping[str, str]] = {"k": "1e4"}
     unilateral = (0,)

@@ -34,6 +34,7 @@ class Disk(Joint):
     """
 
     keyword, rows, holonomic = "disk", 3, (False, False, True)
+    ground_axes = "z"
     synonyms = ("wheel", "rolling")
     symbol = "wheel"
     switch_words = (

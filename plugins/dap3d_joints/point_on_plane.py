@@ -35,6 +35,7 @@ class PointOnPlane(Joint):
     """
 
     keyword, rows = "rP", 1
+    ground_axes = "a_j"
     symbol = "plate"
     body_i: Body = body(default=None, doc="the body; that of P_i when left out")
     P_i: Point = point(default=None, doc="point on body i; the mass centre when left out")

@@ -46,6 +46,7 @@ class Translational(Joint):
     """
 
     keyword, rows = "tran", 5
+    body_axes = ()  # A_c says how they lie
     synonyms = ("translational", "prismatic", "slider", "slide")
     coordinate, limit = "length", "joint_limit"
     symbol = "slider"

@@ -34,6 +34,7 @@ class Weld(Joint):
     """
 
     keyword, rows = "weld", 6
+    body_axes = ()  # the pose to each other alone
     synonyms = ("fixed", "rigid", "lock")
     symbol = "block"
     body_i: Body = body(doc="one of the bodies")

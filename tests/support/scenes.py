@@ -68,7 +68,8 @@ def scene_for(type_info, rng, *, ground=None, values=None):
     if type_info.layout.unknowns:  # off a bent curve the rows that remain turn: no rates of C
         for function in scene.functions.values():
             function.fields["coeff"] = [*function.fields["coeff"][:2], 0.0]
-    getattr(scene, f"add_{type_info.type.kind}")(type_info.type.keyword, "element", **fields)
+    kind = "contact" if type_info.type.is_contact else type_info.type.kind
+    getattr(scene, f"add_{kind}")(type_info.type.keyword, "element", **fields)
     return scene
 
 

@@ -4,7 +4,13 @@ from collections import Counter
 
 import attrs
 
-from dap3d_core.interface.formats import WORLD, FormatError, Geometry, XmlElement
+from dap3d_core.interface.formats import (
+    FRICTION_DIRECTIONS,
+    WORLD,
+    FormatError,
+    Geometry,
+    XmlElement,
+)
 from dap3d_formats.mjcf.reader import MjcfReader
 
 #: Where a geom lies: its link, and which of the shapes of that it is.
@@ -54,12 +60,17 @@ def _pair(reader: MjcfReader, given: XmlElement) -> tuple[Slot, Slot] | None:
     one, other = (contact for contact in both if contact is not None)
     if one.priority != other.priority:
         one = other = max(one, other, key=lambda contact: contact.priority)
-    smooth = element.number("condim", 1.0 if one.smooth and other.smooth else 3.0) < 3.0
-    mu, *across = element.numbers("friction", None, (max(one.mu, other.mu),))
-    if across[:1] not in ([], [mu]) and not smooth:
+    mu, spin, roll = (max(getattr(one, n), getattr(other, n)) for n in ("mu", "mu_spin", "mu_roll"))
+    directions = element.number("condim", max(one.directions, other.directions))
+    friction = element.numbers("friction", None, (mu,))
+    usual = (mu, friction[0], spin, roll, friction[3] if len(friction) == 4 else roll)
+    mu, across, spin, roll, around = friction + usual[len(friction) :]
+    if directions >= 3 and (across != mu or (directions >= 6 and around != roll)):
         text = "friction of a pair that differs along its directions: the first holds"
         document.source.remarks.translate(element.place, text, motion=True)
-    model.friction[frozenset(names)] = 0.0 if smooth else mu
+    found = {"mu": mu, "mu_spin": spin, "mu_roll": roll}
+    found |= {name: 0.0 for name, least in FRICTION_DIRECTIONS.items() if directions < least}
+    model.friction[frozenset(names)] = found
     return slots[names[0]], slots[names[1]]
 
 

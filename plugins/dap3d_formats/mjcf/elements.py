@@ -167,7 +167,7 @@ MJCF: Table = {
 CONTACTS: Table = {
     **MJCF,
     "geom": dict(MJCF["geom"]) | taken("contype conaffinity friction priority")
-    | translated("condim", "of 1 smooth, else friction along the surface alone")
+    | taken("condim")
     | moves("solmix solref solimp margin gap", "contacts are rigid"),
     "contact": taken(),
     "exclude": taken() | taken("name body1 body2"),

@@ -22,6 +22,8 @@ from dap3d_core.interface.formats import (
 from dap3d_formats.axes import along
 from dap3d_formats.mjcf.document import Document
 
+#: Friction of sliding, spinning and rolling.
+FRICTION = (1.0, 0.005, 0.0001)
 #: Geoms without a volume.
 FLAT = ("plane", "hfield", "sdf")
 #: Density of geoms, kg/m^3.
@@ -95,9 +97,10 @@ class Geoms:
             return None
         if self.document.disables("contact", "constraint"):
             return None
-        friction = geom.numbers("friction", None, (1.0,))
-        smooth, priority = geom.number("condim", 3.0) < 3.0, int(geom.number("priority", 0.0))
-        return Contact(friction[0], smooth, bits[0], bits[1], priority, surface=surface)
+        given = geom.numbers("friction", None, FRICTION)
+        mu, spin, roll = given + FRICTION[len(given) :]
+        directions, priority = int(geom.number("condim", 3.0)), int(geom.number("priority", 0.0))
+        return Contact(mu, spin, roll, directions, bits[0], bits[1], priority, surface=surface)
 
     def _mesh_shape(self, geom: XmlElement, frame: Frame, common: Any) -> Geometry | None:
         asset = self._asset(geom)

@@ -46,9 +46,14 @@ class TypeBase:
     keyword: ClassVar[str] = ""
     #: Classes that replace this one for certain values of fields: (conditions, class).
     variants: ClassVar[tuple[tuple[Mapping[str, Any], type["TypeBase"]], ...]] = ()
-    #: True for a type of two bodies or more that uses the axes of ground in its formulas: it need
-    #: not be invariant to a common rigid motion of its bodies (docs/how-to/check-plugin.md).
-    ground_axes: ClassVar[bool] = False
+    #: True for a type that uses the axes of ground in its formulas; or the one direction of ground
+    #: that it measures along, an axis ("z") or a field (a vector). It need not be invariant to a
+    #: common rigid motion of its bodies (docs/how-to/check-plugin.md); a sub-assembly that is moved
+    #: along that direction, or turned against it, refuses such elements.
+    ground_axes: ClassVar[bool | str] = False
+    #: Slots whose body's axes it uses, as for the edges of a box; None: those whose ``A_`` or
+    #: ``p_`` its kernels name. Sub-assemblies that are turned refuse it where ground is that body.
+    body_axes: ClassVar[tuple[str, ...] | None] = None
     symbol: ClassVar[str] = ""
     #: Of the example of ``describe``: fields -> what is written there, where no value is usual.
     example: ClassVar[Mapping[str, str]] = {}

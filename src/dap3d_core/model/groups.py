@@ -63,6 +63,11 @@ class Group:
     read: tuple["Group", ...] = ()
     loaded: Integers | None = None
 
+    def number(self, name: str) -> Floats:
+        """(m,) a number of each, by the name of its field; zeros where the type has none."""
+        place = self.type_info.layout.numbers.get(name)
+        return np.zeros(len(self.members)) if place is None else self.numbers[:, place[0]]
+
     @property
     def keyword(self) -> str:
         """The type's word in a scene."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from dap3d_core.interface.codegen.reactions import joint_fields
+from dap3d_core.interface.contacts.contact import RESISTED
 from dap3d_core.interface.types import BodyPose, pose
 from dap3d_core.model.groups import Floats, Group, Grouping, Integers, PrepareError
 from dap3d_core.model.joint_angles import JointAngles, joint_angle_name
@@ -122,6 +123,14 @@ class Model:
     def contact_names(self) -> tuple[str, ...]:
         """Names of points of contacts, ``NAME#1`` of those of several."""
         return tuple(self.joint_names[len(self.joint_names) - self.contact_count :])
+
+    @property
+    def resists_turning(self) -> bool:
+        """True if contacts resist that bodies roll or spin, which steps alone can follow."""
+        shapes = self.collisions
+        if shapes is not None and shapes.mu_roll.size + shapes.mu_spin.size:
+            return True
+        return any(group.number(name).any() for group in self.contacts for name in RESISTED)
 
     @property
     def contacts(self) -> tuple[Group, ...]:

@@ -26,6 +26,7 @@ _OTHER_NAMES = {
     "body": "parent link",
     "sPp": "offset coordinates",
     "name": "title",
+    "type": "kind class",
     "scene": "title model header",
     "bodies": "links parts body link part",
     "points": "markers frames sites marker frame site",

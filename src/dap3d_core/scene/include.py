@@ -1,62 +1,55 @@
 """Sub-assemblies: the parts of one scene in another, at a place of their own, as NAME/PART.
 
 Inputs, outputs and parameters are words of expressions, so they become NAME_WORD. What belongs to a
-scene as a whole (its settings, forces such as gravity that name no part) is not taken over.
+scene as a whole (its settings, forces such as gravity that act on all bodies) is not taken over.
 """
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import attrs
-import numpy as np
 
+from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.interface.fields import FieldSpec, slot_of, specs_of
-from dap3d_core.kernels.array_types import Floats
+from dap3d_core.interface.types import acts_on_all
 from dap3d_core.registry import UnknownTypeError, load_registry
 from dap3d_core.registry.arguments import checked
 from dap3d_core.scene.coerce import plain
+from dap3d_core.scene.contacts.tables import Collisions, Material
 from dap3d_core.scene.errors import MISSING, Key, MistakeList, dotted
 from dap3d_core.scene.expressions.expression import fault_of_word
+from dap3d_core.scene.place import Place, is_expression, read_place
 from dap3d_core.scene.scene import Scene
 from dap3d_core.scene.tables import (
     ACTIVE,
     GROUND,
     NAMED,
-    NO_TURN,
     ZERO,
     Element,
     Point,
     Vector,
     fault_of_name,
 )
-from dap3d_core.scene.validate.coerce_values import (
-    Fault,
-    angle_of,
-    from_axis_angle,
-    from_rpy,
-    numbers_of,
-    quaternion_of,
-)
+from dap3d_core.scene.validate.coerce_values import Fault
+from dap3d_core.scene.validate.geometry import AXES
 from dap3d_core.scene.validate.shapes import SHAPES
+from dap3d_core.scene.validate.types import KINDS
 
-#: How an orientation is given, and what makes Euler parameters of it.
-ORIENTATIONS: Mapping[str, Callable[[Any], Any]] = {
-    "p": quaternion_of,
-    "rpy": from_rpy,
-    "axis_angle": from_axis_angle,
-}
-PLACE = ("r", *ORIENTATIONS)
-#: Suffixes of names that stand for the origin and the axes of a body.
-AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
-#: Entries of a rotation matrix below this are rounding, as of a turn of 90 deg.
-ROTATION_ROUNDING = 1e-15
-#: Elements whose type may take something from ground that is not written, and the kind of each.
-KINDS = {"joints": "joint", "forces": "force", "contacts": "contact"}
 #: The field of a constant orientation A_i^T A_j, which is another one where ground is turned.
 RELATIVE = "A_c"
+#: Kinds of fields of types that hold names, and the keys of other tables that do.
+REFERENCES = frozenset({
+    "body", "point", "vector", "vector2", "joint", "joint_fields", "function", "functions", "input",
+    "points", "vectors", "bodies",
+})  # fmt: skip
+NAMES = ("body", "P_i", "P_j", "material")
+#: Words of expressions of quantities that every scene has.
+SYSTEM_WORDS = ("t", "work")
+#: Ends of the names of contacts that limit a joint.
+LIMIT_ENDS = ("_lower", "_upper")
 #: A name in an expression: quoted, or a dotted word.
 _NAMES = re.compile(r"""'[^']*'|"[^"]*"|(?<![\w.])[^\W\d]\w*(?:\.\w+)*""")
 
@@ -96,7 +89,7 @@ def included(
     name, before = str(key[-1]), len(mistakes.mistakes)
     if fault := fault_of_name(name) or fault_of_word(name):
         mistakes.add(key, name, f"not a name for a sub-assembly: {fault}")
-    place = _place(mistakes, (*key, "at"), plain(at))
+    place = read_place(mistakes, (*key, "at"), plain(at))
     given = plain(parameters)
     if not isinstance(given, dict):
         mistakes.add((*key, "parameters"), given, "should be a table such as {k = 2.0}")
@@ -110,135 +103,15 @@ def included(
     return _Part(name, part.copy(), place, given)
 
 
-@attrs.frozen(eq=False)
-class _Place:
-    """Where the ground of a sub-assembly lies: its rotation, its Euler parameters, its origin."""
-
-    A: Floats
-    p: tuple[float, ...]
-    r: tuple[Any, ...]
-
-    @property
-    def is_turned(self) -> bool:
-        return bool(np.any(np.eye(3) != self.A))
-
-    @property
-    def is_moved(self) -> bool:
-        return self.is_turned or any(x != 0.0 for x in self.r)
-
-    def position(self, x: Any) -> Any:
-        """The coordinates in ground of a point; what is no list of three is left to the check."""
-        turned = self.direction(x)
-        if type(turned) is not tuple or len(turned) != 3:
-            return turned
-        return tuple(_sum([(1.0, a), (1.0, b)]) for a, b in zip(self.r, turned, strict=True))
-
-    def direction(self, x: Any) -> Any:
-        """The components in ground of a vector."""
-        if type(x) is not tuple or len(x) != 3 or not self.is_turned:
-            return x
-        return tuple(_sum(list(zip(map(float, row), x, strict=True))) for row in self.A)
-
-    def orientation(self, given: Mapping[str, Any]) -> Any:
-        """Euler parameters behind the turn of the place, or a fault."""
-        word = next((w for w in ("rpy", "axis_angle") if given.get(w) is not None), "p")
-        p = ORIENTATIONS[word](given.get(word, NO_TURN))
-        if isinstance(p, Fault) and word == "rpy":
-            p = _quaternion(given[word]) or p
-        if isinstance(p, Fault):
-            return p
-        e0, e1, e2, e3 = self.p
-        left = ((e0, -e1, -e2, -e3), (e1, e0, -e3, e2), (e2, e3, e0, -e1), (e3, -e2, e1, e0))
-        return tuple(_sum(list(zip(row, p, strict=True))) for row in left)
-
-
-def _place(mistakes: MistakeList, key: Key, at: Any) -> _Place | None:
-    if not isinstance(at, dict):
-        mistakes.add(key, at, "should be a table such as {r = [0.0, 0.5, 0.0], rpy = [...]}")
-        return None
-    mistakes.add_unknown_keys(key, at, PLACE, in_order=True)
-    words = [word for word in ORIENTATIONS if word in at]
-    if len(words) > 1:
-        mistakes.add(key, MISSING, f"give one of {' and '.join(words)}")
-    r = at.get("r", ZERO)
-    if type(r) is not tuple or len(r) != 3 or not all(map(_is_number, r)):
-        numbers = numbers_of(r, 3)
-        what = numbers.what if isinstance(numbers, Fault) else "should be a list of 3 numbers"
-        mistakes.add((*key, "r"), r, what)
-        r = ZERO
-    p = ORIENTATIONS[words[0]](at[words[0]]) if words else NO_TURN
-    if isinstance(p, Fault):
-        given = at[words[0]]
-        if type(given) is tuple and any(map(_is_expression, given)):
-            p = Fault("takes numbers: expressions may move a sub-assembly, not turn it")
-        mistakes.add((*key, words[0]), given, p.what, p.nearest, p.remedy)
-        return None
-    e0, e1, e2, e3 = p
-    A = np.eye(3) + 2.0 * (
-        e0 * np.array([[0, -e3, e2], [e3, 0, -e1], [-e2, e1, 0]])
-        + np.array([[-e2 * e2 - e3 * e3, e1 * e2, e1 * e3],
-                    [e1 * e2, -e1 * e1 - e3 * e3, e2 * e3],
-                    [e1 * e3, e2 * e3, -e1 * e1 - e2 * e2]])
-    )  # fmt: skip
-    A[np.abs(A) < ROTATION_ROUNDING] = 0.0
-    return _Place(A, p, r)
-
-
-def _quaternion(rpy: Any) -> tuple[str, ...] | None:
-    """Euler parameters, as expressions, of roll, pitch and yaw with expressions; None of others."""
-    if type(rpy) is not tuple or len(rpy) != 3:
-        return None
-    angles = [x[1:].strip() if _is_expression(x) else angle_of(x) for x in rpy]
-    if any(isinstance(x, Fault) for x in angles):
-        return None
-    (c0, s0), (c1, s1), (c2, s2) = ((f"cos(({x}) / 2)", f"sin(({x}) / 2)") for x in angles)
-    return (
-        f"= {c2} * {c1} * {c0} + {s2} * {s1} * {s0}",
-        f"= {c2} * {c1} * {s0} - {s2} * {s1} * {c0}",
-        f"= {c2} * {s1} * {c0} + {s2} * {c1} * {s0}",
-        f"= {s2} * {c1} * {c0} - {c2} * {s1} * {s0}",
-    )
-
-
-def _is_number(x: Any) -> bool:
-    return type(x) in (float, int) or _is_expression(x)
-
-
-def _is_expression(x: Any) -> bool:
-    return type(x) is str and x.startswith("=")
-
-
-def _sum(terms: list[tuple[float, Any]]) -> Any:
-    """The sum of factors times numbers or expressions; an expression where there is one."""
-    terms = [(a, x) for a, x in terms if a != 0.0 and x != 0.0]
-    if all(type(x) in (float, int) for _, x in terms):
-        return float(sum(a * x for a, x in terms))
-    if not all(_is_number(x) for _, x in terms):
-        return next(x for _, x in terms if not _is_number(x))  # the check refuses it
-    if len(terms) == 1 and terms[0][0] == 1.0:
-        return terms[0][1]
-    texts = [f"({x[1:].strip()})" if _is_expression(x) else f"({x!r})" for _, x in terms]
-    factors = ["" if a == 1.0 else f"{a!r} * " for a, _ in terms]
-    return "= " + " + ".join(f"{a}{x}" for a, x in zip(factors, texts, strict=True))
-
-
-def _specs(kind: str, keyword: Any) -> Mapping[str, FieldSpec]:
-    """The fields of an installed type; none where the check of the scene has to refuse it."""
-    try:
-        return specs_of(load_registry().get(kind, keyword).type)
-    except (UnknownTypeError, PluginError, TypeError):
-        return {}
-
-
 class _Part:
     """The parts of a scene under the names that they have in another."""
 
-    def __init__(self, name: str, part: Scene, place: _Place, parameters: dict[str, Any]) -> None:
+    def __init__(self, name: str, part: Scene, place: Place, parameters: dict[str, Any]) -> None:
         self.name, self.part, self.place, self.given = name, part, place, parameters
         tables = (getattr(part, table) for table in NAMED if table != "inputs")
         self.names = {n: f"{name}/{n}" for table in tables for n in table}
         self.words = {n: f"{name}_{n}" for n in (*part.inputs, *part.outputs)}
-        self.parameters = {n: f"{name}_{n}" for n in part.parameters}
+        self._registry = load_registry()
         self._axes_of_ground: dict[str, None] = {}
         self._left_out: list[str] = []
 
@@ -258,21 +131,24 @@ class _Part:
             else:
                 scene.vectors[name] = Vector(name, GROUND, self.place.direction(AXES[axis]))
         for point in self.part.animation.points:
-            body, sPp = str(point.body), point.sPp
+            body, sPp = str(point.body), self._value(point.sPp)
             sPp = self.place.position(sPp) if body == GROUND else sPp
             scene.animation.points.append(attrs.evolve(point, body=self._name(body), sPp=sPp))
         for name, versions in self.part.requires.items():
             both = {scene.requires.get(name, "*"), versions} - {"*"}
             scene.requires[name] = ", ".join(sorted(map(str, both))) or "*"
+        scene.files |= {f"{self.name}/{file}": path for file, path in self.part.files.items()}
         if scene.folder and self.part.folder:
             self._find_meshes(scene, os.path.relpath(self.part.folder, scene.folder))
+        if self.part.collisions is not None and (pairs := self.part.collisions.exclude):
+            whole, pairs = scene.collisions or Collisions(), self._value(pairs, is_name=True)
+            scene.collisions = whole
+            scene.add_collisions(whole.bodies, pairs, whole.material)
         file = self.part.path
         files = {f"{self.name}/{n}": other for n, other in self.part.included.items()}
         scene.included |= files | ({self.name: file} if file else {})
         scene.faults += [self._fault(key, mistake) for key, mistake in self.part.faults]
         scene.notes += [f"{self.name}: {note}" for note in self.part.notes]
-        if self.part.collisions is not None:
-            scene.notes.append(f"{self.name}: [collisions] left out; that of the whole scene holds")
         if self._left_out:
             scene.notes.append(
                 f"{self.name}: {', '.join(self._left_out)} left out, which names no part of the "
@@ -282,36 +158,63 @@ class _Part:
     def _entries(self, table: str, mistakes: MistakeList) -> dict[str, Any]:
         if table == "parameters":
             values = self.part.parameters
-            own = {n: self._expression(v, self.parameters) for n, v in values.items()}
-            return {self.parameters[n]: v for n, v in (own | self.given).items()}
+            own = {n: self._value(v) for n, v in values.items()}
+            return {f"{self.name}_{n}": v for n, v in (own | self.given).items()}
         if table == "outputs":
             outputs = self.part.outputs
             return {self.words[n]: self._output(value) for n, value in outputs.items()}
-        if table == "inputs":
-            return {self.words[n]: attrs.evolve(x, name=self.words[n], value=self._value(x.value))
-                    for n, x in self.part.inputs.items()}  # fmt: skip
         entries = {}
         for old, entry in getattr(self.part, table).items():
-            name = self.names[old]
-            if isinstance(entry, Element):
-                fields = {k: self._output(v) if table == "joints" and k == ACTIVE else
-                          self._field(k, v) for k, v in entry.fields.items()}  # fmt: skip
-                if table == "forces" and not self._names_a_part(entry.fields):
-                    self._left_out.append(old)
-                    continue
-                if table == "shapes" and fields.get("body") == GROUND and self.place.is_moved:
-                    self._shape(entry.type, fields)
-                if table in KINDS and self.place.is_moved:
-                    self._write_out(_specs(KINDS[table], entry.type), entry.fields, fields)
-                entries[name] = Element(name, entry.type, fields)
+            name = self.words[old] if table == "inputs" else self.names[old]
+            if not isinstance(entry, Element):
+                entries[name] = self._other(mistakes, table, name, entry)
+            elif (element := self._element(mistakes, table, name, entry)) is not None:
+                entries[name] = element
             else:
-                given = attrs.asdict(entry, recurse=False)
-                given = {f: v for f, v in given.items()
-                         if v is not attrs.fields_dict(type(entry))[f].default}  # fmt: skip
-                changed = {f: self._field(f, v) for f, v in given.items()}
-                entries[name] = attrs.evolve(entry, **changed | {"name": name})
-                self._put(mistakes, table, entries[name])
+                self._left_out.append(old)
         return entries
+
+    def _other(self, mistakes: MistakeList, table: str, name: str, entry: Any) -> Any:
+        """A body, point, vector, input or material under its new name, at its place."""
+        given = attrs.asdict(entry, recurse=False)
+        given = {f: v for f, v in given.items()
+                 if v is not attrs.fields_dict(type(entry))[f].default}  # fmt: skip
+        changed = {f: self._value(v, is_name=f in NAMES) for f, v in given.items()}
+        if isinstance(entry, Material) and isinstance(entry.with_, dict):
+            changed["with_"] = {
+                self.names[other] if other in self.part.materials else other: self._value(pair)
+                for other, pair in entry.with_.items()
+            }
+        entry = attrs.evolve(entry, **changed | {"name": name})
+        self._put(mistakes, table, entry)
+        return entry
+
+    def _element(
+        self, mistakes: MistakeList, table: str, name: str, entry: Element
+    ) -> Element | None:
+        """An element under its new name, at its place; None of a force on the whole scene."""
+        type_info = self._type_of(table, entry.type)
+        specs = specs_of(type_info.type) if type_info else {}
+        if table == "forces" and self._acts_on_all(type_info, entry.fields):
+            return None
+        fields = {k: self._output(v) if table == "joints" and k == ACTIVE else
+                  self._field(table, k, v, specs.get(k))
+                  for k, v in entry.fields.items()}  # fmt: skip
+        if table == "shapes":
+            self._shape(entry.type, fields, entry.fields.get("body"))
+        elif type_info and self.place.is_moved:
+            if what := self._refusal(type_info, entry.fields):
+                remedy = "give the sub-assembly a body in place of ground, held by a joint weld"
+                mistakes.add((table, name), MISSING, what, remedy=remedy)
+            self._write_out(specs, entry.fields, fields)
+        return Element(name, entry.type, fields)
+
+    def _type_of(self, table: str, keyword: Any) -> TypeInfo | None:
+        """An installed type; None where there is none, or the check of the scene refuses it."""
+        try:
+            return self._registry.get(KINDS[table], keyword) if table in KINDS else None
+        except (UnknownTypeError, PluginError, TypeError, AttributeError):
+            return None
 
     def _put(self, mistakes: MistakeList, table: str, entry: Any) -> None:
         """Bring a body, or a point or vector of ground, to its place."""
@@ -324,23 +227,39 @@ class _Part:
                 if (value := getattr(entry, field)) is not ZERO:
                     setattr(entry, field, place.direction(value))
             if place.is_turned:
-                p = place.orientation(attrs.asdict(entry, recurse=False))
-                if isinstance(p, Fault):
-                    what = f"is turned with the sub-assembly, which needs numbers or rpy: {p.what}"
-                    mistakes.add((table, entry.name), MISSING, what)
-                else:
+                p = self._turned(mistakes, entry, attrs.asdict(entry, recurse=False))
+                if p is not None:
                     entry.p, entry.rpy, entry.axis_angle = p, None, None
                 if entry.p_0 is not None:
-                    p = place.orientation({"p": entry.p_0})
-                    entry.p_0 = entry.p_0 if isinstance(p, Fault) else p
+                    entry.p_0 = self._turned(mistakes, entry, {"p": entry.p_0})
         elif table == "points" and entry.body == GROUND:
             entry.sPp = place.position(entry.sPp)
         elif table == "vectors" and entry.body == GROUND:
             entry.sp = place.direction(entry.sp)
 
-    def _shape(self, type_: Any, fields: dict[str, Any]) -> None:
-        """Bring a shape of ground to its place."""
-        known, put = SHAPES.get(type_, {"at": None, "p": None}), self.place
+    def _turned(self, mistakes: MistakeList, body: Any, given: Mapping[str, Any]) -> Any:
+        """Euler parameters of a body turned with the place; None where a mistake is reported."""
+        p = self.place.orientation(given)
+        if not isinstance(p, Fault):
+            return p
+        what = f"is turned with the sub-assembly, which needs numbers, p or rpy: {p.what}"
+        mistakes.add(("bodies", body.name), MISSING, what)
+        return None
+
+    def _shape(self, type_: Any, fields: dict[str, Any], body: Any) -> None:
+        """Give a shape what [collisions] of the part says; bring one of ground to its place."""
+        known, put, collisions = (
+            SHAPES.get(type_, {"at": None, "p": None}),
+            self.place,
+            self.part.collisions,
+        )
+        if fields.get("collides") is True and collisions is not None:
+            if collisions.material is not None:
+                fields.setdefault("material", self._value(collisions.material, is_name=True))
+            if type(collisions.bodies) is tuple and body not in collisions.bodies:
+                fields["collides"] = False
+        if body != GROUND or not put.is_moved:
+            return
         if "at" in known:
             fields["at"] = put.position(fields.get("at", ZERO))
         if type(fields.get("points")) is tuple:
@@ -352,20 +271,38 @@ class _Part:
         if "p" in known and not isinstance(p := put.orientation(fields), Fault):
             fields["p"] = p
 
+    def _refusal(self, type_info: TypeInfo, given: Mapping[str, Any]) -> str:
+        """Why an element cannot follow where its ground is moved; "" where it can."""
+        along: Any = type_info.type.ground_axes
+        named = str(given.get(along, f"{GROUND}.{along}"))
+        vector = self.part.vectors.get(named)
+        d = vector.sp if vector else AXES.get(named.rpartition(".")[2], ZERO)
+        turned = along in AXES and self.place.direction(d) != d
+        if along and (along is True or turned or self.place.moves_along(d)):
+            return (
+                "measures from the ground of the whole scene, and does not follow the sub-assembly"
+            )
+        slots = type_info.axis_slots if self.place.is_turned else ()
+        if any(self._is_on_ground(specs_of(type_info.type), given, slot) for slot in slots):
+            return "lies by the axes of ground, which are not turned with the sub-assembly"
+        return ""
+
     def _write_out(
         self, specs: Mapping[str, FieldSpec], given: Mapping[str, Any], fields: dict[str, Any]
     ) -> None:
         """Write what an element takes from ground, by default or as components in its axes."""
-        joints = [spec.gives for field, spec in specs.items() if spec.gives and field in given]
+        taken = {own for field, spec in specs.items() if field in given for own in spec.gives}
         for field, spec in specs.items():
-            if spec.kind != "point" or spec.default is not None or field in given:
-                continue
-            taken = any(field in gives for gives in joints)
-            if not taken and self._is_on_ground(specs, given, str(slot_of(field))):
-                fields[field] = self._name(f"{GROUND}.O")
-        for field, spec in specs.items():
+            if spec.in_ground and spec.given and not spec.required:
+                fields.setdefault(field, spec.default)
             if spec.in_ground and field in fields:
                 fields[field] = self.place.direction(fields[field])
+            if spec.kind not in ("point", "vector") or field in given or field in taken:
+                continue
+            if type(spec.default) is str:
+                fields[field] = self._name(spec.default)
+            elif spec.kind == "point" and self._is_on_ground(specs, given, str(slot_of(field))):
+                fields[field] = self._name(f"{GROUND}.O")
         if RELATIVE in specs and self.place.is_turned:
             A = fields.get(RELATIVE, specs[RELATIVE].default)
             turned = self.place.direction
@@ -378,14 +315,12 @@ class _Part:
     def _is_on_ground(
         self, specs: Mapping[str, FieldSpec], given: Mapping[str, Any], slot: str
     ) -> bool:
-        """Whether a body of an element is ground, by what it names there."""
+        """Whether a body of an element is ground, by what it names there, or by default."""
         ends = [self.part.vectors2[v] for v in given.values()
                 if isinstance(v, str) and v in self.part.vectors2]  # fmt: skip
         values = {f"P_{slot}": getattr(end, f"P_{slot}", None) for end in ends} | dict(given)
-        body = specs.get(f"body_{slot}")
         named = [value for field, value in values.items() if slot_of(field) == slot]
-        if not named and body is not None:
-            named = [body.default]
+        named = named or [spec.default for field, spec in specs.items() if slot_of(field) == slot]
         return any(self._body_of(name) == GROUND for name in named)
 
     def _body_of(self, name: Any) -> Any:
@@ -399,7 +334,9 @@ class _Part:
         """Name the files of meshes as seen from the folder of the other scene."""
         for old in self.part.shapes:
             fields = scene.shapes[self.names[old]].fields
-            if way != "." and type(fields.get("file")) is str:
+            if fields.get("file") in self.part.files:
+                fields["file"] = f"{self.name}/{fields['file']}"
+            elif way != "." and type(fields.get("file")) is str:
                 fields["file"] = f"{way.replace(os.sep, '/')}/{fields['file']}"
 
     def _name(self, name: str) -> str:
@@ -414,30 +351,41 @@ class _Part:
             return f"{self.name}/{GROUND} {tail}"
         return name
 
-    def _names_a_part(self, fields: Mapping[str, Any]) -> bool:
+    def _acts_on_all(self, type_info: TypeInfo | None, fields: Mapping[str, Any]) -> bool:
+        """Whether a force acts on whole scenes; of one that is not known, if it names no part."""
+        if type_info:
+            return bool(acts_on_all(type_info.type))
         values = [x for v in fields.values() for x in (v if type(v) is tuple else (v,))]
-        return any(type(x) is str and (self._name(x) != x or x == GROUND) for x in values)
+        return not any(type(x) is str and (self._name(x) != x or x == GROUND) for x in values)
 
-    def _field(self, field: str, value: Any) -> Any:
+    def _field(self, table: str, field: str, value: Any, spec: FieldSpec | None) -> Any:
+        """The value of a field of an element, which may be a name, or an input: a word."""
+        if table == "shapes":
+            return self._value(value, is_name=field in NAMES)
         is_input = type(value) is str and value in self.part.inputs
-        if is_input and (field.startswith("input") or value not in self.names):
+        if spec is None:  # of no type that is known here
+            is_input = is_input and value not in self.names
+        elif spec.kind != "input":
+            is_input = is_input and bool(spec.by_name) and value not in self.part.functions
+        if is_input:
             return self.words[value]
-        return self._value(value)
+        is_name = spec is None or spec.kind in REFERENCES or bool(spec.by_name)
+        return self._value(value, is_name=is_name)
 
-    def _value(self, value: Any) -> Any:
+    def _value(self, value: Any, *, is_name: bool = False) -> Any:
+        """A value with other names of parameters in its expressions; a name under its new one."""
         if type(value) is tuple:
-            return tuple(map(self._value, value))
-        if type(value) is not str:
-            return value
-        return (
-            self._expression(value, self.parameters) if _is_expression(value) else self._name(value)
-        )
+            return tuple(self._value(x, is_name=is_name) for x in value)
+        if isinstance(value, dict):
+            return {key: self._value(x) for key, x in value.items()}
+        if is_expression(value):
+            return _NAMES.sub(lambda match: self._word(match[0]), value)
+        return self._name(value) if is_name and type(value) is str else value
 
-    def _expression(self, text: Any, words: Mapping[str, str]) -> Any:
-        """An expression with other names of its parameters, inputs and outputs."""
-        if type(text) is not str:
-            return text
-        return _NAMES.sub(lambda match: words.get(match[0], match[0]), text)
+    def _word(self, written: str) -> str:
+        """The new word for one of an expression; functions, constants and others stay."""
+        word = written.strip("'\"")
+        return written if fault_of_word(word) else f"{self.name}_{word}"
 
     def _output(self, output: Any) -> Any:
         if isinstance(output, dict):
@@ -449,7 +397,12 @@ class _Part:
             head, dot, rest = match[0].strip("'\"").partition(".")
             if head in self.words:
                 return self.words[head] + dot + rest
-            return f"'{self.names[head]}{dot}{rest}'" if head in self.names else match[0]
+            if not dot:
+                return head if head in SYSTEM_WORDS else self._word(match[0])
+            owner = head.partition("#")[0]  # of a contact at several points, or a limit
+            owners = (owner, *(owner.removesuffix(end) for end in LIMIT_ENDS))
+            is_part = any(name in self.names for name in owners)
+            return f"'{self.name}/{head}.{rest}'" if is_part else match[0]
 
         return _NAMES.sub(renamed, output)
 

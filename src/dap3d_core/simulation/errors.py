@@ -35,12 +35,17 @@ def refuse_contacts(model: Any, what: str) -> None:
 
 
 def refuse_collisions(model: Any, what: str) -> None:
-    """Refuse what knows declared contacts, and not shapes that meet anywhere; as above."""
+    """Refuse what knows declared contacts, and not what steps alone can follow; as above."""
     if model.collisions is not None:
         raise SimulationError(
             f"{what} does not take shapes that collide yet, and the scene has some "
             f"({model.collisions.names[0]}): leave collides = true out, or run the scene "
             "(simulate), which does"
+        )
+    if model.resists_turning:
+        raise SimulationError(
+            f"{what} does not take contacts that resist rolling or spinning yet: leave mu_roll and "
+            "mu_spin out, or run the scene (simulate), which does"
         )
     refuse_breaks(model, what)
 

@@ -248,6 +248,23 @@ def test_geoms_meet_as_in_the_file(tmp_path):
     assert "1e-06 of the mass that it carries" in first.text
 
 
+def test_geoms_resist_spinning_and_rolling_by_their_condim(tmp_path):
+    """As MuJoCo: the larger condim and the larger coefficients of a pair, or those of a pair."""
+    geom = '<body pos="0 0 {z}"><freejoint/><geom name="{name}" size="0.1" {more}/></body>'
+    given = {"rolls": 'condim="6" friction="0.8 0.02 0.003"', "spins": 'condim="4"', "usual": ""}
+    bodies = "".join(geom.format(z=z, name=name, more=more)
+                     for z, (name, more) in enumerate(given.items()))  # fmt: skip
+    pair = '<contact><pair geom1="rolls" geom2="spins" condim="4" friction="1 1 0.1"/></contact>'
+    scene, _ = imported(tmp_path, f"<worldbody>{bodies}</worldbody>{pair}", contacts=True)
+    rolls, spins, usual = (scene.materials[s.fields["material"]] for s in scene.shapes.values())
+    assert (rolls.mu_spin, rolls.mu_roll) == (0.02, 0.003)
+    assert (spins.mu_spin, spins.mu_roll, usual.mu_spin) == (0.005, None, None)
+    pairs = {**rolls.with_, **spins.with_}
+    assert rolls.with_[spins.name] == {"mu": 1.0, "mu_spin": 0.1, "mu_roll": 0.0}
+    assert rolls.with_[usual.name] == {"mu": 1.0, "mu_spin": 0.02, "mu_roll": 0.003}
+    assert pairs[usual.name] == {"mu": 1.0, "mu_spin": 0.005}
+
+
 PAIRS = """<worldbody><geom name="floor" type="plane" size="5 5 0.1" contype="0" conaffinity="0"/>
 <body name="a" pos="0 0 3"><freejoint/><geom name="a" size="1" contype="0" conaffinity="0"/></body>
 <body name="b" pos="0 0 2"><freejoint/><geom name="b" size="0.1" contype="2"/></body>

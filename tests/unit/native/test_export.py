@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+from functools import partial
 
 import attrs
 import numpy as np
@@ -318,13 +319,13 @@ def test_an_output_that_is_named_twice_is_one(tmp_path):
     assert made.outputs == ("cart.r.x", "cart.r.y", "cart.r.z")
 
 
-def falling_ball():
+def falling_ball(**material):
     """A ball that falls onto a floor, by time stepping."""
     scene = dap.Scene(name="ball")
     scene.add_body("ball", mass=2.0, Jp=[0.008] * 3, r=[0, 0, 0.15], r_dot=[3.0, 0, 0])
     scene.add_shape("sphere", body="ball", radius=0.1, collides=True)
     scene.add_shape("plane", body="ground", collides=True)
-    scene.add_material("surface", mu=0.3)
+    scene.add_material("surface", mu=0.3, **material)
     scene.add_collisions(material="surface")
     scene.add_force("weight", "gravity")
     scene.simulation = attrs.evolve(scene.simulation, contact_step=4e-3)
@@ -343,6 +344,7 @@ def declared_ball():
 @pytest.mark.every(3)
 @pytest.mark.parametrize(("make", "more", "settings"), [
     (falling_ball, ["ball.rdd"], {}),
+    (partial(falling_ball, mu_roll=0.01, mu_spin=0.01), ["ball.rdd"], {}),
     (declared_ball, ["ball.rdd"], {"contact": "stepping", "contact_step": 2e-3}),
     (lambda: dap.load("quadruped"), ["trunk.rdd", "front_left_hinge.i.force"], {}),
 ])  # fmt: skip

@@ -18,6 +18,7 @@ class PointOnSurface(Joint):
     """
 
     keyword, rows = "point-on-surface", 1
+    body_axes = ("j",)
     P_i: Point = point(doc="the point that slides, on body i")
     P_j: Point = point(doc="point of the surface that is lowest along z, on body j")
     a: float = number(unit="m", positive=True, doc="half the extent along x of body j")

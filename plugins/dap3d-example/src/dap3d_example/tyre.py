@@ -23,7 +23,7 @@ class Tyre(Force):
 
     keyword = "tyre"
     states = ("alpha",)
-    ground_axes = True
+    ground_axes = "z"
     P_i: Point = point(doc="contact point")
     a_i: Vector = vector(doc="heading of the wheel")
     load: float = number(unit="N", positive=True, doc="load of the wheel")

@@ -32,8 +32,8 @@ class PlacedShapes(Arrays):
         ),
         **dict.fromkeys(("corners", "bits", "cells", "pairs", "which"), INTEGER_MATRIX),
         **dict.fromkeys(
-            ("at", "local", "size", "vertices", "mu", "e", "centre", "axes", "found", "scratch",
-             "work"),
+            ("at", "local", "size", "vertices", "mu", "mu_roll", "mu_spin", "e", "centre", "axes",
+             "found", "scratch", "work"),
             MATRIX,
         ),
     }  # fmt: skip
@@ -52,6 +52,8 @@ class PlacedShapes(Arrays):
     bits: Integers
     material: Integers
     mu: Floats
+    mu_roll: Floats  # none where nothing resists rolling, or spinning
+    mu_spin: Floats
     e: Floats
     apart: Integers
     reach: Floats
@@ -83,8 +85,8 @@ def placed_shapes(shapes: CollisionShapes | None) -> PlacedShapes:
         )  # fmt: skip
     m = len(shapes.kind)
     solids = np.flatnonzero(shapes.kind != PLANE)
-    names = ("kind", "body", "at", "size", "corners", "vertices", "bits", "material", "mu", "e",
-             "apart")  # fmt: skip
+    names = ("kind", "body", "at", "size", "corners", "vertices", "bits", "material", "mu",
+             "mu_roll", "mu_spin", "e", "apart")  # fmt: skip
     given: dict[str, Any] = {name: np.ascontiguousarray(getattr(shapes, name)) for name in names}
     whole: dict[str, Any] = {
         name: np.zeros(len(solids), dtype=np.int64) for name in ("small", "large", "following")

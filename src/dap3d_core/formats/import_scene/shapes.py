@@ -10,6 +10,7 @@ import attrs
 from dap3d_core.formats.import_scene.names import usable
 from dap3d_core.formats.import_scene.scene_builder import SceneBuilder, float_tuple
 from dap3d_core.interface.formats.articulation import (
+    FRICTION_DIRECTIONS,
     WORLD,
     Articulation,
     Contact,
@@ -180,13 +181,17 @@ def add_collisions(builder: SceneBuilder, model: Articulation) -> None:
 
 
 def _coefficients(model: Articulation, one: Contact, other: Contact) -> dict[str, float]:
-    """Friction and restitution of a pair: its own, or of the one that has priority, if one has."""
+    """Coefficients of a pair: its own, or of the one that has priority, if one has."""
     own = model.friction.get(frozenset((one.surface, other.surface)))
     if one.priority != other.priority:
         one = other = max(one, other, key=lambda contact: contact.priority)
-    mu = 0.0 if one.smooth and other.smooth else model.coefficient_of_pair(one.mu, other.mu)
-    e = model.coefficient_of_pair(one.e, other.e)
-    return {"mu": mu if own is None else own} | ({"e": e} if e else {})
+    found = {name: model.coefficient_of_pair(getattr(one, name), getattr(other, name))
+             for name in ("mu", "e", "mu_spin", "mu_roll")}  # fmt: skip
+    directions = max(one.directions, other.directions)
+    found |= {name: 0.0 for name, least in FRICTION_DIRECTIONS.items() if directions < least}
+    found |= own or {}
+    always = {"mu", *(own or ())}
+    return {name: value for name, value in found.items() if value or name in always}
 
 
 def _beyond_rows(model: Articulation) -> Iterator[tuple[str, str]]:

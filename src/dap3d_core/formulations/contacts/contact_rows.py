@@ -64,7 +64,7 @@ class ContactTable:
         self._loops = []
         places = {(s.element, s.name): s.first for s in model.element_states if s.kind == "joint"}
         for group in model.contacts:
-            which, layout = group.members - first, group.type_info.layout
+            which = group.members - first
             type_: Any = group.type_info.type
             self.turns[which], self.alone[which] = type_.at is None, type_.is_friction_alone()
             self.holds[which] = type_.holds
@@ -74,7 +74,7 @@ class ContactTable:
                                for c, rows in zip(which, starts, strict=True)}  # fmt: skip
             self.movable[which] &= not type_.is_smooth
             for name, values in self.numbers.items():
-                values[which] = group.numbers[:, layout.numbers[name][0]]
+                values[which] = group.number(name)
             self.mode[which] = [places[self.names[k], "mode"] for k in which]
             q = next(q for q, (kind, g) in enumerate(evaluator.loop_groups)
                      if g is group and kind == "switch")  # fmt: skip

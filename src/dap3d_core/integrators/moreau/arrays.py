@@ -14,6 +14,7 @@ from dap3d_core.assembly.collisions.placed_shapes import (
 )
 from dap3d_core.formulations.contacts.contact_rows import ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
+from dap3d_core.interface.contacts.contact import RESISTED
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.array_struct import INTEGER_MATRIX, INTEGERS, MATRIX, Arrays, Scalar
 from dap3d_core.model import Model
@@ -29,12 +30,13 @@ LOG_ROOM = 64
 MOST_PAIRS, MOST_POINTS, MOST_ENTRIES, MOST_HELD = 32, 8, 16, 100
 #: Part of the mass, or moment, of what a joint holds at a body below which that body is light.
 LIGHT = 1e-3
-#: Kinds of contacts: with a cone; friction of a joint along rows 1 and 2, or along all three.
+#: Kinds of contacts: with a cone; friction of a joint, or of what rolls, along rows 1 and 2; of a
+#: joint along all three.
 CONE, ALONE, WHOLE = range(3)
 #: Arrays of which a row belongs to a contact.
-OF_CONTACTS = ("bodies", "key", "kind", "group", "chosen", "J", "moved", "own", "own_held", "gap",
-               "mu", "rim", "e", "bias", "r", "left", "collides", "closing", "x", "u", "z", "B",
-               "push", "kept", "met", "x_bounce")  # fmt: skip
+OF_CONTACTS = ("bodies", "key", "kind", "under", "group", "chosen", "J", "moved", "own",
+               "own_held", "gap", "mu", "rim", "e", "bias", "r", "left", "collides", "closing",
+               "x", "u", "z", "B", "push", "kept", "met", "x_bounce")  # fmt: skip
 
 
 def _integer() -> Scalar[int]:
@@ -54,7 +56,7 @@ class StepArrays(Arrays):
 
     types: ClassVar[dict[str, Any]] = {
         **dict.fromkeys(
-            ("integer", "key", "kind", "group", "chosen", "collides", "declared_gap",
+            ("integer", "key", "kind", "under", "group", "chosen", "collides", "declared_gap",
              "declared_mode", "declared_kind", "declared_turns", "declared_law", "load_row",
              "load_count", "load_pushes", "held",
              "row_start", "row_body", "row_place", "used", "place", "parent", "queue", "order",
@@ -77,6 +79,7 @@ class StepArrays(Arrays):
     # of the step
     contact_count = _integer()
     touch_count = _integer()  # the first ones, of shapes
+    law_count = _integer()  # with those declared; behind them what resists their rolling
     stage = _integer()  # of a step that waits for room: 0, or FREE or MOVED (step.py)
     is_solved = _integer()  # 1: there were contacts in the last step
     met_count = _integer()
@@ -94,6 +97,7 @@ class StepArrays(Arrays):
     # constants
     light_count = _integer()  # bodies that carry far heavier ones
     dense_size = _integer()  # unknowns up to which K is a square
+    resistance_count = _integer()  # of rolling and spinning: how many a contact has at most
     first_v_dot = _integer()  # places in reported rows
     first_lam = _integer()
     first_state = _integer()
@@ -140,6 +144,7 @@ class StepArrays(Arrays):
     bodies: Integers  # (c, 2) i and j, ground 0
     key: Integers  # a number that a contact keeps
     kind: Integers  # CONE, ALONE or WHOLE
+    under: Integers  # the contact whose rolling it resists, or -1
     group: Integers  # the least body of those that contacts connect
     chosen: Integers  # contacts of a group
     collides: Integers  # what it does; the part of the step at which it closes
@@ -174,6 +179,8 @@ class StepArrays(Arrays):
     declared_mu_s: Floats
     declared_ratio: Floats  # the same along the second tangent, as parts of these: 1 but in
     declared_ratio_s: Floats  # ellipses
+    declared_mu_roll: Floats  # m
+    declared_mu_spin: Floats
     declared_e: Floats
     held: Integers  # 1 where it has stuck until this step
     grip: Floats  # coefficient that counts now, and ratio, by which the second row is multiplied
@@ -247,6 +254,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     arrays.dense_size, arrays.length = dense_size, model.length
     arrays.first_v_dot, arrays.first_lam = layout["v_dot"].start, layout["Lam"].start
     arrays.first_state = layout["states"].start
+    arrays.resistance_count = 2 if model.resists_turning else 0
     _put_carried(arrays)
     return arrays
 
@@ -292,7 +300,7 @@ def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
     widths = {"bodies": 2, "J": 36, "moved": 36, "own": 9, "own_held": 9, "B": 9, "met": MET,
               **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
-    whole = ("bodies", "key", "kind", "group", "chosen", "collides")
+    whole = ("bodies", "key", "kind", "under", "group", "chosen", "collides")
     return {
         name: np.zeros((room, widths[name]) if name in widths else room,
                        dtype=np.int64 if name in whole else float)
@@ -337,7 +345,8 @@ def _declared(evaluator: Evaluator) -> dict[str, Any]:
             "declared_mode", "declared_kind", "declared_turns", "declared_law", "held",
             "load_row", "load_count", "load_pushes")},
         **{name: np.zeros(d) for name in (
-            "declared_mu", "declared_mu_s", "declared_e", "grip")},
+            "declared_mu", "declared_mu_s", "declared_mu_roll", "declared_mu_spin", "declared_e",
+            "grip")},
         **{name: np.ones(d) for name in ("declared_ratio", "declared_ratio_s", "ratio")},
         "declared_x": np.zeros((d, 7)),
     }  # fmt: skip
@@ -350,6 +359,8 @@ def _declared(evaluator: Evaluator) -> dict[str, Any]:
         for group in model.contacts:
             type_: Any = group.type_info.type
             found["declared_law"][group.members - first] = type_.grip is not None
+            for name in RESISTED:
+                found[f"declared_{name}"][group.members - first] = group.number(name)
         for c, (rows, pushes) in table.loads.items():
             found["load_row"][c], found["load_count"][c] = rows[0], len(rows)
             found["load_pushes"][c] = pushes
@@ -364,7 +375,8 @@ def all_room(s: StepArrays) -> StepArrays:
     s.bit_size = n * (n // 32 + 1)
     s.entry_count = min(n * (n - 1) // 2, MOST_ENTRIES * n)
     s.matrix_size = 36 * (n + 2 * s.entry_count)
-    s.held_count = min(s.shapes.point_count + len(s.declared_gap), MOST_HELD) if len(s.y) else 0
+    points = s.shapes.point_count + len(s.declared_gap)
+    s.held_count = min((1 + s.resistance_count) * points, MOST_HELD) if len(s.y) else 0
     found = grown(s)
     found.shapes.pair_count = found.shapes.point_count = 0
     found.entry_count = found.held_count = 0
@@ -375,7 +387,8 @@ def all_room(s: StepArrays) -> StepArrays:
 def grown(s: StepArrays) -> StepArrays:
     """The same arrays with the room that a step has asked for."""
     new: dict[str, Any] = {"shapes": with_room(s.shapes)}
-    room = max(s.contact_count, s.shapes.point_count + len(s.declared_gap))
+    points = s.shapes.point_count + len(s.declared_gap)
+    room = max(s.contact_count, (1 + s.resistance_count) * points)
     if room > len(s.key):
         new |= _of_contacts(room + room // 4)
         new["met"][: s.met_count] = s.met[: s.met_count]

@@ -17,14 +17,14 @@ from dap3d_core.formulations.contacts.equations import (
     ROW,
     STATE,
 )
-from dap3d_core.integrators.moreau.arrays import CONE, StepArrays
+from dap3d_core.integrators.moreau.arrays import ALONE, CONE, StepArrays
 from dap3d_core.interface.contacts.rows import FAR_APART, SLIDES, STEPPED
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.array_struct import pointer
 from dap3d_core.kernels.runtime.cache import compiled
 
-#: Of keys of declared contacts, which are beyond those of shapes.
-DECLARED = 2**52
+#: Of keys of what resists rolling and spinning, behind those of shapes, and of declared contacts.
+ROLLS, SPINS, DECLARED = 2**50, 2**51, 2**52
 #: Points of a pair of shapes that keys tell apart.
 POINTS = 256
 #: The least ratio of an ellipse of friction.
@@ -40,7 +40,7 @@ def find_contacts(
     """Find the contacts at an integrated state y; False without room.
 
     Shapes are nearer than the margins of bodies, declared contacts than ``most``; friction of
-    joints is among them where that is FAR_APART.
+    joints, and of what rolls, is among them where that is FAR_APART.
     """
     place_poses(y, s)
     s.contact_count = s.touch_count = 0
@@ -48,14 +48,14 @@ def find_contacts(
         if not find_touches(s.shapes, s.poses, s.margin):
             return False
         s.touch_count = s.shapes.point_count
-    s.contact_count = s.touch_count + s.declared_gap.size
+    s.contact_count = (1 + s.resistance_count) * (s.touch_count + s.declared_gap.size)
     if s.contact_count > s.key.size:
         return False
+    s.contact_count = s.touch_count
     for c in range(s.touch_count):
         put_touch(c, s)
     if s.declared_gap.size > 0:
         evaluate_rows(t, y, s, system, loops)
-        s.contact_count = s.touch_count
         for k in range(s.declared_gap.size):
             if s.declared_kind[k] != CONE:
                 near = most >= FAR_APART
@@ -63,6 +63,10 @@ def find_contacts(
                 near = system.residual[s.declared_gap[k]] < most
             if near:
                 put_declared(k, s, system)
+    s.law_count = s.contact_count
+    if s.resistance_count > 0 and most >= FAR_APART:
+        for c in range(s.law_count):
+            put_resistances(c, s)
     return True
 
 
@@ -112,7 +116,7 @@ def put_touch(c: int, s: StepArrays) -> None:
     a, b = shapes.body[i], shapes.body[j]
     s.bodies[c, 0], s.bodies[c, 1] = a, b
     s.key[c] = (i * shapes.kind.size + j) * POINTS + which[2]
-    s.gap[c], s.kind[c] = found[6], CONE
+    s.gap[c], s.kind[c], s.under[c] = found[6], CONE, -1
     first, second = shapes.material[i], shapes.material[j]
     s.mu[c], s.e[c] = shapes.mu[first, second], shapes.e[first, second]
     put_frame(found[3], found[4], found[5], J)
@@ -124,6 +128,51 @@ def put_touch(c: int, s: StepArrays) -> None:
             J[k], J[k + 1], J[k + 2] = sign * x, sign * y, sign * z
             J[k + 3], J[k + 4] = sign * (q * z - w * y), sign * (w * x - p * z)
             J[k + 5] = sign * (p * y - q * x)
+
+
+@compiled
+def put_resistances(c: int, s: StepArrays) -> None:
+    """Append contacts of what resists rolling and spinning at contact c."""
+    shapes, roll, spin = s.shapes, 0.0, 0.0
+    if c >= s.touch_count:
+        k = s.key[c] - DECLARED
+        roll, spin = s.declared_mu_roll[k], s.declared_mu_spin[k]
+    else:
+        i, j = shapes.material[shapes.which[c, 0]], shapes.material[shapes.which[c, 1]]
+        roll = shapes.mu_roll[i, j] if shapes.mu_roll.size > 0 else 0.0
+        spin = shapes.mu_spin[i, j] if shapes.mu_spin.size > 0 else 0.0
+    if roll > 0.0:
+        put_resistance(c, ROLLS, s)
+        put_turning(c, 1, roll, 1, s)
+        put_turning(c, 2, roll, 2, s)
+    if spin > 0.0:
+        put_resistance(c, SPINS, s)
+        put_turning(c, 0, spin, 1, s)
+
+
+@compiled
+def put_resistance(c: int, key: int, s: StepArrays) -> None:
+    """Append friction as large as what contact c pushes with, its rows still empty."""
+    d = s.contact_count
+    s.contact_count = d + 1
+    s.bodies[d, 0], s.bodies[d, 1] = s.bodies[c, 0], s.bodies[c, 1]
+    s.key[d], s.kind[d], s.under[d] = key + s.key[c], ALONE, c
+    s.gap[d] = s.mu[d] = s.e[d] = 0.0
+    for k in range(36):
+        s.J[d, k] = 0.0
+
+
+@compiled
+def put_turning(c: int, along: int, arm: float, row: int, s: StepArrays) -> None:
+    """Put turning along a row of contact c into a row of the last one, times ``arm``, m.
+
+    Its velocities are in m/s then, and its impulses, moments over ``arm``, in N s.
+    """
+    d, of = s.contact_count - 1, 12 * along
+    side, sign = (0, 1.0) if s.bodies[c, 0] > 0 else (6, -1.0)
+    for k in range(3):
+        axis = sign * arm * s.J[c, of + side + k]
+        s.J[d, 12 * row + 3 + k], s.J[d, 12 * row + 9 + k] = axis, -axis
 
 
 @compiled
@@ -169,7 +218,7 @@ def find_grips(t: float, s: StepArrays, system: System, loops: Any) -> None:
 
     They are the friction that a normal force of one has at a slip along either tangent.
     """
-    for c in range(s.touch_count, s.contact_count):
+    for c in range(s.touch_count, s.law_count):
         k = s.key[c] - DECLARED
         if s.declared_law[k] != 0:
             _, u1, u2 = velocity_of(s, c, s.before)
@@ -233,7 +282,7 @@ def put_declared(k: int, s: StepArrays, system: System) -> None:
     c = s.contact_count
     s.contact_count = c + 1
     s.bodies[c, 0], s.bodies[c, 1] = s.declared_bodies[k, 0], s.declared_bodies[k, 1]
-    s.key[c], s.gap[c], s.kind[c] = DECLARED + k, 0.0, s.declared_kind[k]
+    s.key[c], s.gap[c], s.kind[c], s.under[c] = DECLARED + k, 0.0, s.declared_kind[k], -1
     s.mu[c], s.e[c], s.ratio[k] = 0.0, s.declared_e[k], 1.0
     if s.kind[c] == CONE:
         s.gap[c], s.mu[c] = system.residual[s.declared_gap[k]], s.declared_mu[k]

@@ -31,7 +31,8 @@ DEPENDENT, HELD = 1e-12, 1e-12
 @compiled
 def sweep_bodies(
     bodies: Integers, J: Floats, moved: Floats, own: Floats, bias: Floats, kind: Integers,
-    mu: Floats, rim: Floats, x: Floats, v: Floats, sweeps: int, tolerance: float, relax: float,
+    under: Integers, mu: Floats, rim: Floats, x: Floats, v: Floats, sweeps: int, tolerance: float,
+    relax: float,
 ) -> int:  # fmt: skip
     """Sweep until no impulse changes by more than a part of the largest; sweeps done.
 
@@ -41,6 +42,7 @@ def sweep_bodies(
         own: (m, 9) J moved^T of each contact.
         bias: (m,) m/s, added to the normal velocity.
         kind: (m,) CONE, ALONE or WHOLE.
+        under: (m,) contact before, whose push is the most friction of one, or -1.
         mu, rim: (m,) friction is at most mu times what pushes, and ``rim``, N s.
         x: (m, 3) impulses, N s, changed in place.
         v: (n + 1, 6) velocities with these impulses, changed with them.
@@ -56,6 +58,8 @@ def sweep_bodies(
                 u0 += rows[k] * a[k] + rows[6 + k] * b[k]
                 u1 += rows[12 + k] * a[k] + rows[18 + k] * b[k]
                 u2 += rows[24 + k] * a[k] + rows[30 + k] * b[k]
+            if under[c] >= 0:
+                rim[c] = x[under[c], 0]
             d0, d1, d2 = change_of(
                 own[c], kind[c], mu[c], rim[c], x[c], relax * u0, relax * u1, relax * u2
             )
@@ -71,8 +75,8 @@ def sweep_bodies(
 
 @compiled
 def sweep_contacts(
-    felt: Floats, own: Floats, u: Floats, kind: Integers, mu: Floats, rim: Floats, x: Floats,
-    sweeps: int, tolerance: float,
+    felt: Floats, own: Floats, u: Floats, kind: Integers, under: Integers, mu: Floats, rim: Floats,
+    x: Floats, sweeps: int, tolerance: float,
 ) -> int:  # fmt: skip
     """The same where joints answer as well: u = felt x + what there is without impulses.
 
@@ -80,13 +84,15 @@ def sweep_contacts(
         felt: (3 m, 3 m) how contacts feel each other, symmetric.
         own: (m, 9) its diagonal blocks; contacts whose first number is zero are left as they are.
         u: (m, 3) velocities with the impulses x, changed with them.
-        kind, mu, rim, x, sweeps, tolerance: as of ``sweep_bodies``.
+        kind, under, mu, rim, x, sweeps, tolerance: as of ``sweep_bodies``.
     """
     for done in range(sweeps):
         change, largest = 0.0, 1e-300
         for c in range(mu.size):
             if own[c, 0] == 0.0:
                 continue
+            if under[c] >= 0:
+                rim[c] = x[under[c], 0]
             d0, d1, d2 = change_of(own[c], kind[c], mu[c], rim[c], x[c], u[c, 0], u[c, 1], u[c, 2])
             p, q, r = felt[3 * c], felt[3 * c + 1], felt[3 * c + 2]
             for k in range(mu.size):
@@ -160,8 +166,9 @@ def refine_held(s: StepArrays, tolerance: float, aim: float) -> bool:
                     for k in range(3):
                         u[r] += s.felt[3 * c + r, 3 * q + k] * s.x[q, k]
         for c in range(m):
-            s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.y)
-        sweep_contacts(s.felt, s.own_held, s.u, s.kind, s.mu[:m], s.rim, s.x, SWEEPS, aim)
+            s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.x, s.y)
+        sweep_contacts(s.felt, s.own_held, s.u, s.kind, s.under, s.mu[:m], s.rim, s.x, SWEEPS,
+                       aim)  # fmt: skip
         for k in range(s.y.size):
             s.y[k] = 0.0
             for c in range(m):

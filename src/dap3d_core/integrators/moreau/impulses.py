@@ -52,7 +52,7 @@ def recall(work: Any, s: StepArrays) -> None:
                 s.x[c, r] += J[12 * r + k] * memory[row, 1 + k]
         if s.kind[c] == CONE:
             s.x[c, 0] = max(s.x[c, 0], 0.0)
-        if c >= s.touch_count:
+        if c >= s.touch_count and c < s.law_count:
             u0, u1, u2 = velocity_of(s, c, s.before)
             u0 = u0 if s.kind[c] == WHOLE else 0.0
             rests = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) <= STILL
@@ -78,7 +78,7 @@ def put_grip(s: StepArrays, c: int, holds: bool) -> None:
 def let_slip(s: StepArrays) -> bool:
     """Let contacts slide that no longer stick; True where less friction holds them then."""
     found = False
-    for c in range(s.touch_count, s.contact_count):
+    for c in range(s.touch_count, s.law_count):
         k = s.key[c] - DECLARED
         if s.held[k] != 0 and mode_of(s, c) == SLIDES:
             put_grip(s, c, False)
@@ -113,7 +113,7 @@ def mode_of(s: StepArrays, c: int) -> float:
         return OPEN
     if s.kind[c] == WHOLE:
         first = x[0] * x[0]
-    most = (1.0 - ON_CONE) * bound_of(s, c, x[0], s.y)
+    most = (1.0 - ON_CONE) * bound_of(s, c, s.x, s.y)
     return SLIDES if math.sqrt(first + (x[1] * x[1] + x[2] * x[2])) >= most else STICKS
 
 
@@ -122,7 +122,7 @@ def keep_for_reports(s: StepArrays) -> None:
     """Keep what contacts and joints have pushed with in this step."""
     for k in range(s.y.size):
         s.joint_y[k] = s.y[k]
-    for c in range(s.touch_count, s.contact_count):
+    for c in range(s.touch_count, s.law_count):
         d, x, J = s.key[c] - DECLARED, s.x[c], s.J[c]
         kept, sign = s.declared_x[d], -1.0 if s.bodies[c, 0] > 0 else 1.0
         axis = J[3 * s.declared_turns[d] + (0 if sign < 0.0 else 6) :]

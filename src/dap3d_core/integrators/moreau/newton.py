@@ -16,8 +16,6 @@ taken back where rounds no longer help.
 
 import math
 
-import numpy as np
-
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
 from dap3d_core.integrators.moreau.dense import solve_blocks, solve_square
@@ -93,11 +91,13 @@ def put_missed(x: Floats, u: Floats, bound: float, kind: int, r: float, out: Flo
 
 
 @compiled
-def rim_of(s: StepArrays, c: int, y: Floats) -> float:
-    """Friction that contact c, of a joint, may have, N s.
+def rim_of(s: StepArrays, c: int, x: Floats, y: Floats) -> float:
+    """Friction that contact c, of a joint or of what rolls, may have, N s.
 
-    y: impulses of joints, N s, besides those of free motion.
+    x, y: impulses of contacts, and of joints besides those of free motion, N s.
     """
+    if s.under[c] >= 0:
+        return max(x[s.under[c], 0], 0.0)
     k = s.key[c] - DECLARED
     first, total = s.load_row[k], 0.0
     if s.load_count[k] == 0:
@@ -109,33 +109,9 @@ def rim_of(s: StepArrays, c: int, y: Floats) -> float:
 
 
 @compiled
-def bound_of(s: StepArrays, c: int, push: float, y: Floats) -> float:
-    """The most friction of contact c, N s, where it pushes with ``push`` and joints with y."""
-    return s.mu[c] * max(push, 0.0) if s.kind[c] == CONE else rim_of(s, c, y)
-
-
-def project(z: Floats, mu: Floats) -> Floats:
-    """(m, 3) impulses next to z (m, 3) that Coulomb's law allows, given the normal ones."""
-    found = np.zeros_like(z)
-    for one, k, out in zip(z, mu, found, strict=True):
-        put_projected(one, k * max(0.0, one[0]), CONE, out)
-    return found
-
-
-def slopes(z: Floats, mu: Floats) -> Floats:
-    """(m, 3, 3) derivatives of ``project``."""
-    found = np.zeros((len(mu), 9))
-    for one, k, out in zip(z, mu, found, strict=True):
-        put_slopes(one, k, k * max(0.0, one[0]), CONE, out)
-    return found.reshape(-1, 3, 3)
-
-
-def distance(x: Floats, u: Floats, mu: Floats, r: Floats) -> Floats:
-    """(m, 3) what impulses x miss Coulomb's law by at velocities u, both (m, 3)."""
-    found = np.zeros_like(x)
-    for one, v, k, m, out in zip(x, u, mu, r, found, strict=True):
-        put_missed(one, v, k * max(0.0, one[0]), CONE, m, out)
-    return found
+def bound_of(s: StepArrays, c: int, x: Floats, y: Floats) -> float:
+    """The most friction of contact c, N s; arguments as of ``rim_of``."""
+    return s.mu[c] * max(x[c, 0], 0.0) if s.kind[c] == CONE else rim_of(s, c, x, y)
 
 
 # ------------------------------------------------------------------ velocities and residuals
@@ -215,7 +191,7 @@ def left_at(s: StepArrays, c: int, v: Floats) -> float:
     u = s.u[c]
     u[0], u[1], u[2] = velocity_of(s, c, v)
     u[0] += s.bias[c]
-    put_missed(s.x[c], u, bound_of(s, c, s.x[c, 0], s.y), s.kind[c], s.r[c], u)
+    put_missed(s.x[c], u, bound_of(s, c, s.x, s.y), s.kind[c], s.r[c], u)
     return max(abs(u[0]), abs(u[1]), abs(u[2]))
 
 
@@ -224,7 +200,7 @@ def impulse_of(s: StepArrays, c: int) -> float:
     """The size of an impulse, or of the most that friction of a joint has."""
     x = s.x[c]
     found = max(abs(x[0]), abs(x[1]), abs(x[2]))
-    return found if s.kind[c] == CONE else max(found, rim_of(s, c, s.y))
+    return found if s.kind[c] == CONE else max(found, rim_of(s, c, s.x, s.y))
 
 
 @compiled
@@ -322,7 +298,8 @@ def put_rest(s: StepArrays, v: Floats, weight: float, R: Floats) -> float:
         part, z, J = weight * s.r[c], s.z[c], s.J[c]
         z[0] = s.x[c, 0] - part * (u0 + s.bias[c])
         z[1], z[2] = s.x[c, 1] - part * u1, s.x[c, 2] - part * u2
-        s.rim[c] = bound_of(s, c, z[0], s.pull)
+        s.push[c, 0] = z[0]
+        s.rim[c] = bound_of(s, c, s.push, s.pull)
         put_projected(z, s.rim[c], s.kind[c], s.push[c])
         p, y, w = s.push[c, 0], s.push[c, 1], s.push[c, 2]
         first, second = R[s.bodies[c, 0]], R[s.bodies[c, 1]]
@@ -446,7 +423,9 @@ def assemble(s: StepArrays, weight: float, feels: float) -> None:
                     row = s.place[s.bodies[c, other]]
                     if row >= 0:
                         add_contact(s, block_at(s, row, first), s.J[c], 6 * other, turned)
-        if s.kind[c] != CONE and feels > 0.0:
+        if s.under[c] >= 0 and feels > 0.0:
+            add_pressed(s, c, weight)
+        elif s.kind[c] != CONE and feels > 0.0:
             add_load(s, c, weight)
     for k in range(s.y.size):
         for p in range(s.row_start[k], s.row_start[k + 1]):
@@ -464,7 +443,7 @@ def add_load(s: StepArrays, c: int, weight: float) -> None:
     """Add to K that friction of a joint which slides grows with the joint's load."""
     k, z = s.key[c] - DECLARED, s.z[c]
     first, whole = s.load_row[k], z[0] if s.kind[c] == WHOLE else 0.0
-    size, rim = math.sqrt(whole * whole + z[1] * z[1] + z[2] * z[2]), rim_of(s, c, s.pull)
+    size, rim = math.sqrt(whole * whole + z[1] * z[1] + z[2] * z[2]), s.rim[c]
     if not 0.0 < rim < size:
         return
     for q in range(first, first + s.load_count[k]):
@@ -484,6 +463,28 @@ def add_load(s: StepArrays, c: int, weight: float) -> None:
                     at = start + i * s.width
                     for j in range(6):
                         s.K[at + j] += along * s.D[p, j]
+
+
+@compiled
+def add_pressed(s: StepArrays, c: int, weight: float) -> None:
+    """Add to K that what resists rolling grows with what presses, where it yields."""
+    u, z, J = s.under[c], s.z[c], s.J[c]
+    size = math.sqrt(z[1] * z[1] + z[2] * z[2])
+    if not 0.0 < s.rim[c] < size:
+        return
+    part = weight * s.r[u] / size
+    for side in range(2):
+        row = s.place[s.bodies[c, side]]
+        for other in range(2 if row >= 0 else 0):
+            column = s.place[s.bodies[u, other]]
+            if column < 0:
+                continue
+            start, normal = block_at(s, row, column), s.J[u]
+            for i in range(3, 6):
+                k, at = 6 * side + i, start + i * s.width
+                along = part * (z[1] * J[12 + k] + z[2] * J[24 + k])
+                for j in range(6):
+                    s.K[at + j] += along * normal[6 * other + j]
 
 
 @compiled

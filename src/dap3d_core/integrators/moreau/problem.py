@@ -152,9 +152,9 @@ def sweep(s: StepArrays, sweeps: int, tolerance: float, relax: float) -> None:
     m = s.contact_count
     put_velocities(s, s.v)
     for c in range(m):
-        s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.y)
-    sweep_bodies(s.bodies, s.J, s.moved, s.own, s.bias, s.kind, s.mu[:m], s.rim, s.x, s.v, sweeps,
-                 0.1 * tolerance, relax)  # fmt: skip
+        s.rim[c] = 0.0 if s.kind[c] == CONE else rim_of(s, c, s.x, s.y)
+    sweep_bodies(s.bodies, s.J, s.moved, s.own, s.bias, s.kind, s.under, s.mu[:m], s.rim, s.x, s.v,
+                 sweeps, 0.1 * tolerance, relax)  # fmt: skip
 
 
 @compiled

@@ -32,7 +32,7 @@ def limit_bounces(s: StepArrays, tolerance: float) -> bool:
     """Weaken the bounces of groups that would gain energy; False without room."""
     rubs = False
     for c in range(s.contact_count):
-        rubs |= s.collides[c] == BOUNCES and s.mu[c] > 0.0
+        rubs |= s.under[c] >= 0 or (s.collides[c] == BOUNCES and s.mu[c] > 0.0)
     if not rubs or not any_gains(s):
         return True
     for b in range(s.v.shape[0]):

@@ -7,7 +7,7 @@ from typing import Any
 import attrs
 
 from dap3d_core.interface.codegen.instance_layout import InstanceLayout
-from dap3d_core.interface.codegen.kernel_arguments import KernelArgument
+from dap3d_core.interface.codegen.kernel_arguments import KernelArgument, parameters
 from dap3d_core.interface.fields import specs_of
 from dap3d_core.interface.types import TypeBase
 
@@ -75,6 +75,17 @@ class TypeInfo:
     def row_count(self) -> int:
         """Rows of a joint that constrain the bodies; 0 of other types."""
         return int(getattr(self.type, "rows", 0)) - len(self.layout.unknowns)
+
+    @property
+    def axis_slots(self) -> tuple[str, ...]:
+        """Slots whose body's axes it uses: as declared, or those whose A or p its kernels name."""
+        if self.type.body_axes is not None:
+            return self.type.body_axes
+        types = (self, *(type_info for _, type_info in self.variants))
+        kernels = [kernel for t in types for kernel in t.kernels.values()]
+        kernels += [k for t in types for n in t.type.declared if (k := getattr(t.type, n, None))]
+        named = {name for kernel in kernels for name in parameters(kernel)}
+        return tuple(s for s in self.layout.slots if {f"A_{s}", f"p_{s}"} & named)
 
     def chosen(self, values: Mapping[str, Any], named: Mapping[str, str] = NONE) -> "TypeInfo":
         """The variant for the values of an instance's fields; itself where none fits.

@@ -13,7 +13,9 @@ DECLARED = ("gap", "normal")
 #: What they may define besides.
 OPTIONAL = ("at", "reach", "along", "grip", "grain")
 #: Fields that a material gives.
-MATERIAL = ("mu", "mu_s", "e", "law")
+MATERIAL = ("mu", "mu_s", "mu_roll", "mu_spin", "e", "law")
+#: Fields of lengths by which contacts resist how bodies turn.
+RESISTED = {"mu_roll": "rolling", "mu_spin": "spinning"}
 #: Values of ``law``.
 LAWS = ("poisson", "newton")
 #: Initial mode of a contact that touches as the scene is assembled.
@@ -156,6 +158,10 @@ def _add_material(class_: type) -> None:
         "law": choice(LAWS, "poisson", doc="of impacts: whose coefficient e is"),
         "touch": choice((False, True), False, doc="the bodies are moved until they touch at t = 0"),
     }
+    if class_.at is not None:  # type: ignore[attr-defined]
+        fields |= {name: number(0.0, minimum=0.0, unit="m", doc=f"moment against {what} over the "
+                                "force that presses, by stepping alone")
+                   for name, what in RESISTED.items()}  # fmt: skip
     alone = class_.is_friction_alone()  # type: ignore[attr-defined]
     if class_.is_smooth or alone:  # type: ignore[attr-defined]
         fields = {name: hidden(0.0) for name in ("e", "mu", "mu_s")}

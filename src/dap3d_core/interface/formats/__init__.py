@@ -1,6 +1,7 @@
 """The interface of file formats: what an importer returns and what an exporter is given."""
 
 from dap3d_core.interface.formats.articulation import (
+    FRICTION_DIRECTIONS,
     UNBOUNDED,
     WORLD,
     Actuator,
@@ -51,6 +52,7 @@ __all__ = [
     "INTERFACE_VERSION",
     "LEAST",
     "NOWHERE",
+    "FRICTION_DIRECTIONS",
     "UNBOUNDED",
     "WORLD",
     "Actuator",

@@ -79,13 +79,19 @@ class Geometry:
     name: str = ""
 
 
+#: Coefficients of friction, and the ``directions`` of a contact from which on they count.
+FRICTION_DIRECTIONS = {"mu": 3, "mu_spin": 4, "mu_roll": 6}
+
+
 @attrs.frozen
 class Contact:
     """How a shape meets others.
 
     Attributes:
-        mu: coefficient of friction; of a pair see ``Articulation.coefficient_of_pair``.
-        smooth: without friction, but with shapes that are not smooth.
+        mu, mu_spin, mu_roll: coefficients of friction, and moments against spinning and rolling
+            over the force that presses, m; of a pair see ``Articulation.coefficient_of_pair``.
+        directions: that it acts along: 1 is smooth, 3 has friction, 4 resists spinning and 6 also
+            rolling; of a pair the larger one counts.
         group, meets: bits; a pair meets where ``group`` of one and ``meets`` of the other have one
             in common.
         priority: of a pair the one with the larger decides alone.
@@ -94,7 +100,9 @@ class Contact:
     """
 
     mu: float = 1.0
-    smooth: bool = False
+    mu_spin: float = 0.0
+    mu_roll: float = 0.0
+    directions: int = 3
     group: int = 1
     meets: int = 1
     priority: int = 0
@@ -329,7 +337,7 @@ class Articulation:
         base_meets: whether links meet those that do not move and that a joint holds them at.
         coefficient_of_pair: friction and restitution of two shapes that meet, of those of both: max
             or min.
-        friction: of two surfaces, for pairs that do not take it of both.
+        friction: coefficients by name of two surfaces, for pairs that do not take them of both.
         gravity: (3,) m/s^2.
         fixed_base: whether links without a joint to a parent are fixed to the world, rather than
             free; None where the format leaves it open.
@@ -346,7 +354,7 @@ class Articulation:
     excluded: list[tuple[str, str]] = attrs.Factory(list)
     base_meets: bool = False
     coefficient_of_pair: Callable[[float, float], float] = max
-    friction: dict[frozenset[str], float] = attrs.Factory(dict)
+    friction: dict[frozenset[str], dict[str, float]] = attrs.Factory(dict)
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     fixed_base: bool | None = None
     place: Place = NOWHERE

@@ -15,6 +15,12 @@ KINDS = {
 }  # fmt: skip
 
 
+def _no_pairs() -> "Floats":
+    from numpy import zeros
+
+    return zeros((0, 0))
+
+
 @attrs.frozen(eq=False)
 class CollisionShapes:
     """Shapes that collide, m of them, in the order of the scene; prisms, of a height field.
@@ -31,6 +37,8 @@ class CollisionShapes:
         bits: (m, 2) groups that each is in, and that it meets.
         mu, e: (materials, materials) coefficients of pairs.
         apart: (k,) i (n + 1) + j, i < j, ascending, of bodies that do not meet.
+        mu_roll, mu_spin: (materials, materials) moments against rolling and spinning over the force
+            that presses, m; (0, 0) where all are zero.
     """
 
     names: tuple[str, ...]
@@ -46,6 +54,8 @@ class CollisionShapes:
     mu: "Floats"
     e: "Floats"
     apart: "Integers"
+    mu_roll: "Floats" = attrs.field(factory=_no_pairs)
+    mu_spin: "Floats" = attrs.field(factory=_no_pairs)
 
     @property
     def reach(self) -> "Floats":

@@ -9,21 +9,20 @@ import numpy as np
 from dap3d_core.interface.formats.frames import from_quaternion
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.scene.contacts.collision_shapes import KINDS, CollisionShapes
-from dap3d_core.scene.contacts.tables import Collisions, Material
+from dap3d_core.scene.contacts.tables import OF_PAIRS, Collisions, Materials
 from dap3d_core.scene.errors import Key
 from dap3d_core.scene.files.read_mesh import read_mesh
-from dap3d_core.scene.validate.coerce_values import Fault, bounded, number_of
+from dap3d_core.scene.validate.coerce_values import Fault
 from dap3d_core.scene.validate.geometry import missing_words
 from dap3d_core.scene.validate.mistake_collector import Collector
 from dap3d_core.scene.validate.shapes import Shape, height_field, mesh_file
 from dap3d_core.scene.validate.validated_scene import Instance
 
-COEFFICIENTS = {"mu": None, "e": 1.0}
-
 
 def read_collisions(
-    report: Collector, shapes: Sequence[Shape], index: Mapping[str, int], joints: list[Instance]
-) -> CollisionShapes | None:
+    report: Collector, shapes: Sequence[Shape], index: Mapping[str, int], joints: list[Instance],
+    materials: Materials,
+) -> CollisionShapes | None:  # fmt: skip
     """The shapes that collide; None where there are none, mistakes are reported.
 
     Args:
@@ -31,6 +30,7 @@ def read_collisions(
         shapes: of the scene.
         index: name of a body -> its index, ground 0.
         joints: bodies of one joint do not meet, but ground.
+        materials: of the scene.
     """
     given = report.scene.collisions or Collisions()
     chosen = _bodies(report, given.bodies, index)
@@ -45,7 +45,7 @@ def read_collisions(
     apart |= _excluded(report, given.exclude, index)
     parts = [(s, part) for s in meeting for part in _parts(report, s)]
     meeting = [s for s, _ in parts]
-    material, mu, e = _materials(report, meeting, given.material)
+    material, coefficients = _materials(report, meeting, given.material, materials)
     width = len(index)
     keys = sorted(i * width + j for i, j in apart)
     at, p, size = (np.array([part[k] for _, part in parts], dtype=float) for k in range(3))
@@ -55,9 +55,9 @@ def read_collisions(
         names=tuple(s.name for s in meeting),
         kind=np.array([KINDS[s.type] for s in meeting]), body=np.array([s.body for s in meeting]),
         at=at, p=p, size=size, corners=np.column_stack([np.cumsum(counts) - counts, counts]),
-        vertices=np.concatenate(hulls), material=material, mu=mu, e=e,
+        vertices=np.concatenate(hulls), material=material,
         bits=np.array([[s.values["group"], s.values["meets"]] for s in meeting]),
-        apart=np.array(keys, dtype=np.int64),
+        apart=np.array(keys, dtype=np.int64), **coefficients,
     )  # fmt: skip
 
 
@@ -94,48 +94,30 @@ def _excluded(report: Collector, pairs: Any, index: Mapping[str, int]) -> set[tu
 
 
 def _materials(
-    report: Collector, shapes: Sequence[Shape], usual: Any
-) -> tuple[Integers, Floats, Floats]:
-    """Index of the material of each shape, and mu and e of all pairs of materials."""
-    materials = report.scene.materials
+    report: Collector, shapes: Sequence[Shape], usual: Any, materials: Materials
+) -> tuple[Integers, dict[str, Floats]]:
+    """Index of the material of each shape, and coefficients of all pairs of materials, by name."""
+    known = materials.by_name
     used: dict[str, int] = {}
     index = []
     for shape in shapes:
         own = shape.values["material"]
         name = own or usual or ""
-        if name and name not in materials and (own or name not in used):
+        if name and name not in known and (own or name not in used):
             key = ("shapes", shape.name) if own else ("collisions",)
-            words = missing_words(report, "material", name, materials)
+            words = missing_words(report, "material", name, known)
             report.add((*key, "material"), name, *words)
         index.append(used.setdefault(name, len(used)))
-    tables = np.zeros((2, len(used), len(used)))
+    for name in used.keys() & known.keys():
+        if (mu_s := known[name].mu_s) is not None and mu_s != known[name].mu:
+            report.note(f"materials.{name}.mu_s is of declared contacts alone: shapes that collide "
+                        "stick and slide by mu")  # fmt: skip
+    tables = np.zeros((len(OF_PAIRS), len(used), len(used)))
     for a, b in combinations_with_replacement(used, 2):
-        pair = _pair(report, materials.get(a, Material(a)), materials.get(b, Material(b)))
         i, j = used[a], used[b]
-        tables[:, i, j] = tables[:, j, i] = pair
-    return np.array(index), tables[0], tables[1]
-
-
-def _pair(report: Collector, a: Material, b: Material) -> list[float]:
-    """Mu and e of a pair of materials: as declared, or else their geometric means."""
-    declared: dict[str, Any] = {}
-    for one, other in ((a, b), (b, a)):
-        tables, key = one.with_ or {}, ("materials", one.name, "with")
-        if not isinstance(tables, Mapping) or not isinstance(tables.get(other.name, {}), Mapping):
-            report.add(key, tables, "should be tables by name of the other material")
-            continue
-        declared = declared or dict(tables.get(other.name, {}))
-        report.add_unknown_keys((*key, other.name), declared, tuple(COEFFICIENTS))
-    found = []
-    for name, most in COEFFICIENTS.items():
-        values = [declared.get(name, getattr(m, name)) or 0.0 for m in (a, b)]
-        for m, value in zip((a, b), values, strict=True):
-            read = bounded(number_of(value), minimum=0.0, maximum=most)
-            if isinstance(read, Fault):
-                report.add(("materials", m.name, name), value, read.what)
-                values = [0.0, 0.0]
-        found.append(values[0] if values[0] == values[1] else (values[0] * values[1]) ** 0.5)
-    return found
+        tables[:, i, j] = tables[:, j, i] = materials.pair(a, b)
+    found = zip(OF_PAIRS, tables, strict=True)
+    return np.array(index), {n: table for n, table in found if n in ("mu", "e") or table.any()}
 
 
 def _parts(report: Collector, shape: Shape) -> list[tuple[Any, Any, Any, Floats]]:

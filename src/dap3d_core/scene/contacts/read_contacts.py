@@ -10,6 +10,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.contacts.contact import HIDDEN, MATERIAL, SMOOTH, TOUCHES
 from dap3d_core.interface.examine.examine import examine
 from dap3d_core.interface.fields import FieldSpec, specs_of
+from dap3d_core.scene.contacts.tables import Materials
 from dap3d_core.scene.errors import MISSING
 from dap3d_core.scene.tables import Element
 from dap3d_core.scene.validate.coerce_values import READERS
@@ -25,16 +26,16 @@ _ANY = FieldSpec("number", None)
 
 def read_contacts(
     report: Collector, geometry: Geometry, types: Types, functions: Sequence[Instance],
-    elements: Mapping[str, Element],
+    elements: Mapping[str, Element], materials: Materials,
 ) -> list[Instance]:  # fmt: skip
     """The contacts of a scene; of one with several points ``NAME#1``, ``NAME#2``, ...
 
-    elements: those of the scene, and limits of joints.
+    elements: those of the scene, and limits of joints; materials: of the scene.
     """
     for name in elements.keys() & report.scene.joints.keys():
         what = "is the name of a joint as well; results know both by their names"
         report.add(("contacts", name), MISSING, what, remedy="rename one of them")
-    elements = {name: _with_material(report, types, e) for name, e in elements.items()}
+    elements = {name: _with_material(report, types, e, materials) for name, e in elements.items()}
     found = []
     for one in read_elements(report, geometry, "contacts", types, functions, elements):
         count: int = one.type_info.type.points  # type: ignore[attr-defined]
@@ -144,15 +145,17 @@ def _examined(grip: Any) -> TypeInfo:
     return examine(grip)
 
 
-def _with_material(report: Collector, types: Types, element: Element) -> Element:
+def _with_material(
+    report: Collector, types: Types, element: Element, materials: Materials
+) -> Element:
     """A contact with the fields that its material gives, and it does not."""
     fields: dict[str, Any] = dict(element.fields)
     if "material" not in fields:
         return element
-    name, materials = fields.pop("material"), report.scene.materials
-    material = materials.get(name) if isinstance(name, str) else None
+    name = fields.pop("material")
+    material = materials.by_name.get(name) if isinstance(name, str) else None
     if material is None:
-        what, near, remedy = missing_words(report, "material", name, materials)
+        what, near, remedy = missing_words(report, "material", name, materials.by_name)
         report.add(("contacts", element.name, "material"), name, what, near, remedy)
         return attrs.evolve(element, fields=fields)
     known = types.known("contact", element.type)

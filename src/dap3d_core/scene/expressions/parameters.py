@@ -57,12 +57,15 @@ def _resolve_part(report: Collector, key: Key, part: Any, values: Mapping[str, f
         return
     for field in attrs.fields_dict(type(part)):
         if field not in ("name", "body", "P_i", "P_j", "color"):
-            value = _resolve(report, (*key, field), getattr(part, field), values)
+            place = (*key, field.rstrip("_"))  # with_ of materials
+            value = _resolve(report, place, getattr(part, field), values)
             setattr(part, field, value)
 
 
 def _resolve(report: Collector, key: Key, value: Any, values: Mapping[str, float]) -> Any:
-    """A value, lists within lists as well, with numbers for its expressions."""
+    """A value, lists and tables within it as well, with numbers for its expressions."""
+    if isinstance(value, Mapping):
+        return {k: _resolve(report, (*key, k), one, values) for k, one in value.items()}
     if type(value) is tuple:
         return tuple(_resolve(report, (*key, k), one, values) for k, one in enumerate(value))
     if type(value) is not str or not value.startswith(MARK):

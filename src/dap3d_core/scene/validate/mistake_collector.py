@@ -1,6 +1,6 @@
 """Collects mistakes and notes of the check of a scene, and locates them in its file."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,8 @@ from dap3d_core.scene.validate.coerce_values import Fault
 
 #: Notes of one kind that are written out; the others are counted.
 NOTES_OF_A_KIND = 10
+#: Tables of words, which in sub-assemblies have the names of these before them.
+WORDS = ("parameters", "inputs", "outputs")
 
 
 class Collector(MistakeList):
@@ -38,6 +40,20 @@ class Collector(MistakeList):
                 value, what = MISSING, f"is required; it {what.removesuffix(', not nothing')}"
             self.add(key, value, what, result.nearest, result.remedy)
         return result
+
+    def add_missing_type(self, key: Key, fields: Mapping[str, Any], what: str) -> None:
+        """Report that an element has no type; or the key that is its misspelling, as ``typ``.
+
+        Args:
+            key: of the element.
+            fields: as written.
+            what: that it is required, and what it may be.
+        """
+        near = [field for field in fields if self.nearest(field, ("type",))]
+        if near:
+            self.add((*key, near[0]), fields[near[0]], f"unknown key; type {what}", "type")
+        else:
+            self.add((*key, "type"), MISSING, what)
 
     def note(self, text: str, kind: str = "") -> None:
         """Append a note; of one kind only the first few are written out."""
@@ -73,6 +89,8 @@ def located(scene: SceneTables, mistakes: list[tuple[Key, Mistake]]) -> list[Mis
         if shortest == 2 and "/" in str(key[1]):
             head, _, tail = str(key[1]).rpartition("/")
             name, key = (head, (key[0], tail, *key[2:])) if head in files else ("", key)
+        elif key[:1] and key[0] in WORDS and key[:2] not in lines[""]:
+            name, key = next(_of_part(key, lines), ("", key))
         parts = (key[:n] for n in range(len(key), shortest - 1, -1))
         line = next((lines[name][part] for part in parts if part in lines[name]), None)
         return str(files[name] or ""), line
@@ -82,6 +100,19 @@ def located(scene: SceneTables, mistakes: list[tuple[Key, Mistake]]) -> list[Mis
         file, line = place_of(key)
         result.append(attrs.evolve(mistake, file=file, line=line))
     return sorted(result, key=lambda m: (m.line is None, m.line or 0))
+
+
+def _of_part(key: Key, lines: Mapping[str, Mapping[Key, int]]) -> Iterator[tuple[str, Key]]:
+    """The files and keys that may have given a parameter, input or output of a sub-assembly."""
+    table, long_word = str(key[0]), str(key[1])
+    for name in lines:
+        word = long_word.removeprefix(f"{name.replace('/', '_')}_")
+        outer, _, last = name.rpartition("/")
+        given: Key = ("include", last, table, word)
+        if word != long_word and given in lines.get(outer, {}):
+            yield outer, given
+        if word != long_word and (table, word) in lines[name]:
+            yield name, (table, word, *key[2:])
 
 
 def mistake_at(scene: SceneTables, key: Key, what: str, remedy: str = "") -> Mistake:

@@ -173,7 +173,7 @@ def _shape(report: Collector, index: Mapping[str, int], element: Element) -> Sha
     key: Key = ("shapes", element.name)
     word, given = element.type, element.fields
     body = body_index_of(report, index, (*key, "body"), given.get("body"))
-    fields = SHAPES[word] if isinstance(word, str) and word in SHAPES else _added(report, key, word)
+    fields = SHAPES[word] if isinstance(word, str) and word in SHAPES else _added(report, element)
     if fields is None:
         return None
     allowed = ("type", "body", *fields)
@@ -193,19 +193,22 @@ def _shape(report: Collector, index: Mapping[str, int], element: Element) -> Sha
     return Shape(element.name, str(word), body, values)
 
 
-def _added(report: Collector, key: Key, word: Any) -> Mapping[str, Field] | None:
+def _added(report: Collector, element: Element) -> Mapping[str, Field] | None:
     """The fields of a kind that a package brings; None where a mistake is reported."""
     from dap3d_core.interface.errors import PluginError
     from dap3d_core.interface.fields import specs_of
     from dap3d_core.registry.extensions import extensions
     from dap3d_core.scene.validate.coerce_values import READERS
 
-    added = extensions("shape")
+    key, word, added = ("shapes", element.name), element.type, extensions("shape")
+    known = (*SHAPES, *added.keywords)
+    if word is None:
+        what = f"is required; one of {', '.join(known)}"
+        report.add_missing_type(key, element.fields, what)
+        return None
     if not isinstance(word, str) or word not in added.keywords:
-        known = (*SHAPES, *added.keywords)
-        value = MISSING if word is None else word
-        what = f"{'is required' if word is None else 'unknown shape'}; one of {', '.join(known)}"
-        report.add((*key, "type"), value, what, nearest(word, known))
+        what = f"unknown shape; one of {', '.join(known)}"
+        report.add((*key, "type"), word, what, nearest(word, known))
         return None
     try:
         specs = specs_of(added.load(word))

@@ -8,7 +8,6 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.errors import PluginError
 from dap3d_core.registry import Registry, UnknownTypeError
 from dap3d_core.registry.discovery import declares
-from dap3d_core.scene.errors import MISSING
 from dap3d_core.scene.tables import PLUGIN_FILE, Element
 from dap3d_core.scene.validate.coerce_values import Fault, text_of
 from dap3d_core.scene.validate.mistake_collector import Collector
@@ -46,13 +45,12 @@ class Types:
         """The types of elements of a table by keyword; unusable ones are reported."""
         named: dict[str, list[str]] = {}
         for name, element in elements.items():
-            key = (table, name, "type")
             if element.type is None:
                 known = ", ".join(self.registry.keywords(KINDS[table]))
                 what = f"is required: the keyword of a type, one of {known}"
-                self.report.add(key, MISSING, what)
+                self.report.add_missing_type((table, name), element.fields, what)
                 continue
-            keyword = self.report.read(key, element.type, text_of)
+            keyword = self.report.read((table, name, "type"), element.type, text_of)
             if not isinstance(keyword, Fault):
                 named.setdefault(keyword, []).append(name)
         types = {keyword: self._get(table, keyword, names) for keyword, names in named.items()}

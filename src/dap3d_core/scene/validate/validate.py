@@ -7,6 +7,7 @@ import attrs
 
 from dap3d_core.interface.types import acts_on_all
 from dap3d_core.registry import Registry
+from dap3d_core.scene.contacts.tables import Materials
 from dap3d_core.scene.errors import MISSING, dotted
 from dap3d_core.scene.scene import Scene
 from dap3d_core.scene.tables import LIMITS, NAMED, RELEASES, fault_of_name
@@ -51,8 +52,9 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
     joints = read_elements(report, geometry, "joints", types, functions)
     forces = read_elements(report, geometry, "forces", types, functions)
     _check_together(report, joints, forces)
-    contacts = _read_contacts(report, geometry, types, functions, (joints, forces))
-    collisions = _check_shapes_and_outputs(report, bodies, joints)
+    materials = _read_materials(report)
+    contacts = _read_contacts(report, geometry, types, functions, (joints, forces), materials)
+    collisions = _check_shapes_and_outputs(report, bodies, joints, materials)
     left = bool(contacts or collisions)
     forces = _acting_forces(report, geometry, types, (joints, forces), left=left)
     check_header(report)
@@ -61,7 +63,7 @@ def check(scene: Scene, registry: Registry, *, allow_code: bool = False) -> Vali
 
     types.note_unused_file()
     acting = [*joints, *forces, *contacts]
-    _note_loose_bodies(report, bodies, acting)
+    _note_loose_bodies(report, bodies, acting, collisions)
     _note_unused_signals(report, acting, functions)
     notes = [*report.notes(), *notes_of(scene.simulation), *types.registry.notes]
     return ValidatedScene(
@@ -133,9 +135,18 @@ def _acting_forces(
     return forces
 
 
+def _read_materials(report: Collector) -> Materials:
+    """The materials of a scene, those as well that nothing uses."""
+    if not report.scene.materials:
+        return Materials()
+    from dap3d_core.scene.contacts.read_materials import read_materials
+
+    return read_materials(report)
+
+
 def _read_contacts(
     report: Collector, geometry: "Geometry", types: "Types", functions: list[Instance],
-    others: tuple[list[Instance], list[Instance]],
+    others: tuple[list[Instance], list[Instance]], materials: Materials,
 ) -> list[Instance]:  # fmt: skip
     """Contacts, limits of joints, and stops that are rigid; others: joints and forces."""
     joints, forces = others
@@ -155,7 +166,9 @@ def _read_contacts(
     )
 
     elements = report.scene.contacts | limits_of(report, limited)
-    contacts = read_contacts(report, geometry, types, functions, elements) if elements else []
+    contacts = (
+        read_contacts(report, geometry, types, functions, elements, materials) if elements else []
+    )
     by_name = {joint.name: joint for joint in joints}
     sticking = read_friction(report, by_name, rubbing)
     return [*contacts, *read_rigid(report, types, rigid), *sticking]
@@ -190,7 +203,7 @@ def _check_requires(report: Collector) -> str:
 
 
 def _check_shapes_and_outputs(
-    report: Collector, bodies: "Bodies", joints: list[Instance]
+    report: Collector, bodies: "Bodies", joints: list[Instance], materials: Materials
 ) -> "CollisionShapes | None":
     """Check shapes and outputs; the shapes that collide, or None."""
     shapes: list[Shape] = []
@@ -206,14 +219,18 @@ def _check_shapes_and_outputs(
         return None
     from dap3d_core.scene.contacts.read_collisions import read_collisions
 
-    return read_collisions(report, shapes, bodies.body_index, joints)
+    return read_collisions(report, shapes, bodies.body_index, joints, materials)
 
 
-def _note_loose_bodies(report: Collector, bodies: "Bodies", elements: list[Instance]) -> None:
-    """Note bodies without joints and forces."""
+def _note_loose_bodies(
+    report: Collector, bodies: "Bodies", elements: list[Instance],
+    collisions: "CollisionShapes | None",
+) -> None:  # fmt: skip
+    """Note bodies without joints and forces, which meet no others."""
     if any(acts_on_all(e.type_info.type) for e in elements):
         return
     used = {body for e in elements for body in e.bodies}
+    used |= set(collisions.body.tolist()) if collisions else set()
     for k, name in enumerate(bodies.body_names, 1):
         if k not in used:
             report.note(f"bodies.{name}: no joint and no force acts on it", "bodies left alone")

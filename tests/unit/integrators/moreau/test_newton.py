@@ -2,8 +2,33 @@
 
 import numpy as np
 
+from dap3d_core.integrators.moreau.arrays import CONE
 from dap3d_core.integrators.moreau.dense import solve_blocks, solve_dense
-from dap3d_core.integrators.moreau.newton import distance, project, slopes
+from dap3d_core.integrators.moreau.newton import put_missed, put_projected, put_slopes
+
+
+def project(z, mu):
+    """(m, 3) impulses next to z (m, 3) that Coulomb's law allows, given the normal ones."""
+    found = np.zeros_like(z)
+    for one, k, out in zip(z, mu, found, strict=True):
+        put_projected(one, k * max(0.0, one[0]), CONE, out)
+    return found
+
+
+def slopes(z, mu):
+    """(m, 3, 3) derivatives of ``project``."""
+    found = np.zeros((len(mu), 9))
+    for one, k, out in zip(z, mu, found, strict=True):
+        put_slopes(one, k, k * max(0.0, one[0]), CONE, out)
+    return found.reshape(-1, 3, 3)
+
+
+def distance(x, u, mu, r):
+    """(m, 3) what impulses x miss Coulomb's law by at velocities u, both (m, 3)."""
+    found = np.zeros_like(x)
+    for one, v, k, m, out in zip(x, u, mu, r, found, strict=True):
+        put_missed(one, v, k * max(0.0, one[0]), CONE, m, out)
+    return found
 
 
 def test_slopes_are_those_of_the_projection():

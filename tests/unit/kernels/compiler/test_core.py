@@ -135,7 +135,8 @@ NOT_CALLED = {
         ),
         "integrators.moreau.contact_set": (
             "find_contacts place_poses axes_of turn_tensor put_touch put_frame evaluate_rows "
-            "put_declared velocity_of find_grips friction_at"
+            "put_declared velocity_of find_grips friction_at put_resistances put_resistance "
+            "put_turning"
         ),
         "integrators.moreau.free_motion": "add_pushed move_freely normalise size_of largest_rate",
         "integrators.moreau.groups": (
@@ -150,7 +151,7 @@ NOT_CALLED = {
             "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of add_load "
             "put_velocities clear add_pull times_inverse add_inverse speed_of left_at residual_of "
             "residual_after newton exchange put_rest product_of solve_round try_pass assemble "
-            "put_turned add_contact"
+            "put_turned add_contact add_pressed"
         ),
         "integrators.moreau.problem": (
             "prepare_problem take_carried felt_by solve judge sweep finish refine_groups"

@@ -1,0 +1,104 @@
+"""What resists rolling and spinning, beside closed forms of a solid ball."""
+
+import numpy as np
+import pytest
+
+import dap3d_core as dap
+
+G, R, M = 9.81, 0.1, 2.0
+I = 0.4 * M * R * R
+#: Inertia of rolling over m R^2.
+ROLLS = 1.4
+
+
+def ball(declared, angle=0.0, v=0.0, w=(0.0, 0.0, 0.0), **material):
+    """A solid ball on a plane that falls off at an angle along x, in the axes of the plane."""
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=M, Jp=[I] * 3, r=[0.0, 0.0, R], r_dot=[v, 0.0, 0.0], w=w)
+    scene.add_material("felt", mu=0.8, **material)
+    if declared:
+        scene.add_contact("ball_plane", P_i="ball.O", radius=R, material="felt")
+    else:
+        scene.add_shape("sphere", body="ball", radius=R, collides=True)
+        scene.add_shape("plane", body="ground", collides=True)
+        scene.add_collisions(material="felt")
+    scene.add_force("weight", "gravity", gravity=G, wgt=[np.sin(angle), 0.0, -np.cos(angle)])
+    return scene
+
+
+@pytest.mark.parametrize("declared", [False, True])
+def test_a_ball_that_rolls_slows_down_evenly_and_stops(declared):
+    v, mu_roll, h = 1.0, 0.01, 1e-3
+    a = G * mu_roll / (ROLLS * R)
+    result = dap.simulate(ball(declared, v=v, w=[0.0, v / R, 0.0], mu_roll=mu_roll),
+                          t_end=2.0, dt=0.1, contact_step=h)  # fmt: skip
+    t = np.minimum(result.t, v / a)
+    x = v * t - 0.5 * a * t**2
+    assert result.r[:, 0, 0] == pytest.approx(x, abs=a * h**2)
+    assert abs(result.rd[-1, 0, 0]) < 1e-12
+    early = result.t < 1.0
+    assert result.r[early, 0, 0] == pytest.approx(x[early], abs=1e-8)
+
+
+@pytest.mark.parametrize("part", [0.95, 1.3])
+@pytest.mark.parametrize("declared", [False, True])
+def test_a_ball_rolls_down_slopes_beyond_a_limit(declared, part):
+    mu_roll = 0.02
+    angle = np.arctan(part * mu_roll / R)
+    result = dap.simulate(ball(declared, angle, mu_roll=mu_roll), t_end=1.0, dt=0.1,
+                          contact_step=2e-3)  # fmt: skip
+    a = max(G * np.sin(angle) - G * np.cos(angle) * mu_roll / R, 0.0) / ROLLS
+    limit = 1e-12 if part < 1.0 else 1e-8
+    assert result.r[:, 0, 0] == pytest.approx(0.5 * a * result.t**2, abs=limit)
+
+
+@pytest.mark.parametrize("declared", [False, True])
+def test_a_ball_that_spins_stops_in_its_time(declared):
+    mu_spin, w = 0.002, 20.0
+    a = mu_spin * M * G / I
+    result = dap.simulate(ball(declared, w=[0.0, 0.0, w], mu_spin=mu_spin), t_end=0.6, dt=0.05,
+                          contact_step=1e-3)  # fmt: skip
+    assert result.w[:, 0, 2] == pytest.approx(np.maximum(w - a * result.t, 0.0), abs=1e-9)
+
+
+def test_events_refuse_what_steps_alone_can_follow():
+    scene = ball(True, mu_roll=0.01)
+    with pytest.raises(dap.SceneError, match="resists rolling or spinning is followed by stepping"):
+        dap.simulate(scene, t_end=0.1, contact="events")
+    assert any("resist rolling" in note for note in dap.simulate(scene, t_end=0.01).notes)
+
+
+def test_of_pairs_that_are_not_named_the_mean_counts_and_the_pair_where_it_is():
+    a = G / (ROLLS * R)
+    for with_, mu_roll in (({}, 0.004), ({"ice": {"mu_roll": 0.001}}, 0.001)):
+        scene = ball(False, v=1.0, w=[0.0, 1.0 / R, 0.0], mu_roll=0.002, with_=with_)
+        scene.add_material("ice", mu=0.8, mu_roll=0.008)
+        scene.shapes["plane1"].fields["material"] = "ice"
+        result = dap.simulate(scene, t_end=0.5, contact_step=1e-3)
+        assert result.rd[-1, 0, 0] == pytest.approx(1.0 - 0.5 * a * mu_roll, abs=1e-10)
+
+
+def test_a_cart_on_wheels_slows_down_by_what_its_wheels_resist():
+    """However the load is shared: mu_roll M g / R over M and the inertia of the wheels."""
+    scene, v, mu_roll, whole = dap.Scene(name="cart"), 2.0, 0.004, 5.0 + 4 * M
+    scene.add_body("cart", mass=5.0, Jp=[0.1] * 3, r=[0.3, 0.0, 0.3], r_dot=[v, 0.0, 0.0])
+    for k in range(4):
+        x, y = (-0.5, 0.5)[k % 2], (-0.3, 0.3)[k // 2]
+        scene.add_body(
+            f"wheel{k}", mass=M, Jp=[I] * 3, r=[x, y, R], r_dot=[v, 0, 0], w=[0, v / R, 0]
+        )
+        scene.add_shape("sphere", body=f"wheel{k}", radius=R, collides=True)
+        scene.add_point(f"hub{k}", body="cart", sPp=[x - 0.3, y, R - 0.3])
+        scene.add_joint(
+            "rev", f"axle{k}", P_i=f"wheel{k}.O", P_j=f"hub{k}", a_i=f"wheel{k}.y", a_j="cart.y"
+        )
+    scene.add_shape("plane", body="ground", collides=True)
+    scene.add_material("rubber", mu=0.8, mu_roll=mu_roll)
+    scene.add_collisions(material="rubber")
+    scene.add_force("weight")
+    result = dap.simulate(scene, t_end=1.0, dt=0.5, contact_step=2e-3)
+    a = mu_roll * whole * G / R / (whole + 4 * I / R**2)
+    assert result.rd[-1, 0, 0] == pytest.approx(v - a, abs=1e-8)
+    taken = 0.5 * (whole + 4 * I / R**2) * (v**2 - (v - a) ** 2)
+    assert -result.record.stepping["friction_work"] == pytest.approx(taken, rel=1e-6)
+    assert all(entry.ok for entry in result.ledger.values())
