@@ -4,6 +4,7 @@ import statistics
 import subprocess
 import tempfile
 import time
+from itertools import chain
 from pathlib import Path
 
 import dap3d_core as dap
@@ -44,7 +45,7 @@ def exported(folder, model, **options):
 
 
 def real_time():
-    """Microseconds of steps of quarter cars at 1 kHz: of the wall, of the CPU, and of the step itself.
+    """Microseconds of steps of quarter cars at 1 kHz: of the wall, of the CPU, and their own.
 
     The last is the least of the passes, which leaves out what else the machine does.
     """
@@ -96,5 +97,5 @@ def steps(models=("pen1", "crane", "fourbar3", "quarter_car"), count=500, dt=1e-
 
 
 if __name__ == "__main__":
-    for row in (*real_time(), *steps()):
-        print(row)
+    for row in chain(real_time(), steps()):
+        print(row, flush=True)
