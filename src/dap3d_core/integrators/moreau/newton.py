@@ -38,6 +38,8 @@ HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
 INNER = 1e-2
 #: The best to which a round is solved.
 ROUNDING = 1e-15
+#: A residual from which a round that does not help is the last.
+SETTLED = 2e-14
 TINY = 1e-300
 #: Unknowns up to which the matrix of a pass is a square; that of more has blocks.
 SMALL = 60
@@ -241,13 +243,13 @@ def newton(s: StepArrays, tolerance: float) -> float:
         solve_round(s, weight, INNER * max(0.1 * tolerance, min(left, 1e-3)))
         exchange(s)
         new = residual_after(s)
-        if new > HELPS * left:
-            weight *= LESS
+        helps = new <= HELPS * left
+        weight *= 1.0 if helps else LESS
         if new >= left:
             exchange(s)
             put_velocities(s, s.v)
         left = min(left, new)
-        if weight < LEAST:
+        if weight < LEAST or (left <= SETTLED and not helps):
             break
     return left
 

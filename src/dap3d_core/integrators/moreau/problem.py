@@ -29,6 +29,8 @@ RELAX = 1.4
 MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
 FEW, RESIDUAL_ROUNDING = 100, 1e-14
+#: Residual above which rows of light bodies are taken as those of what these carry.
+CARRIED = 1e-12
 
 
 def arrays_of(evaluator: Evaluator, size: int, remembered: int) -> StepArrays:
@@ -114,7 +116,7 @@ def solve(s: StepArrays, tolerance: float) -> bool:
             return False
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
         s.residual = newton(s, aim)
-        if s.residual > aim and s.light_count > 0:
+        if s.residual > max(aim, CARRIED) and s.light_count > 0:
             take_carried(s)
             s.residual = newton(s, aim)
         if few and joined and s.residual > tolerance and not refine_held(s, tolerance, aim):
