@@ -9,8 +9,9 @@ from dap3d_core.formulations.contacts.cone import solve_cone
 from dap3d_core.formulations.contacts.contact_rows import ContactRows, ContactTable, length_of
 from dap3d_core.kernels.array_types import Floats, Integers
 
-#: Speed, m/s, below which a contact is at rest; part of the largest acceleration below which one
-#: is zero; part of the largest entry of A below which rows depend on each other.
+#: Speed, m/s of a scene of ordinary size, below which a contact is at rest; part of the largest
+#: acceleration below which one is zero; part of the largest entry of A below which rows depend on
+#: each other.
 STILL, ZERO, DEPENDENT = 1e-9, 1e-9, 1e-12
 #: Part of the largest acceleration of a group that counts as one of each of its contacts: what
 #: joints let turn fast beside what they let slide is no measure of it, but its rounding is there.
@@ -44,8 +45,9 @@ class Modes:
 
     Attributes:
         mode: (m,) 0 open, 1 slides, 2 sticks.
-        way: (m, 3) unit vectors of sliding, zero where none is known; of friction alone that
-            sticks 1.0 for rows that do not hold, as others hold what they would.
+        way: (m, 3) directions of sliding, of the length of the scene (1 of what turns), zero where
+            none is known; of friction alone that sticks 1.0 for rows that do not hold, as others
+            hold what they would.
         near: (m, 3) forces on body i of those that share what they carry.
         force: (m, 3) forces with which they were found, in the frames of the contacts.
     """
@@ -74,20 +76,19 @@ def find_modes(
     Raises:
         JamError: a contact jams.
     """
-    limit = STILL * max(1.0, table.evaluator.model.length)
     closing = rows.closing
     found = Modes(*(np.zeros((table.count, *shape)) for shape in ((), (3,), (3,), (3,))))
-    for group in _groups(rows, [c for c in touching if closing[c] < limit]):
+    for group in _groups(rows, [c for c in touching if closing[c] < STILL * table.length[c]]):
         if table.loads.keys().isdisjoint(group):
-            _put_modes(table, rows, group, sliding, leaving, limit, found)
+            _put_modes(table, rows, group, sliding, leaving, found)
         else:
-            _put_loaded(table, rows, group, sliding, leaving, limit, found)
+            _put_loaded(table, rows, group, sliding, leaving, found)
     return found
 
 
 def _put_loaded(
     table: ContactTable, rows: ContactRows, group: list[int], sliding: dict[int, Floats],
-    leaving: list[int], limit: float, found: Modes,
+    leaving: list[int], found: Modes,
 ) -> None:  # fmt: skip
     """The modes of a group with friction of joints: found by loads that they give themselves.
 
@@ -96,7 +97,7 @@ def _put_loaded(
     those of as many passes as there are loads.
     """
     mine = [c for c in group if c in table.loads]
-    ways, none = _ways(table, rows, group, sliding, limit), np.zeros(len(rows.G))
+    ways, none = _ways(table, rows, group, sliding), np.zeros(len(rows.G))
     slides = np.array([c in ways for c in mine])
     loads = np.where(slides, rows.loads_by(none)[mine], LARGE)
     taken: list[Floats] = []
@@ -105,7 +106,7 @@ def _put_loaded(
         rows.load[mine] = loads
         for values in attrs.astuple(found, recurse=False):
             values[group] = 0.0
-        _put_modes(table, rows, group, sliding, leaving, limit, found)
+        _put_modes(table, rows, group, sliding, leaving, found)
         force = np.zeros_like(found.force)
         force[group] = found.force[group]
         given = rows.loads_by(force.ravel())[mine]
@@ -152,29 +153,29 @@ def _groups(rows: ContactRows, closed: list[int]) -> list[list[int]]:
 
 def _put_modes(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    leaving: list[int], limit: float, found: Modes,
+    leaving: list[int], found: Modes,
 ) -> None:  # fmt: skip
     """Find the modes of one group of contacts."""
     left = [c for c in leaving if c in closed]
     if left or any(c in sliding for c in closed):
         # of contacts that share, one at the end of its cone may only have to carry less
-        inner = _inside(table, rows, closed, {}, limit)
+        inner = _inside(table, rows, closed, {})
         if inner is not None and all(
             inner[3 * closed.index(c)] > TO_STAY * inner.max() for c in left
         ):
-            _put(table, rows, closed, {}, limit, found, inner)
+            _put(table, rows, closed, {}, found, inner)
             return
         which = rows.rows_of(closed)
         if not left and _share(table, closed, rows.W[np.ix_(which, which)], {}):
             # what each of them carried was a choice, and so is the direction of it
-            _put(table, rows, closed, {}, limit, found, loose=True)
+            _put(table, rows, closed, {}, found, loose=True)
             return
-    _put(table, rows, _staying(table, rows, closed, sliding, left, limit), sliding, limit, found)
+    _put(table, rows, _staying(table, rows, closed, sliding, left), sliding, found)
 
 
 def _staying(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    leaving: list[int], limit: float,
+    leaving: list[int],
 ) -> list[int]:  # fmt: skip
     """Contacts that stay where some leave, unless these would close again at once.
 
@@ -185,7 +186,7 @@ def _staying(
     while leaving:
         gone, without = [*gone, *leaving], [c for c in closed if c not in leaving]
         try:
-            x, _ = _solve(table, rows, without, *_matrix(table, rows, without, sliding, limit))
+            x, _ = _solve(table, rows, without, *_matrix(table, rows, without, sliding))
         except JamError:
             return closed
         rates = _rates(rows, without, x, gone)
@@ -208,14 +209,13 @@ def _rates(rows: ContactRows, contacts: list[int], x: Floats, wanted: list[int])
 
 def _ways(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float,
 ) -> dict[int, Floats]:  # fmt: skip
     """Directions (2,) of the contacts that slide."""
     found = {}
     for c in closed:
         u = rows.slip[c, table.across(c)]
         size = length_of(u)
-        if size > limit:
+        if size > STILL * table.length[c]:
             found[c] = u / size
         elif c in sliding:
             found[c] = sliding[c]
@@ -224,12 +224,11 @@ def _ways(
 
 def _matrix(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float,
 ) -> tuple[Floats, dict[int, Floats]]:  # fmt: skip
     """Rates by forces, those along normals with sliding friction, and directions of sliding."""
     which = rows.rows_of(closed)
     full = rows.W[np.ix_(which, which)]
-    A, ways = full.copy(), _ways(table, rows, closed, sliding, limit)
+    A, ways = full.copy(), _ways(table, rows, closed, sliding)
     for k, c in enumerate(closed):
         if c in ways and not table.gapless[c]:
             across = full[:, 3 * k + 1 : 3 * k + 3]
@@ -244,9 +243,8 @@ def nearly_jams(table: ContactTable, rows: ContactRows, closed: list[int]) -> st
 
     Its normal force grows beyond all bounds there, in a finite time.
     """
-    limit = STILL * max(1.0, table.evaluator.model.length)
     pushed = [c for c in closed if not table.alone[c]]
-    A, ways = _matrix(table, rows, pushed, {}, limit)
+    A, ways = _matrix(table, rows, pushed, {})
     for k, c in enumerate(pushed):
         if c in ways and A[3 * k, 3 * k] < NEARLY * rows.W[3 * c, 3 * c]:
             return table.names[c]
@@ -284,7 +282,7 @@ def _solve(
 
 def _put(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float, found: Modes, inner: Floats | None = None, *, loose: bool = False,
+    found: Modes, inner: Floats | None = None, *, loose: bool = False,
 ) -> None:  # fmt: skip
     """Put the modes of contacts that are closed among those found; inner: of ``_inside``.
 
@@ -292,10 +290,10 @@ def _put(
     """
     if not closed:
         return
-    A, ways = _matrix(table, rows, closed, sliding, limit)
+    A, ways = _matrix(table, rows, closed, sliding)
     shares = _share(table, closed, A, ways)
     if inner is None and not loose:
-        inner = _inside(table, rows, closed, sliding, limit)
+        inner = _inside(table, rows, closed, sliding)
     if inner is None:
         x, moves = _begin(table, rows, closed, A, ways, LOOSE if loose else 1.0)
     else:
@@ -317,7 +315,8 @@ def _put(
             mode, way = 1.0, along / length_of(along)
         else:
             mode, way = 2.0, np.zeros_like(rate[across])
-        found.mode[c], found.way[c], found.force[c] = mode, way @ frame[across], force
+        found.mode[c], found.force[c] = mode, force
+        found.way[c] = table.length[c] * way @ frame[across]
         if shares or table.alone[c]:  # what its row adds has next to no rounding then
             normal = 0.0 if table.gapless[c] else force[0]
             found.near[c] = force @ frame if mode == 2.0 else normal * frame[0]
@@ -403,13 +402,12 @@ def _own_rows(table: ContactTable, closed: list[int], ways: dict[int, Floats]) -
 
 def _inside(
     table: ContactTable, rows: ContactRows, closed: list[int], sliding: dict[int, Floats],
-    limit: float,
 ) -> Floats | None:  # fmt: skip
     """Forces well within the cones of contacts that share what they carry, and hold.
 
     None where they do not share, or there are none.
     """
-    A, ways = _matrix(table, rows, closed, sliding, limit)
+    A, ways = _matrix(table, rows, closed, sliding)
     if not _share(table, closed, A, ways):
         return None
     own, own_rates = _own_rows(table, closed, ways), np.diag(A).reshape(-1, 3).max(axis=1)
