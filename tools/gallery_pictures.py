@@ -21,6 +21,7 @@ AT = {
     "marble_run": 0.9,
     "quadruped": 0.4,
     "sphere_box": 0.08,
+    "walker": 0.125,
     "crane": 1.5,
     "engine": 0.004,
     "excavator": 2.5,

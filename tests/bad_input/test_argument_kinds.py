@@ -126,6 +126,11 @@ MESSAGES = {
         lambda: dap.simulate("pen1", controllers=np.zeros(2)),
         "controllers should be a list of dap.Controller, not a ndarray",
     ),
+    "one event": (
+        lambda: dap.simulate("pen1", events=dap.Event("t", above=0.2)),
+        r"write \[event\] for a single one",
+    ),
+    "a name for an event": (lambda: dap.simulate("pen1", events=["t"]), "a list of dap.Event, not"),
     "a part for a whole": (
         lambda: dap.linearize("pen1", modes=2.5),
         "modes should be a whole number or None, not 2.5",

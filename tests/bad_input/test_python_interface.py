@@ -117,42 +117,6 @@ def test_rates_that_are_not_finite_are_an_error_that_names_the_culprit(compiled)
 
 
 @pytest.mark.parametrize(
-    ("given", "error", "words"),
-    [
-        ({"events": dap.Event("t", above=0.2)}, TypeError, r"write \[event\] for a single one"),
-        ({"events": 3}, TypeError, "a list of dap.Event, not 3"),
-        ({"events": ["t"]}, TypeError, r"a list of dap.Event, not \['t'\]"),
-        ({"watch": 3}, TypeError, "watch should be a function"),
-        ({"method": 3}, dap.SceneError, "should be text|should be one of"),
-        ({"integrator": b"dop853"}, dap.SceneError, "should be one of"),
-        ({"t_end": "1"}, dap.SceneError, "without quotes"),
-        ({"tend": 1.0}, TypeError, "unexpected keyword"),
-    ],
-    ids=spelt,
-)
-def test_arguments_that_make_no_sense_are_refused_before_the_run(compiled, given, error, words):
-    with pytest.raises(error, match=words) as caught:
-        dap.simulate(compiled, **({"t_end": 0.5} | given))
-    assert not hasattr(caught.value, "result")
-
-
-@pytest.mark.parametrize(
-    ("of", "given", "error"),
-    [
-        (None, {}, TypeError),
-        (3, {"above": 1.0}, TypeError),
-        ("t", {"above": np.nan}, ValueError),
-        ("t", {"above": "1"}, ValueError),
-        ("t", {"above": np.array([1.0])}, ValueError),
-        ("t", {"at": True}, ValueError),
-    ],
-)
-def test_events_that_can_never_be_found_are_refused(of, given, error):
-    with pytest.raises(error, match="event"):
-        dap.Event(of, **given)
-
-
-@pytest.mark.parametrize(
     ("answer", "words"),
     [
         (None, "finite number, not None"),
@@ -234,13 +198,6 @@ def test_a_compiled_model_is_a_value(compiled):
     assert copy.deepcopy({"model": compiled})["model"] is compiled
     with pytest.raises(TypeError, match="send the scene to the other process"):
         pickle.dumps(compiled)
-
-
-def test_a_result_travels(fresh):
-    made = pickle.loads(pickle.dumps(fresh))
-    assert_same_run(made, fresh)
-    with pytest.raises(OSError, match="does not travel between processes"):
-        made.reaction("hinge")
 
 
 # ------------------------------------------------------------------ callbacks

@@ -38,14 +38,6 @@ def test_a_film(dap3d, runs):
 
 
 @pytest.mark.slow
-def test_a_run_at_t_0_alone_gives_a_snapshot(dap3d):
-    dap.simulate("fourbar3", t_end=0.0).save(dap3d.folder / "a.nc")
-    done = dap3d.succeed("animate", "a.nc")
-    assert "a.png written" in done.stdout
-    assert (dap3d.folder / "a.png").read_bytes().startswith(b"\x89PNG")
-
-
-@pytest.mark.slow
 def test_ctrl_c_leaves_no_file(dap3d, runs):
     process = dap3d.start("animate", "pen1.nc", "--speed", "0.005", "--fps", "50", "-o", "a.gif")
     end = time.monotonic() + 60

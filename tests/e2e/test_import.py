@@ -50,30 +50,3 @@ def test_nothing_is_overwritten_without_force(dap3d, refuse, arm):
     assert dap3d("import", "arm.urdf", "--force").returncode == 0
     assert dap3d("export", "arm", "--format", "mjcf").returncode == 0
     assert "exists; --force" in refuse("export", "arm", "--format", "mjcf")
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("import", "arm.urdf", "--strict"), "effort"),
-        (("import", "nothing.urdf"), "there is no file nothing.urdf"),
-        (("import", "amr.urdf"), "did you mean 'arm.urdf'"),
-        (("import", "."), "is a folder"),
-        (("import", "arm.urdf", "--root", "nowhere"), "nowhere is no folder"),
-        (("import", "arm.urdf", "--position", "elbw=1"), "no such joint"),
-        (("import", "arm.urdf", "--position", "elbow"), "write NAME=VALUE"),
-        (("import", "arm.urdf", "--position", "a=1", "--position", "a=2"), "more than once"),
-        (("import", "arm.urdf", "--package", "a=nowhere"), "nowhere is no folder"),
-        (("import", "arm.urdf", "--limits", "softly"), "'off', 'soft', 'hard'"),
-        (("import", "arm.urdf", "--position", "elbow=1,x"), "is no number"),
-        (("import", "arm.urdf", "--arg", "L=2"), "write NAME:=VALUE"),
-        (("import", "arm.urdf", "--arg", "L:=2"), "takes no argument 'L'"),
-        (("import", "arm.urdf", "--format", "urfd"), "did you mean 'urdf'"),
-        (("export", "arm.urdf", "--format", "urfd"), "did you mean 'urdf'"),
-        (("run", "arm.urdf"), "dap3d import arm.urdf"),
-    ],
-)
-def test_what_is_wrong_is_told(refuse, arm, words, said):
-    """Exit code 2, and no file is left behind."""
-    assert said in refuse(*words)
-    assert not (arm / "arm").exists()

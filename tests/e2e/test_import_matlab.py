@@ -14,23 +14,6 @@ from support.process import REPOSITORY
 import dap3d_core as dap
 
 
-@pytest.mark.slow
-def test_import_check_and_run(dap3d):
-    """From a folder to a result, with a report on the way."""
-    done = dap3d.succeed("import-matlab", MODELS / "pen2", "-o", "pen2.toml")
-    told = " ".join(done.stdout.split())
-    assert "inBodies.m read 2 bodies" in told
-    assert "inVectors2.m absent no vectors of type 2" in told
-    assert "pen2.toml: 2 bodies, 4 points, 2 vectors, 2 joints, 1 force" in told
-    assert "dap3d run pen2.toml --t-end 2 --dt 0.02" in told
-    assert "user_force" not in told
-    checked = json.loads(dap3d("check", "pen2.toml", "--json").stdout)
-    # a ball joint and a revolute joint on two bodies (models/pen2)
-    assert (checked["rows"], checked["dof"]) == (8, 4)
-    done = dap3d.succeed("run", "pen2.toml", "--t-end", "0.1", "--dt", "0.05", "--json")
-    assert json.loads(done.stdout)["status"] == "done"
-
-
 def test_what_is_written_reads_as_the_scene_of_the_library(dap3d):
     assert dap3d("import-matlab", MODELS / "tri").returncode == 0
     scene, _ = dap.import_matlab(MODELS / "tri")

@@ -141,27 +141,6 @@ def test_a_keyword_that_is_taken_is_refused_and_may_be_forced(refuse, dap3d):
     new_plugin(dap3d.folder / "other", "sph", "--kind", "force")  # scenes tell them apart
 
 
-@pytest.mark.parametrize(
-    ("kind", "taken", "words"),
-    [
-        ("importer", "urdf", "there is an importer 'urdf' already, from distribution dap3d"),
-        ("integrator", "auto", "dap3d itself has the integrator 'auto'"),
-        ("shape", "box", "dap3d itself has the shape 'box'"),
-        ("exporter", "vtk", "there is an exporter 'vtk' already, from distribution dap3d"),
-    ],
-)
-def test_names_of_extensions_that_are_taken_are_refused(refuse, kind, taken, words):
-    """Of a built-in one also with --force: it would never be reached."""
-    assert words in refuse("new-plugin", taken, "--kind", kind)
-    if "itself" in words:
-        assert words in refuse("new-plugin", taken, "--kind", kind, "--force")
-
-
-def test_modules_of_dap3d_are_never_replaced(refuse):
-    for name in ("core", "joints", "formats"):
-        assert "would hide dap3d's own" in refuse("new-plugin", name, "--force")
-
-
 def test_a_folder_that_holds_files_is_refused_and_kept(refuse, dap3d):
     folder = dap3d.folder / "dap3d-mine"
     folder.mkdir()
@@ -171,10 +150,6 @@ def test_a_folder_that_holds_files_is_refused_and_kept(refuse, dap3d):
     new_plugin(folder, "mine", "--force")
     assert (folder / "notes.txt").read_text() == "mine"
     new_plugin(dap3d.folder / "a" / "b", "mine")
-
-
-def test_an_author_of_two_lines_is_refused(refuse):
-    assert "one line" in refuse("new-plugin", "mine", "--author", "a\nb")
 
 
 def test_json(tmp_path):

@@ -230,13 +230,3 @@ def test_an_unknown_backend_of_matplotlib_is_one_sentence(scene_file, dap3d, com
     assert found.returncode == 1
     assert "the environment variable MPLBACKEND is 'nonsense'" in found.stderr
     assert "unexpected" not in found.stderr
-
-
-@pytest.mark.parametrize(
-    "words",
-    [f"modes pen1 {t}" for t in ("--t inf", "--t=-inf", "--t nan", "--t 1e999", "--t x")]
-    + [f"plugins --no-compile --limit {limit}" for limit in ("nan", "inf", "0", "-1")],
-)
-def test_times_that_are_none_are_usage_errors(refuse, words):
-    """Of a state, finite ones; of a limit of loading, positive ones."""
-    assert ("--t" if "modes" in words else "--limit") in refuse(*words.split())

@@ -32,15 +32,6 @@ def test_a_report_with_table_files_and_a_setting_that_can_be_run(dap3d):
 
 
 @pytest.mark.slow
-def test_json_is_one_object_with_the_runs_and_nothing_else(dap3d):
-    done = dap3d("report", "pen1", *QUICK, "--integrator", "dop853", "--integrator", "rk4",
-                 "--method", "standard", "--json")  # fmt: skip
-    assert (done.returncode, done.stderr) == (0, "")
-    found = json.loads(done.stdout)
-    assert [run["integrator"] for run in found["runs"]] == ["dop853"] * 3 + ["rk4"] * 3
-
-
-@pytest.mark.slow
 def test_tables_fit_the_width(dap3d):
     done = dap3d.succeed("report", "pen1", *QUICK, "--method", "standard", COLUMNS=60)
     lines = done.stdout.splitlines()

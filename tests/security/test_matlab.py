@@ -73,16 +73,6 @@ def test_a_link_out_of_the_folder_is_not_followed(tmp_path, capfd, monkeypatch, 
     assert not (tmp_path / "plugin.py").exists()
 
 
-@pytest.mark.skipif(os.name != "posix", reason="no such files")
-def test_pipes_and_devices(tmp_path):
-    folder = write(tmp_path / "model", inPoints=None, inForces=None)
-    os.mkfifo(folder / "inPoints.m")
-    (folder / "inForces.m").symlink_to("/dev/zero")
-    with pytest.raises(dap.SceneError) as caught:
-        dap.import_matlab(folder)
-    assert sum("not a regular file" in str(m) for m in caught.value.mistakes) == 2
-
-
 def test_very_many_files(tmp_path, capfd, monkeypatch):
     folder = write(tmp_path / "model")
     for k in range(300):

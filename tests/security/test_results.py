@@ -10,7 +10,7 @@ import dap3d_core as dap
 from dap3d_core.cli import main
 from dap3d_core.plot.film.stick_figure import sticks_of
 from dap3d_core.result import ResultError
-from dap3d_core.result.file.validate import ALWAYS, check_attributes, check_shapes
+from dap3d_core.result.file.validate import ALWAYS, check_shapes
 
 netCDF4 = pytest.importorskip("netCDF4")
 
@@ -99,13 +99,6 @@ def test_attributes_of_another_form_and_no_json(changed, name, text):
     path = changed(lambda d: d.setncattr_string(name, text))
     with pytest.raises(ResultError, match="damaged"):
         dap.open(path)
-
-
-def test_what_dap3d_writes_is_accepted(good):
-    with netCDF4.Dataset(good) as dataset:
-        found = {n: dataset.getncattr(n) for n in dataset.ncattrs()}
-    names = ("notes", "settings", "statistics", "versions", "events")
-    check_attributes({"actuation": {}} | {n: json.loads(found[n]) for n in names})
 
 
 #: Texts of a scene; none of them is one, or not of this result.

@@ -160,12 +160,3 @@ def test_a_point_off_the_mass_centre_slides_on_a_plane():
     sine = np.sqrt(1.0 - height**2)
     square = 2.0 * 9.81 * (np.cos(lean) - height) / (sine**2 + 1 / 3)
     assert result.w[:, 0, 1] == pytest.approx(np.sqrt(np.maximum(square, 0.0)), abs=1e-7)
-
-
-def test_a_vector_of_a_body_is_no_normal_of_a_plane():
-    """rP's plane is fixed in ground: another vector is refused with the place and the reason."""
-    scene = dap.Scene(name="lift")
-    scene.add_body("cabin", mass=3.0, Jp=(1.0, 1.0, 1.0))
-    scene.add_joint("rP", "floor", body_i="cabin", a_j="cabin.z", length=0.0)
-    with pytest.raises(dap.SceneError, match=r"floor.*a_j.*cabin"):
-        dap.compile(scene)

@@ -103,18 +103,6 @@ def test_a_scene_without_friction_compiles_and_keeps_nothing_of_it():
     assert "friction" not in {kind for kind, _ in dap.compile(scene).evaluator.loop_groups}
 
 
-def test_a_joint_without_friction_is_named():
-    """sph-sph does not rub: the scene is refused, and says which joint."""
-    scene = dap.Scene(name="link")
-    scene.add_body("ball", r=(0.0, 0.0, -1.0))
-    scene.add_joint("sph-sph", "rod", P_i="ball.O", P_j="ground.O", length=1.0)
-    scene.add_force("friction", "rub", joint="rod")
-    with pytest.raises(
-        dap.SceneError, match=r"forces.rub.*joint rod: type sph-sph has no friction"
-    ):
-        dap.compile(scene)
-
-
 REGISTRY = dap.load_registry()
 MU, V_TOL, RADIUS = 0.3, 1e-3, 0.2
 

@@ -291,3 +291,69 @@ def test_linkages_of_one_freedom_that_no_count_tells_have_it_in_any_units(linkag
     assert [name for name, entry in small.ledger.items() if entry.ok is False] == []
     np.testing.assert_allclose(small.r / length, ordinary.r, atol=1e-6)
     np.testing.assert_allclose(small.w, ordinary.w, atol=1e-5)
+
+
+def turning_box(length, time=1.0):
+    """A box on four corners that slides and spins until it sticks: its slip turns all the way."""
+    scene = dap.Scene(name="box")
+    scene.add_body("box", mass=2.0, Jp=[0.008 * length**2] * 3, r=[0.0, 0.0, 0.1 * length],
+                   r_dot=[0.7 * length / time, 0.2 * length / time, 0.0],
+                   w=[0.0, 0.0, 6.0 / time])  # fmt: skip
+    scene.add_force("weight", "gravity", gravity=GRAVITY * length / time**2)
+    size = [0.3 * length, 0.3 * length, 0.2 * length]
+    scene.add_contact("box_plane", "floor", P_i="box.O", size=size, mu=0.3)
+    return scene
+
+
+def bouncing_ball(length, time=1.0):
+    """A ball that bounces to rest, and slides, then rolls."""
+    scene = dap.Scene(name="ball")
+    scene.add_body("ball", mass=2.0, Jp=[0.008 * length**2] * 3, r=[0.0, 0.0, 0.5 * length],
+                   r_dot=[length / time, 0.0, 0.0])  # fmt: skip
+    scene.add_force("weight", "gravity", gravity=GRAVITY * length / time**2)
+    scene.add_contact("ball_plane", "floor", P_i="ball.O", radius=0.1 * length, mu=0.3, e=0.5)
+    return scene
+
+
+@pytest.mark.parametrize(
+    ("length", "time"),
+    [(1e-4, 1.0), (1e-6, 1.0), (1e-7, 1.0), (1e-9, 1.0), (1e-6, 1e-3), (1e3, 1.0), (1e6, 1.0)],
+)
+@pytest.mark.parametrize("make", [turning_box, bouncing_ball])
+def test_contacts_of_grains_are_those_of_large_bodies(make, length, time):
+    """Slip, bounces and rest do not depend on the units: the same motion and the same events.
+
+    At rtol 1e-10 some 100 steps leave 1e-8; a limit of speed in m/s stops a grain of 0.1 um some
+    percent of its way too early."""
+    ours, theirs = (
+        dap.simulate(make(*s), t_end=s[1], dt=0.1 * s[1], rtol=1e-10)
+        for s in ((length, time), (1.0, 1.0))
+    )
+    assert [e.kind for e in ours.events][:16] == [e.kind for e in theirs.events][:16]
+    np.testing.assert_allclose(
+        [e.t / time for e in ours.events][:16], [e.t for e in theirs.events][:16], atol=1e-7
+    )
+    assert all(entry.ok for entry in ours.ledger.values()), ours.ledger
+    np.testing.assert_allclose(ours.r / length, theirs.r, atol=1e-8)
+    np.testing.assert_allclose(ours.rd * time / length, theirs.rd, atol=1e-8)
+    np.testing.assert_allclose(ours.w * time, theirs.w, atol=1e-8)
+
+
+def stopped_wheel(length):
+    """A wheel of that size, which rebounds from its stop, in a hinge that rubs."""
+    scene = dap.Scene(name="wheel")
+    scene.add_body("wheel", mass=2.0, Jp=[0.5 * length**2] * 3, w=[0.0, 0.0, 2.0])
+    axle = {"P_i": "wheel.O", "P_j": "ground.O", "a_i": "wheel.z", "a_j": "ground.z"}
+    scene.add_joint("rev", "axle", **axle, upper=0.7, e=0.4)
+    scene.add_force("rot_friction", "rub", joint="axle", n_c=0.3 * length**2)
+    return scene
+
+
+@pytest.mark.parametrize("length", [1e-6, 1e6])
+def test_limits_of_angles_do_not_depend_on_the_size_of_what_turns(length):
+    """The gap is an angle: what counts as a touch, or as rest, is the same in all scenes."""
+    ours, theirs = (dap.simulate(stopped_wheel(s), t_end=2.0, dt=0.1) for s in (length, 1.0))
+    assert [(e.name, e.kind) for e in ours.events] == [(e.name, e.kind) for e in theirs.events]
+    times = ([e.t for e in each.events] for each in (ours, theirs))
+    np.testing.assert_allclose(*times, atol=1e-9)
+    np.testing.assert_allclose(ours.w, theirs.w, atol=1e-9)

@@ -89,3 +89,25 @@ def test_accelerations(tmp_path, which):
         moved = max(moved, largest)
     assert moved > 1.0
     assert touched > 4 or "spatial" not in tendons
+
+
+def test_a_muscle_without_lengthrange(tmp_path):
+    """Of a sum of joints by their limits; MuJoCo finds it within 5 % of the range (tolrange)."""
+    import mujoco
+
+    path = tmp_path / "a.xml"
+    joints = MODEL.replace('axis="0 1 0"', 'axis="0 1 0" range="0.1 0.9" damping="1"')
+    path.write_text(joints.format(
+        tendons='<fixed name="f"><joint joint="p" coef="0.7"/>'
+        '<joint joint="q" coef="-1.2"/></fixed>',
+        actuators='<muscle tendon="f" gear="2" force="30"/>',
+    ))  # fmt: skip
+    scene, report = dap.import_model(path)
+    assert not [one for one in report.left_out if one.motion]
+    low, high = mujoco.MjModel.from_xml_path(str(path)).actuator_lengthrange[0]
+    (muscle,) = (f.fields for f in scene.forces.values() if f.fields.get("activation") == "muscle")
+    optimum, sinew = 2.0 * muscle["optimum"], 2.0 * muscle["sinew"]
+    found = sinew + 0.75 * optimum, sinew + 1.05 * optimum
+    np.testing.assert_allclose(found, (low, high), rtol=0, atol=0.05 * (high - low))
+    ends = 0.7 * -1.5 - 1.2 * 0.9, 0.7 * 2.0 - 1.2 * 0.1
+    np.testing.assert_allclose(found, 2.0 * np.array(ends), rtol=0, atol=1e-12)

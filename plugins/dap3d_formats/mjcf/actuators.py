@@ -146,7 +146,7 @@ class ActuatorReader:
         number = dict(zip(MUSCLE, _muscle_numbers(element), strict=True))
         (at_low, at_high), (force,) = number["range"], number["force"]
         if not low < high or not at_low < at_high:
-            return "a muscle without lengthrange, not of a joint with limits"
+            return "a muscle without lengthrange, not of joints with limits alone"
         if force < 0.0:
             return "a muscle whose force is scaled by the mass matrix"
         gear = element.numbers("gear", None, (1.0,))[0]
@@ -175,17 +175,16 @@ class ActuatorReader:
         return ""
 
     def _length_range(self, element: XmlElement, line: Tendon) -> Bounds:
-        """The lengths of the actuator at its ends; of one joint without them its limits."""
+        """The lengths of the actuator at its ends; of joints without them by their limits."""
         if "lengthrange" in element.attributes:
             low, high = element.numbers("lengthrange", 2)
             return low, high
-        if len(line.terms) != 1 or line.points:
-            return 0.0, 0.0
-        joint, gear = self.reader.model.joints[line.terms[0][0]], line.terms[0][1]
-        gear *= element.numbers("gear", None, (1.0,))[0]
-        ends = sorted(gear * (q + joint.reference) for q in
-                      (joint.limits[0].lower, joint.limits[0].upper))  # fmt: skip
-        return (ends[0], ends[1]) if np.isfinite(ends).all() else (0.0, 0.0)
+        gear, ends = element.numbers("gear", None, (1.0,))[0], np.zeros(2)
+        for name, factor in line.terms:
+            joint = self.reader.model.joints[name]
+            q = np.array([joint.limits[0].lower, joint.limits[0].upper]) + joint.reference
+            ends += np.sort(gear * factor * q) if gear * factor else 0.0
+        return (float(ends[0]), float(ends[1])) if np.isfinite(ends).all() else (0.0, 0.0)
 
     def _name(self, element: XmlElement) -> str:
         names = {one.name for one in self.reader.model.actuators}

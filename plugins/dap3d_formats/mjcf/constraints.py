@@ -1,5 +1,8 @@
 """Equalities of MJCF."""
 
+import attrs
+import numpy as np
+
 from dap3d_core.interface.formats import (
     WORLD,
     Coupling,
@@ -7,19 +10,20 @@ from dap3d_core.interface.formats import (
     Frame,
     Joint,
     Place,
+    Tendon,
     XmlElement,
     from_quaternion,
     held,
 )
 from dap3d_formats.mjcf.reader import MjcfReader
-from dap3d_formats.mjcf.tendons import pose_of, tendon_of
+from dap3d_formats.mjcf.tendons import line_of, pose_of, tendon_of
 
 #: Joints with one coordinate.
 SCALAR = ("revolute", "prismatic")
 
 
 def read_equalities(reader: MjcfReader) -> None:
-    """Read equalities: connect, weld, joint, and tendon of a fixed tendon of two joints.
+    """Read equalities: connect, weld, joint and tendon.
 
     Raises:
         FormatError: one names something that is not there.
@@ -82,50 +86,76 @@ def _relative(reader: MjcfReader, of: str, other: str) -> Frame:
     return pose_of(reader, of).inverse() @ pose_of(reader, other)
 
 
-def _joint(reader: MjcfReader, name: str, place: Place) -> Joint:
+def _joint(reader: MjcfReader, name: str, place: Place) -> None:
     joint = reader.model.joints.get(name)
     if joint is None or joint.kind not in (*SCALAR, "fixed"):  # fixed by an equality of its own
         raise FormatError(f"there is no hinge or slide {name!r}", place)
-    return joint
 
 
 def _couple(reader: MjcfReader, element: XmlElement) -> None:
     """q1 - ref1 = a0 + a1 (q2 - ref2); coordinates of the model are without their references."""
-    joint, remarks = element.require("joint1"), reader.document.source.remarks
-    one = _joint(reader, joint, element.place)
+    joint, other = element.require("joint1"), element.get("joint2")
+    _joint(reader, joint, element.place)
     a0, a1, *higher = (*element.numbers("polycoef", None, (0.0, 1.0)), 0.0, 0.0)[:5]
-    other = element.get("joint2")
     if other is None:
-        text = "an equality of one joint holds it fixed"
-        remarks.translate(element.place, text)
-        reader.model.joints[joint] = held(one, a0)
+        _hold_sum(reader, element, "", {joint: 1.0}, a0)
         return
     _joint(reader, other, element.place)
     if any(higher):
         text = "an equality of joints with a polynomial of a higher degree"
-        remarks.leave_out(element.place, text, motion=True)
+        reader.document.source.remarks.leave_out(element.place, text, motion=True)
         return
-    reader.model.couplings.append(
-        Coupling(element.get("name") or "", joint, other, a1, a0, element.place)
-    )
+    name = element.get("name") or ""
+    reader.model.couplings.append(Coupling(name, joint, other, a1, a0, element.place))
 
 
 def _couple_by_tendon(reader: MjcfReader, element: XmlElement) -> None:
-    """The length of a fixed tendon of two joints stays constant: c1 q1 + c2 q2 = 0."""
-    remarks, name = reader.document.source.remarks, element.require("tendon1")
-    tendon = tendon_of(reader, element, "tendon1")
-    terms = tendon.all("joint")
-    simple = tendon.name == "fixed" and len(terms) == 2 and "tendon2" not in element.attributes
-    polycoef = element.numbers("polycoef", None, (0.0, 1.0))
-    if not simple or polycoef[0]:
-        text = "an equality of tendons but fixed ones of two joints"
-        remarks.leave_out(element.place, text, motion=True)
+    """L - L_0 = a0 + a1 (L' - L'_0) of two tendons, or L - L_0 = a0 of one, as MuJoCo has it.
+
+    L_0 is the length where the file draws it. Of fixed tendons this is a sum of coordinates.
+    """
+    remarks, place = reader.document.source.remarks, element.place
+    keys = [key for key in ("tendon1", "tendon2") if key in element.attributes]
+    lines = [line_of(reader, tendon_of(reader, element, key), element.require(key))
+             for key in keys or ("tendon1",)]  # fmt: skip
+    a0, a1, *higher = (*element.numbers("polycoef", None, (0.0, 1.0)), 0.0, 0.0)[:5]
+    found = [line for line in lines if line is not None]
+    if len(found) < len(lines):
         return
-    (c1, q1), (c2, q2) = ((t.number("coef"), t.require("joint")) for t in terms)
-    for joint in (q1, q2):
-        _joint(reader, joint, element.place)
-    if not c1:
-        text = "an equality of a tendon with a coefficient of 0"
-        remarks.leave_out(element.place, text, motion=True)
+    name = element.get("name") or found[0].name
+    two_points = len(found[0].points) == 2 and not (found[0].drums or found[0].divisors)
+    if len(found) == 1 and two_points:
+        ends = [(pose_of(reader, link) @ Frame(at)).r for link, at in found[0].points]
+        length = float(np.linalg.norm(ends[1] - ends[0])) + a0
+        reader.model.held.append(attrs.evolve(found[0], name=name, rest=length, place=place))
         return
-    reader.model.couplings.append(Coupling(name, q1, q2, -c2 / c1, 0.0, element.place))
+    if any(line.points for line in found) or (len(found) == 2 and any(higher)):
+        text = "an equality of tendons over more than two points, of two not fixed, or with"
+        remarks.leave_out(place, f"{text} a polynomial of a higher degree", motion=True)
+        return
+    factors: dict[str, float] = {}
+    for line, share in zip(found, (1.0, -a1), strict=False):
+        for joint, factor in line.terms:
+            factors[joint] = factors.get(joint, 0.0) + share * factor
+    _hold_sum(reader, element, name, {q: c for q, c in factors.items() if c}, a0)
+
+
+def _hold_sum(
+    reader: MjcfReader, element: XmlElement, name: str, factors: dict[str, float], a0: float
+) -> None:
+    """A sum of coordinates stays a0: of one joint, of two that are coupled, of more."""
+    model, remarks = reader.model, reader.document.source.remarks
+    if not factors:
+        text = "an equality of tendons that are the same, or have coefficients of 0"
+        remarks.leave_out(element.place, text, motion=bool(a0))
+        return
+    (q1, c1), *others = factors.items()
+    if not others:
+        remarks.translate(element.place, "an equality of one joint holds it fixed")
+        model.joints[q1] = held(model.joints[q1], a0 / c1)
+    elif len(others) == 1:
+        ((q2, c2),) = others
+        model.couplings.append(Coupling(name, q1, q2, -c2 / c1, a0 / c1, element.place))
+    else:
+        terms = tuple(factors.items())
+        model.held.append(Tendon(name, rest=a0, terms=terms, place=element.place))

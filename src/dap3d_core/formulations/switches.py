@@ -33,7 +33,7 @@ class Switch:
             function that the element is given takes another form; "bound": that of an unknown of
             the element from its bound.
         is_one_of_several, part: where the kernel gives a tuple, which of its numbers.
-        length: of the scene, m (Model.length).
+        length: of the scene, m (Model.length); 1 rad of a contact whose gap or slip is an angle.
     """
 
     group: Group
@@ -110,8 +110,13 @@ def switches_of(loops: Iterable[tuple[str, Group]], length: float = 1.0) -> tupl
         loops: (kind, group).
         length: of the scene, m.
     """
+
+    def length_of(group: Group) -> float:
+        type_: Any = group.type_info.type
+        return 1.0 if type_.is_contact and type_.at is None else length
+
     return tuple(
-        Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part, length)
+        Switch(group, k, kind, len(group.type_info.outputs[kind]) > 1, part, length_of(group))
         for kind, group in loops
         if kind in ("switch", "bound", "knot")
         for k in range(group.count)

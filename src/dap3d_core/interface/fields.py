@@ -15,8 +15,9 @@ Vector = NewType("Vector", str)
 Vector2 = NewType("Vector2", str)
 Body = NewType("Body", str)
 
-#: Body slots that a type may have: those after k follow one another without a gap.
-SLOTS = ("i", "j", "k", "l", "m", "n", "o", "p")
+#: Body slots that a type may have: those after k follow one another without a gap. A list of bodies
+#: may need more than there are letters free.
+SLOTS = (*"ijklmnop", *(f"b{k}" for k in range(9, 25)))
 #: Marks a field that the scene must give.
 REQUIRED = attrs.NOTHING
 

@@ -8,6 +8,9 @@ import numpy as np
 from dap3d_core.model import Model
 from dap3d_core.model.groups import Floats, Integers
 
+#: Separates the name of a contact from the number of one of its points.
+POINT = "#"
+
 
 @attrs.frozen(eq=False)
 class ModelSummary:
@@ -15,7 +18,7 @@ class ModelSummary:
 
     Attributes:
         body_names, joint_names, point_names: in file order; ground is not among the bodies,
-            animation points come last.
+            animation points come last, and points of contacts, which have rows, behind the joints.
         mass: (n,) kg.
         Jp: (n, 3, 3) inertia matrices in body axes, kg m^2.
         joint_rows: (joints,) constraint rows of each joint.
@@ -73,8 +76,25 @@ class ModelSummary:
 
     @cached_property
     def joint_index(self) -> dict[str, int]:
-        """Name of a joint -> its index."""
-        return _index(self.joint_names)
+        """Name of a joint -> its index; of joints that are no points of contacts."""
+        count = len(self.joint_names) - sum(map(len, self.contacts.values()))
+        return _index(self.joint_names[:count])
+
+    @cached_property
+    def contacts(self) -> dict[str, list[str]]:
+        """Declared contacts, each with the names of its points, in the order of the scene."""
+        found: dict[str, list[str]] = {}
+        known = set(self.state_names)
+        for label in self.state_names:
+            kind, name, *state = label.split(".")
+            if kind == "joints" and state == ["mode"] and f"joints.{name}.near.1" in known:
+                found.setdefault(name.partition(POINT)[0], []).append(name)
+        return found
+
+    @property
+    def contact_points(self) -> list[str]:
+        """Names of the points of all contacts."""
+        return [point for points in self.contacts.values() for point in points]
 
 
 def _index(names: tuple[str, ...]) -> dict[str, int]:

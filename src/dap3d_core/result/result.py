@@ -17,9 +17,9 @@ from dap3d_core.result.display import ResultDisplay
 from dap3d_core.result.errors import ResultError, UnknownNameError, unknown
 from dap3d_core.result.event_record import EventRecord
 from dap3d_core.result.metadata import RunMetadata, RunStatistics
-from dap3d_core.result.model_summary import ModelSummary, summary_of
+from dap3d_core.result.model_summary import POINT, ModelSummary, summary_of
 from dap3d_core.result.note import Note
-from dap3d_core.result.post.contact_output import POINT, ResultContacts
+from dap3d_core.result.post.contact_output import ResultContacts
 from dap3d_core.result.post.force_output import ForceOutput, force_output, reactions_of
 from dap3d_core.result.post.global_error import ErrorEstimate, estimate_of
 from dap3d_core.result.post.ledger import Entry, ledger_of
@@ -303,18 +303,16 @@ class Result(ResultDisplay, ResultContacts):
             ResultError: as ``model``.
         """
         joint = canonical(joint)
-        if joint not in self.summary.joint_index:
-            raise unknown("joint", joint, self.summary.joint_names)
         if joint.partition(POINT)[0] in self.contact_names:
             raise UnknownNameError(f"{joint!r} is a contact: its forces are those of .contact()")
+        if joint not in self.summary.joint_index:
+            raise unknown("joint", joint, tuple(self.summary.joint_index))
         self._compute_reactions([joint])
         return dict(self._reactions[joint])
 
     def reactions(self) -> dict[str, Mapping[str, Reaction]]:
         """Reactions of all joints by name, computed in one pass; otherwise as ``reaction``."""
-        names = [
-            n for n in self.summary.joint_names if n.partition(POINT)[0] not in self.contact_names
-        ]
+        names = self.summary.joint_index
         self._compute_reactions(names)
         return {name: dict(self._reactions[name]) for name in names}
 
@@ -335,7 +333,7 @@ class Result(ResultDisplay, ResultContacts):
         """
         joint = canonical(joint)
         if joint not in self.summary.joint_index:
-            raise unknown("joint", joint, self.summary.joint_names)
+            raise unknown("joint", joint, tuple(self.summary.joint_index))
         if joint not in self._coordinates and self._whole is not None:
             whole, index = self._whole
             self._coordinates[joint] = whole.coordinates(joint).at(index)

@@ -150,6 +150,11 @@ def types_of(instances: Sequence[Instance]) -> dict[str, int]:
     return dict(Counter(instance.type_info.type.keyword for instance in instances))
 
 
+def contacts_of(checked: ValidatedScene) -> dict[str, Instance]:
+    """The contacts of a scene by name, each by one of its points."""
+    return {c.name.partition("#")[0]: c for c in checked.contacts}
+
+
 def counts_text(types: Mapping[str, int]) -> str:
     """Numbers of elements by type, as ``types_of`` has them, in words."""
     return ", ".join(f"{count} {word}" for word, count in types.items()) or "none"

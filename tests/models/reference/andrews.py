@@ -172,13 +172,5 @@ def system() -> System:
 
 SYSTEM = system()
 
-
-@cache
-def spatial() -> Trajectory:
-    """Return the motion of the generic simulator."""
-    return SYSTEM.trajectory(1e-12, 1e-13)
-
-
-def simulated(t: float) -> dict[str, Array]:
-    """Return the quantities once more from the generic simulator."""
-    return SYSTEM.quantities(*SYSTEM.unpack(spatial().at(t)))
+#: The quantities once more, from the generic simulator.
+simulated = SYSTEM.simulator(1e-12, 1e-13)

@@ -105,12 +105,5 @@ def quantities(t: float) -> dict[str, Array]:
     return out | {"gap": np.concatenate([tip - NODES[5], axis - AXES[5]]), "angles": y[:2]}
 
 
-@cache
-def spatial() -> Trajectory:
-    """Return the motion of the generic simulator."""
-    return SYSTEM.trajectory(1e-12, 1e-13)
-
-
-def simulated(t: float) -> dict[str, Array]:
-    """Return the quantities once more from the generic simulator."""
-    return SYSTEM.quantities(*SYSTEM.unpack(spatial().at(t)))
+#: The quantities once more, from the generic simulator.
+simulated = SYSTEM.simulator(1e-12, 1e-13)

@@ -44,7 +44,17 @@ ENGINEERING = (
     "wiper",
 )
 #: Scenes of contacts.
-CONTACT = ("cradle", "domino_row", "gripper", "marble_run", "quadruped", "sphere_box")
+CONTACT = (
+    "cradle",
+    "domino_row",
+    "gripper",
+    "hand",
+    "humanoid",
+    "marble_run",
+    "quadruped",
+    "sphere_box",
+    "walker",
+)
 #: The folder of each model that is in one.
 GROUPS = {
     **dict.fromkeys(BENCHMARKS, "benchmarks"),

@@ -2,12 +2,10 @@
 The motion is that of `fourbar3`; the reactions are those that Newton's law needs for it (12
 unknowns, 12 equations). `simulated` integrates the same system with the generic simulator `kkt`."""
 
-from functools import cache
-
 import fourbar
 import numpy as np
 from kkt import GROUND, Body, Driver, Fixed, Spring, System, distance, rev
-from rigid import Array, Trajectory
+from rigid import Array
 
 CRANK, FOLLOWER = 0, 1
 AXIS_X, AXIS_H = (1.0, 0.0, 0.0), tuple(fourbar.H)
@@ -50,12 +48,5 @@ def driver_moment(t: float) -> float:
     return fourbar.driver_moment(t, [(b.mass, b.Jp) for b in SYSTEM.bodies], parts)
 
 
-@cache
-def trajectory() -> Trajectory:
-    """Return the motion of the generic simulator."""
-    return SYSTEM.trajectory()
-
-
-def simulated(t: float) -> dict[str, Array]:
-    """Return the quantities once more from the generic simulator."""
-    return SYSTEM.quantities(*SYSTEM.unpack(trajectory().at(t)))
+#: The quantities once more, from the generic simulator.
+simulated = SYSTEM.simulator()

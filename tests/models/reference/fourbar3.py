@@ -4,12 +4,10 @@ that Newton's law needs for these accelerations (17 unknowns, 18 equations, resi
 moment of the driver is found once more from the power balance, without any Jacobian. `simulated`
 integrates the same system with the generic simulator `kkt`."""
 
-from functools import cache
-
 import fourbar
 import numpy as np
 from kkt import GROUND, Body, Driver, Fixed, Spring, System, rev, sph
-from rigid import Array, Trajectory
+from rigid import Array
 
 CRANK, COUPLER, FOLLOWER = 0, 1, 2
 AXIS_X, AXIS_H = (1.0, 0.0, 0.0), tuple(fourbar.H)
@@ -62,12 +60,5 @@ def driver_moment(t: float) -> float:
     return fourbar.driver_moment(t, [(b.mass, b.Jp) for b in SYSTEM.bodies], parts)
 
 
-@cache
-def trajectory() -> Trajectory:
-    """Return the motion of the generic simulator."""
-    return SYSTEM.trajectory()
-
-
-def simulated(t: float) -> dict[str, Array]:
-    """Return the quantities once more from the generic simulator."""
-    return SYSTEM.quantities(*SYSTEM.unpack(trajectory().at(t)))
+#: The quantities once more, from the generic simulator.
+simulated = SYSTEM.simulator()

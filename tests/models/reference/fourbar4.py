@@ -4,14 +4,12 @@ that Newton's law needs for it (23 unknowns, 24 equations, residual checked). Wh
 carries is found once more in `held` from the balance of the whole mechanism, without any Jacobian.
 `simulated` integrates the same system with the generic simulator `kkt`."""
 
-from functools import cache
-
 import fourbar
 import fourbar3
 import numpy as np
 from kkt import Body, Driver, Fixed, Spring, System, rev, sph
 from kkt_joints import fix
-from rigid import Array, Trajectory, cross
+from rigid import Array, cross
 
 CRANK, COUPLER, FOLLOWER, LINK = 0, 1, 2, 3
 PLACE = (0.0, 2.0, 0.0)
@@ -66,12 +64,5 @@ def held(t: float) -> Array:
     return np.concatenate([force, moment])
 
 
-@cache
-def trajectory() -> Trajectory:
-    """Return the motion of the generic simulator."""
-    return SYSTEM.trajectory()
-
-
-def simulated(t: float) -> dict[str, Array]:
-    """Return the quantities once more from the generic simulator."""
-    return SYSTEM.quantities(*SYSTEM.unpack(trajectory().at(t)))
+#: The quantities once more, from the generic simulator.
+simulated = SYSTEM.simulator()

@@ -7,7 +7,7 @@ Body -1 is the ground. Velocities are ordered (v, w) a body, in global axes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -307,6 +307,17 @@ class System:
         wp = [rotation(x).T @ w for x, w in zip(p, rate[:, 3:], strict=True)]
         y0 = np.concatenate([np.ravel(x) for x in (r, p, rate[:, :3], wp)])
         return Trajectory(rhs, y0, rtol, atol)
+
+    def simulator(
+        self, rtol: float = 1e-13, atol: float = 1e-15
+    ) -> Callable[[float], dict[str, Array]]:
+        """Return a function of time: all quantities of the motion, which is found once."""
+
+        @cache
+        def motion() -> Trajectory:
+            return self.trajectory(rtol, atol)
+
+        return lambda t: self.quantities(*self.unpack(motion().at(t)))
 
     def unpack(self, y: Array) -> tuple[Array, Array, Array]:
         """Return r, p and the velocities (global axes) of a state of `trajectory`."""

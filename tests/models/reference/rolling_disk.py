@@ -4,12 +4,10 @@ about the vertical at -(r / R) spin, so that the contact does not slip. The cont
 from the acceleration of the centre; Euler's equation about it fixes the spin ("imbalance" is its
 residual). `simulated` integrates the disk in the generic simulator `kkt`."""
 
-from functools import cache
-
 import numpy as np
 from kkt import Body, System
 from kkt_joints import disk
-from rigid import GRAVITY, Array, Trajectory, Z, cross, product, rotation, turn
+from rigid import GRAVITY, Array, Z, cross, product, rotation, turn
 
 RADIUS, MASS, CIRCLE, LEAN = 0.05, 0.3048, 0.5, np.radians(5.0)
 JP = tuple(x * MASS * RADIUS**2 for x in (0.25, 0.5, 0.25))
@@ -53,12 +51,5 @@ def quantities(t: float) -> dict[str, Array]:
     return SYSTEM.counts | out | {"lambda.contact": MASS * (v_dot[:3] + GRAVITY * Z)}
 
 
-@cache
-def trajectory() -> Trajectory:
-    """Return the motion of the generic simulator."""
-    return SYSTEM.trajectory()
-
-
-def simulated(t: float) -> dict[str, Array]:
-    """Return the quantities once more from the generic simulator."""
-    return SYSTEM.quantities(*SYSTEM.unpack(trajectory().at(t)))
+#: The quantities once more, from the generic simulator.
+simulated = SYSTEM.simulator()

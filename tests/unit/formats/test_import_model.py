@@ -88,14 +88,6 @@ def test_stops_push_back_and_dampers_brake():
     np.testing.assert_array_equal(moments["shoulder_min_stop"], 0.0)
 
 
-def test_what_is_left_out_is_said_with_its_line_and_strict_refuses_it():
-    """Limits of effort, at line 36."""
-    _, report = dap.import_model(ARM)
-    assert any(r.place.line == 36 and "effort" in r.text for r in report.left_out)
-    with pytest.raises(dap.SceneError, match=r"arm\.urdf:36: effort"):
-        dap.import_model(ARM, strict=True)
-
-
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [

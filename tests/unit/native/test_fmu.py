@@ -51,6 +51,18 @@ def test_model_exchange_by_cvode_gives_the_motion(tmp_path, fmi):
 
 
 @VERSIONS
+def test_times_of_model_exchange_may_round_beyond_the_end(tmp_path, fmi):
+    made = written(dap.load("pen1"), tmp_path, fmi=fmi, outputs=["cone.r"])
+    fmu, _ = begun(made, tmp_path, fmi, kind="ModelExchange")
+    fmu.setTime(np.nextafter(5.0, 6.0))
+    fmu.completedIntegratorStep()
+    fmu.setTime(5.1)
+    with pytest.raises(fmpy.fmi1.FMICallException):
+        fmu.completedIntegratorStep()
+    fmu.freeInstance()
+
+
+@VERSIONS
 def test_velocities_jump_at_events_of_model_exchange(tmp_path, fmi):
     """A ball from 1 m: at rest on top of the next flight, e^2 = 0.64 m, after V (1 + e)/g."""
     made = written(bouncing(), tmp_path, fmi=fmi, outputs=["ball.r"])

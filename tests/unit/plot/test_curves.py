@@ -62,14 +62,6 @@ def test_units_share_a_figure_in_panels_below_one_another(result):
     assert axes[-1].get_xlabel() == "time [s]"
 
 
-def test_one_quantity_over_another(result):
-    ax = plot(result, "bob.r.y", x="bob.r.x")
-    data = lines(ax)["bob.r.y"]
-    every = (len(data) - 1) // (len(result.t) - 1)
-    np.testing.assert_allclose(data[::every], result.r[:, 0, :2], rtol=1e-15, atol=1e-15)
-    assert ax.get_xlabel() == "position of bob, x [m]"
-
-
 def test_a_path_has_one_scale_and_shows_where_it_begins(result):
     ax = plot(result, "bob.r.y", x="bob.r.x")
     ax.figure.draw_without_rendering()

@@ -33,15 +33,6 @@ def dap3d_importers():
 ROD = ("rod", "dap3d.importers")
 
 
-def test_a_format_from_outside_takes_the_same_road(install, tmp_path):
-    install("rods", GOOD, *ROD)
-    (tmp_path / "a.rod").write_text("0.5")
-    scene, report = dap.import_model(tmp_path / "a.rod")
-    assert report.format == "rod"
-    assert scene.bodies["bob"].r == (0.0, 0.0, -0.5)
-    assert scene.joints["hinge"].type == "rev"
-
-
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -100,15 +100,6 @@ def test_the_reported_multipliers_give_that_reaction():
         np.testing.assert_allclose(found[6:9], result.Lam[k], atol=1e-12)
 
 
-def test_jacobian_has_a_row_for_each_constraint_and_vanishes_on_the_motion():
-    result, _, _ = circling()
-    assert result.Jac.shape == (21, 3, 6)
-    assert result.Jac is result.Jac
-    v = result.u[:, 7:]
-    np.testing.assert_allclose(np.einsum("trc,tc->tr", result.Jac, v), 0, atol=1e-14)
-    np.testing.assert_allclose(result.Jac[0, :, :3], -np.eye(3), atol=0)
-
-
 def test_jacobian_of_many_rows_is_sparse(monkeypatch):
     monkeypatch.setattr("dap3d_core.result.post.reactions.DENSE_ROWS", 2)
     result, _, _ = circling(nt=4)

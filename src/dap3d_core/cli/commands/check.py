@@ -54,7 +54,7 @@ def _data(compiled: "CompiledModel", metric: str | None) -> dict[str, Any]:
     """
     from dap3d_core.cli.console.run_summary import correction_data
     from dap3d_core.simulation import AssemblyError
-    from dap3d_core.simulation.explain import types_of
+    from dap3d_core.simulation.explain import contacts_of, types_of
     from dap3d_core.simulation.initial.assemble import violation
 
     model, settings = compiled.model, compiled.scene.simulation
@@ -95,6 +95,7 @@ def _data(compiled: "CompiledModel", metric: str | None) -> dict[str, Any]:
         "reason": compiled.reason,
         "joint_types": types_of(compiled.checked.joints),
         "force_types": types_of(compiled.checked.forces),
+        "contact_types": types_of([*contacts_of(compiled.checked).values()]),
         "function_types": types_of(compiled.checked.functions),
         "notes": list(compiled.notes),
         "mistakes": mistakes,
@@ -154,6 +155,7 @@ def _show(console: "Terminal", compiled: "CompiledModel", data: dict[str, Any]) 
             ("bodies", f"{count(data['bodies'], 'body', 'bodies')}: {names}"),
             ("joints", counts_text(data["joint_types"])),
             ("forces", counts_text(data["force_types"])),
+            ("contacts", counts_text(data["contact_types"]) if data["contact_types"] else ""),
             ("functions", counts_text(data["function_types"])),
             ("freedoms", f"{count(data['rows'], 'row')}, rank {data['rank']}; "
                          f"{degrees_of_freedom(data['dof'])}"),

@@ -33,6 +33,7 @@ def model_data(model: str, *, allow_code: bool, source: bool = False) -> dict[st
     """
     import dap3d_core as dap
     from dap3d_core.result import find
+    from dap3d_core.simulation.explain import contacts_of
     from dap3d_core.simulation.output.check_outputs import probe_of
 
     compiled = dap.compile(model, allow_code=allow_code)
@@ -45,6 +46,10 @@ def model_data(model: str, *, allow_code: bool, source: bool = False) -> dict[st
         "points": list(compiled.model.point_names),
         "joints": _joints(compiled, probe),
         "forces": [{"name": n, "type": str(f.type)} for n, f in scene.forces.items()],
+        "contacts": [
+            {"name": name, "type": str(one.type_info.type.keyword)}
+            for name, one in contacts_of(compiled.checked).items()
+        ],
         "parameters": [
             {"name": name, "value": resolved[name], "given": given}
             for name, given in scene.parameters.items()
@@ -120,6 +125,7 @@ def show_model(console: "Terminal", data: dict[str, Any]) -> None:
         ("bodies", f"{count(len(data['bodies']), 'body', 'bodies')}: {some(data['bodies'], 8)}"),
         ("points", some(data["points"], 8) if data["points"] else ""),
         ("forces", ", ".join(f"{f['name']} ({f['type']})" for f in data["forces"][:20])),
+        ("contacts", ", ".join(f"{c['name']} ({c['type']})" for c in data["contacts"][:20])),
     ])  # fmt: skip
     if data["joints"]:
         console.title("joints")

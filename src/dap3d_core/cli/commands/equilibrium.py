@@ -106,7 +106,7 @@ def _target(
     Raises:
         Refused: it cannot be written, or is no picture, or one without a path.
     """
-    from dap3d_core.cli.framework.paths import writable
+    from dap3d_core.cli.framework.paths import SCENES, writable
 
     if output is None:
         return None
@@ -115,9 +115,10 @@ def _target(
 
         with refusing(ValueError):
             check_suffix(Path(output))
-    elif Path(output).suffix.lower() in PICTURES:
+        return writable(Path(output), force=force, sources=sources)
+    if Path(output).suffix.lower() in PICTURES:
         raise Refused(f"-o {output}: a picture is that of a path: give --over PARAMETER=FROM:TO:N")
-    return writable(Path(output), force=force, sources=sources)
+    return writable(Path(output), force=force, sources=sources, kinds=SCENES)
 
 
 def _found(scene: "Scene", start: Any, *, allow_code: bool) -> "Equilibrium":

@@ -100,12 +100,20 @@ def _export_result(
     from dap3d_core.exchange import check_fps, exporter_of, suffix_of
     from dap3d_core.result import ResultError
 
-    target = output_path(result, output, suffix_of(kind or "vtk"))
+    suffix = suffix_of(kind or "vtk")
+    target = output_path(result, output, suffix)
     opened = open_result(result, model=model, allow_code=allow_code)
     refuse_all(
         partial(exporter_of, target, kind),
         partial(check_fps, fps),
-        partial(writable, target, force=force, sources=(Path(result),)),
+        partial(
+            writable,
+            target,
+            force=force,
+            sources=(Path(result),),
+            kinds=(suffix,) if kind else (),
+            any_name=True,
+        ),
     )
     try:
         with counting("part") as progress, refusing(ValueError, ResultError):
@@ -132,8 +140,9 @@ def _export_model(model: str, kind: str, output: str | None, *, strict: bool, fo
         hint = did_you_mean(kind, known := [*formats.keywords, "c", "fmu"], "{} ")
         raise Refused(f"--format {kind}: unknown; {hint}formats: {', '.join(known)}")
     scene = dap.load(model)
-    target = Path(output or _name_of(model) + formats.load(kind).suffix)
-    writable(target, force=force, sources=(scene.path,))
+    suffix = formats.load(kind).suffix
+    target = Path(output or _name_of(model) + suffix)
+    writable(target, force=force, sources=(scene.path,), kinds=(suffix,), any_name=True)
     try:
         report = dap.export_model(scene, target, format=kind, strict=strict, force=True)
     except OSError as error:
@@ -177,7 +186,8 @@ def _export_native(
     target = Path(output or _name_of(model) + (".fmu" if kind == "fmu" else ""))
     scene = dap.load(model)
     if kind == "fmu" or not target.exists():
-        writable(target, force=force, sources=(scene.path,))
+        kinds = (".fmu",) if kind == "fmu" else ()
+        writable(target, force=force, sources=(scene.path,), kinds=kinds, any_name=True)
     try:
         made: Any = dap.export_model(
             scene, target, format=kind, outputs=list(quantities) or None,

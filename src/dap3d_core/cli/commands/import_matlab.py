@@ -60,10 +60,10 @@ def write_folder(scene: "Scene", report: Any, path: Path, *, force: bool, stub: 
     import attrs
 
     from dap3d_core.cli.console.console import show_data
-    from dap3d_core.cli.framework.paths import writable, write_text
+    from dap3d_core.cli.framework.paths import SCENES, writable, write_text
 
     sources = tuple(Path(report.folder) / f.name for f in report.files)
-    target = writable(path, force=force, sources=sources)
+    target = writable(path, force=force, sources=sources, kinds=SCENES)
     plugin = None
     if stub and report.stub:
         plugin = writable(target.parent / "plugin.py", force=force, sources=sources)

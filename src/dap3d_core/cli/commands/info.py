@@ -36,7 +36,7 @@ def _show_sweep(file: str) -> None:
 
 
 def _show_run(file: str) -> None:
-    from dap3d_core.cli.console.console import print_json, scene_name, size, stdout
+    from dap3d_core.cli.console.console import count, print_json, scene_name, size, stdout
     from dap3d_core.cli.console.run_summary import run_data, run_pairs, show_details
     from dap3d_core.cli.framework.paths import open_result
     from dap3d_core.registry.suggestions import some
@@ -46,7 +46,10 @@ def _show_run(file: str) -> None:
     summary = result.summary
     names = {
         "body_names": summary.body_names,
-        "joint_names": summary.joint_names,
+        "joint_names": list(summary.joint_index),
+        "contact_names": result.contact_names,
+        "shape_names": result.record.contacts.names,
+        "shape_contacts": len(result.record.contacts),
         "point_names": summary.point_names,
     }
     if prints_json():
@@ -54,13 +57,18 @@ def _show_run(file: str) -> None:
         print_json({**about, **data, **names, "scene_text": result.scene_text})
         return
     console = stdout()
-    settings = (f"{k} {_short(v)}" for k, v in result.settings.items() if v is not None)
+    settings = (f"{k} {_short(v)}" for k, v in result.settings.items()
+                if v is not None and k != "stepping")  # fmt: skip
+    shapes = result.record.contacts
     console.title(f"{scene_name(data['scene'])}: {data['status']}")
     console.facts(
         [
             ("file", f"{file}, {size(byte_count)}"),
             ("bodies", some(summary.body_names, 12)),
-            ("joints", some(summary.joint_names, 12)),
+            ("joints", some(tuple(summary.joint_index), 12)),
+            ("contacts", some(result.contact_names, 12)),
+            ("shapes", some(shapes.names, 12)),
+            ("met", f"at {count(len(shapes), 'point')} at reported instants" * bool(shapes.names)),
             ("points", some(summary.point_names, 12)),
             *run_pairs(data),
             ("settings", ", ".join(settings)),
@@ -73,4 +81,6 @@ def _show_run(file: str) -> None:
 def _short(value: object) -> str:
     if isinstance(value, bool):
         return "on" if value else "off"
+    if isinstance(value, dict):  # tolerances by quantity
+        return f"({', '.join(f'{k} {_short(v)}' for k, v in value.items())})"
     return f"{value:g}" if isinstance(value, float) else str(value)

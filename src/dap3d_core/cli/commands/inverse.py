@@ -50,11 +50,11 @@ def inverse(
     import dap3d_core as dap
     from dap3d_core.cli.console.run_summary import report_run
     from dap3d_core.cli.framework.execute import execute_scene, progress_of
-    from dap3d_core.cli.framework.paths import named_after, writable
+    from dap3d_core.cli.framework.paths import RESULTS, named_after, writable
 
     scene = dap.load(model)
     target = named_after(model, output, "-inverse")
-    writable(target, force=force, sources=(scene.path,))
+    writable(target, force=force, sources=(scene.path,), kinds=RESULTS)
     given: Any = dap.open(motion) if motion.endswith(".nc") else motion
     names = None if actuators is None else [n.strip() for n in actuators.split(",") if n.strip()]
 

@@ -49,11 +49,11 @@ def kinematics(
     import dap3d_core as dap
     from dap3d_core.cli.console.run_summary import report_run
     from dap3d_core.cli.framework.execute import execute_scene, progress_of
-    from dap3d_core.cli.framework.paths import named_after, writable
+    from dap3d_core.cli.framework.paths import RESULTS, named_after, writable
 
     scene = dap.load(model)
     target = named_after(model, output, "-kinematics")
-    writable(target, force=force, sources=(scene.path,))
+    writable(target, force=force, sources=(scene.path,), kinds=RESULTS)
     options.check_settings(scene, dict.fromkeys(options.SETTINGS) | given)
 
     def find(compiled: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":

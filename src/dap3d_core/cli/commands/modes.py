@@ -131,16 +131,18 @@ def _draw(found: Any, names: list[str], plot: str | None, *, force: bool) -> Non
 
 def _targets(plot: str | None, output: str | None, force: bool) -> list[Path]:
     """The files to write; Refused where one cannot be written, or is no picture."""
-    from dap3d_core.cli.framework.paths import refuse_all, writable
+    from dap3d_core.cli.framework.paths import RESULTS, refuse_all, writable
 
     checks: list[Callable[[], object]] = []
     if plot is not None:
         from dap3d_core.plot.figure_file import check_suffix
 
         checks.append(partial(check_suffix, Path(plot)))
-    targets = [Path(path) for path in (plot, output) if path is not None]
-    refuse_all(*checks, *(partial(writable, path, force=force) for path in targets))
-    return targets
+        checks.append(partial(writable, Path(plot), force=force))
+    if output is not None:
+        checks.append(partial(writable, Path(output), force=force, kinds=RESULTS))
+    refuse_all(*checks)
+    return [Path(path) for path in (plot, output) if path is not None]
 
 
 def state_of(start: str, allow_code: bool) -> tuple["Result", float]:

@@ -67,7 +67,14 @@ def post(
     opened = open_result(result, model=model, allow_code=allow_code)
     names = tuple(dict.fromkeys((*selected, *quantities)))
     refuse_all(
-        partial(writable, target, force=force, sources=(Path(result),)),
+        partial(
+            writable,
+            target,
+            force=force,
+            sources=(Path(result),),
+            kinds=(f".{kind}",),
+            any_name=True,
+        ),
         *(partial(opened.quantity, name) for name in names),
     )
     earlier = len(opened.notes)

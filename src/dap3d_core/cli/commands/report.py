@@ -100,10 +100,11 @@ def _targets(
         with refusing(ValueError):
             check_suffix(Path(files["picture"]))
     targets = {
-        kind: writable(Path(name), force=force, sources=(scene_file,))
+        kind: writable(Path(name), force=force, sources=(scene_file,),
+                       kinds=() if kind == "picture" else (f".{kind}",), any_name=True)
         for kind, name in files.items()
         if name is not None
-    }
+    }  # fmt: skip
     if len({path.resolve() for path in targets.values()}) < len(targets):
         raise Refused("--plot, --csv and --output name one file twice; give each its own")
     return targets

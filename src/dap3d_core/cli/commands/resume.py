@@ -47,7 +47,7 @@ def resume(
     """
     from dap3d_core.cli.console.run_summary import report_run
     from dap3d_core.cli.framework.execute import execute
-    from dap3d_core.cli.framework.paths import writable
+    from dap3d_core.cli.framework.paths import RESULTS, writable
     from dap3d_core.result import ResultError
     from dap3d_core.simulation import CheckpointError
     from dap3d_core.simulation.resume import resumption
@@ -63,7 +63,7 @@ def resume(
 
     def run(_: "CompiledModel", announce: "Announce", watch: "Watch") -> "Result":
         if output is not None:
-            writable(Path(output), force=force, sources=(Path(checkpoint),))
+            writable(Path(output), force=force, sources=(Path(checkpoint),), kinds=RESULTS)
         with refusing(CheckpointError):  # a fault of the file that shows as it is restored
             return resumed[0].execute(output, force=force, checkpoint=every, watch=watch)
 

@@ -59,14 +59,15 @@ def run(
     import dap3d_core as dap
     from dap3d_core.cli.console.run_summary import report_run
     from dap3d_core.cli.framework.execute import execute_scene
-    from dap3d_core.cli.framework.paths import named_after, writable
+    from dap3d_core.cli.framework.paths import RESULTS, named_after, writable
 
     if model is None:
         model, scene, force = _ask(ctx, given, output, force=force)
     else:
         scene = dap.load(model)
     start, source = _start(ctx, start_file, given)
-    target = writable(named_after(model, output), force=force, sources=(scene.path, source))
+    target = named_after(model, output)
+    writable(target, force=force, sources=(scene.path, source), kinds=RESULTS)
     options.check_settings(scene, given)
     if given["estimate_error"] is None:
         given["estimate_error"] = "quick"

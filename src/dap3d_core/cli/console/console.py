@@ -8,7 +8,6 @@ import json
 import math
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +27,8 @@ from dap3d_core.cli.process.streams import (
 
 #: Bits of an integer; Python refuses to write more than some 14000 of them in decimal digits.
 LONGEST_INTEGER = 4096
+#: What an item of a list begins with.
+ITEM = "  - "
 
 
 class Terminal(Console):
@@ -87,18 +88,16 @@ class Terminal(Console):
         self.print(Text("\n".join(line.rstrip() for line in lines)), soft_wrap=True)
 
     def prose(self, words: str) -> None:
-        """Print a docstring: paragraphs are filled, indented lines stay lines."""
+        """Print a docstring: paragraphs and items are filled, indented lines stay lines."""
         if not self.wraps:
             self.say(words)
             return
         for block in words.split("\n\n"):
-            lines = block.splitlines()
-            for is_indented, group in groupby(lines, lambda line: line.startswith(" ")):
-                if not is_indented:
-                    self.say(" ".join(group))
-                    continue
-                for line in group:
-                    self._hang(" " * (len(line) - len(line.lstrip())), line.strip())
+            for lead, text in _pieces_of(block):
+                if lead:
+                    self._hang(lead, text)
+                else:
+                    self.say(text)
             self.print()
 
     def _hang(self, lead: str, words: str, style: str = "") -> None:
@@ -113,9 +112,9 @@ class Terminal(Console):
         """Print a list, each text after a dash."""
         for words in texts:
             if self.wraps:
-                self._hang("  - ", words, style)
+                self._hang(ITEM, words, style)
             else:
-                self.print(Text(f"  - {line_of(words)}", style=style), soft_wrap=True)
+                self.print(Text(f"{ITEM}{line_of(words)}", style=style), soft_wrap=True)
 
     def title(self, words: str) -> None:
         """Print a heading, one line."""
@@ -172,6 +171,24 @@ def _without_colors() -> bool | None:
     """True after ``--no-color``; None leaves it to the environment (NO_COLOR)."""
     ctx = click.get_current_context(silent=True)
     return True if ctx is not None and ctx.color is False else None
+
+
+def _pieces_of(block: str) -> list[tuple[str, str]]:
+    """A paragraph's leads and texts: "" of what is filled, of an indented line its indent, or ITEM.
+
+    Items begin with "* "; lines behind one that are indented belong to it.
+    """
+    found: list[tuple[str, str]] = []
+    for line in block.splitlines():
+        words, lead = line.strip(), line[: len(line) - len(line.lstrip())]
+        before = found[-1][0] if found else None
+        if line.startswith("* "):
+            found.append((ITEM, words.removeprefix("* ")))
+        elif before == (ITEM if lead else ""):
+            found[-1] = (before, f"{found[-1][1]} {words}")
+        else:
+            found.append((lead, words))
+    return found
 
 
 def _indented(shape: RenderableType, indent: int) -> RenderableType:

@@ -49,20 +49,16 @@ CHANGED = 1e-12
 
 def run_data(result: "Result") -> dict[str, Any]:
     """The summary of a result as data."""
-    from dap3d_core.result.post.contact_output import contact_names
-
     summary, error = result.summary, result.error
     instants = len(result.t)
     dof = 6 * summary.body_count - result.settings.get("rank", summary.row_count)
-    contacts = contact_names(summary.state_names)
-    points = sum(map(len, contacts.values()))
     return {
         "scene": result.record.title,
         "status": result.status,
         "bodies": summary.body_count,
-        "joints": len(summary.joint_names) - points,
-        "rows": summary.row_count - 3 * points,
-        "contacts": len(contacts),
+        "joints": len(summary.joint_index),
+        "rows": summary.row_count - 3 * len(summary.contact_points),
+        "contacts": len(summary.contacts),
         "dof": dof,
         "points": len(summary.point_names),
         "method": result.method,

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 
     from dap3d_core.result import Result
 
+#: Suffixes of results, and of scenes.
+RESULTS, SCENES = (".nc",), (".toml",)
+
 
 def named_after(model: str, output: str | None, tail: str = "") -> Path:
     """The file of a result: ``output``, by default MODEL and a tail in the current folder."""
@@ -32,8 +35,22 @@ def output_path(result: str, output: str | None, ending: str) -> Path:
     return Path(output) if output is not None else Path(f"{Path(result).stem}{ending}")
 
 
-def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) -> Path:
-    """Returns the path if it can be written; ``sources`` are never overwritten.
+def writable(
+    path: Path,
+    *,
+    force: bool,
+    sources: tuple[Path | None, ...] = (),
+    kinds: tuple[str, ...] = (),
+    any_name: bool = False,
+) -> Path:
+    """Returns the path if it can be written.
+
+    Args:
+        path: the file.
+        force: True to overwrite an existing file.
+        sources: input files, which are never overwritten.
+        kinds: suffixes of what the command writes; files of others are never overwritten.
+        any_name: a new file may have another suffix.
 
     Raises:
         Refused: says why, and what to do.
@@ -52,6 +69,10 @@ def writable(path: Path, *, force: bool, sources: tuple[Path | None, ...] = ()) 
     for source in sources:
         if source is not None and path.exists() and source.exists() and path.samefile(source):
             raise Refused(f"{path} is the input file; name another file with -o")
+    is_named = path.suffix.lower() in kinds or (any_name and not path.exists())
+    if kinds and not is_named:
+        other = "; dap3d post and dap3d export make other files of it" if kinds == RESULTS else ""
+        raise Refused(f"cannot write {path}: name a {' or '.join(kinds)} file with -o{other}")
     with suppress(OSError, ValueError):  # no such file, or no stream of the system
         is_stdout = os.path.samestat(target.stat(), os.fstat(sys.stdout.fileno()))
     if is_stdout:

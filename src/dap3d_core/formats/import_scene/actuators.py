@@ -110,9 +110,9 @@ def _act_on_link(builder: SceneBuilder, actuator: Actuator, name: str) -> None:
 
 def _act_on_tendon(builder: SceneBuilder, model: Articulation, actuator: Actuator) -> None:
     """Add an actuator or a muscle of a tendon, whose tension is less its force."""
-    line = None if actuator.tendon is None else _line(builder, model, actuator.tendon)
+    line = None if actuator.tendon is None else line_of(builder, model, actuator.tendon)
     if line is None:
-        text = "an actuator of a tendon that does not move, or of more than 8 bodies"
+        text = "an actuator of a tendon that does not move"
         builder.remarks.leave_out(actuator.place, text, motion=True)
         return
     keyword, fields = ("tendon" if line[0] == "ptp" else line[0]), line[1]
@@ -137,9 +137,9 @@ def _act_on_tendon(builder: SceneBuilder, model: Articulation, actuator: Actuato
 def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
     """Add springs and dampers of tendons, and stops at their limits; rigid of two points."""
     for tendon in model.tendons:
-        line = _line(builder, model, tendon)
+        line = line_of(builder, model, tendon)
         if line is None:
-            text = "springs and limits of a tendon that does not move, or of more than 8 bodies"
+            text = "springs and limits of a tendon that does not move"
             builder.remarks.leave_out(tendon.place, text, motion=True)
             continue
         keyword, fields = line
@@ -157,14 +157,14 @@ def add_tendons(builder: SceneBuilder, model: Articulation) -> None:
             builder.scene.add_force(keyword, name, **fields, **spring)
 
 
-def _line(
+def line_of(
     builder: SceneBuilder, model: Articulation, tendon: Tendon
 ) -> tuple[str, dict[str, Any]] | None:
     """The keyword and the fields of the line of a tendon; "ptp" of two points; None if rigid."""
     if tendon.terms:
         return _sum_of_joints(builder, model, tendon)
     links = [link for link, _ in tendon.points] + [drum.link for drum in tendon.drums]
-    if not 1 < len({builder.member[link][0] for link in links}) <= 8:
+    if len({builder.member[link][0] for link in links}) < 2:
         return None
     names, made = builder.names, builder.names.scene_names
 
@@ -220,7 +220,7 @@ def _sum_of_joints(
         ends = named_ends(builder, from_ground(builder, joint))
         axis = ends.vector("j", ends.joint.axes[0], "_axis")
         columns.append((ends.child, ends.parent, axis, factor, float(joint.kind == "prismatic")))
-    if not columns or len({body for child, parent, *_ in columns for body in (child, parent)}) > 8:
+    if not columns:
         return None
     fields = dict(zip(("movers", "holders", "axes", "coefs", "slides"),
                       zip(*columns, strict=True), strict=True))  # fmt: skip

@@ -161,13 +161,19 @@ def wheel_of(builder: SceneBuilder, joint: Joint, mass: float, inertia: float) -
         scene_name = builder.names.scene_names["joints", joint.name]
         wheel = builder.names.free("bodies", f"{scene_name}_rotor")
         builder.names.scene_names[key] = wheel
-        rate = (*joint.rate, 0.0)[0]
-        builder.scene.add_body(wheel, mass=mass, Jp=(inertia,) * 3,
-                               w=(0.0, 0.0, rate) if rate else None)  # fmt: skip
-        bearing = builder.names.free("joints", f"{wheel}_bearing")
-        builder.scene.add_joint("rev", bearing, P_i=f"{wheel}.O", P_j="ground.O",
-                                a_i=f"{wheel}.z", a_j="ground.z")  # fmt: skip
+        add_wheel(builder, wheel, mass, inertia, (*joint.rate, 0.0)[0])
     return wheel
+
+
+def add_wheel(
+    builder: SceneBuilder, wheel: str, mass: float, inertia: float, rate: float = 0.0
+) -> None:
+    """Add a body that turns about ground's z."""
+    builder.scene.add_body(wheel, mass=mass, Jp=(inertia,) * 3,
+                           w=(0.0, 0.0, rate) if rate else None)  # fmt: skip
+    bearing = builder.names.free("joints", f"{wheel}_bearing")
+    builder.scene.add_joint("rev", bearing, P_i=f"{wheel}.O", P_j="ground.O",
+                            a_i=f"{wheel}.z", a_j="ground.z")  # fmt: skip
 
 
 def follow(builder: SceneBuilder, joint: Joint, wheel: str, ratio: float, suffix: str) -> None:
@@ -206,7 +212,7 @@ def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
             builder.remarks.leave_out(coupling.place, text, motion=True)
             continue
         had_rotor = bool(other.armature[0])
-        wheel = wheel_of(builder, other, *_light(builder, one, other))
+        wheel = wheel_of(builder, other, *light(builder, one, other))
         if not had_rotor and ("followed", other.name) not in builder.names.scene_names:
             builder.names.scene_names["followed", other.name] = wheel
             text = "joints are coupled by a wheel on ground, with a millionth of the inertia"
@@ -215,7 +221,7 @@ def add_couplings(builder: SceneBuilder, model: Articulation) -> None:
         follow(builder, one, wheel, coupling.ratio, "coupling")
 
 
-def _light(builder: SceneBuilder, *joints: Joint) -> tuple[float, float]:
+def light(builder: SceneBuilder, *joints: Joint) -> tuple[float, float]:
     """Mass and inertia of a wheel beside what joints move: beside its mass, for a slider."""
     masses, sizes = [], []
     for joint in joints:

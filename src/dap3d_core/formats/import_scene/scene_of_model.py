@@ -8,6 +8,7 @@ import attrs
 import numpy as np
 
 from dap3d_core.formats.import_scene.actuators import add_actuators, add_tendons
+from dap3d_core.formats.import_scene.held_tendons import add_held
 from dap3d_core.formats.import_scene.joints import (
     add_couplings,
     add_joint,
@@ -158,6 +159,7 @@ def _add_joints(builder: SceneBuilder, model: Articulation) -> None:
             add_joint(builder, joint)
         _add_joint_forces(builder, joint)
     add_couplings(builder, model)
+    add_held(builder, model)
     add_actuators(builder, model)
     add_tendons(builder, model)
 

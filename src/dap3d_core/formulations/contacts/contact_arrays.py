@@ -21,10 +21,6 @@ def _integer() -> Scalar[int]:
     return Scalar("integer")
 
 
-def _real() -> Scalar[float]:
-    return Scalar("real")
-
-
 @attrs.define(eq=False, kw_only=True, slots=False)
 class ContactArrays(Arrays):
     """Contacts at one instant: m of them, of which l have friction that a joint loads.
@@ -55,17 +51,16 @@ class ContactArrays(Arrays):
     group_count = _integer()
     kept_count = _integer()
     mine_count = _integer()
-    length = _real()  # of the scene, m
 
     cone: Cone
     integer: Integers
-    real: Floats
     # constants
     mu: Floats  # (m,) along the first tangent, and along the second as a part of that
     mu_s: Floats
     ratio: Floats
     ratio_s: Floats
     e: Floats
+    length: Floats  # of the scene, m, and 1 of what turns
     gapless: Floats  # 1 where the first row is one of slip, and not along a normal
     newton: Integers  # 1 where the law of impact is Newton's
     alone: Integers  # 1 of friction without a gap: of joints
@@ -89,7 +84,7 @@ class ContactArrays(Arrays):
     leaves: Integers  # 1 of those whose normal force has just vanished
     # what is found
     mode: Floats  # (m,) 0 open, 1 slides, 2 sticks
-    way: Floats  # (m, 3) unit vectors of sliding, global axes, zero where none is known; of
+    way: Floats  # (m, 3) directions of sliding, as long as ``length``, zero where none is known; of
     near: Floats  # friction alone that sticks 1 for rows that do not hold, as others hold that;
     force: Floats  # forces on body i of those that share, global axes; forces in their frames
     jams: Integers  # 1 of contacts that jam
@@ -146,7 +141,6 @@ def contact_arrays(m: int, rows: int, loads: int, given: dict[str, Any]) -> Cont
         **arrays,
         cone=cone_of(m),
         integer=np.zeros(len(ContactArrays.indices("integer")), dtype=np.int64),
-        real=np.zeros(len(ContactArrays.indices("real"))),
         holds=np.ones((m, 3), dtype=np.int64),
         feels=np.zeros((m, m), dtype=np.int64),
         direction=np.zeros(3),

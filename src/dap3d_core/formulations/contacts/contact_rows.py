@@ -41,6 +41,8 @@ class ContactTable:
         ratio, ratio_s: (m,) the same along the second tangent, as parts of them: 1 but in ellipses.
         newton: (m,) True where the law of impact is Newton's.
         turns: (m,) 1 of those whose gap or slip is an angle, 0 of others.
+        length: (m,) what limits of gaps and speeds are multiplied by: the length of the scene, m;
+            1 rad of those that turn.
         movable: (m,) True of those that a scene may have moved until they touch.
         alone: (m,) True of friction without a gap: of joints.
         holds: (m, 3) True of the rows that act where it sticks.
@@ -85,6 +87,7 @@ class ContactTable:
             loop = loop_list([compiled_loop(group.type_info, "tension")])
             width = WIDTH + LAW_WIDTH * (type_.grip is not None)
             self._loops.append((loop, evaluator.system.groups[q], which, width))
+        self.length = np.where(self.turns > 0.0, 1.0, model.length)
         self.gapless = (self.alone & self.holds[:, 0]).astype(float)
         self.way: Integers = self.mode[:, None] + np.arange(1, 4)
         self.near: Integers = self.mode[:, None] + np.arange(4, 7)
@@ -97,14 +100,13 @@ class ContactTable:
     @cached_property
     def arrays(self) -> ContactArrays:
         """Those of compiled code, with the coefficients of the table."""
-        names = ("mu", "mu_s", "e", "ratio", "ratio_s", "gapless")
+        names = ("mu", "mu_s", "e", "ratio", "ratio_s", "gapless", "length")
         given = {name: getattr(self, name) for name in names}
         model = self.evaluator.model
         s = contact_arrays(self.count, model.joint_row_count, len(self.loads), given)
         s.newton[:], s.alone[:], s.holds[:] = self.newton, self.alone, self.holds
         for c, (rows, pushes) in self.loads.items():
             s.load_row[c], s.load_count[c], s.load_pushes[c] = rows[0], len(rows), pushes
-        s.length = model.length
         return s
 
     def across(self, c: int) -> slice:
@@ -316,20 +318,21 @@ class ContactRows:
         self.change(self.P @ self.G.T @ x)
 
     def lifted(
-        self, values: Floats, held: list[int], others: list[int], slack: float = 0.0
+        self, values: Floats, held: list[int], others: list[int], slack: Floats | None = None
     ) -> Floats:
         """(6 n,) least change of positions, or velocities, with the joints held.
 
         It brings ``values`` (m,), gaps or their rates, of held contacts to zero, and of others that
-        would be less than zero by more than a slack.
+        would be less than zero by more than a slack (m,).
         """
         N, active = self.G[::3], [c for c in held if not self._table.gapless[c]]
         normal, x = self.W[::3, ::3], np.zeros(0)
+        least = np.zeros(len(values)) if slack is None else -slack
         for _ in range(len(others) + 1):
             block = normal[np.ix_(active, active)]
             x = np.asarray(np.linalg.lstsq(block, -values[active], rcond=1e-12)[0])
             moved = values + normal[:, active] @ x
-            below = [c for c in others if c not in active and moved[c] < -slack]
+            below = [c for c in others if c not in active and moved[c] < least[c]]
             if not below:
                 break
             active += below

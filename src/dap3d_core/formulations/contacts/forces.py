@@ -21,9 +21,9 @@ UNSOLVED = 1e-6
 
 
 @compiled
-def still_speed(s: ContactArrays) -> float:
-    """Speed, m/s, below which contacts are at rest."""
-    return STILL * max(1.0, s.length)
+def still_speed(s: ContactArrays, c: int) -> float:
+    """Speed, m/s, below which a contact is at rest."""
+    return STILL * s.length[c]
 
 
 @compiled
@@ -65,11 +65,10 @@ def put_matrix(s: ContactArrays, begins: bool) -> bool:
     begins: those that begin to slide, slide.
     """
     put_plain(s)
-    limit = still_speed(s)
     for k in range(s.closed_count):
         c = s.closed[k]
         size = size_across(s, c, s.slip[c])
-        if size > limit:
+        if size > still_speed(s, c):
             put_across(s, c, s.slip[c], 1.0 / size, s.along[c])
             s.slides[c] = 1
         elif begins and s.begins[c] != 0:

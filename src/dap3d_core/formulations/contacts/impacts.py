@@ -65,7 +65,7 @@ def repeat(table: ContactTable, rows: ContactRows, impact: Impact) -> Impact:
     return attrs.evolve(impact, work=np.array([work]))
 
 
-def collide(table: ContactTable, rows: ContactRows, touching: list[int], length: float) -> Impact:
+def collide(table: ContactTable, rows: ContactRows, touching: list[int]) -> Impact:
     """Let the contacts that touch collide until none approaches; velocities of ``rows`` follow."""
     rounds: list[Round] = []
     impulses, rest = np.zeros((table.count, 3)), dict[int, float]()
@@ -73,7 +73,7 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
     e = table.e.copy()
     for k in range(ROUNDS):
         slip, closing = rows.slip, rows.closing
-        approach = [c for c in touching if closing[c] < -AT_REST * length]
+        approach = [c for c in touching if closing[c] < -AT_REST * table.length[c]]
         if not approach:
             break
         last = k == ROUNDS - 1
@@ -81,7 +81,7 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
         taking = approach if bounces else touching
         of = np.zeros_like(e) if last else e
         x = _impulses(rows, taking, of)
-        short = _last_bounces(table, rows, taking, x, e, length)
+        short = _last_bounces(table, rows, taking, x, e)
         if short:
             rest |= short
             e[list(short)] = 0.0
@@ -93,12 +93,12 @@ def collide(table: ContactTable, rows: ContactRows, touching: list[int], length:
         work[taking] += np.sum(parts + after, axis=1)
         exchanged += float(np.sum(np.abs(parts)) + np.sum(np.abs(after)))
         impulses[taking] += x.reshape(-1, 3)
-    low = _stop_low_rocking(rows, touching, length)
+    low = _stop_low_rocking(table, rows, touching)
     return Impact(impulses, work, exchanged, rest, rounds, low)
 
 
 def unjam(
-    table: ContactTable, rows: ContactRows, touching: list[int], impact: Impact, length: float
+    table: ContactTable, rows: ContactRows, touching: list[int], impact: Impact
 ) -> Impact | None:
     """Stop slip that jams behind an impact, by an impulse without a collision; None if none does.
 
@@ -106,7 +106,7 @@ def unjam(
     it sticks; then that turns what approaches back (Genot, Brogliato, Eur. J. Mech. A 18 (1999)
     653). So what holds is at rest then, and nothing bounces.
     """
-    closed = [c for c in touching if rows.closing[c] < AT_REST * length]
+    closed = [c for c in touching if rows.closing[c] < AT_REST * table.length[c]]
     x = _stopping(rows, closed)
     if x is None:
         return None
@@ -127,11 +127,11 @@ def _stopping(rows: ContactRows, closed: list[int]) -> Floats | None:
     return s.x[: 3 * len(closed)].copy() if stop_slip(s) else None
 
 
-def _stop_low_rocking(rows: ContactRows, touching: list[int], length: float) -> list[int]:
+def _stop_low_rocking(table: ContactTable, rows: ContactRows, touching: list[int]) -> list[int]:
     """Hold what would be back from a height too low to tell from rest, as of rocking: which."""
     v, a = rows.closing, -rows.free[::3]
-    limit = 2.0 * LAST_HEIGHT * length * a
-    low = [c for c in touching if v[c] > AT_REST * length and v[c] ** 2 < limit[c]]
+    limit = 2.0 * LAST_HEIGHT * table.length * a
+    low = [c for c in touching if v[c] > AT_REST * table.length[c] and v[c] ** 2 < limit[c]]
     _hold_low(rows, low, [c for c in touching if c not in low])
     return low
 
@@ -155,7 +155,7 @@ def _impulses(rows: ContactRows, contacts: list[int], e: Floats) -> Floats:
 
 
 def _last_bounces(
-    table: ContactTable, rows: ContactRows, contacts: list[int], x: Floats, e: Floats, length: float
+    table: ContactTable, rows: ContactRows, contacts: list[int], x: Floats, e: Floats
 ) -> dict[int, float]:
     """Contacts whose bounces would be too low from here on -> how long these would take, s."""
     which = rows.rows_of(contacts)
@@ -163,7 +163,7 @@ def _last_bounces(
     found = {}
     for c, v in zip(contacts, after, strict=True):
         a = -float(rows.free[3 * c])
-        low = 0.0 < v * v < 2.0 * a * LAST_HEIGHT * length if a > 0.0 else False
+        low = 0.0 < v * v < 2.0 * a * LAST_HEIGHT * table.length[c] if a > 0.0 else False
         if e[c] > 0.0 and low and rows.slip[c, 0] < 0.0:
             # what has come to rest before: the speeds after bounces are v, e v, e^2 v, ...
             found[c] = 2.0 * float(v) / (a * (1.0 - float(e[c]))) if e[c] < 1.0 else np.inf

@@ -46,13 +46,13 @@ def put_loaded(s: ContactArrays) -> bool:
     more than itself holds. Then each pass takes the loads of the one before, extrapolated from
     those of as many passes as there are loads.
     """
-    count, limit, all_slide = s.mine_count, still_speed(s), True
+    count, all_slide = s.mine_count, True
     for k in range(s.group_count):
         clear_mode(s, s.group[k])
     put_loads(s, s.loads)
     for k in range(count):
         c = s.mine[k]
-        if not (s.begins[c] != 0 or size_across(s, c, s.slip[c]) > limit):
+        if not (s.begins[c] != 0 or size_across(s, c, s.slip[c]) > still_speed(s, c)):
             s.loads[k], all_slide = LARGE, False
     kept = 0
     for step in range(PASSES):

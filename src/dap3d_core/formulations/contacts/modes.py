@@ -32,10 +32,10 @@ TO_STAY = 1e-6
 @compiled
 def put_closed(s: ContactArrays) -> None:
     """Put the contacts that touch and do not part, and clear what is found."""
-    limit, count = still_speed(s), 0
+    count = 0
     for k in range(s.touching_count):
         c = s.touching[k]
-        if s.gapless[c] > 0.0 or s.slip[c, 0] < limit:
+        if s.gapless[c] > 0.0 or s.slip[c, 0] < still_speed(s, c):
             s.kept[count] = c
             count += 1
     s.kept_count = count
@@ -250,7 +250,7 @@ def put_one(s: ContactArrays, k: int, shares: bool) -> None:
         s.force[c, i] = force[i]
         s.way[c, i] = s.near[c, i] = 0.0
         for q in range(3):
-            s.way[c, i] += way[q] * s.frames[c, q, i]
+            s.way[c, i] += s.length[c] * way[q] * s.frames[c, q, i]
             if near and (sticks or (q == 0 and normal)):
                 s.near[c, i] += force[q] * s.frames[c, q, i]
 

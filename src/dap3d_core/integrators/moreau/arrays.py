@@ -36,7 +36,7 @@ CONE, ALONE, WHOLE = range(3)
 #: Arrays of which a row belongs to a contact.
 OF_CONTACTS = ("bodies", "key", "kind", "under", "group", "chosen", "J", "moved", "own",
                "own_held", "gap", "mu", "rim", "e", "bias", "r", "left", "collides", "closing",
-               "x", "u", "z", "B", "push", "kept", "met", "x_bounce")  # fmt: skip
+               "x", "u", "z", "B", "B_factored", "push", "kept", "met", "x_bounce")  # fmt: skip
 
 
 def _integer() -> Scalar[int]:
@@ -60,14 +60,14 @@ class StepArrays(Arrays):
              "declared_mode", "declared_kind", "declared_turns", "declared_law", "load_row",
              "load_count", "load_pushes", "held",
              "row_start", "row_body", "row_place", "used", "place", "parent", "queue", "order",
-             "entry_start", "entries", "bits", "slots"),
+             "entry_start", "entries", "bits", "slots", "exchanged"),
             INTEGERS,
         ),
         **dict.fromkeys(("bodies", "declared_bodies", "declared_place"), INTEGER_MATRIX),
         **dict.fromkeys(
-            ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "trial",
-             "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z", "B",
-             "push",
+            ("poses", "Jp", "Jp_inverse", "spin", "spin_inverse", "before", "free", "v", "delta",
+             "trial", "rest", "trial_rest", "end", "J", "moved", "own", "own_held", "x", "u", "z",
+             "B", "B_factored", "push",
              "kept", "met", "D", "declared_x", "log", "values", "vectors", "crossed", "answer",
              "felt", "bounce", "v_bounce", "x_bounce",
              "carried"),
@@ -104,6 +104,7 @@ class StepArrays(Arrays):
     t1 = _real()  # s, end of the step, and its length
     h = _real()
     residual = _real()
+    factored = _real()  # weight whose matrix K has the factors of, or 0
     length = _real()  # of the scene, m
 
     shapes: PlacedShapes
@@ -123,6 +124,7 @@ class StepArrays(Arrays):
     before: Floats  # (n + 1, 6) velocities at the start, without contacts, with them; scratch
     free: Floats
     v: Floats
+    delta: Floats  # what it changes by within a round
     trial: Floats
     rest: Floats
     trial_rest: Floats
@@ -163,6 +165,7 @@ class StepArrays(Arrays):
     x: Floats  # (c, 3) impulses, N s; what is projected, its slopes, impulses tried, others kept
     z: Floats
     B: Floats
+    B_factored: Floats  # those of K
     push: Floats
     kept: Floats
     u: Floats  # velocities
@@ -196,6 +199,7 @@ class StepArrays(Arrays):
     D: Floats  # (entries, 6)
     s: Floats  # masses that they feel
     y: Floats  # impulses; tried, kept, and of the last step; those of motion without contacts
+    lead: Floats  # D v at the begin of a round, less that of motion without contacts, m/s
     pull: Floats
     y_kept: Floats
     y_bounce: Floats
@@ -206,6 +210,7 @@ class StepArrays(Arrays):
     changed: Floats
     slots: Integers  # table of the contacts remembered
     K: Floats
+    exchanged: Integers  # rows of K
     change: Floats
     turned: Floats  # (36,)
     log: Floats  # (room, MET) contacts at instants reported
@@ -230,7 +235,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     layout = model.row_layout
     scratch: dict[str, Any] = {
         **{name: np.zeros(k) for name in (
-            "s", "y", "pull", "y_kept", "y_bounce", "joint_y", "y_free")},
+            "s", "y", "lead", "pull", "y_kept", "y_bounce", "joint_y", "y_free")},
         **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
     }  # fmt: skip
     arrays = StepArrays(
@@ -247,6 +252,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
         changed=np.zeros(size),
         slots=np.zeros(2 * remembered + 1, dtype=np.int64),
         K=np.zeros(min(6 * n, dense_size) ** 2),
+        exchanged=np.zeros(max(dense_size, 6), dtype=np.int64),
         change=np.zeros(6 * n),
         turned=np.zeros(36),
         log=np.zeros((LOG_ROOM, MET)),
@@ -276,7 +282,7 @@ def _of_bodies(model: Model) -> dict[str, Any]:
     found: dict[str, Any] = {
         **{name: np.zeros((n + 1, 9)) for name in ("Jp", "Jp_inverse", "spin", "spin_inverse")},
         **{name: np.zeros((n + 1, 6)) for name in (
-            "before", "free", "v", "trial", "rest", "trial_rest", "end", "v_bounce")},
+            "before", "free", "v", "delta", "trial", "rest", "trial_rest", "end", "v_bounce")},
         "bounce": np.zeros((n + 1, 5)),
         "carried": np.zeros((n + 1, 2)),
         **{name: np.zeros(n + 1) for name in (
@@ -298,7 +304,8 @@ def _of_bodies(model: Model) -> dict[str, Any]:
 
 def _of_contacts(room: int) -> dict[str, Any]:
     """Arrays of so many contacts."""
-    widths = {"bodies": 2, "J": 36, "moved": 36, "own": 9, "own_held": 9, "B": 9, "met": MET,
+    widths = {"bodies": 2, "J": 36, "moved": 36, "met": MET,
+              **dict.fromkeys(("own", "own_held", "B", "B_factored"), 9),
               **dict.fromkeys(("x", "u", "z", "push", "kept", "x_bounce"), 3)}  # fmt: skip
     whole = ("bodies", "key", "kind", "under", "group", "chosen", "collides")
     return {

@@ -9,12 +9,14 @@ from typing import Any
 from dap3d_core.integrators.moreau.arrays import CONE, MET, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
 from dap3d_core.integrators.moreau.newton import bound_of
+from dap3d_core.integrators.stepping.vector_ops import copy
 from dap3d_core.kernels.array_types import Floats, Integers
 from dap3d_core.kernels.runtime.cache import compiled
 
 #: A contact whose friction is on its cone to this part slides.
 ON_CONE = 1e-6
-#: Modes, and the slip of what sticks at the start, m/s (interface/contacts/rows.py).
+#: Modes, and the slip of what sticks at the start, m/s of a scene of ordinary size, or rad/s
+#: (interface/contacts/rows.py).
 OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0
 STILL = 1e-8
 
@@ -32,6 +34,8 @@ def slot_of(memory: Any, slots: Integers, key: int) -> int:
 def recall(work: Any, s: StepArrays) -> None:
     """Take the impulses of the last step in the frames of the contacts, zero of new ones.
 
+    Those of joints as well.
+
     Those that are declared stick or slide as they did, new ones by their slip.
     """
     memory, slots, count = work.memory, s.slots, 0
@@ -42,6 +46,7 @@ def recall(work: Any, s: StepArrays) -> None:
         if slots[at] < 0:
             slots[at] = count
         count += 1
+    copy(s.y, work.pulls)
     for c in range(s.contact_count):
         row, J = slots[slot_of(memory, slots, s.key[c])], s.J[c]
         for r in range(3):
@@ -55,7 +60,8 @@ def recall(work: Any, s: StepArrays) -> None:
         if c >= s.touch_count and c < s.law_count:
             u0, u1, u2 = velocity_of(s, c, s.before)
             u0 = u0 if s.kind[c] == WHOLE else 0.0
-            rests = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) <= STILL
+            still = STILL if s.declared_turns[s.key[c] - DECLARED] != 0 else STILL * s.length
+            rests = math.sqrt(u0 * u0 + u1 * u1 + u2 * u2) <= still
             put_grip(s, c, rests if row < 0 else memory[row, 4] == STICKS)
 
 
@@ -90,6 +96,7 @@ def let_slip(s: StepArrays) -> bool:
 def remember(work: Any, s: StepArrays) -> None:
     """Keep the impulses of contacts that push, and of friction of joints."""
     memory, count = work.memory, 0
+    copy(work.pulls, s.y)
     for c in range(s.contact_count):
         if (s.x[c, 0] > 0.0 or s.kind[c] != CONE) and count < memory.shape[0]:
             memory[count, 0] = s.key[c]

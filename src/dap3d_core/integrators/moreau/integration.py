@@ -61,6 +61,7 @@ class MoreauState(IntegrationState):
     overlap_key = _measure()  # of that contact
 
     memory: Floats  # (room, 5) key of a contact, or -1, its impulse, N s, and its mode
+    pulls: Floats  # impulses of joints, N s, besides those of motion without contacts
     pushed: Floats  # (n + 1, 6) accelerations by contacts, global axes; 1 in the first item if any
     measures: Floats  # scalars
 
@@ -92,6 +93,7 @@ class MoreauIntegration(Integration):
         pushed = np.zeros((model.body_count + 1, 6))
         return {
             "memory": memory,
+            "pulls": np.zeros(model.joint_row_count),
             "pushed": pushed,
             "measures": np.zeros(len(MoreauState.indices("measures"))),
         }
@@ -115,9 +117,10 @@ class MoreauIntegration(Integration):
             if arrays.log_count:
                 self._contact_rows.append(arrays.log[: arrays.log_count].copy())
                 arrays.log_count = 0
-            if not waits and not arrays.stage:
+            if arrays.stage or 2 * arrays.met_count > len(arrays.log):
+                self._arrays = grown(arrays)
+            elif not waits:
                 return
-            self._arrays = grown(arrays)
 
     def state_within(self, t: float) -> Floats | None:
         """As ``Integration.state_within``, linear."""

@@ -18,8 +18,14 @@ import math
 
 from dap3d_core.integrators.moreau.arrays import CONE, WHOLE, StepArrays
 from dap3d_core.integrators.moreau.contact_set import DECLARED, velocity_of
-from dap3d_core.integrators.moreau.dense import solve_blocks, solve_square
-from dap3d_core.integrators.moreau.groups import block_at
+from dap3d_core.integrators.moreau.matrix import (
+    assemble,
+    factor_blocks,
+    factor_square,
+    is_factored,
+    solve_blocks,
+    solve_square,
+)
 from dap3d_core.kernels.array_types import Floats
 from dap3d_core.kernels.runtime.cache import compiled
 
@@ -30,6 +36,10 @@ WEIGHT, LESS, LEAST = 1e5, 1e-2, 1.0
 HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
+#: The best to which a round is solved.
+ROUNDING = 1e-15
+#: A residual from which a round that does not help is the last.
+SETTLED = 2e-14
 TINY = 1e-300
 #: Unknowns up to which the matrix of a pass is a square; that of more has blocks.
 SMALL = 60
@@ -226,22 +236,21 @@ def residual_of(s: StepArrays, v: Floats, left: float) -> float:
 def newton(s: StepArrays, tolerance: float) -> float:
     """Improve the impulses x and y of a group; the residual."""
     put_velocities(s, s.v)
-    left, weight = residual_of(s, s.v, 0.0), WEIGHT
+    left, weight, s.factored = residual_of(s, s.v, 0.0), WEIGHT, 0.0
     for _ in range(ROUNDS):
         if left <= tolerance:
             break
         solve_round(s, weight, INNER * max(0.1 * tolerance, min(left, 1e-3)))
         exchange(s)
         new = residual_after(s)
-        if new > HELPS * left:
-            weight *= LESS
-        if new < left:
-            left = new
-        else:
+        helps = new <= HELPS * left
+        weight *= 1.0 if helps else LESS
+        if new >= left:
             exchange(s)
-            if weight < LEAST:
-                break
             put_velocities(s, s.v)
+        left = min(left, new)
+        if weight < LEAST or (left <= SETTLED and not helps):
+            break
     return left
 
 
@@ -273,29 +282,44 @@ def exchange(s: StepArrays) -> None:
 
 
 @compiled
-def put_rest(s: StepArrays, v: Floats, weight: float, R: Floats) -> float:
-    """Put what velocities v leave of the equations of a round; its square in M^-1.
+def begin_round(s: StepArrays) -> None:
+    """Take the velocities v as those that a round counts its changes from."""
+    for q in range(s.used_count):
+        for k in range(6):
+            s.delta[s.used[q], k] = 0.0
+    for q in range(s.chosen_count):
+        u = s.u[s.chosen[q]]
+        u[0], u[1], u[2] = velocity_of(s, s.chosen[q], s.v)
+        u[0] += s.bias[s.chosen[q]]
+    for k in range(s.y.size):
+        s.lead[k] = speed_of(s, k, s.v) - speed_of(s, k, s.free)
 
-    ``push`` and ``pull`` become the impulses there, z what is projected.
+
+@compiled
+def put_rest(s: StepArrays, delta: Floats, weight: float, R: Floats) -> float:
+    """Put what velocities v + delta leave of the equations of a round; its square in M^-1.
+
+    ``push`` and ``pull`` become the impulses there, z what is projected. Weights multiply the
+    rounding of delta, and not that of v.
     """
     for k in range(s.y.size):
-        speed = speed_of(s, k, v) - speed_of(s, k, s.free)
-        s.pull[k] = s.y[k] - weight * s.s[k] * speed
+        s.pull[k] = s.y[k] - weight * s.s[k] * (s.lead[k] + speed_of(s, k, delta))
     clear(s, R)
     add_pull(s, s.pull, R)
     for q in range(s.used_count):
-        b = s.used[q]
+        b, x = s.used[q], s.turned
         row, spin, m = R[b], s.spin[b], s.mass[b]
-        d, e, f = v[b, 3] - s.free[b, 3], v[b, 4] - s.free[b, 4], v[b, 5] - s.free[b, 5]
+        for k in range(6):
+            x[k] = (s.v[b, k] - s.free[b, k]) + delta[b, k]
         for k in range(3):
-            row[k] = m * (v[b, k] - s.free[b, k]) - row[k]
-            row[3 + k] = spin[3 * k] * d + spin[3 * k + 1] * e + spin[3 * k + 2] * f - row[3 + k]
+            turn = spin[3 * k] * x[3] + spin[3 * k + 1] * x[4] + spin[3 * k + 2] * x[5]
+            row[k], row[3 + k] = m * x[k] - row[k], turn - row[3 + k]
     for q in range(s.chosen_count):
         c = s.chosen[q]
-        u0, u1, u2 = velocity_of(s, c, v)
+        u0, u1, u2 = velocity_of(s, c, delta)
         part, z, J = weight * s.r[c], s.z[c], s.J[c]
-        z[0] = s.x[c, 0] - part * (u0 + s.bias[c])
-        z[1], z[2] = s.x[c, 1] - part * u1, s.x[c, 2] - part * u2
+        z[0], z[1] = s.x[c, 0] - part * (s.u[c, 0] + u0), s.x[c, 1] - part * (s.u[c, 1] + u1)
+        z[2] = s.x[c, 2] - part * (s.u[c, 2] + u2)
         s.push[c, 0] = z[0]
         s.rim[c] = bound_of(s, c, s.push, s.pull)
         put_projected(z, s.rim[c], s.kind[c], s.push[c])
@@ -325,29 +349,48 @@ def product_of(x: Floats, y: Floats, m: float, spin: Floats) -> float:
 @compiled
 def solve_round(s: StepArrays, weight: float, tolerance: float) -> None:
     """Bring v to where it solves the equations of a round; impulses there in push and pull."""
-    size, rubs = TINY, False
+    rubs = is_far = False
     for q in range(s.chosen_count):
         rubs |= s.kind[s.chosen[q]] != CONE
-    for q in range(s.used_count):
-        b = s.used[q]
-        x = s.free[b]
-        if rubs:  # friction of joints may be little beside the momentum of its bodies
-            x = s.change
-            for k in range(6):
-                x[k] = s.free[b, k] - s.v[b, k]
-        size += product_of(x, x, s.mass[b], s.spin[b])
-    merit = put_rest(s, s.v, weight, s.rest)
+    begin_round(s)
+    merit = put_rest(s, s.delta, weight, s.rest)
     for _ in range(PASSES):
-        if merit <= tolerance * tolerance * size:
-            return
+        if merit <= aim_of(s, tolerance, rubs):
+            break
         better = try_pass(s, weight, merit, 1.0)
         if better < 0.0:
-            put_rest(s, s.v, weight, s.rest)
+            put_rest(s, s.delta, weight, s.rest)
             better = try_pass(s, weight, merit, 0.0)
+        if better < 0.0 and is_far:
+            put_rest(s, s.delta, weight, s.rest)
+            break
         if better < 0.0:
-            put_rest(s, s.v, weight, s.rest)
-            return
+            is_far = True
+            for q in range(s.used_count):
+                for k in range(6):
+                    s.delta[s.used[q], k] = s.free[s.used[q], k] - s.v[s.used[q], k]
+            better = put_rest(s, s.delta, weight, s.rest)
         merit = better
+    for q in range(s.used_count):
+        for k in range(6):
+            s.v[s.used[q], k] += s.delta[s.used[q], k]
+
+
+@compiled
+def aim_of(s: StepArrays, tolerance: float, rubs: bool) -> float:
+    """The merit at which a round is solved.
+
+    rubs: friction of joints may be little beside the momentum of its bodies, which is left out.
+    """
+    size = TINY
+    for q in range(s.used_count):
+        b, x = s.used[q], s.change
+        for k in range(6):
+            x[k] = s.free[b, k] - s.v[b, k] - s.delta[b, k]
+        size += product_of(x, x, s.mass[b], s.spin[b])
+        if not rubs:
+            size += product_of(s.free[b], s.free[b], s.mass[b], s.spin[b])
+    return max(tolerance, ROUNDING) ** 2 * size
 
 
 @compiled
@@ -359,138 +402,31 @@ def try_pass(s: StepArrays, weight: float, merit: float, feels: float) -> float:
     for q in range(s.chosen_count):
         c = s.chosen[q]
         put_slopes(s.z[c], feels * s.mu[c], s.rim[c], s.kind[c], s.B[c])
-    assemble(s, weight, feels)
+    if not is_factored(s, weight, feels):
+        assemble(s, weight, feels)
+        if s.width == 6 * s.used_count:
+            factor_square(s.K, s.exchanged, s.width)
+        else:
+            factor_blocks(s.K, s.used_count, s.entry_start, s.entries, s.parent, s.turned)
     for q in range(s.used_count):
         for k in range(6):
             s.change[6 * q + k] = -s.rest[s.used[q], k]
     if s.width == 6 * s.used_count:
-        solve_square(s.K, s.change, s.width)
+        solve_square(s.K, s.exchanged, s.change, s.width)
     else:
-        solve_blocks(s.K, s.change, s.used_count, s.entry_start, s.entries, s.parent, s.turned)
+        solve_blocks(s.K, s.change, s.used_count, s.entry_start, s.entries, s.turned)
     part = 1.0
     for _ in range(CUTS):
         for q in range(s.used_count):
             b = s.used[q]
             for k in range(6):
-                s.trial[b, k] = s.v[b, k] + part * s.change[6 * q + k]
+                s.trial[b, k] = s.delta[b, k] + part * s.change[6 * q + k]
         found = put_rest(s, s.trial, weight, s.trial_rest)
         if found < (1.0 - 0.1 * part) * merit:
             for q in range(s.used_count):
                 b = s.used[q]
                 for k in range(6):
-                    s.v[b, k], s.rest[b, k] = s.trial[b, k], s.trial_rest[b, k]
+                    s.delta[b, k], s.rest[b, k] = s.trial[b, k], s.trial_rest[b, k]
             return found
         part *= 0.5
     return -1.0
-
-
-@compiled
-def assemble(s: StepArrays, weight: float, feels: float) -> None:
-    """Put the matrix of a Newton pass, M + J^T weight r B J + D^T weight s D.
-
-    feels: as of ``try_pass``.
-    """
-    K = s.K
-    for k in range(s.matrix_size):
-        K[k] = 0.0
-    for q in range(s.used_count):
-        spin, m = s.spin[s.used[q]], s.mass[s.used[q]]
-        start = block_at(s, q, q)
-        for i in range(3):
-            K[start + i * s.width + i] = m
-            at = start + (3 + i) * s.width + 3
-            K[at], K[at + 1], K[at + 2] = spin[3 * i], spin[3 * i + 1], spin[3 * i + 2]
-    for q in range(s.chosen_count):
-        c = s.chosen[q]
-        for side in range(2):
-            first = s.place[s.bodies[c, side]]
-            if first >= 0:
-                turned = s.turned
-                put_turned(s.B[c], weight * s.r[c], s.J[c], 6 * side, turned)
-                for other in range(2):
-                    row = s.place[s.bodies[c, other]]
-                    if row >= 0:
-                        add_contact(s, block_at(s, row, first), s.J[c], 6 * other, turned)
-        if s.under[c] >= 0 and feels > 0.0:
-            add_pressed(s, c, weight)
-        elif s.kind[c] != CONE and feels > 0.0:
-            add_load(s, c, weight)
-    for k in range(s.y.size):
-        for p in range(s.row_start[k], s.row_start[k + 1]):
-            for q in range(s.row_start[k], s.row_start[k + 1]):
-                start = block_at(s, s.place[s.row_body[p]], s.place[s.row_body[q]])
-                for i in range(6):
-                    at = start + i * s.width
-                    part = weight * s.s[k] * s.D[p, i]
-                    for j in range(6):
-                        K[at + j] += part * s.D[q, j]
-
-
-@compiled
-def add_load(s: StepArrays, c: int, weight: float) -> None:
-    """Add to K that friction of a joint which slides grows with the joint's load."""
-    k, z = s.key[c] - DECLARED, s.z[c]
-    first, whole = s.load_row[k], z[0] if s.kind[c] == WHOLE else 0.0
-    size, rim = math.sqrt(whole * whole + z[1] * z[1] + z[2] * z[2]), s.rim[c]
-    if not 0.0 < rim < size:
-        return
-    for q in range(first, first + s.load_count[k]):
-        load = s.y_free[q] + s.pull[q]
-        if load < 0.0 and s.load_pushes[k] != 0:
-            continue
-        part = s.grip[k] * s.grip[k] * load / (rim * size) * weight * s.s[q]
-        for p in range(s.row_start[q], s.row_start[q + 1]):
-            for side in range(2):
-                b, rows = s.bodies[c, side], s.J[c]
-                if b == 0:
-                    continue
-                J = rows[6 * side :]
-                start = block_at(s, s.place[b], s.place[s.row_body[p]])
-                for i in range(6):
-                    along = part * (whole * J[i] + z[1] * J[12 + i] + z[2] * J[24 + i])
-                    at = start + i * s.width
-                    for j in range(6):
-                        s.K[at + j] += along * s.D[p, j]
-
-
-@compiled
-def add_pressed(s: StepArrays, c: int, weight: float) -> None:
-    """Add to K that what resists rolling grows with what presses, where it yields."""
-    u, z, J = s.under[c], s.z[c], s.J[c]
-    size = math.sqrt(z[1] * z[1] + z[2] * z[2])
-    if not 0.0 < s.rim[c] < size:
-        return
-    part = weight * s.r[u] / size
-    for side in range(2):
-        row = s.place[s.bodies[c, side]]
-        for other in range(2 if row >= 0 else 0):
-            column = s.place[s.bodies[u, other]]
-            if column < 0:
-                continue
-            start, normal = block_at(s, row, column), s.J[u]
-            for i in range(3, 6):
-                k, at = 6 * side + i, start + i * s.width
-                along = part * (z[1] * J[12 + k] + z[2] * J[24 + k])
-                for j in range(6):
-                    s.K[at + j] += along * normal[6 * other + j]
-
-
-@compiled
-def put_turned(B: Floats, weight: float, J: Floats, side: int, out: Floats) -> None:
-    """Put weight B J of the columns of one body, (18,)."""
-    for k in range(6):
-        a, b, c = weight * J[side + k], weight * J[12 + side + k], weight * J[24 + side + k]
-        out[k] = B[0] * a + B[1] * b + B[2] * c
-        out[6 + k] = B[3] * a + B[4] * b + B[5] * c
-        out[12 + k] = B[6] * a + B[7] * b + B[8] * c
-
-
-@compiled
-def add_contact(s: StepArrays, start: int, J: Floats, side: int, turned: Floats) -> None:
-    """Add J^T of one body times ``turned`` of another one to their block of K."""
-    K = s.K
-    for i in range(6):
-        a, b, c = J[side + i], J[12 + side + i], J[24 + side + i]
-        at = start + i * s.width
-        for k in range(6):
-            K[at + k] += a * turned[k] + b * turned[6 + k] + c * turned[12 + k]

@@ -29,6 +29,8 @@ RELAX = 1.4
 MOST_SWEEPS = 2000
 #: Contacts up to which a problem is solved to rounding, whatever the tolerance.
 FEW, RESIDUAL_ROUNDING = 100, 1e-14
+#: Residual above which rows of light bodies are taken as those of what these carry.
+CARRIED = 1e-12
 
 
 def arrays_of(evaluator: Evaluator, size: int, remembered: int) -> StepArrays:
@@ -101,22 +103,20 @@ def solve(s: StepArrays, tolerance: float) -> bool:
 
     Args:
         s: with velocities ``free`` that fit the joints; ``bias`` is added to normal velocities,
-            which are not to become negative then; ``x`` is tried first.
+            which are not to become negative then; ``x``, ``y`` are tried first.
         tolerance: of the residual, a part of the largest impulse.
     """
     few, joined = s.contact_count <= FEW, s.y.size > 0
     for b in range(s.v.shape[0]):
         for k in range(6):
             s.v[b, k] = s.trial[b, k] = s.free[b, k]
-    for k in range(s.y.size):
-        s.y[k] = 0.0
     choose(s, -1)
     if few or joined:
         if not lay_out(s):
             return False
         aim = RESIDUAL_ROUNDING if few and tolerance < NEAR else tolerance
         s.residual = newton(s, aim)
-        if s.residual > aim and s.light_count > 0:
+        if s.residual > max(aim, CARRIED) and s.light_count > 0:
             take_carried(s)
             s.residual = newton(s, aim)
         if few and joined and s.residual > tolerance and not refine_held(s, tolerance, aim):

@@ -252,7 +252,9 @@ def put_bias(s: StepArrays) -> bool:
         for k in range(3):
             fall = max(fall, abs(s.free[b, k] - s.before[b, k]))
     for c in range(s.contact_count):
-        s.collides[c], s.bias[c] = 0, max(s.gap[c], 0.0) / s.h
+        s.collides[c], s.bias[c] = 0, 0.0
+        if s.gap[c] > OVERLAP * s.length:  # redundant contacts would disagree by less
+            s.bias[c] = s.gap[c] / s.h
         if s.kind[c] != CONE:
             continue
         approach, _, _ = velocity_of(s, c, s.before)
@@ -377,6 +379,8 @@ def part(work: Any, s: StepArrays, system: System, loops: Any) -> bool:
         for c in range(s.contact_count):
             s.bias[c], s.mu[c] = s.gap[c], 0.0
             s.x[c, 0] = s.x[c, 1] = s.x[c, 2] = 0.0
+        for k in range(s.y.size):
+            s.y[k] = 0.0
         if not solve(s, NEAR):
             return False
         for b in range(1, s.v.shape[0]):

@@ -23,6 +23,7 @@ from dap3d_core.interface.contacts.rows import (
     slip_of,
     tangent_rates,
     tangents,
+    unit,
 )
 from dap3d_core.kernels import add, cross, dot, neg, row, scale, sqrt, sub, where
 
@@ -194,7 +195,7 @@ def switch(axes, u, ahead, toward, lam, load, mu, mu_s, mode, near):
     """What ends a mode where it is negative: nothing; slip, or the rest of the cone."""
     T = whole(axes, ahead, lam, load, mu, mode, near)
     sticks = where(mu_s > 0.0, mu_s * load - sqrt(dot(T, T)), 1.0)
-    slides = where(mu > 0.0, dot(u, toward), 1.0)
+    slides = where(mu > 0.0, dot(u, unit(toward)), 1.0)
     return 1.0, where(held(mode), sticks, where(closed(mode), slides, 1.0))
 
 

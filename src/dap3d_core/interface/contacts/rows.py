@@ -13,7 +13,8 @@ from dap3d_core.kernels import add, cross, dot, neg, row, scale, sqrt, sub, wher
 
 #: Modes of a contact; in the last one, of time stepping, all rows hold as where it sticks.
 OPEN, SLIDES, STICKS, STEPPED = 0.0, 1.0, 2.0, 3.0
-#: Speed, m/s, below which friction points against the direction in which sliding began.
+#: Speed, m/s of a scene of ordinary size, below which friction points against the direction in
+#: which sliding began: ``way``, whose length is that of the scene, m (1 of what turns).
 STILL = 1e-8
 #: The same of friction in an ellipse, which turns slip all the way to its end.
 STILL_IN_ELLIPSE = 1e-10
@@ -126,19 +127,23 @@ def across(vector, n):
     return sub(vector, scale(dot(vector, n), n))
 
 
+def unit(vector):
+    """A vector of length 1 in the direction of another; zero of that of zero."""
+    length = sqrt(dot(vector, vector))
+    return scale(1.0 / where(length > 0.0, length, 1.0), vector)
+
+
 def direction(slip, n, way, still=STILL):
     """Unit vector of sliding; through zero it goes on as it was, so that no step sees a jump.
 
     Of slow slip that in which sliding began has a part, of (still / |u|)^3 soon: slip that turns
     while it is next to nothing would ask for steps as short as that.
     """
-    u, w = across(slip, n), across(way, n)
-    square, length = dot(u, u), sqrt(dot(w, w))
-    w = scale(1.0 / where(length > 0.0, length, 1.0), w)
+    u, w = across(slip, n), unit(across(way, n))
+    square, still = dot(u, u), still * sqrt(dot(way, way))
     back = where(dot(u, w) < 0.0, dot(u, w), 0.0)
-    u = add(u, scale(still**3 / (still * still + square) - 2.0 * back, w))
-    size = sqrt(dot(u, u))
-    return scale(1.0 / where(size > 0.0, size, 1.0), u)
+    least = where(still > 0.0, still, 1.0)
+    return unit(add(u, scale(least**3 / (least * least + square) - 2.0 * back, w)))
 
 
 def sliding(u, n, grain, grip, way):
@@ -205,7 +210,7 @@ def switch(gap, reach, c, n, grain, r_i, v_i, w_i, r_j, v_j, w_j, lam, grip, hol
         first, second = tangents(n, grain)
         part = hold[0] / where(hold[1] > 0.0, hold[1], 1.0)
         held_by = (dot(tangential, first), part * dot(tangential, second), 0.0)
-    slides = where(mu > 0.0, dot(slip, across(way, n)), 1.0)
+    slides = where(mu > 0.0, dot(slip, unit(across(way, n))), 1.0)
     sticks = where(mu_s > 0.0, mu_s * normal - sqrt(dot(held_by, held_by)), 1.0)
     return (
         where(

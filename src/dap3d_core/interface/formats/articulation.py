@@ -333,6 +333,8 @@ class Articulation:
         name: of the model.
         links, joints: by name, in the order of the file.
         couplings, actuators, tendons: in the order of the file.
+        held: tendons whose length stays ``rest``: of two points, or sums of coordinates, which are
+            zero where the file draws them.
         excluded: pairs of links whose shapes do not meet.
         base_meets: whether links meet those that do not move and that a joint holds them at.
         coefficient_of_pair: friction and restitution of two shapes that meet, of those of both: max
@@ -351,6 +353,7 @@ class Articulation:
     couplings: list[Coupling] = attrs.Factory(list)
     actuators: list[Actuator] = attrs.Factory(list)
     tendons: list[Tendon] = attrs.Factory(list)
+    held: list[Tendon] = attrs.Factory(list)
     excluded: list[tuple[str, str]] = attrs.Factory(list)
     base_meets: bool = False
     coefficient_of_pair: Callable[[float, float], float] = max

@@ -174,8 +174,9 @@ static fmi_status fmi_completed(fmu *f, bool *event)
     double y[STATES];
     dap3d_states(f->model, y);
     *event = dap3d_project(f->model, f->model->t, y, &f->moved) == DAP3D_OK && f->moved > DRIFT;
-    return dap3d_set_states(f->model, f->model->t, (double *)y_of(f->model)) == DAP3D_OK ? fmi_ok
-                                                                                       : fmi_error;
+    if (dap3d_set_states(f->model, f->model->t, y_of(f->model)) != DAP3D_OK)
+        return fmi_failed(f, fmi_error, dap3d_message(f->model));
+    return fmi_ok;
 }
 
 /* Time of the environment: no integration follows. */

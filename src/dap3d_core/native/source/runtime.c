@@ -762,7 +762,7 @@ int dap3d_set_states(dap3d_model *m, double t, const double *y)
     for (int k = 0; k < STATES; k++)
         if (!(fabs(y[k]) <= LARGEST))
             return fail(m, DAP3D_INVALID, "a state is not finite");
-    if (!(t >= 0.0 && t <= m->t_end))
+    if (!(t >= 0.0 && t <= m->t_end * (1.0 + ALIKE))) /* sums of steps round */
         return fail(m, DAP3D_INVALID, "the time is not one of the run");
     double *real = real_of(m);
     memmove(y_of(m), y, 8 * STATES);

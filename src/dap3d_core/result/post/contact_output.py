@@ -18,23 +18,24 @@ if TYPE_CHECKING:
     from dap3d_core.model import Model
     from dap3d_core.result.arrays import Arrays
 
-#: Separates the name of a contact from the number of one of its points.
-POINT = "#"
-
 
 @attrs.frozen(eq=False)
 class ContactOutput:
     """Output of a contact at nt instants; of k points, with an axis (nt, k) before components.
 
+    What turns, as the limit of an angle or the friction of a hinge, has rad for m and N m for N:
+    ``units`` says which. Its ``at`` and ``force`` are zero.
+
     Attributes:
         gap: (nt,) m, distance of the bodies, zero where they touch.
-        normal_force: (nt,) N, not negative.
+        normal_force: (nt,) N, not negative; of friction of a joint its load.
         friction: (nt, 3) N, on body i, global axes.
         slip: (nt, 3) m/s, velocity of body i less that of body j at the point of contact, across
             the normal, global axes.
         mode: (nt,) 0 open, 1 slides, 2 sticks.
         at: (nt, 3) m, the point of contact, global axes.
         force: (nt, 3) N, on body i, normal force and friction together, global axes.
+        units: of each of these, by its name; "SI" where points of a contact differ.
     """
 
     gap: Floats
@@ -44,17 +45,21 @@ class ContactOutput:
     mode: Integers
     at: Floats
     force: Floats
+    units: Mapping[str, str]
 
 
-def contact_names(state_names: Sequence[str]) -> dict[str, list[str]]:
-    """Contacts of a result, each with the names of its points, from the names of its states."""
-    found: dict[str, list[str]] = {}
-    known = set(state_names)
-    for label in state_names:
-        kind, name, *state = label.split(".")
-        if kind == "joints" and state == ["mode"] and f"joints.{name}.near.1" in known:
-            found.setdefault(name.partition(POINT)[0], []).append(name)
-    return found
+def units_of(*, turns: bool, alone: bool) -> dict[str, str]:
+    """Units of a ``ContactOutput``.
+
+    Args:
+        turns: its gap, or its slip, is an angle, or an angular velocity.
+        alone: it is friction without a gap, whose normal force is the load of a joint.
+    """
+    units = {"gap": "m", "normal_force": "N", "friction": "N", "slip": "m/s"}
+    if turns:
+        units = {"gap": "rad", "normal_force": "N" if alone else "N m", "friction": "N m",
+                 "slip": "rad/s"}  # fmt: skip
+    return units | {"mode": "1", "at": "m", "force": "N"}
 
 
 def contact_outputs(evaluator: "Evaluator", arrays: "Arrays") -> dict[str, ContactOutput]:
@@ -78,14 +83,18 @@ def contact_outputs(evaluator: "Evaluator", arrays: "Arrays") -> dict[str, Conta
                 evaluator.begin_turns(float(time), u[k], arrays.angles[k])
             values[k] = table.outputs(float(time), u[k], arrays.Lam[k])
         evaluator.states = before
-    modes: Any = states[:, table.mode]  # unknown at an instant of which the poses are known alone
-    modes = modes.astype(np.int64) if np.isfinite(modes).all() else modes
+    modes: Any = states[:, table.mode]
+    unknown = ~np.isfinite(modes)  # at an instant of which the state of bodies is known alone
+    for part in (rows.NORMAL, rows.FRICTION, rows.FORCE):
+        values[unknown, part] = np.nan
+    modes = modes if unknown.any() else modes.astype(np.int64)
     return {
         name: ContactOutput(
             gap=values[:, k, rows.GAP], normal_force=values[:, k, rows.NORMAL],
             friction=values[:, k, rows.FRICTION], slip=values[:, k, rows.SLIP],
             mode=modes[:, k], at=values[:, k, rows.PLACE],
             force=values[:, k, rows.FORCE],
+            units=units_of(turns=bool(table.turns[k]), alone=bool(table.alone[k])),
         )
         for k, name in enumerate(table.names)
     }  # fmt: skip
@@ -121,23 +130,20 @@ def together(outputs: Sequence[ContactOutput]) -> ContactOutput:
     """The output of a contact with several points; of one that of the point."""
     if len(outputs) == 1:
         return outputs[0]
-    columns = zip(*(attrs.astuple(one, recurse=False) for one in outputs), strict=True)
-    return ContactOutput(*(np.stack(column, axis=1) for column in columns))
+    units = [one.units for one in outputs]
+    shared = {n: u if all(each[n] == u for each in units) else "SI" for n, u in units[0].items()}
+    columns = {n: np.stack([getattr(one, n) for one in outputs], axis=1) for n in shared}
+    return ContactOutput(**columns, units=shared)
 
 
 class ResultContacts:
     """What a result says of contacts."""
 
-    @cached_property
-    def _points(self) -> dict[str, list[str]]:
-        """Names of the points of each contact."""
-        result: Any = self
-        return contact_names(result.summary.state_names)
-
     @property
     def contact_names(self) -> tuple[str, ...]:
         """Names of the declared contacts, in the order of the scene."""
-        return tuple(self._points)
+        result: Any = self
+        return tuple(result.summary.contacts)
 
     @cached_property
     def contacts(self) -> ContactTable:
@@ -151,7 +157,7 @@ class ResultContacts:
         """
         result: Any = self
         table: ContactTable = result.record.contacts.at(result.t)
-        if not self._points:
+        if not self.contact_names:
             return table
         return table.joined(contact_table(result.model, result.t, self._contact_outputs))
 
@@ -165,14 +171,16 @@ class ResultContacts:
         Returns:
             ``.gap`` (nt,) m, ``.normal_force`` (nt,) N, ``.friction`` (nt, 3) N on body i,
             ``.slip`` (nt, 3) m/s, ``.mode`` (nt,) 0 open, 1 slides, 2 sticks, ``.at`` (nt, 3) m,
-            ``.force`` (nt, 3) N on body i, global axes; of k points (nt, k) and (nt, k, 3).
+            ``.force`` (nt, 3) N on body i, global axes; of k points (nt, k) and (nt, k, 3). Of what
+            turns gap, slip and moments are in rad, rad/s and N m: ``.units`` has the unit of each.
 
         Raises:
             UnknownNameError: there is no such contact; names the nearest.
             ResultError: as ``model``.
         """
-        name, every = canonical(name), self._points.values()
-        points = self._points.get(name) or [p for of in every for p in of if p == name]
+        result: Any = self
+        summary, name = result.summary, canonical(name)
+        points = summary.contacts.get(name) or [p for p in summary.contact_points if p == name]
         if not points:
             raise unknown("contact", name, self.contact_names)
         return together([self._contact_outputs[point] for point in points])

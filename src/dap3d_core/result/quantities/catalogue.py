@@ -101,7 +101,7 @@ class QuantitySource(Protocol):
 
 
 class QuantityOwner(NamedTuple):
-    """The body, point, joint or force that a quantity belongs to.
+    """The body, point, joint, contact or force that a quantity belongs to.
 
     Attributes:
         kind: "body", "point", "joint" or "force".

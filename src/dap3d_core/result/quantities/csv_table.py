@@ -13,7 +13,12 @@ from dap3d_core.result.errors import ResultError
 from dap3d_core.result.file.atomic_write import whole_file
 from dap3d_core.result.post.reactions import DENSE_ROWS, jacobians
 from dap3d_core.result.quantities.catalogue import ACTIONS, MOTION, SYSTEM, Quantity
-from dap3d_core.result.quantities.lookup import available_outputs, find, joint_coordinates
+from dap3d_core.result.quantities.lookup import (
+    available_outputs,
+    contact_quantities,
+    find,
+    joint_coordinates,
+)
 
 if TYPE_CHECKING:
     from dap3d_core.result.result import Result
@@ -42,14 +47,14 @@ class TableColumn(NamedTuple):
 
 
 def columns_of(result: "Result", reactions: bool = True) -> list[TableColumn]:
-    """All columns: time, bodies, points, joints, outputs, energies, residuals.
+    """All columns: time, bodies, points, joints, contacts, outputs, energies, residuals.
 
     Named as in ``Result.quantity``. Where a body and a point share a name, the point's are called
     NAME.rP.x, NAME.rPd.x, NAME.rPdd.x.
 
     Args:
         result: what is tabulated.
-        reactions: True to include reactions and coordinates, which need the model.
+        reactions: True to include reactions, coordinates and contacts, which need the model.
 
     Raises:
         ResultError: the model is not available.
@@ -60,8 +65,8 @@ def columns_of(result: "Result", reactions: bool = True) -> list[TableColumn]:
         columns.append(TableColumn(f"{joint}.lambda.{number}", "SI", result.Lam[:, row]))
     if reactions:
         columns.extend(_of_joints(result))
-        for coordinate in joint_coordinates(result):
-            columns.extend(_of_quantity(coordinate))
+        for quantity in (*joint_coordinates(result), *contact_quantities(result)):
+            columns.extend(_of_quantity(quantity))
     for output in available_outputs(result):
         columns.extend(_of_quantity(output))
     return columns + others
@@ -177,8 +182,6 @@ def _components(
 def _rows(result: "Result") -> Iterator[tuple[str, int, int]]:
     """(joint, row of the joint from 1, row of the model)."""
     summary = result.summary
-    for joint, start, count in zip(
-        summary.joint_names, summary.joint_start, summary.joint_rows, strict=False
-    ):
-        for k in range(int(count)):
-            yield joint, k + 1, int(start) + k
+    for joint, place in summary.joint_index.items():
+        for k in range(int(summary.joint_rows[place])):
+            yield joint, k + 1, int(summary.joint_start[place]) + k

@@ -13,8 +13,7 @@ from dap3d_core.model.joint_angles import JOINT_ANGLES
 from dap3d_core.registry.suggestions import nearest
 from dap3d_core.result.arrays import AXES
 from dap3d_core.result.errors import LISTED, ResultError, UnknownNameError
-from dap3d_core.result.model_summary import ModelSummary
-from dap3d_core.result.post.contact_output import POINT, contact_names
+from dap3d_core.result.model_summary import POINT, ModelSummary
 from dap3d_core.result.quantities.catalogue import (
     ACTIONS,
     POINT_ARRAYS,
@@ -140,11 +139,22 @@ def joint_coordinates(result: QuantitySource) -> Iterator[Quantity]:
     Raises:
         ResultError: the model is not available.
     """
-    for joint in result.summary.joint_names:
+    for joint in result.summary.joint_index:
         with suppress(UnknownNameError):
             for k in range(len(result.coordinates(joint).units)):
                 yield find(result, f"{joint}.q{k + 1}")
                 yield find(result, f"{joint}.q{k + 1}_dot")
+
+
+def contact_quantities(result: QuantitySource) -> Iterator[Quantity]:
+    """The quantities of all points of contacts, those of each together.
+
+    Raises:
+        ResultError: the model is not available.
+    """
+    for point in result.summary.contact_points:
+        for attribute in CONTACT_QUANTITIES:
+            yield find(result, f"{point}.{attribute}")
 
 
 def available_outputs(result: QuantitySource) -> Iterator[Quantity]:
@@ -261,6 +271,7 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
         return UnknownNameError(f"the output {parts[0]} has {components}, not {name!r}")
     heads = [n for n in SYSTEM if n.startswith(f"{parts[0]}.")]
     names = {kind: tuple(indices) for kind, indices in _indices(result).items()}
+    names["contact"] = tuple(result.summary.contacts)
     inside = [n for of_kind in names.values() for n in of_kind if n.startswith(f"{name}/")]
     if inside:
         part = f"parts of the sub-assembly {name!r} have names such as {inside[0]}"
@@ -272,10 +283,12 @@ def _unknown(result: QuantitySource, name: str) -> UnknownNameError:
         return UnknownNameError(fault, nearest(name, known))
     size = 2 if parts[0] == "animation" and len(parts) > 2 else 1
     given = ".".join(parts[:size])
-    fault = f"there is no body, point, joint or force {given!r}"
+    fault = f"there is no body, point, joint, contact or force {given!r}"
     near = nearest(given, [n for of_kind in names.values() for n in of_kind])
     if not near and sum(map(len, names.values())) <= LISTED:
         fault += "".join(f"; {kind}: {', '.join(known)}" for kind, known in names.items() if known)
+    if near in result.summary.contacts:
+        return UnknownNameError(fault, ".".join([near, *parts[size:]]))
     return UnknownNameError(fault, _suggestion(result, near, parts[size:]))
 
 
@@ -325,7 +338,9 @@ def names_of(result: QuantitySource, begin: str = "") -> list[str]:
     Returns:
         Whole names, and names of owners, which end in a dot.
     """
+    contacts = dict.fromkeys((*result.summary.contacts, *result.summary.contact_points))
     owners = [name for indices in _indices(result).values() for name in indices]
+    owners += contacts
     known = (*SYSTEM, *result.summary.input_names, *result.outputs)
     names = [*(f"{name}." for name in owners), *known]
     head = begin.rpartition(".")[0]
@@ -337,6 +352,11 @@ def names_of(result: QuantitySource, begin: str = "") -> list[str]:
     for owner in _owners(result, label):
         if attribute in _attributes(result, owner):
             names += [f"{head}.{one}" for one in _components(result, owner, attribute)]
+    if head in contacts:
+        names += [f"{head}.{one}" for one in CONTACT_QUANTITIES]
+    elif label in contacts and attribute in CONTACT_QUANTITIES:
+        is_vector = CONTACT_QUANTITIES[attribute].is_vector
+        names += [f"{head}.{one}" for one in (*AXES, NORM) if is_vector]
     names = [name for name in dict.fromkeys(names) if name.startswith(begin) and name != begin]
     if len(names) == 1 and names[0].endswith("."):
         return names_of(result, names[0])
@@ -391,20 +411,19 @@ def own_quantity(
 
 
 class _Part(NamedTuple):
-    """Attribute of a ``ContactOutput``, what it is, its unit, whether it is a vector."""
+    """Attribute of a ``ContactOutput``, what it is, whether it is a vector."""
 
     attribute: str
     label: str
-    unit: str
     is_vector: bool = False
 
 
 CONTACT_QUANTITIES = {
-    "gap": _Part("gap", "gap", "m"),
-    "normal": _Part("normal_force", "normal force", "N"),
-    "friction": _Part("friction", "friction", "N", True),
-    "slip": _Part("slip", "slip", "m/s", True),
-    "mode": _Part("mode", "mode", "1"),
+    "gap": _Part("gap", "gap"),
+    "normal": _Part("normal_force", "normal force"),
+    "friction": _Part("friction", "friction", True),
+    "slip": _Part("slip", "slip", True),
+    "mode": _Part("mode", "mode"),
 }
 
 
@@ -418,8 +437,7 @@ def _contact_quantity(source: QuantitySource, name: str) -> Quantity | None:
         UnknownNameError: the contact has no such quantity.
     """
     head, *rest = name.split(".")
-    names = contact_names(source.summary.state_names)
-    points = names.get(head.partition(POINT)[0])
+    points = source.summary.contacts.get(head.partition(POINT)[0])
     if points is None or (POINT in head and head not in points):
         return None
     part = CONTACT_QUANTITIES.get(rest[0]) if rest else None
@@ -430,11 +448,14 @@ def _contact_quantity(source: QuantitySource, name: str) -> Quantity | None:
         known = ", ".join(f"{head}.{n}" for n in CONTACT_QUANTITIES)
         more = f"; vectors are those of a point, {points[0]}.slip.x" if several else ""
         raise UnknownNameError(f"there is no quantity {name!r}; contact {head} has {known}{more}")
-    values = np.asarray(getattr(source.contact(head), part.attribute), dtype=float)
-    label = f"{part.label} of {head}" + (f", {component}" if component else "")
+    contact = source.contact(head)
+    values = np.asarray(getattr(contact, part.attribute), dtype=float)
+    unit = contact.units[part.attribute]
+    kind = "moment" if part.attribute == "normal_force" and unit == "N m" else part.label
+    label = f"{kind} of {head}" + (f", {component}" if component else "")
     components = AXES if part.is_vector else tuple(points) if several else ()
     if component:
         column = np.linalg.norm(values, axis=1) if component == "norm" else None
         values = values[:, AXES.index(component)] if column is None else column
         components = ()
-    return Quantity(name, values, part.label, label, part.unit, components, "contact")
+    return Quantity(name, values, kind, label, unit, components, "contact")

@@ -13,7 +13,7 @@ from dap3d_core.result.file.library import NETCDF
 from dap3d_core.result.file.schema import about, attributes, write_attributes
 from dap3d_core.result.post.reactions import DENSE_ROWS, rows_at
 from dap3d_core.result.quantities.catalogue import ACTIONS
-from dap3d_core.result.quantities.lookup import find, joint_coordinates
+from dap3d_core.result.quantities.lookup import CONTACT_QUANTITIES, find, joint_coordinates
 from dap3d_core.result.quantities.xarray_dataset import add_outputs, dataset_of
 
 if TYPE_CHECKING:
@@ -23,21 +23,23 @@ if TYPE_CHECKING:
 
 
 def dataset_to_write(result: "Result", reactions: bool = True) -> "xarray.Dataset":
-    """All arrays of a result but the Jacobian; reactions and coordinates of joints can be left out.
+    """All arrays of a result but the Jacobian; what needs the model can be left out.
+
+    That is reactions and coordinates of joints, and contacts.
 
     Raises:
         ResultError: the model for the reactions is not available.
     """
     dataset = dataset_of(result)
-    if reactions and result.summary.joint_names:
-        dataset = dataset.merge(reactions_of(result), combine_attrs="override")
-        dataset = dataset.merge(coordinates_of(result), combine_attrs="override")
+    parts = (reactions_of, coordinates_of, contacts_of) if reactions else ()
+    for part in parts:
+        dataset = dataset.merge(part(result), combine_attrs="override")
     dataset = add_outputs(dataset, result)
     return dataset.drop_dims([name for name, count in dataset.sizes.items() if not count])
 
 
 def why_no_reactions(result: "Result") -> str:
-    """The reason that the reactions of joints cannot be computed, "" if they can."""
+    """The reason that reactions of joints, and contacts, cannot be computed, "" if they can."""
     try:
         if result.summary.joint_names:
             _ = result.evaluator
@@ -59,6 +61,8 @@ def reactions_of(result: "Result") -> "xarray.Dataset":
     """
     import xarray
 
+    if not result.summary.joint_index:
+        return xarray.Dataset()
     actions = [
         (f"{joint}.{slot}", joint, action)
         for joint, by_slot in result.reactions().items()
@@ -116,6 +120,36 @@ def coordinates_of(result: "Result") -> "xarray.Dataset":
             "coordinate_unit": ("coordinate", units, about("1", "unit of the coordinate")),
         },
     )
+
+
+def contacts_of(result: "Result") -> "xarray.Dataset":
+    """What the declared contacts do, at each of their points.
+
+    Returns:
+        Dimensions time, contact, axis; ``contact_gap``, ``contact_normal``, ``contact_friction``,
+        ``contact_slip``, ``contact_mode``; coordinate ``contact`` with the names of the points, and
+        ``contact_turns``, 1 for those whose gap, slip and moments are in rad, rad/s and N m.
+
+    Raises:
+        ResultError: the model is not available.
+    """
+    import xarray
+
+    points = result.summary.contact_points
+    outputs = [result.contact(point) for point in points]
+    variables: dict[str, Any] = {}
+    for name, part in CONTACT_QUANTITIES.items() if points else ():
+        values = np.stack([getattr(one, part.attribute) for one in outputs], axis=1)
+        units = {one.units[part.attribute] for one in outputs}
+        dimensions = ("time", "contact", "axis")[: values.ndim]
+        unit = units.pop() if len(units) == 1 else "SI"
+        variables[f"contact_{name}"] = (dimensions, values, about(unit, part.label))
+    turns = [int(one.units["slip"] == "rad/s") for one in outputs]
+    coordinates = {
+        "contact": ("contact", np.array(points, dtype=str), about("1", "point of a contact")),
+        "contact_turns": ("contact", turns, about("1", "1 where it turns")),
+    }
+    return xarray.Dataset(variables, coordinates if points else None)
 
 
 def selection_of(result: "Result", names: Iterable[str]) -> "xarray.Dataset":

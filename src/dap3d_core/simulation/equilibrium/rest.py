@@ -129,7 +129,7 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
 
     table, still = ContactTable(evaluator), u.copy()
     velocities_of(still)[:] = 0.0
-    gaps, limit = table.outputs(0.0, still)[:, GAP], TOUCHING * evaluator.model.length
+    gaps, limit = table.outputs(0.0, still)[:, GAP], TOUCHING * table.length
     table.find_grips(0.0, still)
     touching, slips = np.flatnonzero(gaps < limit).tolist(), "jams"
     try:

@@ -107,15 +107,14 @@ class ContactJumps(Jumps):
         Raises:
             SceneError: bodies overlap.
         """
-        length = self._evaluator.model.length
         if self.repeats:
             self._repeat(integration)
             return
-        gaps = self._gaps(integration)
-        beyond = np.flatnonzero(gaps < -TOUCHING_AT_START * length)
+        gaps, touching = self._gaps(integration), TOUCHING_AT_START * self.table.length
+        beyond = np.flatnonzero(gaps < -touching)
         if beyond.size:
             raise SceneError([self._overlap(int(k), -gaps[k]) for k in beyond])
-        self._resolve(integration, [], TOUCHING_AT_START * length)
+        self._resolve(integration, [], touching)
 
     def _movable(self, rows: ContactRows, closed: list[int]) -> list[int]:
         """Contacts that joints leave an effect; those that touch a body that they hold do nothing.
@@ -123,12 +122,12 @@ class ContactJumps(Jumps):
         Raises:
             SimulationError: one closes, and joints prescribe that.
         """
-        movable, limit = list[int](), -AT_REST * self._evaluator.model.length
+        movable, limits = list[int](), -AT_REST * self.table.length
         for c in closed:
             row = rows.G[3 * c]
             if self.table.alone[c] or rows.W[3 * c, 3 * c] > HELD * (row @ rows.inverse @ row):
                 movable.append(c)
-            elif rows.slip[c, 0] < limit or rows.free[3 * c] < limit:
+            elif rows.slip[c, 0] < limits[c] or rows.free[3 * c] < limits[c]:
                 raise SimulationError(
                     f"the run stopped at t = {rows.t:.9g} s: contact {self.table.names[c]} closes, "
                     "and joints or drivers prescribe the motion of its bodies: nothing that it "
@@ -144,7 +143,7 @@ class ContactJumps(Jumps):
             remedy = "turn them back by that about the axis, or change the bound"
         elif self.table.movable[k]:
             remedy += ", or have them moved until they touch (touch = true)"
-        least = TOUCHING_AT_START * self._evaluator.model.length
+        least = TOUCHING_AT_START * self.table.length[k]
         return Mistake(
             self.table.names[k], MISSING, f"its bodies overlap by {depth:.6g} {unit} at the start",
             remedy=f"{remedy}; a gap of up to {least:g} {unit} counts as touching",
@@ -163,7 +162,7 @@ class ContactJumps(Jumps):
             self._repeat(integration)
             return
         self._refuse_endless(integration, [self.table.names[c] for c, _ in which])
-        self._resolve(integration, which, TOUCHING * self._evaluator.model.length)
+        self._resolve(integration, which, TOUCHING * self.table.length)
 
     def repeat_of(self, other: Jumps) -> None:
         """Decide what another decided at its last instant, at states nearby.
@@ -263,7 +262,7 @@ class ContactJumps(Jumps):
 
     def settle(self, integration: Integration) -> None:
         """Find velocities and modes anew, where joints have ended or velocities were set."""
-        self._resolve(integration, [], TOUCHING * self._evaluator.model.length)
+        self._resolve(integration, [], TOUCHING * self.table.length)
 
     def _gaps(self, integration: Integration) -> Floats:
         u = self._state_of(integration)
@@ -273,14 +272,14 @@ class ContactJumps(Jumps):
 
     @IGNORE_FLOAT_ERRORS
     def _resolve(
-        self, integration: Integration, ended: list[tuple[int, int]], touching: float
+        self, integration: Integration, ended: list[tuple[int, int]], touching: Floats
     ) -> None:
         """Velocities and modes at the present state.
 
         Args:
             integration: of the run.
             ended: contacts with which of their switches has changed its sign.
-            touching: gap, m, below which contacts touch.
+            touching: (m,) gap, m or rad, below which each contact touches.
         """
         evaluator, table, t = self._evaluator, self.table, integration.t
         u, before = self._state_of(integration), evaluator.states[table.mode].copy()
@@ -299,7 +298,7 @@ class ContactJumps(Jumps):
         sliding, leaving, stopped = self._what_ended(rows, outputs, before, ended)
         closed = self._movable(rows, closed)
         opening = {c for c, _ in ended if before[c] < 0.5 and rows.closing[c] > 0.0}
-        impact = collide(table, rows, closed, evaluator.model.length)
+        impact = collide(table, rows, closed)
         table.find_grips(t, rows.with_velocities(rows.v))
         jammed, self._jammed = self._jammed, ""
         try:
@@ -341,7 +340,7 @@ class ContactJumps(Jumps):
             SimulationError: none does.
         """
         table = self.table
-        stopped = unjam(table, rows, closed, impact, self._evaluator.model.length)
+        stopped = unjam(table, rows, closed, impact)
         try:
             if stopped is not None:
                 table.find_grips(rows.t, rows.with_velocities(rows.v))
@@ -362,10 +361,10 @@ class ContactJumps(Jumps):
         What opens from rest, or opened already, would stop the run again where its gap is as deep
         as a switch passes.
         """
-        rounding = POSITION_ROUNDING * self._evaluator.model.length
-        still = AT_REST * self._evaluator.model.length
-        slow = [c for c in others if rows.closing[c] < still or c in opening]
-        deep = [c for c in slow if gaps[c] < -0.5 * rounding]
+        length = self.table.length
+        rounding = POSITION_ROUNDING * length
+        slow = [c for c in others if rows.closing[c] < AT_REST * length[c] or c in opening]
+        deep = [c for c in slow if gaps[c] < -0.5 * rounding[c]]
         return rows.lifted(gaps, [*held, *deep], others, 2.0 * rounding)
 
     def _outputs(self, t: float, u: Floats) -> Floats:
@@ -389,10 +388,7 @@ class ContactJumps(Jumps):
                 size = length_of(force)
                 if size > 0.0:
                     sliding[c] = self.table.slip_against(c, force)
-            elif (
-                length_of(rows.slip[c, self.table.across(c)])
-                < STOPPED * self._evaluator.model.length
-            ):
+            elif length_of(rows.slip[c, self.table.across(c)]) < STOPPED * self.table.length[c]:
                 stopped.append(c)
         self._stop(rows, stopped, before)
         return sliding, leaving, stopped
@@ -419,8 +415,8 @@ class ContactJumps(Jumps):
         )
         for c in np.flatnonzero(modes.mode == 1.0).tolist():
             slip, frame = rows.slip[c, table.across(c)], rows.frames[c, table.across(c)]
-            if length_of(slip) > STOPPED * evaluator.model.length:
-                states[table.way[c]] = slip / length_of(slip) @ frame
+            if length_of(slip) > STOPPED * table.length[c]:
+                states[table.way[c]] = table.length[c] * slip / length_of(slip) @ frame
         moved = np.zeros(len(rows.v))
         self._go_on(integration, u, rows, moved, states, float(np.sum(impact.work)))
 

@@ -70,10 +70,10 @@ class ContactForces:
 
     def at(self, t: float, u: Floats) -> Closed:
         """The contacts that a state u (13 n,) closes."""
-        table, length = self.table, self.table.evaluator.model.length
+        table = self.table
         outputs, rows = table.outputs(t, u), ContactRows(table, t, u)
-        still, slip = STILL * length, rows.slip
-        near = (np.abs(outputs[:, GAP]) < CLOSED * length) & (outputs[:, REACH] >= 0.0)
+        still, slip = STILL * table.length, rows.slip
+        near = (np.abs(outputs[:, GAP]) < CLOSED * table.length) & (outputs[:, REACH] >= 0.0)
         columns, places, known = [], list[int](), np.zeros(len(rows.v))
         cones: dict[int, tuple[list[int], float]] = {}
         states, loaded = table.evaluator.states.copy(), table.evaluator.states.copy()
@@ -81,7 +81,7 @@ class ContactForces:
         for c in np.flatnonzero(closed).tolist():
             across = table.across(c)
             normal, tangents = rows.G[3 * c], rows.G[3 * c : 3 * c + 3][across]
-            sliding = length_of(slip[c, across]) > still
+            sliding = length_of(slip[c, across]) > still[c]
             way = slip[c, across] / length_of(slip[c, across]) if sliding else 0.0 * slip[c, across]
             friction = -table.mu[c] * (way @ tangents)
             own, first = [], len(places)
@@ -98,7 +98,7 @@ class ContactForces:
             cones[c] = list(range(first, len(places))), float(table.mu_s[c])
             for some in (states, loaded) if c in table.loads and sliding else (states,):
                 some[table.mode[c]] = 1.0 if sliding else 2.0
-                some[table.way[c]] = way @ rows.frames[c, across]
+                some[table.way[c]] = table.length[c] * way @ rows.frames[c, across]
         wrenches = np.array(columns).reshape(-1, len(rows.v)).T
         load = {c: np.inf if c in table.loads else 1.0 for c in cones}  # unknown at first
         return Closed(wrenches, known, cones, places, states, loaded, load)

@@ -12,11 +12,13 @@ import numpy as np
 import pytest
 from support.command_line import dap3d
 from support.falling import SCENE
+from support.process import REPOSITORY
 from tests.e2e.conftest import COMMAND, environment
 
 import dap3d_core as dap
 from dap3d_core.cli import main
 
+ARM = REPOSITORY / "tests" / "data" / "formats" / "arm.urdf"
 #: Width of the narrowest terminal that lines are made for.
 COLUMNS = 60
 
@@ -37,6 +39,7 @@ def folder(falling, tmp_path, monkeypatch):
     """The working folder: that scene and result, and things that are none."""
     for name in ("fall.toml", "fall.nc"):
         shutil.copy(falling / name, tmp_path / name)
+    shutil.copy(ARM, tmp_path)
     shutil.copy(falling / "fall.nc", tmp_path / "single.nc.part")
     shutil.copy(falling / "swept.nc", tmp_path / "swept.nc.part")
     (tmp_path / "foreign.nc.part").write_text("words\n")
@@ -66,7 +69,7 @@ def call(folder, capfd):
     return run
 
 
-R = "fall.nc"
+R, MASS = "fall.nc", "bodies.stone.mass"
 #: The file of a sweep.
 S = "swept.nc.part"
 #: Commands that read a result.
@@ -75,6 +78,7 @@ OF_RESULTS = ("info", "post", "export", "plot", "animate", "view")
 SWEEP = ("sweep", "fall.toml")
 VARY, KEEP = ("--vary", "bodies.stone.mass=1,2"), ("--keep", "stone.r.z")
 QUIET = ("-o", "new.nc")
+RESPONSE = ("response", "fall.toml", "--input", "gravity.gravity", "--output", "stone.r.x")
 #: Words of a command -> what its message says. All are refused with 2 and change no file.
 REFUSED = [
     # settings
@@ -155,6 +159,37 @@ REFUSED = [
     (("run", "fall.toml", "-o", R), "--force overwrites it"),
     (("run", "fall.toml", "-o", "fall.toml", "--force"), "is the input file"),
     (("run", "fall.toml", "-o", "x" * 300), "File name too long"),
+    *(((c, "fall.toml", "-o", "x.csv"), "name a .nc file with -o; dap3d post")
+      for c in ("run", "kinematics")),
+    ((*SWEEP, *VARY, *KEEP, "-o", "x"), "name a .nc file"),
+    (("equilibrium", "fall.toml", "-o", "x.csv"), "name a .toml file"),
+    # analyses
+    (("modes", "fall.toml", "--from", f"{R}@0.044"), "no instant at t = 0.044 s; the nearest is"),
+    (("modes", "fall.toml", "--from", f"{R}@soon"), "'soon' is no time in s"),
+    (("modes", "fall.toml", "--from", R, "--t", "1"), "--t does not go with --from"),
+    (("modes", "fall.toml", "--mode", "1"), "--mode chooses the motion that -o writes"),
+    (("modes", "fall.toml", "--mode", "7", "-o", "m.nc"), "the modes are 1 to 6"),
+    (("modes", "fall.toml", "--plot", "e.txt"), "cannot write e.txt"),
+    (("modes", "fall.toml", "-n", "0"), "0"),
+    (("modes", "fall.toml", "--over", MASS), "write PARAMETER=FROM:TO:N"),
+    (("modes", "fall.toml", "--over", "bodies.stone.mas=1:2:3"), f"did you mean '{MASS}'"),
+    (("modes", "fall.toml", "--over", f"{MASS}=1:x:3"), "'x' is no finite number"),
+    (("modes", "fall.toml", "--over", f"{MASS}=1:2:3", "-o", "m.nc"), "--over does not go with"),
+    *((("modes", "pen1", "--t", t), "--t") for t in ("inf", "-inf", "nan", "1e999", "x")),
+    ((*RESPONSE, "--from", "3", "--to", "1"), "give --from below --to"),
+    ((*RESPONSE, "--output", "stone.r.q"), "stone.r has x, y, z"),
+    ((*RESPONSE, "--input", "gravity.gravit"), "did you mean 'gravity'"),
+    ((*RESPONSE, "-o", "bode.docx"), ".png"),
+    ((*RESPONSE, "-n", "1"), "is not in the range"),
+    # starts
+    (("run", "fall.toml", "--from", f"{R}@9"), "the result reaches from t = 0 s to 0.1 s"),
+    (("run", "fall.toml", "--from", f"{R}@soon"), "'soon' is no time in s"),
+    (("run", "fall.toml", "--from", "fall.toml"), "fall.toml"),
+    (("run", "fall.toml", "--from", R, "--start", "equilibrium"), "give one"),
+    (("run", "fall.toml", "--start", "rest"), "'scene', 'equilibrium'"),
+    (("run", "fall.toml", "--from", ""), "is an empty word"),
+    (("run", "pen1", "--from", R), "it is of another scene: it has no body cone"),
+    (("equilibrium", "fall.toml", "--from", R, "-o", R, "--force"), "is the input file"),
     # results
     *(((c, "nothing.nc"), "there is no such file") for c in ("info", "post", "plot", "view")),
     *(((c, "empty.nc"), "the file is empty") for c in OF_RESULTS),
@@ -189,8 +224,29 @@ REFUSED = [
     (("new-plugin",), "Missing argument"),
     (("new-plugin", "mine", "--kind", "wheel"), "'wheel' is not one of"),
     (("new-plugin", "rev"), "there is a joint type 'rev' already"),
+    (("new-plugin", "mine", "--author", "a\nb"), "one line"),
+    *((("new-plugin", name, "--force"), "would hide dap3d's own")
+      for name in ("core", "joints", "formats")),
+    *((("new-plugin", n, "--kind", k), f"there is an {k} '{n}' already, from distribution dap3d")
+      for k, n in (("importer", "urdf"), ("exporter", "vtk"))),
+    # a built-in one would never be reached, forced or not
+    *((("new-plugin", n, "--kind", k, *force), f"dap3d itself has the {k} '{n}'")
+      for k, n in (("integrator", "auto"), ("shape", "box")) for force in ((), ("--force",))),
+    *((("plugins", "--no-compile", "--limit", n), "--limit") for n in ("nan", "inf", "0", "-1")),
     (("import", "nothing.urdf"), "there is no file nothing.urdf"),
     (("import", "sub"), "sub is a folder"),
+    (("import", "amr.urdf"), "did you mean 'arm.urdf'"),
+    (("import", "arm.urdf", "--strict"), "effort"),
+    (("import", "arm.urdf", "--root", "nowhere"), "nowhere is no folder"),
+    (("import", "arm.urdf", "--position", "elbw=1"), "no such joint"),
+    (("import", "arm.urdf", "--position", "elbow"), "write NAME=VALUE"),
+    (("import", "arm.urdf", "--position", "a=1", "--position", "a=2"), "more than once"),
+    (("import", "arm.urdf", "--position", "elbow=1,x"), "is no number"),
+    (("import", "arm.urdf", "--package", "a=nowhere"), "nowhere is no folder"),
+    (("import", "arm.urdf", "--limits", "softly"), "'off', 'soft', 'hard'"),
+    (("import", "arm.urdf", "--arg", "L=2"), "write NAME:=VALUE"),
+    (("import", "arm.urdf", "--arg", "L:=2"), "takes no argument 'L'"),
+    (("run", "arm.urdf"), "dap3d import arm.urdf"),
     (("import", "words", "--format", "urfd"), "did you mean 'urdf'"),
     (("import-matlab", "nothing"), "there is no such folder"),
     (("import-matlab", "sub"), "there is no inBodies.m"),
@@ -404,3 +460,20 @@ def test_an_exploding_run_ends_with_3_and_names_the_first_offender(call, folder,
     assert result.status == "stopped"
     assert all(np.all(np.isfinite(a)) for a in (result.u, result.v_dot, result.work))
     assert result.t[-1] < 0.08
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("run", "fall.toml"), ("post", R), ("post", R, "--format", "csv"), ("plot", R, "stone.r.z"),
+     ("export", R, "--format", "mat"), ("export", "fall.toml", "--format", "urdf"), ("view", R),
+     ("export", "fall.toml", "--format", "fmu"), ("export", "fall.toml", "--format", "c"),
+     ("animate", R), (*SWEEP, *VARY, *KEEP), ("report", "fall.toml"),
+     ("modes", "fall.toml", "--mode", "1"), ("sensitivities", "fall.toml", *VARY, "stone.r.z")],
+    ids=lambda words: "-".join(words[:1]),
+)  # fmt: skip
+def test_no_output_takes_the_place_of_a_scene(call, folder, words):
+    """Not with --force either: a command overwrites files of the kind that it writes."""
+    shutil.copy(folder / "fall.toml", folder / "other.toml")
+    code, _, err = call(*words, "-o", "other.toml", "--force")
+    assert code == 2, err
+    assert (folder / "other.toml").read_text() == SCENE

@@ -78,27 +78,6 @@ def test_from_a_result(model, capsys):
         assert json.loads(capsys.readouterr().out)["t"] == t
 
 
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--from", "run.nc@0.4"], "no instant at t = 0.4 s; the nearest is t = 0.5 s"),
-        (["--from", "run.nc@soon"], "'soon' is no time in s"),
-        (["--from", "run.nc", "--t", "1"], "--t does not go with --from"),
-        (["--mode", "1"], "--mode chooses the motion that -o writes"),
-        (["--mode", "7", "-o", "m.nc"], "there is no mode 7: the modes are 1 to 1"),
-        (["--plot", "e.txt"], "cannot write e.txt"),
-        (["-n", "0"], "0"),
-    ],
-)
-def test_refusals(model, capsys, words, message):
-    """Wrong usage ends with exit code 2 and one clear message."""
-    dap.simulate(model, t_end=1.0, dt=0.5).save("run.nc")
-    assert main(["modes", model, *words]) == 2
-    error = capsys.readouterr().err
-    assert message in " ".join(error.split())
-    assert "Traceback" not in error
-
-
 def test_over_a_parameter(model, capsys, monkeypatch):
     """--over follows the mode: sqrt(g l m / J) of a rod whose mass and inertia vary."""
     monkeypatch.setenv("COLUMNS", "60")
@@ -112,11 +91,3 @@ def test_over_a_parameter(model, capsys, monkeypatch):
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 60
     assert any(line.split() == ["1", "0.61052", "0.66879", "0", "0"] for line in lines)
-    for wrong, said in (
-        (["--over", "bodies.rod.mass"], "write PARAMETER=FROM:TO:N"),
-        (["--over", "bodies.rod.mas=1:2:3"], "did you mean 'bodies.rod.mass'"),
-        (["--over", "bodies.rod.mass=1:x:3"], "'x' is no finite number"),
-        (["--over", "bodies.rod.mass=1:2:3", "-o", "m.nc"], "--over does not go with"),
-    ):
-        assert main(["modes", model, *wrong]) == 2
-        assert said in " ".join(capsys.readouterr().err.split())

@@ -38,19 +38,3 @@ def test_table_fits_sixty_columns(model, capsys, monkeypatch):
     assert any("b.r.x over push" in line for line in lines)
     assert any(line.split()[:2] == ["1.1254", "0.37723"] for line in lines)
     assert main([*model, "-o", "bode.png"]) == 2  # it exists
-
-
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--from", "3", "--to", "1"), "give --from below --to"),
-        (("--output", "b.r.q"), "b.r has x, y, z"),
-        (("--input", "pus"), "did you mean 'push'"),
-        (("-o", "bode.docx"), ".png"),
-        (("-n", "1"), "is not in the range"),
-    ],
-)
-def test_what_is_refused(model, words, said, capsys):
-    """One message, exit status 2."""
-    assert main([*model, *words]) == 2
-    assert said in capsys.readouterr().err

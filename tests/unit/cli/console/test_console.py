@@ -30,3 +30,16 @@ def test_an_empty_column_breaks_no_other(capsys):
     assert [line.rstrip() for line in capsys.readouterr().out.splitlines()] == [
         "   a", "   1  stable", "  -2  stable",
     ]  # fmt: skip
+
+
+def test_lists_of_a_docstring_are_lists(monkeypatch, capsys):
+    """Items keep their lines, wrapped below their text; equations and paragraphs as before."""
+    monkeypatch.setenv("COLUMNS", "30")
+    stdout().prose(
+        "A curve of\nbody j:\n\n* y = f(x), by ``function``, over\n  its abscissa;\n* in space.\n\n"
+        "As it is:\n    y = f(x)\nThe end."
+    )
+    assert capsys.readouterr().out.splitlines() == [
+        "A curve of body j:", "", "  - y = f(x), by ``function``,", "    over its abscissa;",
+        "  - in space.", "", "As it is:", "    y = f(x)", "The end.", "",
+    ]  # fmt: skip

@@ -7,10 +7,8 @@ import pytest
 from click.testing import CliRunner
 from support.internals import Refused, Terminated
 
-import dap3d_core as dap
 from dap3d_core.cli.framework import error_messages
 from dap3d_core.cli.framework.error_messages import report_error
-from dap3d_core.scene import Mistake
 
 
 def reported(error, debug=False):
@@ -50,20 +48,6 @@ def test_errors_have_their_exit_codes(error, code):
     found, data, err = reported(error)
     assert found == data["exit_code"] == code
     assert len(err.splitlines()) == 1
-
-
-def test_all_mistakes_of_a_scene_are_listed():
-    mistakes = [
-        Mistake("a.b", float("nan"), "wrong", "ab", "do", "f.toml", 3),
-        Mistake("c", 1, "x"),
-    ]
-    code, data, err = reported(dap.SceneError(mistakes))
-    assert code == 2
-    assert data["mistakes"][0] == {
-        "file": "f.toml", "line": 3, "key": "a.b", "value": None, "what": "wrong",
-        "nearest": "ab", "remedy": "do",
-    }  # fmt: skip
-    assert err.splitlines()[:2] == ["2 mistakes:", "f.toml:3: a.b = nan: wrong; did you mean 'ab'?"]
 
 
 @pytest.mark.parametrize("error", [Refused("cannot write a.nc: HDF error"), KeyError()])

@@ -3,7 +3,12 @@
 import numpy as np
 
 from dap3d_core.integrators.moreau.arrays import CONE
-from dap3d_core.integrators.moreau.dense import solve_blocks, solve_dense
+from dap3d_core.integrators.moreau.matrix import (
+    factor_blocks,
+    factor_square,
+    solve_blocks,
+    solve_square,
+)
 from dap3d_core.integrators.moreau.newton import put_missed, put_projected, put_slopes
 
 
@@ -56,7 +61,9 @@ def test_elimination_solves_as_numpy_does():
     rng = np.random.default_rng(2)
     K, x = rng.standard_normal((30, 30)), rng.standard_normal(30)
     expected, found = np.linalg.solve(K, x), x.copy()
-    solve_dense(K.copy(), found)
+    factors, exchanged = K.ravel().copy(), np.zeros(len(x), dtype=np.int64)
+    factor_square(factors, exchanged, len(x))
+    solve_square(factors, exchanged, found, len(x))
     assert np.abs(found - expected).max() < 1e-11  # condition of some hundreds
 
 
@@ -75,5 +82,7 @@ def test_elimination_by_blocks_solves_as_numpy_does():
                 full[row, :, column] = block[:] = rng.standard_normal((6, 6))
     x = rng.standard_normal(6 * n)
     expected = np.linalg.solve(full.reshape(6 * n, 6 * n), x)
-    solve_blocks(K, x, n, start, entries, np.zeros(n, dtype=np.int64), np.zeros(36))
+    scratch = np.zeros(36)
+    factor_blocks(K, n, start, entries, np.zeros(n, dtype=np.int64), scratch)
+    solve_blocks(K, x, n, start, entries, scratch)
     assert np.abs(x - expected).max() < 1e-11  # condition of some hundreds

@@ -126,8 +126,9 @@ NOT_CALLED = {
             "find_pairs add_pair meet ranked place_of fill_cells grid_pairs"
         ),
         "assembly.collisions.find": "has_formula touch find_touches",
-        "integrators.moreau.dense": (
-            "solve_dense solve_square solve_blocks invert multiply take take_from"
+        "integrators.moreau.matrix": (
+            "is_factored assemble add_load add_pressed put_turned add_contact "
+            "factor_square solve_square factor_blocks solve_blocks invert multiply take take_from"
         ),
         "integrators.moreau.gauss_seidel": (
             "sweep_bodies sweep_contacts size_of change_of refine_held copy_impulses put_crossed "
@@ -148,10 +149,9 @@ NOT_CALLED = {
             "log_contacts"
         ),
         "integrators.moreau.newton": (
-            "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of add_load "
-            "put_velocities clear add_pull times_inverse add_inverse speed_of left_at residual_of "
-            "residual_after newton exchange put_rest product_of solve_round try_pass assemble "
-            "put_turned add_contact add_pressed"
+            "put_projected slip_size put_slopes put_missed rim_of bound_of impulse_of begin_round "
+            "aim_of put_velocities clear add_pull times_inverse add_inverse speed_of left_at "
+            "residual_of residual_after newton exchange put_rest product_of solve_round try_pass"
         ),
         "integrators.moreau.problem": (
             "prepare_problem take_carried felt_by solve judge sweep finish refine_groups"

@@ -43,17 +43,6 @@ def test_turns_are_counted_though_reports_are_far_apart(turning):
         np.testing.assert_array_equal(one, other)
 
 
-def test_a_joint_with_an_angle_and_a_length():
-    result = dap.simulate(spinning("cyl"), t_end=0.5, dt=0.05)
-    value = {n: result.quantity(f"hinge.{n}").values
-             for n in ("angle", "length", "angle_rate", "length_rate")}  # fmt: skip
-    np.testing.assert_allclose(value["angle"], RATE * result.t, atol=1e-9)
-    np.testing.assert_allclose(value["length"], SPEED * result.t, atol=1e-12)
-    np.testing.assert_allclose(value["length_rate"], SPEED, rtol=1e-12)
-    assert result.quantity("hinge.length").unit == "m"
-    assert result.coordinates("hinge").q.shape == (len(result.t), 2)
-
-
 def test_a_screw_has_coordinates():
     """It turns by its advance over its pitch."""
     scene = dap.Scene(name="screw")

@@ -158,9 +158,12 @@ def test_the_nearest_right_name(result, wrong, right):
         ("bob.r.x.y", "bob.r has x, y, z, norm, not 'x.y'"),
         ("bob.p.norm", "bob.p has e0, e1, e2, e3, not 'norm'"),
         ("P.w", "the point 'P' has r, v, a, not 'w'"),
-        ("zzz.r", "no body, point, joint or force 'zzz'; body: bob; point: Q, H, P; joint: J1"),
+        (
+            "zzz.r",
+            "no body, point, joint, contact or force 'zzz'; body: bob; point: Q, H, P; joint: J1",
+        ),
         ("", "no quantity ''; there are BODY.r"),
-        (".", "no body, point, joint or force ''"),
+        (".", "no body, point, joint, contact or force ''"),
     ],
 )
 def test_what_is_wrong_with_a_name(result, wrong, words):

@@ -29,7 +29,7 @@ def mistake_of(tmp_path, outputs):
         ("a = 3", "an expression in quotes"),
         ("a = 'stone.q'", "the body 'stone' has r, p"),
         ("a = 'stoen.r'", "did you mean 'stone.r'"),
-        ("a = 'enrgy.kinetic'", "there is no body, point, joint or force 'enrgy'"),
+        ("a = 'enrgy.kinetic'", "there is no body, point, joint, contact or force 'enrgy'"),
         ("a = 'stone.r + stone.p'", "vectors of 3 and 4 components"),
         ("a = 'a + 1'", "in a circle: a -> a"),
         ("stone = 't'", "one of this name in bodies already"),

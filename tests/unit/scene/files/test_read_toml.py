@@ -63,16 +63,6 @@ def test_a_folder_of_the_users_own_goes_before_a_shipped_model_and_says_so(monke
     assert "also the name of a shipped model" in scene.notes[0]
 
 
-def test_a_missing_model_names_the_nearest():
-    name = max(dap.shipped_models(), key=len)
-    said = refused(name[:-1])
-    assert "there is no file or folder" in said
-    assert f"did you mean {name!r}" in said or any(
-        f"did you mean {n!r}" in said for n in dap.shipped_models()
-    )
-    assert ", ".join(dap.shipped_models()) in said
-
-
 def test_a_missing_file_names_the_nearest_in_its_folder(tmp_path, monkeypatch):
     (tmp_path / "derrick.toml").write_text(TEXT)
     near = str(tmp_path / "derrick.toml")

@@ -99,20 +99,6 @@ def test_a_models_own_types_are_refused_until_code_is_allowed(model, registry, t
     assert "push" not in registry.keywords("force")
 
 
-def test_a_plugin_that_is_not_needed_is_not_run(model, registry, capfd):
-    checked = check(model('[forces.g]\ntype = "weight"\n'), registry, allow_code=True)
-    assert "the plugin is run" not in "".join(capfd.readouterr())
-    assert any("plugin.py was not loaded" in note for note in checked.notes)
-
-
-def test_a_broken_plugin_of_a_model_is_reported_at_the_element(model, registry, tmp_path):
-    scene = model('[forces.p]\ntype = "push"\nbody_i = "a"\n[joints.j]\ntype = "between"\n')
-    (tmp_path / "plugin.py").write_text("import nothing_of_this_name\n")
-    mistakes = mistakes_of(scene, registry, allow_code=True)
-    assert [m.key for m in mistakes] == ["forces.p.type", "joints.j.type"]
-    assert all("nothing_of_this_name" in str(m) for m in mistakes)
-
-
 def test_a_word_that_neither_the_plugin_knows_is_reported(model, registry):
     (mistake,) = mistakes_of(
         model('[forces.p]\ntype = "pull"\nbody_i = "a"\n'), registry, allow_code=True

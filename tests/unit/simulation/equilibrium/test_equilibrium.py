@@ -36,16 +36,6 @@ def test_a_motor_holds_a_pendulum_or_turns_it_without_end(moment):
         assert found.r[0] == pytest.approx([math.sin(angle), 0, -math.cos(angle)], abs=1e-15)
 
 
-def test_the_scene_at_rest_can_be_saved_and_is_at_rest(tmp_path):
-    """The types of the toggle take no reference from poses. A step may be made of last digits."""
-    found = dap.equilibrium(at_rest.toggle(1.2))
-    scene = found.scene()
-    assert scene.notes == []
-    again = dap.equilibrium(scene.save(tmp_path / "rest.toml"))
-    assert again.steps <= 1
-    assert again.r == pytest.approx(found.r, abs=1e-15)
-
-
 def referring():
     """An arm, a slider in it and a ball whose elements count from the poses of the scene."""
     scene = at_rest.pendulum(1.2, "referring")

@@ -190,16 +190,6 @@ def test_balls_that_touch_without_a_load_cost_no_steps():
     assert result.stats.rhs < 30_000  # 10_000; without a band of rounding there is no end
 
 
-def test_what_approaches_at_the_start_rebounds_there():
-    scene = dap.Scene(name="at_the_floor")
-    scene.add_body("ball", mass=2.0, Jp=(0.1, 0.1, 0.1), r_dot=(0.0, 0.0, -1.0))
-    scene.add_force("test-bounce", "floor", P_i="ball.O", e=0.5)
-    result = dap.simulate(dap.compile(scene, registry=JUMPING), t_end=1.0)
-    (jump,) = jumps_of(result)
-    assert (jump.t, jump.direction) == (0.0, 0)
-    np.testing.assert_array_equal(result.rd[:, 0, 2], 0.5)
-
-
 def test_a_driver_that_moves_a_body_into_a_stop_is_refused():
     """The joint prescribes the velocity: no impulse can change it."""
     scene = dap.Scene(name="driven")

@@ -229,35 +229,6 @@ def test_the_metric_of_masses_weighs_rotations_by_inertia(rows, request):
     assert found.turned == pytest.approx(g * L / J / share, rel=1e-4)
 
 
-def test_equal_masses_make_no_difference_to_the_metric():
-    """With every mass and inertia one, both metrics are the same."""
-    evaluator, unit = corrected(door(0.02))
-    mass = correct_initial(evaluator, evaluator.model.u0, metric="mass")
-    assert mass.u == pytest.approx(unit.u, abs=1e-12)
-
-
-@pytest.mark.parametrize("metric", ["unit", "mass"])
-def test_the_metric_of_many_rows_is_that_of_few(metric, monkeypatch):
-    """Bodies of different mass and inertia, turned: the block factorisation weighs as numpy."""
-    scene = bent_chain(5)
-    _, few = corrected(scene, metric=metric)
-    monkeypatch.setattr(least_change, "DENSE_ROWS", 0)
-    monkeypatch.setattr(redundancy, "FEW_ROWS", 0)
-    _, many = corrected(scene, metric=metric)
-    assert many.u == pytest.approx(few.u, abs=1e-10)
-    assert few.u[:35] != pytest.approx(corrected(scene)[1].u[:35], abs=1e-4) or metric == "unit"
-
-
-def test_a_metric_that_is_none_is_refused():
-    """One of two words; by the scene and by the call."""
-    scene = dumb_bell(1.0)
-    with pytest.raises(dap.SceneError, match=r"correct_metric.*mass"):
-        dap.simulate(scene, t_end=0.0, correct_metric="energy")
-    scene.simulation.correct_metric = "energy"
-    with pytest.raises(dap.SceneError, match="correct_metric"):
-        dap.compile(scene)
-
-
 # ------------------------------------------------------------------ velocities
 
 

@@ -188,19 +188,6 @@ def test_motion_of_a_mode():
         lin.motion(2)
 
 
-def test_damped_modes():
-    """Real eigenvalues are modes of their own, with damping ratio one."""
-    scene = dap.Scene(name="overdamped")
-    scene.add_body("b", mass=1.0, Jp=np.eye(3), r=[1.0, 0, 0])
-    scene.add_joint("tran", "rail", P_i="b.O", P_j="ground.O", a_j="ground.x")
-    scene.add_force("ptp", "S", P_i="b.O", P_j="ground.O", k=2.0, c=3.0, l0=1.0)
-    lin = dap.linearize(scene)
-    np.testing.assert_allclose(lin.eigenvalues, [-1.0, -2.0], rtol=1e-12)
-    np.testing.assert_array_equal(lin.damping, [1.0, 1.0])
-    assert lin.stable
-    assert lin.modes.shape == (6, 2)
-
-
 def test_friction_is_a_damper_at_rest():
     """Smooth friction at rest damps with mu N / v_tol, and a note says what that means."""
     scene = dap.Scene(name="sledge")

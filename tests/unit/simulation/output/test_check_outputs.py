@@ -151,7 +151,7 @@ def test_one_joint_takes_over_from_another():
         ("bob.yaw < 1", "names bob.yaw, which steps by a turn at pi"),
         ("bob.r < 1", "is a vector, and should be one number"),
         ("bob.r.x < t", "unlike units"),
-        ("bop.r.x < 1", "there is no body, point, joint or force 'bop'"),
+        ("bop.r.x < 1", "there is no body, point, joint, contact or force 'bop'"),
         (True, "should be an expression in quotes"),
     ],
 )
