@@ -215,16 +215,22 @@ def put_found(s: ContactArrays, begins: bool, inner: bool, loose: bool) -> bool:
             s.cone.x[k], s.rates[k] = s.inner[k], 0.0
     elif not begin_to_move(s, LOOSE if loose else 1.0):
         return False
+    largest = 0.0
+    for k in range(3 * s.closed_count):
+        largest = max(largest, abs(s.cone.x[k]))
     for k in range(s.closed_count):
-        put_one(s, k, shares)
+        put_one(s, k, shares, ZERO * largest)
     if shares:
         leave_to_others(s)
     return True
 
 
 @compiled
-def put_one(s: ContactArrays, k: int, shares: bool) -> None:
-    """Put the mode of closed contact k, if it stays closed."""
+def put_one(s: ContactArrays, k: int, shares: bool, least: float) -> None:
+    """Put the mode of closed contact k, if it stays closed.
+
+    least: friction, N, whose direction is not that of rounding.
+    """
     c, force, rate = s.closed[k], s.cone.x[3 * k : 3 * k + 3], s.rates[3 * k : 3 * k + 3]
     alone, opens = s.alone[c] != 0, s.cone.A[3 * k, 3 * k] * force[0]
     if not alone and rate[0] > max(opens, 0.0):
@@ -240,7 +246,7 @@ def put_one(s: ContactArrays, k: int, shares: bool) -> None:
         size = size_across(s, c, rate)
         if size == 0.0:
             s.mode[c] = 2.0
-        elif s.mu[c] > 0.0 and size_across(s, c, force) > 0.0:
+        elif s.mu[c] > 0.0 and size_across(s, c, force) > least:
             put_slip_against(s, c, force, way)
         else:
             put_across(s, c, rate, 1.0 / size, way)
