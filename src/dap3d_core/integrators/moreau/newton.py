@@ -37,7 +37,7 @@ HELPS, ROUNDS, PASSES, CUTS = 0.5, 40, 40, 8
 #: Part of the tolerance to which a round is solved.
 INNER = 1e-2
 #: The best to which a round is solved.
-ROUNDING = 1e-15
+SOLUTION_ROUNDING = 1e-15
 #: A residual from which a round that does not help is the last.
 SETTLED = 2e-14
 TINY = 1e-300
@@ -390,7 +390,7 @@ def aim_of(s: StepArrays, tolerance: float, rubs: bool) -> float:
         size += product_of(x, x, s.mass[b], s.spin[b])
         if not rubs:
             size += product_of(s.free[b], s.free[b], s.mass[b], s.spin[b])
-    return max(tolerance, ROUNDING) ** 2 * size
+    return max(tolerance, SOLUTION_ROUNDING) ** 2 * size
 
 
 @compiled
