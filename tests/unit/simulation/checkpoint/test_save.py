@@ -45,27 +45,33 @@ def quarter_car():
 @pytest.mark.every(5)
 @pytest.mark.skipif(not jit_is_on(), reason="takes long in plain Python")
 @pytest.mark.parametrize(
-    ("make", "t", "has_factors"),
+    ("make", "has_factors"),
     [
-        (quarter_car, 0.5, True),
-        (quarter_car, 1.3, False),
-        (mechanisms.door, 0.2, False),  # its rows are regularised
+        (quarter_car, True),
+        (quarter_car, False),
+        (mechanisms.door, False),  # its rows are regularised
     ],
 )
-def test_a_tangent_that_is_kept_for_the_next_step(make, t, has_factors, tmp_path):
-    """It converged so fast; its factors are kept as well where the step stays as long."""
-    settings = {"t_end": t + 1.0, "dt": 0.2, "integrator": "radau"}
-    whole = dap.simulate(make(), **settings)
-    checkpoint = leave(make(), tmp_path, t, **settings)
-    arrays = read_checkpoint(checkpoint).arrays
-    state = {
-        name: arrays[f"0.{s.array}"][s.index]
-        for name, s in RadauState.scalars.items()
-        if s.array != "limits"
-    }  # which holds where this call ends
-    assert state["tangent_needed"] == 0
-    assert (state["factored_step"] == state["h"]) == has_factors
-    assert same_bits(dap.resume(checkpoint), whole)
+def test_a_tangent_that_is_kept_for_the_next_step(make, has_factors, tmp_path):
+    """It converged so fast; its factors are kept as well where the step stays as long.
+
+    The first of some instants at which that is so: steps differ by the processor.
+    """
+    settings = {"t_end": 2.3, "dt": 0.2, "integrator": "radau"}
+    for t in (0.2, 0.3, 0.4, 0.5, 0.7, 0.9, 1.1, 1.3):
+        checkpoint = leave(make(), tmp_path, t, **settings)
+        arrays = read_checkpoint(checkpoint).arrays
+        state = {
+            name: arrays[f"0.{s.array}"][s.index]
+            for name, s in RadauState.scalars.items()
+            if s.array != "limits"
+        }  # which holds where this call ends
+        kept = state["factored_step"] == state["h"]
+        if state["tangent_needed"] == 0 and kept == has_factors:
+            break
+    else:
+        pytest.fail("none of these instants has such a tangent")
+    assert same_bits(dap.resume(checkpoint), dap.simulate(make(), **settings))
 
 
 def paradox():
