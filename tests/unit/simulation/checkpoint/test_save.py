@@ -59,7 +59,8 @@ def test_a_tangent_that_is_kept_for_the_next_step(make, has_factors, tmp_path):
     """
     settings = {"t_end": 2.3, "dt": 0.2, "integrator": "radau"}
     for t in (0.2, 0.3, 0.4, 0.5, 0.7, 0.9, 1.1, 1.3):
-        checkpoint = leave(make(), tmp_path, t, **settings)
+        (folder := tmp_path / f"{t}").mkdir()
+        checkpoint = leave(make(), folder, t, **settings)
         arrays = read_checkpoint(checkpoint).arrays
         state = {
             name: arrays[f"0.{s.array}"][s.index]
