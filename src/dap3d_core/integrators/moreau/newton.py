@@ -244,7 +244,7 @@ def newton(s: StepArrays, tolerance: float) -> float:
         exchange(s)
         new = residual_after(s)
         helps = new <= HELPS * left
-        weight *= 1.0 if helps else LESS
+        weight = min(weight / LESS, WEIGHT) if helps else weight * LESS
         if new >= left:
             exchange(s)
             put_velocities(s, s.v)
