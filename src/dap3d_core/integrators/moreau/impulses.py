@@ -19,8 +19,8 @@ ON_CONE = 1e-6
 #: (interface/contacts/rows.py).
 OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0
 STILL = 1e-8
-#: Part of the impulses of joints that is tried first in the next step: shares of a load that nothing
-#: determines fade, and do not wander.
+#: Part of the impulses of joints that is tried first in the next step: shares of a load that
+#: nothing determines fade, and do not wander.
 AGAIN = 0.9
 
 
