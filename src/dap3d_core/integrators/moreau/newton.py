@@ -7,8 +7,8 @@ and y of joints,
 
 P the projection of Coulomb's law (Alart, Curnier, Comp. Meth. Appl. Mech. Eng. 92, 1991), is solved
 by Newton's method; then the impulses become what they are there. Its matrix M + J^T rho P' J is
-regular however rows depend on each other. Large weights make few rounds, and cost digits: they are
-taken back where rounds no longer help.
+regular however rows depend on each other. Large weights make few rounds, and kinks that a pass may
+not get over: they are taken back where rounds no longer help, and raised again where they do.
 """
 
 # An element of an array, and what a compiled function returns, is Any to mypy.
