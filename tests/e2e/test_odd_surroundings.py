@@ -148,16 +148,16 @@ def test_a_file_of_the_system_without_a_size_is_empty(refuse):
 def test_a_link_of_the_system_stays_and_its_pipe_is_refused(scene_file):
     """As root, ``-o /dev/stdout --force`` replaced the system's link by a result."""
     folder = scene_file().parent
-    (folder / "stdout").symlink_to("/proc/self/fd/1")
-    if not (folder / "stdout").exists():
+    (folder / "stdout.nc").symlink_to("/proc/self/fd/1")
+    if not (folder / "stdout.nc").exists():
         pytest.skip("no /proc")
-    piped = in_shell("$DAP3D run fall.toml --t-end 0.1 -o stdout --force | cat", folder)
-    assert "cannot write stdout: it is no regular file but a pipe" in piped.stderr
-    to_file = in_shell("$DAP3D run fall.toml --t-end 0.1 -o stdout --force > r.nc", folder)
+    piped = in_shell("$DAP3D run fall.toml --t-end 0.1 -o stdout.nc --force | cat", folder)
+    assert "cannot write stdout.nc: it is no regular file but a pipe" in piped.stderr
+    to_file = in_shell("$DAP3D run fall.toml --t-end 0.1 -o stdout.nc --force > r.nc", folder)
     assert to_file.returncode == 2
-    assert "stdout is the standard output of this command" in to_file.stderr
-    assert (folder / "stdout").is_symlink()
-    assert sorted(p.name for p in folder.iterdir()) == ["fall.toml", "r.nc", "stdout"]
+    assert "stdout.nc is the standard output of this command" in to_file.stderr
+    assert (folder / "stdout.nc").is_symlink()
+    assert sorted(p.name for p in folder.iterdir()) == ["fall.toml", "r.nc", "stdout.nc"]
 
 
 @posix
