@@ -21,7 +21,7 @@ OPEN, SLIDES, STICKS = 0.0, 1.0, 2.0
 STILL = 1e-8
 #: Part of the impulses of joints that is tried first in the next step: shares of a load that
 #: nothing determines fade, and do not wander.
-AGAIN = 0.9
+TRIED_PULL = 0.9
 
 
 @compiled
@@ -50,7 +50,7 @@ def recall(work: Any, s: StepArrays) -> None:
             slots[at] = count
         count += 1
     for k in range(s.y.size):
-        s.y[k] = AGAIN * work.pulls[k]
+        s.y[k] = TRIED_PULL * work.pulls[k]
     for c in range(s.contact_count):
         row, J = slots[slot_of(memory, slots, s.key[c])], s.J[c]
         for r in range(3):
