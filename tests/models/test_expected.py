@@ -15,8 +15,15 @@ EXPECTED = {
     if (folder / "expected.toml").exists()
 }
 #: Of forty loops, stiff, and of hundreds of steps with contacts.
-LONG = {"A02-40", "A05", "domino_row", "marble_run", "sphere_box", "walker"}
+LONG = {"A02-40", "A05", "domino_row", "marble_run", "sphere_box"}
+LONGEST = {"walker"}  # twenty thousand steps
 COUNTS = ("rows", "rank", "dof")
+
+
+def marks_of(name):
+    """The markers of a model."""
+    long = [pytest.mark.long] if name in LONGEST else []
+    return [pytest.mark.slow, *long] if name in LONG | LONGEST else []
 
 
 @cache
@@ -33,9 +40,7 @@ def run_to(name, t):
     return dap.simulate(compiled(name), t_end=t, dt=dt, **settings)
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(n, marks=[pytest.mark.slow] if n in LONG else []) for n in EXPECTED]
-)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=marks_of(n)) for n in EXPECTED])
 def test_expected(name):
     """Each quantity agrees with its independent value."""
     checks = EXPECTED[name]["check"]
@@ -106,3 +111,12 @@ def time_of(name, crossing):
         value = sign * (getattr(end, kind)[-1, body, crossing["component"]] - crossing["level"])
         low, high = (middle, high) if value < 0.0 else (low, middle)
     return 0.5 * (low + high)
+
+
+@pytest.mark.slow
+def test_the_walker_sets_out():
+    """A period of it, of which both halves are alike but for half a turn: it stays in place."""
+    result = dap.simulate("walker", t_end=0.5, dt=0.1)
+    for name in ("trunk.r.x", "trunk.r.y"):
+        assert np.ptp(result.quantity(name).values) < 1e-9
+    assert all(entry.ok for entry in result.ledger.values())
