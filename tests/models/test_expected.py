@@ -16,7 +16,7 @@ EXPECTED = {
 }
 #: Of forty loops, stiff, and of hundreds of steps with contacts.
 LONG = {"A02-40", "A05", "domino_row", "marble_run", "sphere_box"}
-LONGEST = {"walker"}  # twenty thousand steps
+LONGEST = {"walker"}  # fifty thousand steps
 COUNTS = ("rows", "rank", "dof")
 
 
