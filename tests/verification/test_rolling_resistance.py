@@ -1,4 +1,8 @@
-"""What resists rolling and spinning, beside closed forms of a solid ball."""
+"""What resists rolling and spinning, beside closed forms of a solid ball.
+
+Accelerations are constant, which steps follow to rounding; only where motion ends within a step is
+it off, by a part of a h^2.
+"""
 
 import numpy as np
 import pytest
@@ -37,7 +41,7 @@ def test_a_ball_that_rolls_slows_down_evenly_and_stops(declared):
     assert result.r[:, 0, 0] == pytest.approx(x, abs=a * h**2)
     assert abs(result.rd[-1, 0, 0]) < 1e-12
     early = result.t < 1.0
-    assert result.r[early, 0, 0] == pytest.approx(x[early], abs=1e-8)
+    assert result.r[early, 0, 0] == pytest.approx(x[early], abs=1e-13)
 
 
 @pytest.mark.parametrize("part", [0.95, 1.3])
@@ -48,8 +52,7 @@ def test_a_ball_rolls_down_slopes_beyond_a_limit(declared, part):
     result = dap.simulate(ball(declared, angle, mu_roll=mu_roll), t_end=1.0, dt=0.1,
                           contact_step=2e-3)  # fmt: skip
     a = max(G * np.sin(angle) - G * np.cos(angle) * mu_roll / R, 0.0) / ROLLS
-    limit = 1e-12 if part < 1.0 else 1e-8
-    assert result.r[:, 0, 0] == pytest.approx(0.5 * a * result.t**2, abs=limit)
+    assert result.r[:, 0, 0] == pytest.approx(0.5 * a * result.t**2, abs=1e-14)
 
 
 @pytest.mark.parametrize("declared", [False, True])
@@ -58,7 +61,7 @@ def test_a_ball_that_spins_stops_in_its_time(declared):
     a = mu_spin * M * G / I
     result = dap.simulate(ball(declared, w=[0.0, 0.0, w], mu_spin=mu_spin), t_end=0.6, dt=0.05,
                           contact_step=1e-3)  # fmt: skip
-    assert result.w[:, 0, 2] == pytest.approx(np.maximum(w - a * result.t, 0.0), abs=1e-9)
+    assert result.w[:, 0, 2] == pytest.approx(np.maximum(w - a * result.t, 0.0), abs=1e-11)
 
 
 def test_events_refuse_what_steps_alone_can_follow():
@@ -98,7 +101,24 @@ def test_a_cart_on_wheels_slows_down_by_what_its_wheels_resist():
     scene.add_force("weight")
     result = dap.simulate(scene, t_end=1.0, dt=0.5, contact_step=2e-3)
     a = mu_roll * whole * G / R / (whole + 4 * I / R**2)
-    assert result.rd[-1, 0, 0] == pytest.approx(v - a, abs=1e-8)
+    assert result.rd[-1, 0, 0] == pytest.approx(v - a, abs=1e-11)
     taken = 0.5 * (whole + 4 * I / R**2) * (v**2 - (v - a) ** 2)
-    assert -result.record.stepping["friction_work"] == pytest.approx(taken, rel=1e-6)
+    assert -result.record.stepping["friction_work"] == pytest.approx(taken, rel=1e-9)
     assert all(entry.ok for entry in result.ledger.values())
+
+
+def test_forty_balls_slow_down_as_one():
+    """More than a hundred contacts: sweeps, and Newton's method on each that they leave."""
+    scene, v, mu_roll, a = dap.Scene(name="forty"), 1.0, 0.01, G * 0.01 / (ROLLS * R)
+    for k in range(40):
+        r, turn = [0.0, 0.3 * k, R], [0.0, v / R, 0.0]
+        scene.add_body(f"ball{k}", mass=M, Jp=[I] * 3, r=r, r_dot=[v, 0.0, 0.0], w=turn)
+        scene.add_shape("sphere", body=f"ball{k}", radius=R, collides=True)
+    scene.add_shape("plane", body="ground", collides=True)
+    scene.add_material("felt", mu=0.8, mu_roll=mu_roll, mu_spin=0.002)
+    scene.add_collisions(material="felt")
+    scene.add_force("weight")
+    result = dap.simulate(scene, t_end=0.2, dt=0.1, contact_step=2e-3, rtol=1e-10)
+    assert result.rd[-1, :, 0] == pytest.approx(
+        np.full(40, v - 0.2 * a), abs=1e-9
+    )  # rtol, 100 steps

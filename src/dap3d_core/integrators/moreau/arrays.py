@@ -203,7 +203,6 @@ class StepArrays(Arrays):
     pull: Floats
     y_kept: Floats
     y_bounce: Floats
-    joint_y: Floats
     y_free: Floats
     # scratch
     slopes: Floats  # (2, y) flat: dy/dt
@@ -235,7 +234,7 @@ def step_arrays(evaluator: Evaluator, size: int, remembered: int, dense_size: in
     layout = model.row_layout
     scratch: dict[str, Any] = {
         **{name: np.zeros(k) for name in (
-            "s", "y", "lead", "pull", "y_kept", "y_bounce", "joint_y", "y_free")},
+            "s", "y", "lead", "pull", "y_kept", "y_bounce", "y_free")},
         **{name: np.zeros((0, 0)) for name in ("values", "vectors", "crossed", "answer", "felt")},
     }  # fmt: skip
     arrays = StepArrays(

@@ -131,8 +131,6 @@ def mode_of(s: StepArrays, c: int) -> float:
 @compiled
 def keep_for_reports(s: StepArrays) -> None:
     """Keep what contacts and joints have pushed with in this step."""
-    for k in range(s.y.size):
-        s.joint_y[k] = s.y[k]
     for c in range(s.touch_count, s.law_count):
         d, x, J = s.key[c] - DECLARED, s.x[c], s.J[c]
         kept, sign = s.declared_x[d], -1.0 if s.bodies[c, 0] > 0 else 1.0
@@ -163,9 +161,9 @@ def complete_row(work: Any, s: StepArrays, row: Floats) -> None:
         for k in range(6):
             mean = (s.end[b, k] - s.before[b, k]) / s.h
             row[s.first_v_dot + 6 * (b - 1) + k] = mean
-    own, solved = s.joint_y.size, s.is_solved != 0
+    own, solved = s.y.size, s.is_solved != 0
     for k in range(own if solved else 0):
-        row[s.first_lam + k] += s.joint_y[k] / s.h
+        row[s.first_lam + k] += work.pulls[k] / s.h
     for c in range(s.declared_gap.size if solved else 0):
         x = s.declared_x[c]
         for k in range(3):
