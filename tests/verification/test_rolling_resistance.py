@@ -122,3 +122,23 @@ def test_forty_balls_slow_down_as_one():
     assert result.rd[-1, :, 0] == pytest.approx(
         np.full(40, v - 0.2 * a), abs=1e-9
     )  # rtol, 100 steps
+
+
+def test_a_heap_comes_to_rest_where_its_balls_resist_rolling():
+    """27 balls in a box, with more than a hundred contacts that press on each other."""
+    scene, rng, radius = dap.Scene(name="heap"), np.random.default_rng(3), 0.05
+    for k in range(27):
+        x, y = 0.12 * (np.array([k % 3, k // 3 % 3]) - 1) + 1e-3 * rng.standard_normal(2)
+        r = [x, y, 0.06 + 0.11 * (k // 9)]
+        scene.add_body(f"ball{k}", mass=1.0, Jp=[0.4 * radius**2] * 3, r=r)
+        scene.add_shape("sphere", body=f"ball{k}", radius=radius, collides=True)
+    scene.add_shape("plane", body="ground", collides=True)
+    for n in ([1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]):
+        at = [-0.25 * n[0], -0.25 * n[1], 0.0]
+        scene.add_shape("plane", body="ground", at=at, normal=n, collides=True)
+    scene.add_material("felt", mu=0.4, mu_roll=0.005, mu_spin=0.01)
+    scene.add_collisions(material="felt")
+    scene.add_force("weight")
+    result = dap.simulate(scene, t_end=0.5, dt=0.1, contact_step=4e-3)
+    assert result.record.stepping["largest_residual"] <= 1e-8  # rtol
+    assert max(np.abs(result.rd[-1]).max(), np.abs(result.w[-1]).max()) < 1e-12
