@@ -8,13 +8,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.internals import change_over, objects, scene_program
 from support.plain import jit_is_on
 from support.process import REPOSITORY
 
 import dap3d_core as dap
 from dap3d_core.formulations import FORMULATIONS
-from dap3d_core.formulations.programs import change_over, scene_program
-from dap3d_core.kernels.compiler import objects
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")]
 #: Scenes with contacts have other loops of steps.

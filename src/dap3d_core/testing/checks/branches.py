@@ -168,7 +168,7 @@ class _Path:
                     yield place
 
     def _located(self, low: float, high: float, which: int, first: bool) -> float | None:
-        """The end of the interval in which a condition changes; None where the law is continuous."""
+        """Where a condition changes, from behind; None where the law is continuous there."""
         laws = [self._evaluated(low)[0], self._evaluated(high)[0]]
         small = 0
         for _ in range(HALVINGS):

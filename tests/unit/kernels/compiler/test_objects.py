@@ -7,11 +7,20 @@ from itertools import count
 
 import numpy as np
 import pytest
-from support.internals import FLOAT, Array, Entry, Functions, Program, Signature, Unit
+from support.internals import (
+    FLOAT,
+    Array,
+    Entry,
+    Functions,
+    Program,
+    Signature,
+    Unit,
+    background,
+    objects,
+    units,
+)
 from support.plain import jit_is_on
 from support.process import run, start
-
-from dap3d_core.kernels.compiler import background, objects, units
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
 
