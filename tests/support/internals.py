@@ -115,28 +115,3 @@ from dap3d_core.simulation.checkpoint.save import (
 )
 from dap3d_core.simulation.initial.assemble import correct_initial
 from dap3d_core.testing.samples.sampled_type import own_values, sampled_types, with_functions
-
-__all__ = [
-    "ANGLE", "BEHIND", "BODY_WIDTH", "COLUMNS", "COMPLEX", "COORDINATE", "DTYPES", "ENERGY",
-    "FLOAT", "FORMAT", "FRICTION", "INT", "INTEGERS", "INTEGRATORS", "JP", "LARGEST_FILE", "LOGGED",
-    "LOOP", "LOOP_KINDS", "MASS", "MATRIX", "MEASURES", "METHODS", "NOTHING", "OPERATORS",
-    "SYMBOLS", "TOLERANCE_C", "TOLERANCE_V", "VALUE", "VECTOR", "WORDS", "WRENCH", "Array",
-    "Arrays", "Checkpoint", "Collector", "CompileError", "Compiled", "Entry",
-    "Evaluator", "ExpressionError", "FormatError", "Frame", "Functions", "Inertial",
-    "IntegrationState", "Item", "Known", "Loop", "LoopArrays", "Pose", "Program",
-    "RadauIntegration", "RadauState", "Refusals", "Refused", "Remarks", "Signature", "StraightLine",
-    "Struct", "Symbol", "System", "Table", "Terminated", "TraceError", "Tuple", "Unit",
-    "address_of", "array_members", "arrays_of", "background", "build", "call_kinds", "call_loop",
-    "change_over", "classify", "columns_of", "compile_all", "compiled", "compose",
-    "constant_numbers", "constant_parts", "correct_initial", "dataset_to_write", "differentiate",
-    "distrust", "extensions", "inertia_of_mesh", "inertia_of_solid", "inverse", "jit_is_on", "join",
-    "lines_of", "load_programs", "loop_list", "make_plan", "matrices", "names_of",
-    "near_singular_rows", "objects", "off_constraints", "order_nodes", "own_values",
-    "parse_expression", "parse_xml", "path_of", "place_bodies", "placed_shapes", "pointer", "pose",
-    "read_checkpoint", "ready", "relative", "rotation", "rotation_vector", "sample_classes",
-    "sampled_types", "scene_of", "scene_program", "selected", "sized_fields", "slot_of",
-    "smooth_parts", "source_of", "specs_of", "split", "step_functions", "store_reference_pivots",
-    "stride", "total_inertia", "trace", "type_of", "u_from_y", "unit_names", "units", "unwound",
-    "with_functions", "write", "write_checkpoint", "write_checksums", "write_csv", "write_program",
-    "write_programs", "y_from_u"
-]  # fmt: skip
