@@ -101,6 +101,7 @@ class StepArrays(Arrays):
     first_v_dot = _integer()  # places in reported rows
     first_lam = _integer()
     first_state = _integer()
+    is_steady = _integer()  # 1 where contacts push as in the last step, and hit nothing
     t1 = _real()  # s, end of the step, and its length
     h = _real()
     residual = _real()
