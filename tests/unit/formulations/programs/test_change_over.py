@@ -2,13 +2,12 @@
 
 import numpy as np
 import pytest
+from support.internals import BEHIND, change_over, scene_program
 from support.plain import jit_is_on
 
 import dap3d_core as dap
 from dap3d_core.formulations import PROJECT, REPORT, RHS, WATCH
-from dap3d_core.formulations.programs import change_over, scene_program
 from dap3d_core.formulations.programs.change_over import ChangeOver
-from dap3d_core.formulations.programs.scene_program import BEHIND
 from dap3d_core.integrators import EXPLICIT
 
 pytestmark = pytest.mark.skipif(not jit_is_on(), reason="nothing is compiled")
