@@ -67,8 +67,7 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
     if not constrained:
         return usual, f"asked for {requested}, but the scene has no joints"
     raise SimulationError(
-        f"method {requested} does not fit: the scene has {len(model.joint_names)} joints with "
-        f"{model.row_count} rows; use {usual} or auto"
+        f"method {requested} does not fit: the scene has joints; use {usual} or auto"
     )
 
 
