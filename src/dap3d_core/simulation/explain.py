@@ -49,7 +49,8 @@ def choose_method(model: Model, requested: str) -> tuple[str, str]:
     """
     if model.contact_count:
         if requested in ("auto", "lsq"):
-            return "lsq", "the scene has contacts"
+            touch = any(hasattr(group.type_info.type, "gap") for group in model.contacts)
+            return "lsq", "the scene has contacts" if touch else "joints have dry friction"
         if requested == "joint" and not model.breaks:
             return "joint", "asked for"
         raise SimulationError(

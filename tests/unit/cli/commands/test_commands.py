@@ -83,7 +83,7 @@ RESPONSE = ("response", "fall.toml", "--input", "gravity.gravity", "--output", "
 REFUSED = [
     # settings
     (("run", "fall.toml", "--t-end", "-1"), "--t-end = -1.0: should be at least 0"),
-    (("run", "fall.toml", "--t-end", "soon"), "'soon' is not a valid float"),
+    (("run", "fall.toml", "--t-end", "soon"), "'soon' is not a valid number in s"),
     (("run", "fall.toml", "--t-end", "1e12", "--dt", "1"), "9.69e+04 GiB"),
     (("run", "fall.toml", "--integrator", "rk4"), "rk4 does not choose its step"),
     (("run", "fall.toml", "--checkpoint", "0"), "'0' is no time; write 90, 90s, 5min or 2h"),
