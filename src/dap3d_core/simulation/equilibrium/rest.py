@@ -327,8 +327,8 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
     rolling = model.row_owners(np.flatnonzero(~model.position_row & (rows.nu == 0.0)))
     if rolling:
         yield information(
-            f"rolling joints constrain displacements as they do velocities: "
-            f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
+            "what rolls or sticks constrains displacements as it does velocities: "
+            f"{some(rolling, MOST_NAMES)}; where the scene comes to rest depends on the way there"
         )
 
 
