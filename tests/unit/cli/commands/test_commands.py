@@ -17,6 +17,7 @@ from tests.e2e.conftest import COMMAND, environment
 
 import dap3d_core as dap
 from dap3d_core.cli import main
+from dap3d_core.result.file.atomic_write import whole_file
 
 ARM = REPOSITORY / "tests" / "data" / "formats" / "arm.urdf"
 #: Width of the narrowest terminal that lines are made for.
@@ -357,7 +358,6 @@ def test_a_folder_that_is_read_only_is_refused(folder):
 def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
     """Many times, for it is a race: the file is that of one of them, the other is told."""
     from dap3d_core.result import ResultError
-    from dap3d_core.result.file.atomic_write import whole_file
 
     told, texts = [], ["a" * 5000, "b" * 5000]
 
@@ -384,8 +384,6 @@ def test_of_two_that_write_one_file_at_once_one_wins_whole(tmp_path):
 
 def test_of_several_that_overwrite_one_file_at_once_none_disturbs_another(tmp_path):
     """With force each of them succeeds, and the file is always that of one of them, whole."""
-    from dap3d_core.result.file.atomic_write import whole_file
-
     target, errors, texts = tmp_path / "run.nc", [], [letter * 5000 for letter in "abcd"]
     barrier = threading.Barrier(len(texts))
 
