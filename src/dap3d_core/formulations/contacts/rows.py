@@ -28,7 +28,7 @@ DEPENDENT = 1e-6
 DEPENDENT_NORMALS = 1e-12
 #: Of a change of velocity this part is rounding; velocities that are set are met to this part.
 CANCELLED, HELD = 1e-15, 1e-9
-#: Part of the largest change by which a contact feels a force.
+#: Part of the mobilities of both, or of a joint, by which a contact feels a force.
 FELT = 1e-14
 #: Numbers of a contact among the states of elements: mode, way, near.
 OF_CONTACT = 7
@@ -165,23 +165,20 @@ def put_frames(s: ContactArrays) -> None:
 @compiled
 def put_feels(s: ContactArrays) -> None:
     """Which contacts change slip or load of each other by their forces."""
-    m, n, largest, most = s.state.shape[0], s.free.shape[0], 0.0, 0.0
+    m, n, size = s.state.shape[0], s.free.shape[0], s.x
     for i in range(n):
-        for k in range(n):
-            largest = max(largest, abs(s.W[i, k]))
-        for r in range(s.lam_free.shape[0]):
-            most = max(most, abs(s.reaction[r, i]))
+        size[i] = math.sqrt(max(s.W[i, i], 0.0))
     for c in range(m):
         for d in range(m):
             s.feels[c, d] = 0
     for i in range(n):
         for k in range(n):
-            if abs(s.W[i, k]) > FELT * largest:
+            if abs(s.W[i, k]) > FELT * size[i] * size[k]:
                 s.feels[i // 3, k // 3] = 1
     for c in range(m):
         for r in range(s.load_row[c], s.load_row[c] + s.load_count[c]):
             for k in range(n):
-                if abs(s.reaction[r, k]) > FELT * most:
+                if abs(s.reaction[r, k]) > FELT * size[k] * s.unit[r]:
                     s.feels[c, k // 3] = s.feels[k // 3, c] = 1
 
 
@@ -312,7 +309,7 @@ def follow_joints(
     Args:
         s: with rows that are put.
         given: (k, 6 n + 1) rows, global axes, and behind each the change of its rate.
-        moves: (k, 6 n) scratch. A: (k, k) scratch.
+        moves: (k, 6 n) scratch. A: (k, k + 1) scratch, sizes of the rows last.
         system: of the model.
 
     Returns:
@@ -329,11 +326,12 @@ def follow_joints(
         add_scaled(s.unit[r] * rest, s.answers[r], s.push)
     change(s, system)
     for q in range(m):
-        put_held(s, given[q], moves[q], system)
+        A[q, m] = put_held(s, given[q], moves[q], system)
     for q in range(m):
-        s.right[q] = given[q, n]
+        rest = given[q, n]
         for k in range(n):
-            s.right[q] -= given[q, k] * s.v[k]
+            rest -= given[q, k] * s.v[k]
+        s.right[q] = rest / A[q, m]
         for p in range(m):
             A[q, p] = 0.0
             for k in range(n):
@@ -354,14 +352,19 @@ def follow_joints(
 
 
 @compiled
-def put_held(s: ContactArrays, row: Floats, out: Floats, system: System) -> None:
-    """A row along global axes, scaled, less what the joints hold of it."""
+def put_held(s: ContactArrays, row: Floats, out: Floats, system: System) -> float:
+    """A row along global axes, of unit length, less what the joints hold of it; its length."""
+    square = 0.0
     for b in range(1, system.body.shape[0]):
         m, o = system.metric[b], 6 * b - 6
         for i in range(3):
             out[o + i] = m[0] * row[o + i]
             turning = row[o + 3] * m[7 + i] + row[o + 4] * m[10 + i] + row[o + 5] * m[13 + i]
             out[o + 3 + i] = turning
+            square += out[o + i] * out[o + i] + turning * turning
+    size = math.sqrt(square)
+    for k in range(out.shape[0]):
+        out[k] /= size
     for _ in range(2):  # what was held of it is rounding then
         for r in range(s.lam_free.shape[0]):
             s.unit_of[r] = 0.0
@@ -369,3 +372,4 @@ def put_held(s: ContactArrays, row: Floats, out: Floats, system: System) -> None
                 s.unit_of[r] -= s.unit[r] * s.scaled[r, k] * out[k]
         for r in range(s.lam_free.shape[0]):
             add_scaled(s.unit_of[r], s.answers[r], out)
+    return size

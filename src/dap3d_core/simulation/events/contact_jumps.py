@@ -205,7 +205,7 @@ class ContactJumps(Jumps):
         self._put_rows(integration)
         rows = [np.append(row[6:], change) for row, change in rows_to(u, bodies)]
         given = np.array(rows).reshape(-1, 6 * model.body_count + 1)
-        scratch = np.zeros((len(given), len(s.v))), np.zeros((len(given), len(given)))
+        scratch = np.zeros((len(given), len(s.v))), np.zeros((len(given), len(given) + 1))
         if not follow_joints(s, given, *scratch, evaluator.system):
             raise self._impossible(integration.t, title, bodies)
         for first, numbers in states.items():
