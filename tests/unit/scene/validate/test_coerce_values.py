@@ -140,4 +140,5 @@ def test_angles_of_types_may_be_given_in_degrees_and_rates_in_turns():
     )
     scene.forces["coil"].fields["k"] = "3 deg"
     with pytest.raises(dap.SceneError, match='k = "3 deg": should be a number'):
-        check(scene, dap.load_registry())
+    words = r'k = "3 deg": should be a number, not text\n +write a number without its unit'
+    with pytest.raises(dap.SceneError, match=words):
