@@ -42,6 +42,9 @@ from dap3d_core.study.parameters import SceneParameter, all_parameters, with_val
 STEPS = (3e-3, 1e-3, 1e-4)
 #: Residual of corrected starts: of rounding.
 EXACT = 1e-15
+#: A vector of this length, but for so much, is a direction; one that is turned by more, where a
+#: parameter differs by a step, is another choice.
+UNIT, TURNED = 1e-12, 0.3
 #: What is written before it is read, or counts: without derivatives by parameters.
 WITHOUT = ("rows", "crossings")
 
@@ -214,13 +217,31 @@ def floats_of(run: Run) -> dict[str, Floats]:
 
 
 def _are_alike(one: Run, other: Run) -> bool:
-    """True if the arrays of two runs are of the same sizes, and the same steps end at breaks."""
+    """True if the arrays of two runs are of the same sizes, and the same steps end at breaks.
+
+    Directions that types have chosen (``normals``) are those of the one, turned a little.
+    """
     shapes = [[(name, array.shape) for name, array in arrays_of(run)] for run in (one, other)]
     if shapes[0] != shapes[1]:
         return False
     stops = [run.present.work.stops for run in (one, other)]
     jumps = [table[BEFORE] < table[INSTANT] for table in stops]
-    return bool(np.array_equal(*jumps))
+    directions = [_vectors(run) for run in (one, other)]
+    is_unit = [np.abs(np.linalg.norm(v, axis=1) - 1.0) < UNIT for v in directions]
+    turns = np.linalg.norm(directions[0] - directions[1], axis=1)
+    has_turned = np.any(is_unit[0] & is_unit[1] & (turns > TURNED))
+    return bool(np.array_equal(*jumps)) and not has_turned
+
+
+def _vectors(run: Run) -> Floats:
+    """(k, 3) vectors among the constants of elements."""
+    found = [
+        group.numbers[:, first : first + 3]
+        for group in run.evaluator.model.acting
+        for first, shape in group.type_info.layout.numbers.values()
+        if shape == (3,)
+    ]
+    return np.concatenate([np.zeros((0, 3)), *found])
 
 
 def total_derivative(
