@@ -28,9 +28,13 @@ from dap3d_core.study.batch.parameter_map import NotCopiedError, ParameterMap
 from dap3d_core.study.batch.slopes import COPIES, starts_with_slopes
 from dap3d_core.study.differences import (
     OFFSETS,
+    SHORTER,
+    SHORTER_STEPS,
+    best_of,
     change_along,
     differences,
     power_of_two,
+    slope_at,
     weighted,
     weights_of,
 )
@@ -76,11 +80,13 @@ class RunsBeside(NamedTuple):
         runs: each at its start.
         weights: of what each run has, in the derivative.
         offsets: how far the parameter is from its value in each.
+        places: the same in steps.
     """
 
     runs: tuple[Run, ...]
     weights: tuple[float, ...]
     offsets: tuple[float, ...]
+    places: tuple[int, ...]
 
 
 @attrs.define(eq=False, slots=False)
@@ -94,12 +100,13 @@ class Neighbours:
 
     parameter: SceneParameter
     copied: tuple[list[Floats], Floats] | None
-    _make: Callable[[], RunsBeside]
+    _make: Callable[[float], RunsBeside]
+    _closer: list[RunsBeside] = attrs.field(factory=list)
 
     @cached_property
     def made(self) -> RunsBeside:
         """The runs. Errors as of ``neighbours_of``."""
-        return self._make()
+        return self._make(1.0)
 
     @property
     def is_brought_back(self) -> bool:
@@ -111,6 +118,29 @@ class Neighbours:
         """The derivative by the parameter of what a function gives of a run."""
         pairs = zip(self.made.weights, self.made.runs, strict=True)
         return weighted([(w, function(run)) for w, run in pairs])
+
+    def smooth_derivative(self, function: Callable[[Run], Any]) -> Any:
+        """The same, by closer runs where a corner or a jump of the function lies among these."""
+        return best_of(
+            slope_at([function(run) for run in made.runs], made.places, max(made.offsets, key=abs)
+                     / max(made.places, key=abs))
+            for made in self._ever_closer()
+        )  # fmt: skip
+
+    def _ever_closer(self) -> Iterator[RunsBeside]:
+        yield self.made
+        for k in range(1, SHORTER_STEPS):
+            if len(self._closer) < k:
+                self._closer.append(self._make(SHORTER**-k))
+            yield self._closer[k - 1]
+
+    def offset_of(self, run: Run) -> float:
+        """How far the parameter is from its value in a run; 0 where the run is none of these."""
+        for made in (self.made, *self._closer):
+            for offset, other in zip(made.offsets, made.runs, strict=True):
+                if other is run:
+                    return offset
+        return 0.0
 
 
 def run_beside(
@@ -165,12 +195,13 @@ def _made(
     size: float,
     given: dict[str, Any],
     base: Run,
+    part: float,
 ) -> RunsBeside:
-    """Runs beside a run; arguments and errors as of ``neighbours_of``."""
+    """Runs beside a run, a part of the usual steps away; else as of ``neighbours_of``."""
     value, why = float(parameter.value or 0.0), ""
     for offsets in OFFSETS:
         for step in STEPS:
-            h = power_of_two(step * size)
+            h = power_of_two(part * step * size)
             try:
                 runs = tuple(
                     run_beside(compiled, given, [(parameter, value + k * h)], base.start)
@@ -185,7 +216,7 @@ def _made(
                 why = "the model has another structure there"
                 continue
             weights = tuple((weights_of(offsets) / h).tolist())
-            return RunsBeside(runs, weights, tuple(k * h for k in offsets))
+            return RunsBeside(runs, weights, tuple(k * h for k in offsets), offsets)
     raise SimulationError(
         f"there is no derivative by {parameter.name} at {value:g}: with values near it, the scene "
         f"cannot be run as here: {why}"
@@ -267,7 +298,7 @@ def total_derivative(
     none = 0.0 if of_model else np.zeros_like(function(base, x))
     for j, neighbours in enumerate(beside):
         along = slopes[..., j]
-        total = neighbours.derivative(lambda run: function(run, x)) if of_model else none
+        total = neighbours.smooth_derivative(lambda run: function(run, x)) if of_model else none
         if step := change_along(x[..., motion], along[..., motion]):
             total = total + differences(lambda e: function(base, x + e * along), step)  # noqa: B023
         found.append(total)
