@@ -470,10 +470,8 @@ class DifferentiatedRun(Run):
     def _offset_of(self, run: Run) -> tuple[float, int]:
         """How far the parameter of a neighbour is from its value, and which one it is."""
         for j, beside in enumerate(self.neighbours):
-            made = beside.made
-            for offset, other in zip(made.offsets, made.runs, strict=True):
-                if other is run and run is not self.base:
-                    return offset, j
+            if offset := beside.offset_of(run):
+                return offset, j
         return 0.0, 0
 
 
