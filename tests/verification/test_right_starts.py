@@ -53,6 +53,7 @@ CHAINS = [
 ]
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("joint", ["sph", "rev"])
 @pytest.mark.parametrize(("lengths", "end"), CHAINS)
 def test_a_chain_drawn_straight_is_assembled(lengths, end, joint):

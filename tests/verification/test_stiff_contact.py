@@ -156,6 +156,7 @@ def test_a_clutch_meets(w_tol, rtol, integrator):
     assert result.ledger["energy"].ok
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("integrator", ["radau", "auto"])
 @pytest.mark.parametrize("kind", ["friction", "tran_friction"])
 @pytest.mark.parametrize("v_tol", [1e-3, 1e-5, 1e-7, 1e-9])

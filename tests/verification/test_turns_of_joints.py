@@ -73,6 +73,7 @@ def test_the_reporting_step_does_not_matter(method, integrator, dt):
     np.testing.assert_allclose(angle, result.quantity("pin.q1").values, atol=0.0)
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("reverse", [False, True])
 @pytest.mark.parametrize("dt", [0.1, 4.0])
 @pytest.mark.parametrize(
@@ -89,6 +90,7 @@ def test_a_motion_that_comes_to_rest_again_and_again(method, integrator, dt, rev
     )
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("method", ["standard", "joint"])
 @pytest.mark.parametrize(
     ("speed", "integrator"),
