@@ -197,6 +197,7 @@ AT_ANCHOR = {
 }
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("integrator", ["dop853", "radau", "adams", "auto"])
 @pytest.mark.parametrize("name", AT_ANCHOR)
 def test_a_spring_without_natural_length_may_begin_at_its_anchor(name, integrator):

@@ -60,6 +60,7 @@ def settings(integrator):
     return {"integrator": integrator} | ({"step": 0.01} if integrator == "rk4" else {})
 
 
+@pytest.mark.thinned(2)
 @pytest.mark.parametrize("dt", [0.05, 1.0, 6.0])
 @pytest.mark.parametrize(("method", "integrator"), PAIRS)
 def test_the_reporting_step_does_not_matter(method, integrator, dt):

@@ -7,9 +7,9 @@ from functools import partial
 import attrs
 import numpy as np
 import pytest
+from support.internals import placed_shapes
 
 import dap3d_core as dap
-from dap3d_core.assembly.collisions import placed_shapes
 from dap3d_core.integrators.moreau import arrays
 from dap3d_core.native.build import own_platform
 

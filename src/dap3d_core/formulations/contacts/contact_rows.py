@@ -32,6 +32,17 @@ def length_of(vector: Floats) -> float:
     return float(reduce(np.hypot, vector, 0.0))
 
 
+def least_inverse(mobility: Floats, free: Floats) -> Floats:
+    """Pseudo-inverse of the mobility of rows, which have units of their own: m and rad.
+
+    Of rows that depend on each other it is the least, as equations.py has them. free: (rows,)
+    mobilities of each alone, without joints.
+    """
+    s = 1.0 / np.sqrt(np.maximum(free, 1e-300))
+    scaled = s[:, None] * mobility * s
+    return s[:, None] * np.linalg.pinv(scaled, rcond=1e-12, hermitian=True) * s
+
+
 class ContactTable:
     """The contacts of a model by their numbers, in the order of the model.
 
@@ -186,6 +197,7 @@ class ContactRows:
             of those that the joints allow the one of least energy. Impulses do their work, with
             that of the drivers, along what is left of the slip.
         reaction: (rows, 3 m) what forces of contacts change of multipliers of joints.
+        row_size: (rows,) sizes of the rows of joints, by masses: roots of their mobilities.
     """
 
     @IGNORE_FLOAT_ERRORS
@@ -213,17 +225,17 @@ class ContactRows:
             self.M[k, k] = A[b] @ model.Jp[b] @ A[b].T
             self.inverse[k, k] = A[b] @ np.linalg.inv(model.Jp[b]) @ A[b].T
         self.P, self.driven = self.inverse, np.zeros((table.count, 3))
-        self.reaction = np.zeros((own, 3 * table.count))
+        self.reaction, self.row_size = np.zeros((own, 3 * table.count)), np.zeros(own)
         if own:
             held = self.inverse @ self.D.T
             mobility = self.D @ held
-            answer = held @ np.linalg.pinv(mobility, rcond=1e-12, hermitian=True)
+            self.row_size = np.sqrt(np.diag(mobility))
+            least = least_inverse(mobility, np.diag(mobility))
+            answer = held @ least
             self.P = self.inverse - answer @ held.T
             self.driven = (self.G @ (answer @ self._nu)).reshape(-1, 3)
-            if table.loads:  # of rows that depend on each other the least, as equations.py has them
-                s = 1.0 / np.sqrt(np.maximum(np.diag(mobility), 1e-300))
-                least = np.linalg.pinv(s[:, None] * mobility * s, rcond=1e-12, hermitian=True)
-                self.reaction = -s[:, None] * (least @ (s[:, None] * held.T @ self.G.T))
+            if table.loads:
+                self.reaction = -least @ held.T @ self.G.T
         self.W = self.G @ self.P @ self.G.T
 
     @cached_property
@@ -264,11 +276,12 @@ class ContactRows:
     def feels(self) -> Any:
         """(m, m) True where a force of the second contact changes slip or load of the first."""
         count = len(self.W) // 3
-        size = np.abs(self.W).max(initial=0.0)
-        found = np.abs(self.W).reshape(count, 3, -1, 3).max(axis=(1, 3)) > 1e-14 * size
-        changes, least = np.abs(self.reaction), 1e-14 * np.abs(self.reaction).max(initial=0.0)
+        size = np.sqrt(np.maximum(np.diag(self.W), 0.0))
+        felt = np.abs(self.W) > 1e-14 * size[:, None] * size
+        found = felt.reshape(count, 3, -1, 3).any(axis=(1, 3))
+        changes = np.abs(self.reaction) * self.row_size[:, None] > 1e-14 * size
         for c, (rows, _) in self._table.loads.items():
-            found[c] |= (changes[rows] > least).reshape(-1, count, 3).any(axis=(0, 2))
+            found[c] |= changes[rows].reshape(-1, count, 3).any(axis=(0, 2))
         return found | found.T if self._table.loads else found
 
     @property
@@ -297,7 +310,8 @@ class ContactRows:
         for N, P, rates in ((self.D, self.inverse, self._nu), (R, self.P, target)):
             if len(N):
                 held = P @ N.T
-                self.change(held @ np.linalg.pinv(N @ held, rcond=1e-12) @ (rates - N @ self.v))
+                free = np.einsum("ij,ji->i", N, self.inverse @ N.T)
+                self.change(held @ least_inverse(N @ held, free) @ (rates - N @ self.v))
         missed, size = np.abs(R @ self.v - target), np.abs(target)
         return bool(np.all(missed <= HELD * np.maximum(size.max(initial=0.0), 1.0)))
 

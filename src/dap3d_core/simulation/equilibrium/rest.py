@@ -92,7 +92,7 @@ def find_rest(
         _hold_contacts(evaluator, u, "at the start of the search for an equilibrium")
     search = search_equilibrium(evaluator, u)
     if evaluator.model.state_count:
-        search = _with_states(evaluator, search)
+        search = _with_states(evaluator, search, u)
     if search.outcome is not Outcome.BALANCED:
         raise SimulationError(failure(search, evaluator.model))
     statics, pose = Statics(evaluator), search.pose
@@ -197,14 +197,15 @@ def _with_brought(
     return multipliers, force
 
 
-def _with_states(evaluator: Evaluator, search: Search) -> Search:
+def _with_states(evaluator: Evaluator, search: Search, u: Floats) -> Search:
     """The search, its pose such that the states of elements are at rest as well.
 
     Raises:
-        SimulationError: states do not come to rest; names them.
+        SimulationError: states do not come to rest, or keep the way there; names them.
     """
-    from dap3d_core.simulation.equilibrium.statics import moving_states
+    from dap3d_core.simulation.equilibrium.statics import moving_states, refuse_carried
 
+    refuse_carried(evaluator, u, search.pose.u)
     moving = moving_states(evaluator, search.pose.u)
     if not moving:
         return search
@@ -326,8 +327,8 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
     rolling = model.row_owners(np.flatnonzero(~model.position_row & (rows.nu == 0.0)))
     if rolling:
         yield information(
-            f"rolling joints constrain displacements as they do velocities: "
-            f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
+            "what rolls or sticks constrains displacements as it does velocities: "
+            f"{some(rolling, MOST_NAMES)}; where the scene comes to rest depends on the way there"
         )
 
 

@@ -173,8 +173,8 @@ def _refuse_unknown_modes(evaluator: Evaluator, t: float, u: Floats, states: Flo
     k = int(np.argmin(gaps))
     if gaps[k] < AT_SWITCH * evaluator.model.length:
         raise SimulationError(
-            f"linearisation of a scene with contacts that touch ({table.names[k]}) takes modes "
-            "from a run: linearize(scene, at=result, t=...)"
+            f"whether what touches ({table.names[k]}) sticks or slips is known from a run alone: "
+            "linearize about a state of one, at=result, t=... (dap3d modes --from RESULT@TIME)"
         )
 
 

@@ -216,22 +216,23 @@ def repeated(runs, few, more="", every=()):
     return json.loads(run(script, timeout=1200).splitlines()[-1])
 
 
-@pytest.fixture(scope="module")
-def found():
-    """Recorded once: to record takes as long as to compile."""
-    return repeated(RUNS, ["differentiated"], MORE, ["O3"])
+@pytest.fixture(scope="module", params=["O0", pytest.param("O3", marks=pytest.mark.long)])
+def found(request):
+    """Recorded once: to record takes as long as to compile. To optimise takes longest."""
+    return repeated(RUNS, ["differentiated"], MORE, [request.param])
 
 
-def test_calls_of_a_short_run_have_the_bits_of_plain_python():
-    (count, different), *_ = repeated(QUICK, ["O0"])
+@pytest.mark.parametrize("level", ["O0", pytest.param("O3", marks=pytest.mark.slow)])
+def test_calls_of_a_short_run_have_the_bits_of_plain_python(level):
+    (count, different), *_ = repeated(QUICK, [level])
     assert count > 100
     assert different == []
 
 
 @pytest.mark.slow
 def test_each_compiled_function_of_the_core_has_the_bits_of_plain_python(found):
-    """Optimised for this processor; functions not called are listed.
-    Without FMA: `make no-fma`. Unoptimised: a short run, above."""
+    """Functions not called are listed. Optimised for releases, those of a short run always.
+    Without FMA: `make no-fma`."""
     _, (count, different), missing = found
     assert count > 4000
     assert different == []
