@@ -406,11 +406,6 @@ def test_a_run_ends_where_contacts_have_no_room(tmp_path, monkeypatch):
             run.step_to(t)
 
 
-def test_contacts_that_events_follow_are_refused(tmp_path):
-    with pytest.raises(dap.SimulationError, match="export does not take contacts yet"):
-        dap.export_model(declared_ball(), tmp_path / "ball.fmu", format="fmu")
-
-
 def test_a_folder_of_another_model(tmp_path):
     """Its libraries go; what a user has put there stays. A folder of others is left alone."""
     first, second = dap.load("fourbar2"), dap.load("pen1")

@@ -166,7 +166,7 @@ def _refuse_unknown_modes(evaluator: Evaluator, t: float, u: Floats, states: Flo
     """Refuses a state at which bodies touch, in modes that are not known."""
     if states is not None or not evaluator.model.contact_count:
         return
-    from dap3d_core.formulations.contacts.contact_rows import GAP, ContactTable
+    from dap3d_core.formulations.contacts.contact_table import GAP, ContactTable
 
     table = ContactTable(evaluator)
     gaps = table.outputs(t, u)[:, GAP]

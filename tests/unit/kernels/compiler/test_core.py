@@ -175,16 +175,30 @@ NOT_CALLED = {
             "add_sliding solve_forces put_sliding_force put_sizes largest_entry begin_to_move "
             "clear_rounding"
         ),
-        "formulations.contacts.impulses": "begin_problem put_impulses stop_slip",
+        "formulations.contacts.contact_table": "call_tension put_outputs find_grips",
+        "formulations.contacts.decide": (
+            "decide repeat remember_modes find_overlap put_in_touch take_ended stop leave_movable "
+            "put_opening find_modes_now find_modes_at_rest settle put_roles put_state"
+        ),
+        "formulations.contacts.impacts": (
+            "begin_problem put_impulses stop_slip collide take_part end_bounces remember_round act "
+            "count_work unjam stop_low_rocking hold_low repeat_rounds"
+        ),
+        "formulations.contacts.rows": (
+            "put_rows let_stick put_jacobian put_answers along_bodies put_moves put_driven "
+            "add_scaled put_frames put_feels put_slip put_velocities move_on put_free kick change "
+            "unscale lift follow_joints put_held"
+        ),
         "formulations.contacts.loads": "find_modes put_loaded put_loads remember extrapolate",
         "formulations.contacts.modes": (
             "put_closed clear_mode next_group sort close_group put_modes all_stay let_leave "
             "put_returning put_found put_one nearly_jams"
         ),
         "formulations.contacts.sharing": (
-            "do_share put_own_rows part_of_cones hold_inside are_held_within leave_to_others "
+            "do_share put_own_rows left_of bring_in hold_inside are_held_within leave_to_others "
             "factor_rows freedom_of"
         ),
+        "linear.inverse": "invert",
         "linear.least_squares": "factor_least longest_column reflect fold solve_least",
         "formulations.contacts.equations": (
             "accelerate add_columns add_friction column force_of force_of_one has_settled "
@@ -192,7 +206,6 @@ NOT_CALLED = {
             "largest_given project report rhs watch contact_of fill_load has_loads solve_loads "
             "are_independent"
         ),
-        "formulations.contacts.inverse": "invert",
         "formulations.contacts.watched_rates": "store_watched take_watched",
         "formulations.joint_loops.contacts": (
             "accelerate add_contact_forces add_scaled find_columns find_multipliers project report "
