@@ -6,7 +6,6 @@ A wrong shape, an unknown name, a velocity in a position-level kernel or an exce
 
 import math
 import random
-import re
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from keyword import iskeyword
@@ -41,7 +40,7 @@ from dap3d_core.interface.codegen.type_info import TypeInfo
 from dap3d_core.interface.contacts.contact import DECLARED
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.element_states import unknown_names
-from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
+from dap3d_core.interface.errors import PluginError, line_of, name_hint, no_field, where_is
 from dap3d_core.interface.examine.random_values import (
     numbers,
     random_field,
@@ -421,11 +420,7 @@ def _check_names(
     who = f"{where_is(type_)}.{kernel}"
     for name in wanted:
         if name not in names:
-            meant = re.sub(r"^(r_dot|rd)_", "v_", name).replace("omega_", "w_")
-            near, declared = get_close_matches(meant, names, 1), no_field(type_, name)
-            hint = f"did you mean {near[0]}? " if near else ""
-            hint = f"{declared}; " if declared else hint
-            hint = "kernels take no self, but fields by their names; " if name == "self" else hint
+            hint = name_hint(type_, name, names)
             if name in reaction_names(type_):
                 hint = f"reactions are known to {' and '.join(READING)} alone; "
             raise PluginError(
@@ -500,9 +495,5 @@ def _expected(
     if kernel in ("C", "C_dot"):
         level = "position" if kernel == "C" else "velocity"
         n = len(type_.position_rows() if kernel == "C" else type_.velocity_rows())
-        return (n,), f"{_numbers(n)}, one for each row of the {level} level"
-    return (type_.rows,), f"{_numbers(type_.rows)}, one for each row"
-
-
-def _numbers(count: int) -> str:
-    return "1 number" if count == 1 else f"{count} numbers"
+        return (n,), f"{n} number{'s' * (n != 1)}, one for each row of the {level} level"
+    return (type_.rows,), f"{type_.rows} number{'s' * (type_.rows != 1)}, one for each row"
