@@ -37,7 +37,7 @@ def is_out_of_memory(error: BaseException | None) -> bool:
 
 
 def plain_words() -> str:
-    """The remedy for a kernel written with anything but the words of kernels."""
+    """The remedy for a kernel written with anything but the functions of kernels."""
     from dap3d_core.kernels import __all__ as words  # imports numpy
     from dap3d_core.kernels import scalar_math
 

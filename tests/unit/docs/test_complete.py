@@ -14,7 +14,7 @@ import attrs
 import click
 import pytest
 from support.command_line import dap3d
-from support.internals import specs_of
+from support.internals import INTEGRATORS, METHODS, specs_of
 from support.process import REPOSITORY
 
 import dap3d_core as dap
@@ -23,7 +23,6 @@ from dap3d_core.interface import hooks
 from dap3d_core.scene import Simulation
 from dap3d_core.scene.coerce import keys_of
 from dap3d_core.scene.tables import HEADER_KEYS, NAMED, TABLES, Animation
-from dap3d_core.settings import INTEGRATORS, METHODS
 
 DOCS = REPOSITORY / "docs"
 #: Members of a class that have docstrings of their own.
@@ -145,9 +144,10 @@ class Three(interface.Force):
 
 def names_of(line="", constants=()):
     """The names of the position and of the velocity level with one more field, or constants."""
+    from support.internals import sized_fields
+
     from dap3d_core.interface.codegen.instance_layout import layout_of
     from dap3d_core.interface.codegen.kernel_arguments import namespace
-    from dap3d_core.interface.fields import sized_fields
 
     members = {"__module__": __name__}
     exec(line, vars(interface) | {}, members)

@@ -4,6 +4,7 @@ import random
 
 import numpy as np
 import pytest
+from support.internals import sampled_types
 from support.plain import jit_is_on
 
 from dap3d_core.interface import examine
@@ -16,7 +17,6 @@ from dap3d_core.testing.samples.random_state import (
     random_state,
     rotation,
 )
-from dap3d_core.testing.samples.sampled_type import sampled_types
 from dap3d_forces.weight import Weight
 from dap3d_functions.polynomial import Polynomial
 from dap3d_joints.spherical import Spherical

@@ -6,6 +6,7 @@ A wrong shape, an unknown name, a velocity in a position-level kernel or an exce
 
 import math
 import random
+import re
 from collections.abc import Callable, Mapping, Sequence
 from difflib import get_close_matches
 from keyword import iskeyword
@@ -37,6 +38,7 @@ from dap3d_core.interface.codegen.loop_source import JUMP_KINDS, jump_names, row
 from dap3d_core.interface.codegen.reactions import READING, reaction_names
 from dap3d_core.interface.codegen.return_shapes import ShapeError, checked_shape, value_at
 from dap3d_core.interface.codegen.type_info import TypeInfo
+from dap3d_core.interface.contacts.contact import DECLARED
 from dap3d_core.interface.derive.derive import CannotDeriveError, derive, missing
 from dap3d_core.interface.element_states import unknown_names
 from dap3d_core.interface.errors import PluginError, line_of, no_field, where_is
@@ -317,7 +319,7 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     who, kind = where_is(type_), type_.kind
     if not type_.keyword:
         example = f'keyword = "{type_.__name__.lower()}"'
-        raise PluginError(f"{who} has no keyword; add e.g. {example}, without a type behind it")
+        raise PluginError(f"{who} has no keyword; add e.g. {example}, without an annotation")
     for field in attrs.fields(type_):  # type: ignore[arg-type]
         if "dap3d" not in field.metadata and field.default is attrs.NOTHING:
             raise PluginError(f"{who}: {no_field(type_, field.name)}")
@@ -345,7 +347,9 @@ def _check_class(type_: type[TypeBase], *, is_abstract: bool = False) -> None:
     _check_members(type_)
     for name in needed:
         if name not in kernels:
-            raise PluginError(f"{who} does not define {name}, which every {kind} of its rows needs")
+            if type_.is_contact:
+                name = " and ".join(one for one in DECLARED if getattr(type_, one, None) is None)
+            raise PluginError(f"{who} does not define {name}")
 
 
 def _check_rows(type_: type[Joint]) -> None:
@@ -417,9 +421,11 @@ def _check_names(
     who = f"{where_is(type_)}.{kernel}"
     for name in wanted:
         if name not in names:
-            near, declared = get_close_matches(name, names, 1), no_field(type_, name)
+            meant = re.sub(r"^(r_dot|rd)_", "v_", name).replace("omega_", "w_")
+            near, declared = get_close_matches(meant, names, 1), no_field(type_, name)
             hint = f"did you mean {near[0]}? " if near else ""
             hint = f"{declared}; " if declared else hint
+            hint = "kernels take no self, but fields by their names; " if name == "self" else hint
             if name in reaction_names(type_):
                 hint = f"reactions are known to {' and '.join(READING)} alone; "
             raise PluginError(
@@ -494,5 +500,9 @@ def _expected(
     if kernel in ("C", "C_dot"):
         level = "position" if kernel == "C" else "velocity"
         n = len(type_.position_rows() if kernel == "C" else type_.velocity_rows())
-        return (n,), f"{n} numbers, one for each row of the {level} level"
-    return (type_.rows,), f"{type_.rows} numbers, one for each row"
+        return (n,), f"{_numbers(n)}, one for each row of the {level} level"
+    return (type_.rows,), f"{_numbers(type_.rows)}, one for each row"
+
+
+def _numbers(count: int) -> str:
+    return "1 number" if count == 1 else f"{count} numbers"

@@ -119,25 +119,21 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
     Raises:
         SimulationError: bodies overlap, or a contact slips.
     """
-    from dap3d_core.formulations.contacts.contact_rows import (
-        GAP,
-        ContactRows,
-        ContactTable,
-        JamError,
-        find_modes,
-    )
+    from dap3d_core.formulations.contacts.contact_table import GAP, ContactTable
+    from dap3d_core.formulations.contacts.decide import find_modes_at_rest
 
     table, still = ContactTable(evaluator), u.copy()
     velocities_of(still)[:] = 0.0
     gaps, limit = table.outputs(0.0, still)[:, GAP], TOUCHING * table.length
-    table.find_grips(0.0, still)
-    touching, slips = np.flatnonzero(gaps < limit).tolist(), "jams"
-    try:
-        found = find_modes(table, ContactRows(table, 0.0, still), touching, {}, [])
-        bad = [table.names[k] for k in np.flatnonzero((found.mode == 1.0) & (table.mu > 0.0))]
+    s, touching = table.arrays(), np.flatnonzero(gaps < limit)
+    s.y[:] = evaluator.integrated(still)
+    s.in_touch[: len(touching)], s.in_touch_count = touching, len(touching)
+    given = evaluator.system, evaluator.loops, evaluator.functions, table.tensions
+    if find_modes_at_rest(0.0, s, *given):
+        bad = [table.names[k] for k in np.flatnonzero((s.mode == 1.0) & (table.mu > 0.0))]
         slips = "slips"
-    except JamError as error:
-        bad = [str(error)]
+    else:
+        bad, slips = [table.names[k] for k in np.flatnonzero(s.jams)], "jams"
     if over := [table.names[k] for k in np.flatnonzero(gaps < -limit)]:
         bad, slips = over, "overlaps"
     if bad:
@@ -147,7 +143,7 @@ def _hold_contacts(evaluator: Evaluator, u: Floats, where: str) -> None:
             "(start=result)"
         )
     states = evaluator.states.copy()
-    states[table.mode], states[table.way], states[table.near] = found.mode, found.way, 0.0
+    states[table.mode], states[table.way], states[table.near] = s.mode, s.way, 0.0
     evaluator.states = states
 
 
@@ -327,8 +323,8 @@ def assumptions(evaluator: Evaluator, start: Floats, rows: ConstraintRows) -> It
     rolling = model.row_owners(np.flatnonzero(~model.position_row & (rows.nu == 0.0)))
     if rolling:
         yield information(
-            f"rolling joints constrain displacements as they do velocities: "
-            f"{some(rolling, MOST_NAMES)}; where they come to rest depends on the way"
+            "what rolls or sticks constrains displacements as it does velocities: "
+            f"{some(rolling, MOST_NAMES)}; where the scene comes to rest depends on the way there"
         )
 
 

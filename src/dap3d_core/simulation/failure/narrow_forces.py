@@ -11,7 +11,7 @@ from dap3d_core.model.knots import breaks_are_told
 from dap3d_core.result import information
 from dap3d_core.scene import Instance, ValidatedScene
 
-#: Words of kernels that choose between formulas.
+#: Functions of kernels that choose between formulas.
 CHOOSING = (where, lookup)
 #: Kernels that make the law of a force, and those of its states.
 LAWS = ("wrench", "energy")

@@ -45,8 +45,8 @@ if TYPE_CHECKING:
 
     from dap3d_core.simulation.initial.start_state import Start
 
-#: Directions of one run that make, with the value, vectors of 2, 4, 8 or 16 numbers.
-FAST = (1, 3, 7, 15)
+#: Directions of one run that fill vectors: 8 beside the value, others with it.
+FAST = (1, 3, 7, 8, 15)
 #: Motion of each body in data sets.
 OF_BODIES = ("r", "rd", "w")
 

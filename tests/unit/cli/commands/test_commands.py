@@ -83,7 +83,7 @@ RESPONSE = ("response", "fall.toml", "--input", "gravity.gravity", "--output", "
 REFUSED = [
     # settings
     (("run", "fall.toml", "--t-end", "-1"), "--t-end = -1.0: should be at least 0"),
-    (("run", "fall.toml", "--t-end", "soon"), "'soon' is not a valid float"),
+    (("run", "fall.toml", "--t-end", "soon"), "'soon' is not a valid number in s"),
     (("run", "fall.toml", "--t-end", "1e12", "--dt", "1"), "9.69e+04 GiB"),
     (("run", "fall.toml", "--integrator", "rk4"), "rk4 does not choose its step"),
     (("run", "fall.toml", "--checkpoint", "0"), "'0' is no time; write 90, 90s, 5min or 2h"),
@@ -144,8 +144,8 @@ REFUSED = [
     (("run", "fall.toml", "--t-end"), "requires an argument"),
     (("run", "--", "fall.toml", "--t-end", "1"), "unexpected extra arguments (--t-end 1)"),
     (("run", "fall.toml", "--", "-o", "x.nc"), "unexpected extra arguments (-o x.nc)"),
-    (("run", ""), "is an empty word"),
-    (("run", "fall.toml", "-o", ""), "'--output' is an empty word"),
+    (("run", ""), "'MODEL' is empty"),
+    (("run", "fall.toml", "-o", ""), "'--output' is empty"),
     (("rnu", "fall.toml"), "did you mean 'run'"),
     (("--bogus",), "No such option '--bogus'"),
     # files of scenes
@@ -187,7 +187,7 @@ REFUSED = [
     (("run", "fall.toml", "--from", "fall.toml"), "fall.toml"),
     (("run", "fall.toml", "--from", R, "--start", "equilibrium"), "give one"),
     (("run", "fall.toml", "--start", "rest"), "'scene', 'equilibrium'"),
-    (("run", "fall.toml", "--from", ""), "is an empty word"),
+    (("run", "fall.toml", "--from", ""), "is empty"),
     (("run", "pen1", "--from", R), "it is of another scene: it has no body cone"),
     (("equilibrium", "fall.toml", "--from", R, "-o", R, "--force"), "is the input file"),
     # results
@@ -233,8 +233,8 @@ REFUSED = [
     *((("new-plugin", n, "--kind", k, *force), f"dap3d itself has the {k} '{n}'")
       for k, n in (("integrator", "auto"), ("shape", "box")) for force in ((), ("--force",))),
     *((("plugins", "--no-compile", "--limit", n), "--limit") for n in ("nan", "inf", "0", "-1")),
-    (("import", "nothing.urdf"), "there is no file nothing.urdf"),
-    (("import", "sub"), "sub is a folder"),
+    (("import", "nothing.urdf"), "nothing.urdf: there is no such file"),
+    (("import", "sub"), "sub: is a folder"),
     (("import", "amr.urdf"), "did you mean 'arm.urdf'"),
     (("import", "arm.urdf", "--strict"), "effort"),
     (("import", "arm.urdf", "--root", "nowhere"), "nowhere is no folder"),
