@@ -16,8 +16,8 @@ CHOOSING = (where, lookup)
 #: Kernels that make the law of a force, and those of its states.
 LAWS = ("wrench", "energy")
 STATES = ("rate",)
-#: Python's own words for a number with a corner.
-CORNERS = ("abs", "min", "max")
+#: Python's own words for a number with a corner, and the one of an angle, which jumps at half a turn.
+CORNERS = ("abs", "min", "max", "atan2")
 
 
 def notes_on_laws(checked: ValidatedScene) -> list[str]:

@@ -190,6 +190,19 @@ def test_tendons_hold_what_would_fall():
         assert dap.equilibrium(scene).stable is stable
 
 
+def test_a_motor_on_its_way_is_refused():
+    """A position that is set is not where the scene stands: its pace was given as one at rest."""
+    scene = rod()
+    del scene.forces["tendon"]
+    scene.add_input("angle", 0.5)
+    scene.add_joint("motor", "motor", joint="hinge", position="angle", lag=0.1)
+    with pytest.raises(dap.SimulationError, match="motor moves bodies to another position"):
+        dap.equilibrium(scene)
+    scene.inputs["angle"].value = 0.0
+    eq = dap.equilibrium(scene)
+    assert eq.reaction("motor")["i"].moment == pytest.approx((0.0, -WEIGHT / 2.0, 0.0), abs=1e-9)
+
+
 @pytest.mark.slow
 def test_a_state_that_never_rests_is_refused():
     """By its name."""
