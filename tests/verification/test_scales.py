@@ -375,7 +375,8 @@ def test_friction_of_hinges_does_not_depend_on_the_size_of_what_turns(length):
     """Rows of angles and of lengths stand side by side in the start of contacts: of a mechanism of
     a micrometre those of lengths were taken for dependent, and the hinge stuck for ever, by a
     moment twice its bound. Compared at rtol 1e-10."""
-    results = [dap.simulate(rubbing_pendulum(x), t_end=0.6, dt=0.1, rtol=1e-10) for x in (1, length)]
-    metres, other = results
+    metres, other = (
+        dap.simulate(rubbing_pendulum(x), t_end=0.6, dt=0.1, rtol=1e-10) for x in (1.0, length)
+    )
     assert metres.contact("rub").mode.tolist() == other.contact("rub").mode.tolist() == [1] * 7
     assert other.r / length == pytest.approx(metres.r, abs=1e-9)

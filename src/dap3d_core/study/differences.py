@@ -15,7 +15,7 @@ OFFSETS = (-3, -2, -1, 1, 2, 3), (0, 1, 2, 3, 4, 5, 6), (0, -1, -2, -3, -4, -5, 
 CHANGE = 1e-3
 #: Differences of two orders of a smooth function agree to this part, and this of the largest. Else
 #: steps are so much shorter, and tried so often.
-SMOOTH, ROUNDING = 1e-6, 1e-9
+SMOOTH, SMOOTH_OF_LARGEST = 1e-6, 1e-9
 SHORTER, SHORTER_STEPS = 16.0, 4
 
 
@@ -43,7 +43,7 @@ def slope_at(values: Sequence[Any], offsets: tuple[int, ...], step: float) -> tu
     lower = weights_of(tuple(offsets[k] for k in kept))
     other = weighted([(w, values[k]) for w, k in zip(lower, kept, strict=True)]) / step
     size = np.abs(found)
-    limit = SMOOTH * size + ROUNDING * np.max(size, initial=0.0)
+    limit = SMOOTH * size + SMOOTH_OF_LARGEST * np.max(size, initial=0.0)
     parts = np.abs(found - other) / np.where(limit > 0.0, limit, 1.0)
     return found, float(np.max(parts, initial=0.0))
 

@@ -294,8 +294,8 @@ def refuse_carried(evaluator: Evaluator, u: Floats, other: Floats) -> None:
                if np.any(moves[state.first : state.first + state.length])]  # fmt: skip
     if carried:
         raise SimulationError(
-            f"statics does not know {', '.join(carried)} where forces balance: no pose decides such "
-            "a state, it keeps the way of the motion there. Let a damped motion come to rest "
+            f"statics does not know {', '.join(carried)} where forces balance: no pose decides "
+            "such a state, it keeps the way of the motion there. Let a damped motion come to rest "
             "(simulate)"
         )
 
@@ -307,7 +307,7 @@ def _kept_way(own: StateDerivatives, inverse: Any) -> Any:
 
 
 def with_settled(tangent: "TangentMatrices", evaluator: Evaluator) -> "TangentMatrices":
-    """A tangent with the stiffness of settled states, and of those that keep the way of a motion."""
+    """A tangent with the stiffness of states: settled, or such that keep the way of a motion."""
     own = tangent.states
     if own is None:
         return tangent

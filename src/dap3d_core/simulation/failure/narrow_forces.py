@@ -16,7 +16,7 @@ CHOOSING = (where, lookup)
 #: Kernels that make the law of a force, and those of its states.
 LAWS = ("wrench", "energy")
 STATES = ("rate",)
-#: Python's own words for a number with a corner, and the one of an angle, which jumps at half a turn.
+#: Python's own words for a number with a corner, and that of an angle: it jumps at half a turn.
 CORNERS = ("abs", "min", "max", "atan2")
 
 
