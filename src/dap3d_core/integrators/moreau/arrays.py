@@ -12,7 +12,7 @@ from dap3d_core.assembly.collisions.placed_shapes import (
     placed_shapes,
     with_room,
 )
-from dap3d_core.formulations.contacts.contact_rows import ContactTable
+from dap3d_core.formulations.contacts.contact_table import ContactTable
 from dap3d_core.formulations.evaluator import Evaluator
 from dap3d_core.interface.contacts.contact import RESISTED
 from dap3d_core.kernels.array_types import Floats, Integers
